@@ -9,7 +9,8 @@ import numpy as np
 from symfric.choice.friction import Friction
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_law import law_block
-from symfric.codegen.routines import routines
+from symfric.codegen.layout import CBlock
+from symfric.codegen.source import routines
 from symfric.embedded import measure
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
@@ -154,7 +155,7 @@ def _block(law: Law) -> Block:
 def c_operations(law: Law) -> tuple[int | None, str]:
     """Return the operations of the law's step in C, float, parameters constant, or the reason."""
     try:
-        every = routines(_block(law), REALS["float"])
+        every = routines(CBlock(_block(law), REALS["float"]))
     except ValueError as problem:
         return None, str(problem)
     steps = [r for r in every if not r.name.endswith(("_init", "_reset", "_init_sliding"))]

@@ -8,10 +8,10 @@ the absolute value. Residuals of closing equations are judged by all their terms
 the larger of m(a) |b| and |a| m(b), and m(a / b) = m(a) / |b|.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import final
 
 import casadi as ca
@@ -19,13 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.generated import Generated
-from symfric.codegen.guards import STEP_SIZE, Status, parameter_range, range_of
-from symfric.codegen.rounding import modes, rounded
-from symfric.codegen.runner import GuardModel, signals
-from symfric.emitter.c99 import Real
+from symfric.codegen.guards import Status
+from symfric.codegen.layout import CBlock
+from symfric.codegen.runner import GuardModel, in_type
 from symfric.foundation.graph import SELECT, Graph, graph, rebuild
-from symfric.foundation.parameters import Variable
 from symfric.model.kinds import CONSTRAINTS
 
 Array = NDArray[np.float64]
@@ -49,21 +46,13 @@ class Run:
         inputs: as given, shape (steps, inputs).
         parameters: of every step, shape (steps, parameters); None: the defaults.
         rows, expected: results of C and CasADi, see `run_c`.
-        terms: of the block, see `magnitude`, built on demand.
     """
 
-    generated: Generated
-    real: Real
+    c: CBlock
     inputs: Array
     parameters: Array | None
     rows: Array
     expected: Array
-    terms: Callable[[], ca.Function]
-
-    @property
-    def block(self) -> Block:
-        """Block that was generated."""
-        return self.generated.block
 
     @cached_property
     def relative(self) -> Array:
@@ -85,29 +74,28 @@ class Run:
         float, to nearest or randomly up or down. Other differences in that step are not accepted.
         """
         found = np.zeros(self.rows.shape, bool)
-        if self.real.size == 8:
+        if self.c.real.size == 8:
             return found
-        of = np.flatnonzero(modes(self.block))
+        of = np.flatnonzero(modes(self.c.block))
         rows = np.flatnonzero((self.rows != self.expected)[:, of].any(axis=1))
         if 0 < rows.size <= RARE * len(self.rows):
-            places, made = np.ix_(rows, of), self._rounded(rows)
-            if made is not None:
-                as_c = (made[:, :, of] == self.rows[places]).any(axis=0)
-                found[places] = as_c & (self.rows != self.expected)[places]
+            places = np.ix_(rows, of)
+            as_c = (self._rounded(rows)[:, :, of] == self.rows[places]).any(axis=0)
+            found[places] = as_c & (self.rows != self.expected)[places]
         return found
 
-    def _rounded(self, rows: NDArray[np.int64]) -> Array | None:
+    def _rounded(self, rows: NDArray[np.int64]) -> Array:
         """Return results of CasADi's operations in float for some of the steps, see `rounded`."""
         states, parameters, inputs = self._arguments
         own = np.broadcast_to(parameters, (len(inputs), parameters.shape[-1]))
-        return rounded(self.block, states[rows], own[rows], inputs[rows])
+        return rounded(self.c.block, states[rows], own[rows], inputs[rows])
 
     @property
     def _overflows(self) -> NDArray[np.bool_]:
-        """Steps in which float overflows, as reported by the status of the C, but double does
+        """Mask of steps in which float overflows, as the status of the C reports, but double does
         not.
         """
-        if self.real.size == 8 or not self.generated.guards:
+        if self.c.real.size == 8 or not self.c.guards:
             return np.zeros(len(self.rows), bool)
         said = (self.rows[:, -1].astype(int) & int(Status.OUTPUT)) != 0
         return said & (np.abs(self.expected).max(axis=1) > OVERFLOWS)
@@ -120,18 +108,17 @@ class Run:
     @property
     def worst(self) -> str:
         """Signal with the largest difference, "" without a difference."""
-        names = signals(self.block, guards=self.generated.guards)
-        return names[self._place[1]] if self.error else ""
+        return self.c.signals[self._place[1]] if self.error else ""
 
     @property
     def rounding(self) -> float | None:
         """Largest change of the worst signal by rounding to float in the worst step, see `rounded`.
 
-        None if it is not known.
+        None if it is the status.
         """
         row, column = self._place
         made = self._rounded(np.array([row]))
-        if made is None or column == made.shape[-1]:  # the status
+        if column == made.shape[-1]:
             return None
         finite = made[:, 0, column][np.isfinite(made[:, 0, column])]
         moved = np.abs(finite - self.expected[row, column]).max(initial=0.0)
@@ -146,25 +133,23 @@ class Run:
     @cached_property
     def _arguments(self) -> tuple[Array, Array, Array]:
         """States before every step, parameters and inputs, as arguments of the step."""
-        block, model = self.block, GuardModel(self.block, self.real)
-        start, inputs = model.start, self.real.rounded(self.inputs)
-        states = np.vstack([start, self.rows[:-1, : len(block.states)]])
-        parameters = (
-            model.default if self.parameters is None else self.real.rounded(self.parameters)
-        )
-        if self.generated.guards:
+        count, model = len(self.c.block.states), GuardModel(self.c)
+        inputs, parameters = self.c.real.rounded(self.inputs), self.c.default
+        if self.parameters is not None:
+            parameters = self.c.real.rounded(self.parameters)
+        states = np.vstack([self.c.start, self.rows[:-1, :count]])
+        if self.c.guards:
             inputs, _ = model.inputs(inputs)
-            states = np.where([[model.lost(x)] for x in states], start, states)
+            states = np.where([[model.lost(x)] for x in states], self.c.start, states)
         return states, parameters, inputs
 
     @cached_property
     def _scale(self) -> Array:
         """Magnitude of every column: of its terms, its nominal value or its peak."""
-        count = len(self.block.states)
-        found = magnitudes(self.terms(), self.block, *self._arguments)
-        found = np.concatenate([found, *(found[:count] for _ in self.block.resets)])
-        if self.generated.guards:
-            found = np.append(found, 1.0)  # the status
+        block = self.c.block
+        found = magnitudes(block, *self._arguments)
+        states = found[: len(block.states)]
+        found = np.concatenate([found, *[states] * len(block.resets), *[[1.0]] * self.c.guards])
         finite = np.where(np.isfinite(self.expected), np.abs(self.expected), 0.0)
         found = np.maximum(found, finite.max(axis=0, initial=0.0))
         return np.where(found > 0.0, found, 1.0)
@@ -193,10 +178,11 @@ PASSES = {*SUMS, *SAME, ca.OP_TWICE, ca.OP_SQ, ca.OP_SQRT, SELECT}
 PRODUCTS = {ca.OP_MUL, ca.OP_DIV}
 
 
+@lru_cache(maxsize=4)
 def terms(block: Block) -> ca.Function:
     """Return (state, param, in) of a step -> the magnitudes of its states and outputs, a column."""
     source = graph(block.step)
-    arguments = [ca.SX.sym("x", len(g)) for g in (block.states, block.parameters, block.inputs)]
+    arguments = [ca.SX.sym("x", len(group)) for group in block.groups.values()]
     everything = Graph(source.nodes, (tuple(range(len(source.nodes))),))
     values = ca.vertsplit(rebuild(everything, arguments, {})[0])
     states, outputs = source.results
@@ -244,95 +230,81 @@ def _passed(op: int, own: Sequence[ca.SX], m: Sequence[ca.SX]) -> ca.SX:
     return m[0] if op in SAME else 2 * m[0] if op == ca.OP_TWICE else m[0] * m[0]
 
 
-def magnitudes(
-    of: ca.Function, block: Block, states: Array, parameters: Array, inputs: Array
-) -> Array:
+def magnitudes(block: Block, states: Array, parameters: Array, inputs: Array) -> Array:
     """Return the largest magnitude of every state and output over some steps.
 
     The shape is (states + outputs,); states have at least the nominal value.
 
     Args:
-        of: `terms` of the block.
         states, inputs: before and in every step, shape (steps, ...).
         parameters: of every step, shape (steps, parameters), or of all, shape (parameters,).
     """
     every = max(1, len(inputs) // SAMPLES)
     given = (states, np.broadcast_to(parameters, (len(inputs), len(block.parameters))), inputs)
-    found = of(*(ca.DM(np.ascontiguousarray(column[::every].T)) for column in given)).full()
+    columns = (ca.DM(np.ascontiguousarray(column[::every].T)) for column in given)
+    found = terms(block)(*columns).full()
     largest = np.where(np.isfinite(found), found, 0.0).max(axis=1, initial=0.0)
     return np.maximum(largest, [v.nominal for v in block.states] + [0.0] * len(block.outputs))
 
 
-STRETCH = 100
-"""Number of consecutive steps with one type of motion, or of load."""
+REPETITIONS = 64
+"""Repetitions of a step, the first rounded to nearest and the others randomly."""
 
-LOADS = (1.0, 10.0, 0.1, 1.5, 0.0, 1.0, 1e-3, 6.0, 0.5, 0.0, 100.0, 1.0)
-"""Loads in units of the nominal value, in a random order with jumps and zeros."""
+AT_ONCE = 2048
+"""Number of steps in memory at once."""
 
-BAD = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e9, -1e9, 1e-310, -1.0)
-"""Bad values of an input, in units of its nominal value."""
+DECISIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN}
+PASSING = {ca.OP_NEG, ca.OP_FABS, ca.OP_SQ, ca.OP_MUL, ca.OP_FMIN, ca.OP_FMAX}
 
 
-def excitation(block: Block, steps: int) -> Array:
-    """Return valid inputs of every step, shape (steps, inputs), the same at each call.
+def modes(block: Block) -> NDArray[np.bool_]:
+    """Return a mask of the columns that hold a mode, shape (columns,): a number from decisions
+    only.
 
-    An input with a lower bound of 0 or more, such as a load, fluctuates about levels between which
-    it jumps by factors up to 1e5, including zero; the others get in turn, in units of their nominal
-    value, slow sines, bursts up to 2, tiny values of 1e-12 ... 1e-3, a hundred zeros and abrupt
-    reversals. All stay within their bounds.
+    It is the result of a comparison, or one of some constants and modes selected by comparisons. A
+    state is a mode if its next value is one, in the step and in every initialisation.
     """
-    random = np.random.default_rng(0)
-    columns = [_signal(variable, steps, random) for variable in block.inputs]
-    return np.column_stack([np.zeros((steps, 0)), *columns])
+    sources, count = [graph(function) for function in block.functions], len(block.states)
+    states = np.ones(count, bool)
+    while True:
+        found = [_discrete(source, states) for source in sources]
+        left = states & np.all([columns[:count] for columns in found], axis=0)
+        if (left == states).all():
+            return np.concatenate(found)
+        states = left
 
 
-def _signal(variable: Variable, steps: int, random: np.random.Generator) -> Array:
-    k, stretches = np.arange(steps), -(-steps // STRETCH)
-    if variable.lower >= 0.0:
-        levels = np.repeat(random.choice(LOADS, stretches), STRETCH)[:steps]
-        wavering = 1.0 + 0.5 * np.sin(0.003 * k + random.uniform(0.0, 6.0))
-        return _within(variable, variable.nominal * levels * wavering)
-    tiny = 10.0 ** random.uniform(-12.0, -3.0, steps) * random.choice([-1.0, 1.0], steps)
-    pieces = [
-        0.05 * np.sin(0.008 * k),
-        np.clip(random.standard_normal(steps), -2.0, 2.0),
-        tiny,
-        0.1 * np.sign(np.sin(0.03 * k)),
-        np.zeros(steps),
-    ]
-    turn = np.repeat(random.integers(0, len(pieces), stretches), STRETCH)[:steps]
-    return _within(variable, variable.nominal * np.choose(turn, pieces))
-
-
-def _within(variable: Variable, values: Array) -> Array:
-    limits = range_of(variable)
-    return np.clip(values, limits.low, limits.high)
-
-
-def spoiled(block: Block, inputs: Array) -> Array:
-    """Return the inputs with a twentieth of the values not finite or out of range."""
-    random = np.random.default_rng(1)
-    nominal = np.array([v.nominal for v in block.inputs])
-    bad = random.choice(BAD, inputs.shape) * nominal
-    return np.where(random.uniform(size=inputs.shape) < 0.05, bad, inputs)
-
-
-def varied(block: Block, steps: int, longest: float) -> Array:
-    """Return parameters of every step, shape (steps, parameters), constant over `STRETCH` steps.
-
-    The step size passes through three decades up to `longest` times its default, the others through
-    +-20 %, or from 0 to a tenth if they are 0, within their bounds.
-    """
-    random = np.random.default_rng(2)
-    stretches = -(-steps // STRETCH)
-    columns = [np.zeros((stretches, 0))]
-    for variable in block.parameters:
-        start, limits = float(variable.start), parameter_range(variable)
-        if variable.name == STEP_SIZE:
-            values = start * longest * 10.0 ** random.uniform(-3.0, 0.0, stretches)
-        elif start == 0.0:
-            values = random.uniform(0.0, 0.1, stretches)
+def _discrete(source: Graph, states: Sequence[bool] | NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return a mask of the rows that only decisions determine, given the states that are modes."""
+    found: list[bool] = []
+    for node in source.nodes:
+        if node.op == ca.OP_INPUT:
+            found.append(node.entry[0] == 0 and bool(states[node.entry[1]]))
+        elif node.op in (SELECT, ca.OP_IF_ELSE_ZERO):
+            found.append(all(found[i] for i in node.args[1:]))
         else:
-            values = start * random.uniform(0.8, 1.2, stretches)
-        columns.append(np.clip(values, limits.low, limits.high))
-    return np.repeat(np.column_stack(columns), STRETCH, axis=0)[:steps]
+            known = node.op in DECISIONS or node.op == ca.OP_CONST
+            found.append(known or (node.op in PASSING and all(found[i] for i in node.args)))
+    return np.array([found[i] for row in source.results for i in row], bool)
+
+
+def rounded(block: Block, states: Array, parameters: Array, inputs: Array) -> Array:
+    """Return results of CasADi's operations in float, shape (REPETITIONS, steps, columns).
+
+    Args:
+        states, parameters, inputs: before and in every step, shape (steps, ...).
+
+    Returns:
+        The same at each call.
+    """
+    random, parts = np.random.default_rng(0), list[Array]()
+    size = max(1, AT_ONCE // REPETITIONS)
+    for first in range(0, len(inputs), size):
+        given = [a[first : first + size].astype("f4") for a in (states, parameters, inputs)]
+        many = [np.tile(a, (REPETITIONS - 1, 1)) for a in given]
+        columns = [
+            np.vstack([in_type(function, given, "f4"), in_type(function, many, "f4", random)])
+            for function in block.functions
+        ]
+        parts.append(np.hstack(columns).reshape(REPETITIONS, len(given[0]), -1))
+    return np.concatenate(parts, axis=1)

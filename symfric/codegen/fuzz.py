@@ -19,10 +19,10 @@ from typing import final
 
 import casadi as ca
 
-from symfric.codegen.blocks.block import GROUPS, Block
+from symfric.codegen.blocks.block import Block
 from symfric.codegen.generated import generate
-from symfric.codegen.guards import parameter_range, range_of, state_limit
-from symfric.codegen.layout import TEMPLATES, called, fields, filled, members, prefix
+from symfric.codegen.guards import STEP_SIZE, parameter_range, range_of, state_limit
+from symfric.codegen.layout import TEMPLATES, CBlock, filled
 from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
@@ -78,17 +78,18 @@ def fuzz(block: Block, real: str, compiler: Compiler, *, steps: int = STEPS) -> 
     """
     checks.choice("fuzz: real", real, REALS)
     checks.count("fuzz: steps", steps, least=1)
-    kind, bare = REALS[real], replace(block, name=f"{block.name}_bare")
+    c = CBlock(block, REALS[real])
+    bare = CBlock(replace(block, name=f"{block.name}_bare"), c.real, guards=False)
     with TemporaryDirectory(prefix="symfric-") as name:
         folder = Path(name)
-        sources = [
-            generate(block, folder, real=real).source(real),
-            generate(bare, folder, real=real, guards=False).source(real),
-        ]
-        write_text(folder / "main.c", _program(block, bare, kind))
-        parts = [str(folder / "main.c"), *map(str, sources)]
-        compiler.run(*SANITIZED, f"-I{folder}", *parts, "-o", str(folder / "main"), "-lm")
-        done = finished([str(folder / "main"), str(steps)])
+        write_text(folder / "main.c", _program(c, bare))
+        parts = [folder / "main.c"]
+        for one in (c, bare):
+            made = generate(one.block, folder, real=real, guards=one.guards, kit=False)
+            parts.append(made.source(real))
+        target = str(folder / "main")
+        compiler.run(*SANITIZED, f"-I{folder}", *map(str, parts), "-o", target, "-lm")
+        done = finished([target, str(steps)])
     numbers = done.output.split()
     if done.status != 0 or len(numbers) != len(COUNTS):
         said = (done.messages or f"it ended with {done.status}").strip()
@@ -97,14 +98,12 @@ def fuzz(block: Block, real: str, compiler: Compiler, *, steps: int = STEPS) -> 
     return Fuzzed(block.name, real, steps, **found)
 
 
-DEFAULT = "memcpy(param, &{0}_default, sizeof {0}_default);"
-
-
-def _program(block: Block, bare: Block, real: Real) -> str:
+def _program(c: CBlock, bare: CBlock) -> str:
     """Return the program, with calls and ranges of the block in it."""
+    block = c.block
     inputs = [range_of(v) for v in block.inputs]
     parameters = [parameter_range(v) for v in block.parameters]
-    used = _used(block)
+    used = {node.entry for node in graph(block.step).nodes if node.op == ca.OP_INPUT}
     columns = {
         "IN_LOW": [r.low for r in inputs],
         "IN_HIGH": [r.high for r in inputs],
@@ -116,44 +115,20 @@ def _program(block: Block, bare: Block, real: Real) -> str:
         "STATE_LIMIT": [state_limit(v) for v in block.states],
         "STATE_START": [float(v.start) for v in block.states],
     }
-    steps = [i for i, v in enumerate(block.parameters) if v.name == "h"]
+    sizes = [i for i, v in enumerate(block.parameters) if v.name == STEP_SIZE]
+    default = "memcpy(param, &{0}_default, sizeof {0}_default);" if block.parameters else ""
     return filled(
         TEMPLATES / "fuzz.c",
-        guarded=prefix(block, real),
-        bare=prefix(bare, real),
-        real=real.name,
-        double=int(real.size == 8),
-        states=len(block.states),
-        params=len(block.parameters),
-        inputs=len(block.inputs),
-        outputs=len(block.outputs),
-        size=steps[0] if steps else -1,
-        columns="\n".join(_column(name, values, real) for name, values in columns.items()),
-        call=_call(block, real, guards=True),
-        call_bare=_call(bare, real, guards=False),
-        default=DEFAULT.format(prefix(block, real)) if block.parameters else "",
+        **c.sizes,
+        bare=bare.name,
+        step_bare=bare.flat_step,
+        double=int(c.real.size == 8),
+        size=sizes[0] if sizes else -1,
+        columns="\n".join(_column(name, values, c.real) for name, values in columns.items()),
+        default=default.format(c.name),
     )
-
-
-def _used(block: Block) -> set[tuple[int, int]]:
-    """Return (argument, row) of the numbers that a step depends on."""
-    return {node.entry for node in graph(block.step).nodes if node.op == ca.OP_INPUT}
 
 
 def _column(name: str, values: Sequence[float], real: Real) -> str:
     shown = ", ".join(real.literal(value) for value in values) or real.literal(0.0)
     return f"static const {real.name} {name}[] = {{{shown}}};"
-
-
-def _call(block: Block, real: Real, *, guards: bool) -> str:
-    """Return statements that copy the numbers into structs, call a step, and copy them back."""
-    groups, name = members(block), prefix(block, real)
-    short = {group: letter for group, letter in zip(GROUPS, "spuy", strict=True) if group in groups}
-    pointers = {group: f"&{letter}" for group, letter in short.items()}
-    call = called(block, real, guards, pointers, fields(block, "in"))
-    result = "out[0] = " if block.is_function else "status = " * guards
-    lines = [f"{name}_{group}_t {letter};" for group, letter in short.items()]
-    lines += [f"memcpy(&{s}, {g}, sizeof {s});" for g, s in short.items() if g != "out"]
-    lines.append(f"{result}{call};")
-    lines += [f"memcpy({g}, &{s}, sizeof {s});" for g, s in short.items() if g in ("state", "out")]
-    return "\n    ".join(lines)

@@ -13,15 +13,14 @@ from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_law import contact_block, law_block
 from symfric.codegen.blocks.variables import Fold
 from symfric.codegen.guards import MEANING, Range, Status, parameter_range, range_of
-from symfric.codegen.header import header
 from symfric.codegen.kit import kit_files
-from symfric.codegen.layout import members, prefix
-from symfric.codegen.routines import routines, source
+from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import footprint
-from symfric.emitter.c99 import REALS, Real
+from symfric.codegen.source import header, routines, source
+from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
-from symfric.foundation.parameters import Variable, check_names
+from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.laws import AnyLaw, Population
 
@@ -47,13 +46,17 @@ class Generated:
     manifest: Mapping[str, Any]
     guards: bool = True
 
+    def c(self, real: str) -> CBlock:
+        """Return the C of the type `real`."""
+        return CBlock(self.block, REALS[real], self.guards)
+
     def header(self, real: str) -> Path:
         """Return the header file of the type `real`."""
-        return self.folder / f"{prefix(self.block, REALS[real])}.h"
+        return self.folder / f"{self.c(real).name}.h"
 
     def source(self, real: str) -> Path:
         """Return the source file of the type `real`."""
-        return self.folder / f"{prefix(self.block, REALS[real])}.c"
+        return self.folder / f"{self.c(real).name}.c"
 
 
 def generate(
@@ -101,31 +104,39 @@ def generate(
         ValueError: bad input, a law that has no step, an operation that C99 lacks, a number
             outside the range of float (a computed one below it becomes the smallest nonzero one).
     """
-    several = (real,) if isinstance(real, str) else checks.many("codegen: real", real, "types")
-    check_names("codegen: real", several, REALS)
-    names = tuple(dict.fromkeys(several))
+    given = (real,) if isinstance(real, str) else checks.many("codegen: real", real, "types")
+    checks.check_names("codegen: real", given, REALS)
+    reals = tuple(dict.fromkeys(given))
     folder = checks.path("codegen: out", out)
     checks.flag("codegen: guards", guards)
-    if not names:
+    if not reals:
         raise ValueError("codegen: real: expected double, float or both, got none")
-    given = {"name": name, "h": h, "free": free, "fold": fold, "turning": turning or None}
-    block = _block(law, {option: value for option, value in given.items() if value is not None})
-    reals = [REALS[n] for n in names]
-    for one in reals:
-        for value in block.constants.values():
-            one.literal(value)  # raises an error if rounded to 0 or infinity
+    chosen = {"name": name, "h": h, "free": free, "fold": fold, "turning": turning or None}
+    block = _block(law, {option: value for option, value in chosen.items() if value is not None})
+    several = [CBlock(block, REALS[n], guards) for n in reals]
     texts: dict[str, str] = {}
-    for one in reals:
-        texts[f"{prefix(block, one)}.h"] = header(block, one, guards)
-        texts[f"{prefix(block, one)}.c"] = source(block, one, guards)
-    texts |= kit_files(block, reals, guards) if kit else {}
+    for c in several:
+        for value in block.constants.values():
+            c.real.literal(value)  # raises an error if rounded to 0 or infinity
+    for c in several:
+        texts |= {f"{c.name}.h": header(c), f"{c.name}.c": source(c)}
+    texts |= kit_files(several) if kit else {}
     for file, text in texts.items():
         write_text(folder / file, text)
-    content = manifest(block, reals, guards, texts, _measured(block, reals, folder) if kit else {})
+    content = manifest(several, texts)
+    compiler = find_compiler() if kit else None
+    for c in several:
+        if compiler is None:
+            break
+        try:
+            sizes = footprint(c, folder, compiler)
+        except CompileError:  # no sizes without a working compiler; `verify` reports why
+            continue
+        content["real"][c.real.name]["measured"] = {"compiler": str(compiler), **sizes}
     last = f"{block.name}_manifest.json"
     write_text(folder / last, json.dumps(content, indent=2) + "\n")
     files = tuple(folder / file for file in (*texts, last))
-    return Generated(block, folder, names, files, content, guards)
+    return Generated(block, folder, reals, files, content, guards)
 
 
 def with_cores(generated: Generated, measured: Sequence[Mapping[str, Any]]) -> Generated:
@@ -141,50 +152,31 @@ def with_cores(generated: Generated, measured: Sequence[Mapping[str, Any]]) -> G
     return replace(generated, manifest=content)
 
 
-def _measured(block: Block, reals: Sequence[Real], folder: Path) -> dict[str, dict[str, Any]]:
-    """Return sizes and stack by type from the compiler of this machine, if it has one."""
-    compiler = find_compiler()
-    if compiler is None:
-        return {}
-    found: dict[str, dict[str, Any]] = {}
-    for real in reals:
-        try:
-            sizes = footprint(block, real, folder, compiler)
-        except CompileError:  # no sizes without a working compiler; `verify` reports why
-            continue
-        found[real.name] = {"measured": {"compiler": str(compiler), **sizes.to_dict()}}
-    return found
-
-
 def _block(law: AnyLaw | Block, options: dict[str, Any]) -> Block:
     """Return the block of a law with the given `options`, all of which must apply."""
-    allowed = ("name", "h", "free", "fold", "turning")
-    what = "a law"
+    allowed, what, make = ("name", "h", "free", "fold", "turning"), "a law", law_block
     if isinstance(law, Block):
         allowed, what = (), "a block, which has its own"
     elif isinstance(law, Population):
-        allowed, what = ("name", "h"), "a population, whose numbers are constants and which slides"
+        what = "a population, whose numbers are constants and which slides"
+        allowed, make = ("name", "h"), contact_block
     wrong = [option for option in options if option not in allowed]
     if wrong:
         raise ValueError(f"codegen: {', '.join(wrong)}: expected with a law only, got {what}")
-    if isinstance(law, Block):
-        return law
-    return (contact_block if isinstance(law, Population) else law_block)(law, **options)  # pyright: ignore[reportArgumentType]
+    return law if isinstance(law, Block) else make(law, **options)  # pyright: ignore[reportArgumentType]
 
 
-def manifest(
-    block: Block,
-    reals: Sequence[Real],
-    guards: bool,
-    texts: Mapping[str, str],
-    measured: Mapping[str, Any],
-) -> dict[str, Any]:
+def manifest(several: Sequence[CBlock], texts: Mapping[str, str]) -> dict[str, Any]:
     """Return the content of NAME_manifest.json.
 
     Args:
+        several: the block in all its types.
         texts: files of the package and their content.
-        measured: by type, sizes and stack from a compiler, empty without one.
     """
+    block, guards = several[0].block, several[0].guards
+    parameters = [(v, parameter_range(v) if guards else None) for v in block.parameters]
+    inputs = [(v, range_of(v) if guards else None) for v in block.inputs]
+    data = {name: text.encode() for name, text in texts.items()}
     return {
         "name": block.name,
         "model": block.fingerprint,
@@ -198,52 +190,43 @@ def manifest(
         "limits": list(block.limits),
         "sources": list(block.sources),
         "states": [_variable(v, "start", None) for v in block.states],
-        "parameters": [
-            _variable(v, "default", parameter_range(v) if guards else None)
-            for v in block.parameters
-        ],
-        "inputs": [_variable(v, "safe", range_of(v) if guards else None) for v in block.inputs],
+        "parameters": [_variable(v, "default", within) for v, within in parameters],
+        "inputs": [_variable(v, "safe", within) for v, within in inputs],
         "outputs": [
             {"name": name, "unit": output.unit, "doc": output.doc}
             for name, output in block.outputs.items()
         ],
         "constants": dict(block.constants),
         "guards": guards,
-        "status": {str(s.name): {"bit": int(s), "meaning": MEANING[s]} for s in Status}
-        if guards
-        else {},
-        "real": {
-            real.name: _described(block, real, guards) | dict(measured.get(real.name, {}))
-            for real in reals
-        },
+        "status": {str(s.name): {"bit": int(s), "meaning": MEANING[s]} for s in Status if guards},
+        "real": {c.real.name: _described(c) for c in several},
         "files": {
-            name: {"bytes": len(data), "sha256": sha256(data).hexdigest()}
-            for name, data in ((n, text.encode()) for n, text in texts.items())
+            name: {"bytes": len(content), "sha256": sha256(content).hexdigest()}
+            for name, content in data.items()
         },
     }
 
 
 def _variable(variable: Variable, start: str, within: Range | None) -> dict[str, Any]:
     """Return meaning, unit and range; for guarded variables the range that guards enforce."""
-    low, high = (variable.lower, variable.upper) if within is None else (within.low, within.high)
+    low, high, safe = within or (variable.lower, variable.upper, float(variable.start))
     return {
         "name": variable.name,
         "unit": variable.unit,
         "doc": variable.doc,
         "nominal": variable.nominal,
         "range": [bound if isfinite(bound) else None for bound in (low, high)],
-        start: float(variable.start) if within is None else within.safe,
+        start: safe,
     }
 
 
-def _described(block: Block, real: Real, guards: bool) -> dict[str, Any]:
-    name = prefix(block, real)
+def _described(c: CBlock) -> dict[str, Any]:
     return {
-        "header": f"{name}.h",
-        "source": f"{name}.c",
+        "header": f"{c.name}.h",
+        "source": f"{c.name}.c",
         "bytes": {
-            group: real.size * sum(row.count for row in rows)
-            for group, rows in members(block).items()
+            group: c.real.size * sum(row.length for row in rows)
+            for group, rows in c.block.members.items()
         },
         "functions": {
             routine.name: {
@@ -251,6 +234,6 @@ def _described(block: Block, real: Real, guards: bool) -> dict[str, Any]:
                 "operations": routine.operations,
                 "calls": dict(sorted(routine.calls.items())),
             }
-            for routine in routines(block, real, guards)
+            for routine in routines(c)
         },
     }

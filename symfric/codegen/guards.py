@@ -15,16 +15,13 @@ fell. Numbers are compared by their bits, as integers: that is as cheap as float
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import IntFlag
 from math import isfinite
-from typing import final
+from typing import NamedTuple
 
 import numpy as np
 
-from symfric.codegen.blocks.block import Block
-from symfric.codegen.layout import TEMPLATES, Member, filled, members, places, prefix
-from symfric.emitter.c99 import Real
+from symfric.codegen.layout import TEMPLATES, CBlock, filled
 from symfric.foundation.parameters import Variable
 
 WIDE = 1e6
@@ -61,9 +58,7 @@ MEANING = {
 }
 
 
-@final
-@dataclass(frozen=True)
-class Range:
+class Range(NamedTuple):
     """Closed range of a number, and the value that replaces one that is not finite."""
 
     low: float
@@ -77,8 +72,7 @@ def range_of(variable: Variable) -> Range:
     The safe value is its start value, by default 0.
     """
     wide = WIDE * variable.nominal
-    start = float(variable.start)
-    return _range(variable, -wide, wide, min(max(start, variable.lower), variable.upper))
+    return _range(variable, wide, min(max(float(variable.start), variable.lower), variable.upper))
 
 
 def parameter_range(variable: Variable) -> Range:
@@ -89,15 +83,14 @@ def parameter_range(variable: Variable) -> Range:
     start = float(variable.start)
     if variable.name == STEP_SIZE:
         return Range(min(SHORTEST, start), max(LONGEST, start), start)
-    wide = WIDE * max(variable.nominal, 1.0)
-    return _range(variable, -wide, wide, start)
+    return _range(variable, WIDE * max(variable.nominal, 1.0), start)
 
 
-def _range(variable: Variable, low: float, high: float, safe: float) -> Range:
-    low = variable.lower if isfinite(variable.lower) else min(low, variable.upper, safe)
-    high = variable.upper if isfinite(variable.upper) else max(high, variable.lower, safe)
-    low = 0.0 if abs(low) < 1 / TOP else max(low, -TOP)
-    return Range(low, min(high, TOP), safe)
+def _range(variable: Variable, wide: float, safe: float) -> Range:
+    low, high = variable.lower, variable.upper
+    least = low if isfinite(low) else min(-wide, high, safe)
+    most = high if isfinite(high) else max(wide, low, safe)
+    return Range(0.0 if abs(least) < 1 / TOP else max(least, -TOP), min(most, TOP), safe)
 
 
 def state_limit(variable: Variable) -> float:
@@ -105,186 +98,150 @@ def state_limit(variable: Variable) -> float:
     return min(HUGE * max(variable.nominal, abs(float(variable.start))), TOP)
 
 
-def constants(block: Block, real: Real) -> str:
+def constants(c: CBlock) -> str:
     """Return the bits of the status as macros for the header."""
-    stem = prefix(block, real).upper()
-    kinds = [s for s in Status if block.states or s != Status.STATE]
-    kinds = [s for s in kinds if block.parameters or s != Status.PARAMETER]
-    width = max(len(s.name or "") for s in kinds)
+    absent = {Status.STATE: not c.block.states, Status.PARAMETER: not c.block.parameters}
+    kinds = [s for s in Status if not absent.get(s)]
     meaning = dict(MEANING)
-    if not block.states:
+    if not c.block.states:
         meaning[Status.OUTPUT] = "a result was not finite; outputs are 0"
-    return "".join(
-        f"#define {stem}_{s.name:<{width}} {s.value}u /* {meaning[s]} */\n" for s in kinds
-    )
+    width = max(len(bit(c, s)) for s in kinds)
+    return "".join(f"#define {bit(c, s):<{width}} {s.value}u /* {meaning[s]} */\n" for s in kinds)
 
 
-def bit(block: Block, real: Real, status: Status) -> str:
+def bit(c: CBlock, status: Status) -> str:
     """Return the macro of one bit."""
-    return f"{prefix(block, real).upper()}_{status.name}"
+    return f"{c.name.upper()}_{status.name}"
 
 
-def helpers(block: Block, real: Real, text: str) -> str:
+def helpers(c: CBlock, text: str) -> str:
     """Return the static functions that `text`, the guarded functions of a block, calls."""
-    name = prefix(block, real)
-    own = {"unfit": _unfit(block, real), "lost": _lost(block, real)}
     general = filled(
         TEMPLATES / "guards.c",
-        name=name,
-        real=real.name,
-        whole=f"uint{8 * real.size}_t",
-        magnitude="UINT32_C(0x7FFFFFFF)" if real.size == 4 else "UINT64_C(0x7FFFFFFFFFFFFFFF)",
-        infinite="UINT32_C(0x7F800000)" if real.size == 4 else "UINT64_C(0x7FF0000000000000)",
+        name=c.name,
+        real=c.real.name,
+        whole=f"uint{8 * c.real.size}_t",
+        magnitude="UINT32_C(0x7FFFFFFF)" if c.real.size == 4 else "UINT64_C(0x7FFFFFFFFFFFFFFF)",
+        infinite="UINT32_C(0x7F800000)" if c.real.size == 4 else "UINT64_C(0x7FF0000000000000)",
     )
-    general_parts = dict(
-        zip(("bits", "beyond", "outside", "mended"), general.rstrip().split("\n\n"), strict=True)
-    )
-    needed: list[str] = []
-    for what, body in reversed((general_parts | own).items()):
-        if f"{name}_{what}(" in text + "".join(needed):
-            needed.insert(0, body + "\n\n")
-    return "".join(needed)
+    names = ("bits", "beyond", "outside", "mended")
+    parts: dict[str, str] = dict(zip(names, general.rstrip().split("\n\n"), strict=True))
+    limits = [parameter_range(v)[:2] for v in c.block.parameters]
+    parts["unfit"] = _any(c, "unfit", "a parameter is outside its range", "param", limits)
+    limits = [(-state_limit(v), state_limit(v)) for v in c.block.states]
+    parts["lost"] = _any(c, "lost", "a state is absurd or not finite", "state", limits)
+    needed = ""
+    for what, body in reversed(parts.items()):
+        if f"{c.name}_{what}(" in text + needed:
+            needed = f"{body}\n\n{needed}"
+    return needed
 
 
-def _outside(name: str, real: Real, place: str, low: float, high: float) -> str:
+def _outside(c: CBlock, place: str, low: float, high: float) -> str:
     """Return the condition that the number at `place` is outside its range, or NaN."""
-    least, most = real.literal(low), real.literal(high)
+    least, most = c.real.literal(low), c.real.literal(high)
     if low >= 0.0:
-        return f"{name}_outside({place}, {least}, {most})"
+        return f"{c.name}_outside({place}, {least}, {most})"
     if low == -high:
-        return f"{name}_beyond({place}, {most})"
-    widest = real.literal(max(-low, abs(high)))
-    return f"{name}_beyond({place}, {widest}) || {place} < {least} || {place} > {most}"
+        return f"{c.name}_beyond({place}, {most})"
+    widest = c.real.literal(max(-low, abs(high)))
+    return f"{c.name}_beyond({place}, {widest}) || {place} < {least} || {place} > {most}"
 
 
-def mended(block: Block, real: Real, variable: Variable, group: str, status: str) -> list[str]:
-    """Return statements that bring a local, an input or the step size, into its range.
-
-    Args:
-        group: "in" or "param".
-        status: the pointer to the status.
-    """
-    name, local = prefix(block, real), variable.name
-    if group == "in":
-        within, kinds = range_of(variable), (Status.CLAMPED, Status.NOT_FINITE)
-    else:
-        within, kinds = parameter_range(variable), (Status.PARAMETER, Status.PARAMETER)
-    numbers = ", ".join(real.literal(x) for x in (within.low, within.high, within.safe))
-    said = ", ".join(bit(block, real, kind) for kind in kinds)
-    return [
-        f"if ({_outside(name, real, local, within.low, within.high)}) {{",
-        f"    {local} = {name}_mended({local}, {numbers}, {said}, {status});",
-        "}",
-    ]
-
-
-def fit_parameters(block: Block, real: Real, status: str) -> list[str]:
-    """Return statements that use the default parameters if one is out of range."""
-    name = prefix(block, real)
-    if all(v.name == STEP_SIZE for v in block.parameters):
-        return []
-    return [
-        f"if (param != &{name}_default && {name}_unfit(param)) {{",
-        f"    param = &{name}_default;",
-        f"    {_said(block, real, Status.PARAMETER, status)}",
-        "}",
-    ]
-
-
-def found_states(block: Block, real: Real, status: str) -> list[str]:
-    """Return statements that restart all states if one of them is invalid."""
-    if not block.states:
-        return []
-    name = prefix(block, real)
-    return [
-        f"if ({name}_lost(state)) {{",
-        f"    *state = {name}_start;",
-        f"    {_said(block, real, Status.STATE, status)}",
-        "}",
-    ]
-
-
-def finite_outputs(block: Block, real: Real, status: str) -> list[str]:
-    """Return statements that replace outputs that are not finite by 0."""
-    name, said = prefix(block, real), _said(block, real, Status.OUTPUT, status)
-    most = real.literal(float(np.finfo(real.kind).max))
-    if block.is_function:
-        (shown,) = block.outputs
-        bad = f"if ({name}_beyond({shown}, {most})) {{"
-        return [bad, f"    {said}", f"    return {real.literal(0.0)};", "}", f"return {shown};"]
-    shown = places(block, "out")
-    if not shown:
-        return []
-    restart = [f"    *state = {name}_start;"] if block.states else []
-    return [
-        f"if ({' || '.join(f'{name}_beyond(out->{place}, {most})' for place in shown)}) {{",
-        *(f"    out->{place} = {real.literal(0.0)};" for place in shown),
-        *restart,
-        f"    {said}",
-        "}",
-    ]
-
-
-def _said(block: Block, real: Real, kind: Status, status: str) -> str:
-    """Return the statement that adds a bit to the status that a pointer shows."""
-    place = status.removeprefix("&") if status.startswith("&") else f"*{status}"
-    return f"{place} |= {bit(block, real, kind)};"
-
-
-def _unfit(block: Block, real: Real) -> str:
-    """Return the function that is true if a parameter is out of its range."""
-    name = prefix(block, real)
-    ranges = {v.name: parameter_range(v) for v in block.parameters}
-    limits = [ranges[v.name] for v in block.parameters]
-    rows = [m for m in members(block).get("param", ()) if m.name != STEP_SIZE]
-    conditions = [(m, [(r.low, r.high) for r in limits[m.first : m.first + m.count]]) for m in rows]
-    return _any(
-        f"/* Returns true if a parameter is outside its range. */\n"
-        f"static bool {name}_unfit(const {name}_param_t *param)",
-        name, real, "param", conditions,
-    )  # fmt: skip
-
-
-def _lost(block: Block, real: Real) -> str:
-    """Return the function that is true if a state is invalid."""
-    name = prefix(block, real)
-    limits = [state_limit(v) for v in block.states]
-    rows = members(block).get("state", ())
-    conditions = [(m, [(-x, x) for x in limits[m.first : m.first + m.count]]) for m in rows]
-    return _any(
-        f"/* Returns true if a state is absurd or not finite. */\n"
-        f"static bool {name}_lost(const {name}_state_t *state)",
-        name, real, "state", conditions,
-    )  # fmt: skip
-
-
-def _any(
-    head: str,
-    name: str,
-    real: Real,
-    group: str,
-    rows: Sequence[tuple[Member, Sequence[tuple[float, float]]]],
-) -> str:
-    """Return a function that is true if one of the members is outside its range; loops for
-    arrays.
-    """
-    single: list[str] = []
-    loops: list[str] = []
-    for member, ranges in rows:
+def _any(c: CBlock, what: str, doc: str, group: str, limits: Sequence[tuple[float, ...]]) -> str:
+    """Return a function that is true if a member of a struct is outside its range."""
+    single, loops = list[str](), list[str]()
+    for member in c.block.members.get(group, ()):
+        ranges = limits[member.first : member.first + member.length]
+        if group == "param" and member.name == STEP_SIZE:
+            continue
         if member.size and len(set(ranges)) == 1:
-            place = f"{group}->{member.name}[i]"
             loops += [
                 f"    for (i = 0; i < {member.size}; i++) {{",
-                f"        if ({_outside(name, real, place, *ranges[0])}) {{",
+                f"        if ({_outside(c, f'{group}->{member.name}[i]', *ranges[0])}) {{",
                 "            return true;",
                 "        }",
                 "    }",
             ]
-            continue
-        single += [
-            _outside(name, real, f"{group}->{place}", *limits)
-            for place, limits in zip(member.places, ranges, strict=True)
-        ]
-    joined = "\n        || ".join(single) if single else "false"
-    count = ["    int i;"] if loops else []
-    return "\n".join([head, "{", *count, *loops, f"    return {joined};", "}"])
+        else:
+            places = zip(member.places, ranges, strict=True)
+            single += [_outside(c, f"{group}->{place}", *within) for place, within in places]
+    return "\n".join([
+        f"/* Returns true if {doc}. */",
+        f"static bool {c.name}_{what}(const {c.name}_{group}_t *{group})",
+        "{",
+        *["    int i;"] * bool(loops),
+        *loops,
+        "    return " + ("\n        || ".join(single) or "false") + ";",
+        "}",
+    ])  # fmt: skip
+
+
+def mended(c: CBlock, variable: Variable, group: str) -> list[str]:
+    """Return statements that bring a local, an input or the step size, into its range.
+
+    Args:
+        group: "in" or "param".
+    """
+    within = range_of(variable) if group == "in" else parameter_range(variable)
+    kinds = (Status.CLAMPED, Status.NOT_FINITE) if group == "in" else (Status.PARAMETER,) * 2
+    arguments = [*map(c.real.literal, within), *(bit(c, kind) for kind in kinds), _pointer(c)]
+    local = variable.name
+    return [
+        f"if ({_outside(c, local, within.low, within.high)}) {{",
+        f"    {local} = {c.name}_mended({local}, {', '.join(arguments)});",
+        "}",
+    ]
+
+
+def _pointer(c: CBlock) -> str:
+    """Return the pointer to the status: an argument of a function of scalars, else a local."""
+    return "status" if c.block.is_function else "&status"
+
+
+def _set(c: CBlock, kind: Status) -> str:
+    """Return the statement that adds a bit to the status."""
+    return f"    {'*' * c.block.is_function}status |= {bit(c, kind)};"
+
+
+def fit_parameters(c: CBlock) -> list[str]:
+    """Return statements that use the default parameters if one is out of range."""
+    if all(v.name == STEP_SIZE for v in c.block.parameters):
+        return []
+    return [
+        f"if (param != &{c.name}_default && {c.name}_unfit(param)) {{",
+        f"    param = &{c.name}_default;",
+        _set(c, Status.PARAMETER),
+        "}",
+    ]
+
+
+def found_states(c: CBlock) -> list[str]:
+    """Return statements that restart all states if one of them is invalid."""
+    if not c.block.states:
+        return []
+    return [
+        f"if ({c.name}_lost(state)) {{",
+        f"    *state = {c.name}_start;",
+        _set(c, Status.STATE),
+        "}",
+    ]
+
+
+def finite_outputs(c: CBlock) -> list[str]:
+    """Return statements that replace outputs that are not finite by 0."""
+    zero, most = c.real.literal(0.0), c.real.literal(float(np.finfo(c.real.kind).max))
+    if c.block.is_function:
+        (shown,) = c.block.outputs
+        bad = f"if ({c.name}_beyond({shown}, {most})) {{"
+        return [bad, _set(c, Status.OUTPUT), f"    return {zero};", "}", f"return {shown};"]
+    places = c.block.places("out")
+    if not places:
+        return []
+    return [
+        f"if ({' || '.join(f'{c.name}_beyond(out->{place}, {most})' for place in places)}) {{",
+        *(f"    out->{place} = {zero};" for place in places),
+        *[f"    *state = {c.name}_start;"] * bool(c.block.states),
+        _set(c, Status.OUTPUT),
+        "}",
+    ]

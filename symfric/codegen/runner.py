@@ -1,14 +1,15 @@
-"""Compilation of generated C, and runs of a block in C and in CasADi's VM on the same inputs.
+"""Compilation of generated C, and runs of a block in C, in CasADi's VM and in NumPy.
 
-Both give one row per step: the states after it, the outputs, the states of each reset for the
-inputs, and with guards the status.
+A run gives one row per step: the states after it, the outputs, the states of each reset for the
+inputs, and with guards the status (`CBlock.signals`).
 """
 
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from math import isfinite, nan, remainder
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, final
@@ -17,12 +18,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.codegen.blocks.block import GROUPS, Block
 from symfric.codegen.guards import STEP_SIZE, Range, Status, parameter_range, range_of, state_limit
-from symfric.codegen.layout import TEMPLATES, called, fields, filled, members, prefix
-from symfric.emitter.c99 import Real
-from symfric.foundation.graph import graph
-from symfric.foundation.numeric import bound
+from symfric.codegen.layout import TEMPLATES, CBlock, filled
+from symfric.emitter.c99 import FUNCTIONS
+from symfric.foundation.files import write_text
+from symfric.foundation.graph import SELECT, graph
+from symfric.foundation.instructions import CODES
+from symfric.foundation.numeric import bound, erf
 from symfric.foundation.programs import PATIENCE, CompileError, Compiler, ProgramError, finished
 
 WARNINGS = tuple(
@@ -43,15 +45,6 @@ def compile_object(compiler: Compiler, source: Path, target: Path) -> list[str]:
     return compiler.warnings(*FLAGS, *WARNINGS, "-c", str(source), "-o", str(target))
 
 
-def link_program(compiler: Compiler, parts: Sequence[Path], include: Path, target: Path) -> None:
-    """Compile and link C and object files.
-
-    Raises:
-        CompileError: the compiler rejects them.
-    """
-    compiler.run(*FLAGS, f"-I{include}", *map(str, parts), "-o", str(target), "-lm")
-
-
 def needed_symbols(target: Path) -> frozenset[str] | None:
     """Return the undefined names of an object file; None without `nm`."""
     nm = shutil.which("nm")
@@ -67,51 +60,28 @@ def needed_symbols(target: Path) -> frozenset[str] | None:
     return frozenset(names)
 
 
-@final
-@dataclass(frozen=True)
-class Footprint:
-    """Size of the object file of one source.
+def footprint(c: CBlock, folder: Path, compiler: Compiler) -> dict[str, Any]:
+    """Compile the source of a block in `folder` and measure the object file.
 
-    Attributes:
-        text: bytes of code and of constants; None without `size`.
+    Returns:
+        text: bytes of code and of constants; None without the program `size`.
         data: bytes of variables, always 0.
         stack: function -> bytes of its own frame, without functions of libm. Empty if the compiler
             does not report it.
-    """
-
-    text: int | None
-    data: int | None
-    stack: dict[str, int]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return all values by name."""
-        return {"text": self.text, "data": self.data, "stack": dict(self.stack)}
-
-
-def footprint(
-    block: Block, real: Real, folder: Path, compiler: Compiler, flags: Sequence[str] = ()
-) -> Footprint:
-    """Compile the source of a block in `folder` and measure the object file.
-
-    Args:
-        flags: in addition to -std=c99 -O2 -ffp-contract=off, such as -mcpu=cortex-m4 of a
-            cross-compiler.
 
     Raises:
         CompileError: the compiler rejects it.
     """
-    stem = prefix(block, real)
     with TemporaryDirectory(prefix="symfric-") as place:
-        target = Path(place) / f"{stem}.o"
-        command = [*FLAGS, *flags, "-c", str(folder / f"{stem}.c"), "-o", str(target)]
+        target = Path(place) / f"{c.name}.o"
+        command = [*FLAGS, "-c", str(folder / f"{c.name}.c"), "-o", str(target)]
         try:
             compiler.run("-fstack-usage", *command)
         except CompileError:  # clang before 11, and others, lack the option
             compiler.run(*command)
-        said = target.with_suffix(".su")
+        said, (text, data) = target.with_suffix(".su"), _sizes(compiler, target)
         stack = _stack(said.read_text(encoding="utf-8")) if said.is_file() else {}
-        text, data = _sizes(compiler, target)
-    return Footprint(text, data, stack)
+        return {"text": text, "data": data, "stack": stack}
 
 
 def _stack(text: str) -> dict[str, int]:
@@ -123,8 +93,8 @@ def _stack(text: str) -> dict[str, int]:
 def _sizes(compiler: Compiler, target: Path) -> tuple[int | None, int | None]:
     """Return bytes of text and of data with bss, by the `size` next to the compiler."""
     program = Path(compiler.command[0])
-    beside = program.name.removesuffix("gcc") + "size" if program.name.endswith("gcc") else "size"
-    size = shutil.which(str(program.with_name(beside))) or shutil.which(beside)
+    name = program.name.removesuffix("gcc") + "size" if program.name.endswith("gcc") else "size"
+    size = shutil.which(str(program.with_name(name))) or shutil.which(name)
     if size is None:
         return None, None
     try:
@@ -133,76 +103,50 @@ def _sizes(compiler: Compiler, target: Path) -> tuple[int | None, int | None]:
         return None, None
     if done.status:
         return None, None
-    text, data, bss, *_ = done.output.decode().splitlines()[1].split()
-    return int(text), int(data) + int(bss)
+    text, data, bss, *_ = map(int, done.output.decode().splitlines()[1].split()[:3])
+    return text, data + bss
 
 
-Array = NDArray[np.float64]
+Array = NDArray[Any]
 
 PER_STEP = 1e-3
 """Time limit of a step [s]."""
 
 
-def program(block: Block, real: Real, guards: bool = True) -> str:
+def program(c: CBlock) -> str:
     """Return a C program that reads inputs from standard input and writes a row per step, all
     binary.
 
     With a second argument on its command line it reads the parameters before the inputs.
     """
-    name = prefix(block, real)
-    types = {group: f"{name}_{group}_t" for group in members(block)}
-    own = {group: f"&{group}" for group in GROUPS} | {"param": "param"}
-    call = called(block, real, guards, own, fields(block, "in"))
-    if block.is_function:
-        types |= {"out": real.name}
-        calls = [*["status = 0u;"] * guards, f"out = {call};", _write("out")]
-    else:
-        calls = [f"{'status = ' * guards}{call};"]
-        calls += [_write(g) for g in ("state", "out") if g in types]
-    for reset in block.resets:
-        rest = [own[group] for group in ("param", "in") if group in types]
-        calls += [f"{name}_{reset}({', '.join(['&other', *rest])});", _write("other")]
-    declarations = [f"{kind} {group};" for group, kind in types.items() if group != "param"]
-    if block.inputs:
-        calls.insert(0, _read("in"))
-    if block.parameters:
-        calls.insert(0, f"if (argc > 2) {{ {_read('given')} }}")
-        declarations.append(f"{types['param']} given = {name}_default;")
-        declarations.append(f"const {types['param']} *param = argc > 2 ? &given : &{name}_default;")
-    if block.resets:
-        declarations.append(f"{types['state']} other;")
-    if guards:
-        declarations += ["unsigned int status;", f"{real.name} said;"]
-        calls += [f"said = ({real.name})status;", _write("said")]
-    if block.is_function and block.inputs:
-        declarations.append(f"{real.name} in[{len(block.inputs)}];")
-    if block.states:
-        declarations.append(f"{name}_init(&state, &{name}_start);")
-    return filled(
-        TEMPLATES / "steps.c",
-        name=name,
-        declarations="\n".join(f"    {line}" for line in declarations),
-        body="\n".join(f"        {line}" for line in calls),
+    start = f"{c.name}_init({c.casts['state']}, &{c.name}_start);" if c.block.states else ""
+    if c.block.parameters:
+        start += f" if (!own) {{ param = (const {c.real.name} *)&{c.name}_default; }}"
+    given = [c.casts[group] for group in ("param", "in") if group in c.block.members]
+    write = f"fwrite(other, sizeof({c.real.name}), STATES, stdout);"
+    resets = (
+        f"{c.name}_{reset}({', '.join([f'({c.name}_state_t *)other', *given])}); {write}"
+        for reset in c.block.resets
     )
+    steps = {"start": start, "resets": "\n        ".join(resets), "guards": int(c.guards)}
+    return filled(TEMPLATES / "steps.c", **c.sizes, **steps)
 
 
-def _write(what: str) -> str:
-    return f"fwrite(&{what}, sizeof {what}, 1, stdout);"
+def compiled(c: CBlock, parts: Sequence[Path], include: Path, compiler: Compiler) -> Path:
+    """Compile and link the `program` of a block with C or object files; return the executable.
+
+    Raises:
+        CompileError: the compiler rejects the C.
+    """
+    main = parts[0].parent / f"{c.name}_main.c"
+    write_text(main, program(c))
+    target = main.with_suffix("")
+    files = [str(part) for part in (main, *parts)]
+    compiler.run(*FLAGS, f"-I{include}", *files, "-o", str(target), "-lm")
+    return target
 
 
-def _read(what: str) -> str:
-    return f"if (fread(&{what}, sizeof {what}, 1, stdin) != 1) {{ return 1; }}"
-
-
-def run_c(
-    block: Block,
-    real: Real,
-    executable: Path,
-    inputs: Array,
-    parameters: Array | None = None,
-    *,
-    guards: bool = True,
-) -> Array:
+def run_c(c: CBlock, executable: Path, inputs: Array, parameters: Array | None = None) -> Array:
     """Return rows (steps, columns) of the compiled `program` for `inputs` (steps, inputs).
 
     Args:
@@ -212,30 +156,24 @@ def run_c(
         CompileError: the program does not run here, or ends too early.
     """
     given = inputs if parameters is None else np.column_stack([parameters, inputs])
-    command = [str(executable), str(len(inputs)), *(["own"] if parameters is not None else [])]
+    command = [str(executable), str(len(inputs)), *["own"] * (parameters is not None)]
     with np.errstate(over="ignore", under="ignore"):
-        numbers = given.astype(real.kind).tobytes()
+        numbers = given.astype(c.real.kind).tobytes()
     try:
         limit = PATIENCE + PER_STEP * len(inputs)
         done = finished(command, numbers, limit=limit, name="the program that was compiled")
     except ProgramError as error:
         raise CompileError(str(error)) from None
-    columns = len(signals(block, guards=guards))
-    if done.status != 0 or len(done.output) != len(inputs) * columns * real.size:
+    shape = len(inputs), len(c.signals)
+    if done.status != 0 or len(done.output) != shape[0] * shape[1] * c.real.size:
         raise CompileError(f"the program ended too early, with status {done.status}")
-    return np.frombuffer(done.output, real.kind).reshape(len(inputs), columns).astype(float)
+    return np.frombuffer(done.output, c.real.kind).reshape(shape).astype(float)
 
 
 def run_vm(
-    block: Block,
-    real: Real,
-    inputs: Array,
-    states: Array | None = None,
-    parameters: Array | None = None,
-    *,
-    guards: bool = True,
+    c: CBlock, inputs: Array, states: Array | None = None, parameters: Array | None = None
 ) -> Array:
-    """Return the same rows from CasADi in double, with inputs and parameters rounded to `real`.
+    """Return the same rows from CasADi in double, with inputs and parameters rounded to the type.
 
     The guards are those of `GuardModel`.
 
@@ -243,47 +181,36 @@ def run_vm(
         states: shape (steps, states): every step but the first starts from the row before.
         parameters: of every step, shape (steps, parameters); by default those of the block.
     """
-    model = GuardModel(block, real)
-    inputs, said = real.rounded(inputs), np.zeros(len(inputs), np.int64)
-    if guards:
+    block, model = c.block, GuardModel(c)
+    inputs, said = c.real.rounded(inputs), np.zeros(len(inputs), np.int64)
+    if c.guards:
         inputs, said = model.inputs(inputs)
-    p, x, u = model.default.copy(), model.start.copy(), np.zeros(len(block.inputs))
+    p, x, u = c.default.copy(), c.start.copy(), np.zeros(len(block.inputs))
     following, y = np.zeros_like(x), np.zeros(len(block.outputs))
-    step = bound(block.step, (x, p, u), (following, y))
     others = [np.zeros_like(x) for _ in block.resets]
-    calls = [
-        bound(block.reset(reset), (x, p, u), (other,))
-        for reset, other in zip(block.resets, others, strict=True)
-    ]
-    rows = np.zeros((len(inputs), len(signals(block, guards=guards))))
+    results = [(following, y), *((other,) for other in others)]
+    calls = [bound(f, (x, p, u), of) for f, of in zip(block.functions, results, strict=True)]
+    rows = np.zeros((len(inputs), len(c.signals)))
     for k, (row, now) in enumerate(zip(rows, inputs, strict=True)):
         u[:] = now
         if states is not None and k:
             x[:] = states[k - 1]
         if parameters is not None:
-            p[:] = real.rounded(parameters[k])
-            if guards:
+            p[:] = c.real.rounded(parameters[k])
+            if c.guards:
                 p[:], bits = model.parameters(p)
                 said[k] |= bits
-        if guards and model.lost(x):
-            x[:] = model.start
+        if c.guards and model.lost(x):
+            x[:] = c.start
             said[k] |= Status.STATE
-        step()
         for call in calls:
             call()
-        if guards and not np.isfinite(y).all():
-            following[:], y[:] = model.start, 0.0
+        if c.guards and not np.isfinite(y).all():
+            following[:], y[:] = c.start, 0.0
             said[k] |= Status.OUTPUT
-        row[:] = np.concatenate([following, y, *others, said[k : k + 1] if guards else ()])
+        row[:] = np.concatenate([following, y, *others, said[k : k + 1] if c.guards else ()])
         x[:] = following
     return rows
-
-
-def signals(block: Block, *, guards: bool = True) -> list[str]:
-    """Return the names of the columns."""
-    states = [v.name for v in block.states]
-    later = [f"{r}.{name}" for r in block.resets for name in states]
-    return states + list(block.outputs) + later + ["status"] * guards
 
 
 @final
@@ -291,25 +218,17 @@ def signals(block: Block, *, guards: bool = True) -> list[str]:
 class GuardModel:
     """Guards of a block in NumPy, on rows of numbers of one type."""
 
-    block: Block
-    real: Real
-
-    @cached_property
-    def start(self) -> Array:
-        """Start values of the states."""
-        return self.real.rounded([v.start for v in self.block.states])
-
-    @cached_property
-    def default(self) -> Array:
-        """Default parameters, in the type."""
-        return self.real.rounded([v.start for v in self.block.parameters])
+    c: CBlock
 
     def inputs(self, rows: Array) -> tuple[Array, NDArray[np.int64]]:
         """Return inputs (steps, inputs) after the guards, and the status of every step."""
         found, status = rows.copy(), np.zeros(len(rows), np.int64)
-        for i in self._used:
-            found[:, i], bits = self._mended(rows[:, i], range_of(self.block.inputs[i]))
-            status |= bits
+        for i, within in self._used.items():
+            low, high, safe = self.c.real.rounded(within)
+            finite = np.isfinite(rows[:, i])
+            found[:, i] = np.where(finite, np.clip(rows[:, i], low, high), safe)
+            status[~finite] |= Status.NOT_FINITE
+            status[finite & (found[:, i] != rows[:, i])] |= Status.CLAMPED
         return found, status
 
     def lost(self, states: Array) -> bool:
@@ -322,33 +241,102 @@ class GuardModel:
         unfit = ~((values >= low) & (values <= high))
         found = values.copy()
         if unfit[~is_size].any():
-            found[~is_size] = self.default[~is_size]
+            found[~is_size] = self.c.default[~is_size]
         for i in np.flatnonzero(unfit & is_size):
-            found[i] = np.clip(values[i], low[i], high[i])
-            found[i] = found[i] if np.isfinite(values[i]) else self.default[i]
+            clipped = np.clip(values[i], low[i], high[i])
+            found[i] = clipped if np.isfinite(values[i]) else self.c.default[i]
         return found, int(Status.PARAMETER) if unfit.any() else 0
 
     @cached_property
-    def _used(self) -> tuple[int, ...]:
-        """Inputs that the step depends on; only these are checked."""
-        nodes = graph(self.block.step).nodes
-        return tuple(n.entry[1] for n in nodes if n.op == ca.OP_INPUT and n.entry[0] == 2)
+    def _used(self) -> dict[int, Range]:
+        """Ranges of the inputs that the step depends on; only these are checked."""
+        entries = (n.entry for n in graph(self.c.block.step).nodes if n.op == ca.OP_INPUT)
+        return {row: range_of(self.c.block.inputs[row]) for group, row in entries if group == 2}
 
     @cached_property
     def _limits(self) -> Array:
-        return self.real.rounded([state_limit(v) for v in self.block.states])
+        return self.c.real.rounded([state_limit(v) for v in self.c.block.states])
 
     @cached_property
     def _ranges(self) -> tuple[Array, Array, NDArray[np.bool_]]:
-        ranges = [parameter_range(v) for v in self.block.parameters]
-        low, high = (
-            self.real.rounded([getattr(r, side) for r in ranges]) for side in ("low", "high")
-        )
-        return low, high, np.array([v.name == STEP_SIZE for v in self.block.parameters], bool)
+        ranges = [parameter_range(v) for v in self.c.block.parameters]
+        low, high = (self.c.real.rounded([r[side] for r in ranges]) for side in (0, 1))
+        return low, high, np.array([v.name == STEP_SIZE for v in self.c.block.parameters], bool)
 
-    def _mended(self, column: Array, within: Range) -> tuple[Array, NDArray[np.int64]]:
-        low, high, safe = self.real.rounded([within.low, within.high, within.safe])
-        finite = np.isfinite(column)
-        found = np.where(finite, np.clip(column, low, high), safe)
-        kinds = np.where(finite, int(Status.CLAMPED), int(Status.NOT_FINITE))
-        return found, np.where(finite & (found == column), 0, kinds).astype(np.int64)
+
+def _remainder(x: float, y: float) -> float:
+    return remainder(x, y) if y and isfinite(x) else nan
+
+
+NUMPY = {"pow": "power"} | {
+    f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan", "tan2", "sinh", "cosh", "tanh")
+}
+"""Functions with other names in NumPy than in C99."""
+
+OPERATIONS: dict[int, Callable[..., Any]] = {
+    CODES[name]: getattr(np, other)
+    for name, other in (
+        ("add", "add"), ("sub", "subtract"), ("mul", "multiply"), ("div", "divide"),
+        ("neg", "negative"), ("sq", "square"), ("inv", "reciprocal"), ("sign", "sign"),
+        ("lt", "less"), ("le", "less_equal"), ("eq", "equal"), ("ne", "not_equal"),
+        ("not", "logical_not"), ("and", "logical_and"), ("or", "logical_or"), ("fmin", "fmin"),
+        ("fmax", "fmax"),
+    )
+} | {
+    op: getattr(np, NUMPY.get(name, name))
+    for op, name in FUNCTIONS.items()
+    if name not in ("erf", "remainder")  # absent, and another function
+} | {
+    ca.OP_TWICE: partial(np.multiply, 2), CODES["erf"]: erf,
+    CODES["remainder"]: np.vectorize(_remainder, otypes=[float]),
+}  # fmt: skip
+"""Functions of arrays by CasADi's numbers of operations."""
+
+
+def in_type(
+    function: ca.Function,
+    arguments: Sequence[Array],
+    kind: str,
+    random: np.random.Generator | None = None,
+) -> Array:
+    """Return the results of a function, below each other, with every operation rounded to a type.
+
+    Args:
+        function: of SX, with dense arguments and results.
+        arguments: rows of numbers, shape (rows, size of the argument).
+        kind: NumPy's name of the type, such as "f4".
+        random: rounds each inexact result randomly to one of its two neighbours, instead of to the
+            nearest. Differences between runs are rounding errors.
+            Source: Vignes, Mathematics and Computers in Simulation 35 (1993), CESTAC.
+
+    Returns:
+        Shape (rows, results), in double.
+    """
+    source, found = graph(function), list[Array]()
+    with np.errstate(all="ignore"):
+        for node in source.nodes:
+            given = [found[i] for i in node.args]
+            if node.op == ca.OP_INPUT:
+                value = arguments[node.entry[0]][:, node.entry[1]]
+            elif node.op == ca.OP_CONST:
+                value = np.full(len(arguments[0]), node.value)
+            elif node.op in (SELECT, ca.OP_IF_ELSE_ZERO):
+                value = np.where(given[0] != 0, given[1], given[2] if len(given) > 2 else 0.0)
+            elif random is None:
+                value = OPERATIONS[node.op](*given)
+            else:
+                exact = np.asarray(OPERATIONS[node.op](*(x.astype(float) for x in given)), float)
+                value = _up_or_down(exact, kind, random)
+            found.append(np.asarray(value).astype(kind))
+    return np.column_stack([found[i] for row in source.results for i in row]).astype(float)
+
+
+def _up_or_down(exact: Array, kind: str, random: np.random.Generator) -> Array:
+    """Return a random neighbour of the type for each number, or the number itself if exact.
+
+    The double nearest to a result of an operation on floats stands for the result itself.
+    """
+    nearest = exact.astype(kind)
+    beyond = np.where(exact > nearest, np.inf, -np.inf).astype(kind)
+    other = (exact != nearest) & (random.random(exact.shape) < 0.5)
+    return np.where(other, np.nextafter(nearest, beyond), nearest)

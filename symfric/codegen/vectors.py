@@ -6,17 +6,17 @@ that both outcomes of every comparison in the block occur if they do in that run
 parameter is changed, in the rows in which that matters most; with guards, bad inputs follow.
 """
 
-from dataclasses import dataclass
-from typing import final
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.rounding import in_type
-from symfric.codegen.runner import run_vm
-from symfric.emitter.c99 import Real
+from symfric.codegen.layout import CBlock
+from symfric.codegen.runner import in_type, run_vm
 from symfric.foundation.graph import Graph, graph, rebuild
 from symfric.foundation.parameters import Variable
 
@@ -42,9 +42,7 @@ more, such as at a jump, is left out.
 BAD = (np.nan, np.inf, -np.inf)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Steps:
+class Steps(NamedTuple):
     """Independent steps, one per row, all numbers rounded to the type.
 
     Attributes:
@@ -57,9 +55,6 @@ class Steps:
     inputs: Array
     changed: Integers
     values: Array
-
-    def __len__(self) -> int:
-        return len(self.changed)
 
     def chosen(self, rows: Integers) -> "Steps":
         """Return some of the rows."""
@@ -78,48 +73,41 @@ class Vectors:
         tolerance: of each result, shape (results,).
     """
 
-    block: Block
-    real: Real
+    c: CBlock
     steps: Steps
     results: Array
     status: Integers
     tolerance: Array
 
 
-def vectors(block: Block, real: Real, guards: bool) -> Vectors:
+def vectors(c: CBlock) -> Vectors:
     """Return test vectors of a block in a floating point type, the same at each call."""
-    run = _run(block, real)
-    results, _ = made(block, real, run, guards=False)
-    spread = _spread(block, real, run, results)
+    bare = replace(c, guards=False)
+    run = _run(bare)
+    results = made(bare, run)
+    spread = _spread(bare, run, results)
     peak = np.abs(results).max(axis=0, initial=0.0)
     usual = np.quantile(spread, 0.9, axis=0) if len(spread) else peak
-    tolerance = np.maximum(BASE[real.size] * np.where(peak > 0, peak, 1.0), ROUNDINGS * usual)
+    tolerance = np.maximum(BASE[c.real.size] * np.where(peak > 0, peak, 1.0), ROUNDINGS * usual)
     sound = np.flatnonzero(_is_sound(spread, tolerance))
-    sound = sound[_telling(block, real, run.chosen(sound))]
+    sound = sound[_telling(c, run.chosen(sound))]
     parts = [run.chosen(sound)]
-    parts += [
-        _changing(block, real, parts[0], results[sound], i, tolerance)
-        for i in range(len(block.parameters))
-        if len(sound)
-    ]
-    if guards and len(sound):
-        parts.append(_bad(block, parts[0]))
-    steps = _joined(parts)
-    found, status = made(block, real, steps, guards=guards)
-    return Vectors(block, real, steps, found, status, tolerance)
+    if len(sound):
+        count = len(c.block.parameters)
+        parts += [_changing(bare, parts[0], results[sound], i, tolerance) for i in range(count)]
+        parts += _bad(c.block, parts[0]) if c.guards else ()
+    steps = Steps(*map(np.concatenate, zip(*parts, strict=True)))
+    found, status = made(c, steps), np.zeros(len(steps.changed), np.int64)
+    if c.guards:
+        found, status = found[:, :-1], found[:, -1].astype(np.int64)
+    return Vectors(c, steps, found, status, tolerance)
 
 
-def made(block: Block, real: Real, steps: Steps, *, guards: bool) -> tuple[Array, Integers]:
-    """Return results and status of steps by CasADi; `run_vm` makes one step before them."""
-    first, given = np.zeros((1, len(block.inputs))), _parameters(block, real, steps)
-    parameters, inputs = (
-        np.vstack([_defaults(block, real), given]),
-        np.vstack([first, steps.inputs]),
-    )
-    found = run_vm(block, real, inputs, steps.states, parameters, guards=guards)[1:]
-    if not guards:
-        return found, np.zeros(len(steps), np.int64)
-    return found[:, :-1], found[:, -1].astype(np.int64)
+def made(c: CBlock, steps: Steps) -> Array:
+    """Return the rows of steps by CasADi, see `run_vm`, which makes one step before them."""
+    inputs = np.vstack([np.zeros((1, len(c.block.inputs))), steps.inputs])
+    parameters = np.vstack([c.default, _parameters(c, steps)])
+    return run_vm(c, inputs, steps.states, parameters)[1:]
 
 
 def excitation(block: Block) -> Array:
@@ -152,25 +140,19 @@ def _signal(variable: Variable, random: np.random.Generator) -> Array:
     return np.clip(variable.nominal * shape, variable.lower, variable.upper)
 
 
-def _run(block: Block, real: Real) -> Steps:
+def _run(c: CBlock) -> Steps:
     """Return the steps of a run, as far as it is finite."""
-    inputs, count = real.rounded(excitation(block)), len(block.states)
-    after = run_vm(block, real, inputs, guards=False)
-    start = np.array([[float(v.start) for v in block.states]])
-    states = real.rounded(np.vstack([start, after[:-1, :count]]))
+    inputs, count = c.real.rounded(excitation(c.block)), len(c.block.states)
+    after = run_vm(c, inputs)
+    states = c.real.rounded(np.vstack([c.start, after[:-1, :count]]))
     broken = ~(np.isfinite(after).all(axis=1) & np.isfinite(states).all(axis=1))
     end = int(np.argmax(broken)) if broken.any() else len(inputs)
-    none = np.full(end, -1, np.int64)
-    return Steps(states[:end], inputs[:end], none, np.zeros(end))
+    return Steps(states[:end], inputs[:end], np.full(end, -1, np.int64), np.zeros(end))
 
 
-def _defaults(block: Block, real: Real) -> Array:
-    return real.rounded([float(v.start) for v in block.parameters])
-
-
-def _parameters(block: Block, real: Real, steps: Steps) -> Array:
+def _parameters(c: CBlock, steps: Steps) -> Array:
     """Return the parameters of every step, shape (rows, parameters)."""
-    found = np.tile(_defaults(block, real), (len(steps), 1))
+    found = np.tile(c.default, (len(steps.changed), 1))
     rows = np.flatnonzero(steps.changed >= 0)
     found[rows, steps.changed[rows]] = steps.values[rows]
     return found
@@ -181,41 +163,32 @@ def _is_sound(spread: Array, tolerance: Array) -> NDArray[np.bool_]:
     return np.all(ROUNDINGS / 2 * spread <= tolerance, axis=1)
 
 
-def _spread(block: Block, real: Real, steps: Steps, results: Array) -> Array:
+def _spread(c: CBlock, steps: Steps, results: Array) -> Array:
     """Return changes of the results by rounding of the inputs, shape (rows, results)."""
     random, found = np.random.default_rng(1), np.zeros_like(results)
-    unit = float(np.finfo(f"f{real.size}").eps)
-    first, given = np.zeros((1, len(block.inputs))), _parameters(block, real, steps)
+    unit = float(np.finfo(c.real.kind).eps)
+    first, given = np.zeros((1, len(c.block.inputs))), _parameters(c, steps)
 
     def near(x: Array) -> Array:
         return x * (1.0 + unit * random.choice([-1.0, 1.0], x.shape))
 
     for _ in range(3):
-        parameters = near(np.vstack([_defaults(block, real), given]))
+        parameters = near(np.vstack([c.default, given]))
         inputs = np.vstack([first, near(steps.inputs)])
-        other = run_vm(block, real, inputs, near(steps.states), parameters, guards=False)[1:]
+        other = run_vm(c, inputs, near(steps.states), parameters)[1:]
         found = np.maximum(found, np.abs(other - results))
-    if real.size == 4:
-        found = np.fmax(found, np.abs(_in_float(block, steps, given, results) - results))
+    if c.real.size == 4:
+        arguments = [steps.states, given, steps.inputs]
+        rounded = np.hstack([in_type(function, arguments, "f4") for function in c.block.functions])
+        found = np.fmax(found, np.abs(rounded - results))
     return found
 
 
-def _in_float(block: Block, steps: Steps, parameters: Array, results: Array) -> Array:
-    """Return results with every operation in float; NaN if unknown."""
-    arguments = [steps.states, parameters, steps.inputs]
-    parts: list[Array] = []
-    for function in (block.step, *(block.reset(name) for name in block.resets)):
-        rows = in_type(function, arguments, "f4")
-        parts.append(np.full_like(results, np.nan) if rows is None else rows)
-    found = np.hstack(parts)
-    return found if found.shape == results.shape else np.full_like(results, np.nan)
-
-
-def _telling(block: Block, real: Real, steps: Steps) -> Integers:
+def _telling(c: CBlock, steps: Steps) -> Integers:
     """Return rows with each outcome of each comparison, and some equidistant ones."""
-    seen: set[tuple[int, bool]] = set()
-    chosen = set(np.linspace(0, len(steps) - 1, min(PLAIN, len(steps))).astype(int).tolist())
-    for k, outcomes in enumerate(_outcomes(block, real, steps).astype(bool).tolist()):
+    count, seen = len(steps.changed), set[tuple[int, bool]]()
+    chosen = set(np.linspace(0, count - 1, min(PLAIN, count)).astype(int).tolist())
+    for k, outcomes in enumerate(_outcomes(c, steps).astype(bool).tolist()):
         new = set(enumerate(outcomes)) - seen
         if new:
             seen |= new
@@ -228,35 +201,33 @@ SIDES = frozenset({ca.OP_FABS, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX})
 """Operations that have two branches in C: by the sign of a number, or by which one is smaller."""
 
 
-def _outcomes(block: Block, real: Real, steps: Steps) -> Array:
+def _outcomes(c: CBlock, steps: Steps) -> Array:
     """Return outcomes of the comparisons in a step, shape (rows, comparisons)."""
-    source = graph(block.step)
-    asked = [(i, n) for i, n in enumerate(source.nodes) if n.op in COMPARISONS | SIDES]
-    if not (asked and len(steps)):
-        return np.zeros((len(steps), 0))
-    plain = tuple(i for i, n in asked if n.op in COMPARISONS)
-    sides = [(*n.args, n.args[0])[:2] for _, n in asked if n.op in SIDES]
+    step, count = c.block.step, len(steps.changed)
+    source = graph(step)
+    plain = tuple(i for i, n in enumerate(source.nodes) if n.op in COMPARISONS)
+    sides = [(*n.args, n.args[0])[:2] for n in source.nodes if n.op in SIDES]
+    if not ((plain or sides) and count):
+        return np.zeros((count, 0))
     alone = np.array([a == b for a, b in sides], bool)
     wanted = (plain, tuple(a for a, _ in sides), tuple(b for _, b in sides))
-    arguments = [ca.SX.sym("x", *block.step.size_in(i)) for i in range(3)]
+    arguments = [ca.SX.sym("x", *step.size_in(i)) for i in range(3)]
     columns = rebuild(Graph(source.nodes, wanted), arguments, {})
-    function = ca.Function("outcomes", arguments, columns).map(len(steps))
-    p = np.tile(_defaults(block, real)[:, None], (1, len(steps)))
+    function = ca.Function("outcomes", arguments, columns).map(count)
+    p = np.tile(c.default[:, None], (1, count))
     found = function(steps.states.T, p, steps.inputs.T)
     held, first, second = (column.full().T for column in found)
     return np.hstack([held != 0, first < np.where(alone, 0.0, second)])
 
 
-def _changing(
-    block: Block, real: Real, steps: Steps, before: Array, i: int, tolerance: Array
-) -> Steps:
+def _changing(c: CBlock, steps: Steps, before: Array, i: int, tolerance: Array) -> Steps:
     """Return the rows in which changing parameter `i` changes most, relative to the tolerance."""
-    value = float(real.rounded(changed_value(block.parameters[i])))
-    changed = np.full(len(steps), i, np.int64)
-    new = Steps(steps.states, steps.inputs, changed, np.full(len(steps), value))
-    after, _ = made(block, real, new, guards=False)
+    value = float(c.real.rounded(changed_value(c.block.parameters[i])))
+    values = np.full(len(steps.changed), value)
+    new = steps._replace(changed=np.full(len(values), i, np.int64), values=values)
+    after = made(c, new)
     effect = (np.abs(after - before) / tolerance).max(axis=1, initial=0.0)
-    fit = np.isfinite(effect) & _is_sound(_spread(block, real, new, after), tolerance)
+    fit = np.isfinite(effect) & _is_sound(_spread(c, new, after), tolerance)
     rows = np.argsort(np.where(fit, effect, -1.0))[::-1][:EACH]
     return new.chosen(rows[fit[rows]])
 
@@ -268,26 +239,18 @@ def changed_value(variable: Variable) -> float:
     return start + step if start + step <= variable.upper else start - step
 
 
-def _bad(block: Block, steps: Steps) -> Steps:
-    """Return the last row with each input, state and parameter bad, one at a time."""
-    last = steps.chosen(np.array([len(steps) - 1]))
-    found: list[Steps] = []
-    for i in range(len(block.inputs)):
-        for value in BAD:
-            inputs = last.inputs.copy()
-            inputs[0, i] = value
-            found.append(Steps(last.states, inputs, last.changed, last.values))
-    for i in range(len(block.states)):
-        for value in BAD:
-            states = last.states.copy()
-            states[0, i] = value
-            found.append(Steps(states, last.inputs, last.changed, last.values))
+def _bad(block: Block, steps: Steps) -> Iterator[Steps]:
+    """Yield the last row with each input, state and parameter bad, one at a time."""
+    last = steps.chosen(np.array([-1]))
+
+    def spoiled(column: Array) -> Iterator[Array]:
+        for i in range(column.shape[1]):
+            for value in BAD:
+                bad = column.copy()
+                bad[0, i] = value
+                yield bad
+
+    yield from (last._replace(inputs=inputs) for inputs in spoiled(last.inputs))
+    yield from (last._replace(states=states) for states in spoiled(last.states))
     for i in range(len(block.parameters)):
-        found.append(Steps(last.states, last.inputs, np.array([i]), np.array([np.nan])))
-    return _joined(found) if found else last
-
-
-def _joined(parts: list[Steps]) -> Steps:
-    """Concatenate steps."""
-    names = ("states", "inputs", "changed", "values")
-    return Steps(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+        yield last._replace(changed=np.array([i]), values=np.array([np.nan]))

@@ -2,33 +2,23 @@
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, final
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.compared import TOLERANCE, Run, excitation, spoiled, terms, ulp, varied
+from symfric.codegen.compared import TOLERANCE, Run, ulp
 from symfric.codegen.generated import Generated
-from symfric.codegen.guards import HUGE, Status
-from symfric.codegen.layout import prefix
-from symfric.codegen.routines import routines
-from symfric.codegen.runner import (
-    compile_object,
-    link_program,
-    needed_symbols,
-    program,
-    run_c,
-    run_vm,
-    signals,
-)
-from symfric.emitter.c99 import REALS, Real
+from symfric.codegen.guards import HUGE, STEP_SIZE, Status, parameter_range, range_of
+from symfric.codegen.layout import CBlock
+from symfric.codegen.runner import compile_object, compiled, needed_symbols, run_c, run_vm
+from symfric.codegen.source import routines
+from symfric.emitter.c99 import DOUBLE
 from symfric.foundation.checks import kind
-from symfric.foundation.files import write_text
+from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import CompileError, Compiler, find_compiler, missing_compiler
 
 Array = NDArray[np.float64]
@@ -104,6 +94,15 @@ class Check:
             return self.warnings[0]
         return f"it needs {', '.join(self.foreign)}" if self.foreign else ""
 
+    @property
+    def row(self) -> tuple[str, ...]:
+        """Cells of the table of a `Verification`."""
+        bits = "-" if self.ulp is None else "equal" if self.ulp == 0 else f"{self.ulp} ulp"
+        foreign = "not checked" if self.foreign is None else " ".join(self.foreign) or "none"
+        error = f"{self.error:.1e}" if self.error else "0"
+        numbers = self.real, str(self.steps), str(len(self.warnings)), bits, error
+        return *numbers, self.worst or "-", str(self.ties), foreign
+
 
 ROUNDINGS = 4.0
 """Safety factor on the observed random rounding, which need not contain the worst case."""
@@ -144,12 +143,9 @@ class Verification:
         if not self.checks:
             return head
         rows = [("real", "steps", "warnings", "bits", "error", "of", "ties", "foreign symbols")]
-        rows += [_row(check) for check in self.checks]
-        widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
-        lines = (
-            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-            for row in rows
-        )
+        rows += [check.row for check in self.checks]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
         return "\n".join([head, *lines])
 
 
@@ -199,11 +195,11 @@ def verify(
     block, found = generated.block, find_compiler(compiler)
     if found is None:
         return Verification(block.name, f"not verified: {missing_compiler()}", None, ())
-    given, of = _given(generated), cache(partial(terms, block))
+    sequences = _sequences(block, generated.guards)
     checks: list[Check] = []
     try:
         for real in generated.reals:
-            checks.append(_check(generated, REALS[real], found, given, of))
+            checks.append(_check(generated, generated.c(real), found, sequences))
     except CompileError as error:
         return Verification(block.name, f"not verified: {error}", str(found), tuple(checks))
     wrong = [f"{check.real}: {check.why}" for check in checks if not check.ok]
@@ -211,7 +207,7 @@ def verify(
     lost = [check.runs_away for check in checks if check.runs_away is not None]
     if lost:
         whole = block if adjustable is None or "h" not in block.constants else adjustable()
-        status = f"failed: {_too_long(whole, step_size(block), lost[0], given[0][0])}"
+        status = f"failed: {_too_long(whole, block.sample_time, lost[0], sequences[0][0])}"
     return Verification(block.name, status, str(found), tuple(checks))
 
 
@@ -226,109 +222,75 @@ def _too_long(block: Block, h: float | None, steps: int, inputs: Array) -> str:
     return f"{said}, {shorter:g} s is not"
 
 
-Given = list[tuple[Array, Array | None]]
-"""Inputs and, where they are not the defaults of the C, parameters of every run."""
+Sequences = list[tuple[Array, Array | None]]
+"""Inputs and, if they are not the defaults of the C, parameters of every run."""
 
 
-def _given(generated: Generated) -> Given:
-    block = generated.block
-    found: Given = [(excitation(block, STEPS), None)]
+def _sequences(block: Block, guards: bool) -> Sequences:
+    found: Sequences = [(excitation(block, STEPS), None)]
     few = found[0][0][:FEWER]
-    if generated.guards and block.inputs:
+    if guards and block.inputs:
         found.append((spoiled(block, few), None))
     if block.parameters:
-        parameters = varied(block, FEWER, 10.0)
-        rows = run_vm(block, REALS["double"], few, parameters=parameters, guards=False)
-        if runs_away(block, rows) is not None:  # a plant needs no steps longer than its own
-            parameters = varied(block, FEWER, 1.0)
+        parameters, bare = varied(block, FEWER, 10.0), CBlock(block, DOUBLE, guards=False)
+        if runs_away(bare, run_vm(bare, few, parameters=parameters)) is not None:
+            parameters = varied(block, FEWER, 1.0)  # a plant needs no steps longer than its own
         found.append((few, parameters))
     return found
 
 
-def _check(
-    generated: Generated,
-    real: Real,
-    compiler: Compiler,
-    given: Given,
-    of: Callable[[], ca.Function],
-) -> Check:
-    block = generated.block
+def _check(generated: Generated, c: CBlock, compiler: Compiler, sequences: Sequences) -> Check:
+    is_float, runs = c.real.size == 4, list[Run]()
     with TemporaryDirectory(prefix="symfric-") as name:
-        folder = Path(name)
-        target, main = folder / f"{prefix(block, real)}.o", folder / "main.c"
-        warnings = compile_object(compiler, generated.source(real.name), target)
-        write_text(main, program(block, real, generated.guards))
-        link_program(compiler, [main, target], generated.folder, folder / "main")
-        runs = [
-            Run(generated, real, *g, *_rows(generated, real, folder / "main", *g), of)
-            for g in given
-        ]
+        target = Path(name) / f"{c.name}.o"
+        warnings = compile_object(compiler, generated.source(c.real.name), target)
+        executable = compiled(c, [target], generated.folder, compiler)
+        for inputs, parameters in sequences:
+            rows = run_c(c, executable, inputs, parameters)
+            states = rows[:, : len(c.block.states)] if is_float else None
+            expected = run_vm(c, inputs, states, parameters)
+            runs.append(Run(c, inputs, parameters, rows, expected))
         needed = needed_symbols(target)
-        allowed = _allowed(block, real, generated.guards)
     worst = max(runs, key=lambda run: run.error)
     return Check(
-        real=real.name,
+        real=c.real.name,
         steps=sum(len(run.rows) for run in runs),
         warnings=tuple(warnings),
-        ulp=max(ulp(run.rows, run.expected) for run in runs) if real.size == 8 else None,
+        ulp=None if is_float else max(ulp(run.rows, run.expected) for run in runs),
         error=worst.error,
-        foreign=None if needed is None else tuple(sorted(needed - allowed)),
-        runs_away=runs_away(block, runs[0].expected),
+        foreign=None if needed is None else tuple(sorted(needed - _allowed(c))),
+        runs_away=runs_away(c, runs[0].expected),
         worst=worst.worst,
-        rounding=worst.rounding if real.size == 4 and worst.error > TOLERANCE else None,
+        rounding=worst.rounding if is_float and worst.error > TOLERANCE else None,
         ties=sum(int(run.tied.any(axis=1).sum()) for run in runs),
     )
 
 
-def _rows(
-    generated: Generated, real: Real, executable: Path, inputs: Array, parameters: Array | None
-) -> tuple[Array, Array]:
-    """Return the results of one sequence of inputs, by C and by CasADi."""
-    block, guards = generated.block, generated.guards
-    rows = run_c(block, real, executable, inputs, parameters, guards=guards)
-    own = rows[:, : len(block.states)] if real.size == 4 else None
-    return rows, run_vm(block, real, inputs, own, parameters, guards=guards)
-
-
-def _allowed(block: Block, real: Real, guards: bool) -> set[str]:
+def _allowed(c: CBlock) -> set[str]:
     """Return the allowed functions: those of math.h, and memcpy, by which compilers copy
     structs.
     """
-    functions = {call for routine in routines(block, real, guards) for call in routine.calls}
+    functions = {call for routine in routines(c) for call in routine.calls}
     if {"sin", "cos"} <= functions:
         functions.add("sincos")
-    own = {f"{function}{real.letter}" for function in functions}
+    own = {f"{function}{c.real.letter}" for function in functions}
     return own | {"_GLOBAL_OFFSET_TABLE_", "memcpy"}
-
-
-def _row(check: Check) -> tuple[str, ...]:
-    bits = "-" if check.ulp is None else "equal" if check.ulp == 0 else f"{check.ulp} ulp"
-    foreign = "not checked" if check.foreign is None else " ".join(check.foreign) or "none"
-    error = f"{check.error:.1e}" if check.error else "0"
-    numbers = check.real, str(check.steps), str(len(check.warnings)), bits, error
-    return *numbers, check.worst or "-", str(check.ties), foreign
 
 
 SHORTER = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3)
 
 
-def runs_away(block: Block, rows: Array) -> int | None:
+def runs_away(c: CBlock, rows: Array) -> int | None:
     """Return the first step after which a state is huge or not finite, or restarts; None if none.
 
     Args:
         rows: returned by `run_vm`.
     """
-    scale = np.array([v.nominal for v in block.states])
+    scale = np.array([v.nominal for v in c.block.states])
     lost = ~(np.abs(rows[:, : scale.size]) <= HUGE * scale).all(axis=1)
-    if rows.shape[1] == len(signals(block)):
+    if c.guards:
         lost |= (rows[:, -1].astype(int) & int(Status.STATE | Status.OUTPUT)) != 0
     return int(np.argmax(lost)) + 1 if lost.any() else None
-
-
-def step_size(block: Block) -> float | None:
-    """Return the step size [s] of a block that has one, as a parameter or as a constant."""
-    starts = {v.name: float(v.start) for v in block.parameters}
-    return starts.get("h", block.constants.get("h"))
 
 
 def longest_step(block: Block, inputs: Array, below: float) -> float | None:
@@ -339,14 +301,95 @@ def longest_step(block: Block, inputs: Array, below: float) -> float | None:
         inputs: of every step, shape (steps, inputs).
         below: the step size that is too long [s].
     """
-    if all(v.name != "h" for v in block.parameters):
+    if all(v.name != STEP_SIZE for v in block.parameters):
         return None
     for part in SHORTER:
         h = float(f"{part * below:.3g}")
-        shorter = replace(
-            block,
-            parameters=tuple(replace(v, start=h) if v.name == "h" else v for v in block.parameters),
-        )
-        if runs_away(block, run_vm(shorter, REALS["double"], inputs, guards=False)) is None:
+        parameters = (replace(v, start=h) if v.name == STEP_SIZE else v for v in block.parameters)
+        c = CBlock(replace(block, parameters=tuple(parameters)), DOUBLE, guards=False)
+        if runs_away(c, run_vm(c, inputs)) is None:
             return h
     return None
+
+
+STRETCH = 100
+"""Number of consecutive steps with one type of motion, or of load."""
+
+LOADS = (1.0, 10.0, 0.1, 1.5, 0.0, 1.0, 1e-3, 6.0, 0.5, 0.0, 100.0, 1.0)
+"""Loads in units of the nominal value, in a random order with jumps and zeros."""
+
+BAD = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e9, -1e9, 1e-310, -1.0)
+"""Bad values of an input, in units of its nominal value."""
+
+
+def excitation(block: Block, steps: int) -> Array:
+    """Return valid inputs of every step, shape (steps, inputs), the same at each call.
+
+    An input with a lower bound of 0 or more, such as a load, fluctuates about levels between which
+    it jumps by factors up to 1e5, including zero; the others get in turn, in units of their nominal
+    value, slow sines, bursts up to 2, tiny values of 1e-12 ... 1e-3, a hundred zeros and abrupt
+    reversals. All stay within their bounds.
+    """
+    random = np.random.default_rng(0)
+    columns = [_signal(variable, steps, random) for variable in block.inputs]
+    return np.column_stack([np.zeros((steps, 0)), *columns])
+
+
+def _signal(variable: Variable, steps: int, random: np.random.Generator) -> Array:
+    stretches = -(-steps // STRETCH)
+    if variable.lower >= 0.0:
+        levels = np.repeat(random.choice(LOADS, stretches), STRETCH)[:steps]
+        wavering = 1.0 + 0.5 * np.sin(0.003 * np.arange(steps) + random.uniform(0.0, 6.0))
+        return _within(variable, variable.nominal * levels * wavering)
+    pieces = motions(random, steps, 0.008, 0.03)
+    turn = np.repeat(random.integers(0, len(pieces), stretches), STRETCH)[:steps]
+    return _within(variable, variable.nominal * np.choose(turn, pieces))
+
+
+def motions(
+    random: np.random.Generator, steps: int, slow: float, turning: float, phase: float = 0.0
+) -> list[Array]:
+    """Return slow sines, bursts up to 2, values of 1e-12 ... 1e-3, reversals, and rest.
+
+    Args:
+        slow, turning: phase per step of sines and reversals [rad]; the latter begin at `phase`.
+    """
+    k = np.arange(steps)
+    tiny = 10.0 ** random.uniform(-12.0, -3.0, steps) * random.choice([-1.0, 1.0], steps)
+    bursts = np.clip(random.standard_normal(steps), -2.0, 2.0)
+    turns = 0.1 * np.sign(np.sin(turning * k + phase))
+    return [0.05 * np.sin(slow * k), bursts, tiny, turns, np.zeros(steps)]
+
+
+def _within(variable: Variable, values: Array) -> Array:
+    limits = range_of(variable)
+    return np.clip(values, limits.low, limits.high)
+
+
+def spoiled(block: Block, inputs: Array) -> Array:
+    """Return the inputs with a twentieth of the values not finite or out of range."""
+    random = np.random.default_rng(1)
+    nominal = np.array([v.nominal for v in block.inputs])
+    bad = random.choice(BAD, inputs.shape) * nominal
+    return np.where(random.uniform(size=inputs.shape) < 0.05, bad, inputs)
+
+
+def varied(block: Block, steps: int, longest: float) -> Array:
+    """Return parameters of every step, shape (steps, parameters), constant over `STRETCH` steps.
+
+    The step size passes through three decades up to `longest` times its default, the others through
+    +-20 %, or from 0 to a tenth if they are 0, within their bounds.
+    """
+    random = np.random.default_rng(2)
+    stretches = -(-steps // STRETCH)
+    columns = [np.zeros((stretches, 0))]
+    for variable in block.parameters:
+        start, limits = float(variable.start), parameter_range(variable)
+        if variable.name == STEP_SIZE:
+            values = start * longest * 10.0 ** random.uniform(-3.0, 0.0, stretches)
+        elif start == 0.0:
+            values = random.uniform(0.0, 0.1, stretches)
+        else:
+            values = start * random.uniform(0.8, 1.2, stretches)
+        columns.append(np.clip(values, limits.low, limits.high))
+    return np.repeat(np.column_stack(columns), STRETCH, axis=0)[:steps]

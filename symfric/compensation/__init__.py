@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
-    from symfric.compensation.compensator import Cascade as Cascade
     from symfric.compensation.compensator import compensator as compensator
     from symfric.compensation.force import TERMS as TERMS
+    from symfric.compensation.loop import Cascade as Cascade
     from symfric.compensation.loop import close_loop as close_loop
     from symfric.compensation.observers import disturbance_observer as disturbance_observer
     from symfric.compensation.observers import gms_observer as gms_observer

@@ -1,21 +1,21 @@
-"""Compensating force in the making: the terms of a law, and the stages that the force passes.
+"""Terms of the friction force of a law, and the variables of blocks that are built in stages.
 
-A stage adds its states, inputs and parameters to the parts of the block, and returns the force or
-velocity that it lets through; it is in the C only where it is chosen.
+A stage adds its states, inputs and parameters to the `Parts` of the block, and returns the
+modified force or velocity; the C contains only the chosen stages.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from math import inf
-from typing import final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
 
 from symfric.codegen import Block
+from symfric.foundation import checks
 from symfric.foundation.numeric import is_symbolic
 from symfric.foundation.parameters import Variable, parameters, with_values
+from symfric.foundation.variable import stacked, symbols_of
 from symfric.laws import GMS, Law
 from symfric.laws.base import smooth
 from symfric.laws.composed.wrap import Wrapper
@@ -33,7 +33,7 @@ TERMS = {
 
 
 LEAST = 1e-9
-"""Load [N] that is seen where there is none: laws with states divide by it."""
+"""Smallest load [N] of laws with states, which divide by it."""
 
 
 @final
@@ -48,8 +48,8 @@ class Terms:
         v, N: symbols of its inputs.
         force: all of it [N].
         dry: force [N] without viscous coefficients.
-        viscous: the rest; None where there is none, or it cannot be separated.
-        levels: dry levels among the parameters; empty where they cannot be separated.
+        viscous: the rest; None if absent or inseparable.
+        levels: dry levels among the parameters; empty if inseparable.
         peaks: level of break-away -> the level in fast sliding.
     """
 
@@ -65,23 +65,18 @@ class Terms:
     @property
     def names(self) -> tuple[str, ...]:
         """Terms that this law has, of `TERMS`."""
-        viscous = () if self.viscous is None else ("viscous",)
+        viscous = ("viscous",) * (self.viscous is not None)
         if self.dry.is_zero():
             return viscous
         if not self.levels:
             return ("force", *viscous)
-        found = ["coulomb"]
-        if self.peaks:
-            found.append("stribeck")
-        found += viscous
-        if self.law.states:
-            found.append("bristle")
-        return tuple(found)
+        stribeck, bristle = bool(self.peaks), bool(self.law.states)
+        return ("coulomb", *("stribeck",) * stribeck, *viscous, *("bristle",) * bristle)
 
     def scaled(self, scales: Mapping[str, ca.SX | float]) -> ca.SX:
-        """Return the force [N] with its terms scaled; terms that are not named are whole.
+        """Return the force [N] with scaled terms; terms that are not named keep their size.
 
-        A law without states gets scaled levels. One with states keeps them, and so the motion of
+        A law without states gets scaled levels. One with states keeps them, and thus the motion of
         its states: its dry force is scaled by the ratio of the Stribeck curves,
 
             F_dry g'(v)/g(v),   g' = N [s_c mu_d + s_s (mu_s - mu_d) fall(v)]
@@ -93,17 +88,18 @@ class Terms:
             share = scales["bristle"]
             dry = share * dry + (1 - share) * self._steady()
         coulomb = scales.get("coulomb", 1.0)
-        stribeck = scales.get("stribeck", coulomb if not self.peaks else 1.0)
+        stribeck = scales.get("stribeck", 1.0 if self.peaks else coulomb)
+        level = level_of(self.law, self.v) if self.law.states else None
         if "force" in scales:
             dry = scales["force"] * dry
-        elif "coulomb" in scales or "stribeck" in scales:
-            level = level_of(self.law, self.v) if self.law.states else None
-            if level is not None and self.peaks:
-                dry = dry * self._with_levels(level, coulomb, stribeck) / level
-            elif self.law.states:
-                dry = coulomb * dry
-            else:
-                dry = self._with_levels(dry, coulomb, stribeck)
+        elif not {"coulomb", "stribeck"} & {*scales}:
+            pass
+        elif level is not None and self.peaks:
+            dry = dry * self._with_levels(level, coulomb, stribeck) / level
+        elif self.law.states:
+            dry = coulomb * dry
+        else:
+            dry = self._with_levels(dry, coulomb, stribeck)
         if self.viscous is None:
             return dry
         return dry + scales.get("viscous", 1.0) * self.viscous
@@ -112,7 +108,7 @@ class Terms:
         """Return the terms with `built` times the sliding force of either side as dry friction.
 
         Raises:
-            ValueError: a law that has no sliding force on one side of rest.
+            ValueError: a law without sliding force on one side of rest.
         """
         speed = ca.fabs(self.v)
         one = ca.SX(self.law.sliding(speed, self.N, 1))
@@ -128,10 +124,9 @@ class Terms:
         symbols = {v.name: v.symbol for v in self.levels}
         values: list[ca.SX] = []
         for name, symbol in symbols.items():
-            base = symbols[self.peaks[name]] if name in self.peaks else symbol
-            rise = symbol - base if name in self.peaks else 0
-            values.append(coulomb * base + stribeck * rise)
-        return ca.substitute(expression, ca.vertcat(*symbols.values()), ca.vertcat(*values))
+            base = symbols[self.peaks.get(name, name)]
+            values.append(coulomb * base + stribeck * (symbol - base if name in self.peaks else 0))
+        return ca.substitute(expression, stacked(symbols.values()), stacked(values))
 
     def _steady(self) -> ca.SX:
         """Return the dry force after long sliding at the velocity [N]."""
@@ -143,7 +138,7 @@ class Terms:
 def level_of(law: Law, v: ca.SX) -> ca.SX | None:
     """Return the Stribeck curve g(v) > 0 under 1 N that a law with states tends to, if it has one.
 
-    Only ratios of it count, which do not depend on the load.
+    Only its ratios matter, which do not depend on the load.
     """
     if isinstance(law, Wrapper):
         return level_of(law.inner_at(v), v)
@@ -164,27 +159,27 @@ def terms(law: Law, block: Block) -> Terms:
             viscous = slope @ sigma
             dry = ca.substitute(force, sigma, ca.DM.zeros(sigma.numel()))
     levels = tuple(own[n] for n in own if known[n].role == "level")
-    peaks = _peaks({v.name for v in levels})
+    names = [v.name for v in levels]
+    peaks = {name: name.replace("mu_s", "mu_d", 1) for name in names if "mu_s" in name}
+    peaks = {peak: base for peak, base in peaks.items() if base in names}
     symbolic = with_values(law, {name: variable.symbol for name, variable in own.items()})
     if law.states:
         if peaks and level_of(symbolic, v) is None:
             peaks = {}
     elif not _made_of(dry, levels, block):
         levels, peaks = (), {}
-    return Terms(
-        law=symbolic, v=v, N=N, force=force, dry=dry, viscous=viscous, levels=levels, peaks=peaks
-    )
+    return Terms(symbolic, v, N, force, dry, viscous, levels, peaks)
 
 
 def _without_viscous(law: Law, force: ca.SX) -> ca.SX:
-    """Return the force with viscous coefficients of zero, where they are symbols."""
+    """Return the force with zero for viscous coefficients that are symbols."""
     values = [p.value for p in parameters(law).values() if p.role == "viscous"]
     symbols = ca.veccat(*(ca.SX(value) for value in values if is_symbolic(value)))
     return ca.substitute(force, symbols, ca.DM.zeros(symbols.numel())) if values else force
 
 
 def _same(a: ca.SX, b: ca.SX) -> bool:
-    """Return True if both are the same function, by values for random symbols."""
+    """Return True if both are the same function, by values at random points."""
     symbols = ca.symvar(ca.vertcat(a, b))
     look = ca.Function("both", [ca.vertcat(*symbols)], [a, b])
     points = np.random.default_rng(0).uniform(0.1, 2.0, (4, len(symbols)))
@@ -192,23 +187,16 @@ def _same(a: ca.SX, b: ca.SX) -> bool:
     return all(abs(x - y) <= 1e-12 * abs(x) for x, y in pairs)
 
 
-def _peaks(names: set[str]) -> dict[str, str]:
-    """Levels of break-away and the levels in fast sliding that they fall to."""
-    pairs = {name: name.replace("mu_s", "mu_d", 1) for name in names if "mu_s" in name}
-    return {peak: base for peak, base in pairs.items() if base in names}
-
-
 def _made_of(dry: ca.SX, levels: Variables, block: Block) -> bool:
     """Return True if the dry force is a sum of levels, each times a function of the velocity."""
     if not levels:
         return False
-    symbols = ca.vertcat(*(v.symbol for v in levels))
-    slope = ca.jacobian(dry, symbols)
-    if ca.depends_on(slope, symbols):
+    symbols = symbols_of(levels)
+    if ca.depends_on(ca.jacobian(dry, symbols), symbols):
         return False
     rest = ca.substitute(dry, symbols, ca.DM.zeros(symbols.numel()))
     others = (*block.inputs, *(v for v in block.parameters if v not in levels))
-    look = ca.Function("rest", [ca.vertcat(*(v.symbol for v in others))], [rest])
+    look = ca.Function("rest", [symbols_of(others)], [rest])
     random = np.random.default_rng(0)
     scale = np.array([v.nominal for v in block.inputs])
     fixed = np.array([float(v.start) for v in others[len(block.inputs) :]])
@@ -216,20 +204,35 @@ def _made_of(dry: ca.SX, levels: Variables, block: Block) -> bool:
     return all(float(look(point)) == 0.0 for point in points)
 
 
+INPUTS: dict[str, dict[str, Any]] = {
+    "u": {
+        "unit": "N",
+        "doc": "force that acted since the last call, less that of a compensator in parallel",
+    },
+    "v_ref": {"unit": "m/s", "doc": "reference velocity", "nominal": 0.1},
+    "a_ref": {"unit": "m/s^2", "doc": "reference acceleration"},
+    "e": {"unit": "m", "doc": "position error, reference less measured", "nominal": 1e-5},
+    "v": {"unit": "m/s", "doc": "measured velocity", "nominal": 0.1},
+    "N": {"unit": "N", "doc": "normal force", "nominal": 10.0, "lower": 0.0},
+    "enable": {"unit": "1", "doc": "above 0.5: on", "lower": 0.0, "upper": 1.0},
+}
+"""Possible inputs of compensators and observers, in their order."""
+
+
 @final
 class Parts:
-    """Variables of a block that stages have brought so far.
+    """Variables of a block, to which stages add theirs.
 
     Attributes:
         states, inputs, parameters: as in `Block`.
         next: the states after the step.
     """
 
-    def __init__(
-        self, states: Variables = (), inputs: Variables = (), parameters: Variables = ()
-    ) -> None:
-        self.states, self.inputs, self.parameters = [*states], [*inputs], [*parameters]
-        self.next: list[ca.SX] = []
+    def __init__(self, inner: Block | None = None, v: Variable | None = None) -> None:
+        """Begin with the states and parameters of the block of a law, and an input `v`."""
+        self.states = [*inner.states] if inner else []
+        self.parameters = [p for p in inner.parameters if p.name != "h"] if inner else []
+        self.inputs, self.next = [v] if v else [], list[ca.SX]()
 
     def state(self, name: str, unit: str, doc: str, nominal: float = 1.0) -> ca.SX:
         """Add a state; the caller appends its next value to `next`."""
@@ -237,22 +240,11 @@ class Parts:
         self.states.append(variable)
         return variable.symbol
 
-    def given(
-        self,
-        name: str,
-        unit: str,
-        doc: str,
-        nominal: float = 1.0,
-        lower: float = -inf,
-        upper: float = inf,
-    ) -> ca.SX:
-        """Return the input of that name, added if there is none."""
-        for known in self.inputs:
-            if known.name == name:
-                return known.symbol
-        variable = Variable(name, unit, nominal=nominal, doc=doc, lower=lower, upper=upper)
-        self.inputs.append(variable)
-        return variable.symbol
+    def given(self, name: str) -> ca.SX:
+        """Return an input, one of `INPUTS`; it is added on its first use."""
+        if name not in [v.name for v in self.inputs]:
+            self.inputs.append(Variable(name, **INPUTS[name]))
+        return next(v.symbol for v in self.inputs if v.name == name)
 
     def parameter(self, name: str, start: float, unit: str, doc: str, lower: float = 0.0) -> ca.SX:
         """Add a parameter; one whose name a law has gets a number."""
@@ -266,109 +258,39 @@ class Parts:
         taken = {v.name for v in (*self.states, *self.inputs, *self.parameters)}
         return next(n for n in (name, *(f"{name}_{k}" for k in range(2, 100))) if n not in taken)
 
-
-def blended(parts: Parts, wanted: ca.SX, v: ca.SX, v_blend: float) -> ca.SX:
-    """Return the desired velocity near zero of the measured one, beyond 2 v_blend the measured
-    one, C2.
-    """
-    width = parts.parameter(
-        "v_blend", v_blend, "m/s", "up to here the desired velocity, beyond twice it the measured",
-        lower=1e-12,
-    )  # fmt: skip
-    share = smooth.step5(ca.fabs(v) / width - 1)
-    # each exactly at its end, whatever the other is
-    return ca.SX(share * v + (1 - share) * wanted)
+    def variables(self, sizes: Variables) -> dict[str, Any]:
+        """Return the variables as fields of a `Block`, with the parameters `sizes` at the end."""
+        return {
+            "states": tuple(self.states),
+            "inputs": tuple(self.inputs),
+            "parameters": (*self.parameters, *sizes),
+            "next": stacked(self.next),
+        }
 
 
-def beyond_dead_zone(parts: Parts, v: ca.SX, dead_zone: float) -> ca.SX:
-    """Return the velocity less what lies within +-dead_zone, continuous: 0 inside."""
-    width = parts.parameter("v_dead", dead_zone, "m/s", "velocities up to here count as rest")
-    return ca.SX(v - smooth.clip(v, -width, width))
-
-
-def built_up(
-    parts: Parts, v: ca.SX, h: ca.SX | float, distance: float, table: Sequence[tuple[float, float]]
+def finished(
+    parts: Parts,
+    force: ca.SX,
+    ramp: float | None,
+    limit: float | None,
+    h: ca.SX | float,
+    where: str,
 ) -> ca.SX:
-    """Return the share b in [-1, 1] of sliding friction that has built up, its mean over the step.
+    """Return the force faded in over t_ramp, C1, while `enable` is above 1/2, and within +-F_max.
 
-    b+ = b + 2 v h / distance, held within +-1: linear in the way since the reversal, and by the
-    table, if there is one, bent. What a shorter way back leaves stays, as in a Maxwell element.
+    Args:
+        ramp, limit: time [s] and largest force [N]; None if not chosen.
     """
-    way = parts.parameter(
-        "d_build", distance, "m", "way after a reversal until friction has built up", lower=1e-15
-    )
-    b = parts.state("built", "1", "share of friction that has built up, -1 to 1")
-    end = ca.SX(smooth.clip(b + 2 * v * h / way, -1.0, 1.0))
-    mean = (b + end) / 2
-    if table:
-        mean = 2 * _interpolated(table, (1 + mean) / 2) - 1
-    parts.next.append(end)
-    return mean
-
-
-def _interpolated(table: Sequence[tuple[float, float]], s: ca.SX) -> ca.SX:
-    """Straight lines through the points."""
-    f = ca.SX(table[0][1])
-    for (a, low), (b, high) in pairwise(table):
-        f += (high - low) * smooth.clip((s - a) / (b - a), 0.0, 1.0)
-    return f
-
-
-def freed(
-    parts: Parts, wanted: ca.SX, v: ca.SX, h: ca.SX | float, force: float, time: float, rest: float
-) -> ca.SX:
-    """Return a further force that grows while the desired velocity moves and the axis does not.
-
-    Its share q in [-1, 1] goes with the pace 1/t_stick towards sign(v_ref) while |v| is below
-    v_stick and |v_ref| beyond 2 v_stick, and towards 0 where |v| is beyond 2 v_stick or |v_ref|
-    below v_stick, with straight lines in between.
-    """
-    most = parts.parameter("F_stick", force, "N", "further force while the axis sticks")
-    pace = parts.parameter(
-        "t_stick", time, "s", "time over which that force comes and goes", lower=1e-9
-    )
-    slow = parts.parameter(
-        "v_stick", rest, "m/s", "slower than this is rest, twice as fast is motion", lower=1e-12
-    )
-    q = parts.state("stuck", "1", "share of the further force, -1 to 1")
-    rests = smooth.clip(2 - ca.fabs(v) / slow, 0.0, 1.0)
-    moves = smooth.clip(ca.fabs(wanted) / slow - 1, 0.0, 1.0)
-    goal = ca.sign(wanted) * moves * rests
-    end = q + smooth.clip(goal - q, -h / pace, h / pace)
-    parts.next.append(ca.SX(end))
-    return ca.SX(most * end)
-
-
-def dithered(parts: Parts, h: ca.SX | float, force: float, frequency: float) -> ca.SX:
-    """Return a sine of a force and frequency of its own."""
-    amplitude = parts.parameter("F_dither", force, "N", "amplitude of the dither")
-    pace = parts.parameter("f_dither", frequency, "Hz", "frequency of the dither")
-    phase = parts.state("phase", "1", "turns of the dither, 0 to 1")
-    end = smooth.fraction(phase + pace * h)
-    parts.next.append(ca.SX(end))
-    return ca.SX(amplitude * ca.sin(2 * ca.pi * end))
-
-
-def ramped(parts: Parts, F: ca.SX, h: ca.SX | float, time: float) -> ca.SX:
-    """F in and out without a bump: over t_ramp, C1, while `enable` is above and below 1/2."""
-    on = parts.given("enable", "1", "above 0.5: on", lower=0.0, upper=1.0)
-    duration = parts.parameter("t_ramp", time, "s", "time of fading in or out", lower=1e-9)
-    e = parts.state("faded_in", "1", "0: off, 1: on")
-    end = ca.SX(smooth.clip(e + ca.if_else(on > 0.5, h, -h) / duration, 0.0, 1.0))
-    parts.next.append(end)
-    return F * smooth.step3(end)
-
-
-def limited(parts: Parts, F: ca.SX, limit: float) -> ca.SX:
-    """F within +-F_max."""
-    most = parts.parameter("F_max", limit, "N", "largest force that is added")
-    return ca.SX(smooth.clip(F, -most, most))
-
-
-def slowed(parts: Parts, F: ca.SX, h: ca.SX | float, slew: float) -> ca.SX:
-    """F that changes by no more than F_rate h a step."""
-    rate = parts.parameter("F_rate", slew, "N/s", "fastest change of the force")
-    last = parts.state("F_last", "N", "force of the step before")
-    end = ca.SX(last + smooth.clip(F - last, -rate * h, rate * h))
-    parts.next.append(end)
-    return end
+    if ramp is not None:
+        checks.number(f"{where}: ramp", ramp, unit="s", above=0.0)
+        on = parts.given("enable")
+        duration = parts.parameter("t_ramp", ramp, "s", "time of fading in or out", lower=1e-9)
+        e = parts.state("faded_in", "1", "0: off, 1: on")
+        end = ca.SX(smooth.clip(e + ca.if_else(on > 0.5, h, -h) / duration, 0.0, 1.0))
+        parts.next.append(end)
+        force = force * smooth.step3(end)
+    if limit is not None:
+        checks.number(f"{where}: limit", limit, unit="N", lower=0.0)
+        most = parts.parameter("F_max", limit, "N", "largest force that is added")
+        force = ca.SX(smooth.clip(force, -most, most))
+    return force

@@ -3,42 +3,112 @@
 import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen import Block, generate
-from symfric.codegen.layout import TEMPLATES, called, filled, prefix
+from symfric.codegen.layout import TEMPLATES, CBlock, filled
 from symfric.codegen.runner import FLAGS
-from symfric.compensation.compensator import Cascade
 from symfric.compensation.result import WITHOUT, Comparison, Loop, Reference
-from symfric.emitter.c99 import REALS, Real
+from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.numeric import bound
+from symfric.foundation.parameters import Parametric, Variable, param
 from symfric.foundation.programs import CompileError, Compiler, find_compiler, needed_compiler
 from symfric.foundation.status import SolveError
 from symfric.integrator import stepper
 from symfric.integrator.plant import Plant
-from symfric.model import Model, check_model
+from symfric.laws.base import smooth
+from symfric.model import Model, Output, check_model
 
 Array = NDArray[np.float64]
 
+
+@final
+@dataclass(frozen=True, eq=False)
+class Cascade(Parametric):
+    """Cascade of position (P) and velocity (PI) with an encoder, at a fixed sample time.
+
+        x_m = count round(x / count)                     position of the encoder
+        v_m = v_m + share [(x_m - x_m before) / h - v_m]    filtered difference
+        v_s = v_ref + kp (r - x_m)                       set velocity
+        u   = kv (v_s - v_m) + I + inertia a_ref,   I+ = I + ki kv h (v_s - v_m)
+
+    I and u are held within +-limit; I stops if u has reached it, and on `hold`.
+    """
+
+    h: float = param(1e-3, unit="s", role="time", doc="sample time", lower=1e-9)
+    kp: float = param(60.0, unit="1/s", doc="position gain", lower=0.0)
+    kv: float = param(200.0, unit="N s/m", doc="velocity gain", lower=0.0)
+    ki: float = param(20.0, unit="1/s", doc="integral gain of the velocity loop", lower=0.0)
+    inertia: float = param(1.0, unit="kg", doc="mass that a_ref is times", lower=0.0)
+    limit: float = param(100.0, unit="N", doc="largest force", lower=0.0)
+    count: float = param(1e-6, unit="m", doc="one count of the encoder", lower=1e-15)
+    share: float = param(
+        0.5, unit="1", doc="of a new difference in the velocity", lower=1e-6, upper=1.0
+    )
+
+    def block(self) -> Block:
+        """Return (x, r, v_ref, a_ref, hold) -> u, and what it measures: x_m, v_m, e, v_s."""
+        x, r, v_ref, a_ref, hold = inputs = (
+            Variable("x", "m", nominal=0.1, doc="position"),
+            Variable("r", "m", nominal=0.1, doc="reference position"),
+            Variable("v_ref", "m/s", nominal=0.1, doc="reference velocity"),
+            Variable("a_ref", "m/s^2", nominal=1.0, doc="reference acceleration"),
+            Variable("hold", "1", lower=0.0, upper=1.0, doc="above 0.5: no integration"),
+        )
+        before, v_before, integral = states = (
+            Variable("before", "m", doc="position before"),
+            Variable("v_before", "m/s", doc="velocity before"),
+            Variable("integral", "N", doc="integral force"),
+        )
+        x_m = self.count * ca.floor(x.symbol / self.count + 0.5)
+        v_m = v_before.symbol + self.share * ((x_m - before.symbol) / self.h - v_before.symbol)
+        e = r.symbol - x_m
+        v_s = v_ref.symbol + self.kp * e
+        wanted = self.kv * (v_s - v_m) + integral.symbol + self.inertia * a_ref.symbol
+        u = smooth.clip(wanted, -self.limit, self.limit)
+        more = integral.symbol + self.ki * self.kv * self.h * (v_s - v_m)
+        more = smooth.clip(more, -self.limit, self.limit)
+        free = ca.logic_or(wanted == u, (v_s - v_m) * u < 0)
+        free = ca.logic_and(free, hold.symbol <= 0.5)
+        return Block(
+            "cascade",
+            doc="Position controller: P in position, PI in velocity.",
+            states=states,
+            inputs=inputs,
+            next=ca.vertcat(x_m, v_m, ca.if_else(free, more, integral.symbol)),
+            outputs={
+                "u": Output(u, "N", "commanded force"),
+                "x_m": Output(x_m, "m", "measured position"),
+                "v_m": Output(v_m, "m/s", "measured velocity"),
+                "e": Output(e, "m", "position error"),
+                "v_s": Output(v_s, "m/s", "set velocity"),
+            },
+        )
+
+
 COMPILED: dict[tuple[str, str, str], Any] = {}
-"""Of this process: fingerprint of a block, type and compiler -> its function of members."""
+"""Fingerprint of a block, type and compiler -> its compiled function of members."""
 
 
 @final
 class Members:
-    """Blocks side by side; rows are members, and the arrays may be written between steps.
+    """Instances of a block; rows are members, and the arrays may be written between steps.
 
     Attributes:
-        block: what they are.
+        block: the block.
         state, param, input, output: shapes (members, ...), in the order of the block.
         status: bits of all steps so far, a number each; 0 in the VM, which has no guards.
+        inputs, outputs: columns of these arrays by name.
+        step: makes one step of all members.
     """
 
     def __init__(
@@ -48,18 +118,22 @@ class Members:
         real: str = "double",
         compiler: Compiler | None = None,
     ) -> None:
-        """Return `values` has the parameters of each member that are not the default.
+        """Begin at the start values, with the parameters `values` of each member.
 
         Raises:
             ValueError: unknown parameters.
-            CompileError: the compiler refuses the C, or what it made does not load here.
+            CompileError: the compiler rejects the C, or the library does not load here.
         """
         self.block, count = block, len(values)
         kind = REALS[real].kind
-        self.state = np.tile(np.array([v.start for v in block.states], kind), (count, 1))
-        self.param = np.tile(np.array([v.start for v in block.parameters], kind), (count, 1))
-        self.input = np.zeros((count, len(block.inputs)), kind)
-        self.output = np.zeros((count, len(block.outputs)), kind)
+
+        def rows(numbers: Sequence[Any]) -> Any:
+            return np.tile(np.array(numbers, kind), (count, 1))
+
+        self.state = rows([v.start for v in block.states])
+        self.param = rows([v.start for v in block.parameters])
+        self.input = rows([0.0] * len(block.inputs))
+        self.output = rows([0.0] * len(block.outputs))
         self.status = np.zeros(count, np.uint32)
         self.inputs = {v.name: self.input[:, i] for i, v in enumerate(block.inputs)}
         self.outputs = {name: self.output[:, i] for i, name in enumerate(block.outputs)}
@@ -75,38 +149,22 @@ class Members:
             COMPILED[key] = self._compiled(real, compiler)
         arrays = (self.state, self.param, self.input, self.output, self.status)
         given = [ctypes.c_long(len(self.state)), *(ctypes.c_void_p(a.ctypes.data) for a in arrays)]
-        return lambda: COMPILED[key](*given)
+        return partial(COMPILED[key], *given)
 
     def _compiled(self, real: str, compiler: Compiler) -> Any:
-        kind = REALS[real]
-        name = prefix(self.block, kind)
+        c = CBlock(self.block, REALS[real])
         with TemporaryDirectory(prefix="symfric-") as folder:
-            generate(self.block, folder, real=real, kit=False)
+            made = generate(self.block, folder, real=real, kit=False)
             glue, library = Path(folder) / "members.c", Path(folder) / "members.so"
-            call = self._call(kind)
-            write_text(glue, filled(TEMPLATES / "members.c", name=name, real=kind.name, call=call))
-            sources = [str(Path(folder) / f"{name}.c"), str(glue)]
-            compiler.run(*FLAGS, "-shared", "-fPIC", *sources, "-o", str(library), "-lm")
+            write_text(glue, filled(TEMPLATES / "members.c", **c.sizes))
+            parts = [str(made.source(real)), str(glue), "-o", str(library), "-lm"]
+            compiler.run(*FLAGS, "-shared", "-fPIC", *parts)
             try:
                 found = ctypes.CDLL(str(library))["members"]
             except OSError as error:
                 raise CompileError(f"the library does not load on this machine: {error}") from None
         found.restype = None
         return found
-
-    def _call(self, real: Real) -> str:
-        """Return the statements of a step of member i."""
-        name = prefix(self.block, real)
-        arrays = {"state": self.state, "param": self.param, "in": self.input, "out": self.output}
-        sizes = {group: array.shape[1] for group, array in arrays.items()}
-        pointers = {
-            group: f"({'const ' * (group in ('param', 'in'))}{name}_{group}_t *)({group} + {n} * i)"
-            for group, n in sizes.items()
-        }
-        inputs = [f"in[{sizes['in']} * i + {k}]" for k in range(sizes["in"])]
-        call = called(self.block, real, True, pointers, inputs, "&status[i]")
-        idle = "".join(f"(void){group}; " for group, n in sizes.items() if not n)
-        return f"{idle}{'out[i] =' if self.block.is_function else 'status[i] |='} {call}"
 
     def _in_vm(self) -> Any:
         # CasADi's columns are the rows of the arrays
@@ -124,7 +182,7 @@ class Members:
 
 
 KNOWN = ("v_ref", "a_ref", "v", "e", "u", "N", "enable")
-"""Signals of the loop that a block may take."""
+"""Signals of the loop that may be inputs of a block."""
 WHERE = "close_loop"
 
 
@@ -161,46 +219,42 @@ def close_loop(
     velocity: str = "v",
     load: float = 1.0,
 ) -> Comparison:
-    """Let a plant follow a reference, without compensation and with it in all `cases`.
+    """Simulate a plant in a position loop, without compensation and with it in all `cases`.
 
-    At each sample the encoder counts the position, the controller and the blocks are called, and
-    their forces added, held within the limit of the controller, act on the plant from `delay`
-    samples later for one sample. The plant goes on by the adaptive steps of `simulate`. What is
-    called is the C that `generate` writes, compiled here; without a compiler CasADi's VM, which
-    gives the same bits in double.
+    At each sample the encoder counts the position, and the controller and the blocks are called;
+    the sum of their forces, held within the limit of the controller, acts on the plant `delay`
+    samples later for one sample. The plant makes the adaptive steps of `simulate`. The blocks are
+    the compiled C of `generate`; without a compiler CasADi's VM, which gives the same bits in
+    double.
 
     Args:
-        plant: with one input, the force; any law, bristles, events.
+        plant: a model with one input, the force.
         reference: with the sample time of the controller.
         blocks: compensators and observers; their outputs `F` are added. An output `hold` stops the
             integrator of the controller.
         controller: default `Cascade()`.
-        cases: name -> parameters of the blocks that are not their default; default one case,
-            "compensated". The parameters of all blocks are looked for.
+        cases: name -> parameters of the blocks other than their defaults; default one case,
+            "compensated".
         delay: samples from a command to its force.
-        noise: standard deviation [m] of the position before it is counted.
+        noise: standard deviation [m] of the position before the encoder.
         seed: of the noise.
         real: "double" or "float", the type of the C of the blocks.
-        backend: "c", "vm", or "auto", C where there is a compiler.
+        backend: "c", "vm", or "auto", C if there is a compiler.
         x0, p: start values and parameters of the plant by name.
-        position, velocity: states of the plant that are measured and shown.
+        position, velocity: measured states of the plant.
         load: normal force [N] for blocks with an input N.
 
     Returns:
-        All loops. A plant that cannot be simulated further, or Ctrl-C, ends them early; `ended`
-        says so.
+        All loops. A failed simulation of the plant, or Ctrl-C, ends them early, see `Loop.ended`.
 
     Raises:
-        ValueError: bad input; another sample time in the controller or a block; a block with an
-            input that the loop does not have, or without F.
-        CompileError: C was requested, and there is no compiler or it failed.
+        ValueError: bad input; different sample times of reference, controller and blocks; a block
+            with an input that the loop does not have, or without F.
+        CompileError: C was requested without a working compiler.
     """
     check_model(WHERE, plant)
-    given = (
-        (blocks,)
-        if isinstance(blocks, Block)
-        else checks.many(f"{WHERE}: blocks", blocks, "blocks")
-    )
+    several = isinstance(blocks, Block)
+    given = (blocks,) if several else checks.many(f"{WHERE}: blocks", blocks, "blocks")
     controller = Cascade() if controller is None else controller
     checks.kind(f"{WHERE}: controller", controller, Cascade, "a controller, Cascade()")
     checks.kind(f"{WHERE}: reference", reference, Reference, "a reference, such as sine(...)")
@@ -213,16 +267,8 @@ def close_loop(
     if backend == "c":
         compiler = needed_compiler()
     wanted = {"compensated": {}} if cases is None else checks.named(f"{WHERE}: cases", cases)
-    setup = Setup(
-        controller=controller,
-        delay=delay,
-        noise=noise,
-        seed=seed,
-        real=real,
-        compiler=compiler,
-        measured=(position, velocity),
-        load=load,
-    )
+    measured = (position, velocity)
+    setup = Setup(controller, delay, noise, seed, real, compiler, measured, load)
 
     def going(count: int) -> Plant:
         start, own = ({n: np.full(count, v) for n, v in (of or {}).items()} for of in (x0, p))
@@ -281,7 +327,7 @@ def _run(
     names: Sequence[str],
     setup: Setup,
 ) -> dict[str, Loop]:
-    """Members of one set of blocks, side by side."""
+    """Return the loops of one set of blocks, all members at once."""
     controller, compiler = setup.controller, setup.compiler
     count, steps = len(names), reference.x.size
     control = Members(controller.block(), [{}] * count, compiler=compiler)
@@ -330,9 +376,9 @@ def _commanded(
     forces: Array,
     setup: Setup,
 ) -> Array:
-    """Return the command of controller and blocks together; the `forces` of the blocks are written.
+    """Return the command of controller and blocks together, and write the `forces` of the blocks.
 
-    `acted` are those over the last interval: an observer of forces does not see what others do.
+    An observer of forces does not see the forces `acted` of other blocks over the last interval.
     """
     for name in ("x", "r", "v_ref", "a_ref"):
         control.inputs[name][:] = now[name]

@@ -1,27 +1,25 @@
 """Observers of friction as blocks: its states by a law and an error, or the force by a mass."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import casadi as ca
 
 from symfric.codegen import Block, law_block
-from symfric.codegen.blocks.from_law import in_turning, step_variable
+from symfric.codegen.blocks.from_law import in_turning
 from symfric.codegen.blocks.held_step import held_step
-from symfric.codegen.blocks.variables import arranged
+from symfric.codegen.blocks.variables import arranged, step_size
 from symfric.compensation.compensator import without_end
-from symfric.compensation.force import LEAST, Parts, limited, ramped
+from symfric.compensation.force import LEAST, Parts, finished
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters, with_values
+from symfric.foundation.variable import symbols_of
 from symfric.laws import GMS, Law, LuGre, LuGreNormalised, LuGrePassive, law_name
 from symfric.laws.base import smooth
 from symfric.laws.base.law import check_law
 from symfric.model import Output
 
-USE = (
-    "Call it once a sample and add F to the force that the controller commands.",
-    "e is the position error, reference less measured, in the direction of v.",
-)
+USE = "Call it once a sample and add F to the force that the controller commands."
+ERROR = "e is the position error, reference less measured, in the direction of v."
 Corrected = tuple[ca.SX, ca.SX]
 """States after the step, and the mean force."""
 ESTIMATE = "estimated friction force, to add to that of the controller; mean over the step"
@@ -44,8 +42,8 @@ def lugre_observer(
         F     = sigma_0 z + sigma_1 dz/dt + sigma_2 v
 
     e is the position error, reference less measured. The step is exact for held v and e (see
-    `law_block`) and z is held in the set that the law itself never leaves, so that F is bounded for
-    every gain, error and step size.
+    `law_block`), and z stays in the invariant set of the law, so F is bounded for every gain, error
+    and step size.
 
     Stability: with F added to the force of a linear controller on a mass m, position and friction
     error go to zero if (sigma_1 s + sigma_0) / (m s^2 + k_v s + k_p) is strictly positive real,
@@ -86,14 +84,10 @@ def lugre_observer(
         force = p["sigma_0"] * mean + damping * (end - z) / size + p["sigma_2"] * v
         return end, ca.SX(force * of_load)
 
-    block = _observer(law, corrected, gain, N, ramp, limit, h, where)
-    block = replace(
-        block,
-        name="lugre_observer" if name is None else name,
-        doc=f"Observer of the bristle deflection by the position error. {block.doc}",
-        equations=f"dz/dt of the law + k_e e, |z| <= mu_s N / sigma_0\n\n{block.equations}",
-    )
-    return in_turning(block) if turning else block
+    return _observer(
+        law, corrected, gain, N, ramp, limit, h, where, turning, name or "lugre_observer",
+        "bristle deflection", "dz/dt of the law + k_e e, |z| <= mu_s N / sigma_0",
+    )  # fmt: skip
 
 
 def gms_observer(
@@ -113,10 +107,9 @@ def gms_observer(
         F    = F_1 + F_2 + ... + sigma_2 v
 
     e is the position error, reference less measured; the correction stretches all springs by
-    h k e, as that of LuGre's bristle does. Modes are those of the law. The forces
-    are held in the set that they never leave in the law, so that F is bounded for every gain,
-    error and step size. There is no proof of stability; tests in the loop
-    stand for it, and show that a gain far beyond 1/s x ten makes it worse.
+    h k e, as it does for the bristle of LuGre. Modes are those of the law. The forces stay in the
+    invariant set of the law, so F is bounded for every gain, error and step size. Stability is not
+    proved; in tests of closed loops, gains far above 10/s increase the error.
 
     Args:
         law: form = "event", whose step is known exactly.
@@ -147,15 +140,10 @@ def gms_observer(
             force = force + smooth.clip(mean[i] + more / 2, -most, most)
         return end, ca.SX(force)
 
-    block = _observer(law, corrected, gain, N, ramp, limit, h, where)
-    formula = "F_i+ = F_i of the law + k_i h k_e e, |F_i| <= alpha_i mu_s N"
-    block = replace(
-        block,
-        name="gms_observer" if name is None else name,
-        doc=f"Observer of the spring forces by the position error. {block.doc}",
-        equations=f"{formula}\n\n{block.equations}",
-    )
-    return in_turning(block) if turning else block
+    return _observer(
+        law, corrected, gain, N, ramp, limit, h, where, turning, name or "gms_observer",
+        "spring forces", "F_i+ = F_i of the law + k_i h k_e e, |F_i| <= alpha_i mu_s N",
+    )  # fmt: skip
 
 
 def _check(what: str, law: object, kinds: tuple[type[Law], ...], such_as: str, gain: object) -> str:
@@ -176,60 +164,46 @@ def _observer(
     limit: float | None,
     h: float | None,
     where: str,
+    turning: bool,
+    name: str,
+    what: str,
+    formula: str,
 ) -> Block:
-    """Return the block of an observer of the states of `law`, with the name and texts of the law.
+    """Return the block of an observer of the states of `law`.
 
     Args:
         corrected: (law, v, N, states, gain times error, step size) -> states after the step and
             mean force.
+        what: the observed states.
+        formula: of their correction.
     """
     inner = law_block(law, h=h)
     known = parameters(law)
     own = {p.name: p.symbol for p in inner.parameters if p.name in known}
     size = [p for p in inner.parameters if p.name == "h"]
     duration = size[0].symbol if size else float(inner.constants["h"])
-    v = inner.inputs[0]
-    parts = Parts(inner.states, (v,), tuple(p for p in inner.parameters if p not in size))
-    e = parts.given("e", "m", "position error, reference less measured", 1e-5)
-    k = parts.parameter("k_e", gain, "1/s", "gain of the error")
+    parts = Parts(inner, inner.inputs[0])
+    push = parts.parameter("k_e", gain, "1/s", "gain of the error") * parts.given("e")
     load = checks.number(f"{where}: N", N, unit="N", lower=0.0)
-    constant = parts.parameter("N", load, "N", "normal force")
-    z = ca.vertcat(*(state.symbol for state in inner.states))
-    least = ca.fmax(constant, LEAST)
-    end, force = corrected(with_values(law, own), v.symbol, least, z, k * e, duration)
+    least = ca.fmax(parts.parameter("N", load, "N", "normal force"), LEAST)
+    v, z = inner.inputs[0].symbol, symbols_of(inner.states)
+    end, force = corrected(with_values(law, own), v, least, z, push, duration)
     parts.next = ca.vertsplit(end)
-    force = _finished(parts, force, ramp, limit, duration, where)
-    block = replace(
-        inner,
+    force = finished(parts, force, ramp, limit, duration, where)
+    block = arranged(Block(
+        name,
+        doc=f"Observer of the {what} by the position error. {inner.doc}",
+        equations=f"{formula}\n\n{inner.equations}",
         discretisation=without_end(inner.discretisation),
-        use=USE,
-        states=tuple(parts.states),
-        inputs=tuple(parts.inputs),
-        parameters=(*parts.parameters, *size),
-        next=ca.vertcat(*parts.next),
+        use=(USE, ERROR),
         outputs={"F": Output(force, "N", ESTIMATE)},
-        resets={},
-        arrays=(),
-    )
-    return arranged(block)
-
-
-def _finished(
-    parts: Parts,
-    force: ca.SX,
-    ramp: float | None,
-    limit: float | None,
-    h: ca.SX | float,
-    where: str,
-) -> ca.SX:
-    """Return the force faded in and limited, where that is chosen."""
-    if ramp is not None:
-        ramp = checks.number(f"{where}: ramp", ramp, unit="s", above=0.0)
-        force = ramped(parts, force, h, ramp)
-    if limit is not None:
-        limit = checks.number(f"{where}: limit", limit, unit="N", lower=0.0)
-        force = limited(parts, force, limit)
-    return force
+        constants=inner.constants,
+        about=inner.about,
+        limits=inner.limits,
+        sources=inner.sources,
+        **parts.variables(tuple(size)),
+    ))  # fmt: skip
+    return in_turning(block) if turning else block
 
 
 def disturbance_observer(
@@ -243,19 +217,19 @@ def disturbance_observer(
     name: str | None = None,
     turning: bool = False,
 ) -> Block:
-    """Estimate all that opposes the force of a drive besides inertia, from its expected velocity.
+    """Return the observer of all forces that oppose that of a drive, except inertia.
 
         d = Q(s) [u - m s v],   Q = (w / (s + w))^order,   F = d
 
-    u is the force that acted up to this sample (delayed as the drive delays it), less that of a
-    compensator in parallel, of which it then finds what is left; v is the velocity measured now. In
-    steps
+    u is the force that acted up to this sample (with the delay of the drive), less that of a
+    compensator in parallel, so that the observer estimates the remaining friction; v is the
+    velocity measured at this sample. In steps
 
         f  = u - m (v - v before) / h          mean of what opposes over the last interval
         d+ = d + (1 - exp(-w h)) (f - d)       once for each order
 
-    f is the balance of impulse, exact for a held force; the filter is bounded for every h. No law
-    is needed; it lags by order / w and so comes late after a reversal, where a law knows before.
+    f is the balance of impulse, exact for a held force; the filter is bounded for every h. The
+    observer needs no law, but lags by order / w, which delays it after a reversal.
 
     Stability: with F added to the force, the loop of observer and mass M is stable for every w, h
     and delay of the drive if 0 < m < 2 M: its open loop is Q (1 - m/M), below one then (small
@@ -278,23 +252,18 @@ def disturbance_observer(
     mass = checks.number(f"{where}: mass", mass, unit="kg", above=0.0)
     bandwidth = checks.number(f"{where}: bandwidth", bandwidth, unit="rad/s", above=0.0)
     order = checks.count(f"{where}: order", order, least=1, most=2)
-    size = step_variable(where, h)
-    duration = size.symbol if h is None else float(size.start)
-    parts = Parts()
-    u = parts.given(
-        "u", "N", "force that acted since the last call, less that of a compensator in parallel"
-    )
-    v = parts.given("v", "m/s", "measured velocity", 0.1)
+    size, parts = step_size(where, h), Parts()
+    u, v = map(parts.given, ("u", "v"))
     m = parts.parameter("m", mass, "kg", "mass", lower=1e-12)
     w = parts.parameter("w", bandwidth, "rad/s", "bandwidth of the filter")
     before = parts.state("v_before", "m/s", "velocity at the last call", 0.1)
     parts.next.append(v)
-    force = u - m * (v - before) / duration
+    force = u - m * (v - before) / size.h
     for k in range(order):
         d = parts.state(f"d_{k + 1}", "N", "filtered force")
-        force = d + (1 - ca.exp(-w * duration)) * (force - d)
+        force = d + (1 - ca.exp(-w * size.h)) * (force - d)
         parts.next.append(force)
-    force = _finished(parts, force, ramp, limit, duration, where)
+    force = finished(parts, force, ramp, limit, size.h, where)
     block = Block(
         where if name is None else name,
         doc="Disturbance observer: what opposes the force of a drive besides inertia.",
@@ -303,12 +272,9 @@ def disturbance_observer(
             f"d+ = d + (1 - exp(-w h)) (f - d){', twice' if order == 2 else ''}\nF  = d+"
         ),
         discretisation="The balance of impulse over the last interval, and an exact filter of it.",
-        use=("Call it once a sample and add F to the force that the controller commands.",),
-        states=tuple(parts.states),
-        inputs=tuple(parts.inputs),
-        parameters=(*parts.parameters, *([size] if h is None else [])),
-        next=ca.vertcat(*parts.next),
+        use=(USE,),
         outputs={"F": Output(force, "N", "estimated opposing force, to add to that commanded")},
-        constants={} if h is None else {"h": float(h)},
+        constants=size.constants,
+        **parts.variables(size.parameters),
     )
     return in_turning(block) if turning else block

@@ -35,14 +35,13 @@ class Reference:
     h: float = 1e-3
 
     def __post_init__(self) -> None:
-        found = [checks.array(f"Reference: {name}", getattr(self, name)) for name in "xva"]
-        sizes = [one.size for one in found]
+        for name in "xva":
+            found = checks.array(f"Reference: {name}", getattr(self, name))
+            object.__setattr__(self, name, found)
+        sizes = [self.x.size, self.v.size, self.a.size]
         if len(set(sizes)) > 1 or sizes[0] < 2:
             raise ValueError(f"Reference: expected x, v, a of one length >= 2, got {sizes}")
-        for name, one in zip("xva", found, strict=True):
-            object.__setattr__(self, name, one)
-        h = checks.number("Reference: h", self.h, unit="s", above=0.0)
-        object.__setattr__(self, "h", h)
+        object.__setattr__(self, "h", checks.number("Reference: h", self.h, unit="s", above=0.0))
 
     def __repr__(self) -> str:
         """Return one line."""
@@ -62,7 +61,7 @@ class Reference:
 
 
 def sine(amplitude: float, frequency: float, t_end: float, h: float = 1e-3) -> Reference:
-    """Return a (1 - cos(2 pi f t)) / 2 ... a sine between 0 and 2 A that begins at rest.
+    """Return the sine A (1 - cos(2 pi f t)) between 0 and 2 A, which begins at rest.
 
     Args:
         amplitude: A [m].
@@ -77,16 +76,16 @@ def sine(amplitude: float, frequency: float, t_end: float, h: float = 1e-3) -> R
 
 
 def step(height: float, t_end: float, t_step: float = 0.1, h: float = 1e-3) -> Reference:
-    """Return a jump of the position, without a velocity, and rest after it."""
+    """Return a jump of the position at rest."""
     height = checks.number("step: height", height, unit="m")
     t = _times("step", t_end, h)
     return Reference(np.where(t >= t_step, height, 0.0), 0 * t, 0 * t, h)
 
 
 def moves(goals: Sequence[float], duration: float, rest: float, h: float = 1e-3) -> Reference:
-    """From 0 to one goal [m] after the other, each in `duration` and then at `rest` [s].
+    """Return moves from 0 to one goal [m] after the other, each in `duration` and a `rest` [s].
 
-    Each move is of fifth order, at rest at both ends with no acceleration.
+    Each move is of fifth order, with zero velocity and acceleration at both ends.
     """
     places = checks.array("moves: goals", goals)
     duration = checks.number("moves: duration", duration, unit="s", above=0.0)
@@ -119,13 +118,13 @@ class Loop:
 
     Attributes:
         name: of the case.
-        reference: what it was to follow.
+        reference: desired motion.
         x, v: true position [m] and velocity [m/s] at the samples and at the end.
         force: that acted after each sample [N].
         added: force demanded by the compensation at each sample [N].
         limit: largest force [N].
-        status: bits that the guards of the blocks have set, 0 where nothing was repaired.
-        ended: why it ended early; empty if it did not.
+        status: bits that the guards of the blocks have set, 0 if nothing was repaired.
+        ended: reason of an early end, "" if there is none.
     """
 
     name: str
@@ -202,10 +201,10 @@ class Comparison:
 
     Attributes:
         plant: its name.
-        reference: what the loops were to follow.
+        reference: desired motion.
         loops: case -> loop.
         count: of the encoder [m].
-        engine: what computed the blocks.
+        engine: of the blocks.
         units: of position and force, such as rad and N m; read them for m and N everywhere.
     """
 
@@ -225,15 +224,16 @@ class Comparison:
         return self.loops[name]
 
     def reduction(self, name: str) -> float:
-        """Factor by which the RMS error of a case is smaller than without compensation."""
+        """Return the ratio of the RMS errors without compensation and in a case."""
         own = self[name].rms
         return self[WITHOUT].rms / own if own else np.inf
 
     def remarks(self) -> tuple[str, ...]:
-        """Undesirable behaviour of the cases, one sentence each."""
+        """Return undesirable behaviour of the cases, one sentence each."""
         found: list[str] = []
         before = self[WITHOUT]
         for loop in self.loops.values():
+            other = loop is not before
             if loop.ended:
                 found.append(f"{loop.name}: {loop.ended}")
             if loop.hunting >= self.count:
@@ -245,9 +245,9 @@ class Comparison:
                     f"{loop.name}: rests {counts:.3g} counts off; unless its integrator is held "
                     "it may break away later"
                 )
-            if loop is not before and loop.rms > before.rms:
+            if other and loop.rms > before.rms:
                 found.append(f"{loop.name}: the error is larger than without compensation")
-            if loop is not before and loop.hunting > max(before.hunting, self.count):
+            if other and loop.hunting > max(before.hunting, self.count):
                 found.append(f"{loop.name}: hunts more than without compensation")
             if loop.status:
                 found.append(f"{loop.name}: the guards of the C repaired something, {loop.status}")
@@ -256,7 +256,7 @@ class Comparison:
         return tuple(found)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a row a case, as plain data."""
+        """Return a row for each case, as plain data."""
         return [
             {
                 "case": loop.name,
@@ -274,7 +274,7 @@ class Comparison:
         ]
 
     def table(self) -> str:
-        """Return a few lines of text: errors in a unit of their size, the hunting in counts."""
+        """Return a table: errors in a unit of their size, hunting in counts."""
         width = max(len(name) for name in self.loops)
         x, force = self.units
         scale, small = _unit_for(max(loop.peak for loop in self.loops.values()))
@@ -295,7 +295,7 @@ class Comparison:
         return "\n".join([*lines, *(f"! {remark}" for remark in self.remarks())])
 
     def to_csv(self, path: str | Path) -> None:
-        """Write a row a sample: time, reference, and position, force and compensation of all."""
+        """Write time, reference, positions, forces and compensation, a row for each sample."""
         x, force = self.units
         columns = {"t [s]": self.reference.t, f"reference [{x}]": self.reference.x}
         for name, loop in self.loops.items():
@@ -309,7 +309,7 @@ class Comparison:
         write_table(path, columns, rows)
 
     def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
-        """Position, error, force and what is added over time, and next to it the first reversal.
+        """Plot position, error, force and compensation over time, and the error at a reversal.
 
         Args:
             names: cases to show, by default all.
@@ -350,7 +350,7 @@ class Comparison:
         return save(figure, path)
 
     def _reversal(self) -> range:
-        """Samples around the last reversal of the reference, or the rest at its end."""
+        """Return the samples around the last reversal of the reference, or of its final rest."""
         rest = self.reference.rest
         size = self.reference.x.size
         if rest is not None:
@@ -365,7 +365,7 @@ def _size(values: Array) -> float:
 
 
 def _unit_for(size: float) -> tuple[float, str]:
-    """Factor and prefix that give a length or an angle of `size` digits before the point."""
+    """Return the factor and prefix with which `size` has digits before the point."""
     for factor, prefix in ((1.0, ""), (1e3, "m")):
         if size * factor >= 1.0:
             return factor, prefix

@@ -10,42 +10,51 @@ from symfric.compensation.force import TERMS
 from symfric.foundation import checks
 
 VELOCITIES = ("blend", "reference", "measured")
+BOUNDS: dict[str, tuple[str, dict[str, Any]]] = {
+    "N": ("N", {"lower": 0.0}), "offset": ("N", {}), "v_blend": ("m/s", {"above": 0.0}),
+    "build_up": ("m", {"above": 0.0}), "ramp": ("s", {"above": 0.0}),
+    "dead_zone": ("m/s", {"lower": 0.0}), "inertia": ("kg", {"lower": 0.0}),
+    "delay": ("s", {"lower": 0.0}), "error_gain": ("1/s", {"lower": 0.0}),
+    "limit": ("N", {"lower": 0.0}), "slew": ("N/s", {"lower": 0.0}),
+}  # fmt: skip
+"""Unit and bound of every setting that is a number."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Compensation:
-    """Settings of a friction compensator; features that are None or empty are not in its C.
+    """Settings of a friction compensator; its C omits features that are None or empty.
 
     Every number is a parameter of the C that can be changed while it runs.
 
     Attributes:
-        velocity: what moves the law: "blend" is the desired velocity while the measured one is
-            below `v_blend` and the measured one beyond twice that; "reference" or "measured" are
-            one of them alone. A law that sees measured velocity takes damping from the loop, and
-            noise; one that sees the reference compensates what ought to be.
+        velocity: velocity of the law: "blend" is the desired velocity while the measured one is
+            below `v_blend` and the measured one beyond twice that; "reference" and "measured" are
+            one of them alone. A law of the measured velocity takes damping from the loop and
+            amplifies noise; one of the reference compensates the planned motion.
         v_blend: [m/s]; several counts of the encoder a sample, and several v_s of the law.
         N: normal force [N], a parameter of the C; "input" makes it an input. By default that of
             the drive; 1 with a law alone, whose coefficients are then forces.
-        scales: terms of friction whose scale, 0 to 1, can be set: names of `TERMS`, or start values
-            by name. By default all that the law has, but "bristle", with start value 1.
-        without: terms that are left out.
+        scales: terms of friction with an adjustable scale, 0 to 1: names of `TERMS`, or start
+            values by name. By default all terms of the law except "bristle", with start value 1.
+        without: omitted terms.
         error_gain: [1/s]; the desired velocity is v_ref + error_gain e, e the position error
-            (reference less measured), as the set velocity of a cascade is. Without it there is
-            nothing at rest that would break a standing error away. Give it the position gain.
-        hold: (error [m], velocity [m/s]): an output `hold` that is 1 where reference and axis are
-            slower than the velocity and the error is smaller, else 0. Stop the integrator of the
-            controller on it: an axis that breaks away jumps, and one whose jump is longer than a
-            count hunts for ever if the integrator never rests.
+            (reference less measured), as the set velocity of a cascade. Without it a constant
+            error at rest remains. Use the position gain.
+        hold: (error [m], velocity [m/s]): an output `hold` that is 1 if reference and axis are
+            slower than the velocity and the error is smaller, else 0. It must stop the integrator
+            of the controller: if the axis jumps by more than a count at break-away, it otherwise
+            hunts permanently.
         dead_zone: velocities up to this [m/s] count as rest.
-        build_up: way [m] over which friction builds up after a reversal, of a law without states.
+        build_up: travel [m] over which friction builds up after a reversal, of a law without
+            states.
         build_up_table: its shape: (share of the way, share of the force), from (0, 0) to (1, 1).
-        offset: constant force [N] that is added; of a drive its own, where it has one.
-        inertia: mass [kg] times the reference acceleration is added, too.
-        delay: time [s] by which the reference is looked ahead with its acceleration: the lag of the
+        offset: additional constant force [N]; by default that of the drive.
+        inertia: mass [kg], whose product with the reference acceleration is added.
+        delay: time [s] of the look-ahead of the reference by its acceleration: the lag of the
             drive, and half a step of the law.
-        stick: (force [N], time [s], velocity [m/s]): added while the reference moves, faster than
-            twice this, and the axis, slower than this, does not; rises and decays over this time.
+        stick: (force [N], time [s], velocity [m/s]): added while the reference is faster than
+            twice this velocity and the axis slower than it; rises and decays over this time.
         dither: (amplitude [N], frequency [Hz]) of a sine.
         ramp: time [s] of fading in and out at the input `enable`; None: no such input.
         limit: largest force [N].
@@ -73,12 +82,12 @@ class Compensation:
 
 
 def settings_from_text(texts: Sequence[str]) -> Compensation:
-    """Settings as a command line has them.
+    """Return settings from texts of a command line.
 
         v_blend=0.02  scales=coulomb:0.9,stribeck:0  without=viscous  stick=1,0.1,1e-3
 
     Raises:
-        ValueError: unknown names, repeated ones, no numbers.
+        ValueError: unknown or repeated names, or values that are not numbers.
     """
     where, found = "compensation", dict[str, Any]()
     known = [item.name for item in fields(Compensation)]
@@ -96,12 +105,11 @@ def settings_from_text(texts: Sequence[str]) -> Compensation:
         elif name in ("scales", "build_up_table"):
             if any(len(pair) != 2 for pair in pairs):
                 raise checks.refused(f"{where}: {name}", "A:B,A:B,...", value)
-            number = [checks.parsed(f"{where}: {name}", pair[1]) for pair in pairs]
             firsts = [pair[0] for pair in pairs]
-            found[name] = dict(zip(firsts, number, strict=True))
             if name == "build_up_table":
-                shares = [checks.parsed(f"{where}: {name}", first) for first in firsts]
-                found[name] = tuple(zip(shares, number, strict=True))
+                firsts = [checks.parsed(f"{where}: {name}", first) for first in firsts]
+            seconds = (checks.parsed(f"{where}: {name}", pair[1]) for pair in pairs)
+            found[name] = (dict if name == "scales" else tuple)(zip(firsts, seconds, strict=True))
         else:
             numbers = tuple(checks.parsed(f"{where}: {name}", part) for part in parts)
             found[name] = numbers[0] if len(numbers) == 1 else numbers
@@ -112,44 +120,34 @@ def chosen_settings(
     where: str, settings: Compensation | None, chosen: Mapping[str, Any]
 ) -> Compensation:
     """Combine settings and keywords, and check them."""
-    known = [item.name for item in fields(Compensation)]
-    checks.check_names(where, chosen, known)
-    if settings is None:
-        settings = Compensation()
+    checks.check_names(where, chosen, [item.name for item in fields(Compensation)])
+    settings = Compensation() if settings is None else settings
     s = replace(checks.kind(where, settings, Compensation, "settings, Compensation()"), **chosen)
     checks.choice(f"{where}: velocity", s.velocity, VELOCITIES)
     if isinstance(s.N, str):
         checks.choice(f"{where}: N", s.N, ["input"])
-    elif s.N is not None:
-        checks.number(f"{where}: N", s.N, unit="N", lower=0.0)
-    if s.offset is not None:
-        checks.number(f"{where}: offset", s.offset, unit="N")
-    positive = ("v_blend", "m/s"), ("build_up", "m"), ("ramp", "s")
-    for name, unit in positive:
-        if getattr(s, name) is not None:
-            checks.number(f"{where}: {name}", getattr(s, name), unit=unit, above=0.0)
-    others = (
-        ("dead_zone", "m/s"),
-        ("inertia", "kg"),
-        ("delay", "s"),
-        ("error_gain", "1/s"),
-        ("limit", "N"),
-        ("slew", "N/s"),
-    )
-    for name, unit in others:
-        if getattr(s, name) is not None:
-            checks.number(f"{where}: {name}", getattr(s, name), unit=unit, lower=0.0)
+    for name, (unit, bound) in BOUNDS.items():
+        value = getattr(s, name)
+        if value is not None and (name, value) != ("N", "input"):
+            checks.number(f"{where}: {name}", value, unit=unit, **bound)
     if s.velocity == "measured" and (s.error_gain is not None or s.delay is not None):
         raise ValueError(
             f"{where}: error_gain, delay: expected with a desired velocity only, got "
             "velocity = 'measured'"
         )
-    _check_numbers(f"{where}: hold", s.hold, "(error [m], velocity [m/s])", 2)
-    _check_numbers(f"{where}: stick", s.stick, "(force [N], time [s], velocity [m/s])", 3)
+    for name, what, count in (
+        ("hold", "(error [m], velocity [m/s])", 2),
+        ("stick", "(force [N], time [s], velocity [m/s])", 3),
+        ("dither", "(amplitude [N], frequency [Hz])", 2),
+    ):
+        value = getattr(s, name)
+        if value is not None:
+            found = checks.array(f"{where}: {name}", value, what=what)
+            if found.size != count or (found < 0).any():
+                raise checks.refused(f"{where}: {name}", f"{what}, numbers >= 0", value)
     if s.stick is not None:
         checks.number(f"{where}: stick: velocity", s.stick[2], unit="m/s", above=0.0)
         checks.number(f"{where}: stick: time", s.stick[1], unit="s", above=0.0)
-    _check_numbers(f"{where}: dither", s.dither, "(amplitude [N], frequency [Hz])", 2)
     _check_table(f"{where}: build_up_table", s)
     checks.names(f"{where}: without", s.without, TERMS)
     if isinstance(s.scales, Mapping):
@@ -160,19 +158,11 @@ def chosen_settings(
     return s
 
 
-def _check_numbers(where: str, value: object, what: str, count: int) -> None:
-    if value is None:
-        return
-    found = checks.array(where, value, what=what)
-    if found.size != count or (found < 0).any():
-        raise checks.refused(where, f"{what}, numbers >= 0", value)
-
-
 def _check_table(where: str, s: Compensation) -> None:
     if not s.build_up_table:
         return
     if s.build_up is None:
-        raise ValueError(f"{where}: expected with build_up only, the way that it is a shape of")
+        raise ValueError(f"{where}: expected with build_up only, whose shape it is")
     points = checks.array(where, s.build_up_table, ndim=2, what="pairs of shares")
     ends = points.shape[1] == 2 and (points[0] == 0).all() and (points[-1] == 1).all()
     if not ends or not (np.diff(points[:, 0]) > 0).all() or not (np.diff(points[:, 1]) >= 0).all():
@@ -183,7 +173,7 @@ def _check_table(where: str, s: Compensation) -> None:
 
 
 def formula(s: Compensation) -> str:
-    """Formula of the block, line by line."""
+    """Return the formula of the block, line by line."""
     wanted = "v_ref" + " + t_ahead a_ref" * (s.delay is not None)
     wanted += " + k_error e" * (s.error_gain is not None)
     moves = {
@@ -203,10 +193,10 @@ def formula(s: Compensation) -> str:
     force += " + F_stick stuck" * (s.stick is not None)
     force += " + F_dither sin(2 pi phase)" * (s.dither is not None)
     lines.append(f"F = {force}, terms of the law by their scales")
-    chosen = {
-        "faded in by enable over t_ramp": s.ramp,
-        "within +-F_max": s.limit,
-        "by F_rate h a step at most": s.slew,
-    }
-    last = [text for text, value in chosen.items() if value is not None]
-    return "\n".join([*lines, *([f"F {', '.join(last)}"] if last else [])])
+    stages = (
+        ("faded in by enable over t_ramp", s.ramp),
+        ("within +-F_max", s.limit),
+        ("by F_rate h a step at most", s.slew),
+    )
+    last = ", ".join(text for text, value in stages if value is not None)
+    return "\n".join([*lines, *[f"F {last}"] * bool(last)])

@@ -12,26 +12,25 @@ from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.generated import Generated
-from symfric.codegen.layout import filled, prefix
-from symfric.codegen.runner import link_program, program, run_c, run_vm
+from symfric.codegen.layout import CBlock, filled
+from symfric.codegen.runner import compiled, run_c, run_vm
+from symfric.codegen.verification import motions
 from symfric.embedded.target import (
     BY,
+    CLOCK,
     CORES,
+    SHIFT,
     SOURCES,
     Absent,
-    Core,
-    Said,
     Target,
     Tools,
-    built,
     by_casadi,
     find_tools,
+    literals,
     own,
-    said,
 )
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
-from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import CompileError, find_compiler
 
@@ -42,26 +41,26 @@ STEPS = 400
 MEASURED = "measured"
 
 FAMILY = 1e-3
-"""Least peak of a signal that errors are divided by, in the largest peak of its unit."""
+"""Smallest divisor of the errors of a signal, relative to the largest peak of its unit."""
 
 
 @final
 @dataclass(frozen=True)
 class Measured:
-    """One block on one core.
+    """Measurement of one block on one core.
 
     Attributes:
-        block, real, core, by: what was measured; see `CORES` and `BY`.
-        status: "measured", or a sentence that says what is absent; the numbers are NaN then.
-        average, maximum: instructions of a step, the call included.
+        block, real, core, by: subject; see `CORES` and `BY`.
+        status: "measured", or a sentence about absent tools; the numbers are NaN then.
+        average, maximum: instructions of a step, including the call.
         text: bytes of code and constants of the block.
-        library: bytes of the functions of libm and libgcc that are linked for it.
-        data: bytes of RAM for an instance: states and, so that they can be changed, parameters.
-        stack: bytes of stack that the call uses at most, library included.
+        library: bytes of the linked functions of libm and libgcc.
+        data: bytes of RAM of an instance: states and adjustable parameters.
+        stack: bytes of stack used by the call, including libraries.
         error: largest difference from CasADi's double from the same states, relative to the peak
-            of each signal, at least a thousandth of the largest of its unit.
-        equal: share of numbers with the bits of the host's C; NaN where it was not compared.
-        finite: whether all numbers are.
+            of each signal, or to a thousandth of the largest peak of its unit.
+        equal: fraction of numbers with the bits of the host's C; NaN if not compared.
+        finite: True if all numbers are finite.
     """
 
     block: str
@@ -81,11 +80,11 @@ class Measured:
 
     @property
     def ok(self) -> bool:
-        """Return True if it was measured and all numbers are finite."""
+        """True if it was measured and all numbers are finite."""
         return self.status == MEASURED and self.finite
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything by name; what was not measured is None."""
+        """Return all values by name; None for those that were not measured."""
         return {
             name: None if isinstance(value, float) and not isfinite(value) else value
             for name, value in asdict(self).items()
@@ -105,24 +104,24 @@ def measure(
 ) -> Measured:
     """Cross-compile a step of `block`, run it under QEMU and compare it with the host.
 
-    QEMU counts instructions exactly; it knows no cycles. The inputs are those of `day`. Nothing
-    fuses multiply and add (-ffp-contract=off).
+    QEMU counts instructions exactly, but no cycles. The inputs are those of `day`. Nothing fuses
+    multiply and add (-ffp-contract=off).
 
     Args:
         real: "float" or "double".
         core: one of `CORES`: "m0plus", "m3", "m4f", "m7".
-        by: who writes the C, one of `BY`.
+        by: author of the C, one of `BY`.
         flags: of the compiler, such as -Os.
-        steps: how many, up to 4000.
-        guards: whether our C clamps and repairs; CasADi's has no such thing.
-        tools: what `find_tools` found.
+        steps: number of steps, up to 4000.
+        guards: True if the C of symfric clamps and repairs its numbers.
+        tools: returned by `find_tools`.
 
     Returns:
-        The numbers; where a tool is absent its name and package stand in `status`.
+        The numbers; absent tools with their packages are named in `status`.
 
     Raises:
         ValueError: an unknown name; too many steps.
-        CompileError: the compiler refuses the code, or the program fails under QEMU.
+        CompileError: the compiler rejects the code, or the program fails under QEMU.
     """
     where = "embedded"
     checks.kind(where, block, Block, "law_block(LuGre())")
@@ -133,50 +132,52 @@ def measure(
     found = find_tools() if tools is None else tools
     if isinstance(found, Absent):
         return Measured(block.name, real, core, by, f"skipped: {found.advice}")
-    inputs = day(block, steps)
+    inputs, columns = day(block, steps), len(block.states) + len(block.outputs)
+    c = CBlock(block, REALS[real], guards)
     with TemporaryDirectory(prefix="symfric-") as name:
         folder = Path(name)
         if by == "symfric":
-            subject = own(block, real, folder, guards=guards)
+            source, parts = own(block, real, folder, guards=guards)
         else:
-            subject = by_casadi(block, real, folder, functions_of_float=by != "casadi")
+            source, parts = by_casadi(block, real, folder, functions_of_float=by != "casadi")
+        rows = [f"{{{literals(row, real) or '0'}}}" for row in inputs.tolist()]
+        main = filled(
+            SOURCES / "measured.c",
+            real=real,
+            steps=steps,
+            inputs=max(inputs.shape[1], 1),
+            columns=columns,
+            values=",\n".join(rows),
+            **parts,
+        )
         target = Target(CORES[core], found, flags)
-        image = built(subject, real, inputs, _columns(block), target)
-        heard = said(target.heard(image), real, _columns(block))
-        equal = _equal(block, subject.source, (real, guards), inputs, heard.rows)
-    return _measured(block, real, CORES[core], by, inputs, heard, equal)
-
-
-def _columns(block: Block) -> int:
-    return len(block.states) + len(block.outputs)
-
-
-def _measured(
-    block: Block, real: str, core: Core, by: str, inputs: Array, heard: Said, equal: float
-) -> Measured:
-    expected = run_vm(block, REALS[real], inputs, heard.rows[:, : len(block.states)])
+        words = target.heard(target.linked(folder, main, (source,)))
+        results = words["rows"].view(c.real.kind).reshape(-1, columns).astype(float)
+        equal = _equal(c, source, inputs, results)
+    instructions = (words["ticks"] - words["idle"].mean()) * (1e9 / CLOCK / 2**SHIFT)
+    expected = run_vm(CBlock(block, c.real), inputs, results[:, : len(block.states)])
     return Measured(
         block.name,
         real,
-        core.name,
+        core,
         by,
-        average=float(heard.instructions.mean()),
-        maximum=float(round(heard.instructions.max())),
-        text=heard.text,
-        library=heard.library,
-        data=heard.data,
-        stack=heard.stack,
-        error=_error(block, heard.rows, expected[:, : _columns(block)]),
+        average=float(instructions.mean()),
+        maximum=float(round(instructions.max())),
+        text=int(words["text"][0]),
+        library=int(words["library"][0]),
+        data=int(words["data"][0]),
+        stack=int(words["stack"][0]),
+        error=_error(block, results, expected[:, :columns]),
         equal=equal,
-        finite=bool(np.isfinite(heard.rows).all()),
+        finite=bool(np.isfinite(results).all()),
     )
 
 
 def _error(block: Block, a: Array, b: Array) -> float:
-    """Largest difference of a column relative to its peak in `b`.
+    """Return the largest difference of a column relative to its peak in `b`.
 
-    A peak below a thousandth of that of another signal of the same unit counts as so much: the
-    torque of an upright axis under gravity is rounding alone.
+    A peak counts as at least a thousandth of the largest one of the same unit: the torque of an
+    upright axis under gravity is only rounding.
     """
     units = np.array([v.unit for v in (*block.states, *block.outputs.values())])
     peak = np.abs(b).max(axis=0, initial=0.0)
@@ -186,19 +187,14 @@ def _error(block: Block, a: Array, b: Array) -> float:
     return float(np.where(np.isnan(ratio), inf, ratio).max(initial=0.0))
 
 
-def _equal(block: Block, source: Path, how: tuple[str, bool], inputs: Array, rows: Array) -> float:
-    """Share of numbers with the bits of our C on the host; NaN without a compiler or with others'.
-
-    Args:
-        how: floating point type, and whether there are guards.
+def _equal(c: CBlock, source: Path, inputs: Array, rows: Array) -> float:
+    """Return the fraction of numbers with the bits of the host; NaN without a compiler, or for C
+    of CasADi.
     """
-    compiler, folder = find_compiler(), source.parent
-    real, guards = REALS[how[0]], how[1]
-    if compiler is None or source.stem != prefix(block, real):
+    compiler = find_compiler()
+    if compiler is None or source.stem != c.name:
         return nan
-    write_text(folder / "main.c", program(block, real, guards))
-    link_program(compiler, [folder / "main.c", source], folder, folder / "main")
-    host = run_c(block, real, folder / "main", inputs, guards=guards)
+    host = run_c(c, compiled(c, [source], source.parent, compiler), inputs)
     return float((host[:, : rows.shape[1]] == rows).mean())
 
 
@@ -210,17 +206,17 @@ def wrong_on_target(
     flags: Sequence[str] = ("-O2",),
     tools: Tools | Absent | None = None,
 ) -> int:
-    """Number of wrong results of the kit's own unit test on a core under QEMU.
+    """Return the number of wrong results of the unit test of a kit on a core under QEMU.
 
     Args:
-        generated: what `generate` returned, with the floating point type `real`.
+        generated: returned by `generate`, with the floating point type `real`.
         core: one of `CORES`.
         flags: of the compiler.
-        tools: what `find_tools` found.
+        tools: returned by `find_tools`.
 
     Raises:
         ValueError: an unknown core, a type that was not generated.
-        CompileError: tools are absent, the compiler refuses the code, or the program fails.
+        CompileError: tools are absent, the compiler rejects the code, or the program fails.
     """
     where = "embedded"
     checks.kind(where, generated, Generated, "what generate(...) returned")
@@ -229,52 +225,43 @@ def wrong_on_target(
     found = find_tools() if tools is None else tools
     if isinstance(found, Absent):
         raise CompileError(f"{where}: {found.advice}")
-    name = prefix(generated.block, REALS[real])
+    name = generated.c(real).name
     sources = [generated.folder / f"{name}{ending}.c" for ending in ("", "_test")]
     target = Target(CORES[core], found, flags)
     with TemporaryDirectory(prefix="symfric-") as folder:
-        own = (f"-D{name.upper()}_TEST_NO_MAIN", f"-I{generated.folder}")
-        image = target.linked(Path(folder), filled(SOURCES / "test.c", name=name), sources, *own)
+        options = (f"-D{name.upper()}_TEST_NO_MAIN", f"-I{generated.folder}")
+        main = filled(SOURCES / "test.c", name=name)
+        image = target.linked(Path(folder), main, sources, *options)
         return int(target.heard(image)["wrong"][0])
 
 
 STRETCH = 20
-"""Steps of one kind of motion in a row."""
+"""Number of consecutive steps with one type of motion."""
 
 LOADS = (1.0, 1.5, 0.5, 1.0, 0.1, 10.0)
-"""Of a load, in units of its nominal value, one after the other: steps up to a hundredfold."""
+"""Consecutive levels of a load in units of its nominal value: steps up to a hundredfold."""
 
 
 def day(block: Block, steps: int) -> Array:
-    """Inputs of every step, shape (steps, inputs), the same at each call.
+    """Return inputs of every step, shape (steps, inputs), the same at each call.
 
     In stretches of 20 steps, in units of the nominal value: a slow sine through zero, bursts up to
     2, values of 1e-12 ... 1e-3 of either sign, reversals between -0.1 and 0.1, rest: a fifth each,
-    shuffled. A load (lower bound 0 or more) wavers by a tenth around levels that jump between the
+    shuffled. A load (lower bound 0 or more) varies by a tenth around levels that jump between the
     stretches by factors up to 100.
     """
     random = np.random.default_rng(0)
     columns = [np.zeros((steps, 0)), *(_signal(v, steps, random) for v in block.inputs)]
-    values = np.column_stack(columns)
-    lower = np.array([v.lower for v in block.inputs])
-    upper = np.array([v.upper for v in block.inputs])
-    return np.clip(values, lower, upper)
+    lower, upper = np.array([(v.lower, v.upper) for v in block.inputs]).reshape(-1, 2).T
+    return np.clip(np.column_stack(columns), lower, upper)
 
 
 def _signal(variable: Variable, steps: int, random: np.random.Generator) -> Array:
-    k = np.arange(steps)
-    count = -(-steps // STRETCH)
+    k, count = np.arange(steps), -(-steps // STRETCH)
     if variable.lower >= 0.0:
         levels = np.resize(LOADS, count).repeat(STRETCH)[:steps]
         return variable.nominal * levels * (1.0 + 0.1 * np.sin(0.3 * k + random.uniform(0.0, 6.0)))
-    tiny = 10.0 ** random.uniform(-12.0, -3.0, steps) * random.choice([-1.0, 1.0], steps)
-    pieces = [
-        0.05 * np.sin(0.15 * k),
-        np.clip(random.standard_normal(steps), -2.0, 2.0),
-        tiny,
-        0.1 * np.sign(np.sin(0.6 * k + 0.1)),
-        np.zeros(steps),
-    ]
+    pieces = motions(random, steps, 0.15, 0.6, 0.1)
     turns = np.resize(np.arange(len(pieces)), count)
     random.shuffle(turns)
     return variable.nominal * np.choose(turns.repeat(STRETCH)[:steps], pieces)

@@ -1,112 +1,81 @@
 """Cortex-M cores, the tools that compile and run code for them, and programs under QEMU.
 
-The main program calls a block step by step and says by semihosting what each step cost and gave:
-numbers as words of eight hexadecimal digits, one a line, behind a line with their name. Steps are
-timed by SysTick, which under QEMU's -icount counts instructions and nothing else. Start-up code,
+The main program calls a block step by step and reports cost and results of each step by
+semihosting: numbers as words of eight hexadecimal digits, one a line, after a line with their name.
+Steps are timed by SysTick, which under QEMU's -icount counts instructions only. Start-up code,
 linker script and main programs are files in `sources`.
 """
 
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from re import fullmatch
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.header import header
-from symfric.codegen.layout import called, filled, prefix
-from symfric.codegen.routines import source
-from symfric.emitter.c99 import REALS
+from symfric.codegen.layout import CBlock
+from symfric.codegen.source import header, source
+from symfric.emitter.c99 import FUNCTIONS, REALS
 from symfric.foundation.files import write_text
 from symfric.foundation.programs import CompileError, Compiler, ProgramError, finished
 
 BY = ("symfric", "casadi", "casadi, functions of float")
-"""Who writes the C: we; CasADi, whose code of float calls tanh, exp, fmax of double; CasADi with a
-header before it that maps them to those of float."""
+"""Authors of the C: symfric; CasADi, whose code of float calls tanh, exp, fmax of double; CasADi
+after a header that maps them to those of float."""
 
-_MATH = (
-    *("acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos"),
-    *("cosh", "erf", "exp", "expm1", "fabs", "floor", "fmax", "fmin", "fmod", "hypot", "log"),
-    *("log1p", "pow", "sin", "sinh", "sqrt", "tan", "tanh"),
-)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Subject:
-    """Code with one step of a block in it.
-
-    Attributes:
-        source: the file to compile.
-        parts: of the main program, the places of `sources/measured.c`.
-    """
-
-    source: Path
-    parts: Mapping[str, str]
+Subject = tuple[Path, dict[str, str]]
+"""File with one step of a block, and its values of the placeholders of `sources/measured.c`."""
 
 
 def own(block: Block, real: str, folder: Path, *, guards: bool) -> Subject:
-    """Our C, written into `folder`, and its call."""
-    name, kind = prefix(block, REALS[real]), REALS[real]
-    write_text(folder / f"{name}.h", header(block, kind, guards))
-    write_text(folder / f"{name}.c", source(block, kind, guards))
+    """Write the C of symfric into `folder`."""
+    c = CBlock(block, REALS[real], guards)
+    name = c.name
+    write_text(folder / f"{name}.h", header(c))
+    write_text(folder / f"{name}.c", source(c))
     pointers = {
         "state": "&state",
         "param": f"&{name}_default",
         "in": f"(const {name}_in_t *)U[k]",
         "out": f"({name}_out_t *)(Y[k] + {len(block.states)})",
     }
-    inputs = [f"U[k][{i}]" for i in range(len(block.inputs))]
-    step = called(block, kind, guards, pointers, inputs)
+    step = c.call(pointers, [f"U[k][{i}]" for i in range(len(block.inputs))])
     declarations, start, keep = ["unsigned int status;"], "status = 0u;", "(void)k;"
     if block.states:
         declarations.append(f"{name}_state_t state;")
         start += f" {name}_init(&state, &{name}_start);"
         keep = "memcpy(Y[k], &state, sizeof state);"
-    sizes = [f"sizeof({name}_state_t)"] * bool(block.states)
-    sizes += [f"sizeof({name}_param_t)"] * bool(block.parameters)
-    return Subject(
-        folder / f"{name}.c",
-        {
-            "include": f'#include "{name}.h"',
-            "declarations": "\n".join(f"static {line}" for line in declarations),
-            "start": start,
-            "step": f"{'Y[k][0] = ' if block.is_function else 'status |= ' * guards}{step};",
-            "keep": keep,
-            "data": " + ".join(sizes) or "0u",
-        },
-    )
+    sizes = [f"sizeof({name}_{group}_t)" for group in ("state", "param") if group in block.members]
+    return folder / f"{name}.c", {
+        "include": f'#include "{name}.h"',
+        "declarations": "\n".join(f"static {line}" for line in declarations),
+        "start": start,
+        "step": f"{'Y[k][0] = ' if block.is_function else 'status |= ' * guards}{step};",
+        "keep": keep,
+        "data": " + ".join(sizes) or "0u",
+    }
 
 
 def by_casadi(block: Block, real: str, folder: Path, *, functions_of_float: bool) -> Subject:
-    """CasADi's C of the same step, written into `folder`."""
-    options = {
-        "casadi_real": real,
-        "casadi_int": "int",
-        "static_aux": True,
-        "include_math": not functions_of_float,
-    }
+    """Write CasADi's C of the same step into `folder`."""
+    options = {"casadi_real": real, "casadi_int": "int", "static_aux": True,
+               "include_math": not functions_of_float}  # fmt: skip
     generator = ca.CodeGenerator("casadi_step", options)
     generator.add(block.step)
     text = generator.dump()
     if functions_of_float:
-        renamed = "".join(f"#define {name} {name}f\n" for name in _MATH)
+        names = sorted({*FUNCTIONS.values(), "fmin", "fmax"})
+        renamed = "".join(f"#define {name} {name}f\n" for name in names)
         text = f"#include <math.h>\n{renamed}\n{text}"
     write_text(folder / "casadi_step.c", text)
-    return Subject(folder / "casadi_step.c", _casadi_parts(block, real))
-
-
-def _casadi_parts(block: Block, real: str) -> dict[str, str]:
     f, n = block.step, len(block.states)
-    p, x = (
-        literals(np.array([v.start for v in group] or [0.0], dtype=float), real)
-        for group in (block.parameters, block.states)
-    )
+    p, x = (literals([float(v.start) for v in group] or [0.0], real)
+            for group in (block.parameters, block.states))  # fmt: skip
     static = [
         f"const {real} X0[] = {{{x}}}, P[] = {{{p}}};",
         f"{real} X[{n + 1}], XN[{n + 1}], W[{f.sz_w() + 1}];",
@@ -115,7 +84,7 @@ def _casadi_parts(block: Block, real: str) -> dict[str, str]:
         f"{real} *RES[{f.sz_res()}];",
     ]
     prototype = f"int step(const {real} **arg, {real} **res, int *iw, {real} *w, int mem);\n"
-    return {
+    return folder / "casadi_step.c", {
         "include": "",
         "declarations": prototype + "\n".join(f"static {line}" for line in static),
         "start": "memcpy(X, X0, sizeof X0);",
@@ -126,20 +95,18 @@ def _casadi_parts(block: Block, real: str) -> dict[str, str]:
     }
 
 
-def literals(values: np.ndarray, real: str) -> str:
-    """Numbers as constants of C."""
+def literals(values: Sequence[float], real: str) -> str:
+    """Return numbers as constants of C."""
     form = "{:.9e}f" if real == "float" else "{:.17e}"
-    return ", ".join(form.format(float(value)) for value in values)
+    return ", ".join(form.format(value) for value in values)
 
 
-@final
-@dataclass(frozen=True)
-class Core:
+class Core(NamedTuple):
     """Cortex-M core.
 
     Attributes:
-        name: in short.
-        title: in full, with its floating point unit.
+        name: short name.
+        title: full name with its floating point unit.
         options: of gcc.
         machine: QEMU's board whose core runs this code.
     """
@@ -150,34 +117,23 @@ class Core:
     machine: str
 
 
-_SOFT = "-mfloat-abi=soft"
-_HARD = "-mfloat-abi=hard"
+_SOFT, _HARD = "-mfloat-abi=soft", "-mfloat-abi=hard"
+_M4, _M7 = ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"), ("-mcpu=cortex-m7", "-mfpu=fpv5-d16")
 
 CORES = {
     core.name: core
     for core in (
         Core("m0plus", "Cortex-M0+, no FPU", ("-mcpu=cortex-m0plus", _SOFT), "mps2-an385"),
         Core("m3", "Cortex-M3, no FPU", ("-mcpu=cortex-m3", _SOFT), "mps2-an385"),
-        Core(
-            "m4f",
-            "Cortex-M4F, FPU of float",
-            ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", _HARD),
-            "mps2-an386",
-        ),
-        Core(
-            "m7",
-            "Cortex-M7, FPU of double",
-            ("-mcpu=cortex-m7", "-mfpu=fpv5-d16", _HARD),
-            "mps2-an500",
-        ),
+        Core("m4f", "Cortex-M4F, FPU of float", (*_M4, _HARD), "mps2-an386"),
+        Core("m7", "Cortex-M7, FPU of double", (*_M7, _HARD), "mps2-an500"),
     )
 }
-"""By name. Code for the M0+ runs on QEMU's M3: ARMv6-M is a part of ARMv7-M, instruction by
-instruction, so that the counts are the same; QEMU's one board with an M0 has 16 kB of RAM."""
+"""Cores by name. Code for the M0+ runs on QEMU's M3 with the same counts: ARMv6-M is a subset of
+ARMv7-M, and QEMU's only board with an M0 has 16 kB of RAM."""
 
 CLOCK = 25e6
-"""Of SysTick on the boards [Hz]."""
-
+"""Frequency of SysTick on the boards [Hz]."""
 
 GCC, QEMU, NEWLIB = "arm-none-eabi-gcc", "qemu-system-arm", "newlib for arm-none-eabi"
 
@@ -189,7 +145,7 @@ PACKAGES = {
 """Tool -> package of Debian and Ubuntu."""
 
 LIBRARY_PATIENCE = 10.0
-"""Seconds in which a compiler says where its library is."""
+"""Time limit of a compiler to print the path of its library [s]."""
 
 
 @final
@@ -210,7 +166,7 @@ class Absent:
 
     @property
     def advice(self) -> str:
-        """Sentence with the absent tools and how to install them."""
+        """Sentence with the absent tools and their installation."""
         packages = " ".join(PACKAGES[name] for name in self.names)
         return (
             f"{', '.join(self.names)} not found; on Debian and Ubuntu: "
@@ -219,14 +175,13 @@ class Absent:
 
 
 def find_tools() -> Tools | Absent:
-    """Return the tools in PATH, or which of them are not there."""
+    """Return the tools in PATH, or the names of the missing ones."""
     gcc, qemu = shutil.which(GCC), shutil.which(QEMU)
-    if gcc is not None and qemu is not None and _has_library(gcc):
+    library = gcc is not None and _has_library(gcc)
+    if gcc is not None and qemu is not None and library:
         return Tools(Compiler((gcc,)), qemu)
-    missing = [name for name, path in ((GCC, gcc), (QEMU, qemu)) if path is None]
-    if gcc is None or not _has_library(gcc):
-        missing.insert(1 if gcc is None else 0, NEWLIB)
-    return Absent(tuple(missing))
+    found = {GCC: gcc, NEWLIB: library, QEMU: qemu}
+    return Absent(tuple(name for name, there in found.items() if not there))
 
 
 def _has_library(gcc: str) -> bool:
@@ -238,57 +193,36 @@ def _has_library(gcc: str) -> bool:
     return said not in (b"", b"libm.a")
 
 
-Array = NDArray[np.float64]
-
 SOURCES = Path(__file__).with_name("sources")
-"""Folder of the C and the linker script round the code that is measured."""
+"""Folder of start-up code, linker script and main programs."""
 
 FLAGS = ("-mthumb", "-std=gnu99", "-ffunction-sections", "-fdata-sections", "-ffp-contract=off")
-"""For every core."""
+"""Flags for all cores."""
 
 SHIFT = 7
-"""Instruction takes 2^7 ns of QEMU's time: 3.2 ticks of SysTick, whose 24 bits are enough for
+"""An instruction takes 2^7 ns of QEMU's time, 3.2 ticks of SysTick; its 24 bits count up to
 5 million instructions."""
 
 WORD = "[0-9a-f]{8}"
 
 PATIENCE = 120.0
-"""Seconds that a program may run."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Said:
-    """Output of a program.
-
-    Attributes:
-        instructions: of every step, shape (steps,); each to a third of one, their mean exactly.
-        rows: states after every step, and its outputs.
-        text, library, data, stack: bytes.
-    """
-
-    instructions: Array
-    rows: Array
-    text: int
-    library: int
-    data: int
-    stack: int
+"""Time limit of a program [s]."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Core, the tools for it and options of the compiler."""
+    """Core, its tools and options of the compiler."""
 
     core: Core
     tools: Tools
     flags: Sequence[str]
 
     def linked(self, folder: Path, main: str, sources: Sequence[Path], *flags: str) -> Path:
-        """Return an image of a main program and `sources`, the first of which is what is measured.
+        """Return an image of a main program and `sources`, the first of which is measured.
 
         Raises:
-            CompileError: the compiler refuses it.
+            CompileError: the compiler rejects it.
         """
         write_text(folder / "target.c", main)
         gcc, options = self.tools.gcc, (*self.core.options, *FLAGS, *self.flags, *flags)
@@ -303,10 +237,10 @@ class Target:
         return image
 
     def heard(self, image: Path) -> dict[str, NDArray[np.uint32]]:
-        """Run an image under QEMU; its words by the name before them.
+        """Run an image under QEMU; return the words after each name.
 
         Raises:
-            CompileError: it does not start, comes to no end, or ends in a fault.
+            CompileError: it does not start or end, or ends in a fault.
         """
         core = self.core
         command = (
@@ -322,48 +256,10 @@ class Target:
         if done.status or "end" not in lines:
             said = " ".join(lines[-8:])
             raise CompileError(f"{core.title}: QEMU ended with status {done.status}: {said}")
-        return _words(lines)
-
-
-def built(subject: Subject, real: str, inputs: Array, columns: int, target: Target) -> Path:
-    """Compile and link what calls the subject with `inputs` and keeps rows of `columns` numbers.
-
-    Raises:
-        CompileError: the compiler refuses it.
-    """
-    rows = [f"{{{literals(row, real) or '0'}}}" for row in inputs]
-    main = filled(
-        SOURCES / "measured.c",
-        real=real,
-        steps=len(inputs),
-        inputs=max(inputs.shape[1], 1),
-        columns=columns,
-        values=",\n".join(rows),
-        **subject.parts,
-    )
-    return target.linked(subject.source.parent, main, (subject.source,))
-
-
-def said(words: Mapping[str, NDArray[np.uint32]], real: str, columns: int) -> Said:
-    """Output of a measured program."""
-    kind = REALS[real].kind
-    ticks = words["ticks"] - words["idle"].mean()
-    return Said(
-        instructions=ticks * (1e9 / CLOCK / 2**SHIFT),
-        rows=words["rows"].view(kind).reshape(-1, columns).astype(float),
-        text=int(words["text"][0]),
-        library=int(words["library"][0]),
-        data=int(words["data"][0]),
-        stack=int(words["stack"][0]),
-    )
-
-
-def _words(lines: Sequence[str]) -> dict[str, NDArray[np.uint32]]:
-    """Return the words behind each name, up to "end"."""
-    found: dict[str, list[int]] = {}
-    for line in lines[: lines.index("end")]:
-        if fullmatch(WORD, line):
-            found[next(reversed(found))].append(int(line, 16))
-        else:
-            found[line] = []
-    return {name: np.array(words, dtype=np.uint32) for name, words in found.items()}
+        found: dict[str, list[int]] = {}
+        for line in lines[: lines.index("end")]:
+            if fullmatch(WORD, line):
+                found[next(reversed(found))].append(int(line, 16))
+            else:
+                found[line] = []
+        return {name: np.array(words, dtype=np.uint32) for name, words in found.items()}

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from symfric.emitter.logic import OPPOSITE
 from symfric.foundation.graph import SELECT, Graph, Node
+from symfric.foundation.instructions import CODES
 
 TERNARY, LOGIC, EQUAL, ORDER, SUM, PRODUCT, SIGN, ATOM = range(1, 9)
-"""How tightly a C expression binds."""
+"""Precedence of C expressions."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Real:
         return np.float32 if self.size == 4 else np.float64
 
     def rounded(self, values: object) -> NDArray[np.float64]:
-        """Numbers rounded to this type, as doubles."""
+        """Return numbers rounded to this type, as doubles."""
         with np.errstate(over="ignore", under="ignore", invalid="ignore"):
             return np.asarray(values, float).astype(self.kind).astype(float)
 
@@ -50,14 +51,11 @@ class Real:
         """
         with np.errstate(over="ignore", under="ignore"):
             rounded = self.kind(value)
-        if math.isnan(value) or (math.isinf(rounded) and not math.isinf(value)):
+        vanishes = bool(rounded == 0.0 and value != 0.0)
+        if math.isnan(value) or vanishes or (math.isinf(rounded) and not math.isinf(value)):
             raise ValueError(
                 f"codegen: expected constants within the range of {self.name}, got {value!r}"
-            )
-        if rounded == 0.0 and value != 0.0:
-            raise ValueError(
-                f"codegen: expected constants within the range of {self.name}, got {value!r}, "
-                "which would become 0"
+                + ", which would become 0" * vanishes
             )
         if math.isinf(value):
             return f"{'-' if value < 0 else ''}HUGE_VAL{self.letter.upper()}"
@@ -71,19 +69,16 @@ FLOAT = Real("float", "f32", "f", 4)
 REALS = {real.name: real for real in (DOUBLE, FLOAT)}
 
 
-@dataclass(frozen=True)
-class Form:
+class Form(NamedTuple):
     """C text of an operation: `pattern` with operands that bind as tightly as `needs`.
 
     Attributes:
-        logical: the result is a bool.
-        conditions: leading operands that are bools.
+        conditions: number of leading operands that are bools.
     """
 
     pattern: str
     binds: int
     needs: tuple[int, ...]
-    logical: bool = False
     conditions: int = 0
 
 
@@ -97,49 +92,26 @@ FORMS: dict[int, Form] = {
     ca.OP_TWICE: Form("{two} * {}", PRODUCT, (SIGN,)),
     ca.OP_INV: Form("{one} / {}", PRODUCT, (SIGN,)),
     ca.OP_SIGN: Form("{0} > {zero} ? {one} : ({0} < {zero} ? -{one} : {0})", TERNARY, (ATOM,)),
-    ca.OP_LT: Form("{} < {}", ORDER, (SUM, SUM), logical=True),
-    ca.OP_LE: Form("{} <= {}", ORDER, (SUM, SUM), logical=True),
-    ca.OP_EQ: Form("{} == {}", EQUAL, (SUM, SUM), logical=True),
-    ca.OP_NE: Form("{} != {}", EQUAL, (SUM, SUM), logical=True),
-    ca.OP_NOT: Form("!{}", SIGN, (ATOM,), logical=True, conditions=1),
-    ca.OP_AND: Form("{} && {}", LOGIC, (EQUAL, EQUAL), logical=True, conditions=2),
-    ca.OP_OR: Form("{} || {}", LOGIC, (EQUAL, EQUAL), logical=True, conditions=2),
+    ca.OP_LT: Form("{} < {}", ORDER, (SUM, SUM)),
+    ca.OP_LE: Form("{} <= {}", ORDER, (SUM, SUM)),
+    ca.OP_EQ: Form("{} == {}", EQUAL, (SUM, SUM)),
+    ca.OP_NE: Form("{} != {}", EQUAL, (SUM, SUM)),
+    ca.OP_NOT: Form("!{}", SIGN, (ATOM,), conditions=1),
+    ca.OP_AND: Form("{} && {}", LOGIC, (EQUAL, EQUAL), conditions=2),
+    ca.OP_OR: Form("{} || {}", LOGIC, (EQUAL, EQUAL), conditions=2),
     SELECT: Form("{} ? {} : {}", TERNARY, (LOGIC, LOGIC, LOGIC), conditions=1),
 }
 
-CHEAP = {
-    ca.OP_FABS: "fabs",
-    ca.OP_SQRT: "sqrt",
-    ca.OP_FLOOR: "floor",
-    ca.OP_CEIL: "ceil",
-    ca.OP_COPYSIGN: "copysign",
-}
+CHEAP = {CODES[name]: name for name in ("fabs", "sqrt", "floor", "ceil", "copysign")}
 """Functions of math.h that are an instruction or a few on most processors."""
 
-TRANSCENDENTAL = {
-    ca.OP_EXP: "exp",
-    ca.OP_EXPM1: "expm1",
-    ca.OP_LOG: "log",
-    ca.OP_LOG1P: "log1p",
-    ca.OP_POW: "pow",
-    ca.OP_CONSTPOW: "pow",
-    ca.OP_SIN: "sin",
-    ca.OP_COS: "cos",
-    ca.OP_TAN: "tan",
-    ca.OP_ASIN: "asin",
-    ca.OP_ACOS: "acos",
-    ca.OP_ATAN: "atan",
-    ca.OP_ATAN2: "atan2",
-    ca.OP_SINH: "sinh",
-    ca.OP_COSH: "cosh",
-    ca.OP_TANH: "tanh",
-    ca.OP_ASINH: "asinh",
-    ca.OP_ACOSH: "acosh",
-    ca.OP_ATANH: "atanh",
-    ca.OP_ERF: "erf",
-    ca.OP_HYPOT: "hypot",
-    ca.OP_FMOD: "fmod",
-    ca.OP_REMAINDER: "remainder",
+TRANSCENDENTAL = {ca.OP_CONSTPOW: "pow"} | {
+    CODES[name]: name
+    for name in (
+        *("exp", "expm1", "log", "log1p", "pow", "sin", "cos", "tan", "asin", "acos", "atan"),
+        *("atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "hypot"),
+        *("fmod", "remainder"),
+    )
 }
 """Functions of math.h that cost tens of instructions."""
 
@@ -147,7 +119,7 @@ FUNCTIONS = CHEAP | TRANSCENDENTAL
 
 
 def form(op: int, arity: int, real: Real) -> Form:
-    """C text of the operation `op` with `arity` operands."""
+    """Return the C text of the operation `op` with `arity` operands."""
     if op in FORMS:
         return FORMS[op]
     operands = ", ".join(["{}"] * arity)
@@ -156,67 +128,63 @@ def form(op: int, arity: int, real: Real) -> Form:
 
 
 def macro(function: str, real: Real) -> str:
-    """Name of the macro through which the generated code calls a transcendental function."""
+    """Return the macro through which generated code calls a transcendental function."""
     return f"SF_{function}{real.letter}".upper()
 
 
 def operation_name(op: int) -> str:
-    """CasADi's name of an operation, in lower case."""
-    return next(
-        name[3:].lower() for name in dir(ca) if name.startswith("OP_") and getattr(ca, name) == op
-    )
+    """Return CasADi's name of an operation, in lower case."""
+    names = (name for name in dir(ca) if name.startswith("OP_"))
+    return next(name[3:].lower() for name in names if getattr(ca, name) == op)
 
 
 SMALLEST_FLOAT = float(np.finfo(np.float32).tiny)
-"""What keeps a divisor from zero in single precision where in double a smaller number does."""
+"""Smallest normal number in single precision."""
 
 
 def representable(whole: Graph, real: Real) -> Graph:
-    """Constants that vanish in single precision as the smallest ones that do not.
+    """Return the graph with constants that vanish in single precision replaced by the smallest
+    normal number of their sign.
 
-    What a robot's file holds as 1e-67 instead of 0 is no reason to refuse it, and what divides must
-    not become 0.
+    Robot files contain 1e-67 for 0, and a divisor must not become 0.
     """
 
-    def one(node: Node) -> Node:
+    def kept(node: Node) -> Node:
         if not 0.0 < abs(node.value) < SMALLEST_FLOAT:
             return node
         return replace(node, value=float(np.copysign(SMALLEST_FLOAT, node.value)))
 
-    return whole if real.size == 8 else Graph(tuple(map(one, whole.nodes)), whole.results)
+    return whole if real.size == 8 else Graph(tuple(map(kept, whole.nodes)), whole.results)
 
 
-@final
-@dataclass(frozen=True)
-class Expression:
+class Expression(NamedTuple):
     """Text and how tightly it binds."""
 
     text: str
     binds: int
 
     def within(self, least: int) -> str:
-        """Return the text, in parentheses where it binds less tightly than `least`."""
+        """Return the text, in parentheses if it binds less tightly than `least`."""
         return self.text if self.binds >= least else f"({self.text})"
 
 
 @final
 class Writer:
-    """Writes nodes as formulas of what has a name.
+    """Writes nodes as formulas of named nodes.
 
     Attributes:
         names: of nodes.
-        logical: whether each node is a bool.
+        logical: for each node, True if it is a bool.
     """
 
     def __init__(self, source: Graph, logical: Sequence[bool], real: Real) -> None:
-        self.source, self.real = source, real
+        self.source, self.logical, self.real = source, logical, real
         self.names: dict[int, str] = {}
-        self.logical = logical
-        self.constants = {"zero": real.literal(0.0), "one": real.literal(1.0)}
-        self.constants["two"] = real.literal(2.0)
+        values = {"zero": 0.0, "one": 1.0, "two": 2.0}
+        self.constants = {name: real.literal(value) for name, value in values.items()}
 
     def expression(self, i: int) -> Expression:
-        """Return the value of a node, as it is."""
+        """Return the value of a node in its own type."""
         if i in self.names:
             return Expression(self.names[i], ATOM)
         node = self.source.nodes[i]
@@ -226,23 +194,19 @@ class Writer:
         return self._operation(i, node.op)
 
     def _operation(self, i: int, op: int) -> Expression:
-        """Operation `op` on the operands of node `i`."""
+        """Return the operation `op` on the operands of node `i`."""
         args = self.source.nodes[i].args
-        how = form(op, len(args), self.real)
-        plain = len(args) if op == SELECT and self.logical[i] else how.conditions
+        pattern, binds, needs, conditions = form(op, len(args), self.real)
+        plain = len(args) if op == SELECT and self.logical[i] else conditions
         operands = [(self.expression if k < plain else self.number)(j) for k, j in enumerate(args)]
-        pattern = how.pattern
         if op in MIRRORED and self.source.nodes[args[0]].op == ca.OP_CONST:
             operands.reverse()
             pattern = MIRRORED[op]
-        text = pattern.format(
-            *(operand.within(least) for operand, least in zip(operands, how.needs, strict=True)),
-            **self.constants,
-        )
-        return Expression(text, how.binds)
+        texts = (operand.within(least) for operand, least in zip(operands, needs, strict=True))
+        return Expression(pattern.format(*texts, **self.constants), binds)
 
     def number(self, i: int) -> Expression:
-        """Return the value of a node; a bool as the number 1 or 0 that CasADi means."""
+        """Return the value of a node, of a bool the number 1 or 0."""
         value = self.expression(i)
         if not self.logical[i]:
             return value
@@ -267,4 +231,4 @@ class Writer:
 
 
 MIRRORED = {ca.OP_LT: "{} > {}", ca.OP_LE: "{} >= {}", ca.OP_EQ: "{} == {}", ca.OP_NE: "{} != {}"}
-"""Comparisons read from the right: x > 0 and not 0 < x."""
+"""Comparisons with a constant on the left, written from the right: x > 0 for 0 < x."""

@@ -1,10 +1,10 @@
 """C99 statements for the graph of a CasADi function.
 
-A shared value becomes a constant local, written where it is used first; a value that is used once
-is written where it is used, so that formulas stay recognisable. What only one side of a select
-needs stands in a branch, see `branches`; cheap sides stay `?:`. The order of the operations in a
-formula is CasADi's, so that double precision gives the same bits (`logic` says what about NaN and
-the sign of zero).
+A shared value becomes a constant local before its first use; a value that is used once is written
+inside the formula that uses it, so formulas stay recognisable. Operations that only one side of a
+select needs are in a branch, see `branches`; cheap sides stay `?:`. The order of the operations in
+a formula is CasADi's, so double precision gives the same bits (for NaN and the sign of zero see
+`logic`).
 """
 
 from collections import Counter
@@ -28,10 +28,10 @@ class Code:
 
     Attributes:
         used: (argument, row) of the inputs that occur.
-        lines: C, one statement a line; what is inside a branch is indented by four blanks.
+        lines: C, one statement a line; statements inside a branch are indented by four blanks.
         calls: function of math.h (double's name) -> number of calls, in all branches.
-        operations: number of operations, calls included, in all branches.
-        outside: of these, those outside of branches: they are done each time.
+        operations: number of operations, including calls, in all branches.
+        outside: number of operations outside of branches, which are always executed.
     """
 
     used: frozenset[tuple[int, int]]
@@ -54,10 +54,10 @@ def emit(
 ) -> Code:
     """Write `source` as C statements.
 
-    Results are written as soon as they are known, so that arguments and results may share memory
-    only in these ways: what stands in `loads` is read before a result with the same text is
-    written; what is named by an identifier is a local. Where an argument that is used has another
-    name (`a[3]`) all results are written after the last read.
+    Results are written as soon as they are known, so arguments and results may share memory only in
+    these ways: a place in `loads` is read before a result with the same text is written; an
+    argument named by an identifier is a local. If an argument that is used has another name
+    (`a[3]`), all results are written after the last read.
 
     Args:
         source: the graph of the function.
@@ -65,14 +65,14 @@ def emit(
         targets: a pattern for every row of every result, such as "state->z = {};".
         real: floating point type.
         loads: (argument, row) -> text of the places (such as "state->z") whose values are loaded
-            into locals, with the name in `names`, where they are used first.
-        stem: what the names of locals begin with.
-        conditions: arguments that are bools of C and no numbers.
-        truths: results that are wanted as bools of C.
+            into locals, with the name in `names`, before their first use.
+        stem: first letters of the names of locals.
+        conditions: arguments that are bools in C.
+        truths: results that are bools in C.
 
     Raises:
-        ValueError: operations that have no counterpart in C99, all by name, or constants that do
-            not fit the type.
+        ValueError: operations without counterpart in C99, all by name, or constants outside the
+            range of the type.
     """
     unsupported = {node.op for node in source.nodes} - LEAVES - LOWERED - {*FORMS} - {*FUNCTIONS}
     if unsupported:
@@ -80,15 +80,15 @@ def emit(
         raise ValueError(f"codegen: expected operations that C99 has, got {got}")
     better = settled(simplified(source, conditions, truths))
     bools = logical(better.nodes, conditions)
-    stores = _stores(better, names, targets, loads or {}, truths)
-    plan = planned(better, bools, stores)
-    lines = _Body(plan, bools, names, targets, real, loads or {}, stem, truths).region(0)
-    taken = {i for values in plan.takes.values() for i in values}
-    nodes = enumerate(better.nodes)
-    done = [(n.op, plan.placed.place[i] == 0) for i, n in nodes if n.op not in LEAVES]
+    loads = loads or {}
+    plan = planned(better, bools, _stores(better, names, targets, loads, truths))
+    body = _Body(plan, bools, names, targets, real, loads, stem, truths)
+    lines = tuple(body.region(0))
+    places = zip(better.nodes, plan.placed.place, strict=True)
+    done = [(node.op, place == 0) for node, place in places if node.op not in LEAVES]
     return Code(
-        frozenset(better.nodes[i].entry for i in taken if better.nodes[i].op == ca.OP_INPUT),
-        tuple(lines),
+        frozenset(body.used),
+        lines,
         Counter(FUNCTIONS[op] for op, _ in done if op in FUNCTIONS),
         len(done),
         sum(outside for _, outside in done),
@@ -102,12 +102,12 @@ def _stores(
     loads: Mapping[tuple[int, int], str],
     truths: Collection[int],
 ) -> Stores:
-    """Rules for writing results, see `emit`."""
+    """Return the rules for writing results, see `emit`."""
     inputs = {node.entry: i for i, node in enumerate(source.nodes) if node.op == ca.OP_INPUT}
     patterns = {Store(k, j): text for k, row in enumerate(targets) for j, text in enumerate(row)}
     shared = [names[i][j] for i, j in inputs if (i, j) not in loads]
     late = any(text.startswith("return") for text in patterns.values())
-    places = {loads[entry]: i for entry, i in inputs.items() if entry in loads}
+    assigned = {f"{loads[entry]} = {{}};": i for entry, i in inputs.items() if entry in loads}
     return Stores(
         late or not all(fullmatch(r"\w+", name) for name in shared),
         frozenset(
@@ -115,21 +115,17 @@ def _stores(
             for store, text in patterns.items()
             if fullmatch(r"\S+ \+?= \{\};", text) and store.result not in truths
         ),
-        {
-            store: places[_place(text)]
-            for store, text in patterns.items()
-            if text == f"{_place(text)} = {{}};" and _place(text) in places
-        },
+        {store: assigned[text] for store, text in patterns.items() if text in assigned},
     )
 
 
-def _place(pattern: str) -> str:
-    """Place that a result is written to."""
-    return pattern.partition(" ")[0]
-
-
 class _Body:
-    """Lines of a plan."""
+    """Writes the statements of a plan.
+
+    Attributes:
+        used: (argument, row) of the inputs that occur.
+        loads: inputs that are still to be loaded, with their places.
+    """
 
     def __init__(
         self,
@@ -143,18 +139,15 @@ class _Body:
         truths: Collection[int],
     ) -> None:
         self.plan, self.targets, self.truths, self.real = plan, targets, truths, real
-        self.stem, self.count = _free(stem, [name for row in names for name in row]), 0
-        self.writer = Writer(plan.placed.source, bools, real)
-        self.loads: dict[int, str] = {}
-        """Inputs that are still to be loaded, with their places."""
-        taken = {i for values in plan.takes.values() for i in values}
-        for i in sorted(taken):
-            node = plan.placed.source.nodes[i]
-            if node.op == ca.OP_INPUT:
-                argument, row = node.entry
-                self.writer.names[i] = names[argument][row]
-                if node.entry in loads:
-                    self.loads[i] = loads[node.entry]
+        while any(fullmatch(stem + r"\d+", name) for row in names for name in row):
+            stem += "_"
+        self.stem, self.count = stem, 0
+        self.writer, nodes = Writer(plan.placed.source, bools, real), plan.placed.source.nodes
+        taken = sorted({i for values in plan.takes.values() for i in values})
+        entries = {i: nodes[i].entry for i in taken if nodes[i].op == ca.OP_INPUT}
+        self.used = set(entries.values())
+        self.writer.names |= {i: names[argument][row] for i, (argument, row) in entries.items()}
+        self.loads = {i: loads[entry] for i, entry in entries.items() if entry in loads}
 
     def region(self, number: int) -> list[str]:
         """Return the lines of a region."""
@@ -167,26 +160,24 @@ class _Body:
         return lines
 
     def _loaded(self, number: int, statement: Statement) -> list[int]:
-        """Nodes that have to be loaded before a statement of a region."""
-        places, written = self.plan.placed.place, self._written(statement)
-        taken = self.plan.takes[statement]
-        wanted = [i for i in taken if i in self.loads and places[i] == number]
-        return sorted({*wanted, *(i for i, text in self.loads.items() if text in written)})
-
-    def _written(self, statement: Statement) -> set[str]:
-        """Places that a statement writes to, what is inside it included."""
-        match statement:
-            case Store(result, row):
-                return {_place(self.targets[result][row])}
-            case Branch(selects=selects):
-                goals = [self.plan.goals.get(i) for i in selects]
-                stores = [goal for goal in goals if isinstance(goal, Store)]
-                return {_place(self.targets[store.result][store.row]) for store in stores}
-            case _:
-                return set()
+        """Return nodes that have to be loaded before a statement of a region."""
+        places, taken = self.plan.placed.place, self.plan.takes[statement]
+        stores: list[object] = [statement]
+        if isinstance(statement, Branch):
+            stores = [self.plan.goals.get(i) for i in statement.selects]
+        written = {
+            self.targets[store.result][store.row].partition(" ")[0]
+            for store in stores
+            if isinstance(store, Store)
+        }
+        return sorted(
+            i
+            for i, text in self.loads.items()
+            if text in written or (i in taken and places[i] == number)
+        )
 
     def statement(self, statement: Statement) -> list[str]:
-        """Return the lines of one."""
+        """Return the lines of a statement."""
         nodes, write = self.plan.placed.source.nodes, self.writer
         match statement:
             case Local(node):
@@ -218,14 +209,16 @@ class _Body:
         lines = [f"{self._kind(i)} {self._name(i)};" for i in own]
         condition = placed.source.nodes[branch.selects[0]].args[0]
         yes, no = (self.region(placed.inside[branch.region, branch.label, side]) for side in (1, 2))
+        inner_yes, inner_no = ([INDENT + line for line in side] for side in (yes, no))
         if not yes:
-            return [*lines, f"if ({write.negation(condition).text}) {{", *_indented(no), "}"]
-        lines += [f"if ({write.expression(condition).text}) {{", *_indented(yes)]
+            return [*lines, f"if ({write.negation(condition).text}) {{", *inner_no, "}"]
+        lines += [f"if ({write.expression(condition).text}) {{", *inner_yes]
         if not no:
             return [*lines, "}"]
-        if no[0].startswith("if (") and _is_one_block(no):
+        inside = all(line.startswith((INDENT, "} else")) for line in no[1:-1])
+        if no[0].startswith("if (") and no[-1] == "}" and inside:
             return [*lines, f"}} else {no[0]}", *no[1:]]
-        return [*lines, "} else {", *_indented(no), "}"]
+        return [*lines, "} else {", *inner_no, "}"]
 
     def _kind(self, i: int) -> str:
         return "bool" if self.writer.logical[i] else self.real.name
@@ -235,20 +228,3 @@ class _Body:
         self.count += 1
         self.writer.names[i] = f"{self.stem}{self.count}"
         return self.writer.names[i]
-
-
-def _indented(lines: Sequence[str]) -> list[str]:
-    return [INDENT + line for line in lines]
-
-
-def _is_one_block(lines: Sequence[str]) -> bool:
-    """Return True if the lines are a single `if` with all that belongs to it."""
-    inner = (line.startswith((INDENT, "} else")) for line in lines[1:-1])
-    return lines[-1] == "}" and all(inner)
-
-
-def _free(stem: str, names: Sequence[str]) -> str:
-    """Return a beginning of the locals' names that no argument has."""
-    while any(fullmatch(stem + r"\d+", name) for name in names):
-        stem += "_"
-    return stem

@@ -1,30 +1,30 @@
-"""Conditions as bools, and the smaller of two as a comparison: a graph as C wants it.
+"""Simplification of a graph for C: conditions as bools, minima and maxima as comparisons.
 
-CasADi's bools are the numbers 1 and 0, and its selects are sums of halves; its `fmin` and `fmax`
-are functions, of about thirty instructions on a Cortex-M4F. `simplified` gives a graph of the same
-values in which
+CasADi's bools are the numbers 1 and 0, and its selects are sums of two halves; its `fmin` and
+`fmax` are functions of about thirty instructions on a Cortex-M4F. `simplified` returns a graph of
+the same values in which
 
-* conditions (of selects, in and, or, not) are comparisons and what is made of them, never numbers
-  that are compared with 0; negations stand innermost and constants are folded;
-* `if_else_zero`, `fmin` and `fmax` are selects; * 2 (0.5 / x), which is how `reciprocal` keeps
-CasADi from dividing again, is 1 / x: the same bits
-  for |x| below 2e307 (4e37 in float).
+* conditions (of selects, and in and, or, not) are comparisons and combinations of them, never
+  numbers that are compared with 0; negations are innermost and constants are folded;
+* `if_else_zero`, `fmin` and `fmax` are selects;
+* 2 (0.5 / x), by which `reciprocal` keeps CasADi from dividing again, is 1 / x: the same bits for
+  |x| below 2e307 (4e37 in float).
 
-All finite numbers and infinities keep their bits, but for the sign of a zero, which C leaves to the
-library in fmin(0, -0). A number that is not one (NaN): `fmin(x, c)` gives c as CasADi's does
-wherever c is known to be a number (a constant, or itself cut so; hence every clip to constant
-bounds is NaN-proof); of two others, `fmin(x, NaN)` is NaN here and x there. The derivative of
-`fmin(x, y)` where x or y is NaN is that of a side and not NaN.
+All finite numbers and infinities keep their bits, except for the sign of a zero, which C leaves to
+the library in fmin(0, -0). For NaN, `fmin(x, c)` gives c as CasADi's does if c is known to be a
+number (a constant, or a value clipped to one), so every clip to constant bounds is NaN-proof; of
+two others, `fmin(x, NaN)` is NaN here and x in CasADi. The derivative of `fmin(x, y)` at NaN is
+that of one side and not NaN.
 
-`settled` then removes selects whose condition is known wherever they are used. An expression that
-must have right derivatives guards what it does not take:
+`settled` then removes selects whose condition is known wherever they are used. An expression with
+correct derivatives guards the branch that is not taken:
 
     near ? series : expm1(x) / (near ? 1 : x)
 
 Here the inner select is used in the second branch alone and is x.
 """
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from operator import eq, le, lt, ne
 
@@ -34,30 +34,28 @@ from symfric.foundation.graph import SELECT, Graph, Node, merged, pruned
 
 COMPARISONS = {ca.OP_LT: lt, ca.OP_LE: le, ca.OP_EQ: eq, ca.OP_NE: ne}
 OPPOSITE = {ca.OP_EQ: ca.OP_NE, ca.OP_NE: ca.OP_EQ}
-"""Comparisons that are each other's negation for every number, NaN included."""
+"""Comparisons that are the negation of each other for every number, including NaN."""
 BOOLEAN = frozenset({*COMPARISONS, ca.OP_NOT, ca.OP_AND, ca.OP_OR})
 COMMUTING = frozenset({ca.OP_ADD, ca.OP_MUL, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR})
 TRUTHFUL = frozenset({ca.OP_SIGN, ca.OP_NEG, ca.OP_FABS})
-"""Zero where their operand is zero, and nowhere else."""
+"""Operations that are zero only if their operand is zero."""
 LOWERED = frozenset({ca.OP_FMIN, ca.OP_FMAX, ca.OP_IF_ELSE_ZERO})
-"""Operations that do not occur in a simplified graph."""
+"""Operations without counterpart in a simplified graph."""
 
 
 def simplified(
     source: Graph, conditions: Collection[int] = (), truths: Collection[int] = ()
 ) -> Graph:
-    """Return the graph of the same values as C wants it, see above; what it gives it leaves as it
-    is.
+    """Return the simplified graph of the same values; a simplified one is unchanged.
 
     Args:
         source: of numbers.
         conditions: arguments that are bools.
-        truths: results that are wanted as bools.
+        truths: results that become bools.
     """
     made, found = _Algebra(conditions), list[int]()
     for node in source.nodes:
-        args = [found[i] for i in node.args]
-        found.append(made.of(node, args))
+        found.append(made.of(node, [found[i] for i in node.args]))
     rows = [
         tuple(made.truth(found[i]) if k in truths else found[i] for i in row)
         for k, row in enumerate(source.results)
@@ -66,7 +64,7 @@ def simplified(
 
 
 def logical(nodes: Sequence[Node], conditions: Collection[int] = ()) -> list[bool]:
-    """For each node, True if it is a bool."""
+    """Return for each node True if it is a bool."""
     found: list[bool] = []
     for node in nodes:
         found.append(is_logical(node, found, conditions))
@@ -74,7 +72,7 @@ def logical(nodes: Sequence[Node], conditions: Collection[int] = ()) -> list[boo
 
 
 def is_logical(node: Node, before: Sequence[bool], conditions: Collection[int]) -> bool:
-    """Return True if a node is a bool, by what is known of those before it."""
+    """Return True if a node is a bool, given the earlier ones."""
     if node.op == ca.OP_INPUT:
         return node.entry[0] in conditions
     if node.op == SELECT:
@@ -84,14 +82,14 @@ def is_logical(node: Node, before: Sequence[bool], conditions: Collection[int]) 
 
 @dataclass
 class _Algebra:
-    """Nodes so far, each once, with what is known of their values."""
+    """Unique nodes, and facts about their values."""
 
     conditions: Collection[int]
     nodes: list[Node] = field(default_factory=list[Node])
     known: dict[Node, int] = field(default_factory=dict[Node, int])
     logical: list[bool] = field(default_factory=list[bool])
     number: list[bool] = field(default_factory=list[bool])
-    """True for constants and bools, which are NaN only if an input or an operation made them so."""
+    """True for constants and bools, which are never NaN."""
 
     def of(self, node: Node, args: Sequence[int]) -> int:
         """Return the number of a node that means `node` with these arguments."""
@@ -108,8 +106,11 @@ class _Algebra:
                 return self.joined(node.op, self.truth(args[0]), self.truth(args[1]))
             case _ if node.op in COMPARISONS:
                 return self.compared(node.op, *args)
-            case ca.OP_TWICE if self._is_half_inverse(args[0]):
-                return self.add(ca.OP_INV, self.nodes[args[0]].args[1])
+            case ca.OP_TWICE if self.nodes[args[0]].op == ca.OP_DIV:
+                half, divisor = self.nodes[args[0]].args
+                if self.value(half) == 0.5:
+                    return self.add(ca.OP_INV, divisor)
+                return self.add(node.op, *args)
             case ca.OP_DIV:
                 return self.weight_of_side(*args) or self.add(node.op, *args)
             case _:
@@ -145,11 +146,11 @@ class _Algebra:
         return node.value if node.op == ca.OP_CONST else None
 
     def truth(self, i: int) -> int:
-        """Node that is true if a number is not 0: a bool or a constant."""
+        """Return a node that is true if a number is not 0: a bool or a constant."""
         return i if self.logical[i] else self.compared(ca.OP_NE, i, self.constant(0.0))
 
     def negated(self, i: int) -> int:
-        """Return the opposite of a bool; it moves into and, or where that spares a negation."""
+        """Return the opposite of a bool; it moves into and, or if that saves a negation."""
         node, value = self.nodes[i], self.value(i)
         if value is not None:
             return self.constant(float(value == 0.0))
@@ -157,16 +158,14 @@ class _Algebra:
             return node.args[0]
         if node.op in OPPOSITE:
             return self.add(OPPOSITE[node.op], *node.args)
-        if node.op in (ca.OP_AND, ca.OP_OR) and any(map(self._turns, node.args)):
+        turning = any(self.nodes[k].op in (ca.OP_NOT, *OPPOSITE) for k in node.args)
+        if turning and node.op in (ca.OP_AND, ca.OP_OR):
             other = ca.OP_OR if node.op == ca.OP_AND else ca.OP_AND
             return self.joined(other, *map(self.negated, node.args))
         return self.add(ca.OP_NOT, i)
 
-    def _turns(self, i: int) -> bool:
-        return self.nodes[i].op in (ca.OP_NOT, *OPPOSITE)
-
     def joined(self, op: int, a: int, b: int) -> int:
-        """And, or of two bools."""
+        """Return `and` or `or` of two bools."""
         neutral = float(op == ca.OP_AND)
         for one, other in ((a, b), (b, a)):
             value = self.value(one)
@@ -179,7 +178,7 @@ class _Algebra:
         return self.add(op, a, b)
 
     def select(self, condition: int, yes: int, no: int) -> int:
-        """Return `yes` where the condition holds, else `no`."""
+        """Return `yes` if the condition holds, else `no`."""
         condition = self.truth(condition)
         known = self.value(condition)
         if known is not None:
@@ -189,60 +188,48 @@ class _Algebra:
         yes, no = self._settled(condition, yes, 1), self._settled(condition, no, 2)
         if yes == no:
             return yes
-        sides = [self._as_bool(side) for side in (yes, no)]
-        if None in sides:
-            return self.add(SELECT, condition, yes, no)
-        if sides[0] is True:
-            return self.joined(ca.OP_OR, condition, no)
-        if sides[0] is False:
-            return self.joined(ca.OP_AND, self.negated(condition), no)
-        if sides[1] is True:
-            return self.joined(ca.OP_OR, self.negated(condition), yes)
-        if sides[1] is False:
-            return self.joined(ca.OP_AND, condition, yes)
+        first, second = self.value(yes), self.value(no)
+        if self._is_boolean(yes) and self._is_boolean(no):
+            if first is not None:
+                opposite = condition if first else self.negated(condition)
+                return self.joined(ca.OP_OR if first else ca.OP_AND, opposite, no)
+            if second is not None:
+                opposite = self.negated(condition) if second else condition
+                return self.joined(ca.OP_OR if second else ca.OP_AND, opposite, yes)
         return self.add(SELECT, condition, yes, no)
 
     def _settled(self, condition: int, side: int, taken: int) -> int:
-        """Return a side of a select on the same condition is one of that one's."""
+        """Return a side of a select, or the branch `taken` of a select on the same condition."""
         node = self.nodes[side]
         return node.args[taken] if node.op == SELECT and node.args[0] == condition else side
 
-    def _as_bool(self, i: int) -> bool | int | None:
-        """True, False, the number of a bool, or None for other numbers."""
-        value = self.value(i)
-        if value is None:
-            return i if self.logical[i] else None
-        return bool(value) if value in (0.0, 1.0) else None
+    def _is_boolean(self, i: int) -> bool:
+        """Return True for a bool, and for the numbers 1 and 0."""
+        return self.logical[i] or self.value(i) in (0.0, 1.0)
 
     def compared(self, op: int, a: int, b: int) -> int:
         """Return a comparison; of a choice between constants with a constant it is the choice."""
         x, y = self.value(a), self.value(b)
         if x is not None and y is not None:
             return self.constant(float(COMPARISONS[op](x, y)))
-        for varying, left in ((a, True), (b, False)):
-            fixed = b if left else a
-            if self.value(fixed) is None:
-                continue
+        if x is None and y is None:
+            return self.add(op, a, b)
+        varying = self.nodes[a if x is None else b]
 
-            def against(side: int, left: bool = left, fixed: int = fixed) -> int:
-                return self.compared(op, side, fixed) if left else self.compared(op, fixed, side)
+        def against(side: int) -> int:
+            return self.compared(op, side, b) if x is None else self.compared(op, a, side)
 
-            node = self.nodes[varying]
-            if self.logical[varying]:
-                yes, no = against(self.constant(1.0)), against(self.constant(0.0))
-                return self.select(varying, yes, no)
-            if node.op == SELECT and None not in map(self._as_constant, node.args[1:]):
-                return self.select(node.args[0], against(node.args[1]), against(node.args[2]))
-            if self.value(fixed) == 0.0 and self._sees_zero(op, node):
-                return against(node.args[0])
+        if self.logical[a if x is None else b]:
+            yes, no = against(self.constant(1.0)), against(self.constant(0.0))
+            return self.select(a if x is None else b, yes, no)
+        if varying.op == SELECT:
+            condition, yes, no = varying.args
+            if all(self.logical[i] or self.value(i) is not None for i in (yes, no)):
+                return self.select(condition, against(yes), against(no))
+        alike = varying.op == ca.OP_SIGN or (varying.op in TRUTHFUL and op in OPPOSITE)
+        if alike and 0.0 in (x, y):
+            return against(varying.args[0])
         return self.add(op, a, b)
-
-    def _as_constant(self, i: int) -> float | bool | None:
-        return True if self.logical[i] else self.value(i)
-
-    def _sees_zero(self, op: int, node: Node) -> bool:
-        """Return True if the node compares with 0 as its operand does."""
-        return node.op == ca.OP_SIGN or (node.op in TRUTHFUL and op in OPPOSITE)
 
     def extreme(self, op: int, a: int, b: int) -> int:
         """Return the smaller or the larger of two."""
@@ -253,16 +240,16 @@ class _Algebra:
         return self._clip(op, a, b) or self._first_if(op, a, b)
 
     def _first_if(self, op: int, a: int, b: int) -> int:
-        """Return the one of two; of equal ones the first, or the one that is known to be a
-        number.
-        """
+        """Return one of two; of equal ones the first, or the one known to be a number."""
         if not self.number[b]:
             a, b = b, a
         order = (a, b) if op == ca.OP_FMIN else (b, a)
         return self.select(self.compared(ca.OP_LT, *order), a, b)
 
     def _clip(self, op: int, a: int, b: int) -> int | None:
-        """Return a clip to constants, one cut before: x > low ? (x < high ? x : high) : low."""
+        """Return a clip to constants, the second after the first: x > low ? (x < high ? x : high) :
+        low.
+        """
         node, bound = self.nodes[a], self.value(b)
         if bound is None or node.op != SELECT:
             return None
@@ -275,10 +262,6 @@ class _Algebra:
         if self.nodes[condition].args != before or not ordered:
             return None
         return self.add(SELECT, condition, self._first_if(op, x, b), other)
-
-    def _is_half_inverse(self, i: int) -> bool:
-        node = self.nodes[i]
-        return node.op == ca.OP_DIV and self.value(node.args[0]) == 0.5
 
     def weight_of_side(self, a: int, b: int) -> int | None:
         """Return a side's share in the derivative of fmin, fmax: (p <= q) / ((p <= q) + (q <= p)).
@@ -296,14 +279,20 @@ class _Algebra:
 
 
 Fact = tuple[int, bool]
-"""Node, and whether it is true."""
+"""Node, and True if it holds."""
+
+NEEDED: Mapping[int, tuple[bool | None, ...]] = {
+    SELECT: (None, True, False), ca.OP_IF_ELSE_ZERO: (None, True), ca.OP_AND: (None, True),
+    ca.OP_OR: (None, False),
+}  # fmt: skip
+"""Value of the first argument at which each argument is needed; None if always."""
 
 
 def settled(source: Graph) -> Graph:
-    """Return the same results, without selects that only one of their branches can ever leave.
+    """Return the same results without selects whose condition is known where they are used.
 
-    A node is used in a branch alone if all its users are; in C, where a branch that is not taken is
-    not computed, its condition then is a fact. Values are the same to the bit.
+    A node is used in a branch alone if all its users are; since C does not compute a branch that
+    is not taken, its condition is then a fact. Values are the same to the bit.
     """
     while True:
         facts = _facts(source)
@@ -319,7 +308,7 @@ def settled(source: Graph) -> Graph:
 
 
 def _facts(source: Graph) -> list[frozenset[Fact]]:
-    """Facts that hold wherever the value of a node matters."""
+    """Return the facts that hold wherever the value of a node matters."""
     found: list[frozenset[Fact] | None] = [None] * len(source.nodes)
     for row in source.results:
         for i in row:
@@ -333,21 +322,15 @@ def _facts(source: Graph) -> list[frozenset[Fact]]:
 
 
 def _branches(source: Graph, node: Node) -> Iterator[tuple[int, frozenset[Fact]]]:
-    """Return the arguments of a node, each with the conditions under which its value matters."""
-    conditions: tuple[Fact | None, ...] = (None,) * len(node.args)
-    first = node.args[0] if node.args else 0
-    if node.op == SELECT:
-        conditions = None, (first, True), (first, False)
-    elif node.op in (ca.OP_IF_ELSE_ZERO, ca.OP_AND):
-        conditions = None, (first, True)
-    elif node.op == ca.OP_OR:
-        conditions = None, (first, False)
-    for i, condition in zip(node.args, conditions, strict=True):
-        yield i, frozenset(_implied(source, *condition)) if condition else frozenset()
+    """Yield the arguments of a node, each with the conditions under which its value matters."""
+    needed = NEEDED.get(node.op, (None,) * len(node.args))
+    for i, truth in zip(node.args, needed, strict=True):
+        facts = () if truth is None else _implied(source, node.args[0], truth)
+        yield i, frozenset(facts)
 
 
 def _implied(source: Graph, number: int, truth: bool) -> Iterator[Fact]:
-    """Return the fact itself and those of the conditions that it is made of."""
+    """Yield the fact itself and those of its parts that follow."""
     yield number, truth
     node = source.nodes[number]
     if node.op == ca.OP_NOT:
@@ -358,7 +341,7 @@ def _implied(source: Graph, number: int, truth: bool) -> Iterator[Fact]:
 
 
 def _holds(source: Graph, number: int, facts: frozenset[Fact]) -> bool | None:
-    """Truth of a condition; None if the facts do not determine it."""
+    """Return the truth of a condition; None if the facts do not determine it."""
     for truth in (True, False):
         if (number, truth) in facts:
             return truth

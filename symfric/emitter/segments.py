@@ -1,4 +1,4 @@
-"""Graph cut into straight parts with loops between them.
+"""Graph divided into straight parts with loops between them.
 
     part 0,  loops of stage 1,  part 1,  loops of stage 2,  ...,  last part
 
@@ -14,17 +14,17 @@ from itertools import groupby
 from typing import final
 
 from symfric.emitter.c99 import TRANSCENDENTAL
-from symfric.emitter.rolling import Array, Body, Store, Strand, Sum, strands, woven
+from symfric.emitter.rolling import Arrays, Body, Store, Strand, Sum, strands, woven
 from symfric.foundation.graph import LEAVES, Graph, Node
 
 CALL = 20
-"""Operations that a transcendental function counts for."""
+"""Cost of a transcendental function [operations]."""
 
 SPARED = 8
-"""Operations that a loop must spare to be written."""
+"""Smallest number of operations that a loop must spare."""
 
 MORE = 1.1
-"""How many times the operations may be executed, because a loop and another part need them."""
+"""Largest ratio of executed operations with and without loops."""
 
 
 @final
@@ -47,100 +47,154 @@ class Loop:
         """Rows that it writes."""
         return [strand for strand in self.strands if isinstance(strand, Store)]
 
-    @cached_property
-    def cost(self) -> int:
-        """Operations of one element."""
-        return _cost(self.body.graph.nodes)
-
 
 @final
 @dataclass(frozen=True)
 class Plan:
-    """Place of every computation.
-
-    Attributes:
-        loops: in the order of their execution.
-        part: node -> the straight part that computes it; leaves, sums and what only loops need
-            have none.
-        idle: loops' sums that are not used.
-    """
+    """Graph with its loops, in the order of their execution."""
 
     source: Graph
-    loops: tuple[Loop, ...]
-    part: dict[int, int]
-    idle: tuple[Sum, ...] = ()
+    loops: tuple[Loop, ...] = ()
 
-    @property
+    @cached_property
     def last(self) -> int:
         """Number of the last straight part."""
         return max((loop.stage for loop in self.loops), default=0)
 
-    @property
+    @cached_property
     def totals(self) -> dict[int, Sum]:
         """Sums of all loops by their node."""
         return {s.total: s for loop in self.loops for s in loop.sums}
 
-    @property
+    @cached_property
     def stored(self) -> set[tuple[int, int]]:
         """(result, row) of everything that loops write."""
         return {
-            (store.group, store.first + i)
+            (s.array.group, s.array.first + s.offset + i)
             for loop in self.loops
-            for store in loop.stores
+            for s in loop.stores
             for i in range(loop.size)
         }
 
+    def started(self, part: int) -> list[tuple[int, int]]:
+        """Return (total, start) of sums with a start in the loops after a straight part."""
+        loops = (loop for loop in self.loops if loop.stage == part + 1)
+        return [(s.total, s.start) for loop in loops for s in loop.sums if s.start is not None]
 
-def planned(source: Graph, read: Sequence[Array], written: Sequence[Array]) -> Plan:
+    @cached_property
+    def needed(self) -> dict[int, int]:
+        """Node -> the last straight part that serves all users, of nodes outside the loops."""
+        found: dict[int, int] = {}
+
+        def need(nodes: Sequence[int], part: int) -> None:
+            for i in nodes:
+                found[i] = min(found.get(i, part), part)
+
+        for group, row in enumerate(self.source.results):
+            need([i for k, i in enumerate(row) if (group, k) not in self.stored], self.last)
+        for loop in self.loops:
+            need(loop.body.taken, loop.stage - 1)
+        for part in range(self.last):
+            need([start for _, start in self.started(part)], part)
+        for i in reversed(range(len(self.source.nodes))):
+            if i in found and i not in self.totals:
+                need(self.source.nodes[i].args, found[i])
+        return found
+
+    @cached_property
+    def part(self) -> dict[int, int]:
+        """Operation -> the straight part that computes it; not of sums and inside loops."""
+        nodes = self.source.nodes
+        return {
+            i: part
+            for i, part in sorted(self.needed.items())
+            if i not in self.totals and nodes[i].op not in LEAVES
+        }
+
+
+def planned(source: Graph, arrays: Arrays) -> Plan:
     """Return the graph with all loops that spare statements and cost next to nothing.
 
-    What is left out: loops that would write what another one has yet to read; unused sums;
-    short loops; and, where too much would be computed twice, those that do so.
+    Omitted are loops that would overwrite what another one has yet to read, unused sums, short
+    loops and, if too much would be computed twice, those that do so.
     """
-    chosen = {s: woven(source, [s], read) for s in strands(source, read, written)}
+    chosen = {s: woven(source, [s], arrays) for s in strands(source, arrays)}
     while chosen:
-        plan = _plan(source, chosen, read, written)
-        out = _overwriting(plan.loops, read, written) or _idle(plan) or _wasteful(plan, chosen)
+        plan = Plan(source, _loops(source, chosen, arrays))
+        out = _overwriting(plan.loops) or _idle(plan) or _wasteful(plan, chosen)
         if not out:
             return plan
         chosen = {s: body for s, body in chosen.items() if s not in out}
-    return Plan(source, (), {})
+    return Plan(source)
 
 
-def _plan(
-    source: Graph,
-    chosen: Mapping[Strand, Body],
-    read: Sequence[Array],
-    written: Sequence[Array],
-) -> Plan:
-    stages = _stages(source, chosen, read, written)
+def _loops(source: Graph, chosen: Mapping[Strand, Body], arrays: Arrays) -> tuple[Loop, ...]:
+    """Return a loop for the strands of each stage and size."""
+    stages = _stages(source, chosen)
 
     def key(strand: Strand) -> tuple[int, int]:
         return stages[strand], len(strand.lanes)
 
-    loops = tuple(
-        Loop(stage, size, group := tuple(members), woven(source, group, read))
-        for (stage, size), members in groupby(sorted(chosen, key=key), key)
-    )
-    return Plan(source, loops, *_parts(source, loops))
+    groups = ((*k, tuple(group)) for k, group in groupby(sorted(chosen, key=key), key))
+    return tuple(Loop(stage, size, g, woven(source, g, arrays)) for stage, size, g in groups)
+
+
+def _stages(source: Graph, bodies: Mapping[Strand, Body]) -> dict[Strand, int]:
+    """Return the stage of every strand: after what it needs, stores not before others have read."""
+    sums = {strand.total: strand for strand in bodies if isinstance(strand, Sum)}
+    stages: dict[Strand, int] = {}
+    known: list[int] = []
+
+    def after(*needed: int | None) -> int:
+        return max((known[k] for k in needed if k is not None), default=0)
+
+    for i, node in enumerate(source.nodes):
+        if i in sums:
+            stages[sums[i]] = 1 + after(*bodies[sums[i]].taken, sums[i].start)
+            known.append(stages[sums[i]])
+        else:
+            known.append(after(*node.args))
+    stores = [strand for strand in bodies if isinstance(strand, Store)]
+    stages |= {store: 1 + after(*bodies[store].taken) for store in stores}
+    for _ in range(max(stages.values(), default=0)):
+        for store in stores:
+            readers = (stages[s] for s, body in bodies.items() if _reads(body, store))
+            stages[store] = max([stages[store], *readers])
+    return stages
+
+
+def _reads(body: Body, store: Store) -> list[int]:
+    """Return the offsets at which a body reads the memory that `store` writes."""
+    return [offset for array, offset in body.reads if array.text == store.array.text]
+
+
+def _overwriting(loops: Sequence[Loop]) -> set[Strand]:
+    """Return the stores that would overwrite rows before they have been read."""
+    return {
+        store
+        for i, loop in enumerate(loops)
+        for store in loop.stores
+        if any(offset < store.offset for offset in _reads(loop.body, store))
+        or any(_reads(later.body, store) for later in loops[i + 1 :])
+    }
 
 
 def _idle(plan: Plan) -> set[Strand]:
-    """Sums without users, and what short loops do."""
+    """Return sums without users, and the strands of short loops."""
 
     def spared(loop: Loop) -> int:
-        operations = sum(node.op not in LEAVES for node in loop.body.graph.nodes)
-        return (loop.size - 1) * (operations + len(loop.strands))
+        return (loop.size - 1) * (loop.body.graph.operations + len(loop.strands))
 
     short = {s for loop in plan.loops if spared(loop) < SPARED for s in loop.strands}
-    return short | set(plan.idle)
+    return short | {s for total, s in plan.totals.items() if total not in plan.needed}
 
 
 def _wasteful(plan: Plan, chosen: Mapping[Strand, Body]) -> set[Strand]:
-    """Return the loop that repeats most computations, if too many are repeated."""
+    """Return the loops that repeat most computations, if too many are repeated."""
     nodes = plan.source.nodes
     executed = _cost([nodes[i] for i in plan.part])
-    executed += sum(loop.size * (loop.cost + len(loop.sums)) for loop in plan.loops)
+    for loop in plan.loops:
+        executed += loop.size * (_cost(loop.body.graph.nodes) + len(loop.sums))
     if executed <= MORE * _cost(nodes):
         return set()
     places = Counter(dict.fromkeys(plan.part, 1))
@@ -155,102 +209,3 @@ def _wasteful(plan: Plan, chosen: Mapping[Strand, Body]) -> set[Strand]:
 
 def _cost(nodes: Sequence[Node]) -> int:
     return sum(CALL if n.op in TRANSCENDENTAL else n.op not in LEAVES for n in nodes)
-
-
-def _stages(
-    source: Graph,
-    bodies: Mapping[Strand, Body],
-    read: Sequence[Array],
-    written: Sequence[Array],
-) -> dict[Strand, int]:
-    """Return the stage of every strand: after what it needs, stores not before others have read."""
-    sums = {strand.total: strand for strand in bodies if isinstance(strand, Sum)}
-    stages: dict[Strand, int] = {}
-    known: list[int] = []
-    for i, node in enumerate(source.nodes):
-        if i in sums:
-            start = [sums[i].start]
-            needs = [*bodies[sums[i]].outer, *bodies[sums[i]].truths]
-            needs += [k for k in start if k is not None]
-            stages[sums[i]] = 1 + max((known[k] for k in needs), default=0)
-            known.append(stages[sums[i]])
-        else:
-            known.append(max((known[k] for k in node.args), default=0))
-    for strand, body in bodies.items():
-        if isinstance(strand, Store):
-            stages[strand] = 1 + max((known[k] for k in (*body.outer, *body.truths)), default=0)
-    latest = max(stages.values(), default=0)
-    for _ in range(latest):
-        for strand in bodies:
-            if isinstance(strand, Store):
-                text = _text(strand, written)
-                readers = (s for s, b in bodies.items() if text in _texts(b, read))
-                stages[strand] = max([stages[strand], *(stages[s] for s in readers)])
-    return stages
-
-
-def _text(store: Store, written: Sequence[Array]) -> str:
-    return next(a.text for a in written if a.holds(store.group, store.first))
-
-
-def _texts(body: Body, read: Sequence[Array]) -> dict[str, list[int]]:
-    """Return the memory that a body reads -> offsets of its first elements in it."""
-    found: dict[str, list[int]] = {}
-    for group, row in body.reads:
-        array = next(a for a in read if a.holds(group, row))
-        found.setdefault(array.text, []).append(row - array.first)
-    return found
-
-
-def _overwriting(
-    loops: Sequence[Loop], read: Sequence[Array], written: Sequence[Array]
-) -> set[Strand]:
-    """Loops that would overwrite rows before they have been read."""
-    found = set[Strand]()
-    for i, loop in enumerate(loops):
-        for store in loop.stores:
-            text = _text(store, written)
-            array = next(a for a in written if a.holds(store.group, store.first))
-            own = _texts(loop.body, read).get(text, [])
-            if any(offset < store.first - array.first for offset in own):
-                found.add(store)
-            if any(text in _texts(later.body, read) for later in loops[i + 1 :]):
-                found.add(store)
-    return found
-
-
-def _parts(source: Graph, loops: Sequence[Loop]) -> tuple[dict[int, int], tuple[Sum, ...]]:
-    """Return the straight part of every node outside the loops, the latest that serves all users.
-
-    And the sums without users.
-    """
-    last = max((loop.stage for loop in loops), default=0)
-    totals = {s.total: s for loop in loops for s in loop.sums}
-    stored = {
-        (s.group, s.first + i) for loop in loops for s in loop.stores for i in range(loop.size)
-    }
-    need: dict[int, int] = {}
-
-    def ask(i: int, part: int) -> None:
-        need[i] = min(need.get(i, last), part)
-
-    for group, row in enumerate(source.results):
-        for k, i in enumerate(row):
-            if (group, k) not in stored:
-                ask(i, last)
-    for loop in loops:
-        for i in (*loop.body.outer, *loop.body.truths):
-            ask(i, loop.stage - 1)
-        for s in loop.sums:
-            if s.start is not None:
-                ask(s.start, loop.stage - 1)
-    for i in reversed(range(len(source.nodes))):
-        if i in need and i not in totals:
-            for k in source.nodes[i].args:
-                ask(k, need[i])
-    parts = {
-        i: part
-        for i, part in sorted(need.items())
-        if i not in totals and source.nodes[i].op not in LEAVES
-    }
-    return parts, tuple(s for total, s in totals.items() if total not in need)

@@ -1,4 +1,4 @@
-"""Statements of a function: what becomes a local, what each statement takes, their order."""
+"""Statements of a function: locals, operands of each statement, and their order."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -13,70 +13,60 @@ from symfric.emitter.c99 import FORMS
 from symfric.foundation.graph import LEAVES, Graph
 
 IDLE = 2
-"""Growth of a statement that makes and ends nothing: it waits for those that make one value."""
+"""Growth of a statement that makes and ends no value: others that make one value come first."""
 
 
 def ordered(takes: Sequence[Iterable[int]], makes: Sequence[Iterable[int]]) -> list[int]:
-    """Return an order of statements 0, 1, ... in which what is taken has been made before.
+    """Return an order of statements 0, 1, ... in which a value is made before it is taken.
 
-    Of those that are ready the one comes next that adds least to the values that are live: it makes
-    some, and ends those without another use. Of several it is the first that takes a single
-    value, which is often a call, else the first. The time is that of sorting all that is taken.
+    The next statement is the ready one that adds least to the live values: it makes some, and ends
+    those without another use. Of several it is the first that takes a single value, which is often
+    a call, else the first. The time is that of sorting all that is taken.
 
     Args:
-        takes: values that each statement takes; those that none makes are there from the beginning.
+        takes: values that each statement takes; those that none makes exist from the beginning.
         makes: values that each statement makes, each by one.
 
     Returns:
-        The order; statements that wait for each other in a circle, and what waits for them, are
-        missing.
+        The order, without statements that wait for each other in a circle, and their followers.
     """
+    needs = [set(values) for values in takes]
     maker = {value: i for i, values in enumerate(makes) for value in values}
-    takers: dict[int, set[int]] = {}
-    waits = [0] * len(takes)
-    next_ones: list[list[int]] = [[] for _ in takes]
-    for i, values in enumerate(takes):
-        for value in set(values):
-            takers.setdefault(value, set()).add(i)
-        before = {maker[value] for value in set(values) if value in maker}
-        waits[i] = len(before)
-        for j in before:
-            next_ones[j].append(i)
+    before = [{maker[value] for value in values if value in maker} for values in needs]
+    waits = [len(makers) for makers in before]
+    takers, followers = defaultdict[int, set[int]](set), defaultdict[int, list[int]](list)
+    for i, values in enumerate(needs):
+        for value in values:
+            takers[value].add(i)
+        for j in before[i]:
+            followers[j].append(i)
 
     def rank(i: int) -> tuple[int, int, int]:
         made = sum(bool(takers.get(value)) for value in makes[i])
-        ended = sum(len(takers[value]) == 1 for value in set(takes[i]))
-        return made - ended if made or ended else IDLE, min(len(set(takes[i])), 2), i
+        ended = sum(len(takers[value]) == 1 for value in needs[i])
+        return made - ended if made or ended else IDLE, min(len(needs[i]), 2), i
 
-    heap: list[tuple[int, int, int]] = []
-    for i, count in enumerate(waits):
-        if count == 0:
-            heappush(heap, rank(i))
-    found: list[int] = []
-    done = [False] * len(takes)
+    heap = sorted(rank(i) for i, count in enumerate(waits) if count == 0)
+    found: dict[int, None] = {}
     while heap:
         _, _, i = heappop(heap)
-        if done[i]:
+        if i in found:
             continue
-        done[i] = True
-        found.append(i)
-        fewer: set[int] = set()
-        for value in set(takes[i]):
+        found[i] = None
+        for j in followers[i]:
+            waits[j] -= 1
+        changed = {j for j in followers[i] if waits[j] == 0}
+        for value in needs[i]:
             takers[value].discard(i)
             if len(takers[value]) == 1:
-                fewer |= takers[value]
-        for j in next_ones[i]:
-            waits[j] -= 1
-            if waits[j] == 0:
-                heappush(heap, rank(j))
-        for j in fewer:
-            if waits[j] == 0 and not done[j]:
-                heappush(heap, rank(j))
-    return found
+                changed |= {j for j in takers[value] if waits[j] == 0 and j not in found}
+        for j in changed:
+            heappush(heap, rank(j))
+    return [*found]
 
 
 LONGEST = 5
-"""Operations of an operand beyond which it becomes a local."""
+"""Largest number of operations of an operand inside a formula."""
 
 
 @final
@@ -100,7 +90,7 @@ class Branch:
 @final
 @dataclass(frozen=True)
 class Side:
-    """Inside a branch: `select` gets the value of its argument number `side`."""
+    """Statement in a branch: `select` gets the value of its argument number `side`."""
 
     select: int
     side: int
@@ -124,9 +114,9 @@ class Stores:
     """Rules for writing results.
 
     Attributes:
-        late: all of them when all else is done.
-        within: those that may be written inside a branch, where that decides about them alone.
-        same: those that are written to where an input was loaded from, with its node.
+        late: True if all are written last.
+        within: those that may be written inside a branch, if it alone decides about them.
+        same: those that are written to the place that an input was loaded from, with its node.
     """
 
     late: bool = False
@@ -135,83 +125,107 @@ class Stores:
 
 
 @final
-@dataclass(frozen=True)
 class Plan:
     """Function as statements.
 
     Attributes:
         placed: the graph with its branches.
         bodies: the statements of each region in order.
-        takes: what each statement takes, what is inside it included: nodes of its own region.
+        takes: nodes of its own region that each statement takes, including its inner statements.
         goals: select -> the select or result that it is a side or all of, whose place it takes.
+        waiting: selects of branches that wait for each other.
     """
 
-    placed: Placed
-    bodies: tuple[tuple[Statement, ...], ...]
-    takes: Mapping[Statement, frozenset[int]]
-    goals: Mapping[int, int | Store]
-
-
-def planned(source: Graph, bools: Sequence[bool], stores: Stores) -> Plan:
-    """Statements for a simplified graph.
-
-    Args:
-        bools: whether each node is one.
-        stores: how results are written.
-    """
-    apart: set[int] = set()
-    while True:
-        builder = _Planner(placed(source, apart), bools, stores)
-        plan, waiting = builder.result()
-        if not waiting:
-            return plan
-        apart |= waiting
-
-
-class _Planner:
     def __init__(self, found: Placed, bools: Sequence[bool], stores: Stores) -> None:
-        self.placed, self.stores = found, stores
-        self.branches = _branches(found)
-        uses = _uses(found)
-        self.locals = _locals(found, uses)
-        self.goals = _goals(found, bools, stores, uses)
+        self.placed, self.nodes, self.stores = found, found.source.nodes, stores
+        groups = defaultdict[tuple[int, int], list[int]](list)
+        for i, label in sorted(found.labels.items()):
+            groups[found.place[i], label].append(i)
+        self.branches = {key: Branch(*key, tuple(selects)) for key, selects in groups.items()}
+        uses = Counter[int]()
+        for i, times in self._written():
+            uses[i] += times
+        self.locals = self._locals(uses)
+        self.goals = self._goals(bools, uses)
         self.items: list[list[Statement]] = [[] for _ in found.regions]
         self.takes: dict[Statement, set[int]] = {}
-
-    def result(self) -> tuple[Plan, set[int]]:
-        """Return the plan, and the selects of branches that wait for each other."""
         self._collect()
         self._connect()
-        bodies, waiting = list[tuple[Statement, ...]](), set[int]()
-        for statements in self.items:
-            body, left = self._ordered(statements)
-            bodies.append(body)
-            waiting.update(i for s in left if isinstance(s, Branch) for i in s.selects)
-        takes = {statement: frozenset(values) for statement, values in self.takes.items()}
-        return Plan(self.placed, tuple(bodies), takes, self.goals), waiting
+        self.waiting = set[int]()
+        self.bodies = [self._in_order(statements) for statements in self.items]
+
+    def _in_order(self, statements: Sequence[Statement]) -> list[Statement]:
+        """Return the statements of a region in order, without those that wait for each other."""
+        last = [s for s in statements if self.stores.late and isinstance(s, Store)]
+        early = [s for s in statements if s not in last]
+        order = ordered([self.takes[s] for s in early], [_made(s) for s in early])
+        left = (early[k] for k in {*range(len(early))}.difference(order))
+        self.waiting.update(i for s in left if isinstance(s, Branch) for i in s.selects)
+        return [*(early[k] for k in order), *last]
+
+    def _written(self) -> Iterator[tuple[int, int]]:
+        """Yield every operand that is written somewhere, and the number of times."""
+        labels, place = self.placed.labels, self.placed.place
+        for i, node in enumerate(self.nodes):
+            if i in labels:
+                yield from ((side, 1) for side in node.args[1:])
+            else:
+                repeats = FORMS[node.op].pattern.count("{0}") if node.op in FORMS else 0
+                yield from ((operand, max(repeats, 1)) for operand in node.args)
+        conditions = {(place[i], label, self.nodes[i].args[0]) for i, label in labels.items()}
+        yield from ((condition, 1) for *_, condition in conditions)
+        yield from ((i, 1) for row in self.placed.source.results for i in row)
+
+    def _locals(self, uses: Counter[int]) -> frozenset[int]:
+        """Return nodes that are shared, or too long to be read inside a formula."""
+        labels = self.placed.labels
+        whole = {i for row in self.placed.source.results for i in row}
+        whole |= {side for i in labels for side in self.nodes[i].args[1:]}
+        kept, weight = set[int](), [0] * len(self.nodes)
+        for i, node in enumerate(self.nodes):
+            if node.op in LEAVES or i in labels:
+                continue
+            weight[i] = 1 + sum(weight[j] for j in node.args)
+            if uses[i] > 1 or (weight[i] > LONGEST and i not in whole):
+                kept.add(i)
+                weight[i] = 0
+        return frozenset(kept)
+
+    def _goals(self, bools: Sequence[bool], uses: Counter[int]) -> dict[int, int | Store]:
+        """Return branches without a variable: their select is only one result or one side."""
+        once = {i for i in self.placed.labels if uses[i] == 1}
+        goals: dict[int, int | Store] = {
+            i: outer
+            for outer in self.placed.labels
+            for i in self.nodes[outer].args[1:]
+            if i in once and bools[i] == bools[outer]
+        }
+        for store in self.stores.within if not self.stores.late else ():
+            i = self.placed.source.results[store.result][store.row]
+            if i in once:
+                goals[i] = store
+        return goals
 
     def _collect(self) -> None:
-        """All statements by region, in the order of the graph."""
-        found = self.placed
-        done: set[Branch] = set()
-        for i in range(len(found.source.nodes)):
+        """Collect all statements by region, in the order of the graph."""
+        found, done = self.placed, set[Branch]()
+        for i, node in enumerate(self.nodes):
             if i in self.locals:
                 self.items[found.place[i]].append(Local(i))
             elif i in found.labels:
                 branch = self.branches[found.place[i], found.labels[i]]
                 if branch not in done:
                     done.add(branch)
-                    self.items[found.place[i]].append(branch)
+                    self.items[branch.region].append(branch)
                 for side in (1, 2):
-                    if not self._is_there(i, found.source.nodes[i].args[side]):
+                    if not self._is_there(i, node.args[side]):
                         inner = found.inside[branch.region, branch.label, side]
                         self.items[inner].append(Side(i, side))
         direct = {goal for goal in self.goals.values() if isinstance(goal, Store)}
         for k, row in enumerate(found.source.results):
-            for j, i in enumerate(row):
-                store = Store(k, j)
-                if store not in direct and self.stores.same.get(store) != i:
-                    self.items[0].append(store)
+            stores = ((Store(k, j), i) for j, i in enumerate(row))
+            same = self.stores.same
+            self.items[0] += (s for s, i in stores if s not in direct and same.get(s) != i)
 
     def _is_there(self, select: int, value: int) -> bool:
         """Return True if a side of a select is in its place already and need not be written."""
@@ -224,38 +238,36 @@ class _Planner:
 
     def _connect(self) -> None:
         """Connect every statement with the nodes that it takes."""
-        found = self.placed
         homes: dict[int, tuple[Statement, int]] = {}
         for number, statements in enumerate(self.items):
             for statement in statements:
                 self.takes.setdefault(statement, set())
                 for i in self._operands(statement):
                     self._take(i, statement, number, homes)
-        for i in reversed(range(len(found.source.nodes))):
+        for i in reversed(range(len(self.nodes))):
             if i in homes:
-                for j in found.source.nodes[i].args:
+                for j in self.nodes[i].args:
                     self._take(j, *homes[i], homes)
 
     def _operands(self, statement: Statement) -> Sequence[int]:
-        found = self.placed
         match statement:
             case Local(node):
-                return found.source.nodes[node].args
+                return self.nodes[node].args
             case Branch(selects=selects):
-                return (found.source.nodes[selects[0]].args[0],)
+                return self.nodes[selects[0]].args[:1]
             case Side(select, side):
-                return (found.source.nodes[select].args[side],)
+                return (self.nodes[select].args[side],)
             case Store(result, row):
-                return (found.source.results[result][row],)
+                return (self.placed.source.results[result][row],)
 
     def _take(
         self, i: int, statement: Statement, region: int, homes: dict[int, tuple[Statement, int]]
     ) -> None:
-        """Return `statement` of a region writes out node `i`, or its name."""
-        node = self.placed.source.nodes[i]
-        if node.op == ca.OP_CONST:
+        """Note that `statement` of a region writes out node `i`, or its name."""
+        op = self.nodes[i].op
+        if op == ca.OP_CONST:
             return
-        if not (node.op == ca.OP_INPUT or i in self.locals or i in self.placed.labels):
+        if not (op == ca.OP_INPUT or i in self.locals or i in self.placed.labels):
             homes[i] = (statement, region)
             return
         inner, at = statement, statement
@@ -266,21 +278,22 @@ class _Planner:
             at = inner
         self.takes.setdefault(at, set()).add(i)
 
-    def _ordered(
-        self, statements: Sequence[Statement]
-    ) -> tuple[tuple[Statement, ...], list[Statement]]:
-        """In order; and those that wait for each other in a circle, with others."""
-        early = [s for s in statements if not (self.stores.late and isinstance(s, Store))]
-        takes = [self.takes[s] for s in early]
-        makes = [_made(s) for s in early]
-        order = ordered(takes, makes)
-        body = [early[k] for k in order]
-        body += [s for s in statements if self.stores.late and isinstance(s, Store)]
-        chosen = set(order)
-        return tuple(body), [s for k, s in enumerate(early) if k not in chosen]
+
+def planned(source: Graph, bools: Sequence[bool], stores: Stores) -> Plan:
+    """Return the statements of a simplified graph.
+
+    Args:
+        bools: for each node, True if it is a bool.
+        stores: rules for writing results.
+    """
+    apart: set[int] = set()
+    while (plan := Plan(placed(source, apart), bools, stores)).waiting:
+        apart |= plan.waiting
+    return plan
 
 
 def _made(statement: Statement) -> tuple[int, ...]:
+    """Return the nodes whose value a statement makes."""
     match statement:
         case Local(node):
             return (node,)
@@ -290,64 +303,3 @@ def _made(statement: Statement) -> tuple[int, ...]:
             return (select,)
         case Store():
             return ()
-
-
-def _branches(found: Placed) -> dict[tuple[int, int], Branch]:
-    groups: dict[tuple[int, int], list[int]] = defaultdict(list)
-    for i, label in found.labels.items():
-        groups[found.place[i], label].append(i)
-    return {key: Branch(*key, tuple(sorted(selects))) for key, selects in groups.items()}
-
-
-def _goals(
-    found: Placed, bools: Sequence[bool], stores: Stores, uses: Counter[int]
-) -> dict[int, int | Store]:
-    """Branches that need no variable: all that becomes of their select is one result or side."""
-    once = {i for i in found.labels if uses[i] == 1}
-    goals: dict[int, int | Store] = {}
-    for outer in found.labels:
-        for i in found.source.nodes[outer].args[1:]:
-            if i in once and bools[i] == bools[outer]:
-                goals[i] = outer
-    for store in stores.within:
-        i = found.source.results[store.result][store.row]
-        if i in once and not stores.late:
-            goals[i] = store
-    return goals
-
-
-def _written(found: Placed) -> Iterator[tuple[int, int]]:
-    """(node, how often) of every operand that is written somewhere."""
-    conditions: set[tuple[int, int, int]] = set()
-    for i, node in enumerate(found.source.nodes):
-        if i in found.labels:
-            conditions.add((found.place[i], found.labels[i], node.args[0]))
-            yield from ((side, 1) for side in node.args[1:])
-        else:
-            repeats = FORMS[node.op].pattern.count("{0}") if node.op in FORMS else 0
-            yield from ((operand, max(repeats, 1)) for operand in node.args)
-    yield from ((condition, 1) for _, _, condition in conditions)
-    yield from ((i, 1) for row in found.source.results for i in row)
-
-
-def _uses(found: Placed) -> Counter[int]:
-    """Number of times that each node is written out."""
-    uses: Counter[int] = Counter()
-    for i, times in _written(found):
-        uses[i] += times
-    return uses
-
-
-def _locals(found: Placed, uses: Counter[int]) -> frozenset[int]:
-    """Nodes that are shared, or too long to be read inside a formula."""
-    whole = {i for row in found.source.results for i in row}
-    whole |= {side for i in found.labels for side in found.source.nodes[i].args[1:]}
-    kept, weight = set[int](), [0] * len(found.source.nodes)
-    for i, node in enumerate(found.source.nodes):
-        if node.op in LEAVES or i in found.labels:
-            continue
-        weight[i] = 1 + sum(weight[j] for j in node.args)
-        if uses[i] > 1 or (weight[i] > LONGEST and i not in whole):
-            kept.add(i)
-            weight[i] = 0
-    return frozenset(kept)

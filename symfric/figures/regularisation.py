@@ -70,6 +70,11 @@ class Regularisation:
     law: Law
     powers: Mapping[str, float]
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(self.powers)
+
     def values(self, s: float) -> dict[str, float]:
         """Return their values at the factor `s`."""
         known = parameters(self.law)

@@ -1,10 +1,9 @@
 """Equations of a unit in C: the step of the integrator, signals, start values, events.
 
-All of it comes from the functions that `simulate` runs, through the emitter: the same bits, without
-CasADi at run time.
+The emitter writes the functions that `simulate` runs: the same bits, without CasADi at run time.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from math import inf
@@ -26,7 +25,6 @@ from symfric.integrator.equations.initial import (
     smallest_step,
 )
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.engine import search_source
@@ -47,15 +45,15 @@ EVENT_TOLERANCE = 1e-10
 @final
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """Model as a unit computes it.
+    """Equations of a model and their numerical settings in a unit.
 
     Attributes:
-        model, integrator: whose functions.
+        model, integrator: sources of the functions.
         y0: consistent unknowns at the start.
         rtol: default of the relative tolerance.
-        step: length [s] of fixed steps, None where the step is adaptive.
+        step: length [s] of fixed steps, None if the step is adaptive.
         method: of fixed steps.
-        exchange: whether the importer integrates, from rates of the states.
+        exchange: True if the importer integrates, from rates of the states.
         span: first and last time [s] of the default experiment.
     """
 
@@ -69,8 +67,13 @@ class Equations:
     exchange: bool = False
 
     @property
+    def has_loops(self) -> bool:
+        """True for a mechanism with closed loops."""
+        return self.model.holonomic is not None and self.model.holonomic.phi.numel() > 0
+
+    @property
     def formula(self) -> str:
-        """Name of the method and of its kind of steps."""
+        """Name of the method and type of its steps."""
         if self.exchange:
             return "rates of the states"
         if self.step is None:
@@ -93,54 +96,39 @@ def equations(
     span: tuple[float, float],
     exchange: bool = False,
 ) -> Equations:
-    """Build the integrator of a model whose inputs are held.
+    """Build the integrator of a model with held inputs.
 
     Raises:
-        ValueError: unknown method; start values without consistent algebraic ones; rates for
-            model exchange that are no unknowns of their own.
+        ValueError: unknown method; start values without consistent algebraic ones; several rates
+            in one equation, for model exchange.
     """
     u = model.vector("u")
     held = InputData(u, u, np.array(span), np.zeros((len(model.u), 1)), ("fmu",))
     rtol = min((event.rtol for event in model.events if event.rtol < rtol), default=rtol)
-    # fixed steps, too, look at signals and jumps by it
-    adaptive = "auto" if step is not None else method
+    adaptive = "auto" if step is not None else method  # also evaluates signals of fixed steps
     integrator = Integrator(model, held, chosen("export_fmu", adaptive, rtol))
     system = integrator.system
-    if exchange:
-        _check_rates(model, system)
-    guess = first_guess(system, model, model.initial_state(t=span[0]), span[0])
-    d = np.concatenate([model.values("p"), model.values("u")])
-    integrator = integrator.suited([(guess, d)], span[1] - span[0])
-    return Equations(
-        model=model,
-        integrator=integrator,
-        y0=integrator.start(guess, d),
-        rtol=rtol,
-        step=step,
-        method=method,
-        span=span,
-        exchange=exchange,
-    )
-
-
-def _check_rates(model: Model, system: System) -> None:
-    """Refuse a model whose mass matrix mixes the rates of states."""
-    mass = ca.DM(system.mass).full()
-    if not np.array_equal(mass[: system.nx], np.eye(system.n)[: system.nx]):
+    rates = ca.DM(system.mass).full()[: system.nx]
+    if exchange and not np.array_equal(rates, np.eye(system.n)[: system.nx]):
         raise ValueError(
             f"export_fmu '{model.name}': expected one rate in each equation for model exchange, "
             "got several in one; export it for co-simulation"
         )
+    guess = first_guess(system, model, model.initial_state(t=span[0]), span[0])
+    d = np.concatenate([model.values("p"), model.values("u")])
+    integrator = integrator.suited([(guess, d)], span[1] - span[0])
+    y0 = integrator.start(guess, d)
+    return Equations(model, integrator, y0, rtol, step, method, span, exchange)
 
 
 def _places(integrator: Integrator) -> list[int]:
-    """Positions of the algebraic variables of the model among the unknowns."""
+    """Return the positions of the algebraic variables of the model among the unknowns."""
     names = list(integrator.system.names)
     return [names.index(v.name) for v in integrator.model.z]
 
 
 def header(own: Equations, token: str) -> str:
-    """Sizes and settings of a model as C."""
+    """Return sizes and settings of a model as C."""
     model, system = own.model, own.integrator.system
     manifold, crossings = system.manifold, own.integrator.crossings
     events = len(model.events) if own.step is None else 0
@@ -150,7 +138,7 @@ def header(own: Equations, token: str) -> str:
         "N": system.n, "NX": system.nx, "NZ": len(model.z), "NU": len(model.u),
         "NP": len(model.p), "ND": len(model.p) + len(model.u), "NS": len(model.signals),
         "ROWS": own.integrator.tableau.H.shape[0] if adaptive else 1,
-        "EVENT_MEMORY": events if own.exchange else own_memory(events),
+        "EVENT_MEMORY": events if own.exchange else 105 * bool(events) + 2 * events,  # of `Memory`
         "JUMP": crossings.width if crossings and events else 0,
         "RESET_VALUES": len(crossings.resets) if crossings and events else 0,
     }  # fmt: skip
@@ -167,9 +155,13 @@ def header(own: Equations, token: str) -> str:
         "CLOSES": int(bool(loops) and any(event.reset for event in model.events)),
     }
     span = own.span[1] - own.span[0]
+    # as in `run.integrate`: a few straight pieces of events in time alone
+    quickest = min((pieces(f, *own.span).pace for f in own.integrator.schedules), default=inf)
     numbers = {
-        "DEFAULT_RTOL": own.rtol, "LEAST_RTOL": LEAST_RTOL, "LARGEST_RTOL": largest_rtol(model),
-        "ATOL": 0.1, "LONGEST_STEP": _longest(own), "FIRST_STEP": min(1e-8 * span, LONGEST_FIRST),
+        "DEFAULT_RTOL": own.rtol, "LEAST_RTOL": LEAST_RTOL,
+        "LARGEST_RTOL": min((event.rtol for event in model.events), default=0.1),
+        "ATOL": 0.1, "LONGEST_STEP": PACES * quickest,
+        "FIRST_STEP": min(1e-8 * span, LONGEST_FIRST),
         "SURE_STEP": SURE, "SMALLEST_STEP": smallest_step(span), "STEP_FLOOR": FLOOR,
         "GROWTH_MEMORY": GROWTH_MEMORY, "MOST_ATTEMPTS": MOST_ATTEMPTS,
         "EVENT_TOLERANCE": EVENT_TOLERANCE, "STEP_SIZE": own.step or 0.0,
@@ -186,26 +178,8 @@ def header(own: Equations, token: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def own_memory(events: int) -> int:
-    """Length of what the search for events remembers (`crossings.Memory`)."""
-    return 105 + 2 * events if events else 0
-
-
-def largest_rtol(model: Model) -> float:
-    """Return the loosest tolerance that the events of a model allow."""
-    return min((event.rtol for event in model.events), default=0.1)
-
-
-def _longest(own: Equations) -> float:
-    """Return the longest step [s]: a few straight pieces of events in time alone, see
-    `run.integrate`.
-    """
-    quickest = min((pieces(f, *own.span).pace for f in own.integrator.schedules), default=inf)
-    return PACES * quickest
-
-
 def source(own: Equations) -> str:
-    """Tables and functions of a model as C."""
+    """Return tables and functions of a model as C."""
     system, integrator = own.integrator.system, own.integrator
     model, y, d = own.model, system.y, system.d
     functions: dict[str, ca.Function] = {
@@ -215,13 +189,11 @@ def source(own: Equations) -> str:
         ),
         "model_rates": integrator.f,
     }
-    if own.exchange:
-        pass  # the importer's integrator makes the steps
-    elif own.step is None:
-        functions["model_attempt"] = integrator.step
-    else:
+    if own.step is not None:
         formula = METHODS[own.method]
         functions["model_step"] = build_fixed(suited_to_start(system, formula, model), formula)
+    elif not own.exchange:  # then the importer makes the steps
+        functions["model_attempt"] = integrator.step
     manifold, follow = system.manifold, integrator.follow
     if follow is not None:
         functions |= {"model_equations": system.constraints, "model_round": follow.round}
@@ -240,16 +212,13 @@ def source(own: Equations) -> str:
         text.append("typedef long long casadi_int;\n\n")
     if follow is not None:
         text += [_called("symfric_round", "model_round", 2, 2), FOLLOWED, follow.c_source, "\n"]
-    if model.events and own.step is None:
-        text.append(_search(own) if searches else _resets(own))
-        text.append(_events(own))
+    if own.step is None:
+        text += _events(own)
     return "".join(text)
 
 
 def _along(own: Equations) -> ca.Function:
-    """Return (t, y, d, dy, dd) -> derivatives of rates, signals and algebraic equations along
-    (dy, dd).
-    """
+    """Return (t, y, d, dy, dd) -> derivatives of rates, signals and equations along (dy, dd)."""
     model, system = own.model, own.integrator.system
     t, y, d = ca.SX.sym("t"), system.y, system.d
     dy, dd = ca.SX.sym("dy", system.n), ca.SX.sym("dd", d.numel())
@@ -266,7 +235,7 @@ FOLLOWED = "static int symfric_follow(double *y, const double *d);\n"
 
 
 def _called(name: str, of: str, arguments: int, results: int) -> str:
-    """Return `of` as the C of the integrator calls functions."""
+    """Return the function `of` with the arguments of CasADi's C functions."""
     given = [*(f"arg[{i}]" for i in range(arguments)), *(f"res[{i}]" for i in range(results))]
     return (
         f"static int {name}(const double **arg, double **res, casadi_int *iw, double *w, int mem)\n"
@@ -275,48 +244,30 @@ def _called(name: str, of: str, arguments: int, results: int) -> str:
     )
 
 
-def _search(own: Equations) -> str:
-    """C of the search for events behind a step."""
-    crossings = own.integrator.crossings
-    if crossings is None:
-        return ""
-    parts: list[str] = []
-    for function in crossings.functions:
-        name = f"model_{function.name().removeprefix('symfric_')}"
-        parts.append(routine(function, name))
-        parts.append(_called(function.name(), name, function.n_in(), function.n_out()))
-    return "".join([*parts, search_source(crossings, own.integrator.step.numel_in(1))])
-
-
-def _resets(own: Equations) -> str:
-    """C of what events do, where the importer searches for them."""
-    crossings = own.integrator.crossings
-    if crossings is None:
-        return ""
-    tables = (
-        _table("model_directions", crossings.directions, "int"),
-        _table("model_terminal", map(int, crossings.terminal), "int"),
-        _table("model_by_event", (i for i, _ in crossings.resets), "int"),
-        _table("model_of_state", (j for _, j in crossings.resets), "int"),
-    )
-    return "".join([routine(own.integrator.resets, "model_resets"), *tables])
-
-
-def _events(own: Equations) -> str:
-    """C of the values of events, of what they are at the start, and of their names."""
-    events = own.model.events
-    signs = [-event.direction if event.at_start else 0 for event in events]
-    return "".join(
-        [
-            routine(own.integrator.events, "model_events"),
-            _table("model_at_start", signs),
-            _strings("model_event_names", [event.name for event in events]),
-        ]
-    )
+def _events(own: Equations) -> Iterator[str]:
+    """Yield the C of events: search and effects, values, values at the start, names."""
+    events, crossings = own.model.events, own.integrator.crossings
+    if crossings is not None and own.exchange:  # the importer searches
+        yield routine(own.integrator.resets, "model_resets")
+        yield _table("model_directions", crossings.directions, "int")
+        yield _table("model_terminal", map(int, crossings.terminal), "int")
+        yield _table("model_by_event", (i for i, _ in crossings.resets), "int")
+        yield _table("model_of_state", (j for _, j in crossings.resets), "int")
+    elif crossings is not None:
+        for function in crossings.functions:
+            name = f"model_{function.name().removeprefix('symfric_')}"
+            yield routine(function, name)
+            yield _called(function.name(), name, function.n_in(), function.n_out())
+        yield search_source(crossings, own.integrator.step.numel_in(1))
+    if events:
+        yield routine(own.integrator.events, "model_events")
+        signs = [-event.direction if event.at_start else 0 for event in events]
+        yield _table("model_at_start", signs)
+        yield _strings("model_event_names", [event.name for event in events])
 
 
 def tables(own: Equations) -> str:
-    """Names, start values and ranges."""
+    """Return names, start values and ranges as C."""
     model, system = own.model, own.integrator.system
     data = [*model.values("p"), *model.values("u")]
     guess = [float(v.start) for v in model.z]
@@ -338,7 +289,7 @@ def tables(own: Equations) -> str:
 
 
 def _table(name: str, values: Iterable[float], kind: str = "double") -> str:
-    """Return a constant array, of one number at least."""
+    """Return a constant array of at least one number."""
     texts = [str(x) if kind == "int" else DOUBLE.literal(float(x)) for x in values] or ["0"]
     return _wrapped(f"static const {kind} {name}[{len(texts)}] = {{", texts)
 
@@ -349,7 +300,7 @@ def _strings(name: str, values: Iterable[str]) -> str:
 
 
 def _wrapped(head: str, texts: list[str]) -> str:
-    """Entries of an array in lines of up to 96 columns."""
+    """Return the entries of an array in lines of up to 96 columns."""
     lines, line = [head], "   "
     for text in texts:
         if len(line) + len(text) > 94 and line.strip():
@@ -360,12 +311,12 @@ def _wrapped(head: str, texts: list[str]) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Return the text as in a C string."""
+    """Return the content of a C string."""
     return text.replace("\\", "\\\\").replace('"', '\\"')
 
 
 def fingerprint(parts: Mapping[str, str]) -> str:
-    """Return a token of all that a unit consists of."""
-    digest = sha256("\0".join(f"{name}\0{text}" for name, text in parts.items()).encode())
-    text = digest.hexdigest()
+    """Return a token of the content of a unit."""
+    content = "\0".join(f"{name}\0{text}" for name, text in parts.items())
+    text = sha256(content.encode()).hexdigest()
     return f"{{{text[:8]}-{text[8:12]}-{text[12:16]}-{text[16:20]}-{text[20:32]}}}"

@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any, final
@@ -18,28 +17,28 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.codegen.blocks.from_model import fixed_method
+from symfric.codegen.layout import filled
 from symfric.fmu.equations import equations, fingerprint, header, source
 from symfric.fmu.package import (
-    Described,
-    build_description,
+    SOURCES,
     compiled,
     described,
     fixed_text,
     packed,
     platform_name,
+    shared_name,
     sources,
 )
 from symfric.fmu.variables import LARGEST_RTOL, LEAST_RTOL, Entry, entries
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters
-from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
+from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.model import Model, check_model
 from symfric.scenes.base import Scene
 
 KINDS = ("co-simulation", "model-exchange")
 VERSIONS = (2, 3)
-INTERVALS = 200
-"""Communication steps of the default experiment."""
 
 
 @final
@@ -54,9 +53,9 @@ class Exported:
         identifier: name of its binary.
         variables: all variables.
         binary: name of the binary in the archive; empty without a compiler.
-        missing: why there is no binary.
+        missing: reason of a missing binary.
         method: formula of the steps.
-        times: seconds it took to write and to compile the C.
+        times: time [s] to write the C, and to compile it.
     """
 
     path: Path
@@ -99,31 +98,29 @@ def export_fmu(
 ) -> Exported:
     """Write `model` as a Functional Mock-up Unit: sources and the binary of this platform.
 
-    The unit has the adaptive step of `simulate` inside, the same bits, in C of its own. Inputs are
-    held over a communication step, which may be as long or short as the importer likes: steps go
-    beyond a communication point and are not cut there, as long as no input jumps; values in between
-    are those of the step's polynomial. Where inputs or tunable parameters jump, the last step is
-    made again up to there, and the algebraic variables follow at once. Events of the model are
-    located and carried out inside.
+    The unit contains the adaptive step of `simulate` as C, with the same bits. Inputs are held over
+    a communication step, which may have any length: while no input jumps, steps pass communication
+    points, whose values are those of the polynomial of the step. After a jump of an input or of a
+    tunable parameter the unit repeats the last step up to that point and solves the algebraic
+    equations again. It locates events of the model and applies their resets.
 
-    All unknowns may be set before the initialisation ends; those that were not set follow, as in
-    `simulate(x0=...)`: bristles start in steady sliding, algebraic variables where their equations
-    hold.
+    All unknowns may be set before the end of the initialisation. The others follow from them as in
+    `simulate(x0=...)`: bristles start in steady sliding, algebraic variables solve their equations.
 
     Directional derivatives are exact; units of mechanisms with loops have none.
 
-    Limits: absolute tolerances stay 0.1 rtol times nominal, also for motions that are tiny against
-    their nominal values (`simulate` runs these again); pivots are those that are sound at the
-    start; events in time alone set the longest step by the default experiment.
+    Limits: absolute tolerances are 0.1 rtol times the nominal values, also for much smaller motions
+    (`simulate` repeats these); pivots are chosen at the start values; for events that depend on
+    time only, the default experiment determines the longest step.
 
     Args:
         model: a model, or a scene, whose parameters become tunable.
         path: the archive, such as "drive.fmu".
         fmi: 2 or 3.
-        kind: "co-simulation", with an integrator inside, or "model-exchange", for that of the
-            importer: rates of the states, with algebraic variables solved for inside, and event
-            indicators. Of a mechanism with loops the rates are those at the nearest state that
-            closes them, and pull there within 20 ms; its coordinates stay states.
+        kind: "co-simulation", with its own integrator, or "model-exchange", for the integrator of
+            the importer: rates of the states and event indicators; the unit solves the algebraic
+            equations. Rates of a mechanism with loops are those at the nearest closed state, and
+            lead there within 20 ms; its coordinates stay states.
         rtol: relative tolerance; the importer may change it, by the parameter `rtol` or the
             tolerance of the experiment.
         step: length [s] of fixed steps instead, without error control, as of `plant_block`. A
@@ -135,11 +132,11 @@ def export_fmu(
         name: model identifier; default the name of the model.
 
     Returns:
-        What was written; it prints itself.
+        Description of the unit; `print` shows a summary.
 
     Raises:
         ValueError: bad input, or start values without consistent algebraic variables.
-        CompileError: the compiler refuses the C.
+        CompileError: the compiler rejects the C.
     """
     where = "export_fmu"
     made, span = _model(where, model, free, t_end)
@@ -165,40 +162,23 @@ def export_fmu(
     model_c = source(own)
     shared = {f"fmi{fmi}.c": fixed_text(f"fmi{fmi}.c"), "model.c": model_c, "kind": kind}
     token = fingerprint(shared | {"sizes": header(own, ""), "unit": fixed_text("unit.c")})
-    texts = sources(header(own, token), model_c, fmi, step is not None, exchange)
-    write_time, begin = perf_counter() - begin, perf_counter()
-    binary = compiled(texts, identifier, fmi)
-    compile_time = perf_counter() - begin
-    loops = made.holonomic is not None and made.holonomic.phi.numel() > 0
-    listed = entries(made, own.start, 0.0 if step else own.rtol, not loops, exchange)
-    what = Described(
-        name=made.name,
-        identifier=identifier,
-        token=token,
-        doc=f"{made.name}: {own.formula} of symfric",
-        tool=f"symfric {version('symfric')}",
-        span=span,
-        rtol=None if step else own.rtol,
-        step=step,
-        interval=(span[1] - span[0]) / INTERVALS,
-        files=("all.c",),
-        exchange=exchange,
-        slopes=not loops,
-    )
-    build = build_description(what) if fmi == 3 else ""
-    size = packed(target, described(what, listed, fmi), build, texts, binary)
-    return Exported(
-        path=target,
-        size=size,
-        fmi=fmi,
-        kind=kind,
-        identifier=identifier,
-        variables=listed,
-        binary=binary.name if binary.content else "",
-        missing=binary.missing,
-        method=own.formula,
-        times=(write_time, compile_time),
-    )
+    texts = sources(own, header(own, token), model_c, fmi)
+    written, library = perf_counter(), shared_name(identifier)
+    binary, missing = compiled(texts, library)
+    times = written - begin, perf_counter() - written
+    listed = entries(made, own.start, 0.0 if step else own.rtol, not own.has_loops, exchange)
+    files: dict[str, str | bytes] = {
+        "modelDescription.xml": described(own, identifier, token, listed, fmi),
+        **{f"sources/{name}": text for name, text in texts.items()},
+    }
+    if fmi == 3:
+        build = filled(SOURCES / "buildDescription.xml", identifier=identifier)
+        files["sources/buildDescription.xml"] = build
+    place = f"binaries/{platform_name(fmi)}/{library}" if binary else ""
+    if binary:
+        files[place] = binary
+    size = packed(target, files)
+    return Exported(target, size, fmi, kind, identifier, listed, place, missing, own.formula, times)
 
 
 def _model(
@@ -209,7 +189,8 @@ def _model(
     if isinstance(given, Scene):
         until = given.t_end
         known = parameters(given)
-        names = [n for n, p in known.items() if _switches_on(p.value)] if free is None else free
+        numbers = {n: checks.as_number(p.value) for n, p in known.items()}
+        names = [n for n, value in numbers.items() if value] if free is None else free
         given = given.model(names)
     elif free is not None:
         raise ValueError(
@@ -224,12 +205,6 @@ def _model(
     return given, (0.0, until)
 
 
-def _switches_on(value: object) -> bool:
-    """Return True if a parameter is a number other than zero."""
-    number = checks.as_number(value)
-    return number is not None and number != 0.0
-
-
 def _method(where: str, model: Model, method: str, step: float | None) -> str:
     """Return the formula of the steps."""
     if step is None:
@@ -240,10 +215,7 @@ def _method(where: str, model: Model, method: str, step: float | None) -> str:
             f"{where}: step: expected a model without events, got {len(model.events)}; leave the "
             "step adaptive, or use a smooth or bristle law"
         )
-    method = checks.choice(f"{where}: method", method, ["auto", *METHODS])
-    if method == "auto":
-        method = "backward_euler" if model.holonomic and model.monitors else "rodas3"
-    return method
+    return fixed_method(where, model, method)
 
 
 Array = NDArray[np.float64]
@@ -255,7 +227,7 @@ class Running:
     """Instance for co-simulation, initialised; made by `running`.
 
     Attributes:
-        said: messages of the unit.
+        said: messages of the unit, in their order.
         t: communication point [s].
     """
 
@@ -263,7 +235,7 @@ class Running:
         self.said: list[str] = []
         self.t = 0.0
         self._library, self._references = library, references
-        self._log = LOG(self._hear)
+        self._log = LOG(self._keep)
         library.fmi3InstantiateCoSimulation.restype = c.c_void_p
         none = c.c_size_t(0)
         handle = library.fmi3InstantiateCoSimulation(
@@ -275,14 +247,14 @@ class Running:
         self._reached = c.c_double()
         self._out = [*map(c.byref, self._flags), c.byref(self._reached)]
 
-    def _hear(self, _environment: Any, _status: int, _category: bytes, text: bytes) -> None:
+    def _keep(self, _environment: Any, _status: int, _category: bytes, text: bytes) -> None:
         self.said.append(text.decode())
 
     def initialise(self, start: Mapping[str, float]) -> None:
         """Set start values, inputs and parameters by name, and initialise at t = 0.
 
         Raises:
-            RuntimeError: the unit refuses; with what it says.
+            RuntimeError: the unit refuses a value; the text has its message.
         """
         self.set(start)
         zero = c.c_double(0.0)
@@ -317,7 +289,7 @@ class Running:
         self.t = self._reached.value
 
     def free(self) -> None:
-        """Give its memory back."""
+        """Free its memory."""
         self._library.fmi3FreeInstance(self._self)
         self._self = c.c_void_p(None)
 

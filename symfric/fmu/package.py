@@ -7,239 +7,164 @@ import platform
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
+from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
-from typing import final
 from xml.etree import ElementTree as Xml
 from zipfile import ZIP_DEFLATED, ZipFile
 
+from symfric.fmu.equations import Equations
 from symfric.fmu.variables import Entry
 from symfric.foundation.files import written
 from symfric.foundation.programs import CompileError, Compiler, find_compiler
 from symfric.foundation.units import CELSIUS, exponents
 
 CATEGORIES = ("logStatusDiscard", "logStatusError")
-"""Messages come in any case: there are none but of what failed or was refused."""
+"""Categories of messages: only failures and refusals, in any case."""
+INTERVALS = 200
+"""Communication steps of the default experiment."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Described:
-    """Content of modelDescription.xml besides the variables.
+def described(
+    own: Equations, identifier: str, token: str, entries: Iterable[Entry], fmi: int
+) -> str:
+    """Return the text of modelDescription.xml.
 
-    Attributes:
-        name: of the model.
+    Args:
+        own: equations of the unit.
         identifier: C identifier, the name of the binary.
-        token: what ties the binary to the description.
-        doc: what it is.
-        tool: who made it.
-        span: start and stop time [s] of the default experiment.
-        rtol: tolerance of the default experiment; None with fixed steps.
-        step: length [s] of fixed steps, None where the step is adaptive.
-        interval: communication step [s] that is proposed.
-        files: sources, the one to be compiled.
-        exchange: whether it is for model exchange.
-        slopes: whether it gives directional derivatives.
+        token: ties the binary to the description.
+        entries: variables; FMI 2.0 has none for event indicators.
+        fmi: 2 or 3.
     """
-
-    name: str
-    identifier: str
-    token: str
-    doc: str
-    tool: str
-    span: tuple[float, float]
-    rtol: float | None
-    step: float | None
-    interval: float
-    files: tuple[str, ...]
-    exchange: bool = False
-    slopes: bool = False
-
-    @property
-    def tag(self) -> str:
-        """Name of its kind in the standard."""
-        return "ModelExchange" if self.exchange else "CoSimulation"
-
-    @property
-    def variable_steps(self) -> bool | None:
-        """True if communication steps may have any length; None if there are none."""
-        return None if self.exchange else True
-
-
-def described(what: Described, entries: Iterable[Entry], fmi: int) -> str:
-    """Return the text of modelDescription.xml; `fmi` is 2 or 3."""
-    root = (_second if fmi == 2 else _third)(what, tuple(entries))
+    every = tuple(entries)
+    listed = [entry for entry in every if fmi == 3 or entry.kind != "indicator"]
+    indicators = sum(entry.kind == "indicator" for entry in every)
+    exchange, model, second = own.exchange, own.model.name, fmi == 2
+    root = _element(
+        None, "fmiModelDescription",
+        fmiVersion=f"{fmi}.0",
+        modelName=model,
+        guid=token if second else None,
+        numberOfEventIndicators=indicators if second and exchange else None,
+        instantiationToken=None if second else token,
+        description=f"{model}: {own.formula} of symfric",
+        generationTool=f"symfric {version('symfric')}",
+        generationDateAndTime=datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+        variableNamingConvention="flat",
+    )  # fmt: skip
+    kind = _element(
+        root, "ModelExchange" if exchange else "CoSimulation",
+        modelIdentifier=identifier,
+        canHandleVariableCommunicationStepSize=None if exchange else True,
+        **dict.fromkeys(("canGetAndSetFMUstate", "canSerializeFMUstate",
+                         "canNotUseMemoryManagementFunctions") if second
+                        else ("canGetAndSetFMUState", "canSerializeFMUState"), True),
+        fixedInternalStepSize=None if second else own.step,
+        **{f"providesDirectionalDerivative{'s' * (not second)}": not own.has_loops},
+    )  # fmt: skip
+    if second:
+        _element(_element(kind, "SourceFiles"), "File", name="all.c")
+    _units(root, listed)
+    log = _element(root, "LogCategories")
+    for category in CATEGORIES:
+        _element(log, "Category", name=category)
+    begin, end = own.span
+    _element(
+        root, "DefaultExperiment", startTime=begin, stopTime=end,
+        tolerance=own.rtol if own.step is None else None, stepSize=(end - begin) / INTERVALS,
+    )  # fmt: skip
+    _variables(root, listed, second)
+    _structure(root, listed, second, exchange)
     Xml.indent(root)
     text = Xml.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 
-def build_description(what: Described) -> str:
-    """buildDescription.xml with the sources, of 3.0."""
-    root = Xml.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    build = _child(root, "BuildConfiguration", modelIdentifier=what.identifier)
-    sources = _child(build, "SourceFileSet", language="C99")
-    for name in what.files:
-        _child(sources, "SourceFile", name=name)
-    _child(build, "Library", name="m")
-    Xml.indent(root)
-    text = Xml.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
+def _element(parent: Xml.Element | None, tag: str, **attributes: object) -> Xml.Element:
+    """Return a new element below `parent`; attributes that are None are left out."""
+    element = Xml.Element(tag, _texts(attributes))
+    if parent is not None:
+        parent.append(element)
+    return element
 
 
-def _child(parent: Xml.Element, tag: str, **attributes: object) -> Xml.Element:
-    """Return a new element; attributes that are None are left out."""
-    texts = {name: _text(value) for name, value in attributes.items() if value is not None}
-    return Xml.SubElement(parent, tag, texts)
+def _texts(attributes: Mapping[str, object]) -> dict[str, str]:
+    def text(value: object) -> str:
+        if isinstance(value, bool):
+            return "true" if value else "false"
+        return repr(value) if isinstance(value, float) else str(value)
 
-
-def _text(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return repr(value) if isinstance(value, float) else str(value)
-
-
-def _root(what: Described, version: str, **more: str) -> Xml.Element:
-    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    own = {"fmiVersion": version, "modelName": what.name} | more
-    own |= {"description": what.doc, "generationTool": what.tool, "generationDateAndTime": now}
-    return Xml.Element("fmiModelDescription", own | {"variableNamingConvention": "flat"})
+    return {name: text(value) for name, value in attributes.items() if value is not None}
 
 
 def _units(root: Xml.Element, entries: Iterable[Entry]) -> None:
-    """Every unit once, with its exponents where it is a product of SI units."""
+    """Write every unit once, with its exponents if it is a product of SI units."""
     used = dict.fromkeys(entry.unit for entry in entries if entry.unit not in ("", "1"))
-    if not used:
-        return
-    group = _child(root, "UnitDefinitions")
+    group = _element(root, "UnitDefinitions") if used else root
     for text in used:
-        unit = _child(group, "Unit", name=text)
+        unit = _element(group, "Unit", name=text)
         base = {"K": 1} if text == CELSIUS else exponents(text)
         if base is not None:
-            shift = 273.15 if text == CELSIUS else None
-            _child(unit, "BaseUnit", **base, offset=shift)
+            _element(unit, "BaseUnit", **base, offset=273.15 if text == CELSIUS else None)
 
 
-def _experiment(root: Xml.Element, what: Described) -> None:
-    _child(
-        root, "DefaultExperiment", startTime=what.span[0], stopTime=what.span[1],
-        tolerance=what.rtol, stepSize=what.interval,
-    )  # fmt: skip
+def _numbers(entries: Iterable[Entry], second: bool) -> dict[str, int]:
+    """Return the number of each variable in references: its place in FMI 2.0, else its value
+    reference.
+    """
+    numbered = enumerate(entries, start=1)
+    return {entry.name: place if second else entry.reference for place, entry in numbered}
 
 
-def _log(root: Xml.Element) -> None:
-    group = _child(root, "LogCategories")
-    for name in CATEGORIES:
-        _child(group, "Category", name=name)
-
-
-def _numbers(entry: Entry) -> dict[str, object]:
-    """Attributes of a real variable that both versions have."""
-    return {
-        "unit": entry.unit if entry.unit not in ("", "1") else None,
-        "nominal": entry.nominal,
-        "min": entry.lower if isfinite(entry.lower) else None,
-        "max": entry.upper if isfinite(entry.upper) else None,
-        "start": entry.start,
-    }
-
-
-def _unknowns(entries: Iterable[Entry]) -> list[Entry]:
-    """Unknowns at the start: outputs and states that are not set, and rates."""
-    calculated = (e for e in entries if e.initial in ("approx", "calculated"))
-    return [e for e in calculated if e.causality == "output" or e.kind == "rate"]
-
-
-def _known(what: Described, entries: Iterable[Entry]) -> set[str]:
-    """Names of what outputs may depend on."""
-    kinds = ("state",) if what.exchange else ()
-    return {e.name for e in entries if e.causality == "input" or e.kind in kinds}
-
-
-def _needs(entry: Entry, known: set[str], number: Mapping[str, int]) -> dict[str, object]:
-    """Attribute `dependencies`."""
-    needs = sorted(number[name] for name in entry.needs if name in known)
-    return {"dependencies": " ".join(map(str, needs))}
-
-
-def _second(what: Described, entries: tuple[Entry, ...]) -> Xml.Element:
-    """FMI 2.0, which has no variables for event indicators."""
-    indicators = sum(entry.kind == "indicator" for entry in entries)
-    entries = tuple(entry for entry in entries if entry.kind != "indicator")
-    own = {"numberOfEventIndicators": str(indicators)} if what.exchange else {}
-    root = _root(what, "2.0", guid=what.token, **own)
-    kind = _child(
-        root, what.tag, modelIdentifier=what.identifier,
-        canHandleVariableCommunicationStepSize=what.variable_steps, canGetAndSetFMUstate=True,
-        canSerializeFMUstate=True, canNotUseMemoryManagementFunctions=True,
-        providesDirectionalDerivative=what.slopes,
-    )  # fmt: skip
-    sources = _child(kind, "SourceFiles")
-    for name in what.files:
-        _child(sources, "File", name=name)
-    _units(root, entries)
-    _log(root)
-    _experiment(root, what)
-    index = {entry.name: i for i, entry in enumerate(entries, start=1)}
-    variables = _child(root, "ModelVariables")
+def _variables(root: Xml.Element, entries: Iterable[Entry], second: bool) -> None:
+    number, group = _numbers(entries, second), _element(root, "ModelVariables")
     for entry in entries:
-        variable = _child(
-            variables, "ScalarVariable", name=entry.name, valueReference=entry.reference,
-            description=entry.doc or None, causality=entry.causality,
-            variability=entry.variability, initial=entry.initial or None,
+        variable = _element(
+            group, "ScalarVariable" if second else "Float64", name=entry.name,
+            valueReference=entry.reference, description=entry.doc or None,
+            causality=entry.causality, variability=entry.variability,
+            initial=entry.initial or None,
         )  # fmt: skip
-        _child(variable, "Real", **_numbers(entry), derivative=index.get(entry.of))
-    structure = _child(root, "ModelStructure")
-    known = _known(what, entries)
-    for tag, group in (
-        ("Outputs", [e for e in entries if e.causality == "output"]),
-        ("Derivatives", [e for e in entries if e.kind == "rate"]),
-        ("InitialUnknowns", _unknowns(entries)),
-    ):
-        listed = _child(structure, tag) if group else root
-        for entry in group:
-            needs = _needs(entry, known, index) if tag == "Outputs" else {}
-            _child(listed, "Unknown", index=index[entry.name], **needs)
-    return root
+        values: dict[str, object] = {
+            "unit": entry.unit if entry.unit not in ("", "1") else None,
+            "nominal": entry.nominal,
+            "min": entry.lower if isfinite(entry.lower) else None,
+            "max": entry.upper if isfinite(entry.upper) else None,
+            "start": entry.start,
+            "derivative": number.get(entry.of),
+        }
+        real = _element(variable, "Real") if second else variable
+        real.attrib |= _texts(values)
 
 
-def _third(what: Described, entries: tuple[Entry, ...]) -> Xml.Element:
-    """FMI 3.0."""
-    root = _root(what, "3.0", instantiationToken=what.token)
-    _child(
-        root, what.tag, modelIdentifier=what.identifier,
-        canHandleVariableCommunicationStepSize=what.variable_steps, canGetAndSetFMUState=True,
-        canSerializeFMUState=True, fixedInternalStepSize=what.step,
-        providesDirectionalDerivatives=what.slopes,
-    )  # fmt: skip
-    _units(root, entries)
-    _log(root)
-    _experiment(root, what)
-    reference = {entry.name: entry.reference for entry in entries}
-    variables = _child(root, "ModelVariables")
-    for entry in entries:
-        _child(
-            variables, "Float64", name=entry.name, valueReference=entry.reference,
-            description=entry.doc or None, causality=entry.causality,
-            variability=entry.variability, initial=entry.initial or None, **_numbers(entry),
-            derivative=reference.get(entry.of),
-        )  # fmt: skip
-    structure = _child(root, "ModelStructure")
-    known = _known(what, entries)
-    for entry in entries:
-        if entry.causality == "output":
-            needs = _needs(entry, known, reference)
-            _child(structure, "Output", valueReference=entry.reference, **needs)
-    for tag, group in (
-        ("ContinuousStateDerivative", [e for e in entries if e.kind == "rate"]),
-        ("InitialUnknown", _unknowns(entries)),
-        ("EventIndicator", [e for e in entries if e.kind == "indicator"]),
+def _structure(root: Xml.Element, entries: Iterable[Entry], second: bool, exchange: bool) -> None:
+    """Write outputs with the inputs and states that they depend on, rates, and unknowns of the
+    start: outputs and states that are not set, and rates.
+    """
+    number, group = _numbers(entries, second), _element(root, "ModelStructure")
+    kinds = ("state",) if exchange else ()
+    known = {e.name for e in entries if e.causality == "input" or e.kind in kinds}
+    outputs = [e for e in entries if e.causality == "output"]
+    rates = [e for e in entries if e.kind == "rate"]
+    unknowns = [
+        e
+        for e in entries
+        if e.initial in ("approx", "calculated") and (e.causality == "output" or e.kind == "rate")
+    ]
+    for tag, inner, listed in (
+        ("Outputs", "Output", outputs),
+        ("Derivatives", "ContinuousStateDerivative", rates),
+        ("InitialUnknowns", "InitialUnknown", unknowns),
+        ("", "EventIndicator", [e for e in entries if e.kind == "indicator"]),
     ):
-        for entry in group:
-            _child(structure, tag, valueReference=entry.reference)
-    return root
+        parent = _element(group, tag) if second and listed else group
+        for entry in listed:
+            needs = sorted(number[name] for name in entry.needs if name in known)
+            depends = " ".join(map(str, needs)) if listed is outputs else None
+            place = {"index" if second else "valueReference": number[entry.name]}
+            _element(parent, "Unknown" if second else inner, **place, dependencies=depends)
 
 
 SOURCES = Path(__file__).with_name("sources")
@@ -254,12 +179,12 @@ OLD = {
     "x86_64-linux": "linux64", "x86-linux": "linux32", "x86_64-windows": "win64",
     "x86-windows": "win32", "x86_64-darwin": "darwin64",
 }  # fmt: skip
-"""What version 2.0 calls a platform; one that it does not know keeps its name of 3.0."""
+"""Names of platforms in version 2.0; others keep their name of 3.0."""
 ENDINGS = {"windows": ".dll", "darwin": ".dylib"}
 
 
 def platform_name(fmi: int) -> str:
-    """Name of this platform in the standard."""
+    """Return the name of this platform in the standard."""
     machine = platform.machine().lower()
     system = SYSTEMS.get(platform.system(), platform.system().lower())
     name = f"{MACHINES.get(machine, machine)}-{system}"
@@ -267,81 +192,65 @@ def platform_name(fmi: int) -> str:
 
 
 def shared_name(identifier: str) -> str:
-    """File name of a binary here."""
+    """Return the file name of a binary on this platform."""
     system = SYSTEMS.get(platform.system(), "")
     return identifier + ENDINGS.get(system, ".so")
 
 
 def fixed_text(name: str) -> str:
-    """One of the C files that all units share."""
+    """Return one of the C files that all units share."""
     return (SOURCES / name).read_text(encoding="utf-8")
 
 
-def sources(sizes: str, model: str, fmi: int, fixed: bool, exchange: bool) -> dict[str, str]:
-    """Name -> text of the C of a unit; `all.c` includes the others.
+def sources(own: Equations, sizes: str, model: str, fmi: int) -> dict[str, str]:
+    """Return name -> text of the C of a unit; `all.c` includes the others.
 
     Args:
         sizes, model: C of the model.
         fmi: version, 2 or 3.
-        fixed: whether its steps are.
-        exchange: whether it is for model exchange, and makes no steps.
     """
-    steps = "exchange.c" if exchange else "fixed.c" if fixed else "adaptive.c"
-    shared = ["consistent.c", steps, "unit.c", "rates.c" if exchange else "communication.c"]
-    shared += ["derivatives.c", "states.c"]
-    kinds = ("exchange", "cosimulation") if exchange else ("cosimulation", "exchange")
-    own = [f"fmi{fmi}.c", f"fmi{fmi}_{kinds[0]}.c"]
-    own += ["fmi3_absent.c", f"fmi3_no_{kinds[1]}.c"] if fmi == 3 else []
-    texts = {"sizes.h": sizes, "model.c": model}
-    fixed_files = ("memory.h", "numbers.c", *shared, f"fmi{fmi}.h", *own)
-    texts |= {name: fixed_text(name) for name in fixed_files}
-    included = [f"fmi{fmi}.h", "sizes.h", "memory.h", "numbers.c", "model.c", *shared, *own]
+    kinds = ("exchange", "cosimulation") if own.exchange else ("cosimulation", "exchange")
+    steps, calls = "adaptive.c", "communication.c"
+    if own.exchange:
+        steps, calls = "exchange.c", "rates.c"
+    elif own.step is not None:
+        steps = "fixed.c"
+    shared = ["consistent.c", steps, "unit.c", calls, "derivatives.c", "states.c"]
+    interface = [f"fmi{fmi}.c", f"fmi{fmi}_{kinds[0]}.c"]
+    interface += ["fmi3_absent.c", f"fmi3_no_{kinds[1]}.c"] * (fmi == 3)
+    fixed = ("memory.h", "numbers.c", *shared, f"fmi{fmi}.h", *interface)
+    texts = {"sizes.h": sizes, "model.c": model} | {name: fixed_text(name) for name in fixed}
+    local = [f"fmi{fmi}.h", "sizes.h", "memory.h", "numbers.c", "model.c", *shared, *interface]
     system = ("float.h", "math.h", "stdbool.h", "stdio.h", "stdlib.h", "string.h")
-    texts["all.c"] = (
-        "/* The whole unit: the one file to compile. */\n\n"
-        + "".join(f"#include <{name}>\n" for name in system)
-        + "\n"
-        + "".join(f'#include "{name}"\n' for name in included)
-    )
-    return texts
+    includes = "".join(f"#include <{name}>\n" for name in system)
+    includes += "\n" + "".join(f'#include "{name}"\n' for name in local)
+    return texts | {"all.c": f"/* The whole unit: the one file to compile. */\n\n{includes}"}
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Binary:
-    """Library of this platform, or why there is none."""
-
-    name: str
-    content: bytes
-    missing: str = ""
-
-
-def compiled(texts: Mapping[str, str], identifier: str, fmi: int) -> Binary:
-    """Compile the unit for this platform; without a compiler the sources alone are handed out.
+def compiled(texts: Mapping[str, str], target: str) -> tuple[bytes, str]:
+    """Return the library `target` of this platform, or no bytes and the reason.
 
     Raises:
-        CompileError: the compiler refuses the C.
+        CompileError: the compiler rejects the C.
     """
     compiler = find_compiler()
-    name = f"binaries/{platform_name(fmi)}/{shared_name(identifier)}"
     if sys.platform == "win32":
-        return Binary(name, b"", "units are compiled on Linux and macOS; compile sources/all.c")
+        return b"", "units are compiled on Linux and macOS; compile sources/all.c"
     if compiler is None:
-        return Binary(name, b"", "no C compiler ($CC, gcc, clang or cc) was found")
+        return b"", "no C compiler ($CC, gcc, clang or cc) was found"
     with tempfile.TemporaryDirectory(prefix="symfric-fmu-") as folder:
         place = Path(folder)
         for file, text in texts.items():
             (place / file).write_text(text, encoding="utf-8")
-        target = place / shared_name(identifier)
-        compile_unit(compiler, place, target)
-        return Binary(name, target.read_bytes())
+        compile_unit(compiler, place, place / target)
+        return (place / target).read_bytes(), ""
 
 
 def compile_unit(compiler: Compiler, folder: Path, target: Path, *more: str) -> list[str]:
-    """Compile `all.c` in `folder` to a library; returns the warnings.
+    """Compile `all.c` in `folder` to a library; return the warnings.
 
     Raises:
-        CompileError: the compiler refuses it.
+        CompileError: the compiler rejects it.
     """
     warned = compiler.warnings(*FLAGS, *more, str(folder / "all.c"), "-o", str(target), "-lm")
     if not target.exists():
@@ -349,17 +258,10 @@ def compile_unit(compiler: Compiler, folder: Path, target: Path, *more: str) -> 
     return warned
 
 
-def packed(
-    path: Path, description: str, build: str, texts: Mapping[str, str], binary: Binary
-) -> int:
-    """Write the archive, whole or not at all; returns its size in bytes."""
+def packed(path: Path, files: Mapping[str, str | bytes]) -> int:
+    """Write the archive, whole or not at all; return its size in bytes."""
     with written(path) as temporary:
         with ZipFile(temporary, "w", ZIP_DEFLATED) as archive:
-            archive.writestr("modelDescription.xml", description)
-            for name, text in texts.items():
-                archive.writestr(f"sources/{name}", text)
-            if build:
-                archive.writestr("sources/buildDescription.xml", build)
-            if binary.content:
-                archive.writestr(binary.name, binary.content)
+            for name, content in files.items():
+                archive.writestr(name, content)
         return temporary.stat().st_size

@@ -29,9 +29,9 @@ class Entry:
     Attributes:
         reference: value reference.
         causality, variability, initial: words of the standard; `initial` may be empty.
-        start: None where the unit calculates it.
-        needs: names of what an output or a rate depends on directly: inputs and states.
-        of: state whose rate it is.
+        start: None if the unit calculates it.
+        needs: names of the inputs and states that an output depends on directly.
+        of: state of a rate.
         kind: "rate" or "indicator" in model exchange, "state" of a state.
     """
 
@@ -58,48 +58,43 @@ def entries(
     given: bool = True,
     exchange: bool = False,
 ) -> tuple[Entry, ...]:
-    """All variables of the unit of a `model`.
+    """Return all variables of the unit of a `model`.
 
     Args:
-        model: its signals and parameters.
+        model: source of signals and parameters.
         start: values of states and algebraic variables at the start.
-        rtol: default of the relative tolerance; 0 of a unit in fixed steps, which has none.
-        given: whether the start values of all states stay as they are set: not where the loops of
-            a mechanism have to be closed.
-        exchange: whether rates and event indicators are listed, too.
+        rtol: default of the relative tolerance; 0 for fixed steps, which have none.
+        given: True if the start values of all states are kept as set; not if the loops of a
+            mechanism have to be closed.
+        exchange: True to add rates and event indicators.
     """
     found = [*_signals(model, start, given, exchange)]
     found += [
         _bounded(v, k, "parameter", "tunable", "exact", float(v.start))
         for k, v in enumerate(model.p, start=len(found))
     ]
-    taken, number = {entry.name for entry in found}, len(found)
+    number = len(found)
     if exchange:
         return (*found, *_rates(model, number + 2))
+    taken = {entry.name for entry in found}
     tuned, idle = ("tunable", "") if rtol else ("fixed", "; without effect: steps are fixed")
-    tolerance = Entry(
-        name=_free("rtol", taken),
-        reference=number,
-        causality="parameter",
-        variability=tuned,
-        initial="exact",
-        start=rtol or 1e-6,
-        unit="1",
-        lower=LEAST_RTOL,
-        upper=LARGEST_RTOL,
-        doc=f"relative tolerance of a step{idle}",
-    )
-    attempts = Entry(
-        _free("attempts", taken), number + 1, "local", "discrete", "calculated", unit="1",
-        doc="steps of the integrator so far, rejected ones included",
+    return (
+        *found,
+        Entry(
+            _free("rtol", taken), number, "parameter", tuned, "exact", rtol or 1e-6, "1",
+            lower=LEAST_RTOL, upper=LARGEST_RTOL, doc=f"relative tolerance of a step{idle}",
+        ),
+        Entry(
+            _free("attempts", taken), number + 1, "local", "discrete", "calculated", unit="1",
+            doc="steps of the integrator so far, rejected ones included",
+        ),
     )  # fmt: skip
-    return (*found, tolerance, attempts)
 
 
 def _signals(
     model: Model, start: Mapping[str, float], given: bool, exchange: bool
 ) -> Iterator[Entry]:
-    """Time and all signals."""
+    """Yield time and all signals."""
     names, needed = model.signals, direct(model)
     groups = {v.name: v for v in (*model.x, *model.z, *model.u)}
     states = {v.name for v in model.x}
@@ -111,23 +106,19 @@ def _signals(
                 name, number, "output", "continuous", "calculated", unit=unit,
                 doc=model.outputs[name].doc, needs=needed[name],
             )  # fmt: skip
-        elif name in states:
-            own = given and ca.SX(groups[name].start).is_constant()
-            yield _bounded(
-                groups[name], number, "output", "continuous", "exact" if own else "approx",
-                start[name], (name,) if exchange else (), kind="state",
-            )  # fmt: skip
-        elif name in needed:
-            yield _bounded(
-                groups[name], number, "output", "continuous", "approx", start[name], needed[name]
-            )
-        else:
-            first = float(groups[name].start)
-            yield _bounded(groups[name], number, "input", "continuous", "", first)
+            continue
+        v, role, initial, needs, kind = groups[name], "output", "approx", needed.get(name), ""
+        if name in states:
+            needs, kind = (name,) if exchange else (), "state"
+            initial = "exact" if given and ca.SX(v.start).is_constant() else "approx"
+        elif needs is None:
+            role, initial = "input", ""
+        first = float(v.start) if role == "input" else start[name]
+        yield _bounded(v, number, role, "continuous", initial, first, needs or (), kind)
 
 
 def _rates(model: Model, first: int) -> Iterator[Entry]:
-    """Rates of the states and event indicators of model exchange."""
+    """Yield rates of the states and event indicators of model exchange."""
     for number, v in enumerate(model.x, start=first):
         yield Entry(
             f"der({v.name})", number, "local", "continuous", "calculated",
@@ -146,34 +137,23 @@ def _bounded(
 ) -> Entry:  # fmt: skip
     nominal = v.nominal if v.nominal != 1.0 else None
     return Entry(
-        name=v.name,
-        reference=number,
-        causality=causality,
-        variability=variability,
-        initial=initial,
-        start=start,
-        unit=v.unit,
-        nominal=nominal,
-        lower=v.lower,
-        upper=v.upper,
-        doc=v.doc,
-        needs=needs,
-        kind=kind,
-    )
+        v.name, number, causality, variability, initial, start, v.unit, nominal, v.lower, v.upper,
+        v.doc, needs, kind=kind,
+    )  # fmt: skip
 
 
 def _free(name: str, taken: set[str]) -> str:
-    """Return `name`, or another one where the model has it."""
+    """Return `name`, with a prefix if the model has it already."""
     while name in taken:
         name = f"symfric_{name}"
     return name
 
 
 def direct(model: Model) -> dict[str, tuple[str, ...]]:
-    """Signal -> inputs and states that it depends on at the same instant, by structure.
+    """Return signal -> inputs and states that it depends on at the same instant, by structure.
 
-    Algebraic variables stand for all that their equations contain, those of others included that
-    they are coupled with.
+    Algebraic variables depend on all symbols of their equations, and of the equations that are
+    coupled with these.
     """
     x, z, u = (model.vector(letter) for letter in "xzu")
     known = ca.vertcat(u, x)
@@ -189,13 +169,10 @@ def direct(model: Model) -> dict[str, tuple[str, ...]]:
     for i, v in enumerate(model.z):
         found[v.name] = named(behind[i])
     for name, output in model.outputs.items():
-        expression = ca.SX(output.expression)
-        row = _pattern(expression, known)[0] if strays(expression, ca.SX(0, 1)) else None
-        if row is None:
-            found[name] = ()
-            continue
-        through = _pattern(expression, unknown)[0]
-        found[name] = named(row | (through[:, None] & behind).any(axis=0))
+        expression, found[name] = ca.SX(output.expression), ()
+        if strays(expression, ca.SX(0, 1)):
+            through = _pattern(expression, unknown)[0][:, None] & behind
+            found[name] = named(_pattern(expression, known)[0] | through.any(axis=0))
     return found
 
 
@@ -208,7 +185,7 @@ def _pattern(expression: ca.SX, symbols: ca.SX) -> NDArray[np.bool_]:
 
 
 def _reach(of_unknown: NDArray[np.bool_], of_known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Symbols that each unknown may depend on: all in equations that share unknowns with it."""
+    """Return the mask of symbols in equations that share unknowns with each unknown."""
     group = of_unknown.T.astype(int) @ of_unknown.astype(int) > 0
     group |= np.eye(group.shape[0], dtype=bool)
     while ((wider := group.astype(int) @ group.astype(int) > 0) != group).any():

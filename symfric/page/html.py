@@ -1,4 +1,4 @@
-"""Pieces of one self-contained page, and its style sheet; text of a user is escaped here."""
+"""Parts of a self-contained page and its style sheet; texts of users are escaped here."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -8,7 +8,7 @@ from symfric.foundation.style import COLOURS, dash
 
 
 def page(title: str, language: str, body: str) -> str:
-    """Return a whole document that needs nothing from elsewhere."""
+    """Return a self-contained document."""
     return (
         f'<!DOCTYPE html>\n<html lang="{language}">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -19,7 +19,7 @@ def page(title: str, language: str, body: str) -> str:
 
 
 def section(anchor: str, heading: str, *parts: str) -> str:
-    """Return a section with a heading that can be linked to; "" where all parts are empty."""
+    """Return a section with a heading that links can refer to; "" if all parts are empty."""
     inside = "\n".join(part for part in parts if part)
     if not inside:
         return ""
@@ -27,13 +27,13 @@ def section(anchor: str, heading: str, *parts: str) -> str:
 
 
 def paragraph(text: str, kind: str = "") -> str:
-    """One paragraph; "" of nothing."""
+    """Return a paragraph; "" for an empty text."""
     mark = f' class="{kind}"' if kind else ""
     return f"<p{mark}>{escape(text)}</p>" if text else ""
 
 
 def bullets(sentences: Iterable[str]) -> str:
-    """Return a list; "" of nothing."""
+    """Return a list; "" without sentences."""
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
     return f"<ul>{items}</ul>" if items else ""
 
@@ -60,20 +60,20 @@ def heading(text: str) -> str:
 
 
 def figure(drawing: str, caption: str = "") -> str:
-    """Return a chart with words below."""
+    """Return a chart with a caption below."""
     below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
     return f"<figure>{drawing}{below}</figure>"
 
 
 def verdict(kind: str, word: str, sentences: Iterable[str]) -> str:
-    """Return the verdict in a box, a word and sentences: kind "good", "doubtful" or "bad"."""
+    """Return a box with a word and sentences, of the kind "good", "doubtful" or "bad"."""
     text = "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
     first = f"<strong>{escape(word)}</strong>" if word else ""
     return f'<div class="verdict {kind}" role="status">{first}{text}</div>'
 
 
 def contents(links: Sequence[tuple[str, str]]) -> str:
-    """Links to sections: (anchor, text)."""
+    """Return links to sections, pairs (anchor, text)."""
     text = "".join(f'<a href="#{anchor}">{escape(name)}</a>' for anchor, name in links)
     return f'<nav aria-label="Sections">{text}</nav>'
 
@@ -88,26 +88,26 @@ def table(
     """Return a table whose first column heads the rows; "" without rows.
 
     Args:
-        caption: what it shows.
+        caption: text above.
         header: names of the columns.
         rows: texts.
-        numbers: columns that stand at the right.
+        numbers: right-aligned columns.
         kinds: class of the last column by row: "good", "bad", "note", "why" or "".
     """
-    lines = [list(row) for row in rows]
+    lines = list(rows)
     if not lines:
         return ""
-    body: list[str] = []
-    for k, row in enumerate(lines):
-        last = kinds[k] if k < len(kinds) else ""
-        body.append(f"<tr>{_cells(row, numbers, last)}</tr>")
+    every = (*kinds, *[""] * (len(lines) - len(kinds)))
+    body = "".join(
+        f"<tr>{_cells(row, numbers, last)}</tr>" for row, last in zip(lines, every, strict=False)
+    )
     top = "".join(
         f'<th scope="col"{_class(j in numbers)}>{escape(name)}</th>'
         for j, name in enumerate(header)
     )
     return (
         f'<div class="wide"><table>{f"<caption>{escape(caption)}</caption>" if caption else ""}'
-        f"<thead><tr>{top}</tr></thead><tbody>{''.join(body)}</tbody></table></div>"
+        f"<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>"
     )
 
 
@@ -125,7 +125,7 @@ def _class(number: bool, kind: str = "") -> str:
 
 
 def triangle(caption: str, names: Sequence[str], values: Sequence[Sequence[float | None]]) -> str:
-    """Correlations below the diagonal, the darker the nearer to -1 or 1."""
+    """Return correlations below the diagonal, darker if nearer to -1 or 1."""
     if len(names) < 2:
         return ""
     rows: list[str] = []
@@ -149,7 +149,7 @@ def _shade(value: float | None) -> str:
 
 
 def _lighter(colour: str) -> str:
-    """Half way to white, to be seen on dark paper."""
+    """Return a colour half way to white, for a dark background."""
     return "#" + "".join(f"{(int(colour[k : k + 2], 16) + 255) // 2:02x}" for k in (1, 3, 5))
 
 
@@ -159,7 +159,7 @@ def _dashes(k: int) -> str:
 
 
 def _runs(colours: Sequence[str]) -> str:
-    """Classes run0, run1, ...: the colours and dashes that pictures give to simulations."""
+    """Return classes run0, run1, ... with the colours and dashes of simulations in figures."""
     return "\n".join(
         f"svg .run{k} {{ stroke: {colour}; stroke-dasharray: {_dashes(k)}; }}"
         for k, colour in enumerate(colours)

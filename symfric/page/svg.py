@@ -1,11 +1,11 @@
-"""Charts as SVG text: colours come from the style of the page, so that they follow light and dark.
+"""Charts as SVG text; colours come from the style of the page, which has a light and a dark form.
 
-Every chart has a title and a description for those who do not see it. Whatever is drawn is cut at
-the frame. Coordinates are rounded to a tenth of a pixel and points that fall together are left out.
+Every chart has a title and a description for screen readers. Marks are clipped at the frame.
+Coordinates are rounded to a tenth of a pixel, and coincident points are left out.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from math import ceil, floor, isfinite, log10
@@ -19,19 +19,19 @@ Array = NDArray[np.float64]
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 SMALL, LARGE = 1e-2, 1e5
-"""Magnitudes between which ticks are written as they are; beyond, a power of ten is taken out."""
+"""Magnitudes of tick labels without a power of ten."""
 
 
 @final
 @dataclass(frozen=True)
 class Axis:
-    """One direction of a chart.
+    """Axis of a chart.
 
     Attributes:
-        name, unit: what is drawn; the label is "name [unit]".
-        low, high: its range, low < high; with `logarithmic` 0 < low.
-        logarithmic: by decades.
-        whole: ticks at whole numbers only.
+        name, unit: of the quantity; the label is "name [unit]".
+        low, high: range, low < high; if `logarithmic` 0 < low.
+        logarithmic: True for decades.
+        whole: True for ticks at whole numbers only.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Axis:
     whole: bool = False
 
     def at(self, values: Array) -> Array:
-        """Positions of `values` between low (0) and high (1)."""
+        """Return the positions of `values` between low (0) and high (1)."""
         if self.logarithmic:
             return np.log(values / self.low) / np.log(self.high / self.low)
         return (values - self.low) / (self.high - self.low)
@@ -63,7 +63,7 @@ class Axis:
         return f"{self.name} [{inside}]" if inside else self.name
 
     def ticks(self, most: int = 6) -> list[tuple[float, str]]:
-        """Round values inside the range and their labels."""
+        """Return round values inside the range and their labels."""
         if self.logarithmic:
             return self._decades(most)
         step = self._step(most)
@@ -115,79 +115,64 @@ def around(
 LEFT, RIGHT, TOP, BOTTOM = 68.0, 14.0, 24.0, 40.0
 """Margins of the frame for labels [px]."""
 LETTER = 6.6
-"""Width of a letter of the legend [px], about."""
+"""Approximate width of a letter of the legend [px]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mark(ABC):
-    """Something drawn in a chart; `kind` is the class that the style sheet colours."""
+    """Mark in a chart; `kind` is its class in the style sheet."""
 
     kind: str
 
     @abstractmethod
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """Its SVG inside a frame of this size [px]."""
-
-    @property
-    def name(self) -> str:
-        """Entry in the legend; "" for none."""
-        return ""
+        """Return its SVG inside a frame of this size [px]."""
 
 
 def _places(
     x: Axis, y: Axis, width: float, height: float, xs: Array, ys: Array
 ) -> NDArray[np.float64]:
-    """Pixels (n, 2) of the finite points, far outliers held near the frame."""
+    """Return pixels (n, 2) of the finite points, with far outliers moved near the frame."""
     across, up = x.at(xs), y.at(ys)
     good = np.isfinite(across) & np.isfinite(up)
     across, up = np.clip(across[good], -1.0, 2.0), np.clip(up[good], -1.0, 2.0)
     return np.round(np.column_stack([width * across, height * (1.0 - up)]), 1)
 
 
+@final
 @dataclass(frozen=True, eq=False)
-class Named(Mark):
-    """Points that have an entry in the legend."""
+class Path(Mark):
+    """Line through points; `entry` is its name in the legend."""
 
     x: Array
     y: Array
     entry: str = ""
 
-    @property
-    def name(self) -> str:
-        """Entry in the legend."""
-        return self.entry
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Path(Named):
-    """Line through points."""
-
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
         """Return a polyline for each run of finite points."""
         bad = np.flatnonzero(~np.isfinite(self.y))
-        runs = [_places(x, y, width, height, *run) for run in self._runs(bad)]
-        return "".join(f'<polyline class="{self.kind}" points="{_points(at)}"/>' for at in runs)
-
-    def _runs(self, bad: NDArray[np.intp]) -> Iterator[tuple[Array, Array]]:
-        for xs, ys in zip(np.split(self.x, bad), np.split(self.y, bad), strict=True):
-            if np.isfinite(ys).any():
-                yield xs, ys
+        runs = zip(np.split(self.x, bad), np.split(self.y, bad), strict=True)
+        places = (_places(x, y, width, height, *run) for run in runs if np.isfinite(run[1]).any())
+        return "".join(f'<polyline class="{self.kind}" points="{_points(at)}"/>' for at in places)
 
 
 def _points(at: Array) -> str:
-    """Points of a polyline, those that fall together once."""
+    """Return the points of a polyline, coincident ones once."""
     kept = np.concatenate([[True], (np.diff(at, axis=0) != 0).any(axis=1)])
     return " ".join(f"{a:g},{b:g}" for a, b in at[kept])
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Dots(Named):
-    """Points, each a short stroke with round ends: small in the file."""
+class Dots(Mark):
+    """Points, each a short stroke with round ends; `entry` is their name in the legend."""
+
+    x: Array
+    y: Array
+    entry: str = ""
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """One path of all points."""
+        """Return one path of all points."""
         at = np.unique(_places(x, y, width, height, self.x, self.y), axis=0)
         points = "".join(f"M{a:g} {b:g}h0" for a, b in at)
         return f'<path class="dots {self.kind}" d="{points}"/>' if points else ""
@@ -196,13 +181,13 @@ class Dots(Named):
 @final
 @dataclass(frozen=True, eq=False)
 class Stems(Mark):
-    """Upright lines from zero."""
+    """Vertical lines from zero."""
 
     x: Array
     y: Array
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """One path of all lines."""
+        """Return one path of all lines."""
         zero = _places(x, y, width, height, self.x, np.zeros(self.x.size))
         ends = _places(x, y, width, height, self.x, self.y)
         stems = "".join(f"M{a:g} {b:g}V{c:g}" for (a, b), (_, c) in zip(zero, ends, strict=True))
@@ -212,13 +197,13 @@ class Stems(Mark):
 @final
 @dataclass(frozen=True, eq=False)
 class Level(Mark):
-    """Line across, at y; upright, at x, with `upright`."""
+    """Horizontal line at y; with `upright` a vertical one at x."""
 
     value: float
     upright: bool = False
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """One line."""
+        """Return one line."""
         along = x if self.upright else y
         share = float(along.at(np.array([self.value]))[0])
         if not 0.0 <= share <= 1.0:
@@ -253,14 +238,14 @@ def chart(
     height: float = 230.0,
     says: str = "",
 ) -> str:
-    """One chart.
+    """Return one chart.
 
     Args:
-        title: written above it, and read aloud.
-        x, y: its axes.
-        marks: what is drawn, from the back to the front.
-        width, height: of everything [px]; the page scales it.
-        says: description that is read aloud.
+        title: text above it, also for screen readers.
+        x, y: axes.
+        marks: from the back to the front.
+        width, height: of the whole chart [px]; the page scales it.
+        says: description for screen readers.
     """
     w, h = width - LEFT - RIGHT, height - TOP - BOTTOM
     inside = "".join(mark.draw(x, y, w, h) for mark in marks)
@@ -277,7 +262,7 @@ def chart(
 
 
 def _ticks(x: Axis, y: Axis, w: float, h: float) -> str:
-    """Grid, numbers and labels."""
+    """Return grid, numbers and labels."""
     text: list[str] = []
     for value, label in x.ticks(max(3, int(w // 90))):
         at = LEFT + w * float(x.at(np.array([value]))[0])
@@ -295,15 +280,15 @@ def _ticks(x: Axis, y: Axis, w: float, h: float) -> str:
 
 
 def _legend(marks: Sequence[Mark], width: float) -> str:
-    """Entries at the right of the title."""
+    """Return the entries to the right of the title."""
     text: list[str] = []
     at = width - RIGHT
-    for mark in reversed([mark for mark in marks if mark.name]):
-        at -= LETTER * len(mark.name)
-        text.append(f'<text class="entry" x="{at:.1f}" y="15">{escape(mark.name)}</text>')
+    for mark in reversed([m for m in marks if isinstance(m, Path | Dots) and m.entry]):
+        at -= LETTER * len(mark.entry)
+        text.append(f'<text class="entry" x="{at:.1f}" y="15">{escape(mark.entry)}</text>')
         at -= 20
-        sample = f"M{at:.1f} 11h14" if isinstance(mark, Path) else f"M{at + 7:.1f} 11h0"
-        dots = "" if isinstance(mark, Path) else "dots "
+        line = isinstance(mark, Path)
+        dots, sample = ("", f"M{at:.1f} 11h14") if line else ("dots ", f"M{at + 7:.1f} 11h0")
         text.append(f'<path class="{dots}sample {mark.kind}" d="{sample}"/>')
         at -= 12
     return "".join(text)

@@ -1,19 +1,24 @@
-"""Discrete-time block, the source of C functions on structs."""
+"""Discrete-time block, the source of C functions on structs.
+
+A struct is in memory the flat column of the block's variables. Neighbouring numbers of identical
+elements, such as the states F_1 ... F_10, are one array member, `float F[10]`.
+"""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
-from re import fullmatch
-from typing import final
+from re import ASCII, fullmatch
+from typing import NamedTuple, final
 
 import casadi as ca
 
 from symfric.emitter.c99 import FUNCTIONS
+from symfric.emitter.rolling import Array, Arrays
 from symfric.foundation import checks
 from symfric.foundation.graph import graph
-from symfric.foundation.variable import strays, symbols_of
+from symfric.foundation.variable import stacked, strays, symbols_of
 from symfric.model import Output, Variables
 
 GROUPS = ("state", "param", "in", "out")
@@ -38,9 +43,7 @@ RESERVED = frozenset(
 """Names that variables must not have."""
 
 
-@final
-@dataclass(frozen=True)
-class Elements:
+class Elements(NamedTuple):
     """Neighbouring variables of a group that C holds in one array, one per identical element.
 
     Attributes:
@@ -54,6 +57,41 @@ class Elements:
     name: str
     first: int
     size: int
+
+
+class Member(NamedTuple):
+    """Member of a struct.
+
+    Attributes:
+        name: C identifier.
+        unit: of each number.
+        doc: description, may be "".
+        first: row of its first number in the flat struct.
+        size: 0 for a single number, else the length of the array.
+    """
+
+    name: str
+    unit: str
+    doc: str
+    first: int
+    size: int = 0
+
+    @property
+    def declared(self) -> str:
+        """Declaration, such as `F[10]`."""
+        return f"{self.name}[{self.size}]" if self.size else self.name
+
+    @property
+    def length(self) -> int:
+        """Number of its values."""
+        return max(self.size, 1)
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """C expressions of its numbers: `F[0]`, `F[1]`, ..."""
+        if not self.size:
+            return (self.name,)
+        return tuple(f"{self.name}[{i}]" for i in range(self.size))
 
 
 @final
@@ -104,46 +142,51 @@ class Block:
     arrays: tuple[Elements, ...] = ()
 
     def __post_init__(self) -> None:
-        problems = [*self._name_problems(), *self._shape_problems()]
+        problems = "; ".join([*self._name_problems(), *self._shape_problems()])
         if problems:
-            raise ValueError(f"block '{self.name}': " + "; ".join(problems))
+            raise ValueError(f"block '{self.name}': {problems}")
         for variable in (*self.states, *self.parameters):
             checks.number(f"block '{self.name}': {variable.name}", variable.start)
 
-    def _name_problems(self) -> list[str]:
-        variables = [v.name for v in (*self.states, *self.inputs, *self.parameters)]
-        members = variables + list(self.outputs)
-        wrong = [
-            name
-            for name in (self.name, *members, *self.resets)
-            if not (name.isascii() and fullmatch(r"[A-Za-z]\w*", name)) or name in RESERVED
-        ]
-        repeated = [name for name, count in Counter(members).items() if count > 1]
-        return [
-            *(f"expected a free C identifier, got {name!r}" for name in wrong),
-            *(f"expected every name once, got '{name}' twice" for name in repeated),
-        ]
+    def _name_problems(self) -> Iterator[str]:
+        names = [v.name for v in self.variables] + [*self.outputs]
+        for name in (self.name, *names, *self.resets):
+            if not fullmatch(r"[A-Za-z]\w*", name, ASCII) or name in RESERVED:
+                yield f"expected a free C identifier, got {name!r}"
+        for name, count in Counter(names).items():
+            if count > 1:
+                yield f"expected every name once, got '{name}' twice"
 
-    def _shape_problems(self) -> list[str]:
-        expected, problems = len(self.states), list[str]()
+    def _shape_problems(self) -> Iterator[str]:
+        expected = len(self.states)
         for what, rows in {"next": self.next, **self._reset_states}.items():
-            if ca.SX(rows).numel() != expected:
-                problems.append(
-                    f"{what}: expected {expected} rows (one a state), got {ca.SX(rows).numel()}"
-                )
+            count = ca.SX(rows).numel()
+            if count != expected:
+                yield f"{what}: expected {expected} rows (one a state), got {count}"
         if not (expected or self.outputs):
-            problems.append("expected states or outputs, got none")
-        declared = symbols_of((*self.states, *self.inputs, *self.parameters))
-        stray = strays(self.everything, declared)
+            yield "expected states or outputs, got none"
+        stray = strays(self.everything, symbols_of(self.variables))
         if stray:
-            problems.append(f"expected only declared symbols, got {', '.join(stray)}")
-        return problems
+            yield f"expected only declared symbols, got {', '.join(stray)}"
+
+    @property
+    def groups(self) -> dict[str, Variables]:
+        """Variables of the structs state, param and in."""
+        return dict(zip(GROUPS, (self.states, self.parameters, self.inputs), strict=False))
+
+    @property
+    def variables(self) -> Variables:
+        """States, inputs and parameters."""
+        return (*self.states, *self.inputs, *self.parameters)
 
     @cached_property
     def everything(self) -> ca.SX:
         """All expressions in one column."""
-        outputs = (output.expression for output in self.outputs.values())
-        return ca.veccat(ca.SX(0, 1), self.next, *outputs, *self._reset_states.values())
+        return ca.veccat(self.next, self._out, *self._reset_states.values())
+
+    @property
+    def _out(self) -> ca.SX:
+        return stacked(output.expression for output in self.outputs.values())
 
     @property
     def _reset_states(self) -> dict[str, ca.SX]:
@@ -152,8 +195,7 @@ class Block:
     @cached_property
     def step(self) -> ca.Function:
         """(state, param, in) -> (state_next, out), all columns."""
-        results = ca.SX(0, 1), *(ca.SX(output.expression) for output in self.outputs.values())
-        return self._function("step", {"state_next": self.next, "out": ca.vertcat(*results)})
+        return self._function("step", {"state_next": self.next, "out": self._out})
 
     @property
     def sample_time(self) -> float | None:
@@ -169,12 +211,11 @@ class Block:
     @cached_property
     def fingerprint(self) -> str:
         """Sixteen hexadecimal digits that change with names, units, numbers, operations, ranges."""
-        groups = (self.states, self.parameters, self.inputs)
         content = (
             self.name,
             [
                 [(v.name, v.unit, float(v.start).hex(), v.nominal, v.lower, v.upper) for v in group]
-                for group in groups
+                for group in self.groups.values()
             ],
             [(name, output.unit) for name, output in self.outputs.items()],
             graph(self.step),
@@ -182,14 +223,61 @@ class Block:
         )
         return sha256(repr(content).encode()).hexdigest()[:16]
 
+    @cached_property
+    def members(self) -> dict[str, tuple[Member, ...]]:
+        """Struct -> its members, without empty structs."""
+        flat = {g: [(v.name, v.unit, v.doc) for v in of] for g, of in self.groups.items()}
+        flat["out"] = [(name, output.unit, output.doc) for name, output in self.outputs.items()]
+        kept = GROUPS[:2] if self.is_function else GROUPS
+        return {group: tuple(self._members(group, flat[group])) for group in kept if flat[group]}
+
+    def _members(self, group: str, rows: Sequence[tuple[str, str, str]]) -> Iterator[Member]:
+        arrays = {a.first: a for a in self.arrays if a.group == group}
+        row = 0
+        while row < len(rows):
+            (name, unit, doc), size = rows[row], 0
+            if row in arrays:
+                name, size = arrays[row].name, arrays[row].size
+                same = all(other[2] == doc for other in rows[row : row + size])
+                doc = f"{doc}, of each element".removeprefix(", ") if same else "of each element"
+            yield Member(name, unit, doc, row, size)
+            row += max(size, 1)
+
+    def places(self, group: str) -> tuple[str, ...]:
+        """Return the numbers of a struct in the block's order, as C writes them after `state->`."""
+        return tuple(p for member in self.members.get(group, ()) for p in member.places)
+
+    def indexed(self, results: Sequence[str], guards: bool) -> Arrays:
+        """Return the arrays that loops may index: of the structs in the order of `GROUPS`.
+
+        Args:
+            results: the structs that the results of the function are written to.
+            guards: True if inputs are repaired in locals, one by one; no loop may read the
+                originals.
+        """
+
+        def of(groups: Sequence[str]) -> tuple[Array, ...]:
+            return tuple(
+                Array(number, member.first, member.size, f"{group}->{member.name}")
+                for number, group in enumerate(groups)
+                for member in self.members.get(group, ())
+                if member.size and not (guards and group == "in")
+            )
+
+        return Arrays(of(GROUPS[:3]), of(results))
+
     def reset(self, name: str) -> ca.Function:
         """Return (state, param, in) -> (state_next), the initialisation `name`; the state is
         not used.
         """
         return self._function(name, {"state_next": self.resets[name][0]})
 
+    @property
+    def functions(self) -> list[ca.Function]:
+        """Step and further initialisations, whose results are the columns of a run."""
+        return [self.step, *map(self.reset, self.resets)]
+
     def _function(self, name: str, results: Mapping[str, ca.SX]) -> ca.Function:
-        groups = (self.states, self.parameters, self.inputs)
-        columns = [symbols_of(group) for group in groups]
+        columns = [symbols_of(group) for group in self.groups.values()]
         dense = [ca.densify(ca.SX(result)) for result in results.values()]
         return ca.Function(name, columns, dense, list(GROUPS[:3]), list(results))

@@ -13,42 +13,31 @@ import casadi as ca
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.held_step import (
     LEAST_LOAD,
-    NO_LOAD,
     advanced,
     force_of_rate,
     forces_at,
     needs_unloaded_case,
     with_unloaded_case,
 )
-from symfric.codegen.blocks.texts import equations, of_law, texts
-from symfric.codegen.blocks.variables import Fold, above_zero, arranged, variable, without_idle
+from symfric.codegen.blocks.texts import SHEET, equations, of_law, texts
+from symfric.codegen.blocks.variables import (
+    STEP_SIZE,
+    Fold,
+    above_zero,
+    arranged,
+    as_constants,
+    step_size,
+    variable,
+    without_idle,
+)
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_casadi
 from symfric.foundation.parameters import Variable, parameters, symbolise
 from symfric.foundation.units import turned
+from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.laws import Law, Population, law_name
 from symfric.laws.base.law import check_law
 from symfric.model import Output, Variables
-
-STEP_SIZE = 1e-3
-"""Default of the parameter h [s]."""
-
-FORCE = "friction force, opposes the motion"
-SIGN = (
-    "Sign: F has the sign of v in steady sliding and opposes the motion: m dv/dt = F_applied - F. "
-    "v is the velocity of the moving side relative to the base side."
-)
-MEAN_VELOCITY = (
-    "v is the mean velocity over the step: the increment of an encoder over h, or the planned "
-    "one. With the velocity at one instant the error is of first order in h."
-)
-WHICH_FORCE = (
-    "F is the mean over the step: F h is its impulse. Use it for a force that is held over the "
-    "step, such as feed-forward from the velocity planned for the next step. F_end is the force at "
-    "the end of the step, half a step newer: compare it with a measured force, or use it "
-    "for feed-forward from the encoder increment of the last step."
-)
-SLIDING = "Initial state of long sliding at the given inputs, for a start while the machine moves."
 
 
 def law_block(
@@ -132,13 +121,12 @@ def law_block(
     block = _step(law, symbolic, runtime, h, where) if law.states else _function(symbolic, runtime)
     block = without_idle(block, free, where)
     idle = {p.name for p in runtime} - {p.name for p in block.parameters}
-    folded = [p for p in known.values() if p.name not in names]
+    folded = (p for p in known.values() if p.name not in names)
     block = replace(
         block,
         name=name or sub(r"\W+", "_", law_name(law)).strip("_"),
         **_described(law, idle),
-        constants={p.name: float(p.value) for p in folded} | dict(block.constants),
-        about={p.name: f"{p.doc} [{turned(p.unit) if turning else p.unit}]" for p in folded},
+        **as_constants(folded, block.constants, turning),
     )
     if not _at_rest(block):
         raise ValueError(
@@ -151,19 +139,19 @@ def law_block(
 
 def in_turning(block: Block) -> Block:
     """Return the block with the units of a contact that turns."""
-    groups: dict[str, Any] = {
-        group: tuple(replace(v, unit=turned(v.unit)) for v in getattr(block, group))
-        for group in ("states", "inputs", "parameters")
-    }
+    states, parameters, inputs = (
+        tuple(replace(v, unit=turned(v.unit)) for v in group) for group in block.groups.values()
+    )
     outputs = {n: replace(o, unit=turned(o.unit)) for n, o in block.outputs.items()}
     doc = f"{block.doc}\n\nFor a contact that turns: read rad for m, N m for N."
-    return replace(block, **groups, outputs=outputs, doc=doc)
+    return replace(
+        block, states=states, inputs=inputs, parameters=parameters, outputs=outputs, doc=doc
+    )
 
 
-def step_variable(where: str, h: float | None) -> Variable:
-    """Return the parameter h [s], which starts at the step size given, by default 1 ms."""
-    start = STEP_SIZE if h is None else checks.number(f"{where}: h", h, unit="s", above=0.0)
-    return Variable("h", "s", start=start, lower=0.0, doc="step size")
+def states_of(law: Law | Population) -> Variables:
+    """Return the states of a law as variables."""
+    return tuple(Variable(s.name, s.unit, nominal=s.nominal, doc=s.doc) for s in law.states)
 
 
 def _inputs(law: Law) -> Variables:
@@ -182,62 +170,50 @@ def _given(inputs: Variables) -> dict[str, ca.SX]:
 def _function(law: Law, runtime: Variables) -> Block:
     v, N, *_ = inputs = _inputs(law)
     force = law.force(v.symbol, N.symbol, ca.SX(0, 1), **_given(inputs))
-    outputs = {"F": Output(force, "N", FORCE)}
-    return Block("F", inputs=inputs, parameters=runtime, outputs=outputs, use=(SIGN,))
+    outputs = {"F": Output(force, "N", SHEET["law"]["force"])}
+    use = (SHEET["law"]["sign"],)
+    return Block("F", inputs=inputs, parameters=runtime, outputs=outputs, use=use)
 
 
 def _step(numeric: Law, law: Law, runtime: Variables, h: float | None, where: str) -> Block:
     v, N, *_ = inputs = _inputs(law)
-    states = tuple(Variable(s.name, s.unit, nominal=s.nominal, doc=s.doc) for s in law.states)
-    size = step_variable(where, h)
-    duration = size.symbol if h is None else float(size.start)
-
-    z = ca.vertcat(*(state.symbol for state in states))
-    given = _given(inputs)
+    states, size, given = states_of(law), step_size(where, h), _given(inputs)
+    z = symbols_of(states)
     rate = ca.SX(law.rate(v.symbol, N.symbol, z, **given))
-    step = advanced(law, v.symbol, N.symbol, z, rate, given, duration, where)
+    step = advanced(law, v.symbol, N.symbol, z, rate, given, size.h, where)
     force, r = force_of_rate(ca.SX(law.force(v.symbol, N.symbol, z, **given)), rate, z)
     internal = ca.vertcat(z, r)
     at = {"F": ca.vertcat(step.mean, step.mean_rate)}
     if ca.depends_on(force, internal):
         at["F_end"] = ca.vertcat(step.end, step.end_rate)
-    sizes = (size,) if h is None else ()
-    following, forces, use = step.end, forces_at(force, internal, at), (SIGN, MEAN_VELOCITY)
+    following, forces, said = step.end, forces_at(force, internal, at), SHEET["law"]
+    use = (said["sign"], said["mean_velocity"])
     cases = with_unloaded_case(following, force, internal, at, N)
-    both = (following, forces), cases
-    if needs_unloaded_case(numeric, *(_of_numbers(*x, inputs, z, runtime + sizes) for x in both)):
+
+    def of_numbers(following: ca.SX, forces: dict[str, ca.SX]) -> ca.Function:
+        own, columns = (*runtime, *size.parameters), [v.symbol, N.symbol, z, symbols_of(inputs[2:])]
+        rows = ca.substitute(
+            [following, stacked(forces.values())], [symbols_of(own)], [starts_of(own)]
+        )
+        return ca.Function("step", columns, [ca.densify(row) for row in rows])
+
+    if needs_unloaded_case(numeric, of_numbers(following, forces), of_numbers(*cases)):
         following, forces = cases
-        use = (*use, NO_LOAD.format(least=LEAST_LOAD * N.nominal))
-    said = {"F": "mean over the step", "F_end": "at the end of the step"}
-    outputs = {n: Output(e, "N", f"{FORCE}, {said[n]}") for n, e in forces.items()}
+        use = (*use, said["no_load"].format(least=LEAST_LOAD * N.nominal))
+    when = {"F": "mean over the step", "F_end": "at the end of the step"}
+    outputs = {n: Output(e, "N", f"{said['force']}, {when[n]}") for n, e in forces.items()}
     return Block(
         "F",
         states=states,
         inputs=inputs,
-        parameters=runtime + sizes,
+        parameters=runtime + size.parameters,
         next=following,
         outputs=outputs,
-        resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), SLIDING)},
-        constants={} if h is None else {"h": float(size.start)},
+        resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), said["sliding"])},
+        constants=size.constants,
         discretisation=of_law(step.kinds, "F_end" in outputs),
-        use=(*use, *([WHICH_FORCE] if "F_end" in outputs else [])),
+        use=(*use, *[said["which_force"]] * ("F_end" in outputs)),
     )
-
-
-def _of_numbers(
-    following: ca.SX, forces: dict[str, ca.SX], inputs: Variables, z: ca.SX, own: Variables
-) -> ca.Function:
-    """Return (v, N, z, further inputs) -> states, forces with the start values of the
-    parameters `own`.
-    """
-    v, N, *others = (i.symbol for i in inputs)
-    given = ca.vertcat(ca.SX(0, 1), *(p.symbol for p in own))
-    numbers = ca.vertcat(ca.SX(0, 1), *(ca.SX(float(p.start)) for p in own))
-    rows = [
-        ca.densify(ca.substitute(result, given, numbers))
-        for result in (following, ca.vertcat(*forces.values()))
-    ]
-    return ca.Function("step", [v, N, z, ca.vertcat(ca.SX(0, 1), *others)], rows)
 
 
 def _at_rest(block: Block, zero: str = "") -> bool:
@@ -265,13 +241,6 @@ def _described(law: Law, idle: Iterable[str]) -> dict[str, Any]:
     }
 
 
-LOOP = (
-    "The friction force of the population is the sum of F over an array of states, all with the "
-    "same v and N, each with a random number r of its own, even in -1 to 1; {redrawn}."
-)
-STEP = "Keep |v| h below {step:g} m, over which a contact changes."
-
-
 def contact_block(law: Population, *, name: str | None = None, h: float | None = None) -> Block:
     """Return the discrete-time block of one contact of `law` with inputs v, N, r and its force F.
 
@@ -289,30 +258,29 @@ def contact_block(law: Population, *, name: str | None = None, h: float | None =
     where = f"codegen '{law_name(law)}'"
     if name is not None:
         checks.identifier(f"{where}: name", name)
-    states = tuple(Variable(s.name, s.unit, nominal=s.nominal, doc=s.doc) for s in law.states)
+    states, size, about = states_of(law), step_size(where, h), texts(law)
     v = Variable("v", "m/s", nominal=law.step / STEP_SIZE, doc="sliding velocity")
     N = Variable("N", "N", nominal=10.0, lower=0.0, doc="normal force of all contacts")
     r = Variable("r", "1", nominal=0.5, lower=-1.0, upper=1.0, doc="random number of the contact")
-    size = step_variable(where, h)
-    duration = size.symbol if h is None else float(h)
-    z = ca.vertcat(*(state.symbol for state in states))
-    rows = ca.SX(law.contact(z, r.symbol, v.symbol * duration, duration, N.symbol))
+    z = symbols_of(states)
+    rows = ca.SX(law.contact(z, r.symbol, v.symbol * size.h, size.h, N.symbol))
     redrawn = "draw r anew at every step" if law.redraws else "r stays the same at all steps"
-    known = parameters(law).values()
-    constants = {p.name: float(p.value) for p in known}
     return Block(
         name or law_name(law),
-        doc="\n".join(text.title for text in texts(law)) + "\nOne contact of a population.",
-        about={p.name: f"{p.doc} [{p.unit}]" for p in known},
+        doc="\n".join(text.title for text in about) + "\nOne contact of a population.",
         equations=equations(law),
         discretisation="One step of the contact with v, N and r held.",
-        use=(LOOP.format(redrawn=redrawn), SIGN, STEP.format(step=law.step)),
-        limits=tuple(limit for text in texts(law) for limit in text.limits),
-        sources=tuple(text.source for text in texts(law)),
+        use=(
+            SHEET["population"]["loop"].format(redrawn=redrawn),
+            SHEET["law"]["sign"],
+            SHEET["population"]["step"].format(step=law.step),
+        ),
+        limits=tuple(limit for text in about for limit in text.limits),
+        sources=tuple(text.source for text in about),
         states=states,
         inputs=(v, N, r),
-        parameters=(size,) if h is None else (),
+        parameters=size.parameters,
         next=rows[: len(states)],
         outputs={"F": Output(rows[len(states)], "N", "friction force of this contact")},
-        constants=constants | ({} if h is None else {"h": float(h)}),
+        **as_constants(parameters(law).values(), size.constants),
     )

@@ -9,9 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.blocks.from_law import step_variable
-from symfric.codegen.blocks.texts import equations, of_method
-from symfric.codegen.blocks.variables import Fold, above_zero, variable, without_idle
+from symfric.codegen.blocks.texts import SHEET, equations, of_method
+from symfric.codegen.blocks.variables import (
+    Fold,
+    above_zero,
+    as_constants,
+    step_size,
+    variable,
+    without_idle,
+)
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, Parametric, Variable, parameters
 from symfric.integrator.equations.initial import consistent
@@ -93,7 +99,7 @@ def plant_block(
             values without consistent algebraic ones; outputs that depend on time although the
             equations do not.
     """
-    folded: dict[str, Parameter] = {}
+    folded: list[Parameter] = []
     machine = model
     if not isinstance(model, Model):
         model, folded = _opened(model, free, fold)
@@ -106,34 +112,29 @@ def plant_block(
     where = f"codegen '{model.name}'"
     if name is not None:
         checks.identifier(f"{where}: name", name)
-    checks.choice(f"{where}: method", method, ["auto", *METHODS])
-    if method == "auto":
-        method = "backward_euler" if model.holonomic and model.monitors else "rodas3"
+    method = fixed_method(where, model, method)
     if model.events:
         raise ValueError(
             f"{where}: expected a model without events, got {len(model.events)}; "
             "remove your own events, and use a smooth or bristle law"
         )
-    size = step_variable(where, h)
-    whole = suited_to_start(_held(model), METHODS[method], model)
-    duration = size.symbol if h is None else ca.SX(float(h))
-    following = build_fixed(whole, METHODS[method])(whole.y, duration, whole.d)
+    size, formula = step_size(where, h), METHODS[method]
+    whole = suited_to_start(_held(model), formula, model)
+    following = build_fixed(whole, formula)(whole.y, ca.SX(size.h), whole.d)
     block = Block(
         name or model.name,
         doc=f"Plant '{model.name}': the machine with its friction, for simulation in real time.",
         states=_states(model, whole, where),
         inputs=model.u,
-        parameters=model.p + ((size,) if h is None else ()),
+        parameters=model.p + size.parameters,
         next=following,
         outputs=_outputs(model, whole, following, where),
-        constants={n: float(p.value) for n, p in folded.items()}
-        | ({} if h is None else {"h": float(h)}),
-        about={n: f"{p.doc} [{p.unit}]" for n, p in folded.items()},
         equations=equations(machine) if isinstance(machine, Parametric) else "",
-        discretisation=of_method(METHODS[method], whole.n > whole.nx),
-        use=USE,
-        limits=LIMITS,
-        sources=(METHODS[method].source,),
+        discretisation=of_method(formula, whole.n > whole.nx),
+        use=tuple(SHEET["plant"]["use"]),
+        limits=tuple(SHEET["plant"]["limits"]),
+        sources=(formula.source,),
+        **as_constants(folded, size.constants),
     )
     if isinstance(machine, Model):
         return block
@@ -141,31 +142,24 @@ def plant_block(
     return above_zero(without_idle(block, free, where), widths)
 
 
-USE = (
-    "Inputs are held over the step: they are the mean over it. Outputs and states are those at the "
-    "end of the step.",
-    "Friction forces oppose the motion of the moving side relative to the base side.",
-    "Start values are consistent with the default parameters and inputs: they do not follow later "
-    "changes. Pass other values to the initialisation.",
-)
-LIMITS = (
-    "Fixed steps have no error control: if h does not resolve the transition of friction "
-    "between stick and slip, no method is accurate, and explicit ones may diverge.",
-    "Friction that jams (self-locking) is not detected.",
-)
+def fixed_method(where: str, model: Model, method: str) -> str:
+    """Return the method of fixed steps; "auto" is the one for the model, see `plant_block`."""
+    checks.choice(f"{where}: method", method, ["auto", *METHODS])
+    if method != "auto":
+        return method
+    return "backward_euler" if model.holonomic and model.monitors else "rodas3"
 
 
 def _opened(
     machine: Machine, free: Sequence[str] | None, fold: Fold
-) -> tuple[Model, dict[str, Parameter]]:
+) -> tuple[Model, list[Parameter]]:
     """Return the model of a scene with its variable parameters, and the constant ones."""
     if not (isinstance(machine, Parametric) and hasattr(machine, "model")):
         raise checks.refused("codegen", "a model, or a scene such as Rabinowicz(LuGre())", machine)
     names, problems = variable(machine, free, fold)
     if problems:
         raise ValueError(f"codegen '{type(machine).__name__}': {'; '.join(problems)}")
-    folded = {n: p for n, p in parameters(machine).items() if n not in names}
-    return machine.model(names), folded
+    return machine.model(names), [p for n, p in parameters(machine).items() if n not in names]
 
 
 def _held(model: Model) -> System:
@@ -200,8 +194,7 @@ def _outputs(model: Model, whole: System, following: ca.SX, where: str) -> dict[
             f"{', '.join(late)}; make time a state with rate 1"
         )
 
-    def at_end(output: Output) -> Output:
-        expression = ca.substitute(ca.SX(output.expression), whole.y, following)
-        return replace(output, expression=expression)
-
-    return {name: at_end(output) for name, output in model.outputs.items()}
+    return {
+        name: replace(o, expression=ca.substitute(ca.SX(o.expression), whole.y, following))
+        for name, o in model.outputs.items()
+    }

@@ -1,6 +1,6 @@
 """Step of the states of a law with velocity and load held, and its form without load."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import final
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from symfric.foundation.graph import LEAVES, graph, rebuild
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
+from symfric.foundation.variable import stacked
 from symfric.integrator.methods.families import exp_phi1_phi2
 from symfric.laws import Law, Sum
 from symfric.laws.base.law import chosen
@@ -67,7 +68,9 @@ def advanced(
             for term, (_, own), (_, rates) in terms
             if term.states
         ]
-        return _stacked(parts)
+        names = ("end", "mean", "mean_rate", "end_rate")
+        columns = (ca.vertcat(*(getattr(part, name) for part in parts)) for name in names)
+        return Step(*columns, kinds=tuple(dict.fromkeys(k for part in parts for k in part.kinds)))
     known = law.held_step(v, N, z, h)
     if known is not None:
         end, mean = map(ca.SX, known)
@@ -79,20 +82,8 @@ def advanced(
             "form = 'original' are functions of v, N and F_e"
         )
     rest = law.held_rest(v, N, z)
-    if rest is None:
-        return held_step(rate, z, h, ca.SX(law.steady_state(v, N)), where)
-    return held_step(rate, z, h, ca.SX(rest), where, each=True)
-
-
-def _stacked(parts: Sequence[Step]) -> Step:
-    """Return the states of several terms below each other."""
-
-    def column(name: str) -> ca.SX:
-        return ca.vertcat(*(getattr(part, name) for part in parts))
-
-    kinds = tuple(dict.fromkeys(kind for part in parts for kind in part.kinds))
-    columns = (column(name) for name in ("end", "mean", "mean_rate", "end_rate"))
-    return Step(*columns, kinds=kinds)
+    steady = ca.SX(law.steady_state(v, N) if rest is None else rest)
+    return held_step(rate, z, h, steady, where, each=rest is not None)
 
 
 def held_step(
@@ -121,25 +112,24 @@ def held_step(
             affine in its own state, without known equilibrium (without `each`).
     """
     count = z.numel()
-    means, rates = [z[i] for i in range(count)], [z[i] for i in range(count)]
-    last, kinds = [z[i] for i in range(count)], dict[str, None]()
+    means, rates, last = ([z[i] for i in range(count)] for _ in range(3))
+    kinds = dict[str, None]()
     pattern = ca.DM(ca.jacobian(rate, z).sparsity(), 1).full() != 0
     for i in _order(pattern, where):
-        alone = set(pattern[i].nonzero()[0].tolist()) <= {i}
-        others = [means[j] if j != i else z[i] for j in range(count)]
-        f = ca.substitute(rate[i], z, ca.vertcat(*others))
+        alone = not np.delete(pattern[i], i).any()
+        others = ca.vertcat(*(means[j] if j != i else z[i] for j in range(count)))
+        f = ca.substitute(rate[i], z, others)
         slope = ca.densify(ca.jacobian(f, z[i]))
         affine = not ca.depends_on(slope, z[i])
         growth, phi1, phi2 = exp_phi1_phi2(h * slope if affine else ca.fmin(h * slope, FASTEST))
         rates[i], bend = phi1 * f, phi2 * f
-        last[i], kind = growth * f, EXACT if alone else SECOND
+        last[i], kind = growth * f, EXACT if alone and affine else SECOND
         if not affine:
             if not (alone or each):
                 raise ValueError(f"{where}: {_expected('depend on others')}")
-            place = ca.substitute(rest[i], z, ca.vertcat(*others))
-            s = _share(h * rates[i], place - z[i])
+            s = _share(h * rates[i], ca.substitute(rest[i], z, others) - z[i])
             rates[i], bend = s * rates[i], s * ((1 - s) * rates[i] + s * bend)
-            last[i], kind = ca.if_else(s < 1, 0, last[i]), SECOND
+            last[i] = ca.if_else(s < 1, 0, last[i])
         means[i] = z[i] + h * bend
         kinds[kind] = None
     columns = (ca.vertcat(*rows) for rows in (means, rates, last))
@@ -158,12 +148,11 @@ def _order(pattern: NDArray[np.bool_], where: str) -> list[int]:
     """Return the states, each after those that its rate depends on."""
     needs = {i: set(row.nonzero()[0].tolist()) - {i} for i, row in enumerate(pattern)}
     found: list[int] = []
-    while needs:
-        ready = [i for i, others in needs.items() if others <= set(found)]
+    while len(found) < len(needs):
+        ready = [i for i, others in needs.items() if i not in found and others <= set(found)]
         if not ready:
             raise ValueError(f"{where}: {_expected('have circular dependencies')}")
         found += ready
-        needs = {i: others for i, others in needs.items() if i not in ready}
     return found
 
 
@@ -194,11 +183,6 @@ def force_of_rate(force: ca.SX, rate: ca.SX, z: ca.SX) -> tuple[ca.SX, ca.SX]:
 LEAST_LOAD = 1e-9
 """Load, relative to the nominal load, below which a contact carries no force."""
 
-NO_LOAD = (
-    "Without load (N below {least:g} N) there is no dry friction, and the contact forgets its "
-    "deflection; when the load returns, it starts anew."
-)
-
 
 def forces_at(force: ca.SX, own: ca.SX, at: Mapping[str, ca.SX]) -> dict[str, ca.SX]:
     """Return the force with the values `at`, by name, for the states and rates `own`, a column."""
@@ -226,13 +210,12 @@ def with_unloaded_case(
     found: dict[str, ca.SX] = {}
     for name, normal in forces_at(force, own, at).items():
         values, left = ca.vertcat(kept, kept) * at[name], ca.SX()
-        for load in (
-            0.0,
-            least,
-        ):  # not 0 if that gives 0/0: a corner as wide as a part of it
+        for load in (0.0, least):  # not 0 if that gives 0/0: a corner as wide as a part of it
             given = ca.densify(ca.vertcat(values, load))
             left = ca.substitute(force, ca.vertcat(own, N.symbol), given)
-            if _is_finite(left):
+            symbols = stacked(ca.symvar(left))  # at numbers that no formula treats specially
+            value = ca.evalf(ca.substitute(left, symbols, 0.7 * ca.SX.ones(symbols.numel())))
+            if np.isfinite(float(value)):
                 break
         found[name] = ca.if_else(loaded, normal, left)
     return ca.vertcat(*ends), found
@@ -249,7 +232,11 @@ def needs_unloaded_case(law: Law, own: ca.Function, cases: ca.Function) -> bool:
         own, cases: (v, N, z, further inputs) -> states, outputs, by the law itself and
             `with_unloaded_case`.
     """
-    if _level(law) != 0.0:
+    try:
+        level = max(abs(float(law.static_level(0.0, side))) for side in (1, -1))
+    except ValueError:  # it is not defined
+        level = 0.0
+    if level:
         return False
     nominal = np.array([s.nominal for s in law.states])
     for share in (0.0, 1.0, -1.0):
@@ -261,18 +248,3 @@ def needs_unloaded_case(law: Law, own: ca.Function, cases: ca.Function) -> bool:
             if v == 0.0 and float(ca.norm_inf(outputs - expected)) > 1e-9:
                 return True
     return False
-
-
-def _level(law: Law) -> float:
-    """Return the dry friction [N] of the law without load; 0 if it is not defined."""
-    try:
-        return max(abs(float(law.static_level(0.0, side))) for side in (1, -1))
-    except ValueError:
-        return 0.0
-
-
-def _is_finite(expression: ca.SX) -> bool:
-    """Return True if an expression has no 0/0, at numbers that no formula treats specially."""
-    symbols = ca.vertcat(ca.SX(0, 1), *ca.symvar(expression))
-    value = ca.evalf(ca.substitute(expression, symbols, 0.7 * ca.SX.ones(symbols.numel())))
-    return bool(np.isfinite(float(value)))

@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 
 from symfric.codegen.blocks.block import Block
-from symfric.codegen.blocks.from_law import SLIDING, step_variable
 from symfric.codegen.blocks.joints import ContactStep, contact_step, with_gravity, with_payload
-from symfric.codegen.blocks.variables import in_arrays, numbered
+from symfric.codegen.blocks.texts import SHEET
+from symfric.codegen.blocks.variables import in_arrays, numbered, step_size
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
@@ -23,30 +23,7 @@ from symfric.multibody.urdf import read_urdf
 
 WHERE = "inverse dynamics"
 
-EQUATIONS = "tau = M(q) qdd + c(q, qd) + g(q) + T     by Newton and Euler, from body to body"
-
-RUBBING = """\
-T = R F(R qd, N)     turning, radius R; F(qd, N) for a law of the moment, and sliding
-N = |f_1| + |f_2| + |f_z|     of a hinge: reactions of its two stations and its face, which
-                              q, qd, qdd give; or the constant of a joint"""
-
-MEAN = "The friction of laws with states is the mean over the step (F below, not F_end)."
-
-USE = (
-    "tau moves a joint in its positive direction; friction is included.",
-    "Use the planned position, velocity and acceleration: a measured velocity that "
-    "fluctuates about zero gives fluctuating friction.",
-)
-
-LIMITS = (
-    "Rigid bodies and joints; external forces other than the payload are not in tau and "
-    "do not load the bearings.",
-)
-
-SOURCES = (
-    "Luh, Walker, Paul, J. Dyn. Sys. Meas. Control 102, 1980: recursion of Newton and Euler.",
-    "Haug, Mech. Based Des. Struct. Mach., 2018: bearings pressed by reactions.",
-)
+SAID = SHEET["mechanism"]
 
 
 def inverse_dynamics_block(
@@ -100,45 +77,37 @@ def inverse_dynamics_block(
     checks.flag(f"{WHERE}: separate", separate)
     checks.flag(f"{WHERE}: fold", fold)
     machine = _machine(mechanism, p, payload, payload_inertia, tunable_gravity)
-    eq, size = machine.eq, step_variable(WHERE, h)
-    duration = size.symbol if h is None else ca.SX(float(size.start))
+    eq, size = machine.eq, step_size(WHERE, h)
     parts = [
-        contact_step(contact, machine.along(contact), normal, duration, fold=fold)
+        contact_step(contact, machine.along(contact), normal, ca.SX(size.h), fold=fold)
         for contact, normal in zip(eq.contacts, eq.normals, strict=True)
     ]
     labels = [machine.label(part.along) for part in parts]
-    states, order = numbered([part.states for part in parts], labels)
+    states, order = numbered([part.law.states for part in parts], labels)
     if h is not None and not states:
         raise ValueError(f"{WHERE}: h: expected none without laws with states, got {h!r}")
-    forces = stacked(part.force for part in parts)
     still = ca.substitute(eq.balance, eq.F, ca.SX.zeros(eq.F.numel()))
-    rubbed = ca.jacobian(eq.balance, eq.F) @ forces
+    friction = ca.jacobian(eq.balance, eq.F) @ stacked(part.force for part in parts)
+    motion, friction = machine.leading(still), machine.leading(friction)
     following, sliding = (
-        ca.SX(stacked(columns))[order] if order else ca.SX(0, 1)
+        machine.moved(ca.SX(stacked(columns))[order] if order else ca.SX(0, 1))
         for columns in ([p.following for p in parts], [p.sliding for p in parts])
     )
-    motion, rubbed = machine.leading(still), machine.leading(rubbed)
-    following, sliding = machine.moved(following), machine.moved(sliding)
-    outputs = machine.outputs("tau", motion + rubbed, "force required by the motion")
+    outputs = machine.outputs("tau", motion + friction, "force required by the motion")
     if separate:
-        outputs |= machine.outputs("friction", rubbed, "friction, included in tau")
-    own = () if h is not None or not states else (size,)
-    made = Block(
+        outputs |= machine.outputs("friction", friction, "friction, included in tau")
+    of_laws, _ = numbered([part.parameters for part in parts], labels)
+    return in_arrays(Block(
         name or machine.identifier,
         **machine.texts("Inverse dynamics", parts),
         states=states,
         inputs=machine.inputs,
-        parameters=(
-            *machine.parameters,
-            *numbered([part.parameters for part in parts], labels)[0],
-            *own,
-        ),
+        parameters=(*machine.parameters, *of_laws, *(size.parameters if states else ())),
         next=following,
         outputs=outputs,
-        resets={"init_sliding": (sliding, SLIDING)} if states else {},
-        constants={} if h is None else {"h": float(size.start)},
-    )
-    return in_arrays(made)  # fmt: skip
+        resets={"init_sliding": (sliding, SHEET["law"]["sliding"])} if states else {},
+        constants=size.constants,
+    ))  # fmt: skip
 
 
 def gravity_block(
@@ -158,14 +127,13 @@ def gravity_block(
     eq = machine.eq
     zero = [ca.SX.zeros(eq.n), ca.SX.zeros(eq.n), ca.SX.zeros(eq.F.numel())]
     holding = machine.leading(ca.substitute([eq.balance], [eq.qd, eq.a, eq.F], zero)[0])
-    made = Block(
+    return in_arrays(Block(
         name or f"{machine.identifier}_gravity",
         **machine.texts("Forces that hold it at rest: g(q)", ()),
         inputs=tuple(v for v in machine.inputs if v.name.startswith("q_")),
         parameters=tuple(v for v in machine.parameters if ca.depends_on(holding, v.symbol)),
         outputs=machine.outputs("tau", holding, "force that holds it"),
-    )
-    return in_arrays(made)  # fmt: skip
+    ))  # fmt: skip
 
 
 @final
@@ -214,10 +182,9 @@ class _Machine:
 
     def outputs(self, stem: str, column: ca.SX, doc: str) -> dict[str, Output]:
         """Return one output per joint."""
-        return {
-            f"{stem}_{k}": Output(column[k - 1], _force(v.unit), doc)
-            for k, v in enumerate(self.joints, start=1)
-        }
+        units = ("N m" if v.unit == "rad" else "N" for v in self.joints)
+        rows = zip(ca.vertsplit(column), units, strict=True)
+        return {f"{stem}_{k}": Output(row, unit, doc) for k, (row, unit) in enumerate(rows, 1)}
 
     def texts(self, what: str, parts: Sequence[ContactStep]) -> dict[str, Any]:
         """Return the texts of the data sheet."""
@@ -227,28 +194,28 @@ class _Machine:
             f"{law} in {', '.join(self.label(p.along) for p in parts if p.law.name == law)}"
             for law in laws
         )
-        rubbing = (f"Friction, numbered by joints: {'; '.join(where)}.",)
+
+        def all_of(field: str) -> list[str]:
+            texts = (getattr(law, field) for law in laws.values())
+            each = (text if isinstance(text, tuple) else (text,) * bool(text) for text in texts)
+            return list(dict.fromkeys(sentence for several in each for sentence in several))
+
         every = [text for law in laws.values() for text in (law.doc, law.equations) if text]
         return {
             "doc": f"{what} of '{self.name}'.",
-            "equations": "\n\n".join([EQUATIONS, *([RUBBING] if parts else []), *every]),
-            "discretisation": "\n\n".join(
-                dict.fromkeys(law.discretisation for law in laws.values() if law.discretisation)
+            "equations": "\n\n".join(
+                [SAID["equations"], *[SAID["friction"]] * bool(parts), *every]
             ),
+            "discretisation": "\n\n".join(all_of("discretisation")),
             "use": (
                 f"Joints: {order}.",
-                *(rubbing if parts else ()),
-                *USE,
-                *([MEAN] if any(law.states for law in laws.values()) else []),
+                *[f"Friction, numbered by joints: {'; '.join(where)}."] * bool(parts),
+                *SAID["use"],
+                *[SAID["mean"]] * any(law.states for law in laws.values()),
             ),
-            "limits": (*LIMITS, *dict.fromkeys(x for law in laws.values() for x in law.limits)),
-            "sources": (*SOURCES, *dict.fromkeys(x for law in laws.values() for x in law.sources)),
+            "limits": (*SAID["limits"], *all_of("limits")),
+            "sources": (*SAID["sources"], *all_of("sources")),
         }
-
-
-def _force(unit: str) -> str:
-    """Return the unit of the force along a coordinate."""
-    return "N m" if unit == "rad" else "N"
 
 
 def _machine(
@@ -263,38 +230,36 @@ def _machine(
         checks.text(f"{WHERE}: payload", payload, "the name of a frame, such as 'tool0'")
     if not isinstance(mechanism, Mechanism):
         mechanism = read_urdf(mechanism)
-    more: Variables = ()
+    parameters = tuple(p)
     if payload is not None:
         mechanism, load = with_payload(mechanism, payload, inertia=inertia)
-        more += load
+        parameters += load
     if g:
         mechanism, gravity = with_gravity(mechanism)
-        more += gravity
-    parameters = (*tuple(p), *more)
+        parameters += gravity
     made = mechanism.prepare(parameters)
     eq, u = made.eq, tuple(mechanism.inputs)
     _check(eq, mechanism)
     T, offset, leads = _couplings(eq)
     joints = tuple(made.q[i] for i in leads)
-    groups = [
-        tuple(
-            Variable(f"{stem}_{k}", unit.format(v.unit), doc=what,
-                     nominal=nominal, lower=-limit, upper=limit)
-            for k, v in enumerate(joints, start=1)
+    inputs = [
+        Variable(
+            f"{stem}_{k}", f"{v.unit}{per}", doc=what, nominal=nominal, lower=-limit, upper=limit
         )
-        for stem, unit, what, nominal, limit in (
-            ("q", "{}", "coordinate", 1.0, 1e4),
-            ("qd", "{}/s", "velocity", 1.0, 1e3),
-            ("qdd", "{}/s^2", "acceleration", 5.0, 1e5),
+        for stem, per, what, nominal, limit in (
+            ("q", "", "coordinate", 1.0, 1e4),
+            ("qd", "/s", "velocity", 1.0, 1e3),
+            ("qdd", "/s^2", "acceleration", 5.0, 1e5),
         )
-    ]  # fmt: skip
-    y, yd, ydd = (symbols_of(group) for group in groups)
+        for k, v in enumerate(joints, start=1)
+    ]
+    y, yd, ydd = ca.vertsplit(symbols_of(inputs), len(joints))
     T_sx = ca.SX(T)
     return _Machine(
         name=mechanism.name,
         eq=eq,
         joints=joints,
-        inputs=tuple(v for group in groups for v in group),
+        inputs=tuple(inputs),
         parameters=parameters,
         symbols=[eq.q, eq.qd, eq.a, eq.lam, symbols_of(u)],
         values=[T_sx @ y + offset, T_sx @ yd, T_sx @ ydd, ca.SX.zeros(eq.m), ca.SX(starts_of(u))],
@@ -343,14 +308,13 @@ def _couplings(eq: Equations) -> tuple[ca.DM, ca.DM, list[int]]:
         ValueError: a constraint that is not linear in coordinates, or whose ratio is not a number;
             constraints that do not determine the other coordinates.
     """
-    J = ca.jacobian(eq.phi, eq.q)
-    if not (J.is_constant() and ca.substitute(eq.phi, eq.q, ca.SX.zeros(eq.n)).is_constant()):
+    J, at_zero = ca.jacobian(eq.phi, eq.q), ca.substitute(eq.phi, eq.q, ca.SX.zeros(eq.n))
+    if not (J.is_constant() and at_zero.is_constant()):
         raise ValueError(
             f"{WHERE}: expected constraints with constant ratios, got others; leave them "
             "out, or use `plant_block`"
         )
-    matrix = ca.DM(ca.densify(J)).full()
-    constant = ca.DM(ca.substitute(eq.phi, eq.q, ca.SX.zeros(eq.n))).full()
+    matrix, constant = ca.DM(ca.densify(J)).full(), ca.DM(at_zero).full()
     follows: list[int] = []
     for row in matrix:
         follows.append(max(i for i in range(eq.n) if row[i] != 0.0 and i not in follows))

@@ -1,9 +1,8 @@
 """Joints of a mechanism in a block: friction, a payload, gravity at run time."""
 
-from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
-from typing import final
+from dataclasses import replace
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -19,16 +18,14 @@ from symfric.multibody.joint import Contact, JointFriction
 from symfric.multibody.spatial import Frame, skew, vector
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class ContactStep:
+class ContactStep(NamedTuple):
     """Friction of one contact over a step.
 
     Attributes:
         along: the coordinate that it resists.
         law: the block of its law, whose texts are those of the data sheet.
         force: friction [N], for a law of the moment [N m].
-        parameters, states: with the names of the law.
+        parameters: with the names of the law.
         following: the states after the step.
         sliding: the states of long sliding.
     """
@@ -37,7 +34,6 @@ class ContactStep:
     law: Block
     force: ca.SX
     parameters: Variables
-    states: Variables
     following: ca.SX
     sliding: ca.SX
 
@@ -69,17 +65,14 @@ def contact_step(
     if level:
         normal = level[0].symbol
     sizes = [variable for variable in block.parameters if variable.name == "h"]
-    force, following, sliding = ca.substitute(
-        [
-            ca.SX(block.outputs["F"].expression),
-            ca.SX(block.next),
-            ca.SX(block.resets["init_sliding"][0]) if block.states else ca.SX(0, 1),
-        ],
+    parts = (block.outputs["F"].expression, block.next, *(s for s, _ in block.resets.values()))
+    force, following, *sliding = ca.substitute(
+        [ca.SX(part) for part in parts],
         [v.symbol, N.symbol, symbols_of(sizes)],
         [contact.slip, normal, h if sizes else ca.SX(0, 1)],
     )
-    parameters = (*(v for v in block.parameters if v.name != "h"), *level)
-    return ContactStep(along, block, force, parameters, block.states, following, sliding)
+    parameters = (*(v for v in block.parameters if v not in sizes), *level)
+    return ContactStep(along, block, force, parameters, following, *sliding or [ca.SX(0, 1)])
 
 
 def _level(friction: JointFriction) -> Variables:
@@ -111,20 +104,16 @@ def with_payload(mechanism: Mechanism, place: str, *, inertia: bool) -> tuple[Me
     """
     name, frame = _found(mechanism, place)
     m = Variable("payload_m", "kg", lower=0.0, upper=1e6, doc="mass of the payload")
-    c = [
-        Variable(f"payload_c_{k}", "m", lower=-1e3, upper=1e3,
-                 doc=f"its centre of mass in {place}")
-        for k in range(1, 4)
-    ]  # fmt: skip
-    J = [
-        Variable(f"payload_J_{k}", "kg m^2", lower=-1e6, upper=1e6,
-                 doc="its inertia about it, xx yy zz xy xz yz")
-        for k in range(1, 7)
-    ]  # fmt: skip
-    load = Body(
-        "payload", m.symbol, [v.symbol for v in J] if inertia else (0.0, 0.0, 0.0),
-        [v.symbol for v in c], ideal=True,
+    c, J = (
+        [Variable(f"payload_{letter}_{k}", unit, lower=-limit, upper=limit, doc=doc)
+         for k in range(1, count + 1)]
+        for letter, count, unit, limit, doc in (
+            ("c", 3, "m", 1e3, f"its centre of mass in {place}"),
+            ("J", 6, "kg m^2", 1e6, "its inertia about it, xx yy zz xy xz yz"),
+        )
     )  # fmt: skip
+    moments = [v.symbol for v in J] if inertia else (0.0, 0.0, 0.0)
+    load = Body("payload", m.symbol, moments, [v.symbol for v in c], ideal=True)
     changed = copy(mechanism)
     changed.bodies = [
         _together(body, load, frame) if body.name == name else body for body in mechanism.bodies
@@ -135,10 +124,8 @@ def with_payload(mechanism: Mechanism, place: str, *, inertia: bool) -> tuple[Me
 def _found(mechanism: Mechanism, place: str) -> tuple[str, Frame]:
     """Return the body at a place, and the frame on it."""
     places = dict(mechanism.frames)
-    bodies = [body.name for body in mechanism.bodies]
-    if place in bodies:
-        places[place] = Frame()
-        found = [place]
+    if place in [body.name for body in mechanism.bodies]:
+        places, found = {**places, place: Frame()}, [place]
     else:
         found = [known for known in places if place in (known, known.partition(".")[2])]
     where = "inverse dynamics: payload"
@@ -156,19 +143,15 @@ def _found(mechanism: Mechanism, place: str) -> tuple[str, Frame]:
 def _together(body: Body, load: Body, frame: Frame) -> Body:
     """Return a body and its load at a frame, as one body."""
     c = ca.SX(frame.p) + ca.SX(frame.R) @ load.c
-    J = ca.SX(frame.R) @ load.J @ ca.SX(frame.R).T
-    if equals(body.mass, 0.0):
-        return replace(body, mass=load.mass, com=c, inertia=_six(body.J + J), ideal=True)
-    mass = ca.SX(body.mass) + load.mass
-    share, d = load.mass / mass, c - body.c
-    moved = -share * body.mass * (skew(d) @ skew(d))
-    return replace(
-        body, mass=mass, com=body.c + share * d, inertia=_six(body.J + J + moved), ideal=True
-    )
-
-
-def _six(J: ca.SX) -> Sequence[ca.SX]:
-    return [ca.SX(J[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    inertia = body.J + ca.SX(frame.R) @ load.J @ ca.SX(frame.R).T
+    mass = load.mass
+    if not equals(body.mass, 0.0):
+        mass = ca.SX(body.mass) + load.mass
+        share, d = load.mass / mass, c - body.c
+        c = body.c + share * d
+        inertia = inertia - share * body.mass * (skew(d) @ skew(d))
+    six = [ca.SX(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    return replace(body, mass=mass, com=c, inertia=six, ideal=True)
 
 
 def with_gravity(mechanism: Mechanism) -> tuple[Mechanism, Variables]:

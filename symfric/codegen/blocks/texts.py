@@ -1,16 +1,20 @@
 """Texts of a data sheet, from the docstring of a law and the method of its steps."""
 
+import tomllib
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from inspect import getdoc
+from pathlib import Path
 from re import match, search, split
 from textwrap import dedent
-from typing import final
+from typing import NamedTuple
 
-from symfric.codegen.blocks.held_step import EVENT, EXACT, SECOND
 from symfric.foundation.parameters import Option, Parametric, options
 from symfric.integrator.methods.families import BackwardEuler, Exponential, Radau, Rosenbrock
 from symfric.integrator.methods.method import Method
+
+SHEET = tomllib.loads(Path(__file__).with_name("sheet.toml").read_text(encoding="utf-8"))
+"""Fixed texts."""
 
 TELLING = (
     r"[Nn]ot valid|[Cc]reeps? |[Dd]rifts?\b|Needs |Keep |Never |[Oo]nly if |smooth over|rounded"
@@ -21,9 +25,7 @@ LEANING = r"^Without it|^Made for slip|, as there|that form|form = "
 """Patterns of sentences that depend on the previous one, or describe another form."""
 
 
-@final
-@dataclass(frozen=True)
-class LawText:
+class LawText(NamedTuple):
     """Texts about a law, without Python terms.
 
     Attributes:
@@ -41,7 +43,16 @@ class LawText:
 
 def texts(law: Parametric) -> tuple[LawText, ...]:
     """Return the texts of a law and of its parts, each once."""
-    return tuple(dict.fromkeys(_all(law)))
+
+    def every(part: Parametric) -> Iterator[LawText]:
+        yield _text(part)
+        for item in fields(part):
+            value = getattr(part, item.name)
+            for inner in value if isinstance(value, tuple) else (value,):
+                if isinstance(inner, Parametric) and "\n\n    " in (getdoc(type(inner)) or ""):
+                    yield from every(inner)
+
+    return tuple(dict.fromkeys(every(law)))
 
 
 def equations(obj: Parametric) -> str:
@@ -54,28 +65,17 @@ def equations(obj: Parametric) -> str:
     return "\n\n".join(f"{text.title}\n{text.equations}".rstrip() for text in found)
 
 
-def _all(law: Parametric) -> Iterator[LawText]:
-    yield _text(law)
-    for item in fields(law):
-        value = getattr(law, item.name)
-        for inner in value if isinstance(value, tuple) else (value,):
-            if isinstance(inner, Parametric) and "\n\n    " in (getdoc(type(inner)) or ""):
-                yield from _all(inner)
-
-
 def _text(law: Parametric) -> LawText:
     paragraphs = (getdoc(type(law)) or type(law).__name__).split("\n\n")
-    paragraphs = (
-        paragraphs[: paragraphs.index("Raises:")] if "Raises:" in paragraphs else paragraphs
-    )
-    formulas = list(_formulas(paragraphs, options(law).values()))
+    if "Raises:" in paragraphs:
+        paragraphs = paragraphs[: paragraphs.index("Raises:")]
+    formulas = [dedent(p) for p in _formulas(paragraphs, options(law).values())]
     prose = "\n".join(p for p in paragraphs[1:] if not p.startswith(("    ", "Raises:")))
     about, _, source = prose.partition("\nSource: ")
-    chosen = [f"{name}: {option.value}." for name, option in options(law).items()]
-    lines = [dedent(p) for p in formulas] + ["    ".join(chosen).capitalize()] * bool(chosen)
+    chosen = "    ".join(f"{name}: {option.value}." for name, option in options(law).items())
     return LawText(
         title=" ".join(paragraphs[0].split()),
-        equations="\n".join(lines).replace("`", ""),
+        equations="\n".join(formulas + [chosen.capitalize()] * bool(chosen)).replace("`", ""),
         limits=tuple(_limits(about)),
         source=" ".join(source.partition("\nChecked: ")[0].split()),
     )
@@ -103,42 +103,14 @@ def _limits(prose: str) -> Iterator[str]:
                 yield f"{text[0].upper() if capital else text[0]}{text[1:]}."
 
 
-HELD = "Inputs are held over the step h."
-
-KINDS = {
-    EXACT: """\
-Exact exponential step, for any length, for dz/dt = a - b z at held inputs:
-    x     = -b h,   phi1 = (exp(x) - 1) / x,   phi2 = (phi1 - 1) / x
-    z+    = z + h phi1 dz/dt            at the end of the step
-    zm    = z + h phi2 dz/dt            mean over the step
-    r     = (z+ - z) / h                mean rate,   r+ = exp(x) dz/dt at the end""",
-    EVENT: """\
-Event step, exact for any length: every element sticks up to its limit, which it reaches
-within the step, and slips from there on; it sticks again when v reverses.
-    z+, zm  at the end of the step, and mean over it
-    r       = (z+ - z) / h              mean rate,   r+ = dz/dt at z+""",
-    SECOND: """\
-Exponential step of second order, bounded for any length, linearised in each state:
-    J     = d(dz/dt)/dz,   x = J h,   phi1 = (exp(x) - 1) / x,   phi2 = (phi1 - 1) / x
-    z+    = z + s h phi1 dz/dt          at the end of the step
-    zm    = z + s h [(1 - s) phi1 + s phi2] dz/dt       mean over the step
-    r     = (z+ - z) / h                mean rate,   r+ = exp(x) dz/dt at the end
-s is 1, or the fraction of the step up to the equilibrium of z, where r+ = 0.""",
-}
-
-FORCES = """\
-    F     = F(v, N, zm, r)              mean over the step
-    F_end = F(v, N, z+, r+)             at its end"""
-
-
 def of_law(kinds: tuple[str, ...], ends: bool) -> str:
     """Return the text about the step of the states of a law, by the `kinds` of its `Step`.
 
     Args:
         ends: True if the block also has the force at the end of the step.
     """
-    forces = FORCES if ends else FORCES.splitlines()[0]
-    return "\n".join([HELD, *(KINDS[kind] for kind in kinds), forces])
+    names = ("held", *kinds, "mean", *("end",) * ends)
+    return "\n".join(SHEET["step"][name] for name in names)
 
 
 def of_method(method: Method, algebraic: bool) -> str:
@@ -149,7 +121,7 @@ def of_method(method: Method, algebraic: bool) -> str:
     """
     unknowns = "\n    x stands for states and algebraic unknowns" if algebraic else ""
     return (
-        f"Fixed steps by {method.name}, order {method.order}. {HELD}\n"
+        f"Fixed steps by {method.name}, order {method.order}. {SHEET['step']['held']}\n"
         f"{_formula(method)}{unknowns}\n"
         "Outputs are those at the end of the step. Steps have no error control."
     )

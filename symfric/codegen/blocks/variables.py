@@ -1,29 +1,73 @@
-"""Variables of a block: run-time parameters, numbered joints, arrays of identical elements.
+"""Variables of a block: step size, run-time parameters, numbered joints, arrays of elements.
 
 Candidates for arrays are found by names, and confirmed by the graph of the step: only variables
 that a loop reads or writes become an array, and a block without loops is unchanged.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from re import fullmatch
-from typing import final
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import casadi as ca
 
-from symfric.codegen.blocks.block import GROUPS, RESERVED, Block, Elements
-from symfric.emitter.arrays import Arrays
+from symfric.codegen.blocks.block import RESERVED, Block, Elements
+from symfric.emitter.arrays import looped
 from symfric.emitter.c99 import TRANSCENDENTAL
-from symfric.emitter.rolling import LEAST, Array
+from symfric.emitter.rolling import LEAST
 from symfric.foundation import checks
 from symfric.foundation.graph import graph
-from symfric.foundation.parameters import Parametric, Variable, parameters, with_values
+from symfric.foundation.parameters import (
+    Parameter,
+    Parametric,
+    Variable,
+    parameters,
+    with_values,
+)
+from symfric.foundation.units import turned
+from symfric.foundation.variable import stacked
 from symfric.laws import Law
 from symfric.model import Variables
 
 Fold = bool | Sequence[str] | None
 """Parameters that become constants: True for all, names, or None for those that select a cheaper
 form."""
+
+STEP_SIZE = 1e-3
+"""Default of the parameter h [s]."""
+
+
+class StepSize(NamedTuple):
+    """Step size of a block.
+
+    Attributes:
+        h: its symbol, or its number [s].
+        parameters: the parameter h, or nothing.
+        constants: likewise of a constant step size.
+    """
+
+    h: ca.SX | float
+    parameters: Variables
+    constants: dict[str, float]
+
+
+def step_size(where: str, h: float | None) -> StepSize:
+    """Return the step size `h` [s] as a constant; if None, a parameter, by default 1 ms."""
+    if h is not None:
+        h = checks.number(f"{where}: h", h, unit="s", above=0.0)
+        return StepSize(h, (), {"h": h})
+    size = Variable("h", "s", start=STEP_SIZE, lower=0.0, doc="step size")
+    return StepSize(size.symbol, (size,), {})
+
+
+def as_constants(
+    gone: Iterable[Parameter], more: Mapping[str, float], turning: bool = False
+) -> dict[str, Any]:
+    """Return the fields `constants` and `about` of a block for parameters that are constants."""
+    listed = [*gone]
+    return {
+        "constants": {p.name: float(p.value) for p in listed} | dict(more),
+        "about": {p.name: f"{p.doc} [{turned(p.unit) if turning else p.unit}]" for p in listed},
+    }
 
 
 def variable(
@@ -68,8 +112,8 @@ def _worth_it(obj: Parametric) -> tuple[str, ...]:
     if not isinstance(law, Law):
         return names
     kept, inner = runtime_parameters(law), tuple(parameters(law))
-    own = len(names) - len(inner)
-    folded = {name for name, of_law in zip(names[own:], inner, strict=True) if of_law not in kept}
+    of_law = zip(names[len(names) - len(inner) :], inner, strict=True)
+    folded = {name for name, inside in of_law if inside not in kept}
     return tuple(name for name in names if name not in folded)
 
 
@@ -86,43 +130,30 @@ def runtime_parameters(law: Law) -> tuple[str, ...]:
     Parameters with the same meaning and value, such as those of the two sides of an asymmetric law,
     are measured as one.
     """
-    groups = _alike(law)
-    least = _calls(law, groups)
-    kept = [
-        name
-        for group in groups
-        if _calls(law, [g for g in groups if g is not group]) >= least
-        for name in group
-    ]
-    return tuple(name for name in parameters(law) if name in kept)
-
-
-def _alike(law: Law) -> list[list[str]]:
-    """Return groups of parameters with equal meaning (role, unit, name in their own part) and
-    value.
-    """
     groups: dict[tuple[str, str, str, float], list[str]] = {}
-    for name, p in parameters(law).items():
+    for name, p in parameters(law).items():  # `field` is the name in their own part
         groups.setdefault((p.role, p.unit, p.field, float(p.value)), []).append(name)
-    return list(groups.values())
+    least = _calls(law, [*groups.values()])
+    kept: set[str] = set()
+    for group in groups.values():
+        if _calls(law, [other for other in groups.values() if other is not group]) >= least:
+            kept.update(group)
+    return tuple(name for name in parameters(law) if name in kept)
 
 
 def _calls(law: Law, groups: Sequence[Sequence[str]]) -> int:
     """Return the number of transcendental functions in the law with one symbol per group."""
     v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
     p = ca.SX.sym("p", len(groups))
-    symbols = [p[i] for i in range(len(groups))]
-    values = {name: s for s, group in zip(symbols, groups, strict=True) for name in group}
-    symbolic = with_values(law, values)
+    symbols = zip(ca.vertsplit(p), groups, strict=True)
+    symbolic = with_values(law, {name: symbol for symbol, group in symbols for name in group})
     given = {i.name: ca.SX.sym(i.name) for i in law.inputs}
-    w = ca.vertcat(ca.SX(0, 1), *given.values())
     equations = ca.vertcat(symbolic.force(v, N, z, **given), symbolic.rate(v, N, z, **given))
-    source = graph(ca.Function("law", [v, N, z, w, p], [ca.densify(equations)]))
+    columns = [v, N, z, stacked(given.values()), p]
+    source = graph(ca.Function("law", columns, [ca.densify(equations)]))
     of_inputs = source.depends((0, 1, 2, 3))
-    return sum(
-        node.op in TRANSCENDENTAL and depends
-        for node, depends in zip(source.nodes, of_inputs, strict=True)
-    )
+    nodes = zip(source.nodes, of_inputs, strict=True)
+    return sum(node.op in TRANSCENDENTAL and depends for node, depends in nodes)
 
 
 def without_idle(block: Block, free: Sequence[str] | None, where: str) -> Block:
@@ -161,9 +192,7 @@ def above_zero(block: Block, names: Collection[str]) -> Block:
     return replace(block, parameters=changed)
 
 
-@final
-@dataclass(frozen=True)
-class Family:
+class Family(NamedTuple):
     """Variables of one group whose names differ in a number that counts from 1.
 
     Attributes:
@@ -194,13 +223,11 @@ def arranged(block: Block) -> Block:
     }
     if not any(found.values()):
         return block
-    used = _used(_with(block, found))
+    whole = _with(block, found)
+    texts = looped(graph(whole.step), whole.indexed(("state",), guards=False))
     return _with(
         block,
-        {
-            group: [f for f in several if (group, f.name) in used]
-            for group, several in found.items()
-        },
+        {g: [f for f in several if f"{g}->{f.name}" in texts] for g, several in found.items()},
     )
 
 
@@ -249,21 +276,6 @@ def _with(block: Block, found: Mapping[str, Sequence[Family]]) -> Block:
     return replace(block, parameters=parameters, arrays=tuple(arrays))
 
 
-def _used(block: Block) -> set[tuple[str, str]]:
-    """Return (group, name) of the arrays that loops of the step read or write."""
-
-    def of(groups: Sequence[str]) -> tuple[Array, ...]:
-        return tuple(
-            Array(groups.index(a.group), a.first, a.size, f"{a.group}->{a.name}")
-            for a in block.arrays
-            if a.group in groups
-        )
-
-    used = Arrays(of(GROUPS[:3]), of(("state",))).used(graph(block.step))
-    texts = {array.text for array in (*used.read, *used.written)}
-    return {(a.group, a.name) for a in block.arrays if f"{a.group}->{a.name}" in texts}
-
-
 def numbered(groups: Sequence[Variables], labels: Sequence[str]) -> tuple[Variables, list[int]]:
     """Return variables of several joints, grouped by name: mu_s_1, mu_s_2, ..., mu_d_1, ...
 
@@ -275,33 +287,27 @@ def numbered(groups: Sequence[Variables], labels: Sequence[str]) -> tuple[Variab
         The variables, and the place of each among all of `groups`, one group after the other.
     """
     every = [(v, label) for group, label in zip(groups, labels, strict=True) for v in group]
-    found: list[Variable] = []
-    order: list[int] = []
-    for stem in dict.fromkeys(v.name for v, _ in every):
-        alike = [(_rank(label), i) for i, (v, label) in enumerate(every) if v.name == stem]
-        for _, i in sorted(alike):
-            variable, label = every[i]
-            found.append(replace(variable, name=f"{stem}_{label}"))
-            order.append(i)
-    return tuple(found), order
+    stems = list(dict.fromkeys(v.name for v, _ in every))
 
+    def rank(i: int) -> tuple[int, bool, int]:  # numbers in their order, then names as given
+        variable, label = every[i]
+        stem, digits = stems.index(variable.name), label.isdecimal()
+        return stem, not digits, int(label) if digits else 0
 
-def _rank(label: str) -> tuple[bool, int]:
-    """Return the sort key of a label: numbers in their order, then names as given."""
-    return (False, int(label)) if label.isdecimal() else (True, 0)
+    order = sorted(range(len(every)), key=rank)
+    renamed = ((v, f"{v.name}_{label}") for v, label in (every[i] for i in order))
+    return tuple(replace(v, name=name) for v, name in renamed), order
 
 
 def in_arrays(block: Block) -> Block:
     """Return the block with arrays of neighbours that count from 1 with equal unit and range."""
-    outputs = [(name, output.unit) for name, output in block.outputs.items()]
-    groups = {
-        "state": [(v.name, (v.unit, v.lower, v.upper)) for v in block.states],
-        "param": [(v.name, (v.unit, v.lower, v.upper)) for v in block.parameters],
-        "in": [(v.name, (v.unit, v.lower, v.upper)) for v in block.inputs],
-        "out": outputs,
+    groups: dict[str, list[tuple[str, object]]] = {
+        group: [(v.name, (v.unit, v.lower, v.upper)) for v in of]
+        for group, of in block.groups.items()
     }
+    groups["out"] = [(name, output.unit) for name, output in block.outputs.items()]
     taken = {name for rows in groups.values() for name, _ in rows}
-    arrays = [array for group, rows in groups.items() for array in _runs(group, rows)]
+    arrays = (array for group, rows in groups.items() for array in _runs(group, rows))
     return replace(block, arrays=tuple(array for array in arrays if array.name not in taken))
 
 
@@ -310,13 +316,10 @@ def _runs(group: str, rows: Sequence[tuple[str, object]]) -> Iterator[Elements]:
     first = 0
     while first < len(rows):
         (name, kind), size = rows[first], 1
-        counted = fullmatch(r"(\w+)_1", name)
-        while (
-            counted is not None
-            and first + size < len(rows)
-            and rows[first + size] == (f"{counted[1]}_{size + 1}", kind)
-        ):
-            size += 1
-        if counted is not None and size > 1:
-            yield Elements(group, counted[1], first, size)
+        stem = name.removesuffix("_1")
+        if stem and stem != name:
+            while rows[first + size : first + size + 1] == [(f"{stem}_{size + 1}", kind)]:
+                size += 1
+            if size > 1:
+                yield Elements(group, stem, first, size)
         first += size

@@ -1,4 +1,4 @@
-#include "@guarded.h"
+#include "@name.h"
 #include "@bare.h"
 
 #include <float.h>
@@ -66,16 +66,17 @@ static real valid(double low, double high, double nominal)
 }
 
 static real state[STATES + 1], param[PARAMS + 1], in[INPUTS + 1], out[OUTPUTS + 1];
-static unsigned int status;
+static unsigned int bits_of_status, *const status = &bits_of_status;
 
 static void guarded(void)
 {
-    @call
+    *status = 0u;
+    @step
 }
 
 static void bare(void)
 {
-    @call_bare
+    @step_bare
 }
 
 static int differs(const real *a, const real *b, int n) /* but for the sign of a zero */
@@ -144,12 +145,11 @@ int main(int argc, char **argv)
         }
         must = expected();
         memcpy(before, state, sizeof before);
-        status = 0u;
         guarded();
         if (!all_finite(out, OUTPUTS)) { unfinished++; }
-        if ((status & 16u) != 0u && !own) { last++; }
-        if ((status & 15u) != must) { unflagged++; }
-        if (status != 0u) { repaired++; continue; }
+        if ((*status & 16u) != 0u && !own) { last++; }
+        if ((*status & 15u) != must) { unflagged++; }
+        if (*status != 0u) { repaired++; continue; }
         good++;
         memcpy(after, state, sizeof after);
         memcpy(shown, out, sizeof shown);

@@ -1,4 +1,15 @@
-@about
+@head
+ *
+ * S-function of level 2 in plain C. In MATLAB:
+ *     mex @{name}_sfun.c @stem.c
+ * and in the block S-Function the name @{name}_sfun with the arguments h, []. For a
+ * build for a target (dSPACE, Speedgoat) add @stem to its S-function modules: sources are
+ * sufficient.
+ * Arguments: sample time [s].@fixed
+ *     Parameters, [] for the defaults, tunable, in the order @order.
+ * Inputs: @ports.
+ * Outputs: @shown. States are discrete states of the block.
+ */
 #define S_FUNCTION_NAME @{name}_sfun
 #define S_FUNCTION_LEVEL 2
 

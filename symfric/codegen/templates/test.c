@@ -1,4 +1,9 @@
-@banner
+@head
+ *
+ * Unit test of @name: returns the number of wrong results. No stdio is needed.
+ * Define @{macro}_TEST_PRINT to print them, and @{macro}_TEST_NO_MAIN to call
+ * @{name}_test() from elsewhere.
+ */
 #include "@name.h"
 #include "@{name}_vectors.h"
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.starts.maxwell_slip import fit_elements, stretches
+from identification.starts.maxwell_slip import Elements, _merged, fit_elements, stretches
 from identification.starts.measured import Measured, break_away, hysteresis, turning_points
 
 T = 0.015 * np.arange(1000)
@@ -54,6 +54,12 @@ def test_elements_are_found_with_their_radii(noise: float) -> None:
     assert rms < (1e-3 if noise == 0 else 0.2 * noise)
     assert np.allclose(found.radii, radii, rtol=1e-3 if noise == 0 else 0.1)
     assert np.isclose(found.shares.sum(), 1.0)
+
+
+def test_merged_neighbours_keep_their_stiffness_and_their_level() -> None:
+    k, radii = np.array([9e5, 8e4, 8e4, 1e4]), np.array([3e-7, 2.9e-6, 3.1e-6, 9e-6])
+    merged = _merged(Elements(k, radii, 0.0, 0.0, 0, 0.0), 3)
+    np.testing.assert_allclose(merged, [3e-7, 3e-6, 9e-6])
 
 
 def test_slopes_of_the_stretches_by_differences() -> None:

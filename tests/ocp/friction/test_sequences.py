@@ -120,6 +120,16 @@ def test_stops_keep_a_distance_from_the_sliding_force(
     assert float(room([stretch, 0, 0, 0], 0, 0, p)) * 6.0 == pytest.approx(left, abs=1e-5)
 
 
+@pytest.mark.parametrize(("left", "margin"), [(1.0, 0.01), (0.002, 0.01 * np.tanh(1.0)), (0, 0)])
+def test_margin_fades_before_break_away(left: float, margin: float) -> None:
+    model = load_through_spring().chain[0].model
+    made = arc_model(model, {"load": 0}, (), {"load": 1}, {}, {}, {"load": 6.0}, (0.01, 0.002))
+    symbols = [made.vector(letter) for letter in "xzup"]
+    up, down = (ca.Function("f", symbols, [made.expression(f"load_{n}")]) for n in ("up", "down"))
+    at = [0, 0, 0, 0, left], 0, 0, made.values("p", {})
+    assert (float(up(*at)), float(down(*at))) == pytest.approx((1.0 - margin, 1.0), abs=1e-9)
+
+
 # --- solved sequences ---------------------------------------------------------------------------
 
 

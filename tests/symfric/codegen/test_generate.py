@@ -1,78 +1,101 @@
-"""Files and manifest."""
+"""Files, manifest, and the text of header and source."""
 
 import json
-from pathlib import Path
 
+import casadi as ca
 import pytest
 
-from symfric import BrownMcPhee, LuGre, Output, Variable, parameters
+from symfric import BrownMcPhee, LuGre, Output, Variable, Viscous, law_from_text, parameters
 from symfric.codegen import Block, generate, law_block
+from symfric.codegen.blocks.block import Elements
+from symfric.codegen.layout import CBlock
+from symfric.codegen.source import header, interval, routines, source
+from symfric.emitter.c99 import DOUBLE, FLOAT, REALS
+from symfric.foundation.programs import Compiler, find_compiler
 from symfric.laws import GMS
 
-
-def test_writes_header_and_source_for_each_type_and_a_manifest(tmp_path):
-    made = generate(LuGre(), tmp_path / "new" / "c", kit=False)
-    names = ["lugre_f64.h", "lugre_f64.c", "lugre_f32.h", "lugre_f32.c", "lugre_manifest.json"]
-    assert [path.name for path in made.files] == names
-    assert sorted(path.name for path in (tmp_path / "new" / "c").iterdir()) == sorted(names)
-    assert made.header("float") == tmp_path / "new" / "c" / "lugre_f32.h"
+LUGRE = law_block(LuGre())
 
 
-def test_one_type_by_its_name(tmp_path):
-    made = generate(BrownMcPhee(), tmp_path, real="float", name="seal")
-    assert [path.name for path in made.files] == [
-        *("seal_f32.h", "seal_f32.c", "seal_f32_test.c", "seal_f32_vectors.h"),
-        *("seal_f32_vectors.csv", "seal_block.cmake", "CMakeLists.txt", "seal_ctypes.py"),
-        *("seal_sfun.c", "seal_manifest.json"),
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    """The package of LuGre in both types."""
+    return generate(LuGre(), tmp_path_factory.mktemp("both") / "new" / "c")
+
+
+def test_files_are_listed_in_their_order_and_the_same_at_each_call(both, tmp_path):
+    names = [path.name for path in both.files]
+    assert names == [
+        *("lugre_f64.h", "lugre_f64.c", "lugre_f32.h", "lugre_f32.c", "lugre_f64_test.c"),
+        *("lugre_f64_vectors.h", "lugre_f64_vectors.csv", "lugre_f32_test.c"),
+        *("lugre_f32_vectors.h", "lugre_f32_vectors.csv", "lugre_block.cmake", "CMakeLists.txt"),
+        *("lugre_ctypes.py", "lugre_sfun.c", "lugre_manifest.json"),
     ]
-    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in made.files}
+    assert sorted(path.name for path in both.folder.iterdir()) == sorted(names)
+    assert both.header("float") == both.folder / "lugre_f32.h"
+    again = generate(LuGre(), tmp_path, real="float")
+    assert [path.name for path in again.files][:2] == ["lugre_f32.h", "lugre_f32.c"]
+    for path in again.files[:-1]:
+        if path.name in names and "ctypes" not in path.name:
+            same = path.read_bytes() == (both.folder / path.name).read_bytes()
+            assert same or path.suffix in (".cmake",) or "sfun" in path.name
+    bare = generate(BrownMcPhee(), tmp_path / "bare", real="double", name="seal", kit=False)
+    assert [p.name for p in bare.files] == ["seal_f64.h", "seal_f64.c", "seal_manifest.json"]
 
 
-def test_the_manifest_names_everything_with_its_unit(tmp_path):
-    made = generate(LuGre(), tmp_path, h=2e-3, free=("sigma_0", "mu_s"))
+def test_the_manifest_names_everything_with_its_unit_and_ranges(tmp_path):
+    made = generate(LuGre(), tmp_path, h=2e-3, free=("sigma_0", "mu_s"), kit=False)
     manifest = json.loads((tmp_path / "lugre_manifest.json").read_text())
     assert manifest == made.manifest
-    assert [(s["name"], s["unit"], s["start"]) for s in manifest["states"]] == [("z", "m", 0.0)]
+    assert [(s["name"], s["unit"], s["start"], s["range"]) for s in manifest["states"]] == [
+        ("z", "m", 0.0, [None, None])
+    ]
     assert [(p["name"], p["unit"], p["default"]) for p in manifest["parameters"]] == [
         ("sigma_0", "N/m", 1e5),
         ("mu_s", "1", 0.15),
     ]
-    assert [i["name"] for i in manifest["inputs"]] == ["v", "N"]
+    assert [(i["name"], i["range"]) for i in manifest["inputs"]] == [
+        ("v", [-1e6, 1e6]), ("N", [0.0, 1e7])
+    ]  # fmt: skip
     assert manifest["outputs"][0]["unit"] == "N"
-    assert manifest["constants"]["h"] == 2e-3
+    assert (manifest["constants"]["h"], manifest["sample_time"]) == (2e-3, 2e-3)
     assert manifest["model"] == made.block.fingerprint
     assert manifest["real"]["float"]["bytes"] == {"state": 4, "param": 8, "in": 8, "out": 8}
     assert manifest["real"]["double"]["bytes"]["param"] == 16
+    assert manifest["status"]["OUTPUT"]["bit"] == 16
+    free = generate(LuGre(), tmp_path, real="float", kit=False, guards=False).manifest
+    assert {i["name"]: i["range"] for i in free["inputs"]} == {"v": [None, None], "N": [0.0, None]}
+    assert free["status"] == {}
 
 
-@pytest.mark.parametrize("guards", [True, False])
-def test_the_manifest_has_the_ranges_that_are_kept(guards, tmp_path):
-    found = generate(LuGre(), tmp_path, real="float", kit=False, guards=guards).manifest
-    ranges = {variable["name"]: variable["range"] for variable in found["inputs"]}
-    kept, bounds = {"v": [-1e6, 1e6], "N": [0.0, 1e7]}, {"v": [None, None], "N": [0.0, None]}
-    assert ranges == (kept if guards else bounds)
-    assert found["states"][0]["range"] == [None, None]
-
-
-def test_the_manifest_counts_operations_and_calls(tmp_path):
-    step = generate(LuGre(), tmp_path, kit=False).manifest["real"]["float"]["functions"][
-        "lugre_f32_step"
-    ]
+def test_the_manifest_counts_operations_calls_and_bytes(both, tmp_path, monkeypatch):
+    step = both.manifest["real"]["float"]["functions"]["lugre_f32_step"]
     assert step["calls"] == {"exp": 1, "expm1": 1, "fabs": 1, "tanh": 1}
     assert 45 <= step["operations"] <= 62
     assert step["prototype"].startswith("unsigned int lugre_f32_step(lugre_f32_state_t *state, ")
+    compiler = find_compiler()
+    if compiler is not None:
+        measured = both.manifest["real"]["float"]["measured"]
+        assert measured["compiler"] == str(compiler)
+        assert measured["text"] is None or 100 < measured["text"] < 10_000
+        assert measured["data"] in (0, None)
+        if "gcc" in str(compiler):
+            assert set(measured["stack"]) >= {"lugre_f32_step", "lugre_f32_init"}
+            assert all(0 <= n < 1000 for n in measured["stack"].values())
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("CC", raising=False)
+    bare = generate(law_block(BrownMcPhee()), tmp_path, real="float")
+    assert "measured" not in bare.manifest["real"]["float"]
 
 
-def test_the_same_law_gives_the_same_files(tmp_path):
-    first, second = generate(LuGre(), tmp_path / "a"), generate(LuGre(), tmp_path / "b")
-    for one, other in zip(first.files, second.files, strict=True):
-        assert one.read_bytes() == other.read_bytes()
-
-
-def test_a_block_is_generated_as_it_is(tmp_path):
+def test_block_and_law_give_the_same_code(tmp_path):
+    free = tuple(parameters(LuGre()))
+    direct = generate(LuGre(), tmp_path / "a", free=free, kit=False)
+    block = generate(law_block(LuGre(), free=free), tmp_path / "b", kit=False)
+    assert direct.manifest == block.manifest
     x, u = Variable("x", "m"), Variable("u", "m/s")
-    block = Block("integrator", states=(x,), inputs=(u,), next=x.symbol + 1e-3 * u.symbol)
-    made = generate(block, tmp_path, real="double")
+    euler = Block("integrator", states=(x,), inputs=(u,), next=x.symbol + 1e-3 * u.symbol)
+    made = generate(euler, tmp_path / "c", real="double", kit=False)
     assert "state->x = x + 0.001 * u;" in made.source("double").read_text()
 
 
@@ -85,33 +108,118 @@ def test_a_block_is_generated_as_it_is(tmp_path):
         (GMS(), {}, "have circular dependencies"),
         (LuGre(mu_s=0.3), {"free": (), "h": 1e-60}, "would become 0"),
         (Block("b", outputs={"y": Output(1.0, "m")}), {"h": 1e-3}, "with a law only, got a block"),
+        (LUGRE, {"turning": True}, "turning: expected with a law only"),
     ],
 )
 def test_bad_input_writes_nothing(tmp_path, law, options, message):
     with pytest.raises(ValueError, match=message):
         generate(law, tmp_path / "c", **options)
     assert not (tmp_path / "c").exists()
-
-
-def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path):
     (tmp_path / "c").write_text("")
     with pytest.raises(ValueError, match="expected a folder, got the file"):
-        generate(LuGre(), tmp_path / "c")
+        generate(LuGre(), tmp_path / "c", kit=False)
 
 
-def test_block_and_law_give_the_same_code(tmp_path):
-    free = tuple(parameters(LuGre()))
-    direct = generate(LuGre(), tmp_path / "a", free=free, kit=False)
-    block = generate(law_block(LuGre(), free=free), tmp_path / "b", kit=False)
-    assert direct.manifest == block.manifest
-
-
-def test_header_of_a_law_that_turns_has_its_units(tmp_path):
-    made = generate(LuGre(), tmp_path / "b", real="double", turning=True)
-    text = made.header("double").read_text()
+def test_header_of_a_law_that_turns_has_its_units():
+    text = header(CBlock(law_block(LuGre(), turning=True), DOUBLE))
     for unit in ("[rad/s]", "[N m]", "[N m/rad]", "[N m s/rad]", "[rad]"):
         assert unit in text
     for unit in ("[m/s]", "[N]", "[N/m]", "[N s/m]"):
         assert unit not in text
-    with pytest.raises(ValueError, match="turning: expected with a law only"):
-        generate(made.block, tmp_path / "c", turning=True)
+
+
+def test_a_law_with_states_has_a_data_sheet_structs_and_a_step():
+    text = header(CBlock(LUGRE, DOUBLE))
+    for part in (
+        "    double mu_s;    /* static friction coefficient [1], default 0.15, ",
+        "    double z; /* mean bristle deflection [m], start 0 */\n",
+        "extern const lugre_f64_state_t lugre_f64_start;",
+        "extern const lugre_f64_param_t lugre_f64_default;",
+        "void lugre_f64_reset(lugre_f64_state_t *state);\n",
+        "dz/dt = v - sigma_0 |v| z / g",
+        "    delta = 2  Stribeck exponent [1]\n",
+        "SPDX-License-Identifier: MIT-0",
+        "h, a parameter, 0.001 s by default",
+        "Inputs outside their range are clamped to it",
+        "A step size outside its range is clamped to it.",
+    ):
+        assert part in text
+    fixed = header(CBlock(law_block(LuGre(), h=2e-3), DOUBLE))
+    assert "h = 0.002 s, a constant of this code: call it at exactly this interval." in fixed
+    for file in (text, source(CBlock(LUGRE, FLOAT))):
+        first = " ".join(file.splitlines()[:2])
+        assert "symfric 0." in first
+        assert f"CasADi {ca.__version__}" in first
+        assert LUGRE.fingerprint in first
+
+
+def test_a_static_law_is_a_function_of_scalars():
+    block = law_block(BrownMcPhee())
+    arguments = "float v, float N, const brown_mcphee_f32_param_t *param"
+    assert f"float brown_mcphee_f32({arguments});" in header(CBlock(block, FLOAT, False))
+    text = " ".join(header(CBlock(block, FLOAT)).split())
+    assert f"float brown_mcphee_f32({arguments}, unsigned int *status);" in text
+    assert "_state_t" not in text
+    assert "_in_t" not in text
+    assert "v sliding velocity [m/s], +-1e+06" in text
+    constant = law_block(BrownMcPhee(), free=())
+    assert "float brown_mcphee_f32(float v, float N);" in header(CBlock(constant, FLOAT, False))
+    assert "_default" not in source(CBlock(constant, FLOAT))
+    viscous = CBlock(law_block(Viscous()), DOUBLE)
+    assert "double viscous_f64(double v, double N, const" in header(viscous)
+    assert "    (void)N;\n" in source(viscous)
+
+
+def test_ranges_of_members_are_common_and_defaults_of_an_array_are_its_ends():
+    a, b = Variable("a", "1"), Variable("b", "1", nominal=10.0)
+    for variables, group, guards, text in (
+        ([a, b], "param", True, "+-1e+06"),
+        ([a, b], "param", False, ""),
+        ([Variable("c", "1", lower=0.5)], "in", False, ">= 0.5"),
+        ([Variable("c", "1", lower=0.5)], "in", True, "0.5 to 1e+06"),
+        ([Variable("d", "1", upper=2.0)], "state", True, "<= 2"),
+        ([Variable("e", "1", lower=-2.0, upper=2.0)], "in", True, "+-2"),
+    ):
+        assert interval(variables, group, guards) == text
+    k = GMS(form="event").elements
+    text = header(CBlock(law_block(GMS(form="event")), DOUBLE))
+    assert f"default {k[0].k:g} ... {k[-1].k:g}, " in text
+    x = [Variable(f"x_{i}", "m", doc="place" if i < 3 else "end") for i in (1, 2, 3)]
+    for size, doc in ((2, "place, of each element"), (3, "of each element")):
+        arrays = (Elements("in", "x", 0, size),)
+        y = {"y": Output(x[0].symbol, "m"), "z": Output(x[1].symbol, "m")}
+        made = Block("b", inputs=tuple(x), outputs=y, arrays=arrays)
+        assert made.members["in"][0].doc == doc
+
+
+def test_float_code_holds_no_double_and_without_guards_no_trace_of_them():
+    for word in ("malloc", "stdio", "double"):
+        assert word not in source(CBlock(LUGRE, FLOAT))
+    for text in (header(CBlock(LUGRE, FLOAT, False)), source(CBlock(LUGRE, FLOAT, False))):
+        for word in ("status", "stdint", "string.h", "_lost", "_unfit", "static "):
+            assert word not in text.replace("static friction", "")
+
+
+def test_math_functions_can_be_replaced(compiler: Compiler, tmp_path):
+    made = generate(BrownMcPhee(), tmp_path, real="double", kit=False)
+    (tmp_path / "mine.h").write_text("double mine(double x);\n#define SF_TANH mine\n")
+    target = tmp_path / "out.o"
+    flags = ("-include", tmp_path / "mine.h", "-c", made.source("double"), "-o", target)
+    compiler.run("-std=c99", *map(str, flags))
+    assert b"mine" in target.read_bytes()
+    assert b"tanh" not in target.read_bytes()
+
+
+def test_states_are_read_before_any_is_written_and_texts_cannot_end_their_comment():
+    x, y = Variable("x", "1", start=1.0), Variable("y", "1", start=2.0)
+    block = Block("swap", states=(x, y), next=ca.vertcat(y.symbol, x.symbol))
+    step = routines(CBlock(block, DOUBLE, guards=False))[-1]
+    assert {*step.statements[:2]} == {"const double x = state->x;", "const double y = state->y;"}
+    assert {*step.statements[2:]} == {"state->x = y;", "state->y = x;"}
+    x = Variable("x", "N*/m", doc="/* load */")
+    block = Block("f", doc="*/ int f; /*", inputs=(x,), outputs={"y": Output(x.symbol, "1")})
+    text = header(CBlock(block, DOUBLE))
+    assert text.count("/*") == text.count("*/")
+    for real in REALS.values():
+        lines = source(CBlock(law_block(law_from_text("lugre+dahl")), real)).splitlines()
+        assert max(map(len, lines)) <= 100

@@ -1,20 +1,25 @@
-"""What guards do with single numbers, also where a compiler believes that NaN does not exist."""
-
-from pathlib import Path
+"""Guards on single numbers, also if a compiler assumes that NaN does not exist; runs of blocks."""
 
 import casadi as ca
 import numpy as np
 import pytest
+from one_program import OneProgram
 
-from symfric import BrownMcPhee, Law, LuGre, Output, Variable
-from symfric.codegen import Block, generate, law_block
+from symfric import BrownMcPhee, LuGre, Output, Variable
+from symfric.codegen import Block, generate, law_block, runner
 from symfric.codegen.blocks.variables import arranged
 from symfric.codegen.guards import Status, parameter_range, range_of, state_limit
-from symfric.codegen.header import header
-from symfric.codegen.routines import source
-from symfric.codegen.runner import GuardModel, link_program, program, run_c, run_vm, signals
-from symfric.emitter.c99 import DOUBLE, FLOAT
-from symfric.foundation.programs import Compiler
+from symfric.codegen.layout import CBlock
+from symfric.codegen.runner import (
+    GuardModel,
+    compile_object,
+    compiled,
+    needed_symbols,
+    run_c,
+    run_vm,
+)
+from symfric.emitter.c99 import DOUBLE
+from symfric.foundation.programs import CompileError, Compiler
 
 N = 10.0
 GIVEN: dict[str, tuple[list[float], int]] = {
@@ -30,39 +35,28 @@ GIVEN: dict[str, tuple[list[float], int]] = {
 }
 
 
-@pytest.mark.heavy
-@pytest.mark.parametrize("flags", ["-O2", "-O2 -ffast-math", "-O0"])
-@pytest.mark.parametrize("law", [LuGre(), BrownMcPhee()], ids=["lugre", "brown_mcphee"])
-def test_every_repair_is_flagged(law: Law, flags: str, compiler: Compiler, tmp_path: Path) -> None:
-    block, made = law_block(law), generate(law, tmp_path, real="float", kit=False)
-    (tmp_path / "main.c").write_text(program(block, FLOAT))
-    parts = map(str, (tmp_path / "main.c", made.source("float")))
-    executable = tmp_path / "main"
-    compiler.run("-std=c99", *flags.split(), f"-I{tmp_path}", *parts, "-o", str(executable), "-lm")
-    rows = run_c(block, FLOAT, executable, np.array([given for given, _ in GIVEN.values()]))
-    said = rows[:, signals(block).index("status")]
-    assert said.astype(int).tolist() == [int(status) for _, status in GIVEN.values()]
-    assert np.isfinite(rows).all()
-
-
-def test_a_law_works_on_after_a_bad_sample() -> None:
-    """A lost sample of v is rest: the bristle keeps its deflection."""
-    inputs, said = GuardModel(law_block(LuGre()), DOUBLE).inputs(np.array([[np.nan, N], [2e-3, N]]))
-    assert inputs.tolist() == [[0.0, N], [2e-3, N]]
-    assert said.tolist() == [Status.NOT_FINITE, 0]
+@pytest.mark.parametrize("flags", ["-O2 -ffast-math", "-O0"])
+def test_every_repair_sets_its_bit(flags: str, compiler: Compiler, tmp_path) -> None:
+    blocks = [law_block(LuGre()), law_block(BrownMcPhee())]
+    program = OneProgram(blocks, tmp_path, compiler, real="float", flags=flags.split())
+    inputs = np.array([given for given, _ in GIVEN.values()])
+    for rows in program.run([(0, inputs), (1, inputs)]):
+        assert rows[:, -1].astype(int).tolist() == [int(status) for _, status in GIVEN.values()]
+        assert np.isfinite(rows).all()
 
 
 def test_ranges_are_the_bounds_or_a_million_times_the_nominal_value() -> None:
     load = range_of(Variable("N", "N", nominal=10.0, lower=0.0))
-    assert (load.low, load.high, load.safe) == (0.0, 1e7, 0.0)
-    valve = range_of(Variable("u", "V", start=2.0, lower=1.0, upper=5.0))
-    assert (valve.low, valve.high, valve.safe) == (1.0, 5.0, 2.0)
+    assert load == (0.0, 1e7, 0.0)
+    assert range_of(Variable("u", "V", start=2.0, lower=1.0, upper=5.0)) == (1.0, 5.0, 2.0)
+    assert range_of(Variable("u", "V", lower=1.0)) == (1.0, 1e6, 1.0)
+    assert range_of(Variable("u", "V", start=3e6)) == (-1e6, 3e6, 3e6)
+    assert range_of(Variable("u", "V", upper=-2e6)) == (-2e6, -2e6, -2e6)
     assert range_of(Variable("w", "m/s", nominal=1e28)).high == 1e30  # half of it has a square
     small = parameter_range(Variable("v_eps", "m/s", start=1e-15, nominal=1e-15, lower=0.0))
-    assert small.low == 0.0
-    assert small.high == pytest.approx(1e6)
-    step = parameter_range(Variable("h", "s", start=1e-3, lower=0.0))
-    assert (step.low, step.high) == (1e-9, 1e3)
+    assert small == (0.0, pytest.approx(1e6), 1e-15)
+    assert parameter_range(Variable("k", "1", nominal=50.0)).high == pytest.approx(5e7)
+    assert parameter_range(Variable("h", "s", start=1e-3, lower=0.0)) == (1e-9, 1e3, 1e-3)
     assert parameter_range(Variable("h", "s", start=1e-10)).low == 1e-10
     assert state_limit(Variable("z", "m", nominal=1e-5)) == pytest.approx(1e5)
     assert state_limit(Variable("z", "m", start=-1e4)) == pytest.approx(1e14)
@@ -109,19 +103,17 @@ STEPS: dict[str, tuple[list[float], dict[str, float], int]] = {
 }
 
 
-def test_numbers_of_every_range_are_mended_in_c_as_beside_casadi(compiler, tmp_path) -> None:
+def test_numbers_of_every_range_are_repaired_in_c_as_in_numpy(compiler, tmp_path) -> None:
     block = bench()
     assert {a.name for a in block.arrays} == {"F", "k"}
-    made = generate(block, tmp_path, real="double", kit=False)
-    (tmp_path / "main.c").write_text(program(block, DOUBLE))
-    link_program(compiler, [tmp_path / "main.c", made.source("double")], tmp_path, tmp_path / "m")
+    program = OneProgram([block], tmp_path, compiler)
     inputs = np.array([given for given, _, _ in STEPS.values()])
     parameters = np.array(
         [[own.get(v.name, v.start) for v in block.parameters] for _, own, _ in STEPS.values()]
     )
-    c = run_c(block, DOUBLE, tmp_path / "m", inputs, parameters)
+    (c,) = program.run([(0, inputs, parameters)])
     assert c[:, -1].astype(int).tolist() == [int(status) for _, _, status in STEPS.values()]
-    assert np.array_equal(c, run_vm(block, DOUBLE, inputs, parameters=parameters))
+    assert np.array_equal(c, run_vm(program.several[0], inputs, parameters=parameters))
     rows = dict(zip(STEPS, c, strict=True))
     F, big, y = slice(0, 8), 8, 9
     assert rows["no voltage"][y] == 2.0 / 0.25
@@ -133,23 +125,109 @@ def test_numbers_of_every_range_are_mended_in_c_as_beside_casadi(compiler, tmp_p
     assert rows["again"][big] == 1e4
 
 
-def test_parameters_out_of_range_give_way_to_the_defaults() -> None:
-    block = law_block(LuGre())
-    model = GuardModel(block, DOUBLE)
-    names = [v.name for v in block.parameters]
-    values = model.default.copy()
+def test_the_model_of_the_guards_keeps_the_bristle_and_replaces_parameters() -> None:
+    model = GuardModel(CBlock(law_block(LuGre()), DOUBLE))
+    inputs, said = model.inputs(np.array([[np.nan, N], [2e-3, N]]))
+    assert inputs.tolist() == [[0.0, N], [2e-3, N]]  # a lost sample of v is rest
+    assert said.tolist() == [Status.NOT_FINITE, 0]
+    names = [v.name for v in model.c.block.parameters]
+    values = model.c.default.copy()
     assert model.parameters(values)[1] == 0
-    values[names.index("mu_s")] = np.nan
-    values[names.index("h")] = 1e4
+    values[names.index("mu_s")], values[names.index("h")] = np.nan, 1e4
     found, said = model.parameters(values)
     assert said == Status.PARAMETER
-    assert found[names.index("mu_s")] == 0.15
-    assert found[names.index("h")] == 1e3
+    assert (found[names.index("mu_s")], found[names.index("h")]) == (0.15, 1e3)
+    values[names.index("h")] = np.inf
+    assert model.parameters(values)[0][names.index("h")] == 1e-3
 
 
-def test_without_guards_nothing_is_left_of_them() -> None:
-    block = law_block(LuGre())
-    for text in (header(block, FLOAT, guards=False), source(block, FLOAT, guards=False)):
-        assert not any(word in text for word in ("status", "CLAMPED", "stdint", "memcpy"))
-    assert "#define LUGRE_F32_NOT_FINITE 2u" in header(block, FLOAT)
-    assert "_STATE" not in header(law_block(BrownMcPhee()), FLOAT)
+def swap() -> Block:
+    x, y = Variable("x", "1", start=1.0), Variable("y", "1", start=2.0)
+    return Block(
+        "swap",
+        states=(x, y),
+        next=ca.vertcat(y.symbol, x.symbol),
+        outputs={"old": Output(x.symbol, "1")},
+    )
+
+
+def mass() -> Block:
+    """Semi-implicit Euler of a spring-mass with a force: a plant, not a law."""
+    x, v, u = Variable("x", "m"), Variable("v", "m/s"), Variable("u", "N")
+    m, k, h = (Variable(n, "1", start=s) for n, s in (("m", 0.8), ("k", 2.1), ("h", 0.01)))
+    after = v.symbol + h.symbol / m.symbol * (u.symbol - k.symbol * x.symbol)
+    energy = (m.symbol * v.symbol**2 + k.symbol * x.symbol**2) / 2
+    return Block(
+        "mass",
+        states=(x, v),
+        inputs=(u,),
+        parameters=(m, k, h),
+        next=ca.vertcat(x.symbol + h.symbol * after, after),
+        outputs={"energy": Output(energy, "J"), "spring": Output(k.symbol * x.symbol, "N")},
+        resets={"init_balance": (ca.vertcat(u.symbol / k.symbol, 0.0), "Rest under u.")},
+    )
+
+
+def pair() -> Block:
+    u = Variable("u", "1")
+    outputs = {"sum": Output(u.symbol + 1, "1"), "product": Output(2 * u.symbol, "1")}
+    return Block("pair", inputs=(u,), outputs=outputs)
+
+
+def constant() -> Block:
+    p = Variable("p", "1", start=3.0)
+    return Block("constant", parameters=(p,), outputs={"y": Output(p.symbol / 7, "1")})
+
+
+def test_blocks_of_every_shape_have_the_bits_of_casadi(compiler, tmp_path):
+    blocks = [swap(), mass(), pair(), constant()]
+    program = OneProgram(blocks, tmp_path, compiler)
+    random = np.random.default_rng(0)
+    inputs = [random.standard_normal((50, len(block.inputs))) for block in blocks]
+    found = program.run([*enumerate(inputs)])
+    for c, given, rows in zip(program.several, inputs, found, strict=True):
+        assert rows.shape == (50, len(c.signals))
+        assert np.array_equal(rows, run_vm(c, given))
+    assert found[0][:3, :3].tolist() == [[2, 1, 1], [1, 2, 2], [2, 1, 1]]
+    names = ["x", "v", "energy", "spring", "init_balance.x", "init_balance.v"]
+    assert CBlock(mass(), DOUBLE, False).signals == names
+    assert CBlock(mass(), DOUBLE).signals == [*names, "status"]
+    rows = run_vm(CBlock(mass(), DOUBLE), np.array([[1.0], [0.0]]))
+    v_1 = 0.01 / 0.8
+    assert rows[0] == pytest.approx([0.01 * v_1, v_1, 0.0, 0.0, 1 / 2.1, 0.0, 0.0])
+    assert rows[1, 2] == pytest.approx((0.8 * v_1**2 + 2.1 * (0.01 * v_1) ** 2) / 2)
+
+
+def test_programs_that_do_not_run_stop_early_or_hang_are_errors(compiler, tmp_path, monkeypatch):
+    (tmp_path / "main").write_bytes(b"\x7fELF of another machine")
+    (tmp_path / "main").chmod(0o755)
+    of_pair, of_mass = CBlock(pair(), DOUBLE), CBlock(mass(), DOUBLE)
+    with pytest.raises(CompileError, match="that was compiled does not start: Exec format"):
+        run_c(of_pair, tmp_path / "main", np.zeros((1, 1)))
+    made = generate(pair(), tmp_path, real="double", kit=False)
+    executable = compiled(of_pair, [made.source("double")], tmp_path, compiler)
+    assert run_c(of_pair, executable, np.ones((2, 1))).tolist() == [[2.0, 2.0, 0.0]] * 2
+    with pytest.raises(CompileError, match="ended too early"):
+        run_c(of_mass, executable, np.zeros((1, 1)))
+    (tmp_path / "main.c").write_text("int main(void) { for (;;) { } }\n")
+    compiler.run(str(tmp_path / "main.c"), "-o", str(tmp_path / "main"))
+    monkeypatch.setattr(runner, "PATIENCE", 0.3)
+    with pytest.raises(CompileError, match="did not end"):
+        run_c(of_mass, tmp_path / "main", np.ones((2, 2)))
+
+
+def test_objects_report_warnings_errors_and_the_symbols_they_need(compiler, tmp_path, monkeypatch):
+    source, target = tmp_path / "a.c", tmp_path / "a.o"
+    source.write_text("float f(double x) { return x; }\n")
+    warnings = compile_object(compiler, source, target)
+    assert len(warnings) == 2
+    assert any("prototype" in warning for warning in warnings)
+    assert any("conver" in warning or "loses" in warning for warning in warnings)
+    source.write_text("int f(void) { return nothing; }\n")
+    with pytest.raises(CompileError, match="nothing"):
+        compile_object(compiler, source, target)
+    source.write_text("float tanhf(float); float g(float); float g(float x) { return tanhf(x); }\n")
+    compile_object(compiler, source, target)
+    assert needed_symbols(target) in ({"tanhf"}, None)
+    monkeypatch.setenv("PATH", "")
+    assert needed_symbols(target) is None

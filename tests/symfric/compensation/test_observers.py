@@ -2,10 +2,9 @@
 
 from itertools import product
 
-import casadi as ca
 import numpy as np
 import pytest
-from proofs import prove
+from one_program import along
 
 from symfric import GMS, LuGre, LuGreNormalised, LuGrePassive, Stribeck
 from symfric.codegen import Block, law_block
@@ -18,14 +17,9 @@ SPRINGS = GMS(form="event", mu_s=6.0, mu_d=4.0)
 
 def rolled(block: Block, rows: np.ndarray, **parameters: float) -> tuple[np.ndarray, np.ndarray]:
     """States and forces after each row of inputs."""
-    p = [parameters.get(v.name, float(v.start)) for v in block.parameters]
-    x = ca.DM([float(v.start) for v in block.states])
-    states, forces = [], []
-    for row in rows:
-        x, y = block.step(x, p, row)
-        states.append(x.full().ravel())
-        forces.append(float(y[0]))
-    return np.array(states), np.array(forces)
+    p = np.array([parameters.get(v.name, float(v.start)) for v in block.parameters])
+    states, outputs = along(block, rows, p)
+    return states, outputs[:, 0]
 
 
 @pytest.mark.parametrize("law", [*LAWS, SPRINGS], ids=lambda law: type(law).__name__)
@@ -135,20 +129,6 @@ def test_the_disturbance_observer_is_stable_up_to_twice_the_mass() -> None:
     ):
         assert slowest(ratio, 1 - np.exp(-wh), delay, order) < 1.0
     assert slowest(2.5, 1 - np.exp(-10.0), 1, 1) > 1.0
-
-
-@pytest.mark.heavy
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: lugre_observer(LAWS[0], 20.0, limit=5.0),
-        lambda: lugre_observer(LAWS[2], 20.0, h=H),
-        lambda: gms_observer(SPRINGS, 20.0),
-        lambda: disturbance_observer(1.0, 200.0, order=2),
-    ],
-)
-def test_the_c_has_the_bits_of_casadi(make, tmp_path, compiler) -> None:
-    prove(make(), tmp_path)
 
 
 def test_units_turn() -> None:

@@ -1,17 +1,14 @@
 """Units of FMI 2.0 through their C interface: the bits of `simulate`, however they are stepped."""
 
 import ctypes as c
+from functools import partial
 
 import numpy as np
 import pytest
 from backends import needs_compiler
-from units import DISCARD, ERROR, OK, Archive, Second, over
-from wires import wire
+from units import DISCARD, ERROR, OK, Second, over
 
-from symfric import Hold, LuGre, simulate
-from symfric.fmu import export_fmu
-from symfric.model import Model
-from symfric.scenes import Drive
+from symfric import Hold, simulate
 
 pytestmark = needs_compiler
 RTOL, SPAN = 1e-9, 2.0
@@ -19,24 +16,9 @@ TIMES = np.arange(17) / 8
 """Whose sums and differences are exact."""
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """An archive and the model in it by name, exported once."""
-    known = {}
-
-    def make(name):
-        if name not in known:
-            folder, what = (
-                tmp_path_factory.mktemp(name),
-                wire() if name == "wire" else Drive(LuGre()),
-            )
-            unit = export_fmu(what, folder / "unit.fmu", fmi=2, rtol=RTOL, t_end=SPAN)
-            tuned = [e.name for e in unit.variables if e.causality == "parameter"][:-1]
-            model = what if isinstance(what, Model) else what.model(tuned)
-            known[name] = Archive(unit.path, folder / "open"), model
-        return known[name]
-
-    return make
+@pytest.fixture
+def made(exported):
+    return partial(exported, rtol=RTOL)
 
 
 def force(times):

@@ -4,40 +4,23 @@ import numpy as np
 import pytest
 from backends import needs_compiler
 from scipy.integrate import solve_ivp
-from units import ERROR, OK, Archive, Rates
+from units import ERROR, OK, Rates
 from wires import wire
 
-from symfric import BrownMcPhee, ExactCoulomb, simulate
+from symfric import simulate
 from symfric.fmu import export_fmu
-from symfric.model import Model
-from symfric.scenes import Drive, Pendulum, SliderCrank
 
 pytestmark = needs_compiler
 KIND = "model-exchange"
 
 
-SCENES = {
-    "wire": wire(),
-    "drive": Drive(BrownMcPhee()),
-    "sticking": Drive(ExactCoulomb()),
-    "pendulum": Pendulum(BrownMcPhee()),
-    "loop": SliderCrank(BrownMcPhee()),
-}
-
-
-@pytest.fixture(scope="module")
-def unit_of(tmp_path_factory):
-    """A new instance and the model in it by name; exported once."""
-    known = {}
+@pytest.fixture
+def unit_of(exported):
+    """A new instance and the model in it by name."""
 
     def make(name):
-        if name not in known:
-            folder, what = tmp_path_factory.mktemp(name), SCENES[name]
-            made = export_fmu(what, folder / "unit.fmu", kind=KIND)
-            tuned = [e.name for e in made.variables if e.causality == "parameter"]
-            model = what if isinstance(what, Model) else what.model(tuned)
-            known[name] = Archive(made.path, folder / "open"), model
-        return Rates(known[name][0]), known[name][1]
+        archive, model = exported(name, 3, kind=KIND)
+        return Rates(archive), model
 
     return make
 
@@ -59,7 +42,7 @@ def test_rates_are_those_of_the_model_at_any_state(unit_of):
 
 
 def test_an_integrator_of_others_follows_simulate(unit_of):
-    unit, model = unit_of("drive")
+    unit, model = unit_of("smooth drive")
     assert unit.begin(force=1.7, v=0.2) == OK
     begun = unit.x
     found = solve_ivp(unit.rates, (0.0, 1.0), begun, method="LSODA", rtol=1e-9, atol=1e-11)
@@ -93,7 +76,7 @@ def test_events_are_seen_carried_out_and_end_the_run(unit_of):
 
 
 def test_a_block_that_sticks_exactly_breaks_away(unit_of):
-    unit, _ = unit_of("sticking")
+    unit, _ = unit_of("sticking drive")
     assert unit.begin(force=0.5) == OK
     while unit.update()[0]:
         pass

@@ -5,27 +5,25 @@ import ctypes as c
 import numpy as np
 import pytest
 from backends import needs_compiler
-from units import DISCARD, ERROR, OK, Archive, Third, over
+from units import DISCARD, ERROR, OK, Third, over
 
-from symfric import BrownMcPhee, LuGre, simulate
+from symfric import simulate
 from symfric.codegen import plant_block
+from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import run_vm
 from symfric.emitter.c99 import DOUBLE
-from symfric.fmu import export_fmu
-from symfric.scenes import Drive, Pendulum, SliderCrank
 
 pytestmark = needs_compiler
 RTOL = 1e-9
 
 
-def unit_of(what, folder, **how):
-    made = export_fmu(what, folder / "unit.fmu", rtol=RTOL, **how)
-    tuned = [e.name for e in made.variables if e.causality == "parameter"][:-1]
-    return Third(Archive(made.path, folder / "open")), what.model(tuned)
+def unit_of(exported, name, **options):
+    archive, model = exported(name, 3, rtol=RTOL, **options)
+    return Third(archive), model
 
 
-def test_a_mechanism_has_the_bits_of_simulate(tmp_path):
-    unit, model = unit_of(Pendulum(BrownMcPhee()), tmp_path, t_end=2.0)
+def test_a_mechanism_has_the_bits_of_simulate(exported):
+    unit, model = unit_of(exported, "pendulum")
     times = np.arange(9) / 4
     assert unit.begin(stop=2.0) == OK
     found = over(unit, times, list(model.signals))
@@ -38,8 +36,8 @@ def test_a_mechanism_has_the_bits_of_simulate(tmp_path):
 
 
 @pytest.mark.heavy
-def test_a_mechanism_with_loops_starts_closed_where_it_is_told(tmp_path):
-    unit, model = unit_of(SliderCrank(BrownMcPhee()), tmp_path, t_end=0.5)
+def test_a_mechanism_with_loops_starts_closed_where_it_is_told(exported):
+    unit, model = unit_of(exported, "loop")
     x0 = {"crank": 1.1}
     assert unit.begin(**x0) == OK
     times = np.arange(5) / 8
@@ -51,13 +49,13 @@ def test_a_mechanism_with_loops_starts_closed_where_it_is_told(tmp_path):
     unit.free()
 
 
-def test_steps_of_a_fixed_length_are_those_of_the_plant(tmp_path):
-    unit, model = unit_of(Drive(LuGre()), tmp_path, step=1e-3)
+def test_steps_of_a_fixed_length_are_those_of_the_plant(exported):
+    unit, model = unit_of(exported, "drive", step=1e-3)
     assert unit.begin(force=1.7) == OK
     times = np.arange(33) / 8 * 0.25
     found = over(unit, times, ["x", "v", "attempts"])
     block = plant_block(model, h=1 / 1024, name="plant")
-    same = run_vm(block, DOUBLE, np.full((1024, 1), 1.7))
+    same = run_vm(CBlock(block, DOUBLE), np.full((1024, 1), 1.7))
     names = [*(s.name for s in block.states), *block.outputs]
     assert found[-1, 2] == 1024  # 1/32 s in 32 equal steps of at most 1 ms
     for i, name in enumerate(("x", "v")):
@@ -70,8 +68,8 @@ def test_steps_of_a_fixed_length_are_those_of_the_plant(tmp_path):
     unit.free()
 
 
-def test_all_calls_of_the_standard_are_there_and_refuse_what_no_unit_has(tmp_path):
-    unit, _ = unit_of(Drive(BrownMcPhee()), tmp_path)
+def test_all_calls_of_the_standard_are_there_and_refuse_what_no_unit_has(exported):
+    unit, _ = unit_of(exported, "drive", step=1e-3)
     one, number, flag = (c.c_uint32 * 1)(0), (c.c_int32 * 1)(), c.c_size_t(1)
     assert unit.call("GetInt32", one, flag, number, flag) == ERROR
     assert unit.call("GetInt32", one, c.c_size_t(0), number, c.c_size_t(0)) == OK

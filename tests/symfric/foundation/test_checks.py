@@ -77,6 +77,7 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: checks.array("w", [1.0, np.nan]), "expected finite numbers, got nan at 1"),
     (lambda: checks.array("w", ca.SX.sym("a", 2)), "expected a sequence of numbers, got "),
     (lambda: checks.times("w", []), r"expected increasing times \[s\], got none"),
+    (lambda: checks.times("w", [0, 1, 1]), "got 1 after 1 s"),
     (lambda: checks.times("w", [1, 1]), r"expected increasing times \[s\], got 1 after 1 s"),
     (lambda: checks.times("w", [1, 3], 0, 2), r"times in \[0, 2\] s, got 1 ... 3 s"),
     (lambda: checks.path("w", ""), "expected a path, such as 'run.csv', got ''"),

@@ -37,6 +37,7 @@ def test_error_half_way_keeps_the_old_file_and_leaves_nothing(tmp_path: Path) ->
                 target.write_text(text)
             with pytest.raises(error), written(target) as temporary:
                 assert (temporary.suffix, temporary.parent) == (".csv", tmp_path)
+                assert temporary.exists()
                 temporary.write_text("half")
                 raise error
             assert [path.read_text() for path in tmp_path.iterdir()] == old

@@ -169,6 +169,8 @@ def test_user_constraints_load_bodies_where_they_hold_them() -> None:
     for joint, wrench in tree.reactions.items():
         assert wrench == pytest.approx(whole.reactions[joint], rel=1e-9, abs=1e-8), joint
     assert tree.a[1] == pytest.approx(0.0, abs=1e-10)
+    at = made[1].labels.index("own_lambda_1")
+    assert tree.lam[:2] == pytest.approx(whole.lam[at : at + 2], rel=1e-9)
 
 
 def test_start_against_a_drive_is_refused_and_a_fitting_one_offered() -> None:

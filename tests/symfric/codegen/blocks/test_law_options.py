@@ -1,0 +1,170 @@
+"""Parameters, texts and refusals of blocks of laws, and contacts of populations."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import (
+    Dahl,
+    GenericAsperity,
+    LuGre,
+    RandomBristles,
+    Stribeck,
+    Sum,
+    law_from_text,
+    parameters,
+)
+from symfric.codegen import contact_block, generate, law_block
+from symfric.codegen.blocks.held_step import held_step
+from symfric.foundation.graph import graph
+from symfric.laws import (
+    GMS,
+    Asymmetric,
+    BrownMcPhee,
+    ExactCoulomb,
+    Karnopp,
+    Leuven,
+    SelfTuning,
+)
+
+z2 = ca.SX.sym("z", 2)
+
+
+def names_of(law, **options):
+    return [p.name for p in law_block(law, **options).parameters]
+
+
+@pytest.mark.parametrize(
+    ("law", "constants"),
+    [
+        (law_from_text("coulomb"), set()),
+        (law_from_text("coulomb+coulomb"), set()),
+        (BrownMcPhee(), {"mu_v", "N_t"}),
+        (BrownMcPhee(mu_v=0.4), set()),
+        (BrownMcPhee(mu_s=0.1, mu_d=0.1), {"mu_v", "N_t"}),
+        (SelfTuning(), {"E"}),
+        (SelfTuning(E=0.5), set()),
+        (Stribeck(), {"delta"}),
+        (Stribeck(delta=0.78), set()),
+        (LuGre(mu_s=0.1, mu_d=0.1), {"delta"}),
+        (LuGre(delta=1.5), set()),
+        (LuGre(delta=1.5, v_eps=0.0), {"v_eps"}),
+        (Dahl(), {"n", "rho_eps"}),
+        (law_from_text("load_dependent(lugre)"), {"delta"}),
+        (law_from_text("asymmetric(lugre)"), {"delta_pos", "delta_neg"}),
+        (Asymmetric(Stribeck(), Stribeck(delta=1.5)), set()),
+        (law_from_text("lugre+lugre"), {"delta_1", "delta_2"}),
+    ],
+    ids=lambda value: str(sorted(value) if isinstance(value, set) else value),
+)
+def test_only_values_that_save_a_function_call_or_have_no_effect_become_constants(law, constants):
+    assert set(parameters(law)) - set(names_of(law)) == constants
+
+
+def test_free_and_fold_choose_parameters_and_constants_save_operations():
+    law = LuGre()
+    assert names_of(law, fold=("mu_s", "v_eps")) == [
+        "mu_d", "v_s", "sigma_0", "sigma_1", "sigma_2", "h"
+    ]  # fmt: skip
+    assert law_block(law, fold=("mu_s", "v_eps")).constants == {
+        "mu_s": 0.15, "v_eps": 1e-15, "delta": 2.0
+    }  # fmt: skip
+    assert names_of(law, fold=True) == ["h"]
+    assert names_of(law, fold=True, h=1e-3) == []
+    block = law_block(law, free=("mu_s", "delta"), h=2e-3)
+    assert [p.name for p in block.parameters] == ["mu_s", "delta"]
+    assert block.constants["h"] == 2e-3
+    assert set(block.constants) == {"h", *parameters(law)} - {"mu_s", "delta"}
+
+    def operations(**options) -> int:
+        return graph(law_block(law, **options).step).operations
+
+    counts = [operations(free=tuple(parameters(law))), operations(), operations(free=("mu_s",)),
+              operations(free=(), h=1e-3)]  # fmt: skip
+    assert counts == sorted(counts, reverse=True)
+    assert len(set(counts)) == 4
+    assert operations(fold=True, h=1e-3) == counts[-1] <= counts[0] - 8
+
+
+def test_names_and_texts_are_those_of_the_law_and_its_parts():
+    for text, name in (("lugre", "lugre"), ("coulomb+viscous", "coulomb_viscous"),
+                       ("asymmetric(coulomb+viscous)", "asymmetric_coulomb_viscous")):  # fmt: skip
+        assert law_block(law_from_text(text)).name == name
+    block = law_block(law_from_text("asymmetric(coulomb+viscous)"))
+    assert block.equations.count("F = mu_d N s(v / v_eps)") == 1
+    assert block.equations.count("F = sigma_2 v") == 1
+    assert block.doc.startswith("Law with different parameters")
+    static = law_block(Stribeck(sigma_2=0.4))
+    assert static.is_function
+    F = float(static.step([], [float(p.start) for p in static.parameters], [3e-4, 8.0])[1])
+    assert pytest.approx(float(Stribeck(sigma_2=0.4).force(3e-4, 8.0)), rel=1e-14) == F
+
+
+def test_contacts_in_a_loop_are_the_population_of_numpy():
+    law, h, N = GenericAsperity(seed=5), 1e-4, 10.0
+    block, n = contact_block(law, h=h), 200
+    t = np.arange(n + 1) * h
+    x = 2e-5 * np.sin(40 * t)
+    start, v = law.begin(), np.diff(x) / h
+    step, z, F = block.step.map(len(start.r)), start.z, np.zeros(n)
+    for k in range(n):
+        u = np.stack([np.full(len(start.r), v[k]), np.full(len(start.r), N), start.r])
+        z, f = step(z, np.zeros((0, len(start.r))), u)
+        F[k] = float(ca.sum2(f))
+    np.testing.assert_allclose(F, law.force(t, x, N)[1:], rtol=1e-9, atol=1e-12)
+    other = contact_block(RandomBristles(), h=1e-3)
+    assert any("draw r anew" in text for text in other.use)
+    assert (other.constants["count"], other.constants["h"]) == (25.0, 1e-3)
+    assert [v.name for v in other.inputs] == ["v", "N", "r"]
+    assert [v.name for v in contact_block(law, name="one").parameters] == ["h"]
+
+
+@pytest.mark.parametrize(
+    ("law", "options", "message"),
+    [
+        (GMS(), {}, "gms.*states that have circular dependencies; gms with form = 'event'"),
+        (Leuven(), {}, "have circular dependencies"),
+        (Sum((LuGre(), Leuven())), {}, "have circular dependencies"),
+        (ExactCoulomb(), {}, "modes follow zero crossings within the step; karnopp and leine"),
+        (Sum((LuGre(), ExactCoulomb())), {}, "modes follow zero crossings"),
+        (Karnopp(form="event"), {}, "got one whose modes follow zero crossings"),
+        (Dahl(), {"free": ("rho_eps",)}, "free: expected parameters that have an effect"),
+        (LuGre(), {"free": ("mu_x",)}, "got mu_x; did you mean mu_"),
+        (LuGre(), {"free": ("mu_s", "mu_s")}, "every name once"),
+        (LuGre(v_eps=0.0), {"free": ("v_eps",)}, "finite force at rest"),
+        (LuGre(mu_s=ca.SX.sym("mu_s")), {}, "numbers as parameters, got symbols .'mu_s'"),
+        (LuGre(), {"h": 0.0}, r"h: expected a number > 0 \[s\]"),
+        (LuGre(), {"h": float("nan")}, r"h: expected a number > 0 \[s\]"),
+        (LuGre(), {"name": "my law"}, "C identifier, got 'my law'"),
+        (LuGre(), {"free": ("mu_s",), "fold": True}, "fold: expected none with free"),
+        (LuGre(), {"fold": ("mu_z",)}, "fold: expected one of"),
+        (LuGre(), {"fold": False}, "expected True, names, or None for the default, got False"),
+        (Stribeck(), {"h": 1e-3}, "h: expected none for a law without states, which has no step"),
+        (Stribeck(), {"h": 1e-3, "fold": ("a",)}, "fold: expected.*; h: expected none"),
+    ],
+)
+def test_bad_laws_and_options_are_refused(law, options, message):
+    with pytest.raises(ValueError, match=message):
+        law_block(law, **options)
+
+
+@pytest.mark.parametrize(
+    ("rate", "message"),
+    [
+        (ca.vertcat(z2[1], -z2[0]), "here: .* have circular dependencies"),
+        (ca.vertcat(z2[1] - z2[0] ** 3, -z2[1]), "here: .* states that depend on others"),
+    ],
+)
+def test_rates_without_a_step_are_refused(rate, message):
+    with pytest.raises(ValueError, match=message):
+        held_step(rate, z2, 0.1, ca.SX([0.0, 0.0]), "here")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [({"h": 0.0}, "h: expected a number > 0"), ({"free": ("k",)}, "with a law only, got a popul"),
+     ({"name": "a b"}, "C identifier")],
+)  # fmt: skip
+def test_bad_options_of_a_population_are_refused(options, message, tmp_path):
+    with pytest.raises(ValueError, match=message):
+        generate(GenericAsperity(), tmp_path, **options, kit=False)
