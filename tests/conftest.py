@@ -1,5 +1,6 @@
 """Settings of the whole test suite."""
 
+import signal
 import sys
 from collections.abc import Iterator
 
@@ -26,6 +27,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     stored.chosen["update"] = config.getoption("--update-golden")
     stored.chosen["recompute"] = config.getoption("--recompute")
+    # A shell lets its background jobs ignore SIGINT, which the tests of Ctrl-C raise.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(autouse=True)
