@@ -10,6 +10,7 @@ from symfric import Viscous, simulate
 from symfric.foundation.parameters import Variable
 from symfric.laws import Law
 from symfric.multibody import (
+    Cylindrical,
     Distance,
     Mechanism,
     Planar,
@@ -20,7 +21,7 @@ from symfric.multibody import (
     functions,
 )
 from symfric.multibody.kinematics import Kinematics
-from symfric.scenes import SliderCrank
+from symfric.scenes import FourBar, SliderCrank
 
 pytestmark = pytest.mark.heavy
 
@@ -216,3 +217,49 @@ def test_derivatives_by_a_parameter_of_the_motion_are_exact() -> None:
     m.constraint(PrescribedMotion("drive", "crank", lambda t: A.symbol * ca.sin(OMEGA * t)))
     run = simulate(m.build((A,)), 0.5, sensitivities=("A",), samples=11)
     assert run.sensitivities["A"]["crank"] == pytest.approx(np.sin(OMEGA * run.t), abs=1e-12)
+
+
+def test_a_hinge_that_closes_a_loop_is_driven_through_full_turns() -> None:
+    """The crank's own hinge, cylindrical, is cut; the coupler pin fixes the rest."""
+    scene = FourBar(SMOOTH)
+    free = scene.mechanism()
+    m = scene.mechanism()
+    crank, coupler, rocker, pin = m.joints
+    m.joints = [
+        Cylindrical("crank", crank.parent, crank.child),
+        coupler,
+        rocker,
+        Revolute("pin", pin.parent, pin.child),
+    ]
+    beta, gamma, beta_rate, gamma_rate = scene.closed()
+    m.joints[1] = Revolute("coupler", "coupler_rod.far", "rocker_rod.far",
+                           gamma - beta, gamma_rate - beta_rate)  # fmt: skip
+    m.joints[3] = Revolute("knee", "coupler_rod.near", "crank_rod.far",
+                           1.0 - beta, 10.0 - beta_rate)  # fmt: skip
+    m.constraint(PrescribedMotion("drive", "crank", lambda t: 1.0 + 10.0 * t))
+    free.constraint(PrescribedMotion("drive", "theta_crank", lambda t: 1.0 + 10.0 * t))
+    cut, whole = (simulate(each.build(), 2.0, rtol=1e-6, samples=201) for each in (m, free))
+    assert cut["theta_rocker"] == pytest.approx(whole["theta_rocker"], abs=1e-12)
+    assert cut["drive_moment"] == pytest.approx(whole["drive_moment"], abs=1e-9)
+    assert np.ptp(whole["theta_crank"]) == pytest.approx(20.0)
+
+
+@in_both
+def test_energy_changes_by_the_power_of_the_drive(formulation: str) -> None:
+    m = chain()
+    q, qd = (values[0] for values in begin(Revolute, 0))
+    m.constraint(PrescribedMotion("d", "j0", lambda t: q + qd * t + t * t))
+    made = m.prepare(formulation=formulation)
+    eq = made.eq
+    T_dot = ca.jtimes(eq.kinetic, eq.q, eq.qd) + ca.jtimes(eq.kinetic, eq.qd, eq.a)
+    arguments = [eq.q, eq.qd, eq.a, eq.lam, eq.kin.t]
+    values = ca.Function("power", arguments, [T_dot, eq.power])
+    found = solve(eq, made.q0, made.qd0)
+    rate, power = (float(x) for x in values.call([made.q0, made.qd0, found.a, found.lam, 0.0]))
+    weights = m.prepare().eq
+    without = ca.Function("p", [weights.q, weights.qd], [ca.jtimes(weights.potential, weights.q,
+                          weights.qd)])  # fmt: skip
+    tree = m.prepare()
+    drive = found.lam[made.labels.index("d_moment")] * qd
+    assert rate == pytest.approx(power, rel=1e-9)
+    assert power == pytest.approx(drive - float(without(tree.q0, tree.qd0)), rel=1e-9)

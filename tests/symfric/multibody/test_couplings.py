@@ -4,7 +4,7 @@ from math import pi, sin
 
 import numpy as np
 import pytest
-from chains import Y, solve
+from chains import X, Y, Z, solve
 
 from symfric import simulate
 from symfric.foundation.numeric import Scalar
@@ -16,6 +16,7 @@ from symfric.multibody import (
     Mechanism,
     Planar,
     PrescribedMotion,
+    Prismatic,
     Revolute,
     Rolling,
     Screw,
@@ -175,3 +176,24 @@ def test_an_offset_is_part_of_a_consistent_start() -> None:
         m.build()
     start = m.assembled().build().initial_state()
     assert start[1] == pytest.approx(2.0 * start[0] + 0.5)
+
+
+@in_both
+def test_a_pinion_and_its_rack_feel_each_others_inertia(formulation: str) -> None:
+    """Force 5 N on the rack: a = 5 / (m + J / r^2)."""
+    m = Mechanism("rack")
+    m.body("rack", 2.0, (0.1, 0.1, 0.1))
+    m.body("pinion", 1.0, (0.1, 0.1, 0.06))
+    m.frame("ground.rail", z=X, x=Z)
+    m.frame("rack.rail", z=X, x=Z)
+    m.frame("ground.pivot", at=(0.0, 0.1, 0.0))
+    m.joint(Prismatic("x", "ground.rail", "rack.rail"))
+    m.joint(Revolute("angle", "ground.pivot", "pinion"))
+    m.constraint(Rolling("mesh", "angle", "x", radius=-0.1))
+    m.force(JointSpringDamper("push", "x", "slide", actuator=5.0))
+    made = m.prepare(formulation=formulation)
+    found = solve(made.eq, made.q0, made.qd0)
+    a = 5.0 / (2.0 + 0.06 / 0.01)
+    assert found.bodies["rack"][3] == pytest.approx(a, rel=1e-13)
+    assert found.bodies["pinion"][2] == pytest.approx(-a / 0.1, rel=1e-13)
+    assert found.lam[made.labels.index("mesh_force")] == pytest.approx(2.0 * a - 5.0, rel=1e-12)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from chains import X, Y, Z, rod
 
-from symfric import BrownMcPhee, LuGre, Viscous, simulate
+from symfric import BrownMcPhee, LuGre, SolveError, Viscous, simulate
 from symfric.foundation.parameters import Variable
 from symfric.multibody import (
     Distance,
@@ -206,3 +206,9 @@ def test_a_free_body_spins_as_it_must(formulation: str) -> None:
     assert run["constraint_position"].max() < 1e-12
     name = "pose" if formulation == "joint" else "stone"
     assert run[f"{name}_x"] == pytest.approx(run.t, abs=1e-9)
+
+
+def test_a_mechanism_that_falls_into_a_dead_centre_says_so() -> None:
+    """All links of the parallelogram in one line: it may go on as one or folded."""
+    with pytest.raises(SolveError, match="the configuration is singular: constraints depend"):
+        simulate(four_bar(PointOnLine).build(), 1.0, rtol=1e-9)
