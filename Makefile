@@ -1,7 +1,7 @@
 # make demo, test, docs, check, stress, mutants, embedded: each makes its own virtual environment .venv when
 # there is none. PYTHON=... chooses the interpreter (3.11 or newer). make newest: the fast half of the
 # tests on the newest interpreter there is, with the newest NumPy, in .venv-newest. make extras: tests
-# beside other tools (FMPy, NVRTC, Pinocchio, rockit, do-mpc) in .venv-extras.
+# beside other tools (FMPy, NVRTC, Pinocchio, rockit, do-mpc, Dask) in .venv-extras.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
@@ -40,11 +40,11 @@ newest:
 # What other tools say of units, kernels and robots; where their wheels cannot be had, it says so.
 extras:
 	@$(MAKE) VENV=.venv-extras .venv-extras/.test
-	@if .venv-extras/bin/python -m pip install --quiet --editable ".[fmu,cuda-check,pinocchio,interop]"; then \
+	@if .venv-extras/bin/python -m pip install --quiet --editable ".[fmu,cuda-check,pinocchio,interop,cluster]"; then \
 		.venv-extras/bin/python -m pytest -n auto --dist loadfile -p no:cacheprovider \
 			tests/interop tests/symfric/fmu tests/symfric/integrator/cuda tests/symfric/codegen/blocks \
 			tests/symfric/multibody/test_urdf_pinocchio.py tests/symfric/multibody/urdf; \
-	else echo "extras: the wheels of FMPy, NVRTC, Pinocchio, rockit or do-mpc cannot be had here, nothing run"; fi
+	else echo "extras: the wheels of FMPy, NVRTC, Pinocchio, rockit, do-mpc or Dask cannot be had here, nothing run"; fi
 
 stress: $(VENV)/.test
 	$(BIN)/python -m pytest -m slow

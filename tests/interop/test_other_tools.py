@@ -7,7 +7,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from ensembles import assert_same
 
+from symfric import LuGre, rabinowicz, simulate_many
 from symfric.bench.interop import LAWS, ROUTES, integrators, move
 from symfric.bench.report import Row
 
@@ -105,3 +107,18 @@ def test_do_mpc_example(tmp_path: Path) -> None:
 def test_examples_are_short() -> None:
     for path in EXAMPLES.glob("*.py"):
         assert len(path.read_text("utf-8").splitlines()) <= 100
+
+
+def test_executor_of_dask_gives_the_same() -> None:
+    distributed = pytest.importorskip("distributed", reason="extra: pip install symfric[cluster]")
+    model, x0 = rabinowicz(LuGre()), {"v": [-0.1, -0.03, 0.02, 0.1]}
+    serial = simulate_many(model, 2.0, x0=x0, executor="serial", chunk=1)
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+        client.get_executor() as executor,
+    ):
+        other = simulate_many(model, 2.0, x0=x0, executor=executor, chunk=1, workers=2)
+    assert_same(serial, other)

@@ -234,21 +234,6 @@ def test_every_executor_gives_the_same(case: str, backend: str) -> None:
             alone_as(serial, m, model, t_end, backend=backend, **given)
 
 
-def test_executor_of_dask_gives_the_same() -> None:
-    distributed = pytest.importorskip("distributed", reason="extra: pip install symfric[cluster]")
-    model, x0 = rabinowicz(LuGre()), {"v": VELOCITIES}
-    serial = simulate_many(model, 2.0, x0=x0, executor="serial", chunk=2)
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=None
-        ) as cluster,
-        distributed.Client(cluster) as client,
-        client.get_executor() as executor,
-    ):
-        other = simulate_many(model, 2.0, x0=x0, executor=executor, chunk=2, workers=2)
-    assert_same(serial, other)
-
-
 def test_a_dead_worker_leaves_the_finished_members() -> None:
     model = rabinowicz(BrownMcPhee(), free=["m"])
     with (
