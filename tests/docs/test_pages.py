@@ -7,31 +7,24 @@ from pathlib import Path
 import pytest
 
 from docs.machine.pages import (
-    DOCS,
     ROOT,
     agrees,
     blocks,
     commands,
     differences,
-    made_pictures,
     main,
     run,
     written_pages,
 )
 from symfric.cli.app import COMMANDS
 
-FIRST = (ROOT / "README.md", DOCS / "start" / "first_steps.md")
 
-
-@pytest.mark.parametrize("page", FIRST, ids=lambda page: page.stem)
-def test_the_first_pages_print_their_text(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_readme_prints_its_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = ROOT / "README.md"
     monkeypatch.chdir(tmp_path)
     assert not [*differences(page)]
     text = page.read_text("utf-8")
     assert any(block.prints for block in blocks(text))
-    assert all((tmp_path / name).exists() for name in made_pictures(text, page.parent))
 
 
 def test_every_page_has_valid_blocks() -> None:
