@@ -1,12 +1,14 @@
-"""Benchmarks of many short calls, and of events.
+"""Benchmarks of many short calls, of events, and of imports.
 
 Times are processor times of whole calls from Python, the shortest of several rounds in which all
 methods take turns. Ratios are relative to the first method of each task, which is symfric.
 """
 
+import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from math import nan
+from subprocess import run
 
 import casadi as ca
 import numpy as np
@@ -160,4 +162,26 @@ def _gms(count: int, form: str) -> Law:
     return GMS(elements=tuple(Element(float(k), 1.0 / count) for k in stiffness), form=form)
 
 
-TASKS = (_drive, _arm, _events)
+# ---- imports in a new interpreter ----
+
+IMPORTS: tuple[str, ...] = (
+    "import symfric",
+    "from symfric import LuGre, rabinowicz, simulate",
+    "from ocp import solve",
+    "from identification import Fit",
+    "import casadi",
+)
+
+
+def _imports(quick: bool) -> Iterator[Found]:
+    """Measure imports of the packages, and of CasADi alone."""
+    times = dict.fromkeys(IMPORTS, np.inf)
+    for _ in range(1 if quick else 7):
+        for text in IMPORTS:
+            code = f"from time import process_time as now; t = now(); {text}; print(now() - t)"
+            done = run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+            times[text] = min(times[text], float(done.stdout))
+    yield from _rows("import", "import", times)
+
+
+TASKS = (_drive, _arm, _events, _imports)

@@ -130,7 +130,7 @@ def test_every_kind_of_number_is_taken_by_the_tools() -> None:
     truth = sf.simulate(belt, 0.05, t_eval=t, x0={"v": 0.5})
     for kind in PLAIN:
         problem = ocp.rest_to_rest(model, kind(0.5), kind(2.0), limit=kind(16.0))
-        assert problem.spans[0].box("force") == (-16.0, 16.0)
+        assert problem.spans[0].boxes["force"] == (-16.0, 16.0)
         assert ocp.Free(kind(0.5), kind(2.0)).start == 1.0
         assert (kind(0.5) if kind is float else 0.5) * ocp.TIME
         assert ocp.TIME * kind(0.5)

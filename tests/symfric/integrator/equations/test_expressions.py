@@ -141,12 +141,14 @@ def test_amplitudes_are_one_integrator_and_one_call_of_the_compiler(
     monkeypatch: pytest.MonkeyPatch, tmp_path: object
 ) -> None:
     builds, compilations = list[str](), list[str]()
-    build, make = Integrator.__post_init__, compiler._made  # pyright: ignore[reportPrivateUsage]
+    build, begin = Integrator.__post_init__, compiler.Cache.begin
     monkeypatch.setenv("SYMFRIC_CACHE", str(tmp_path))
     monkeypatch.setattr(
         Integrator, "__post_init__", lambda self: builds.append(self.model.name) or build(self)
     )
-    monkeypatch.setattr(compiler, "_made", lambda *a: compilations.append(a[1]) or make(*a))
+    monkeypatch.setattr(
+        compiler.Cache, "begin", lambda self, key: compilations.append(key) or begin(self, key)
+    )
     backend, model, ends = "vm" if find_compiler() is None else "compiled", drive(Viscous()), set()
     for k in range(6):
         late, w = 0.02 * (5.0 + k), 5.0 + k
