@@ -190,7 +190,7 @@ def _divided(data: Dataset, folds: int) -> tuple[list[tuple[Dataset, Dataset]], 
 
 
 def _blocked(data: Dataset, k: int, folds: int) -> tuple[list[Record], list[Record]]:
-    """Return the samples of each record outside block k and its gaps, and those of the block."""
+    """Return the samples of each record beyond a gap around block k, and those of block k."""
     rest, part = list[Record](), list[Record]()
     for record in data:
         first, last = (round(j * record.size / folds) for j in (k, k + 1))

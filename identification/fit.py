@@ -62,7 +62,7 @@ class Fit:
         data: one or several records.
         free: names, or name -> a start value, (lower, upper), `log(...)`, `linear(...)`,
             `above(name)`, `tied(name, factor)`. These are fitted in addition to the parameters
-            fitted by their role; for a model, to all. "x0" and "dead_time" are passed to `kind`.
+            fitted by their role; of a model, all are. "x0" and "dead_time" are passed to `kind`.
         fixed: name -> value of parameters held constant; "others": all that are not in `free`.
         normal_force: normal force of a law [N]; with 1 N its coefficients are forces.
         noise: "estimate", or signal -> standard deviation [SI]; others are estimated.
@@ -70,7 +70,7 @@ class Fit:
         starts: largest number of starts; fewer if others are unnecessary (see `many_starts`).
         start: parameter -> value; or "data", estimates from the data; or "law", values of the law.
         seed: random seed of the starts after the first.
-        evaluations: limit of residual evaluations of each start; the best start gets twice as many.
+        evaluations: limit of residual evaluations of a start; twice as many for the best start.
 
     Raises:
         ValueError: invalid arguments; from `solve`, invalid names and bounds, all in one error.
@@ -246,7 +246,7 @@ class Prepared:
 
 
 def _status(asked: Prepared, end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:
-    """Return status and message of the fit; `gain` is that of `Verdict.status`."""
+    """Return status and message of the fit; `gain` is an argument of `Verdict.status`."""
     status, message = verdict.status(end.status, gain), end.message
     if status is Status.DOUBTFUL and not end.status.ok:
         message = f"The search was not finished; a better fit may be near: {message}"

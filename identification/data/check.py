@@ -1,4 +1,4 @@
-"""Check of a data set, and the checks of times, points, units and of the force given the motion."""
+"""Checks of a data set: times, points, units, and consistency of the force with the motion."""
 
 from collections.abc import Iterator, Mapping, Sequence
 

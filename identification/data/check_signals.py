@@ -106,7 +106,7 @@ def of_clipping(view: View) -> Iterator[Finding]:
 
 
 def _limited(view: View, signal: str, tops: list[float]) -> tuple[Severity, str]:
-    """Return severity and reason; it is an error if only the measurement was limited."""
+    """Return severity and reason: an error if only the measurement was limited."""
     unsure = "the amplifier or the sensor was at its limit there"
     model = rough_model(view, curve=True) if signal == view.name("force") else None
     if model is None or view.steady is None:
@@ -219,7 +219,7 @@ def _force_jumps(view: View, k: int) -> bool:
 
 
 def _period(x: Array, far: NDArray[np.intp]) -> float:
-    """Return the median size of the jumps, corrected by the regular motion during a step."""
+    """Return the period of a wrap, the median of the jumps plus the regular motion of a step."""
     steps = np.abs(np.diff(x))
     found: list[float] = []
     for k in far[(far > 4) & (far < steps.size - 5)].tolist():
@@ -274,7 +274,7 @@ KNOWN = {
 
 
 def of_velocity(view: View) -> Iterator[Finding]:
-    """Find a velocity or an acceleration that differs from the derivative of its integral."""
+    """Find a velocity or acceleration that differs from the derivative of position or velocity."""
     record = view.steady
     if record is None or record.size < 100:
         return

@@ -19,7 +19,7 @@ from symfric.foundation import checks
 Array = NDArray[np.float64]
 
 LOBES = 3
-"""Zero crossings of the decimation filter on each side; a small number affects fewer rows."""
+"""Zero crossings of the decimation filter on each side; few, so a reversal affects few rows."""
 PASS = 0.9
 """Cut-off (-6 dB) of the decimation filter, relative to the Nyquist frequency after decimation."""
 ABOVE = 4.0

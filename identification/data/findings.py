@@ -133,7 +133,7 @@ class View:
         return self.record.signals[self.roles[role]] if role in self.roles else None
 
     def known(self) -> Iterator[tuple[str, Array, str]]:
-        """Yield name, values and unit of signals with a part or a unit that vary and are long.
+        """Yield name, values and unit of long, varying signals that have a part or a unit.
 
         Signals without part and unit may be predictions of a model.
         """

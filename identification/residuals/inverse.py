@@ -146,7 +146,7 @@ class Motion(NamedTuple):
 
     @property
     def inside(self) -> slice:
-        """Samples not affected by the ends of the record in the filter."""
+        """Samples unaffected by the end effects of the filter."""
         return self.filter.inside(self.t.size, self.step)
 
     @property

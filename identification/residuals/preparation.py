@@ -166,7 +166,10 @@ class Preparation:
         return found
 
     def _timeless(self) -> bool:
-        """Return True if the motion does not depend on time; 1e9 s would limit its resolution."""
+        """Return True if the motion does not depend on the origin of time.
+
+        Windows then start near t = 0, because steps are not resolved at times such as 1e9 s.
+        """
         model, outputs = self.model, self.model.outputs
         given = [outputs[n].expression for n in self.signals if n in outputs]
         parts = [e for e in (model.ode, model.alg, model.residual, *given) if e is not None]
@@ -200,7 +203,7 @@ class Preparation:
     # ---- windows of records
 
     def _cut(self, number: int, record: Record, row: int) -> Iterator[Shot]:
-        """Yield the windows of one record; the residuals of each signal follow from `row` on."""
+        """Yield the windows of one record, whose residuals begin at `row`, sorted by signal."""
         origin = float(record.time[0]) if self.timeless else 0.0
         t = record.time - origin
         measured = {s: record[c] for s, c in self.signals.items() if c in record}

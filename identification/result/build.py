@@ -234,7 +234,7 @@ def _series(live: Live, records: Sequence[str], verdict: Verdict) -> tuple[Serie
 
 
 def _curve(live: Live) -> Curve | None:
-    """Return friction over velocity for a law in a drive or fitted to points, else None."""
+    """Return friction over velocity of a law in a drive or fitted to points; None for others."""
     law, machine, data = live.closed.law, live.closed.scene, live.data
     if isinstance(machine, Drive):
         return of_drive(machine, data.records)

@@ -127,7 +127,7 @@ class Fitted(packed.Portable, Outcome):
         return profile(live.task, live.point, live.covariance, name, points)
 
     def alive(self, what: str) -> Live:
-        """Return the problem and its minimum; the operation `what` is named in messages.
+        """Return the problem and its minimum; `what` names the operation in messages.
 
         Raises:
             ValueError: the fit is from JSON, or was stored and had been called with functions.

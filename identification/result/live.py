@@ -32,7 +32,7 @@ class Kind(Protocol):
 
 
 class Question(Protocol):
-    """Arguments of a fit, such as those of `identification.fit.Fit`."""
+    """Arguments of a fit, implemented by `identification.fit.Fit`."""
 
     def live(self, noise: dict[str, float], w: Array) -> "Live":
         """Return the problem with its end at the coordinates `w`."""

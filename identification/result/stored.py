@@ -165,7 +165,7 @@ def source_of(law: Law) -> str:
 
 
 def known(data: Any, own: Mapping[str, type[Parametric]]) -> bool:
-    """Return True if all classes in the output of `to_data` are known, here or in `own`."""
+    """Return True if all classes in the output of `to_data` are in `KINDS` or in `own`."""
     if isinstance(data, Mapping):
         named = data.get("kind") in KINDS or data.get("kind") in own  # pyright: ignore
         return named and all(known(one, own) for one in data.values())  # pyright: ignore

@@ -41,7 +41,7 @@ LEAST = 4
 @final
 @dataclass(frozen=True)
 class Step:
-    """Step with its number, its meaning, the number of points used, and the values."""
+    """Step of the procedure with number, meaning, number of points used, and values."""
 
     number: int
     what: str

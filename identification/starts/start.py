@@ -229,7 +229,10 @@ def _constructible(what: Law | Drive, values: Mapping[str, float]) -> dict[str, 
 
 
 def _inside(parameter: Parameter, value: float) -> float:
-    """Return `value` inside the bounds; a positive lower bound is at least 1e-6 of the default."""
+    """Return `value` inside the bounds.
+
+    A positive lower bound is raised to a millionth of the parameter's value if it is smaller.
+    """
     own = float(parameter.value)
     least = parameter.lower
     if 0 < least < 1e-6 * abs(own):
@@ -308,7 +311,10 @@ def element_values(
 
 
 def _as_if_slow(friction: Measured, curve: StribeckCurve) -> Measured:
-    """Return forces times maximum over Stribeck curve; if there are slow records, only theirs."""
+    """Return the forces scaled as if all sliding were at the maximum of the Stribeck curve.
+
+    If there are slow records, only their samples are returned.
+    """
     side = np.where(friction.v == 0, 1.0, np.sign(friction.v))
     sliding = np.abs(curve.force(np.where(friction.v == 0, side * 1e-300, friction.v)))
     sliding = np.maximum(sliding - curve.sigma_2 * np.abs(friction.v), 0.0)
@@ -350,6 +356,6 @@ def shared(parameter: Parameter, law: Law) -> int:
 
 
 def scaled(values: Mapping[str, Parameter], field: str, count: int) -> float:
-    """Return the mean value of one field times `count`, the sum over `count` elements."""
+    """Return `count` times the mean value of the parameters of one field."""
     same = [float(p.value) for p in values.values() if p.field == field]
     return sum(same) * count / len(same)

@@ -40,7 +40,7 @@ SLOWEST, NARROWEST = 2e-3, 1e-5
 """Smallest velocity scale and smoothing width that data resolve, relative to the largest speed."""
 
 LINEAR = ("level", "viscous", "offset", "temperature", "motion")
-"""Roles of parameters fitted by their value: the force is linear in them, or their sign unknown."""
+"""Roles of parameters fitted by value: the force is linear in them, or their sign is unknown."""
 
 
 def parts(obj: Parametric) -> Iterator[Parametric]:
@@ -178,7 +178,7 @@ def one_digit(value: float) -> float:
 def inseparable(
     law: Law, load: float, names: Sequence[str], asked: Collection[str], bristle: bool
 ) -> dict[str, str]:
-    """Return reasons for those of `names` that only another load or temperature can separate.
+    """Return name -> reason for parameters that only another load or temperature can separate.
 
     The effect of each parameter is compared with combinations of those before it at many speeds and
     at a generic point of the parameters. Effects are sensitivities of the force and of the rates of

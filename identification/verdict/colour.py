@@ -30,7 +30,7 @@ MOST = 30
 REFINED = 6
 """Largest order whose coefficients are refined; higher orders are chosen for long records only."""
 NEAR_ONE = 0.9995
-"""Largest partial autocorrelation; noise with the value one (a random walk) has no variance."""
+"""Largest partial autocorrelation; at one, noise is a random walk without finite variance."""
 
 
 @final
@@ -92,7 +92,7 @@ class Colour:
         if not p:
             return np.zeros((0, 0))
         table, spread = predictors(self.partial)
-        inverse = np.zeros((p, p))  # Cholesky factors of Gamma^-1 are predictors of each order
+        inverse = np.zeros((p, p))  # from the prediction errors of each order
         for k in range(p):
             row = np.zeros(p)
             row[k] = 1.0

@@ -73,7 +73,7 @@ class Family(NamedTuple):
 
 
 def families(regressors: Sequence[Regressor], position: Count) -> Iterator[Family]:
-    """Yield the families of all `regressors`; the number of columns depends on that of rows."""
+    """Yield the families of all `regressors`, with fewer columns if there are few rows."""
     n = position.size
     delays = DELAYS if position.max(initial=0) > 2 * DELAYS[-1] else DELAYS[:1]
     most = n // (2 * ROWS_EACH)
