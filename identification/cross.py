@@ -1,8 +1,8 @@
-"""Cross-validation of a fit: by records, or by blocks of time with gaps.
+"""Cross-validation of a fit by records, points or blocks of time.
 
-Each fold is left out once, the model is fitted to the rest, and its residuals on the fold count.
-Neighbouring samples share noise and motion; therefore folds are whole records or blocks of time,
-with a gap to the rest.
+Each fold is left out once; the model is fitted to the other folds and evaluated on the omitted one.
+Neighbouring samples share noise and motion. Folds are therefore whole records or blocks of time,
+and a gap separates a block from the samples used for fitting.
 Source: Burman, Chow and Nolan, Biometrika 81(2), 1994 (blocks with gaps).
 """
 
@@ -25,9 +25,9 @@ from symfric.foundation.status import SolveError
 Array = NDArray[np.float64]
 
 GAP = 0.05
-"""Gap between a block and the rest, over the length of the block."""
+"""Gap between a block and the samples used for fitting, relative to the length of the block."""
 LEAST = 20
-"""Fewest samples of a part used for fitting."""
+"""Smallest number of samples before or after a block that is used for fitting."""
 DIVERGED = 1e3
 """Error [%] above which a prediction counts as diverged."""
 
@@ -35,11 +35,11 @@ DIVERGED = 1e3
 @final
 @dataclass(frozen=True, eq=False)
 class Left:
-    """Residuals of one signal of one record that was not fitted.
+    """Residuals of one signal of one record that was left out of the fit.
 
     Attributes:
-        record: its name.
-        signal, unit: of the signal.
+        record: name of the record.
+        signal, unit: name and unit of the signal.
         t: times of the residuals [s]; for points, velocities.
         r: predicted - measured [SI], shape of t.
         spread: standard deviation of the measured signal [SI].
@@ -58,12 +58,12 @@ class Left:
 @final
 @dataclass(frozen=True, eq=False)
 class CrossValidation:
-    """Errors on the data that were left out.
+    """Prediction errors on the data that were left out of the fits.
 
     Attributes:
         left: residuals of all folds.
         folds: number of folds that could be fitted and compared.
-        failed: messages on the failed folds.
+        failed: messages of the folds that failed.
         by: "records", "blocks of time" or "points".
     """
 
@@ -74,12 +74,12 @@ class CrossValidation:
 
     @property
     def relative(self) -> float:
-        """Root mean square error over the spread of the signals [%]; NaN without folds."""
+        """Root mean square error relative to the spread of the signals [%]; NaN without folds."""
         return relative(self.left)
 
     @property
     def rms(self) -> dict[str, float]:
-        """Signal -> root mean square error [SI]."""
+        """Root mean square error of each signal [SI]."""
         signals = dict.fromkeys(part.signal for part in self.left)
         return {s: _rms([p.r for p in self.left if p.signal == s]) for s in signals}
 
@@ -95,11 +95,11 @@ def cross_validate(
     """Fit to all but one part of the data, for each part in turn, and evaluate that part.
 
     Args:
-        fit: its data are divided.
-        folds: number of parts: groups of records if there are as many records, else blocks of
-            time of each record, or for points every n-th one.
-        start: values from which the parts are fitted, from one start each, such as the result of
-            a fit to all data; None: as in `fit`.
+        fit: fit whose data are divided.
+        folds: number of parts. The parts are groups of records if there are at least as many
+            records, otherwise every n-th point, or blocks of time of each record.
+        start: values from which each part is fitted with a single start, such as the result of
+            a fit to all data; None: the starts of `fit`.
 
     Raises:
         ValueError: fewer than two folds.
@@ -121,7 +121,7 @@ def left_of(fit: Fitted, data: Dataset) -> list[Left]:
     """Return the residuals of a fit on other data.
 
     Raises:
-        ValueError: data that cannot be compared, or a fit from JSON.
+        ValueError: the data cannot be compared, or the fit was loaded from JSON.
     """
     residuals, r = fit.alive("validate").left_on(data)
     left = list[Left]()
@@ -132,7 +132,7 @@ def left_of(fit: Fitted, data: Dataset) -> list[Left]:
 
 
 def relative(left: Sequence[Left]) -> float:
-    """Return the rms error over the spread [%], averaged over signals; NaN if empty."""
+    """Return the rms error relative to the spread [%], averaged over signals; NaN if empty."""
     signals = dict.fromkeys(part.signal for part in left)
     each = list[float]()
     for s in signals:
@@ -144,14 +144,14 @@ def relative(left: Sequence[Left]) -> float:
 
 
 def percent(value: float) -> str:
-    """Return an error [%] as text."""
+    """Return an error in percent as text."""
     if value > DIVERGED:
         return "diverged"
     return f"{value:.3g} %" if isfinite(value) else "-"
 
 
 def shared(many: Sequence[Sequence[Left]]) -> list[list[Left]]:
-    """Return residuals at common times only: laws without states omit samples near rest."""
+    """Return residuals at common times only, because stateless laws omit samples near rest."""
     common: dict[tuple[str, str], Array] = {}
     for left in many:
         for part in left:
@@ -171,7 +171,7 @@ def _rms(parts: Sequence[Array]) -> float:
 
 
 def _divided(data: Dataset, folds: int) -> tuple[list[tuple[Dataset, Dataset]], str]:
-    """Return (rest, part) of each fold, and the type of the parts."""
+    """Return the remaining and the omitted data of each fold, and the kind of the folds."""
     if len(data) >= folds:
         groups = [data.records[k::folds] for k in range(folds)]
         found = [([r for r in data if r not in group], group) for group in groups]
@@ -190,7 +190,7 @@ def _divided(data: Dataset, folds: int) -> tuple[list[tuple[Dataset, Dataset]], 
 
 
 def _blocked(data: Dataset, k: int, folds: int) -> tuple[list[Record], list[Record]]:
-    """Return block k of each record, and the samples before and after it beyond a gap."""
+    """Return the samples of each record beyond a gap around block k, and those of block k."""
     rest, part = list[Record](), list[Record]()
     for record in data:
         first, last = (round(j * record.size / folds) for j in (k, k + 1))

@@ -1,9 +1,9 @@
-"""Fit a law, a machine or a model to measured data.
+"""Public class `Fit`: fit a law, a machine or a model to measured data.
 
     data = Dataset.read("run*.csv", units="rad, N m")
     fit = Fit(Shooting(windows=4.0), "lugre", data, free={"sigma_0": log(1e3, 1e7)}).solve()
 
-data -> type of residuals -> unknowns -> least squares from many starts -> verdict -> result
+Steps: data, type of residuals, unknowns, least squares from several starts, verdict, result.
 """
 
 from collections.abc import Callable, Mapping
@@ -43,7 +43,7 @@ from symfric.scenes import Drive
 Array = NDArray[np.float64]
 MOST_STARTS = 10_000
 QUICK = 40
-"""Evaluations of a fit that only selects a setting."""
+"""Largest number of evaluations of a fit that only selects a setting."""
 OF_KIND = ("x0", "dead_time")
 """Entries of `free` that belong to the residuals."""
 
@@ -51,7 +51,7 @@ OF_KIND = ("x0", "dead_time")
 @final
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fit of a law, a machine or a model to data.
+    """Least-squares fit of a law, a machine or a model to data.
 
         minimise over p, sigma   sum_s n_s ln sigma_s^2 + sum_i loss(r_i(p) / sigma_s(i))
 
@@ -61,19 +61,19 @@ class Fit:
             law becomes the friction of a `Drive`.
         data: one or several records.
         free: names, or name -> a start value, (lower, upper), `log(...)`, `linear(...)`,
-            `above(name)`, `tied(name, factor)`. They are fitted in addition to those fitted by
-            their role; for a model, all parameters. "x0" and "dead_time" go to `kind`.
-        fixed: name -> value of held parameters; "others": all that are not in `free`.
-        normal_force: of a law [N]; with 1 N its coefficients read as forces.
+            `above(name)`, `tied(name, factor)`. These are fitted in addition to the parameters
+            fitted by their role; of a model, all are. "x0" and "dead_time" are passed to `kind`.
+        fixed: name -> value of parameters held constant; "others": all that are not in `free`.
+        normal_force: normal force of a law [N]; with 1 N its coefficients are forces.
         noise: "estimate", or signal -> standard deviation [SI]; others are estimated.
-        loss: "squares", or against outliers "huber", "soft_l1", "cauchy", "arctan".
+        loss: "squares", or a loss robust against outliers: "huber", "soft_l1", "cauchy", "arctan".
         starts: largest number of starts; fewer if others are unnecessary (see `many_starts`).
-        start: parameter -> value, or "data" (the default), or "law": its values.
+        start: parameter -> value; or "data", estimates from the data; or "law", values of the law.
         seed: random seed of the starts after the first.
-        evaluations: of the residuals, allowed to each start, and as many again to the best one.
+        evaluations: limit of residual evaluations of a start; twice as many for the best start.
 
     Raises:
-        ValueError: bad arguments; from `solve` names and bounds, all in one error.
+        ValueError: invalid arguments; from `solve`, invalid names and bounds, all in one error.
     """
 
     kind: Kind
@@ -105,14 +105,14 @@ class Fit:
         """Solve the fit.
 
         Args:
-            executor: of `concurrent.futures`, for the starts; the result is bit-identical.
-            progress: called with a text and the fraction done.
+            executor: executor of `concurrent.futures` for the starts; the result is bit-identical.
+            progress: called with a text and the completed fraction.
             throw: raise `SolveError` if the result is unusable; its `partial` is the result.
 
         Raises:
-            ValueError: data or names that cannot be used.
+            ValueError: data or names cannot be used.
             SolveError: no start has residuals; with `throw`, also if the fit did not reach a
-                minimum, or data or residuals make the result implausible.
+                minimum, or if data or residuals make the result implausible.
         """
         begun = perf_counter()
         throw = checks.flag("Fit: throw", throw)
@@ -177,7 +177,7 @@ class Fit:
         return Prepared(kind, found, findings, made, made.unknowns.of(values), seen)
 
     def live(self, noise: dict[str, float], w: Array) -> Live:
-        """Return the solved problem, with its end at the coordinates `w`.
+        """Return the solved problem at the coordinates `w` of its solution.
 
         Raises:
             ValueError: the residuals cannot be evaluated again.
@@ -190,7 +190,7 @@ class Fit:
         return self._live(asked, made, point)
 
     def _live(self, asked: "Prepared", made: Task, point: Point) -> Live:
-        """Return the problem with its minimum and its uncertainty."""
+        """Return the problem with its minimum and the covariance of the parameters."""
         found = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
         drive = asked.subject.drive
         mass = None if drive is None else float(found.get("m", drive.m))
@@ -200,13 +200,17 @@ class Fit:
         return Live(asked.kind, asked.subject, self.data, made, point, certain)
 
     def _quickly(self, kind: Kind, data: Dataset) -> dict[str, float] | None:
-        """Return the values of a fit to other data, from one start and without a verdict."""
+        """Fit other data from one start without a verdict; return the values, None if it fails."""
         asked = replace(self, kind=kind, data=data).prepared()
         end = descend(asked.task, asked.centre, 0, min(self.evaluations, QUICK))
         return asked.task.unknowns.named(end.w) if np.isfinite(end.cost) else None
 
     def _task(self, residuals: Residuals, found: Subject) -> Task:
-        """Return the least-squares problem of residuals."""
+        """Return the least-squares problem of the residuals.
+
+        Raises:
+            ValueError: fewer residuals than unknowns.
+        """
         unknowns = unknowns_of(
             (*found.unknowns, *residuals.own), found.ties, residuals.names, found.held
         )
@@ -222,15 +226,15 @@ class Fit:
 @final
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A fit before its solution.
+    """Complete definition of a fit before its solution.
 
     Attributes:
-        kind: type of residuals, with its entries of `free`.
+        kind: type of residuals, including the entries of `free` that belong to it.
         subject: fitted law, machine or model.
         findings: warnings on the data.
         task: the least-squares problem.
         centre: coordinates of the first start, shape (n,).
-        seen: velocity and force, if the data have them.
+        seen: measured velocity and force, if the data contain them.
     """
 
     kind: Kind
@@ -242,7 +246,7 @@ class Prepared:
 
 
 def _status(asked: Prepared, end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:
-    """Return the status of the fit and its message; for `gain` see `Verdict.status`."""
+    """Return status and message of the fit; `gain` is an argument of `Verdict.status`."""
     status, message = verdict.status(end.status, gain), end.message
     if status is Status.DOUBTFUL and not end.status.ok:
         message = f"The search was not finished; a better fit may be near: {message}"
@@ -259,7 +263,7 @@ def _status(asked: Prepared, end: Start, verdict: Verdict, gain: float) -> tuple
 
 
 def _to_kind(kind: Kind, free: Any) -> tuple[Kind, Any]:
-    """Return the residuals with their entries of `free`, and the rest of `free`."""
+    """Pass the entries of `OF_KIND` to the residuals; return them and the other entries."""
     if not isinstance(free, Mapping):
         return kind, free
     given: dict[str, Any] = dict(free)  # pyright: ignore[reportUnknownArgumentType]
@@ -300,11 +304,11 @@ CHECKS: Mapping[str, Callable[[str, Any], object]] = {
 
 
 FEW = 0.01
-"""Share of points with an arbitrarily small speed, such as noise about rest."""
+"""Share of points whose speed may be arbitrarily small, such as noise about rest."""
 
 
 def findings_of(kind: object, data: Dataset) -> Findings:
-    """Return the warnings on the data for these residuals."""
+    """Return the findings of the data check for these residuals."""
     if isinstance(kind, Points):
         return data.check()
     called = {part: name for part, name in _roles(kind).items() if any(name in r for r in data)}
@@ -312,7 +316,7 @@ def findings_of(kind: object, data: Dataset) -> Findings:
 
 
 def explained(error: ValueError, findings: Findings) -> ValueError:
-    """Return the error of failed residuals, preceded by the first error in the data."""
+    """Return the error of failed residuals, preceded by the first error found in the data."""
     if not findings.errors:
         return error
     sentence = findings.errors[0].sentence.rstrip(".")
@@ -320,13 +324,13 @@ def explained(error: ValueError, findings: Findings) -> ValueError:
 
 
 def _roles(kind: object) -> dict[str, str]:
-    """Return the channels of position and force of a drive."""
+    """Return the names of the channels of position and force of a drive."""
     names = {name: getattr(kind, name, name) for name in ("x", "force")}
     return {name: given if isinstance(given, str) else name for name, given in names.items()}
 
 
 def measured(kind: object, data: Dataset, load: float) -> Measured | None:
-    """Return velocity and force of points or of a drive, all records; None if unavailable."""
+    """Return velocity and force of all points or of a drive; None if unavailable."""
     try:
         if isinstance(kind, Points):
             timed = all(r.t is not None for r in data)
@@ -339,7 +343,7 @@ def measured(kind: object, data: Dataset, load: float) -> Measured | None:
         signals = {part: np.concatenate([one[part] for one in each]) for part in each[0]}
         breaks = tuple(np.cumsum([one["v"].size for one in each])[:-1].tolist())
         return Measured(**signals, N=load, breaks=breaks)
-    except ValueError:  # the preparation of the residuals reports missing channels
+    except ValueError:  # preparing the residuals reports missing channels
         return None
 
 
@@ -348,7 +352,7 @@ def strongest(
 ) -> float | None:
     """Return the largest force on the friction of points or of a drive [N]; None if unknown.
 
-    In sliding it is F - m a, at rest F. Unknown for points with a measured normal force.
+    The force is F - m a in sliding and F at rest; unknown for points with a measured normal force.
     """
     loaded = isinstance(kind, Points) and (kind.N is not None or any("N" in r for r in data))
     if seen is None or loaded:
@@ -367,10 +371,10 @@ def slowest(kind: object, seen: Measured | None) -> float:
 
 
 def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) -> dict[str, float]:
-    """Return the start of every free parameter: from the user, else the data, else the law."""
+    """Return the start of each free parameter: from the user, otherwise the data, then the law."""
     values, found = {u.name: u.start for u in subject.unknowns}, dict[str, float]()
     whole: Law | Drive | None = subject.law if subject.scene is None else subject.drive
     if whole is not None and seen is not None:
-        with suppress(ValueError):  # data without motion: keep the values of the law
+        with suppress(ValueError):  # without motion in the data, keep the values of the law
             found = start_values(whole, seen, free=[*values])
     return values | {n: x for n, x in found.items() if n not in subject.started} | dict(given)

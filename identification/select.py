@@ -1,12 +1,12 @@
 """Comparison of several laws on one data set: accuracy, significance and cost.
 
-    validation   root mean square error on data that were not fitted, over the spread of the signals
+    validation   root mean square error on data left out of the fit, relative to their spread
     AICc         n ln(mean square) + 2 k n / (n - k - 1)
     BIC          n ln(mean square) + k ln n
 
-n is the effective number of samples, from the autocorrelation that the best law leaves in each
-signal; it is the same for all laws. With the number of rows instead, autocorrelated residuals would
-make any additional parameter look significant. All laws are compared at their common times.
+n is the effective number of samples, from the autocorrelation of the residuals of the best law in
+each signal, and is the same for all laws. With the number of rows, autocorrelated residuals would
+make any additional parameter appear significant. All laws are compared at their common times.
 Source: Burnham and Anderson, Model Selection and Multimodel Inference, 2002.
 """
 
@@ -41,7 +41,7 @@ HEADER = ("law", "validation", "fit", "AICc", "BIC", "par.", "op.", "status", ""
 NUMBERS = (1, 2, 3, 4, 5, 6)
 """Header of the table of laws, and its numeric columns."""
 TITLES = {"validation": "validation [%]", "fitted": "fit [%]", "aicc": "AICc", "bic": "BIC"}
-"""Names of fields in plain data, if they differ."""
+"""Titles of fields in plain data that differ from their names."""
 LOST = "not fitted"
 OWN = ("kind", "what", "data")
 """Arguments of a fit that `select` sets."""
@@ -50,20 +50,20 @@ OWN = ("kind", "what", "data")
 @final
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A law of a ranking.
+    """Result of one law in a ranking.
 
     Attributes:
         law: name as given.
         status: status of its fit; "" if it could not be fitted.
-        validation: error on data that were not fitted [%], NaN without, infinite if the prediction
-            diverged (`DIVERGED`); None in plain data.
+        validation: error on data left out of the fit [%]; NaN without validation, infinite if the
+            prediction diverged (`DIVERGED`); None in plain data.
         fitted: error on the data of the fit [%].
-        aicc, bic: difference to the best law.
-        parameters: number of fitted ones, start values apart.
+        aicc, bic: difference from the best law.
+        parameters: number of fitted parameters, without start values.
         operations: instructions of force and rate; None for a model without a law.
-        seconds: of the fit.
-        sentence: main objection to it, or reason why it could not be fitted.
-        fit: the result; None if there is none.
+        seconds: duration of the fit.
+        sentence: main objection to the fit, or reason why the law could not be fitted.
+        fit: result of the fit; None if it failed.
     """
 
     law: str
@@ -80,7 +80,7 @@ class Row:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """Row of the table below `HEADER`, as text."""
+        """Cells of the row as text, in the order of `HEADER`."""
         numbers = (
             *map(percent, (self.validation, self.fitted)), *map(_number, (self.aicc, self.bic)),
             str(self.parameters), "-" if self.operations is None else str(self.operations),
@@ -100,10 +100,10 @@ class Row:
 @final
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Laws, the best predictor first; those that could not be fitted last.
+    """Laws in order of their prediction error; laws that could not be fitted come last.
 
     Attributes:
-        rows: of the laws.
+        rows: one row for each law.
         data: name of the data.
         how: method of the validation.
         effective: effective number of samples of all signals together.
@@ -116,7 +116,7 @@ class Ranking:
 
     @property
     def best(self) -> Fitted:
-        """The fit of the first law.
+        """Fit of the first law.
 
         Raises:
             ValueError: no law could be fitted.
@@ -132,7 +132,7 @@ class Ranking:
 
     @property
     def title(self) -> str:
-        """Data and validation method, in a line."""
+        """Data and validation method in one line."""
         return f"laws on {self.data}: {self.how}; {self.effective:.0f} effective samples"
 
     def __str__(self) -> str:
@@ -149,15 +149,15 @@ class Ranking:
         return Shown(self.title, table=table).html(self.plot() if drawn else None)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything but the fits as plain data."""
+        """Return the ranking without the fits as plain data."""
         plain = {name: getattr(self, name) for name in ("data", "how", "effective")}
         return plain | {"rows": [row.to_dict() for row in self.rows]}
 
     def plot(self, path: str | Path | None = None) -> "Figure":
-        """Plot errors on fitted and other data, and information criteria, as bars for each law.
+        """Plot errors on fitted and other data and information criteria as bars for each law.
 
         Args:
-            path: image file.
+            path: image file to write.
         """
         from identification.result.picture import plot_ranking  # noqa: PLC0415 (Matplotlib is slow)
 
@@ -178,17 +178,17 @@ def select(
     """Fit several laws to the same data and rank them by their errors on other data.
 
     Args:
-        laws: texts, laws, scenes or models, or name -> one of them.
-        data: to fit to.
+        laws: texts, laws, scenes or models, or name -> one of these.
+        data: data of the fits.
         kind: type of residuals; None: `InverseDynamics()`.
-        validate: other data; None: cross-validation.
-        folds: of the cross-validation; 0: none, the ranking is by BIC.
-        executor: for the starts of each law.
-        progress: called with a text and the fraction done.
+        validate: data for validation; None: cross-validation.
+        folds: number of folds of the cross-validation; 0: none, and the ranking is by BIC.
+        executor: executor for the starts of each law.
+        progress: called with a text and the completed fraction.
         fit: further arguments of `Fit`, the same for all laws.
 
-    A law that cannot be fitted has a row with the reason; after Ctrl-C the fitted laws are
-    ranked, and the rows of the others are marked as interrupted.
+    A law that cannot be fitted has a row with the reason. After Ctrl-C the laws fitted so far are
+    ranked; the rows of the other laws are marked as interrupted.
 
     Raises:
         ValueError: no laws, or invalid arguments.
@@ -205,7 +205,7 @@ def select(
         one = Fit(residuals, what, data, **fit)
         try:
             tried.append(_try(name, one, validate, folds, executor))
-        except KeyboardInterrupt:  # what was fitted before is ranked
+        except KeyboardInterrupt:  # rank the laws fitted so far
             if not tried:
                 raise
             tried.append(_Tried(name, INTERRUPTED))
@@ -224,7 +224,7 @@ def select(
 
 
 class _Tried(NamedTuple):
-    """Outcome of one law: residuals on the data of the fit and on others, type of the folds."""
+    """Outcome of one law: residuals on the fitted and on other data, and the kind of folds."""
 
     name: str
     why: str = ""
@@ -235,7 +235,7 @@ class _Tried(NamedTuple):
 
     @property
     def ended(self) -> bool:
-        """True if the user interrupted it."""
+        """True if the user interrupted the fit."""
         stopped = self.fit is not None and self.fit.status is Status.INTERRUPTED
         return stopped or self.why == INTERRUPTED
 
@@ -257,7 +257,7 @@ def _named(laws: Iterable[Any] | Mapping[str, Any]) -> dict[str, Any]:
 def _try(
     name: str, asked: Fit, validate: Dataset | None, folds: int, executor: Executor | None
 ) -> _Tried:
-    """Fit and validate one law; failures are kept as messages."""
+    """Fit and validate one law; return failures as messages."""
     try:
         found = asked.solve(executor=executor, throw=False)
     except (ValueError, SolveError) as error:
@@ -316,7 +316,7 @@ def _row(t: _Tried, validation: float, fitted: float, aicc: float, bic: float) -
 
 
 def _count(t: _Tried) -> int:
-    """Return the number of fitted parameters without nuisances."""
+    """Return the number of fitted parameters that are not nuisance parameters."""
     live = None if t.fit is None else t.fit.live
     return 0 if live is None else sum(not u.nuisance for u in live.task.unknowns.unknowns)
 
@@ -330,7 +330,7 @@ def _mean_squares(left: Sequence[Left]) -> dict[str, float]:
 
 
 def _effective(good: Sequence[_Tried], inside: Sequence[Sequence[Left]]) -> dict[str, float]:
-    """Return signal -> independent samples of the residuals of the law that fits it best."""
+    """Return the effective sample count of each signal under the law that fits the signal best."""
     found: dict[str, tuple[float, float]] = {}
     for t, left in zip(good, inside, strict=True):
         counts: dict[str, float] = {}

@@ -1,4 +1,4 @@
-"""Check of a data set; checks of times, points and units, and of the force against the motion."""
+"""Checks of a data set: times, points, units, and consistency of the force with the motion."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -17,13 +17,13 @@ from identification.data.findings import Finding, Findings, Rough, View, rough_m
 from identification.data.record import GAP, JITTER, Record
 
 FEWEST, FEW = 20, 50
-"""Numbers of samples below which a record is an error, and a warning."""
+"""Numbers of samples below which a record gives an error, and a warning."""
 SLOW = 0.5
 """Sample interval [s] above which times may be in ms."""
 
 
 def of_times(view: View) -> Iterator[Finding]:
-    """Find gaps, irregular intervals, too few samples, times that may be in another unit."""
+    """Find gaps, irregular intervals, too few samples, and times that may be in another unit."""
     record, t = view.record, view.record.time
     if record.size < FEW:
         severity = "error" if record.size < FEWEST else "warning"
@@ -48,11 +48,11 @@ def of_times(view: View) -> Iterator[Finding]:
 
 FEWEST_POINTS = 4
 WRONG = 0.2
-"""Share of points with friction along the motion below which the sign is wrong."""
+"""Smallest share of points with friction along the motion; below it, the sign is wrong."""
 
 
 def of_points(view: View) -> Iterator[Finding]:
-    """Find too few points, one direction, one speed, a force that drives instead of braking."""
+    """Find too few points, one direction, one speed, and a force that drives instead of brakes."""
     record = view.record
     if "v" not in record or "F" not in record:
         return
@@ -80,14 +80,15 @@ LIMITS = {
     "m/s": (1e-9, 100.0, 1e5),
     "rad/s": (1e-9, 1e4, 1e8),
 }
-"""Ranges: below the first or above the last is an error, above the second a warning."""
+"""Limits of signal ranges by unit: error below the first or above the last, warning above the
+second."""
 FASTEST = {"m": (50.0, 1e5), "rad": (1e4, 1e8)}
-"""Speeds of a position for a warning and an error."""
+"""Speeds of a position above which a warning and an error are given."""
 TOGETHER = (("m", "N"), ("rad", "N m"))
 
 
 def of_units(view: View, model: Rough | None) -> Iterator[Finding]:
-    """Find units that do not belong together, and implausible ranges."""
+    """Find inconsistent units of position and force, and implausible ranges."""
     record = view.record
     mixed = tuple(view.unit(r) for r in ("x", "force") if r in view.roles)
     if len(mixed) == 2 and "" not in mixed and mixed not in TOGETHER:
@@ -110,15 +111,16 @@ def of_units(view: View, model: Rough | None) -> Iterator[Finding]:
 SURE = 5.0
 """Significance level, in standard errors."""
 LITTLE, MUCH = 0.5, 0.8
-"""Shares of the force that the rough model explains: for exchanged and for correct columns."""
+"""Shares of the force explained by the rough model: at most with exchanged columns, at least with
+correct ones."""
 NOTHING = 0.05
-"""Share of the force below which it is unrelated to the motion."""
+"""Share of the force explained by the motion below which they are unrelated."""
 ONE_WAY = 0.005
-"""Share of the path in the other direction below which the drive moves in one direction only."""
+"""Share of the path against the main direction below which the drive moves in one direction."""
 
 
 def of_direction(view: View, model: Rough) -> Iterator[Finding]:
-    """Find friction that supplies power, exchanged columns, motion in one direction only."""
+    """Find friction that supplies power, exchanged columns, and motion in one direction only."""
     swapped, given = rough_model(view, exchanged=True), model.explained
     exchanged = 0.0 if swapped is None else swapped.explained
     if given < LITTLE and exchanged > max(MUCH, given + 0.4):
@@ -131,7 +133,7 @@ def of_direction(view: View, model: Rough) -> Iterator[Finding]:
 
 
 def _against(view: View, model: Rough, force: str) -> Iterator[Finding]:
-    """Find a force that brakes the motion that it drives, or is unrelated to it."""
+    """Find a force that brakes the motion it should drive, or that is unrelated to it."""
     _, level, viscous, *_ = model.values
     put_in = level * np.sum(np.abs(model.v[model.moving])) + viscous * np.sum(model.v**2)
     sure = max(-model.sure(1) if level < 0 else 0.0, -model.sure(2) if viscous < 0 else 0.0)
@@ -149,7 +151,7 @@ def _against(view: View, model: Rough, force: str) -> Iterator[Finding]:
 
 
 UNSURE = 3.0
-"""Rough mass over its standard error below which the accelerations are too small."""
+"""Ratio of the rough mass to its standard error below which the accelerations are too small."""
 SPREAD = 1.7
 """Ratio of the 90 % and 10 % quantiles of the speed below which there is only one speed."""
 MOST = 0.97
@@ -157,7 +159,7 @@ MOST = 0.97
 
 
 def of_excitation(view: View, model: Rough) -> Iterator[Finding]:
-    """Find too small accelerations, a single speed, too little motion."""
+    """Find too small accelerations, a single speed, and too little motion."""
     name = view.name("x")
     if not model.clean:
         yield view.warning("excitation", name, "no_acceleration")
@@ -175,30 +177,31 @@ def of_excitation(view: View, model: Rough) -> Iterator[Finding]:
 
 
 LARGE = 0.12
-"""Drift over the robust spread of the force above which it is reported."""
+"""Ratio of the drift to the robust spread of the force above which it is reported."""
 DRIFTS = 4.5
 LAGS = (-20, -10, -5, -3, -2, -1, 1, 2, 3, 5, 10, 20)
-"""Delays that are tried first, in samples; then those between the neighbours of the best one."""
+"""Delays tried first, in samples; then those between the neighbours of the best one are tried."""
 BETTER = 0.88
-"""Largest ratio of the unexplained parts with and without a reported delay ..."""
+"""Largest ratio of the unexplained parts with and without a delay that is reported."""
 WORSE = 1.05
-"""... if the opposite delay has at least this ratio."""
+"""Smallest such ratio that the opposite delay must have."""
 LINE = 0.45
-"""Share of the residuals in one spectral line above which it is a hum."""
+"""Share of one spectral line in the power of the residuals above which it is a hum."""
 LOUD = 0.02
-"""Its amplitude over the spread of the force above which it is reported."""
+"""Ratio of the amplitude of a hum to the spread of the force above which it is reported."""
 PERIODS, CLEAR, ANSWER = 8, 20.0, 0.01
-"""Spectral line of the velocity: periods in the record, power over background, power share."""
+"""Least periods in the record, power over the background, and share of the power of a spectral line
+of the velocity."""
 HARMONICS = (1, 2)
-"""Harmonics of an excitation that friction may leave in the force."""
+"""Harmonics of an excitation that friction can cause in the force."""
 UNEQUAL, DIFFERS = 0.04, 6.0
-"""Difference of the mass between both directions, relative, and in standard errors."""
+"""Least difference of the mass between both directions: relative, and in standard errors."""
 
 
 def of_residue(view: View, model: Rough) -> Iterator[Finding]:
-    """Find drift, delay and hum of the force, and a mass that differs by direction.
+    """Find drift, delay and hum of the force, and a mass that depends on the direction.
 
-    The model of these checks has a free curve of friction and a drift.
+    The model of these checks has a free friction curve and a drift.
     """
     free = rough_model(view, curve=True)
     if free is None or not model.clean:
@@ -235,7 +238,7 @@ def _dead_time(view: View, model: Rough, free: Rough) -> Iterator[Finding]:
 
 
 def _hum(view: View, free: Rough) -> Iterator[Finding]:
-    """Find a periodic force in addition to the drive's."""
+    """Find a periodic force that the drive does not cause."""
     limit = 5 * float(np.median(np.abs(free.residual)))
     left, window = np.clip(free.residual, -limit, limit), np.hanning(free.residual.size)
     power = np.abs(np.fft.rfft(left * window)) ** 2
@@ -250,10 +253,10 @@ def _hum(view: View, free: Rough) -> Iterator[Finding]:
 
 
 def _answered(free: Rough, k: int) -> bool:
-    """Return True if the velocity has a spectral line at bin k: an excitation, not a hum.
+    """Return True if the velocity has a spectral line at bin k, which indicates an excitation.
 
-    Not tested below `PERIODS` periods, where a line and a move are indistinguishable; so a slow
-    excitation that only bends bristles can still be reported as a hum.
+    Below `PERIODS` periods a line and a single move are indistinguishable, and the result is False;
+    a slow excitation that only bends bristles can therefore be reported as a hum.
     """
     if k < PERIODS:
         return False
@@ -264,7 +267,7 @@ def _answered(free: Rough, k: int) -> bool:
 
 
 def _unequal(view: View, free: Rough) -> Iterator[Finding]:
-    """Find a mass that differs by direction."""
+    """Find a mass that depends on the direction."""
     value, error = free.with_column(free.a * np.sign(free.v) * free.moving)
     ratio = value / free.values[0]
     if abs(ratio) > UNEQUAL and abs(value) > DIFFERS * error:
@@ -275,17 +278,17 @@ def _unequal(view: View, free: Rough) -> Iterator[Finding]:
 HOPELESS = {"standstill", "noise", "constant", "short", "wrap", "swapped", "glitch", "frozen"}
 """Errors after which a rough model of the drive is meaningless."""
 ALONE = (of_times, of_jumps, of_spikes, of_frozen, of_velocity, of_motion)
-"""Checks that precede the rough model."""
+"""Checks that run before the rough model is computed."""
 OF_MODEL = (of_direction, of_excitation, of_resolution, of_residue)
-"""Checks that need it."""
+"""Checks that need the rough model."""
 
 
 def check(name: str, records: Sequence[Record], roles: Mapping[str, str]) -> Findings:
-    """Check the records; errors come first.
+    """Check the records and return the findings, errors first.
 
     Args:
-        name: of the data.
-        records: to check.
+        name: name of the data.
+        records: records to check.
         roles: part in the drive ("x", "v", "a", "force") -> signal, if the names differ; only
             signals with a part are compared with each other.
     """

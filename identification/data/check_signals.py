@@ -19,19 +19,19 @@ from identification.data.findings import (
 )
 
 FAR = 12.0
-"""Distance of a spike from the running median, over that of the farthest 5 % ..."""
+"""Least distance of a spike from the running median, relative to its 95 % quantile."""
 RANGE = 0.2
-"""... over the range of 98 % of the signal ..."""
+"""The same distance relative to the range of 98 % of the signal."""
 BACK = 3.0
-"""... and over the difference of the samples three before and three after."""
+"""The same distance relative to the difference of the samples three before and three after."""
 MANY = 0.02
-"""Share of the samples above which they are not exceptions."""
+"""Share of outlying samples above which they are not spikes."""
 HEAVY = 0.5
-"""Share of a signal's variance in spikes above which least squares is invalid."""
+"""Share of the variance of a signal due to spikes above which least squares is invalid."""
 
 
 def of_spikes(view: View) -> Iterator[Finding]:
-    """Find spikes of every signal; those that outweigh the signal are an error."""
+    """Find spikes in every signal; those that dominate the variance of the signal are an error."""
     for signal, y, _ in view.known():
         position = signal == view.name("x")
         far, off = spike_samples(y, position=position)
@@ -47,41 +47,41 @@ def of_spikes(view: View) -> Iterator[Finding]:
 
 
 def spike_samples(y: Array, *, position: bool) -> tuple[NDArray[np.intp], Array]:
-    """Return the samples that are spikes, and the distance of all samples from their neighbours."""
+    """Return the indices of spikes, and the distance of each sample from the running median."""
     none = np.zeros(0, dtype=np.intp)
     if y.size < 50 or np.ptp(y) == 0:
         return none, np.zeros(y.size)
     off = np.abs(y - median_of_five(y))
     usual = max(float(np.quantile(off, 0.95)), count_of(y))
     limit = max(FAR * usual, RANGE * float(np.ptp(np.quantile(y, (0.01, 0.99)))))
-    if position:  # a position is smooth: a lower limit
+    if position:  # positions are smooth, hence a lower limit
         limit = max(FAR * usual, 3 * float(np.quantile(np.abs(np.diff(y)), 0.9)))
-    through = np.abs(np.roll(y, -3) - np.roll(y, 3))  # a spike returns to its neighbours
+    through = np.abs(np.roll(y, -3) - np.roll(y, 3))  # small at a spike, because y returns
     through[:3] = through[-3:] = 0.0
     far = np.flatnonzero((off > limit) & (off > BACK * through))
     return (far if limit > 0 and far.size <= MANY * y.size else none), off
 
 
 def median_of_five(y: Array) -> Array:
-    """Return the running median of five, which ignores single samples and pairs."""
+    """Return the running median of five samples, which ignores single outliers and pairs."""
     padded = np.pad(y, 2, mode="edge")
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
 
 
 RUN, SHARE = 5, 0.002
-"""Consecutive samples at an extreme value, and share of the record in such runs, that count as
-clipping.
+"""Clipping: least number of consecutive samples at an extreme value, and least share of the record
+in such runs.
 """
 THERE = 0.6
-"""Least share of long constant runs at the extremes; below it, the signal has few levels."""
+"""Least share of long constant runs at the extremes; below it, the signal has only few levels."""
 MEAN, MOST = 0.03, 0.1
-"""Predicted force beyond the limit, over the limit: mean and 90 % quantile of the clipped samples.
-If the drive itself was at its limit, the motion needs no larger force.
+"""Excess of the predicted force relative to the limit: mean and 90 % quantile over clipped samples.
+Below them the drive itself was at its limit, because the motion needs no larger force.
 """
 
 
 def of_clipping(view: View) -> Iterator[Finding]:
-    """Find signals held at their largest or smallest value, except positions at rest."""
+    """Find signals held at their largest or smallest value; positions may rest there."""
     for signal, y, unit in view.known():
         if signal == view.name("x"):
             continue
@@ -106,7 +106,7 @@ def of_clipping(view: View) -> Iterator[Finding]:
 
 
 def _limited(view: View, signal: str, tops: list[float]) -> tuple[Severity, str]:
-    """Return the severity: whether the force itself was limited, or only its measurement."""
+    """Return severity and reason: an error if only the measurement was limited."""
     unsure = "the amplifier or the sensor was at its limit there"
     model = rough_model(view, curve=True) if signal == view.name("force") else None
     if model is None or view.steady is None:
@@ -126,17 +126,17 @@ def _limited(view: View, signal: str, tops: list[float]) -> tuple[Severity, str]
 
 
 FROZEN = 8
-"""Number of consecutive equal values that a noisy signal does not have."""
+"""Number of consecutive equal values that do not occur in a noisy signal."""
 REPEATED = 0.02
 """Share of equal neighbours below which a signal counts as never repeating."""
 LOST = 0.2
 """Share of a frozen record above which it is unusable."""
 JUMP = 8.0
-"""Step after a frozen interval, over the usual largest one, that counts as a jump."""
+"""Ratio of the step after a frozen interval to the usual largest step that counts as a jump."""
 
 
 def of_frozen(view: View) -> Iterator[Finding]:
-    """Find intervals of equal values in signals that do not repeat elsewhere or jump afterwards."""
+    """Find intervals of equal values in signals that otherwise never repeat, or jump afterwards."""
     for signal, y, unit in view.known():
         steps, position = np.abs(np.diff(y)), signal == view.name("x")
         first, length = constant_runs(y)
@@ -163,34 +163,34 @@ def of_frozen(view: View) -> Iterator[Finding]:
 
 
 JUMPED = 15.0
-"""Step over the 99.5 % quantile of all steps, and ..."""
+"""Least ratio of a jump to the 99.5 % quantile of all steps."""
 NEAR = 8.0
-"""... over the adjacent steps; excludes fast motion."""
+"""Least ratio of a jump to the steps nearby, which excludes fast motion."""
 LEAST = 20
 """Encoder counts below which jumps are not evaluated."""
 WHITE = 0.5
-"""Correlation of neighbours below which a position is noise."""
+"""Correlation of neighbouring samples below which a position is noise."""
 ALIKE = 0.05
-"""Relative spread below which jumps are of one period."""
+"""Relative spread of jumps below which they have the same period."""
 FORCED = 5.0
-"""Step of the force, over the 90 % quantile, that accompanies a true jump."""
+"""Step of the force, relative to the 90 % quantile, that accompanies a true jump."""
 OFTEN = 6
 """Number of jumps of different sizes that indicates stick-slip at a low sample rate."""
 
 
 def of_jumps(view: View) -> Iterator[Finding]:
-    """Find wrapped positions and lost counts."""
+    """Find wrapped positions and lost encoder counts."""
     x = view.signal("x")
     if x is None or x.size < 50 or np.ptp(x) <= LEAST * count_of(x):
         return
-    if np.corrcoef(x[1:], x[:-1])[0, 1] < WHITE:  # noise always jumps
+    if np.corrcoef(x[1:], x[:-1])[0, 1] < WHITE:  # noise jumps at every sample
         return
     name, size = view.name("x"), np.abs(np.diff(median_of_five(x)))
     usual = max(float(np.quantile(size, 0.995)), count_of(x))
     nearby = np.maximum(np.roll(size, 2), np.roll(size, -2))
     far = np.flatnonzero((size > JUMPED * usual) & (size > NEAR * np.maximum(nearby, usual)))
     if not far.size:
-        size = np.abs(np.diff(x))  # a wrap of a fast drive: many jumps raise the usual step
+        size = np.abs(np.diff(x))  # many wraps of a fast drive raise the usual step
         far = np.flatnonzero(size > 0.5 * np.ptp(x))
         if not 0 < far.size <= 0.2 * x.size:
             return
@@ -209,7 +209,7 @@ def of_jumps(view: View) -> Iterator[Finding]:
 
 
 def _force_jumps(view: View, k: int) -> bool:
-    """Return True if the force jumps with the position, as in a true slip."""
+    """Return True if the force jumps together with the position, as in a true slip."""
     force = view.signal("force")
     if force is None:
         return False
@@ -219,7 +219,7 @@ def _force_jumps(view: View, k: int) -> bool:
 
 
 def _period(x: Array, far: NDArray[np.intp]) -> float:
-    """Return the jumps plus the regular motion meanwhile, estimated from adjacent steps."""
+    """Return the period of a wrap, the median of the jumps plus the regular motion of a step."""
     steps = np.abs(np.diff(x))
     found: list[float] = []
     for k in far[(far > 4) & (far < steps.size - 5)].tolist():
@@ -229,13 +229,13 @@ def _period(x: Array, far: NDArray[np.intp]) -> float:
 
 
 COARSE = 0.04
-"""Step of a force over its range above which it is reported."""
+"""Ratio of the step of a force to its range above which it is reported."""
 PER_SAMPLE = 0.5
 """Counts per sample at a usual speed below which velocities are inaccurate."""
 
 
 def of_resolution(view: View, model: Rough) -> Iterator[Finding]:
-    """Find forces of few levels, and positions of few counts at the speeds of the record."""
+    """Find forces with few levels, and positions with few counts at the speeds of the record."""
     x, force = view.signal("x"), view.signal("force")
     if force is not None and np.ptp(force) > 0:
         usual = float(np.ptp(np.quantile(force, (0.01, 0.99))))
@@ -255,7 +255,7 @@ def of_resolution(view: View, model: Rough) -> Iterator[Finding]:
 WIDTH = 12.0
 """Standard deviation of the smoothing window of both signals, in samples."""
 RELATED = 0.7
-"""Least correlation of both."""
+"""Least correlation of the given and the derived signal."""
 OFF = 0.2
 """Relative error of the scale above which it is reported."""
 KNOWN = {
@@ -274,7 +274,7 @@ KNOWN = {
 
 
 def of_velocity(view: View) -> Iterator[Finding]:
-    """Find a velocity that differs from the slope of the position, or an acceleration likewise."""
+    """Find a velocity or acceleration that differs from the derivative of position or velocity."""
     record = view.steady
     if record is None or record.size < 100:
         return
@@ -304,15 +304,15 @@ def of_velocity(view: View) -> Iterator[Finding]:
 
 
 MOVED = 6.0
-"""Range of the position over its noise (standard deviation) below which nothing moved."""
+"""Ratio of the range of a position to its standard deviation of noise below which it is at rest."""
 COUNTS = 4
-"""Encoder counts below which nothing moved."""
+"""Encoder counts below which the position is at rest."""
 NOISE = 0.3
-"""Correlation of neighbours below which a position is noise."""
+"""Correlation of neighbouring samples below which a position is noise."""
 
 
 def of_motion(view: View) -> Iterator[Finding]:
-    """Find signals without motion."""
+    """Find positions at rest or of noise only, and a constant force."""
     x, force = view.signal("x"), view.signal("force")
     if x is not None and x.size >= 20:
         yield from _still(view, x)

@@ -1,4 +1,4 @@
-"""Measured data: one or several records of named signals, in SI units."""
+"""Class `Dataset`: measured data of one or several records of named signals, in SI units."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,8 +23,8 @@ class Dataset:
     """Records that are fitted together.
 
     Attributes:
-        records: at least one.
-        name: common name, for messages.
+        records: at least one record.
+        name: common name for messages.
 
     Raises:
         ValueError: no records, or both rotary and linear ones.
@@ -69,27 +69,27 @@ class Dataset:
         lines; a header such as `t [s], x [mm], F [N]` or none; a row of units below it or none.
         MATLAB: variables, structs (nested; a vector of structs is several records), matrices.
 
-        A column becomes the channel t, x, v, a or force if its name is the channel or a usual
-        alias (time, q, pos, angle, vel, omega, torque, ...) and no other column matches; all
-        others keep their names. Every canonical channel needs a unit, from the file or the call;
-        numbers are SI afterwards. Columns with non-numeric cells are left out, and a later
-        request for one raises an error with the reason; for canonical channels they are errors.
+        A column becomes the channel t, x, v, a or force if its name is that of the channel or a
+        usual alias (time, q, pos, angle, vel, omega, torque, ...) and no other column matches. All
+        other columns keep their names. Every canonical channel needs a unit from the file or the
+        call; the stored numbers are in SI units. Columns with non-numeric cells are left out, and
+        requesting one raises an error with the reason; in a canonical channel they are an error.
 
         Args:
-            paths: a file, a pattern such as "run*.csv", or a list of them.
+            paths: a file, a pattern such as "run*.csv", or a list of these.
             columns: channel -> column ({"x": "encoder [mm]"}), or the names of all columns in
-                their order (["t [ms]", "x", "-", "force"]; "-" leaves one out).
+                order (["t [ms]", "x", "-", "force"]; "-" leaves a column out).
             units: "rad, N m" for canonical channels whose columns have no unit, or channel ->
                 unit ({"x": "mm", "theta_2": "deg"}), which overrides the file.
-            step: sample interval [s] of files without a time.
+            step: sample interval [s] of files without time.
             variable: struct, matrix or nested part of a `.mat` or `.npz` file: "run(2).log".
             points: rows are points (v, F) of a friction curve; no time is needed.
             missing: "drop" leaves out rows in which a channel has no number (an empty cell, NaN)
-                and rows that repeat the previous one, time included; `resampled` then makes the
-                intervals equal and cuts at long gaps.
+                and rows that repeat the previous row including its time; `resampled` then makes
+                the intervals equal and splits records at long gaps.
 
         Raises:
-            ValueError: unusable data, with file, row and column; for several files, all errors.
+            ValueError: unusable data, with file, row and column; for several files all errors.
         """
         wanted = Wanted(columns, units, step, checks.flag("read: points", points), {}, missing)
         found = read_records(paths, wanted, variable)
@@ -110,15 +110,15 @@ class Dataset:
         name: str = "data",
         **arrays: object,
     ) -> "Dataset":
-        """Make one record from arrays: `Dataset.of(t=t, x=x, force=force)`, a dict, a pandas frame.
+        """Return one record from arrays: `Dataset.of(t=t, x=x, force=force)`, a dict or a frame.
 
-        Numbers are SI (m, N; `units="rad, N m"` if rotary) unless a name has a unit, such as
-        "x [mm]"; the columns of a frame need units, as in a file.
+        Numbers are in SI units (m, N; with `units="rad, N m"` rotary) unless a name has a unit,
+        such as "x [mm]"; the columns of a pandas frame need units, as in a file.
 
         Args:
-            frame: a mapping or a frame with the columns.
+            frame: a mapping or a pandas frame with the columns.
             units, columns, step, points, missing: as in `read`.
-            name: of the record.
+            name: name of the record.
             arrays: further columns by name.
 
         Raises:
@@ -140,7 +140,7 @@ class Dataset:
         return self.records[index]
 
     def __add__(self, other: "Dataset") -> "Dataset":
-        """Return the records of both."""
+        """Return the records of both data sets."""
         other = checks.kind("Dataset: +", other, Dataset, "a Dataset")
         return Dataset((*self.records, *other.records), f"{self.name} + {other.name}")
 
@@ -158,17 +158,17 @@ class Dataset:
         return sum(one.size for one in self.records)
 
     def each(self, change: Callable[[Record], Record]) -> "Dataset":
-        """Apply a function to every record."""
+        """Return the data with a function applied to every record."""
         return Dataset(tuple(map(change, self.records)), self.name)
 
     def check(self, **roles: str) -> Findings:
-        """Check the data and return the findings, each with its place; printable.
+        """Check the data and return the findings, each with its location.
 
         An error makes a physically meaningful fit impossible; a warning means that some numbers are
         not identifiable or less accurate than they appear. Every signal is checked for clipping,
-        spikes and frozen intervals; signals with a part in the drive are compared with each other:
-        sign and delay of force against motion, exchanged columns, standstill, motion in one
-        direction, too little excitation, wraps, drift, units.
+        spikes and frozen intervals. Signals with a part in the drive are compared with each other:
+        sign and delay of the force relative to the motion, exchanged columns, standstill, motion in
+        one direction, too little excitation, wraps, drift, units.
 
         Args:
             roles: signals whose names differ from their part: `check(x="theta", force="tau_1")`.
@@ -179,7 +179,7 @@ class Dataset:
         return check(self.name, self.records, roles)
 
     def between(self, begin: float, end: float) -> "Dataset":
-        """Return the samples with begin <= t <= end [s]; records without any are left out.
+        """Return the samples with begin <= t <= end [s]; records without such samples are omitted.
 
         Raises:
             ValueError: no record has two samples in this interval.
@@ -193,7 +193,7 @@ class Dataset:
         return self.each(lambda one: one.thinned(every))
 
     def renamed(self, names: Mapping[str, str]) -> "Dataset":
-        """Return the data with other names of signals: {"old": "new"}."""
+        """Return the data with renamed signals: {"old": "new"}."""
         return self.each(lambda one: one.renamed(names))
 
     def without_spikes(self) -> "Dataset":
@@ -207,11 +207,11 @@ class Dataset:
     def scaled(
         self, factors: Mapping[str, float], units: Mapping[str, str] | None = None
     ) -> "Dataset":
-        """Return the data with signals times factors: {"force": -1}; `units` if they change."""
+        """Return the data with scaled signals: {"force": -1}; `units` gives their new units."""
         return self.each(lambda one: scaled(one, factors, units))
 
     def split(self, share: float = 0.5) -> "tuple[Dataset, Dataset]":
-        """Split each record into the first `share` of its samples and the rest, for validation.
+        """Split each record into the first `share` of its samples and the remaining samples.
 
         Raises:
             ValueError: a share that leaves fewer than two samples in a part.
@@ -231,7 +231,7 @@ class Dataset:
     def resampled(
         self, step: float | None = None, gap: Literal["split", "refuse"] = "split"
     ) -> "Dataset":
-        """Return the data at equal intervals; a record with gaps becomes one for each piece.
+        """Return the data at equal intervals; a record with gaps is split into several records.
 
         See `identification.data.resample.resampled`.
         """
@@ -239,7 +239,7 @@ class Dataset:
         return Dataset(tuple(pieces), self.name)
 
     def delayed(self, delays: Mapping[str, float]) -> "Dataset":
-        """Return the data with signals shifted in time [s]: new(t) = old(t - delay), ends cut."""
+        """Return the data with delayed signals [s], new(t) = old(t - delay), with the ends cut."""
         return self.each(lambda one: delayed(one, delays))
 
     def merged(
@@ -249,19 +249,19 @@ class Dataset:
         shift: float | Literal["estimate"] = "estimate",
         drift: float | Literal["estimate"] = 0.0,
     ) -> "Dataset":
-        """Merge two recorders of one experiment, record by record, at the times of the first.
+        """Merge the records of two recorders of one experiment, at the times of the first.
 
         See `identification.data.merge.merged`.
 
         Args:
-            other: the same number of records.
-            on: a quantity in both, by its names here and in `other`: ("x", "x").
+            other: data with the same number of records.
+            on: names of a quantity that both measured, here and in `other`: ("x", "x").
             shift: offset added to the times of `other` [s].
-            drift: relative excess speed of the clock of the first.
+            drift: relative excess speed of the clock of the first recorder.
 
         Raises:
             ValueError: different numbers of records, no common time, an undetermined delay,
-                clocks that drift.
+                or clocks that drift.
         """
         where = f"data '{self.name}': merged"
         other = checks.kind(where, other, Dataset, "a Dataset")
@@ -277,7 +277,7 @@ class Dataset:
         not written.
 
         Returns:
-            The files.
+            The paths of the files.
         """
         target = checks.path(f"data '{self.name}': to_csv", path)
         if len(self) == 1:

@@ -1,4 +1,4 @@
-"""Velocity and acceleration of a record, points of constant velocity, linear least squares.
+"""Velocity and acceleration of a record, means at constant velocity, and linear regression.
 
     force = m a + F_v v + F_c sign(v) + offset
 
@@ -31,19 +31,19 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 CERTAIN = 4.0
-"""Standard deviations of the velocity's noise within which the velocity may be zero."""
+"""Number of standard deviations of noise within which a velocity may be zero."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class MotionSignals:
-    """A record differentiated without phase shift, its disturbed ends cut off.
+    """A record differentiated without phase shift, with its disturbed ends cut off.
 
     Attributes:
-        name: of the record.
+        name: name of the record.
         t, x, v, a: time [s], filtered position [m], velocity [m/s], acceleration [m/s^2].
-        force: measured force [N], as measured.
-        filter: the filter used.
+        force: unfiltered measured force [N].
+        filter: filter of the position and decimation of the equations.
         slow: samples with an uncertain direction of motion.
     """
 
@@ -65,11 +65,11 @@ class MotionSignals:
 
     @cached_property
     def kept(self) -> NDArray[np.int64]:
-        """Rows of the decimation without a slow sample in their window."""
+        """Indices of the decimated rows whose windows contain no slow sample."""
         return np.flatnonzero(~self.decimation.touched(self.slow))
 
     def equations(self, signal: Array) -> Array:
-        """Return `signal` decimated to the equations in use, shape (rows,)."""
+        """Return `signal` decimated to the equations that are used, shape (rows,)."""
         return self.decimation(signal)[self.kept]
 
     @property
@@ -83,15 +83,15 @@ def derivatives(
 ) -> tuple[Array, Array, Array]:
     """Return filtered position, velocity and acceleration, each shape (n,).
 
-    Central differences of the filtered position; the acceleration is its second difference over
-    two steps, whose gain falls short of one by (w h)^2 / 12 only. A measured velocity is filtered
-    and differentiated once. Of two, velocity and acceleration are combined by `mixer`.
+    Velocities are central differences of the filtered position. The acceleration is its second
+    difference over two steps, whose gain is only (w h)^2 / 12 below one. A measured velocity is
+    filtered and differentiated once. If both are measured, `mixer` combines their derivatives.
 
     Args:
-        x: position, samples; None: not measured (zeros are returned).
-        v: measured velocity, or None.
+        x: samples of the position; None: not measured (zeros are returned).
+        v: samples of a measured velocity, or None.
         step: sample interval [s].
-        filter: cut-off and order.
+        filter: cut-off frequency and order.
         mixer: `Velocity.of(x, v, step)`.
     """
     by_x: list[Array] = []
@@ -108,11 +108,11 @@ def derivatives(
 
 
 def uncertain(v: Array, noise: float, step: float, filter: Filter) -> Mask:
-    """Return a mask of samples with an undetermined force of a static law, shape (n,).
+    """Return a mask of the samples at which the force of a static law is undetermined, shape (n,).
 
-    These are samples where the velocity changes sign or is not distinguishable from rest (four
-    standard deviations of its `noise`), and those that the low-pass filter mixes with them: half of
-    1 / cutoff around. With `filter.v_min`, samples slower than it.
+    At these samples the velocity changes sign or is not distinguishable from rest (four standard
+    deviations of its `noise`). The mask includes neighbours within half of 1 / cutoff, which the
+    low-pass filter mixes with them. With `filter.v_min`, it marks only samples slower than that.
     """
     if filter.v_min is not None:
         return np.abs(v) < filter.v_min
@@ -136,9 +136,9 @@ def differentiate(
 
     Args:
         record: equally spaced samples.
-        filter: cut-off and decimation; by `choose_filter` if none is given.
+        filter: cut-off and decimation; None: chosen by `choose_filter`.
         force, x: names of the channels.
-        v: channel of a measured velocity, combined with that of the position by `Velocity`;
+        v: channel of a measured velocity, which `Velocity` combines with that of the position;
             None: "v" if the record has it.
 
     Raises:
@@ -163,9 +163,9 @@ def differentiate(
 
 
 SMOOTHINGS = 2.0
-"""Cut-off of the evaluated velocity, over 1 / (shortest plateau)."""
+"""Cut-off frequency of the evaluated velocity, relative to 1 / (shortest plateau)."""
 REST = 1e-3
-"""Speed over the largest one below which an interval is rest and not a point of a curve."""
+"""Speed relative to the largest one below which an interval is rest and not a point of a curve."""
 
 
 def plateaus(
@@ -180,26 +180,27 @@ def plateaus(
 ) -> Dataset:
     """Return means of velocity and force over intervals of constant velocity, for `Points`.
 
-    Suitable records are a staircase of speeds or a triangle of positions. A plateau is an interval
+    Suitable records have a staircase of speeds or triangles of positions. A plateau is an interval
     of at least `shortest` in which the smoothed velocity changes by less than the share `change`
-    in that time. Its first part, of the share `settle`, is left out; rest is excluded. There the
-    acceleration is zero, so the mean force is friction plus constant forces such as weight.
+    per `shortest`. The initial share `settle` of a plateau is left out, and rest is excluded. On a
+    plateau the acceleration is zero: the mean force is friction plus constant forces like weight.
 
     Args:
-        data: equally spaced records; each gives a record of points.
+        data: equally spaced records; each one is converted to a record of points.
         force: channel of the driving force or torque.
-        v: channel of the velocity; None: "v" if there is one, else the slope of `x`.
+        v: channel of the velocity; None: "v" if there is one, otherwise the derivative of `x`.
         x: channel of the position.
-        shortest: duration [s].
-        change: largest relative change of velocity.
-        settle: share of a plateau, 0 <= settle < 1.
+        shortest: shortest duration of a plateau [s].
+        change: largest relative change of the velocity.
+        settle: share of a plateau that is left out, 0 <= settle <= 0.9.
 
     Returns:
-        Channels v, F, `n` (samples per mean, for `Points(weight="n")`) and `spread` (standard
-        deviation of the force); mean times as `t_mean`.
+        Records with the channels v, F, `n` (samples per mean, for `Points(weight="n")`), `spread`
+        (standard deviation of the force) and `t_mean` (mean time).
 
     Raises:
-        ValueError: no record has a plateau; unequal intervals; arguments out of range.
+        ValueError: no record has two plateaus, intervals are unequal, or an argument is out of
+            range.
     """
     shortest = checks.number("plateaus: shortest", shortest, unit="s", above=0.0)
     change = checks.number("plateaus: change", change, above=0.0)
@@ -236,19 +237,19 @@ def plateaus(
 
 
 RANK = 1e-7
-"""Smallest singular value of the scaled regressors that counts, relative to the largest."""
+"""Smallest singular value of the scaled regressors taken as nonzero, relative to the largest."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """Estimates by name with standard errors, and the remaining force error.
+    """Estimated parameters with standard errors, and the remaining force error.
 
     Attributes:
-        values: m [kg], F_v [N s/m], F_c [N], offset [N]; with directions F_v_pos, F_v_neg, ...
-        standard_errors: of the same names, for white residuals after decimation; None for values
-            that are not identifiable.
-        force_relative: norm of the force error over norm of the force [%].
+        values: m [kg], F_v [N s/m], F_c [N], offset [N]; by direction: F_v_pos, F_v_neg, ...
+        standard_errors: standard errors of the values for white residuals after decimation; None
+            for values that are not identifiable.
+        force_relative: norm of the force error relative to the norm of the force [%].
         force_rms: root mean square force error [N].
     """
 
@@ -261,14 +262,14 @@ class LinearFit:
 def linear_regression(
     signals: MotionSignals | Sequence[MotionSignals], directions: bool = False
 ) -> LinearFit:
-    """Fit by least squares on the decimated equations of one record or of several.
+    """Fit mass, friction and offset by least squares to the decimated equations of all records.
 
     Args:
         signals: differentiated records.
-        directions: separate F_v and F_c for the two directions, and no offset.
+        directions: estimate F_v and F_c separately for the two directions, without an offset.
 
-    A drive that moves in one direction only does not separate Coulomb friction from an offset: the
-    minimum-norm values are returned, without standard errors.
+    If the drive moves in one direction only, Coulomb friction and offset are not separable. Then
+    the minimum-norm values are returned, without standard errors.
     """
     records = [signals] if isinstance(signals, MotionSignals) else list(signals)
     parts = [_regressors(record, directions) for record in records]
@@ -295,7 +296,7 @@ def _regressors(signals: MotionSignals, directions: bool) -> dict[str, Array]:
 
 
 def _standard_errors(X: Array, error: Array) -> list[float | None]:
-    """Return standard errors; None for columns that are linear combinations of others."""
+    """Return standard errors; None for columns that are linear combinations of other columns."""
     size = np.linalg.norm(X, axis=0)
     scale = np.where(size > 0, size, 1.0)
     _, s, Vt = np.linalg.svd(X / scale, full_matrices=False)

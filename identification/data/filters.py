@@ -1,7 +1,7 @@
 """Zero-phase filtering, differentiation and parallel decimation of sampled signals.
 
-Identification by the inverse model needs velocity and acceleration from position without a phase
-shift, and the same low-pass filter on the measured and on the predicted force.
+Identification by the inverse model requires velocity and acceleration without a phase shift from
+the position, and the same low-pass filter for the measured and the predicted force.
 Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 2013 (IDIM-LS).
 """
 
@@ -19,11 +19,11 @@ from symfric.foundation import checks
 Array = NDArray[np.float64]
 
 LOBES = 3
-"""Zero crossings of the decimation filter on each side: few, so few rows include a reversal."""
+"""Zero crossings of the decimation filter on each side; few, so a reversal affects few rows."""
 PASS = 0.9
-"""Its cut-off (-6 dB) over the Nyquist frequency after decimation."""
+"""Cut-off (-6 dB) of the decimation filter, relative to the Nyquist frequency after decimation."""
 ABOVE = 4.0
-"""Power over the noise power above which a motion is significant."""
+"""Power relative to the noise power above which a motion is significant."""
 
 
 @final
@@ -32,13 +32,13 @@ class Filter:
     """Smoothing of positions and decimation of equations.
 
     Attributes:
-        cutoff: cut-off of the low-pass filter on position (and measured velocity) [Hz]; the gain
-            there is 1/2, since the filter runs forward and backward.
-        decimation: samples per equation, after a low-pass filter on all its terms.
+        cutoff: cut-off of the low-pass filter of position (and measured velocity) [Hz]; its gain
+            there is 1/2, because the filter runs forward and backward.
+        decimation: samples per equation, after a low-pass filter on all terms of the equation.
         order: order of the Butterworth filter.
         v_min: equations of a static law that include samples slower than this are omitted [m/s or
             rad/s]. Filtering blurs the switch of friction at standstill, which a static law
-            does not describe. None: reversals and samples not distinguishable from rest.
+            does not describe. None: omit reversals and samples not distinguishable from rest.
     """
 
     cutoff: float
@@ -62,23 +62,23 @@ class Filter:
         return f"{self.cutoff:g} Hz, decimation {self.decimation}, v_min {limit}"
 
     def inside(self, size: int, step: float) -> slice:
-        """Return the samples away from both ends, where reflection affects the result."""
+        """Return the samples far enough from both ends not to be affected by reflection."""
         cut = ceil(5.0 / (self.cutoff * step) - 1e-9)
         return slice(cut, max(cut, size - cut))
 
     def gain(self, frequency: Array, step: float) -> Array:
-        """Return |H|^2 at frequencies below 1/2, cycles per sample; see `lowpass`."""
+        """Return the gain |H|^2 at frequencies below 1/2 in cycles per sample; see `lowpass`."""
         ratio = np.tan(np.pi * frequency) / np.tan(np.pi * self.cutoff * step)
         return 1 / (1 + ratio ** (2 * self.order))
 
 
 def lowpass(signal: Array, cutoff: float, step: float, order: int = 4) -> Array:
-    """Apply a Butterworth low-pass filter forward and backward: no phase, gain |H|^2.
+    """Apply a Butterworth low-pass filter forward and backward, with zero phase and gain |H|^2.
 
         |H|^2 = 1 / (1 + (tan(pi f h) / tan(pi f_c h))^(2 order))
 
-    which is `filtfilt` of the bilinear Butterworth filter. The ends are continued by odd
-    reflection of the signal after subtracting the straight line from end to end.
+    This is `filtfilt` of the bilinear Butterworth filter. The straight line between the end samples
+    is subtracted, and the signal is continued at both ends by odd reflection.
 
     Args:
         signal: samples, shape (n,).
@@ -102,7 +102,7 @@ def lowpass(signal: Array, cutoff: float, step: float, order: int = 4) -> Array:
 
 
 def central_difference(signal: Array, step: float) -> Array:
-    """Return the first derivative, of second order inside and one-sided at the two ends."""
+    """Return the first derivative, of second order inside and one-sided at both ends."""
     return np.gradient(signal, step)
 
 
@@ -113,8 +113,8 @@ class Decimation:
 
         y = D u,   a sinc filter of 3 lobes under a Hamming window, cut-off 0.9 Nyquist / factor
 
-    Only rows whose window lies inside the data are kept. As D is linear it acts equally on measured
-    force, acceleration and any law, which makes the regression unbiased.
+    Only rows whose window lies inside the data are kept. Since D is linear and acts equally on
+    measured force, acceleration and any law, the regression is unbiased.
     """
 
     samples: int
@@ -122,7 +122,7 @@ class Decimation:
 
     @cached_property
     def taps(self) -> Array:
-        """Weights of one row; they sum to one."""
+        """Weights of one row, with sum one."""
         if self.factor == 1:
             return np.ones(1)
         k = np.arange(-LOBES * self.factor, LOBES * self.factor + 1)
@@ -131,11 +131,11 @@ class Decimation:
 
     @property
     def rows(self) -> int:
-        """Number of remaining values; zero if the window is longer than the data."""
+        """Number of rows; zero if the window is longer than the data."""
         return max(0, (self.samples - self.taps.size) // self.factor + 1)
 
     def centres(self, samples: NDArray[Any]) -> NDArray[Any]:
-        """Return the samples in the middle of the rows, shape (rows,)."""
+        """Return the samples at the centres of the rows, shape (rows,)."""
         half = self.taps.size // 2
         return samples[half : half + self.rows * self.factor : self.factor]
 
@@ -144,22 +144,22 @@ class Decimation:
         return np.convolve(signal, self.taps, mode="valid")[:: self.factor]
 
     def columns(self, signals: Array) -> Array:
-        """Return D applied to each column of `signals`, (samples, k) -> (rows, k)."""
+        """Return D applied to each column of `signals`; shape (samples, k) becomes (rows, k)."""
         if self.factor == 1:
             return signals
         windows = np.lib.stride_tricks.sliding_window_view(signals, self.taps.size, axis=0)
         return windows[:: self.factor] @ self.taps
 
     def touched(self, samples: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return a mask of rows with any of `samples` inside their windows, shape (rows,)."""
+        """Return a mask of the rows whose windows contain any of `samples`, shape (rows,)."""
         return np.convolve(samples, np.ones(self.taps.size), mode="valid")[:: self.factor] > 0.5
 
 
 def bandwidth(force: Array, step: float, share: float = 0.999) -> float:
-    """Return the frequency [Hz] below which `share` of the variance of `force` lies, without noise.
+    """Return the frequency [Hz] below which `share` of the noise-free variance of `force` lies.
 
-    The level of the white noise is estimated from the upper half of the spectrum by a median, which
-    ignores lines; the power of white noise has the median ln 2 times its mean.
+    The level of the white noise is the median of the upper half of the spectrum divided by ln 2,
+    the ratio of median and mean for white noise; spectral lines do not affect the median.
     """
     power = np.abs(np.fft.rfft(force - force.mean())) ** 2
     frequency = np.fft.rfftfreq(force.size, step)
@@ -169,9 +169,9 @@ def bandwidth(force: Array, step: float, share: float = 0.999) -> float:
 
 
 def spectrum(signal: Array) -> Array:
-    """Return the power under a Hann window; for white noise its variance, shape (n//2+1,).
+    """Return the power under a Hann window, shape (n//2+1,); for white noise, its variance.
 
-    If a signal ends at another value than it starts, pass `without_line` of it.
+    If the end values of a signal differ, subtract the line between them by `without_line` first.
     """
     return np.abs(np.fft.rfft(signal * np.hanning(signal.size))) ** 2 / (0.375 * signal.size)
 
@@ -182,9 +182,9 @@ def without_line(signal: Array) -> Array:
 
 
 def noise_level(power: Array) -> float:
-    """Return the power of the white noise in a spectrum, from its upper half, without motion.
+    """Return the power of the white noise in a spectrum from its upper half, free of motion.
 
-    By the median, which ignores lines; for white noise it is ln 2 times the mean.
+    The level is the median divided by ln 2; spectral lines do not affect the median.
     """
     return float(np.median(power[power.size // 2 :])) / float(np.log(2))
 
@@ -192,7 +192,8 @@ def noise_level(power: Array) -> float:
 def position_band(x: Array, step: float) -> float:
     """Return the frequency [Hz] above which the noise of the position exceeds its motion.
 
-    The noise level is that of the upper half of the spectrum. Above it an acceleration is noise.
+    The noise level is that of the upper half of the spectrum. Accelerations above this frequency
+    are noise.
     """
     power = spectrum(without_line(x))
     return band_above(power, np.full(power.size, noise_level(power)), step)
@@ -214,10 +215,10 @@ def choose_filter(
 
         cut-off 5 f_b (at most half the Nyquist frequency), decimation 0.8 Nyquist / (2 f_b)
 
-    f_b is rounded to one digit. The factors are those of the EMPS reference (there f_b = 20 Hz by
-    hand). f_a is the median of `bands`, the significant bandwidths of the coordinates: f_b is at
-    most f_a, and so is the cut-off of the decimation, 0.9 Nyquist / decimation, since noise in the
-    acceleration lowers the mass. The decimation leaves at least `rows` equations if possible.
+    f_b is rounded to one digit. The factors are those of the EMPS reference, which sets f_b = 20 Hz
+    by hand. f_a is the median of `bands`, the significant bandwidths of the coordinates. It limits
+    f_b and the cut-off of the decimation, 0.9 Nyquist / decimation, because noise in the
+    acceleration lowers the mass. At least `rows` equations remain, if possible.
     """
     nyquist = 0.5 / step
     known = float(np.median([*bands] or [nyquist]))
@@ -230,9 +231,9 @@ def choose_filter(
 
 
 WIDTH = 99
-"""Fewest neighbours over which a spectrum is averaged: an accuracy of a level of one eighth."""
+"""Least number of neighbours for the mean of a spectrum; the level is accurate to one eighth."""
 SURE = 2.0
-"""Factor by which two averaged levels must differ to count as different."""
+"""Factor by which two mean levels must differ to be treated as different."""
 
 
 @final
@@ -242,22 +243,22 @@ class Velocity:
 
         V = V_x + W (V_v - V_x),   W = E_x / (E_x + E_v),   E = E_x E_v / (E_x + E_v)
 
-    has the least noise of all unbiased combinations. E_x is white noise of the position under the
-    central difference s = sin(w h) / h, plus the bias of this difference:
+    This has the least noise of all unbiased combinations. E_x is white noise of the position after
+    the central difference s = sin(w h) / h, plus the bias of this difference:
 
         E_x = S_x s^2 + (1 - s / w)^2 |V_v|^2
 
     E_v is at least the white noise S_v of the measured velocity. If |V_v - V_x|^2 clearly exceeds
-    E_x, the excess is attributed to the velocity channel: its scale, delay, drift or filter. If it
-    is clearly lower, both share their noise (a velocity derived from the position), and E_v is at
-    least the difference.
+    E_x, the excess is an error of the velocity channel: its scale, delay, drift or filter. If it
+    is clearly lower, the noise of both is common (a velocity derived from the position), and E_v is
+    at least the difference.
 
     Attributes:
-        frequency: of the spectra, cycles per sample, shape (k,).
+        frequency: frequencies of the spectra in cycles per sample, shape (k,).
         weight: W of the measured velocity; 0 without one, 1 without a position.
         noise: E [(m/s)^2 per sample]; white noise of variance e^2 has E = e^2.
 
-    Limit: noise levels are those of the upper half of the spectra, assumed white below.
+    Limits: noise levels are those of the upper half of the spectra, assumed white below it.
     """
 
     frequency: Array
@@ -266,7 +267,7 @@ class Velocity:
 
     @staticmethod
     def of(x: Array | None, v: Array | None, step: float) -> "Velocity":
-        """Compute it from the samples of position and velocity, one of which may be missing.
+        """Compute the combination from position and velocity, one of which may be missing.
 
         Raises:
             ValueError: both are missing.
@@ -293,7 +294,7 @@ class Velocity:
         return Velocity(frequency, weight, weight * of_v)
 
     def mixed(self, of_x: Array, of_v: Array) -> Array:
-        """Combine a signal derived from the position and one from the velocity, each (n,)."""
+        """Combine a signal derived from the position with one from the velocity, shape (n,)."""
         apart = of_v - of_x
         periodic = np.concatenate([apart, apart[-2:0:-1]])
         weight = np.interp(np.fft.rfftfreq(periodic.size), self.frequency, self.weight)
@@ -308,7 +309,7 @@ class Velocity:
     def band(self, x: Array | None, v: Array | None, step: float) -> float:
         """Return the frequency [Hz] up to which the motion exceeds its noise; see `position_band`.
 
-        If both are measured, it is at least that of the position alone.
+        If position and velocity are given, it is at least that of the position alone.
         """
         if x is None or v is None:
             known = v if x is None else x
@@ -326,5 +327,5 @@ def _averaged(power: Array, step: float) -> Array:
 
 
 def _width(power: Array, step: float, least: int) -> int:
-    """Return the number of entries of a spectrum in 1 Hz, at least `least`."""
+    """Return the number of entries of a spectrum in 1 Hz, at least `least` and at most all."""
     return min(max(least, 2 * round((power.size - 1) * step) + 1), power.size)

@@ -1,10 +1,10 @@
-"""Findings of the checks, each with its place; the view of a record, and its rough model.
+"""Findings of the checks of data, the checked view of a record, and its rough model.
 
     force = m a + level sgn(v) + viscous v + stiffness x + offset
 
-and sin x, cos x for a rotary drive, by robust linear regression on signals smoothed by a Gaussian
-window, whose width depends on the noise of the position. Its signs and its explained variance
-reveal wrong signs, exchanged columns, dead time and drift; its values are not estimates.
+For a rotary drive, sin x and cos x are added. The model is a robust linear regression on signals
+smoothed by a Gaussian window, whose width depends on the noise of the position. Its signs and its
+explained variance reveal wrong signs, exchanged columns, delay and drift; it is not an estimate.
 """
 
 import tomllib
@@ -32,11 +32,11 @@ class Finding:
 
     Attributes:
         kind: one word, such as "clipping".
-        record: number of the record.
+        record: index of the record in the data.
         signal: affected signal; "" for the record as a whole.
-        sentence: description, place and remedy.
-        begin, end: first and last time [s]; for points their indices.
-        severity: "error" if no fit of these data can be physically meaningful, else "warning".
+        sentence: description, location and remedy.
+        begin, end: first and last time [s]; for points, their indices.
+        severity: "error" if no fit of these data is physically meaningful, otherwise "warning".
     """
 
     kind: str
@@ -59,7 +59,7 @@ class Findings:
 
     Attributes:
         items: the findings.
-        name: of the data.
+        name: name of the data.
         records: names of the records.
     """
 
@@ -83,12 +83,12 @@ class Findings:
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
-        """Findings that a fit reports before it continues."""
+        """Findings that do not prevent a fit."""
         return tuple(f for f in self.items if f.severity == "warning")
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """Types of the findings, each once."""
+        """Kinds of the findings, without repetition."""
         return tuple(dict.fromkeys(f.kind for f in self.items))
 
     def __str__(self) -> str:
@@ -108,11 +108,11 @@ def sentences() -> dict[str, str]:
 @final
 @dataclass(frozen=True, eq=False)
 class View:
-    """A record under check.
+    """A record to be checked.
 
     Attributes:
         record: the record.
-        number: its index in the data.
+        number: index of the record in the data.
         roles: part in the drive ("x", "v", "a", "force") -> name of its signal.
     """
 
@@ -122,20 +122,20 @@ class View:
 
     @classmethod
     def of(cls, record: Record, number: int, roles: Mapping[str, str]) -> "View":
-        """Return the view of a record; `roles` names signals whose names differ from their part."""
+        """Return the view of a record; `roles` maps parts to signals with other names."""
         named = checks.named("check", roles, ROLES)
         given = {role: name for role, name in named.items() if role != name or name in record}
         found = {role: role for role in ROLES if role in record.signals}
         return cls(record, number, found | {r: record.channel(n) for r, n in given.items()})
 
     def signal(self, role: str) -> Array | None:
-        """Return the signal of a part, if there is one."""
+        """Return the signal of a part; None if it is missing."""
         return self.record.signals[self.roles[role]] if role in self.roles else None
 
     def known(self) -> Iterator[tuple[str, Array, str]]:
-        """Yield name, values and unit of the long signals that vary and have a part or a unit.
+        """Yield name, values and unit of long, varying signals that have a part or a unit.
 
-        Others may be predictions of a model.
+        Signals without part and unit may be predictions of a model.
         """
         for name, y in self.record.signals.items():
             unit = self.record.units[name]
@@ -152,7 +152,7 @@ class View:
 
     @cached_property
     def steady(self) -> Record | None:
-        """Longest piece without a gap, at equal intervals; None if it is too short."""
+        """Longest piece of the record without gaps, at equal intervals; None if too short."""
         record = self.record
         if record.t is None or record.size < 20:
             return None
@@ -170,13 +170,13 @@ class View:
         self, severity: Severity, kind: str, signal: str, case: str = "",
         begin: int | None = None, end: int | None = None, /, **values: object,
     ) -> Finding:  # fmt: skip
-        """Return a finding at the samples `begin` to `end`, by default the whole record.
+        """Return a finding at the samples `begin` to `end`; by default for the whole record.
 
         Args:
             severity, kind, signal: see `Finding`.
-            case: key of its sentence in `findings.toml`, if that is not the kind.
+            case: key of the sentence in `findings.toml`, if it differs from `kind`.
             begin, end: first and last sample.
-            values: of the fields of the sentence.
+            values: values of the fields in the sentence.
         """
         last = self.record.size - 1 if begin is None else begin
         samples = (begin or 0, last if end is None else end)
@@ -190,14 +190,14 @@ class View:
     warning = partialmethod(finding, "warning")
 
     def at(self, sample: int) -> str:
-        """Return a place as text: its time and its row."""
+        """Return the location of a sample as text, with time and row."""
         t = self.record.t
         place = self.record.place(sample)
         return place if t is None else f"t = {t[sample]:.6g} s ({place})"
 
 
 def constant_runs(y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return first samples and lengths of the runs of equal values of a signal."""
+    """Return first samples and lengths of all runs of equal values in a signal."""
     first = np.concatenate([[0], np.flatnonzero(np.diff(y) != 0) + 1])
     return first, np.diff(np.concatenate([first, [y.size]]))
 
@@ -214,22 +214,22 @@ def count_of(y: Array) -> float:
 
 
 WIDTHS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 100.0)
-"""Standard deviations of the window, in samples."""
+"""Standard deviations of the smoothing window, in samples."""
 CLEAN = 0.1
-"""Noise of the acceleration over the acceleration that is acceptable."""
+"""Largest acceptable ratio of the noise of the acceleration to the acceleration."""
 TURNED = 0.3
 """Range of an angle [rad] above which gravity may be visible."""
 KNOTS = np.array([0.0, 0.05, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0])
-"""Quantiles of the speed at which a free curve of friction has its knots."""
+"""Quantiles of the speed at the knots of a free friction curve."""
 HUBER = 2.5
 ROUNDS = 5
 MOVING = 0.02
-"""Share of the largest speed above which the drive moves."""
+"""Share of the largest speed above which the drive is moving."""
 
 
 @final
 class Rough:
-    """The rough model of one record.
+    """Rough model of one record.
 
     Attributes:
         t, v, a, force: times [s] and smoothed signals of the rows.
@@ -238,7 +238,7 @@ class Rough:
         clean: True if the acceleration exceeds its noise.
         values, errors: m, level, viscous, stiffness, offset (and coefficients of sin x, cos x),
             and their standard errors.
-        explained: share of the variance of the force that the model explains, robust.
+        explained: share of the variance of the force explained by the model, robust to outliers.
     """
 
     def __init__(
@@ -251,28 +251,28 @@ class Rough:
         self.values, self.errors, self.explained = self.fit(columns, force)
 
     def fit(self, columns: Array, force: Array) -> tuple[Array, Array, float]:
-        """Regress a force on columns; return values, standard errors and explained share."""
+        """Regress a force on columns; return values, standard errors and the explained share."""
         A, b = columns[:: self.every], force[:: self.every]
         values, errors = _robust(A, b)
         return values, errors, _explained(A, b, values)
 
     def unexplained_when_late(self, late: float) -> float:
-        """Return the unexplained share of the force if it were late by a time [s]."""
+        """Return the unexplained share of the force after correcting a delay of `late` [s]."""
         return 1 - self.fit(self.columns, np.interp(self.t + late, self.t, self.force))[2]
 
     def with_column(self, column: Array) -> tuple[float, float]:
-        """Return value and standard error of an additional column, shape (rows,)."""
+        """Return value and standard error of an additional regressor, shape (rows,)."""
         values, errors, _ = self.fit(np.column_stack([self.columns, column]), self.force)
         return float(values[-1]), float(errors[-1])
 
     @cached_property
     def residual(self) -> Array:
-        """Force minus model."""
+        """Difference of the force and its prediction by the model."""
         return self.force - self.columns @ self.values
 
     @property
     def moving(self) -> NDArray[np.bool_]:
-        """Mask of rows in which the drive moves."""
+        """Mask of the rows in which the drive moves."""
         return np.abs(self.v) > MOVING * np.abs(self.v).max()
 
     @property
@@ -281,11 +281,11 @@ class Rough:
         return float(np.ptp(np.quantile(self.force, (0.25, 0.75))))
 
     def sure(self, k: int) -> float:
-        """Return a value over its standard error."""
+        """Return the ratio of value k to its standard error."""
         return float(self.values[k] / self.errors[k]) if self.errors[k] > 0 else 0.0
 
     def one_way(self, share: float = 0.1) -> bool:
-        """Return True if the drive moves back by less than a share of its path."""
+        """Return True if motion in one direction is at most `share` of that in the other."""
         path = [float(np.sum(np.maximum(side * self.v, 0.0))) for side in (1, -1)]
         return min(path) <= share * max(path)
 
@@ -295,7 +295,7 @@ def smoothed(y: Array, width: float, order: int = 0) -> Array:
     from scipy.ndimage import gaussian_filter1d  # noqa: PLC0415  (slow to import)
 
     found = np.asarray(gaussian_filter1d(y, width, mode="nearest"), dtype=np.float64)
-    for _ in range(order):  # SciPy's derivatives do not remove a constant exactly
+    for _ in range(order):  # unlike SciPy's derivatives, differences remove a constant exactly
         found = np.gradient(found)
     return found
 
@@ -304,10 +304,10 @@ def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> 
     """Return the rough model of a record; None without position and force, or if it is too short.
 
     Args:
-        view: the record.
+        view: record to model.
         exchanged: exchange force and position.
-        curve: use any function of the velocity as friction, piecewise linear in each
-            direction, instead of level and viscous part, and a drift with time as the last column.
+        curve: replace level and viscous part by any friction curve that is piecewise linear in
+            each direction, and add a drift in time as the last column.
     """
     record = view.steady
     if record is None or not {"x", "force"} <= view.roles.keys() or record.size < 50:
@@ -336,7 +336,7 @@ def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> 
 
 
 def _explained(A: Array, b: Array, values: Array) -> float:
-    """Return the share of the variance of `b` that a regression explains; outliers count less."""
+    """Return the share of the variance of `b` explained by a regression, robust to outliers."""
 
     def mean(squares: Array) -> float:
         return float(np.mean(np.minimum(squares, 25 * np.quantile(squares, 0.9))))
@@ -346,7 +346,7 @@ def _explained(A: Array, b: Array, values: Array) -> float:
 
 
 def _curve(v: Array, still: float, rows: slice) -> list[Array]:
-    """Return hat functions of the speed in each direction, with knots at its quantiles."""
+    """Return hat functions of the speed in each direction, with knots at quantiles of the speed."""
     found: list[Array] = []
     for side in (1.0, -1.0):
         speed = np.maximum(side * v, 0.0)
@@ -358,7 +358,7 @@ def _curve(v: Array, still: float, rows: slice) -> list[Array]:
 
 
 def _width(x: Array) -> tuple[float, bool]:
-    """Return the narrowest window that lets the acceleration exceed its noise; False if none."""
+    """Return the narrowest sufficient window, and whether the acceleration exceeds its noise."""
     noise = max(white_part(x), count_of(x) / np.sqrt(12))
     best = WIDTHS[0]
     for width in WIDTHS:
@@ -372,12 +372,12 @@ def _width(x: Array) -> tuple[float, bool]:
 
 
 def white_part(x: Array) -> float:
-    """Return the standard deviation of the white part of a position."""
+    """Return the standard deviation of the white noise of a position."""
     return float(np.std(np.diff(x, 3))) / np.sqrt(20)
 
 
 def _robust(A: Array, b: Array) -> tuple[Array, Array]:
-    """Return values and standard errors of Huber's regression, by reweighting."""
+    """Return values and standard errors of Huber's regression by iterative reweighting."""
     scale = np.linalg.norm(A, axis=0)
     scale[scale == 0] = 1.0
     B = A / scale

@@ -1,10 +1,10 @@
 """Reader of MATLAB files up to version 7 and NumPy files: variables, structs, matrices as columns.
 
-A level 5 file is a header and elements, each a tag (type, bytes) with its data; a matrix is an
-element of elements: flags, dimensions, name, numbers; of a struct its fields, of a cell array its
-cells are matrices again. A level 4 file is a row of matrices, each with a header of five integers.
-`scipy.io.loadmat` reads the same but ends the process by a segmentation fault on damaged files. The
-files of the EMPS benchmark are recognised with their controller.
+A level 5 file consists of a header and elements, each with a tag (type, bytes) and data. A matrix
+is an element that contains elements: flags, dimensions, name, numbers; those of structs and cell
+arrays contain matrices. A level 4 file is a sequence of matrices with headers of five integers.
+`scipy.io.loadmat` reads the same files but crashes (segmentation fault) on damaged ones. Files of
+the EMPS benchmark are recognised and read with their controller.
 Sources: The MathWorks, MAT-File Format, 2023; A. Janot, M. Gautier, M. Brunot: Data set and
 reference models of EMPS, 2019.
 """
@@ -22,18 +22,18 @@ from identification.data.raw import Array, Column, Raw, label
 from identification.data.record import PositionLoop, Record
 
 Node = Any
-"""An array of floats, a text or a description, a dict of nodes (struct), or a list of nodes
-(struct array, cells).
+"""Array of floats, text or description, dict of nodes (struct), or list of nodes (struct array,
+cells).
 """
 
 NUMBERS = {
     1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
 }  # fmt: skip
-"""NumPy types by the type of an element."""
+"""NumPy types by the type number of an element."""
 OLD_NUMBERS = ("f8", "f4", "i4", "i2", "u2", "u1")
-"""The same by the P of level 4."""
+"""NumPy types by the digit P of level 4."""
 TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
-"""Encodings by the type of an element of text."""
+"""Encodings by the type number of a text element."""
 MATRIX, COMPRESSED = 14, 15
 CELL, STRUCT, TEXT, OPAQUE = 1, 2, 4, 17
 CLASSES = {
@@ -46,7 +46,7 @@ CLASSES = {
 COMPLEX = 0x800
 HEADER, OLD_HEADER = 128, 20
 HDF5 = b"\x89HDF"
-"""First bytes of a file of version 7.3 without a MATLAB header."""
+"""First bytes of a version 7.3 file without a MATLAB header."""
 LARGEST = 2**29
 """Largest size of an uncompressed element [bytes]."""
 
@@ -56,7 +56,7 @@ def variables(content: bytes) -> dict[str, Node]:
 
     Raises:
         NotImplementedError: a file of version 7.3, which is HDF5.
-        ValueError, IndexError, ...: not a MATLAB file, or a damaged one.
+        ValueError, IndexError, ...: the file is damaged or not a MATLAB file.
     """
     order = {b"IM": "<", b"MI": ">"}.get(content[126:HEADER])
     version = content[125 if order == "<" else 124 : 126][:1]
@@ -70,7 +70,7 @@ def variables(content: bytes) -> dict[str, Node]:
 
 
 def node(value: Any) -> Node:
-    """Return an array as floats, fields of structured arrays as a dict, others as a description."""
+    """Return numbers as floats, structured arrays as a dict, and other arrays as a description."""
     if value.dtype.names:
         return {name: node(value[name]) for name in value.dtype.names}
     if value.dtype.kind not in "iufb":
@@ -88,7 +88,7 @@ def _level_5(data: bytes, order: str) -> Iterator[tuple[str, Node]]:
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
-    """Yield type and data of the elements."""
+    """Yield type and data of each element."""
     at = 0
     while at < len(data):
         kind, size = np.frombuffer(data, f"{order}u4", 2, at).tolist()
@@ -110,7 +110,7 @@ def _matrix(data: bytes, order: str) -> tuple[str, Node]:
         return "", np.zeros((0, 0))
     flags = int(_numbers(*parts[0], order)[0])
     kind = flags & 0xFF
-    if kind == OPAQUE:  # names come first, dimensions never
+    if kind == OPAQUE:  # the name comes first, and there are no dimensions
         return (parts[1][1].decode("latin-1") if len(parts) > 1 else ""), CLASSES[kind]
     shape, name = _numbers(*parts[1], order).tolist(), parts[2][1].decode("latin-1")
     if kind in CLASSES or len(parts) < 4:
@@ -125,7 +125,7 @@ def _matrix(data: bytes, order: str) -> tuple[str, Node]:
 
 
 def _nested(name: str, parts: list[tuple[int, bytes]], kind: int, order: str) -> Node:
-    """Return a struct as a dict, a vector of structs as a list of them, cells as a list."""
+    """Return a struct as a dict, a vector of structs as a list of dicts, and cells as a list."""
     fields = [""]
     if kind == STRUCT:
         size, letters = int(_numbers(*parts[0], order)[0]), parts[1][1]
@@ -142,7 +142,7 @@ def _nested(name: str, parts: list[tuple[int, bytes]], kind: int, order: str) ->
 
 
 def _text(kind: int, data: bytes, order: str) -> str:
-    """Return text of one row; several rows in their storage order."""
+    """Return the text of one row; several rows are joined in storage order."""
     code = TEXTS.get(kind, "latin-1")
     code += {"<": "-le", ">": "-be"}[order] if kind == 4 else ""
     return data.decode(code, errors="replace").strip("\0 ")
@@ -177,15 +177,15 @@ def _level_4(data: bytes) -> Iterator[tuple[str, Node]]:
 
 
 def read_variables(file: Path, variable: str | None) -> Record | list[Raw]:
-    """Return the columns of each record in a file; for an EMPS file the record itself.
+    """Return the columns of each record in a file; for an EMPS file, the record.
 
     Args:
         file: a MATLAB file, a `.npy` matrix or structured array, or an `.npz` archive.
-        variable: a struct or matrix in it, with points for nested ones: "run.log"; a vector
+        variable: a struct or matrix in the file, with points for nested ones: "run.log"; a vector
             of structs takes an index: "run(2)".
 
     Raises:
-        ValueError: another file, version 7.3, a damaged file, no such variable.
+        ValueError: another type of file, version 7.3, a damaged file, or no such variable.
     """
     where, data = f"read '{file.name}'", file.read_bytes()
     such = "MATLAB file" if file.suffix.lower() == ".mat" else "NumPy file of numbers"
@@ -215,7 +215,7 @@ def _numpy(data: bytes) -> dict[str, Node]:
 
 
 def _raws(where: str, name: str, content: Mapping[str, Node]) -> list[Raw]:
-    """Return the records in all variables of a file."""
+    """Return the records contained in all variables of a file."""
     if sum(map(_is_vector, content.values())) > 1:
         return [_raw(where, name, content)]
     tables = {k: v for k, v in content.items() if _is_matrix(v) or isinstance(v, dict | list)}
@@ -245,7 +245,7 @@ def _kind(value: Node) -> str:
 
 
 def _records(where: str, name: str, value: Node, path: str) -> Iterator[Raw]:
-    """Yield the records of one variable: several for a vector of structs, else one."""
+    """Yield the records of one variable: several for a vector of structs, otherwise one."""
     if isinstance(value, list):
         for k, one in enumerate(value, start=1):  # pyright: ignore[reportUnknownVariableType]
             yield from _records(where, f"{name}({k})", one, f"{path}({k})")
@@ -266,7 +266,7 @@ def _records(where: str, name: str, value: Node, path: str) -> Iterator[Raw]:
 
 
 def _simulink(struct: Mapping[str, Node]) -> dict[str, Node] | None:
-    """Return the signals of a Simulink log (a structure with time), by their labels."""
+    """Return the signals of a Simulink log (structure with time) by label; None for others."""
     if "time" not in struct or "signals" not in struct:
         return None
     signals = struct["signals"]
@@ -280,7 +280,7 @@ def _simulink(struct: Mapping[str, Node]) -> dict[str, Node] | None:
 
 
 def _raw(where: str, name: str, content: Mapping[str, Node]) -> Raw:
-    """Return the vectors of the most frequent length as columns; others are marked as unusable."""
+    """Return vectors of the most frequent length as columns; mark other variables as unusable."""
     flat = dict(_flat(content))
     lengths = [v.size for v in flat.values() if isinstance(v, np.ndarray)]
     if not lengths:
@@ -302,7 +302,7 @@ def _raw(where: str, name: str, content: Mapping[str, Node]) -> Raw:
 
 
 def _flat(content: Mapping[str, Node], prefix: str = "") -> Iterator[tuple[str, Node]]:
-    """Yield leaves by name; fields of a struct are prefixed by its name."""
+    """Yield name and value of each leaf; a field is prefixed by the name of its struct."""
     for key, value in content.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{prefix}{key}.")  # pyright: ignore[reportUnknownArgumentType]
@@ -316,7 +316,7 @@ def _flat(content: Mapping[str, Node], prefix: str = "") -> Iterator[tuple[str, 
 
 
 def _upright(matrix: Array) -> Array:
-    """Return a matrix with at least as many rows as columns."""
+    """Return a matrix, transposed if it has more columns than rows."""
     return matrix if matrix.shape[0] >= matrix.shape[1] else matrix.T
 
 
@@ -354,7 +354,7 @@ EMPS = ("t", "qm", "vir", "gtau")
 
 
 def _emps(where: str, name: str, content: Mapping[str, Node]) -> Record:
-    """Return the record of an EMPS file: force gtau*vir; pulses_N (volts, uint8) are in vir."""
+    """Return the record of an EMPS file; the force gtau*vir includes pulses_N (volts, uint8)."""
 
     def read(key: str, number: bool = False) -> Any:
         value = content[key]

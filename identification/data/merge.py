@@ -2,9 +2,9 @@
 
     y1(t) = gain y2(t - shift - drift (t - middle)) + offset
 
-The cross-correlation of both at the step of the coarser one, normalised over their overlap, gives
-the shift to a sample; Gauss-Newton on smoothed signals gives it to a fraction of one, with its
-standard error and the drift of the clocks.
+The cross-correlation of both signals at the coarser step, normalised over their overlap, gives the
+shift to one sample. Gauss-Newton on smoothed signals then gives it to a fraction of a sample, with
+its standard error and the drift between the clocks.
 """
 
 from dataclasses import replace
@@ -22,13 +22,13 @@ Array = NDArray[np.float64]
 ALIKE = 0.8
 """Least correlation of two recordings of one quantity."""
 OVERLAP = 0.5
-"""Least overlap of the records, over the shorter one."""
+"""Least overlap of the records, relative to the shorter one."""
 RIVAL = 1.5
-"""Ratio of unexplained parts below which a second shift is as likely as the best one."""
+"""Ratio of the unexplained parts below which another shift is as likely as the best one."""
 SMOOTHING = 2.0
-"""Standard deviation of the smoothing window, in steps."""
+"""Standard deviation of the smoothing window, in samples."""
 NEIGHBOURS = 2 * np.sqrt(np.pi) * SMOOTHING
-"""Samples that count as one independent sample after smoothing."""
+"""Number of samples that count as one independent sample after smoothing."""
 SURE = 5.0
 """Significance level, in standard deviations."""
 FLATTEST = 50
@@ -40,10 +40,10 @@ class Delay(NamedTuple):
     """Offset and drift between the clocks of two records.
 
     Attributes:
-        shift: offset added to the times of the second [s], at the middle of the overlap.
+        shift: offset added to the times of the second record [s], at `middle`.
         drift: relative excess speed of the first clock.
-        middle: time of the first at which `shift` holds [s].
-        shift_error: standard error.
+        middle: time of the first record at which `shift` holds [s].
+        shift_error: standard error of `shift` [s].
     """
 
     shift: float
@@ -57,12 +57,12 @@ def estimated_delay(first: Record, second: Record, on: tuple[str, str], drift: b
 
     Args:
         first, second: two recordings of one quantity, up to a gain and an offset.
-        on: its name in each.
-        drift: whether the clocks may run at different speeds; else that is an error.
+        on: names of the quantity in `first` and in `second`.
+        drift: whether the clocks may run at different speeds; if not, a drift is an error.
 
     Raises:
-        ValueError: recordings without correlation at any shift, several equally likely shifts,
-            an undetermined shift, clocks that drift.
+        ValueError: the recordings correlate at no shift, several shifts are equally likely, the
+            shift is undetermined, or the clocks drift.
     """
     where = f"data '{first.name}': merged with '{second.name}'"
     step = max(first.median_step, second.median_step)
@@ -81,7 +81,7 @@ def estimated_delay(first: Record, second: Record, on: tuple[str, str], drift: b
 
 
 class _Even:
-    """A signal at equal intervals from `start`; `there` is False inside gaps."""
+    """Signal at equal intervals from `start`; `there` is False inside gaps."""
 
     def __init__(self, record: Record, signal: str, step: float) -> None:
         t, y = record.time, record[signal]
@@ -89,7 +89,7 @@ class _Even:
         grid = t[0] + step * np.arange(int((t[-1] - t[0]) / step * (1 + 1e-12)) + 1)
         k = np.clip(np.searchsorted(t, grid, side="right") - 1, 0, t.size - 2)
         self.there: NDArray[np.bool_] = (t[k + 1] - t[k]) <= GAP * record.median_step
-        if step > 1.5 * record.median_step:  # the mean over a step, not a sample of it
+        if step > 1.5 * record.median_step:  # means over a step instead of single samples
             area = np.concatenate([[0.0], np.cumsum(np.diff(t) * (y[1:] + y[:-1]) / 2)])
             low, high = np.clip(grid - step / 2, t[0], t[-1]), np.clip(grid + step / 2, t[0], t[-1])
             values = (np.interp(high, t, area) - np.interp(low, t, area)) / (high - low)
@@ -113,7 +113,7 @@ class _Even:
 
 
 def _coarse(where: str, one: _Even, two: _Even) -> int:
-    """Return the lag in steps of the best correlation."""
+    """Return the lag with the best correlation, in steps."""
     size = 1 << int(np.ceil(np.log2(one.values.size + two.values.size)))
 
     def product(a: Array, b: Array) -> Array:
@@ -140,7 +140,7 @@ def _coarse(where: str, one: _Even, two: _Even) -> int:
     order = np.argsort(lags, kind="stable")
     at = int(np.flatnonzero(order == best)[0])
     _check_single(where, found[order], at, one.step)
-    rest = ((1 - found**2) * var1 / n)[order]  # unexplained variance, whatever the overlap
+    rest = ((1 - found**2) * var1 / n)[order]  # unexplained variance, independent of the overlap
     likely = lively[order] & (rest < rest[at] * (1 + 9 * NEIGHBOURS / n[best] + 9 / n[best] ** 0.5))
     if np.count_nonzero(likely) > FLATTEST:
         raise ValueError(
@@ -151,7 +151,7 @@ def _coarse(where: str, one: _Even, two: _Even) -> int:
 
 
 def _check_single(where: str, values: Array, at: int, step: float) -> None:
-    """Raise ValueError if another shift, outside the peak of the best one, fits equally well."""
+    """Raise ValueError if a shift outside the peak of the best one fits equally well."""
     peak = values[at]
     below = np.flatnonzero(values < peak - max(0.02, 2 * RIVAL * (1 - peak)))
     left, right = below[below < at], below[below > at]
@@ -173,7 +173,7 @@ def _check_single(where: str, values: Array, at: int, step: float) -> None:
 def _refined(
     where: str, one: _Even, two: _Even, lag: int, *, drifting: bool
 ) -> tuple[Delay, float]:
-    """Return the delay by Gauss-Newton on shift, drift, gain and offset, and its residual."""
+    """Return the delay by Gauss-Newton on shift, drift, gain and offset, and the residual."""
     (t1, y1), (t2, y2) = one.smoothed(), two.smoothed()
     slope = np.gradient(y2, two.step)
     begin = one.start - two.start + lag * one.step
@@ -214,18 +214,18 @@ def merged(
     shift: float | Literal["estimate"] = "estimate",
     drift: float | Literal["estimate"] = 0.0,
 ) -> list[Record]:
-    """Return the signals of both at the times of the first, one record for each piece.
+    """Return the signals of both records at the times of the first, a record for each piece.
 
     Args:
-        first: defines the times.
-        second: is interpolated; where it has a gap, the record is split.
-        on: a quantity in both, by its name in each; that of the second is dropped, unless it has
-            a name of its own.
-        shift: offset added to the times of the second [s].
+        first: record that defines the times.
+        second: record that is interpolated; the result is split at its gaps.
+        on: names of a common quantity in `first` and `second`; the signal of `second` is dropped,
+            unless `first` has no signal of that name.
+        shift: offset added to the times of the second record [s].
         drift: relative excess speed of the first clock.
 
     Raises:
-        ValueError: signals of one name in both, no common time, or see `estimated_delay`.
+        ValueError: both have signals of one name or no common time, or see `estimated_delay`.
     """
     where = f"data '{first.name}': merged with '{second.name}'"
     names = checks.names(f"{where}: on", on) if len({*on}) == 2 else tuple(on)

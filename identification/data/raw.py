@@ -1,4 +1,4 @@
-"""Raw columns of a file, and their conversion to a record: names, units, time."""
+"""Raw columns of a file, and their conversion to a record with names, SI units and time."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ ALIASES: Mapping[str, tuple[str, ...]] = {
     "a": ("a", "qdd", "ddq", "acc", "acceleration"),
     "force": ("force", "F", "f", "torque", "tau"),
 }
-"""Aliases of columns by canonical channel; longer ones are case-insensitive."""
+"""Aliases of columns by canonical channel; aliases of several letters are case-insensitive."""
 POINTS: Mapping[str, tuple[str, ...]] = {
     "v": ALIASES["v"],
     "F": ("F", "f", "force", "friction", "torque", "tau"),
@@ -32,7 +32,7 @@ POINTS: Mapping[str, tuple[str, ...]] = {
 }
 """Aliases of columns of points."""
 SKIPPED = ("", "-", "_")
-"""Names in `columns` for ignored columns."""
+"""Entries of `columns` that mark columns to ignore."""
 
 
 @final
@@ -41,10 +41,10 @@ class Column:
     """A column of a file.
 
     Attributes:
-        label: its header, without the unit.
-        unit: unit in the file, "" if there is none.
-        values: its numbers, NaN for missing ones, shape (n,).
-        problem: its first bad cell, with its place; "" if all cells are numbers.
+        label: header without the unit.
+        unit: unit in the file; "" if there is none.
+        values: numbers, NaN for missing ones, shape (n,).
+        problem: first bad cell, with its location; "" if all cells are numbers.
         gaps: True if empty cells (or NaN) are the only problem.
     """
 
@@ -70,11 +70,11 @@ class Column:
 @final
 @dataclass(frozen=True, eq=False)
 class Raw:
-    """Columns of one record before their identification.
+    """Columns of one record before they are assigned to channels.
 
     Attributes:
-        name: of the file, and of the record in it.
-        columns: in their order; without a header their labels are "".
+        name: name of the file and of the record in it.
+        columns: columns in the order of the file; without a header their labels are "".
         first_row: row of the first sample in the file; 0 if samples have no rows.
         verb: first word of messages.
     """
@@ -88,16 +88,16 @@ class Raw:
 @final
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """Arguments of the caller on columns.
+    """Arguments of the caller that concern columns.
 
     Attributes:
-        columns: channel -> column, or the names of all columns in their order; None: the header.
+        columns: channel -> column, or the names of all columns in order; None: the header.
         units: channel or column -> unit, or the short form "rad, N m"; None: the header.
-        step: sample interval of records without a time [s].
+        step: sample interval of records without time [s].
         points: whether the rows are points without time.
         assumed: default units of canonical channels.
-        missing: treatment of rows in which a channel has no number, and of those that repeat the
-            previous row, "refuse" or "drop".
+        missing: "refuse" or "drop": treatment of rows in which a channel has no number, and of
+            rows that repeat the previous one.
     """
 
     columns: Mapping[str, str] | Sequence[str] | None
@@ -112,7 +112,10 @@ class Wanted:
 
 
 def label(cell: str) -> tuple[str, str]:
-    """Return name and unit of a header cell: `x [mm]`, `x (mm)`, `x / mm`; else the cell and ""."""
+    """Return name and unit of a header cell such as `x [mm]`, `x (mm)` or `x / mm`.
+
+    The unit is "" if the cell contains none.
+    """
     cell = cell.strip()
     match = fullmatch(r"(.*?)\s*\[(.*)\]", cell)
     if match:
@@ -135,8 +138,8 @@ def record(raw: Raw, wanted: Wanted) -> Record:
     """Convert raw columns to a record.
 
     Raises:
-        ValueError: a requested channel that is absent or not numeric, no unit or a wrong one, no
-            time; all problems at once.
+        ValueError: a requested channel is absent or not numeric, a unit is missing or wrong, or
+            the time is missing; all problems in one error.
     """
     where = f"{raw.verb} '{raw.name}'"
     columns = _labelled(where, raw, wanted)
@@ -183,7 +186,7 @@ def record(raw: Raw, wanted: Wanted) -> Record:
 
 
 def _labelled(where: str, raw: Raw, wanted: Wanted) -> tuple[Column, ...]:
-    """Return the columns, with the names of the call if it names all of them in their order."""
+    """Return the columns, renamed if the caller gives the names of all columns in order."""
     columns = raw.columns
     if isinstance(wanted.columns, Mapping) or wanted.columns is None:
         if any(c.label == "" for c in columns):
@@ -211,7 +214,7 @@ def _labelled(where: str, raw: Raw, wanted: Wanted) -> tuple[Column, ...]:
 def _channels(
     where: str, columns: Sequence[Column], wanted: Wanted, have: str
 ) -> dict[str, Column]:
-    """Return channel -> column. Names of the call come first, then canonical ones."""
+    """Return channel -> column; names given by the caller precede canonical ones."""
     left, found = [*columns], dict[str, Column]()
 
     def take(key: str, column: Column) -> None:
@@ -235,7 +238,7 @@ def _channels(
         if len(exact) > 1:
             got = ", ".join(f"'{c}'" for c in exact)
             raise ValueError(f"{where}: expected one column for {key}, got {got}")
-        if exact or len(near) == 1:  # the caller has to choose among several near ones
+        if exact or len(near) == 1:  # the caller has to choose among several aliases
             take(key, (exact or near)[0])
     for column in left:
         name = column.label
@@ -246,7 +249,7 @@ def _channels(
 def _rows(
     where: str, columns: Sequence[Column], needed: Mapping[str, Column], wanted: Wanted
 ) -> NDArray[np.bool_]:
-    """Return the mask of used rows: all, or new ones with a number in every needed channel."""
+    """Return the mask of used rows: all, or new rows with numbers in all needed channels."""
     taken = np.ones(max((c.values.size for c in columns), default=0), dtype=np.bool_)
     if wanted.missing == "refuse":
         return taken
@@ -263,7 +266,7 @@ def _rows(
 
 
 def _units(where: str, named: Mapping[str, Column], wanted: Wanted) -> dict[str, str]:
-    """Return the units of the call by channel."""
+    """Return the units given by the caller, by channel."""
     if isinstance(wanted.units, str):
         given = by_channel(f"{where}: units", wanted.units)
         for key, text in given.items():
@@ -282,7 +285,7 @@ def _units(where: str, named: Mapping[str, Column], wanted: Wanted) -> dict[str,
 
 
 def _scale(key: str, column: Column, given: str, wanted: Wanted) -> tuple[float, str]:
-    """Return the factor to SI and the SI unit of a column."""
+    """Return the factor to SI units and the SI unit of a column."""
     text = given or column.unit or wanted.assumed.get(key, "")
     if key == "t" and not text and wanted.units is not None:
         text = "s"
@@ -318,7 +321,7 @@ def _time(
 
 
 def gathered(works: Sequence[Callable[[], T]]) -> list[T]:
-    """Return the results of `works`; their ValueErrors become one error, a line each."""
+    """Return the results of `works`; join their ValueErrors in one error with a line for each."""
     found: list[T] = []
     problems: list[str] = []
     for work in works:

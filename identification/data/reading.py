@@ -1,4 +1,4 @@
-"""Columns from text files (dialects of CSV), other files and Python objects."""
+"""Reader of text files (dialects of CSV), other files and Python objects as columns."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -19,17 +19,17 @@ from symfric.foundation import checks
 from symfric.foundation.files import write_table
 
 ASSUMED = {"t": "s", "x": "m", "v": "m/s", "a": "m/s^2", "force": "N", "F": "N", "N": "N"}
-"""Default units of arrays: numbers in Python are SI."""
+"""Default units of arrays; numbers in Python are in SI units."""
 
 
 def columns_of(name: str, frame: object, arrays: Mapping[str, object]) -> tuple[Raw, bool]:
-    """Return the columns of `frame` and `arrays`, and whether they come from a frame.
+    """Return the columns of `frame` and `arrays`, and whether the columns need units as in a file.
 
-    A frame has `columns` and returns one by its name: pandas, polars. A mapping holds
-    arrays. Times with a date become seconds from the first one.
+    A frame, such as that of pandas or polars, has `columns` and returns a column by its name; a
+    mapping contains arrays. Times with a date are converted to seconds from the first one.
 
     Raises:
-        ValueError: neither, or columns that are not vectors of one length.
+        ValueError: neither is given, or columns are not vectors of one length.
     """
     where = f"data '{name}'"
     given: dict[str, object] = {}
@@ -60,7 +60,7 @@ def columns_of(name: str, frame: object, arrays: Mapping[str, object]) -> tuple[
 
 def _held(where: str, key: str, values: object) -> Column:
     name, said = label(key)
-    if isinstance(values, np.ma.MaskedArray):  # masked values were not measured
+    if isinstance(values, np.ma.MaskedArray):  # masked values are missing
         masked: Any = values  # pyright: ignore[reportUnknownVariableType]
         values = masked.astype(float).filled(np.nan) if masked.dtype.kind in "iuf" else masked
     wrong = checks.refused(f"{where}: {key}", "a vector of numbers", values)
@@ -68,7 +68,7 @@ def _held(where: str, key: str, values: object) -> Column:
         found = np.asarray(values)
     except (ValueError, TypeError):
         raise wrong from None
-    if found.ndim == 2 and min(found.shape) == 1:  # a vector as MATLAB has them
+    if found.ndim == 2 and min(found.shape) == 1:  # a row or column vector as in MATLAB
         found = found.ravel()
     if found.ndim != 1:
         raise wrong
@@ -91,20 +91,20 @@ COMMENTS = ("#", "%", "//")
 """First characters of comment lines."""
 DELIMITERS = ("\t", ";", ",", " ")
 EMPTY = ("", "-", "na", "n/a", "null")
-"""Cells without a number, in addition to NaN."""
+"""Cells that count as missing numbers, in addition to NaN."""
 LOOKED_AT = 40
-"""Lines at the end of the file from which the delimiter is deduced."""
+"""Number of lines at the end of the file from which the delimiter is deduced."""
 WITH_COMMA, WITH_POINT = (pattern(rf"[-+]?\d*{mark}\d+([eE][-+]?\d+)?") for mark in (",", r"\."))
 
 
 class Rows(NamedTuple):
-    """Lines split into cells.
+    """Lines of a text file split into cells.
 
     Attributes:
-        delimiter: between the cells; a space is any number of spaces and tabs.
+        delimiter: delimiter of the cells; " " stands for any number of spaces and tabs.
         numbers: row numbers in the file.
-        cells: of each row.
-        comments: comment rows before the first other row.
+        cells: cells of each row.
+        comments: comment lines before the first other line.
     """
 
     delimiter: str
@@ -116,13 +116,13 @@ class Rows(NamedTuple):
 def read_text(file: Path) -> Raw:
     """Return the columns of a text file.
 
-    Comma, semicolon, tab or spaces separate the cells; decimal commas are accepted unless commas
-    separate cells. Lines before the header and lines that begin with #, % or // are ignored, except
-    that a last comment with as many words as columns is the header of a file without another one. A
-    row of units may follow the header.
+    The cells are separated by commas, semicolons, tabs or spaces; decimal commas are accepted
+    unless commas separate cells. Lines before the header and lines that begin with #, % or // are
+    ignored. If there is no other header, a last comment with as many words as columns is the
+    header. A row of units may follow the header.
 
     Raises:
-        ValueError: an absent file, no text, no rows of numbers, rows of different lengths.
+        ValueError: no such file, no text, no rows of numbers, or rows of different lengths.
     """
     rows = _rows(file)
     where = f"read '{file.name}'"
@@ -157,7 +157,7 @@ def read_text(file: Path) -> Raw:
 
 
 def _rows(file: Path) -> Rows:
-    """Return the lines that are not empty, split into cells."""
+    """Return the non-empty lines, split into cells."""
     raw, where = file.read_bytes(), f"read '{file.name}'"
     wide = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
     try:
@@ -184,7 +184,7 @@ def _rows(file: Path) -> Rows:
 
 
 def _delimiter(lines: Sequence[str]) -> str:
-    """Return the delimiter with which most of the last lines have the same number of numbers."""
+    """Return the delimiter for which most of the last lines have equally many numeric cells."""
 
     def score(delimiter: str) -> tuple[float, int]:
         rows = [_cells(line, delimiter) for line in lines[-LOOKED_AT:]]
@@ -212,7 +212,7 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 
 def _number(cell: str) -> float:
-    if "_" in cell:  # Python accepts it in numbers
+    if "_" in cell:  # accepted by Python in numbers
         raise ValueError
     return float(cell)
 
@@ -226,14 +226,14 @@ def _is_number(cell: str) -> bool:
 
 
 def _numeric(row: Sequence[str], comma: bool) -> bool:
-    """Return True if at least half of the cells are numbers, so the row is not a header."""
+    """Return True if at least half of the cells are numbers; the row is then not a header."""
     cells = [cell.replace(",", ".") if comma else cell for cell in row if cell]
     numbers = sum(map(_is_number, cells))
     return numbers > 0 and numbers >= len(cells) / 2
 
 
 def _first(rows: Rows, comma: bool) -> int | None:
-    """Return the first row of numbers, at least as wide as most of the last ones."""
+    """Return the index of the first numeric row that is as wide as most of the last rows."""
     widths = [_width(row) for row in rows.cells[-LOOKED_AT:] if _numeric(row, comma)]
     usual = max(set(widths), key=widths.count, default=0)
     found = (k for k, r in enumerate(rows.cells) if _width(r) >= usual and _numeric(r, comma))
@@ -241,7 +241,7 @@ def _first(rows: Rows, comma: bool) -> int | None:
 
 
 def _header(rows: Rows, first: int | None) -> tuple[list[str] | None, list[str] | None]:
-    """Return names and units of the columns, if there are any."""
+    """Return names and units of the columns; None for those that the file does not contain."""
     width = 0 if first is None else _width(rows.cells[first])
     above = [row for row in rows.cells[:first] if first is None or len(row) >= width]
     if not above:
@@ -256,12 +256,12 @@ def _header(rows: Rows, first: int | None) -> tuple[list[str] | None, list[str] 
 
 
 def _width(row: Sequence[str]) -> int:
-    """Return the number of cells up to the last that is not empty."""
+    """Return the number of cells up to the last non-empty one."""
     return max((k + 1 for k, cell in enumerate(row) if cell), default=0)
 
 
 def _numbers(cells: Sequence[str], numbers: Sequence[int]) -> tuple[Array, str, bool]:
-    """Return cells as numbers, a message on the first bad one, True if all such are empty."""
+    """Return the numbers, a message on the first bad cell, and True if all bad cells are empty."""
     values = np.full(len(cells), np.nan)
     problem = ""
     for k, cell in enumerate(cells):
@@ -279,7 +279,7 @@ def _numbers(cells: Sequence[str], numbers: Sequence[int]) -> tuple[Array, str, 
 
 
 def to_csv(record: Record, path: Path) -> Path:
-    """Write a record with units in its header, and return the path."""
+    """Write a record with units in the header, and return the path."""
     signals = {**({} if record.t is None else {"t": record.t}), **record.signals}
     units = {key: record.unit(key) for key in signals}
     header = [f"{key} [{units[key]}]" if units[key] else key for key in signals]
@@ -293,10 +293,10 @@ Paths = str | PathLike[str] | Sequence[str | PathLike[str]]
 
 
 def files(paths: Paths) -> tuple[Path, ...]:
-    """Return the files of a path, a pattern such as `run*.csv` or several of them, in order.
+    """Return the files of a path, a pattern such as `run*.csv` or a list of these, in order.
 
     Raises:
-        ValueError: an absent file, a folder, a pattern without a match.
+        ValueError: an absent file, a folder, or a pattern without a match.
     """
     several = paths if not isinstance(paths, str | PathLike) else (paths,)
     found: list[Path] = []
@@ -318,7 +318,7 @@ def files(paths: Paths) -> tuple[Path, ...]:
 
 
 def read_records(paths: Paths, wanted: Wanted, variable: str | None) -> tuple[Record, ...]:
-    """Return the records of all files; the problems of all files are one error."""
+    """Return the records of all files; problems of several files are joined in one error."""
     if variable is not None:
         checks.text("read: variable", variable, "the name of a variable")
     works = [partial(_read, file, wanted, variable) for file in files(paths)]

@@ -1,4 +1,4 @@
-"""A measured record: named signals over time, or points without time, and its controller."""
+"""Class `Record`: signals over time or points without time; and its controller `PositionLoop`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class PositionLoop:
-    """A sampled cascade of position and velocity feedback with its reference.
+    """Sampled cascade of position and velocity feedback with its reference.
 
         command = clip(kp kv (reference - x) - kv dx, +-limit)
         force = gain (command + disturbance)
@@ -30,10 +30,10 @@ class PositionLoop:
         gain: force per command [N per command unit].
         limit: largest command.
         reference: position reference at the samples [m], shape (n,).
-        disturbance: added to the command, shape (n,).
+        disturbance: signal added to the command, shape (n,).
 
     Raises:
-        ValueError: numbers that are not finite, series of different lengths.
+        ValueError: numbers are not finite, or the series have different lengths.
     """
 
     kp: float
@@ -60,19 +60,19 @@ class PositionLoop:
             )
 
     def between(self, first: int, end: int) -> "PositionLoop":
-        """Return the controller over the samples `first` to `end` (not included)."""
+        """Return the controller over the samples `first` to `end`, excluding `end`."""
         reference, disturbance = self.reference[first:end], self.disturbance[first:end]
         return replace(self, reference=reference, disturbance=disturbance)
 
 
 GAP = 5.0
-"""Shortest gap, in median intervals."""
+"""Shortest gap, relative to the median interval."""
 JITTER = 0.01
-"""Largest deviation of a sample interval from the mean one, relative, that counts as uniform."""
+"""Largest relative deviation of a sample interval from the mean in uniform samples."""
 
 
 def runs(there: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return first sample and end (not included) of each run of True."""
+    """Return first and end (exclusive) of each run of True values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -80,25 +80,25 @@ def runs(there: NDArray[np.bool_]) -> list[tuple[int, int]]:
 @final
 @dataclass(frozen=True, eq=False)
 class Record:
-    """Signals of one experiment, all in SI units and of one length.
+    """Signals of one experiment, in SI units and of equal length.
 
-    Canonical channels of a drive are x, v, a and force. If it is rotary, their units are rad,
-    rad/s, rad/s^2 and N m. Points of a friction curve are v and F. Every other signal keeps the
-    name of its column.
+    The canonical channels of a drive are x, v, a and force; for a rotary drive their units are rad,
+    rad/s, rad/s^2 and N m. Points of a friction curve have the channels v and F. All other signals
+    keep the names of their columns.
 
     Attributes:
-        name: origin of the record; every message starts with it.
+        name: origin of the record; all messages begin with it.
         t: increasing sample times [s], shape (n,); None: points without time.
         signals: name -> values, shape (n,) each.
         units: name -> SI unit; "" if unknown.
-        first_row: row of the first sample in its file, for messages; 0: samples are counted.
-        loop: the position controller of the experiment, if it is known.
+        first_row: row of the first sample in its file, for messages; 0: messages give indices.
+        loop: position controller of the experiment, if known.
         columns: name -> name of the column in its file, if different.
         left_out: column -> reason why it is not a signal.
 
     Raises:
-        ValueError: unequal lengths, values that are not finite, times that do not increase, fewer
-            than two samples; all problems at once, each with its place.
+        ValueError: unequal lengths, values that are not finite, times that do not increase, or
+            fewer than two samples; all problems in one error, each with its location.
     """
 
     name: str
@@ -133,7 +133,7 @@ class Record:
         return column
 
     def _problems(self) -> list[str]:
-        """Return the problems of shapes, else those of values, else that of times."""
+        """Return the problems of shapes; if there are none, those of values, then of times."""
         if not self.signals:
             return ["expected at least one signal, got none"]
         every = {**({} if self.t is None else {"t": self.t}), **self.signals}
@@ -173,11 +173,11 @@ class Record:
         ]
 
     def place(self, sample: int) -> str:
-        """Return the place of a sample for messages: its row in the file, else its index."""
+        """Return the location of a sample for messages: its row in the file, or its index."""
         return f"row {sample + self.first_row}" if self.first_row else f"sample {sample}"
 
     def __getitem__(self, name: str) -> Array:
-        """Return a signal by its name or that of its column; "t" returns the times."""
+        """Return a signal by its name or that of its column; "t" stands for the times."""
         if name == "t" and self.t is not None:
             return self.t
         return self.signals[self.channel(name)]
@@ -187,10 +187,10 @@ class Record:
         return timed or name in self.signals or name in self.columns.values()
 
     def channel(self, name: str) -> str:
-        """Return the name of a signal, given it or the name of its column.
+        """Return the name of a signal, given that name or the name of its column.
 
         Raises:
-            ValueError: no such signal; with the reason if it was left out.
+            ValueError: no such signal; the message gives the reason if it was left out.
         """
         if name in self.signals:
             return name
@@ -209,12 +209,12 @@ class Record:
 
     @property
     def size(self) -> int:
-        """Number of samples, the same of all signals."""
+        """Number of samples, equal for all signals."""
         return next(iter(self.signals.values())).size
 
     @property
     def time(self) -> Array:
-        """The sample times [s].
+        """Sample times [s].
 
         Raises:
             ValueError: points without time.
@@ -234,17 +234,17 @@ class Record:
 
     @property
     def median_step(self) -> float:
-        """Median sample interval [s], independent of gaps."""
+        """Median sample interval [s], unaffected by gaps."""
         return float(np.median(np.diff(self.time)))
 
     @property
     def pieces(self) -> list[slice]:
-        """The samples between gaps."""
+        """Slices of the samples between gaps."""
         cuts = np.flatnonzero(np.diff(self.time) > GAP * self.median_step) + 1
         return [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), self.size])]
 
     def uniform(self) -> "Record":
-        """Return the record itself if its samples are equally spaced to 1 % of the interval.
+        """Return this record if its samples are equally spaced to 1 % of the interval.
 
         Raises:
             ValueError: unequal intervals. Filters and differences need equal intervals, and the
@@ -262,7 +262,7 @@ class Record:
         return self
 
     def at(self, rows: slice | NDArray[np.integer] | NDArray[np.bool_]) -> "Record":
-        """Return the record at some samples; a slice without step keeps the controller."""
+        """Return the record at the given rows; slices without a step keep the controller."""
         first, loop = 0, None
         if isinstance(rows, slice) and rows.step in (None, 1):
             begin, end, _ = rows.indices(self.size)
@@ -294,15 +294,15 @@ class Record:
         return self.at(slice(int(first), int(last)))
 
     def thinned(self, every: int) -> "Record":
-        """Return every n-th sample from the first on, n = `every`, without prior filtering.
+        """Return every n-th sample of the record, n = `every`, without prior filtering.
 
-        The controller is dropped: its reference belongs to all samples.
+        The controller is dropped, because its reference belongs to all samples.
         """
         every = checks.count(f"data '{self.name}': thinned", every)
         return self if every == 1 else self.at(slice(None, None, every))
 
     def renamed(self, names: Mapping[str, str]) -> "Record":
-        """Return the record with other names of signals: {"old": "new"}."""
+        """Return the record with renamed signals: {"old": "new"}."""
         where = f"data '{self.name}': renamed"
         given = {self.channel(old): new for old, new in checks.named(where, names).items()}
         for new in given.values():

@@ -1,6 +1,6 @@
-"""Resampling, time shifts and repairs of records, only on request.
+"""Resampling, time shifts and repairs of records on request.
 
-A gap is never bridged silently.
+No function bridges a gap silently.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from symfric.foundation import checks
 Array = NDArray[np.float64]
 
 SHORTEST = 10
-"""Fewest samples of a piece between two gaps that is kept."""
+"""Smallest number of samples in a piece between two gaps that is kept."""
 MOST = 1e8
 """Largest number of samples of a record."""
 
@@ -39,17 +39,19 @@ def resampled(
 ) -> list[Record]:
     """Return records at equal intervals of `step` [s], one for each piece between gaps.
 
-    Positions are interpolated by cubic Hermite, all others linearly, without a filter: with
-    a larger step noise is aliased, not averaged. The controller is dropped: its reference belongs
-    to the old samples. Pieces of fewer than 10 samples, old or new, are dropped.
+    Positions are interpolated by cubic Hermite polynomials, all other signals linearly. There is no
+    filter: with a larger step, noise is aliased and not averaged. The controller is dropped,
+    because its reference belongs to the old samples. Pieces of fewer than 10 old or new samples are
+    dropped.
 
     Args:
-        record: over time.
-        step: default: the median interval.
-        gap: treatment of intervals longer than 5 times the median one.
+        record: record over time.
+        step: sample interval; None: the median interval.
+        gap: treatment of intervals longer than 5 times the median.
 
     Raises:
-        ValueError: a step that is not positive, a gap with gap="refuse", no piece long enough.
+        ValueError: the step is not positive, there is a gap with gap="refuse", or no piece is long
+            enough.
     """
     where = f"data '{record.name}': resampled"
     checks.choice(f"{where}: gap", gap, ("split", "refuse"))
@@ -83,7 +85,7 @@ def _at_step(record: Record, step: float) -> Record:
 
 
 def interpolated(record: Record, signal: str, at: Array) -> Array:
-    """Return a signal at other times: positions by cubic Hermite, others linearly."""
+    """Return a signal at other times: positions by cubic Hermite, other signals linearly."""
     values = record.signals[signal]
     if record.units[signal] in ("m", "rad"):
         return hermite(at, record.time, values)
@@ -91,12 +93,12 @@ def interpolated(record: Record, signal: str, at: Array) -> Array:
 
 
 def delayed(record: Record, delays: Mapping[str, float]) -> Record:
-    """Return the record with signals shifted in time: new(t) = old(t - delay), ends cut.
+    """Return the record with delayed signals, new(t) = old(t - delay), with the ends cut.
 
     A recorder that writes the force 2 ms late is corrected by {"force": -0.002}.
 
     Raises:
-        ValueError: an unknown signal, a delay as long as the record, a record with gaps.
+        ValueError: an unknown signal, a delay as long as the record, or a record with gaps.
     """
     where = f"data '{record.name}': delayed"
     given = {record.channel(name): checks.number(f"{where}: {name}", value, unit="s")
@@ -119,7 +121,7 @@ def delayed(record: Record, delays: Mapping[str, float]) -> Record:
 
 
 def hermite(at: Array, t: Array, y: Array) -> Array:
-    """Interpolate by cubic Hermite with second-order slopes; third order at uneven samples."""
+    """Interpolate by cubic Hermite with second-order slopes; third order on uneven samples."""
     if t.size < 3:
         return np.interp(at, t, y)
     slope = np.gradient(y, t)
@@ -145,7 +147,7 @@ def unwrapped(record: Record, periods: Mapping[str, float]) -> Record:
     """Return the record with periodic signals unwrapped.
 
     Raises:
-        ValueError: an unknown signal, a period that is not positive.
+        ValueError: an unknown signal, or a period that is not positive.
     """
     where = f"data '{record.name}': unwrapped"
     signals = dict(record.signals)
@@ -159,15 +161,15 @@ def unwrapped(record: Record, periods: Mapping[str, float]) -> Record:
 def scaled(
     record: Record, factors: Mapping[str, float], units: Mapping[str, str] | None = None
 ) -> Record:
-    """Return the record with signals times factors: for a wrong sign, or newtons from volts.
+    """Return the record with scaled signals, for a wrong sign or to convert volts to newtons.
 
     Args:
-        record: to change.
+        record: record to scale.
         factors: signal -> factor.
-        units: signal -> its unit afterwards, if it changes.
+        units: signal -> its new unit, if it changes.
 
     Raises:
-        ValueError: an unknown signal, a factor of 0, no unit.
+        ValueError: an unknown signal, a factor of 0, or an unknown unit.
     """
     where = f"data '{record.name}': scaled"
     signals, now = dict(record.signals), dict(record.units)

@@ -1,4 +1,4 @@
-"""A simulated measurement of a drive with known parameters."""
+"""Simulated measurements of a drive with known parameters."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -19,22 +19,22 @@ Array = NDArray[np.float64]
 DRIVE = Drive(
     Stribeck(mu_s=28.0, mu_d=20.0, v_s=0.01, v_eps=1e-4, sigma_2=200.0), m=95.0, N=1.0, offset=-3.0
 )
-"""A positioning stage with levels like those of EMPS and a stiction peak."""
+"""Positioning stage with friction levels similar to those of EMPS, and a stiction peak."""
 
 SPEEDS = (0.002, 0.004, 0.008, 0.015, 0.03, 0.06, 0.12)
 """Speeds of the moves [m/s]."""
 RTOL = 1e-8
-"""Tolerance of the simulation: errors of about 1e-13 m and 1e-6 N for the default drive."""
+"""Tolerance of the simulation; errors are about 1e-13 m and 1e-6 N for the default drive."""
 FORCES = ("sensor", "command")
 
 
 def trapezoids(speeds: Sequence[float], dwell: float, ramp: float, step: float) -> Array:
-    """Return a position reference [m]: out and back once at each speed, with velocity ramps.
+    """Return a position reference [m] with one stroke out and back at each speed.
 
     Args:
         speeds: top speeds [m/s].
-        dwell: time at constant speed of one stroke [s].
-        ramp: time of each ramp [s].
+        dwell: time at constant speed in each stroke [s].
+        ramp: time of each velocity ramp [s].
         step: sample interval [s].
     """
     corners, levels = [0.0], [0.0]
@@ -64,30 +64,30 @@ def synthetic_drive_data(
     turning: bool = False,
     force: Literal["sensor", "command"] = "sensor",
 ) -> Dataset:
-    """Simulate a record of a drive moved back and forth by its position controller, with noise.
+    """Simulate a noisy record of a drive moved back and forth by its position controller.
 
-    The controller is that of `PositionLoop` with a bandwidth of 5 Hz in position and 40 Hz in
-    velocity. Its force is held between the samples; between them the motion is computed by adaptive
-    steps (`symfric.stepper`). White Gaussian noise is added to the finished record; it does not
+    The controller is a `PositionLoop` with a bandwidth of 5 Hz in position and 40 Hz in velocity.
+    Its force is held between the samples; the motion between them is integrated with adaptive
+    steps (`symfric.stepper`). White Gaussian noise is added to the finished record and does not
     enter the loop.
 
     Args:
-        law: a friction law, with states or without; default Stribeck with 28 N static and 20 N
-            dynamic friction. With states it starts as in the law.
+        law: friction law, with or without states; default: Stribeck with 28 N static and 20 N
+            dynamic friction. States start at the values of the law.
         m, offset, normal_force: mass [kg], constant force [N], N [N].
         speeds, dwell, ramp: see `trapezoids`.
         rate: samples per second.
         position_noise: standard deviation [m].
         force_noise: standard deviation [N].
-        seed: of the noise; equal seeds give equal records.
-        turning: the same numbers in rad, N m and kg m^2.
-        force: definition of the recorded force: "sensor": the mean of the forces before and after
-            a sample, which inverse dynamics compares with the motion there; "command": the force
-            held after the sample, as a controller records it and `ClosedLoop` expects it.
+        seed: seed of the noise; equal seeds give equal records.
+        turning: use the same numbers in rad, N m and kg m^2.
+        force: recorded force; "sensor": mean of the forces before and after a sample, which
+            inverse dynamics compares with the motion at the sample; "command": force held after
+            the sample, as a controller records it and `ClosedLoop` expects it.
 
     Raises:
-        ValueError: a parameter outside its bounds, an unknown `force`.
-        SolveError: a law that cannot be simulated.
+        ValueError: a parameter is outside its bounds, or `force` is unknown.
+        SolveError: the law cannot be simulated.
     """
     checks.choice("synthetic_drive_data: force", force, FORCES)
     drive = Drive(
@@ -110,9 +110,10 @@ def synthetic_drive_data(
 
 
 def _simulated(model: Model, loop: PositionLoop, step: float) -> tuple[Array, Array]:
-    """Return positions [m] at the samples, and the forces [N] held after them.
+    """Return the positions [m] at the samples, and the forces [N] held after them.
 
-    The virtual machine takes the same steps as compiled code; one record is too short to compile.
+    The steps on the virtual machine are those of compiled code; one record does not justify
+    compilation.
     """
     plant = stepper(model, step, rtol=RTOL, backend="vm")
     push = model.u[0].name

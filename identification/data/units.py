@@ -1,7 +1,7 @@
-"""Units of measured signals, of channels, headers and calls.
+"""Units of measured signals in channels, headers and calls.
 
-The grammar is that of `symfric.foundation.units`; recorders also use words (`sec`, `newton`),
-letters of any case, and speeds as `1/min`.
+The grammar is that of `symfric.foundation.units`. In addition, recorders use words (`sec`,
+`newton`), letters of either case, and speeds as `1/min`.
 """
 
 from collections.abc import Mapping
@@ -12,15 +12,15 @@ from re import findall
 from symfric.foundation.units import WORDS, Unit, nearest, parsed, per_second, written
 
 SPEEDS = ("1/min", "min^-1")
-"""Spellings of revolutions per minute by recorders."""
+"""Spellings of revolutions per minute used by recorders."""
 PURE = ("1", "%")
-"""Units without a dimension; counts of a recorder have no size in SI units."""
+"""Dimensionless units; counts of a recorder have no size in SI units."""
 PREFIXED = {"s": "num", "m": "numck", "N": "umckM", "rad": "um", "V": "umk", "A": "um", "W": "mk"}
 COMMON = {
     *WORDS, *PREFIXED, *(p + s for s, prefixes in PREFIXED.items() for p in prefixes), "1", "%",
     "min", "h", "deg", "rev", "arcmin", "arcsec", "in", "ft", "g", "kg", "kgf", "lbf", "K", "rpm",
 }  # fmt: skip
-"""Symbols that denote units in a header even without brackets: `x_mm`, but not `tau_d`."""
+"""Symbols that denote units in a header even without brackets, as in `x_mm` but not in `tau_d`."""
 
 KINDS: Mapping[str, tuple[str, ...]] = {
     "t": ("s",),
@@ -31,7 +31,7 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     "F": ("N", "N m"),
     "N": ("N",),
 }
-"""SI units that the canonical channels may have; the first one is for linear drives."""
+"""SI units of the canonical channels; the first one is for linear drives."""
 
 EXAMPLES: Mapping[str, str] = {
     "t": "s, ms, us, min",
@@ -42,12 +42,12 @@ EXAMPLES: Mapping[str, str] = {
     "F": "N, mN, kN, N m, N mm, mN m",
     "N": "N, mN, kN",
 }
-"""Examples of these units, for messages."""
+"""Examples of accepted units, for messages."""
 
 
 @cache
 def unit(text: str) -> Unit | None:
-    """Return the unit that `text` denotes; None if it is not a unit of a signal."""
+    """Return the unit denoted by `text`; None if it is not a unit of a signal."""
     plain = written(text)
     if plain.lower() in SPEEDS:
         plain = "rpm"
@@ -67,11 +67,11 @@ def is_common(text: str) -> bool:
 def by_channel(where: str, text: str) -> dict[str, str]:
     """Return the units of the canonical channels from the short form `rad, N m`.
 
-    Each unit goes to the channel that can have it; velocity and acceleration follow the position
-    if they are not named: `mm, N` gives mm/s.
+    Each unit applies to the channels that can have it. Velocity and acceleration follow the
+    position unless their units are given: `mm, N` implies mm/s.
 
     Raises:
-        ValueError: not a unit, a unit of no canonical channel, two units for one channel.
+        ValueError: not a unit, a unit of no canonical channel, or two units for one channel.
     """
     found: dict[str, str] = {}
     for part in (p.strip() for p in text.split(",")):

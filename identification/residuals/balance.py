@@ -1,4 +1,4 @@
-"""Balance of forces of any model, with the measured motion inserted."""
+"""Force balance of any model with the measured motion inserted."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, cast
@@ -21,15 +21,15 @@ Mask = NDArray[np.bool_]
 Put = Callable[[ca.SX], ca.SX]
 
 ALIKE = 1e-6
-"""Share of a direction of force below which other directions reproduce it."""
+"""Share of a force direction below which other directions reproduce it."""
 
 
 class Coordinate(NamedTuple):
-    """A degree of freedom and its measured quantities.
+    """Degree of freedom with the symbols of its motion.
 
     Attributes:
-        position: state of the model, or None if only its rate is a state.
-        rate: state of the model.
+        position: position among the states of the model; None if only its rate is a state.
+        rate: rate among the states of the model.
         a: symbol of the acceleration.
     """
 
@@ -39,14 +39,14 @@ class Coordinate(NamedTuple):
 
 
 class Row(NamedTuple):
-    """A balance of forces: for the input it is solved for, or for a coordinate without an input.
+    """Force balance solved for an input, or for the remainder of a coordinate without an input.
 
     Attributes:
         signal: name of the input, or "balance of <rate>".
-        unit: of the input, or of the balance.
+        unit: unit of the input or of the balance.
         input: index of the input among those of the model, or None.
-        coordinate: index of the coordinate whose motion determines it.
-        slips: indices of the contacts whose friction enters it.
+        coordinate: index of the coordinate whose motion determines the balance.
+        slips: indices of the contacts whose friction enters the balance.
     """
 
     signal: str
@@ -57,13 +57,13 @@ class Row(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """Equations of the inverse dynamics, with w = (positions, rates, accelerations, inputs, time).
+    """Equations of the inverse dynamics in w = (positions, rates, accelerations, inputs, time).
 
     Attributes:
         rows: descriptions of the rows of `equations`.
-        equations: of w and the unknown parameters p.
-        slips: (w, p) -> sliding velocities of the contacts, and their derivatives by the rates.
-        loaded: True if laws depend on the applied force.
+        equations: equations in w and the unknown parameters p.
+        slips: (w, p) -> sliding velocities of the contacts and their derivatives by the rates.
+        loaded: True if a law depends on the applied force.
     """
 
     rows: tuple[Row, ...]
@@ -76,7 +76,7 @@ def coordinates(model: Model, where: str) -> tuple[Coordinate, ...]:
     """Return the degrees of freedom of `model`: pairs x' = v, and rates without a position.
 
     Raises:
-        ValueError: an implicit model.
+        ValueError: the model is implicit.
     """
     if model.ode is None:
         raise ValueError(f"{where}: expected explicit equations, got a residual; use Shooting()")
@@ -96,7 +96,7 @@ def coordinates(model: Model, where: str) -> tuple[Coordinate, ...]:
 
 
 def measured(model: Model, found: Sequence[Coordinate]) -> ca.SX:
-    """Return the symbols w: positions (zero without one), rates, accelerations, inputs, time."""
+    """Return the symbols w: positions (zero if absent), rates, accelerations, inputs, time."""
     q = [ca.SX.sym("none") if c.position is None else c.position.symbol for c in found]
     v, a = symbols_of(c.rate for c in found), stacked(c.a for c in found)
     return ca.vertcat(*q, v, a, model.vector("u"), model.t)
@@ -107,23 +107,23 @@ def balance(
 ) -> Balance:
     """Return the balance of forces of `model` with its parameters `names` as unknowns.
 
-        r = u needed for the measured motion - u measured          rows with an input
+        r = input needed for the measured motion - measured input  rows with an input
         r = unexplained force of the measured motion               other rows
 
-    If each input drives one coordinate of its own, r is the coordinate's balance over the gain of
-    the input. Else, and in mechanisms with constraints, the inputs are algebraic unknowns like the
-    multipliers, and as many coordinates as have no input carry the remainder. States of laws follow
-    the measured sliding velocity (`imposed_step`).
+    If each input drives exactly one coordinate, r is the balance of the coordinate divided by the
+    gain of the input. Otherwise, and in mechanisms with constraints, the inputs are algebraic
+    unknowns like the multipliers, and as many coordinates as lack an input carry the remainder.
+    States of laws follow the measured sliding velocity (`imposed_step`).
 
     Args:
-        model: explicit equations or a mechanism.
-        names: of its free parameters; the others have their start values.
+        model: model with explicit equations, or a mechanism.
+        names: free parameters; other parameters have their start values.
         found: `coordinates` of the model.
-        typical: a value of w (`measured`), at which directions of force are compared.
-        where: start of the messages.
+        typical: value of w (see `measured`) at which force directions are compared.
+        where: beginning of the messages.
 
     Raises:
-        ValueError: more inputs than coordinates; law states with modes that only a simulation
+        ValueError: more inputs than coordinates, or law states with modes that only a simulation
             can follow.
     """
     put = _closing(model, [v for v in model.p if v.name not in names])
@@ -188,7 +188,7 @@ def _balances(model: Model, found: Sequence[Coordinate]) -> tuple[ca.SX, ca.SX, 
 def _states(
     contacts: Sequence[Contact], w: ca.SX, y: ca.SX, put: Put, where: str
 ) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Start, step, later symbols and sample interval of the states of all laws."""
+    """Return start, step, later symbols and sample interval of the states of all laws."""
     later, h = ca.SX.sym("later", w.numel() + y.numel()), ca.SX.sym("h")
     now, start, step = ca.vertcat(w, y), list[ca.SX](), list[ca.SX]()
     for c in contacts:
@@ -206,7 +206,7 @@ def _states(
 
 
 def _closing(model: Model, held: Sequence[Variable]) -> Put:
-    """Return the substitution of laws for friction forces, and of numbers for held parameters."""
+    """Return a substitution of laws for friction forces and of numbers for held parameters."""
     force = stacked(c.force for c in model.contacts)
     friction = stacked(c.friction for c in model.contacts)
     symbols, numbers = symbols_of(held), ca.SX(starts_of(held))
@@ -223,7 +223,7 @@ def _closing(model: Model, held: Sequence[Variable]) -> Put:
 
 
 def _bearing(model: Model, gains: ca.SX, w: ca.SX, typical: Array, where: str) -> list[int]:
-    """Return the coordinates that carry the forces which neither inputs nor constraints balance."""
+    """Return the coordinates that carry forces not balanced by inputs or constraints."""
     directions = gains
     if model.holonomic is not None:
         q = model.vector("x")[: model.holonomic.n, 0]

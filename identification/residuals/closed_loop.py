@@ -1,4 +1,4 @@
-"""A drive under its sampled controller, compared with measurements in closed loop.
+"""Residuals of a drive simulated under its sampled controller.
 
 At each sample the controller reads the simulated motion and sets the command of the drive until
 the next sample:
@@ -6,9 +6,10 @@ the next sample:
     (s, command)_k = controller(s_(k-1), x_k, reference_k)
     force_k = gain (command_k + disturbance_k),   m v' = force_k - F(v) - offset
 
-Residuals are those of the position and of the force. The controller keeps the motion near the
-reference, so errors do not drift as they do without it, and the force contains the friction.
-Source of the measure: Janot, Gautier, Brunot, Nonlinear System Identification Benchmarks 2019.
+Residuals are those of position and force. The controller keeps the motion near the reference;
+errors therefore do not drift as in open loop, and the force contains the friction.
+Source of the error measure: Janot, Gautier, Brunot, Nonlinear System Identification Benchmarks
+2019.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -36,19 +37,19 @@ WHERE = "ClosedLoop"
 @final
 @dataclass(frozen=True, eq=False)
 class Controller:
-    """A user-defined controller, called once per sample.
+    """User-defined controller, called once per sample.
 
         (state, command) = step(state, measured, reference),   force = gain (command + disturbance)
 
     Attributes:
         step: CasADi Function (state (n,), measured (1,) or (2,), reference (r,)) -> (state (n,),
-            command (1,)); measured is the position, or the position and the velocity, of the
-            simulated drive at the sample. n = 0 without memory.
-        reference: channels of the data that it follows.
+            command (1,)). The measured values are the position, or position and velocity, of the
+            simulated drive at the sample. Without memory, n = 0.
+        reference: channels of the reference in the data.
         disturbance: channel added to the command; None: no disturbance.
         gain: force per command [N or N m per command unit].
-        start: its state before the first sample: numbers, or a Function of (x, v) there; None:
-            zeros.
+        start: state before the first sample as numbers, or a Function of (x, v) at that sample;
+            None: zeros.
     """
 
     step: ca.Function
@@ -86,11 +87,11 @@ class Controller:
 
     @property
     def memory(self) -> int:
-        """Number of its states."""
+        """Number of controller states."""
         return self.step.numel_in(0)
 
     def feedback(self) -> Feedback:
-        """Return the controller with its derivatives; rows hold references and the disturbance."""
+        """Return the controller with derivatives; its rows are references and the disturbance."""
         s, y, r = self.step.sx_in()
         after, command = self.step(s, y, r)
         both = ca.vertcat(after, command)
@@ -110,13 +111,13 @@ class Controller:
         return act
 
     def rows(self, record: Record) -> Array:
-        """Return references and disturbance at the samples."""
+        """Return references and disturbance at the samples, shape (n, r + 1)."""
         name = self.disturbance
         disturbance = np.zeros(record.size) if name is None else record[name]
         return np.column_stack([*(record[name] for name in self.reference), disturbance])
 
     def begin(self) -> ca.Function:
-        """Return a Function (x, v) -> state at the first sample, and its derivative."""
+        """Return a Function (x, v) -> (x, v, controller state) at the start, and its derivative."""
         x = ca.SX.sym("x", 2)
         if isinstance(self.start, ca.Function):
             state = self.start(x)
@@ -135,7 +136,7 @@ def _times(slopes: ca.SX, parts: Sequence[Tangent]) -> ca.SX:
 def position_controller(loop: PositionLoop, step: float) -> Controller:
     """Return the controller of a `PositionLoop` at a sample time of `step` [s].
 
-    Before the first sample the drive is assumed to have moved at its initial velocity.
+    The drive is assumed to move at its initial velocity before the first sample.
     """
     xv = ca.SX.sym("xv", 2)
     before = ca.vertcat(xv[0] - step * xv[1], xv[0] - 1.5 * step * xv[1])
@@ -153,21 +154,21 @@ def position_controller(loop: PositionLoop, step: float) -> Controller:
 @final
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
-    """Simulate the drive under its controller and compare position and force.
+    """Residuals of position and force of the drive simulated under its controller.
 
     Attributes:
-        loop: the controller; None: the one of each record (`Record.loop`).
+        loop: the controller; None: the controller of each record (`Record.loop`).
         signals: compared signals: "x", "v" and "force".
         x0: "given": the motion starts at the first measured position, with the velocity of a cubic
-            through the first ones; "estimate": both are unknowns of each record.
+            through the first positions; "estimate": both are unknowns of each record.
         substeps: implicit steps per sample.
 
     Limits: the controller reads the simulated position without noise, so the noise fed back in the
     experiment remains in the residuals of the force. The measured force must be the one held after
     its sample, as the controller records it. A mean of the forces before and after a sample lags by
     half a sample. The error is small where the force changes slowly (the mass of
-    `synthetic_drive_data` decreases by .005 %) but visible in the residuals at each reversal. One
-    mass with a law without states.
+    `synthetic_drive_data` decreases by .005 %) but visible in the residuals at each reversal. The
+    model must be one mass with a law without states.
     """
 
     loop: PositionLoop | Controller | None = None
@@ -192,8 +193,8 @@ class ClosedLoop:
         """Return the residuals of `data`.
 
         Raises:
-            ValueError: a model other than one mass with friction without states, a record with
-                an unknown controller, missing channels, unequal intervals.
+            ValueError: the model is not one mass with stateless friction, the controller of a
+                record is unknown, channels are missing, or intervals are unequal.
         """
         del start
         mass = Mass(subject.model)
@@ -219,7 +220,7 @@ class ClosedLoop:
         return LoopRows(subject.names, free, tuple(channels), tuple(runs))
 
     def _run(self, mass: Mass, record: Record) -> tuple["Run", Array]:
-        """Return a record with its drive and controller, and references and disturbance."""
+        """Return the record with drive and controller, and its references and disturbance."""
         loop, where = record.loop if self.loop is None else self.loop, f"data '{record.name}'"
         if loop is None:
             hint = "give ClosedLoop(loop=...) or fit Shooting()"
@@ -243,10 +244,10 @@ class ClosedLoop:
 
 
 def _regressors(record: Record, given: Array, signals: Sequence[str]) -> dict[str, Array]:
-    """Return references and disturbance, on which correct residuals do not depend.
+    """Return references and disturbance, of which correct residuals are independent.
 
-    The measured velocity is included only if no motion is compared: residuals of a position depend
-    on its noise. The tests use the simulated motion instead.
+    The measured velocity is included only if no motion is compared, because residuals of a position
+    depend on the noise of that velocity. The tests use the simulated motion instead.
     """
     found = dict[str, Array]()
     if not {"x", "v"} & set(signals):
@@ -261,12 +262,12 @@ def _regressors(record: Record, given: Array, signals: Sequence[str]) -> dict[st
 
 
 class Run(NamedTuple):
-    """A record with its drive and controller.
+    """Record with its drive and controller.
 
     Attributes:
-        name: of the record.
+        name: name of the record.
         chain: drive and controller, sample by sample.
-        begin: (x, v) -> all states at the first sample, and their slopes.
+        begin: (x, v) -> all states at the first sample, and their derivatives.
         rows: inputs of the chain, shape (n, ...).
         first: measured position and velocity at the first sample.
         measured: signal -> samples.
@@ -296,9 +297,9 @@ class Run(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class LoopRows(Blocks):
-    """Residuals, simulated minus measured signals, of `ClosedLoop`.
+    """Residuals of `ClosedLoop`: simulated minus measured signals.
 
-    The own unknowns, if any, are position and velocity at the start of each record.
+    With x0="estimate", `own` contains position and velocity at the start of each record.
     """
 
     runs: tuple[Run, ...]

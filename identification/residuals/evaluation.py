@@ -1,4 +1,4 @@
-"""Common interface of all residuals for minimisation, tests and plots."""
+"""Common interface of all residuals, used by minimisation, tests and plots."""
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,20 +16,20 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """A signal of a record among the rows, in order of time.
+    """Rows of one signal of one record, in order of time.
 
     Attributes:
-        record: number of the record.
+        record: index of the record.
         signal: name of the compared signal, such as "force" or "x".
-        unit: its SI unit.
-        rows: slice of its residuals.
-        t: times of its rows [s]; for points, their velocities or 0, 1, 2 ...
+        unit: SI unit of the signal.
+        rows: slice of the rows among all residuals.
+        t: times of the rows [s]; for points, their velocities or 0, 1, 2 ...
         measured: measured values, shape of `t`.
-        regressors: signals on which correct residuals do not depend, by name, each of the shape
-            of `t`: inputs, velocity, its sign.
-        breaks: first rows of the second and later windows, counted in the channel: residuals on
+        regressors: name -> signal of which correct residuals are independent, such as inputs, the
+            velocity and its sign, shape of `t`.
+        breaks: first rows of the second and later windows, counted in the channel; residuals on
             either side are not neighbours.
-        ordered: whether neighbours in the rows are neighbours in time.
+        ordered: True if neighbouring rows are neighbours in time.
     """
 
     record: int
@@ -44,26 +44,26 @@ class Channel:
 
 
 class Evaluation(NamedTuple):
-    """Residuals r = predicted - measured in SI units (rows,), and dr/dvalues (rows, values)."""
+    """Residuals r = predicted - measured in SI units (rows,), and dr/dvalues J (rows, values)."""
 
     r: Array
     J: Array
 
 
 class Residuals(Protocol):
-    """Residuals of one data set as a function of values."""
+    """Residuals of one data set as a function of the values to be fitted."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the values, in the order of the columns of J.
 
-        All free parameters of the model, then the own unknowns (start values, dead times).
+        Free parameters of the model precede the own unknowns (start values, dead times).
         """
         ...
 
     @property
     def own(self) -> tuple[Unknown, ...]:
-        """Unknowns of the data set, such as start values of each record."""
+        """Unknowns of the data set, such as the start values of each record."""
         ...
 
     @property
@@ -78,12 +78,12 @@ class Residuals(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Residuals in blocks of rows, one below the other.
+    """Residuals computed in blocks of consecutive rows.
 
     Attributes:
         parameters: free parameters of the model.
         own: unknowns of the data set.
-        channels: of all rows.
+        channels: channels of all rows.
     """
 
     parameters: tuple[str, ...]
@@ -92,12 +92,12 @@ class Blocks:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the values: parameters, then own unknowns."""
+        """Names of the values: parameters first, then own unknowns."""
         return (*self.parameters, *(unknown.name for unknown in self.own))
 
     @abstractmethod
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
-        """Yield residuals and derivatives by all values of each block, or a message.
+        """Yield residuals and their derivatives by all values for each block, or a message.
 
         Args:
             p: values of the parameters.

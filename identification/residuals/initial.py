@@ -1,9 +1,9 @@
 """Windows of records, and start values of a motion from measured signals.
 
-A measured state starts at a cubic through the samples nearby, and so does the rate of a measured
-state. No signal shows whether a contact slides steadily at the start: the bristle of a law with one
-is unknown; several bristles keep the model's start if the contact is fast and are unstrained if it
-sticks. All other states start as the model states.
+The start of a measured state, or of the rate of one, is that of a cubic through nearby samples. No
+signal shows whether a contact slides steadily at the start. A single bristle of a law is therefore
+an unknown; several bristles have the start of the model if the contact is fast, and are unstrained
+if it sticks. All other states have the start of the model.
 """
 
 from collections.abc import Iterator, Mapping
@@ -20,20 +20,20 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 
 FEWEST = 8
-"""Fewest samples of a window: fewer do not determine its start values."""
+"""Smallest number of samples of a window that determines its start values."""
 MARGIN = 0.25
-"""Largest shift of a cut, over the length of a window."""
+"""Largest shift of a cut, relative to the length of a window."""
 
 
 def cut(t: Array, length: float | None, speed: Array | None = None) -> tuple[slice, ...]:
-    """Return the samples of consecutive windows of about `length` [s]; None is one window.
+    """Return the samples of consecutive windows of about `length` [s]; None: one window.
 
-    Windows are of equal length, an integer fraction of the record. With `speed` (n,), each cut
-    moves to the fastest sample within a quarter of a window: bristles slide steadily there, so
-    their start follows from the velocity.
+    Windows have equal length, an integer fraction of the record. With `speed` (n,), each cut moves
+    to the fastest sample within a quarter of a window, where bristles slide steadily and their
+    start follows from the velocity.
 
     Raises:
-        ValueError: windows of fewer than eight samples.
+        ValueError: a window has fewer than eight samples.
     """
     n, span = t.size, float(t[-1] - t[0])
     if length is None or length >= span:
@@ -55,9 +55,10 @@ def cut(t: Array, length: float | None, speed: Array | None = None) -> tuple[sli
 
 
 def turnaround(t: Array, y: Array) -> float:
-    """Return the time scale [s] of a signal: the period of a sine.
+    """Return the time scale [s] of a signal; for a sine, its period.
 
-    It is six times the delay after which the signal differs by its standard deviation.
+    The time scale is six times the delay at which the rms difference of the signal reaches its
+    standard deviation.
     """
     size, lag = float(np.std(y)), 1
     while lag < y.size // 2 and np.sqrt(np.mean((y[lag:] - y[:-lag]) ** 2)) < size:
@@ -68,17 +69,17 @@ def turnaround(t: Array, y: Array) -> float:
 ORDERS = 6
 """Highest order of the differences that estimate the noise of a signal."""
 LEAST, MOST = 4, 512
-"""Samples on either side of a start used for its cubic."""
+"""Smallest and largest number of samples on either side of a start for its cubic."""
 MISFIT = 3.0
-"""Standard deviations by which the misfit of a cubic may exceed the noise."""
+"""Standard deviations by which the misfit of a cubic may exceed that of the noise."""
 REST = 0.02
-"""Sliding velocity over its usual size in the record below which a contact counts as sticking."""
+"""Sliding velocity, relative to its usual value in the record, below which a contact sticks."""
 
 
 def noise_of(y: Array) -> float:
-    """Return an upper bound of the standard deviation of white noise, from high differences.
+    """Return an upper bound of the standard deviation of white noise from high-order differences.
 
-    White noise of variance s^2 has k-th differences of variance binomial(2k, k) s^2.
+    The k-th difference of white noise of variance s^2 has the variance binomial(2k, k) s^2.
     """
     found, d = [float(np.std(y))], y
     for k in range(1, min(ORDERS, y.size - 2) + 1):
@@ -88,7 +89,7 @@ def noise_of(y: Array) -> float:
 
 
 class Local(NamedTuple):
-    """Value and rate of a signal at one time, with standard errors for white noise."""
+    """Value and rate of a signal at one time, with standard errors due to white noise."""
 
     value: float
     rate: float
@@ -97,7 +98,7 @@ class Local(NamedTuple):
 
 
 def local(t: Array, y: Array, k: int, noise: float) -> Local:
-    """Fit a cubic around sample k, through as many samples as noise alone explains."""
+    """Fit a cubic around sample k to as many samples as agree with it up to noise."""
     found, reach = np.zeros(4), LEAST
     while True:
         rows = slice(max(0, k - reach), min(t.size, k + reach + 1))
@@ -119,7 +120,7 @@ def local(t: Array, y: Array, k: int, noise: float) -> Local:
 
 
 def rates(model: Model) -> dict[str, str]:
-    """Return state -> the state whose rate it is, if an equation is exactly x' = v."""
+    """Return rate -> position by name, for all equations of exactly the form x' = v."""
     if model.ode is None:
         return {}
     states = {v.symbol.element_hash(): v.name for v in model.x}
@@ -131,7 +132,7 @@ def rates(model: Model) -> dict[str, str]:
 
 
 def hidden(model: Model) -> set[str]:
-    """Return the states whose value within a motion only the data determine.
+    """Return the states whose values within a motion are determined only by the data.
 
     States of contact laws and states reset by events are excluded.
     """
@@ -141,12 +142,12 @@ def hidden(model: Model) -> set[str]:
 
 
 class Begin(NamedTuple):
-    """Start value of one state.
+    """Start value of a state.
 
     Attributes:
-        value: number, start of the estimate; None: as in the model.
-        scale: its typical magnitude; 0: the nominal value.
-        estimated: whether it is an unknown.
+        value: number from which the estimate starts; None: as in the model.
+        scale: typical magnitude; 0: the nominal value.
+        estimated: True if the start value is an unknown.
     """
 
     value: float | None
@@ -155,13 +156,13 @@ class Begin(NamedTuple):
 
 
 class Sensed(NamedTuple):
-    """Measured information on the states of a model in one record.
+    """Information on the states of a model from the measurements of one record.
 
     Attributes:
         t: times [s], shape (n,).
-        measured: state -> its samples, shape (n,).
-        noise: state -> standard deviation of the noise on them.
-        observed_from: observed state -> (measured state it follows from, whether it is its rate).
+        measured: measured state -> samples, shape (n,).
+        noise: measured state -> standard deviation of its noise.
+        observed_from: observed state -> (measured state, True if it is the rate of that state).
         slips: contact with bristles -> its sliding velocity as a Function of the observed states,
             and the names of the bristles.
     """
@@ -174,7 +175,7 @@ class Sensed(NamedTuple):
 
     @classmethod
     def of(cls, model: Model, t: Array, measured: Mapping[str, Array]) -> "Sensed":
-        """Return the information on `model`, with its contacts."""
+        """Return the information on the states of `model` and its contacts."""
         observed_from = {r: (s, True) for r, s in rates(model).items() if s in measured}
         observed_from |= {name: (name, False) for name in measured}
         slips = dict(_slips(model, list(observed_from)))
@@ -182,7 +183,7 @@ class Sensed(NamedTuple):
         return cls(t, measured, noise, observed_from, slips)
 
     def at(self, k: int) -> dict[str, Begin]:
-        """Return the start values at sample k; for bristles if they are unknown or unstrained."""
+        """Return start values at sample k, including those of bristles that need one."""
         found = dict[str, Begin]()
         rows = list[tuple[float, float, float]]()
         for name, (source, is_rate) in self.observed_from.items():
@@ -197,7 +198,7 @@ class Sensed(NamedTuple):
             usual = float(np.linalg.norm(slope * scales))
             error = float(np.linalg.norm(slope * errors))
             sticks = abs(value[0]) <= max(REST * usual, MISFIT * error)
-            if len(names) == 1:  # the direction before a record is unknown
+            if len(names) == 1:  # before a record, the direction of motion is unknown
                 found[names[0]] = Begin(0.0 if sticks or k == 0 else None)
             elif sticks:
                 found |= dict.fromkeys(names, Begin(0.0, estimated=False))
@@ -205,7 +206,7 @@ class Sensed(NamedTuple):
 
     @property
     def speed(self) -> Array:
-        """Rate of the measured states, each over its usual rate, summed, shape (n,)."""
+        """Sum of the rates of the measured states, each relative to its usual rate, shape (n,)."""
         t, reach = self.t, max(1, self.t.size // 100)
         rows = np.arange(t.size)
         a, b = np.maximum(rows - reach, 0), np.minimum(rows + reach, t.size - 1)
@@ -217,7 +218,7 @@ class Sensed(NamedTuple):
         return found
 
     def _pace(self, y: Array) -> float:
-        """Return the usual rate of a signal: root mean square over fiftieths of the record."""
+        """Return the usual rate of a signal, the root mean square over fiftieths of the record."""
         every = max(1, y.size // 50)
         return float(np.sqrt(np.mean((np.diff(y[::every]) / np.diff(self.t[::every])) ** 2)))
 
@@ -225,10 +226,10 @@ class Sensed(NamedTuple):
 def _slips(
     model: Model, observed_from: list[str]
 ) -> Iterator[tuple[str, tuple[ca.Function, tuple[str, ...]]]]:
-    """Yield sliding velocities in the observed states, for contacts whose laws have bristles.
+    """Yield sliding velocities in the observed states for contacts whose laws have bristles.
 
-    Bristles are the states that change sign with the velocity; others, such as the age of a
-    contact, start as in the model.
+    Bristles are the states that change sign with the velocity. Other states, such as the age of a
+    contact, have the start of the model.
     """
     symbols = {v.name: v.symbol for v in model.x}
     x = ca.vertcat(*(symbols.pop(name) for name in observed_from))

@@ -1,4 +1,4 @@
-"""Inverse dynamics: force needed for the measured motion, minus the measured force."""
+"""Residuals of inverse dynamics: force needed for the measured motion minus measured force."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,44 +24,44 @@ Array = NDArray[np.float64]
 
 WHERE = "InverseDynamics"
 FEWEST, ENOUGH = 10, 100
-"""Least number of equations of a signal, and the target if the filter is adapted."""
+"""Smallest number of equations of a signal, and target number if the filter is adapted."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class InverseDynamics:
-    """Residuals of the balance of forces under the measured motion, without a simulation.
+    """Residuals of the force balance under the measured motion, without a simulation.
 
         r = D (force needed for x, v, a - force measured)
 
-    with v, a by zero-phase filtering and differences of the measured position and D a common
+    v and a result from zero-phase filtering and differences of the measured position. D is a common
     low-pass filter and decimation of all terms. For a drive: D (m a + F(v, N) + offset - force).
     States of laws follow the measured sliding velocity, z' = rate(z, v(t), N(t)). A model with
-    several coordinates has one row for each input and one for each coordinate without an input;
-    reactions and normal forces that depend on friction are solved for at every sample.
+    several coordinates has one row for each input and one for each coordinate without an input.
+    Reactions and normal forces that depend on friction are solved for at every sample.
 
     Equations of static laws near a reversal are left out (`Filter.v_min`): there the low-pass
     filter mixes both directions, and a static law does not determine the force at rest.
 
     Attributes:
         force, x: channels of a drive.
-        v: channel of its measured velocity; None: "v" if the records have it. It is combined with
-            the velocity from the position according to the noise of both, frequency by frequency
-            (`Velocity`): a noisy, delayed or wrongly scaled one has no weight where the position
-            is more accurate.
+        v: channel of a measured velocity; None: "v" if the records have it. `Velocity` combines it
+            with the velocity from the position, frequency by frequency, according to their noise. A
+            noisy, delayed or wrongly scaled velocity has no weight where the position is more
+            accurate.
         filter: cut-off and decimation of all records; None: from force and motion of each record.
-        dead_time: bounds of the time [s] by which the measured force leads the acting one, an own
-            unknown of each record; None: no dead time.
+        dead_time: bounds of the time [s] by which the measured force leads the acting force, an
+            additional unknown of each record; None: no dead time.
 
-    Limits: a force that is held for a sample leads by half of it, which lowers the viscous
-    coefficient by about m w^2 h / 2 for motion at w [rad/s]; dead_time=(0, h) finds it. The motion
-    is taken as exact: its remaining noise lowers the mass. Therefore the decimation follows the
-    band in which the motion exceeds its noise (`choose_filter`); a user's filter may not. Errors
-    are those of the force up to the cut-off of the record's own filter: a force of pulses is
-    wide-band and includes all its noise and every resonance, so its percentage cannot be compared
-    with that of a slow record (EMPS: 10.9 % of the pulses, 5.9 % with the filter of the slow
-    record; the mass is the same within .2 %). Channels of a model are named like its states and
-    inputs; velocities without a channel come from the positions.
+    Limits: a force that is held for a sample leads by half a sample, which lowers the viscous
+    coefficient by about m w^2 h / 2 for motion at w [rad/s]; dead_time=(0, h) estimates this lead.
+    The motion is treated as exact, and its remaining noise lowers the mass. Therefore the automatic
+    decimation is limited to the band in which the motion exceeds its noise (`choose_filter`); a
+    filter of the user may not be. Errors are those of the force up to the cut-off of the record:
+    a force of pulses is wide-band and includes all noise and every resonance, so its percentage is
+    not comparable with that of a slow record (EMPS: 10.9 % of the pulses, 5.9 % with the filter of
+    the slow record; the mass is the same within .2 %). Channels of a model have the names of its
+    states and inputs; velocities without a channel are derived from the positions.
     Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 2013 (IDIM-LS).
     """
 
@@ -91,7 +91,7 @@ class InverseDynamics:
 
         Raises:
             ValueError: an implicit model, missing channels, unequal intervals, records too short
-                for the filter, law states that only a simulation can follow.
+                for the filter, or law states that only a simulation can follow.
         """
         del start
         model = subject.model
@@ -124,12 +124,12 @@ class Motion(NamedTuple):
     """Measured motion and inputs of one record.
 
     Attributes:
-        name: of the record.
+        name: name of the record.
         t: times (n,) [s].
         step: sample interval [s].
         w: positions, rates, accelerations, inputs, time, shape (nw, n).
         noise: standard deviations of the filtered rates.
-        filter: the filter used.
+        filter: filter of the record.
     """
 
     name: str
@@ -141,17 +141,17 @@ class Motion(NamedTuple):
 
     @property
     def inputs(self) -> slice:
-        """Rows of `w` with the inputs."""
+        """Rows of `w` that contain the inputs."""
         return slice(3 * self.noise.size, -1)
 
     @property
     def inside(self) -> slice:
-        """Samples away from the end effects of the filter."""
+        """Samples unaffected by the end effects of the filter."""
         return self.filter.inside(self.t.size, self.step)
 
     @property
     def begin(self) -> Array:
-        """The first sample, with rates near rest set to zero."""
+        """First sample of `w`, with rates near rest set to zero."""
         first, count = self.w[:, 0].copy(), self.noise.size
         first[count : 2 * count] = [moving_start(v) for v in self.w[count : 2 * count]]
         return first
@@ -167,13 +167,15 @@ def measure(
     """Differentiate a record with the channels that the model needs.
 
     Args:
-        model: its `found` coordinates.
+        model: the model.
+        found: `coordinates` of the model.
         record: equally spaced samples.
         called: name in the model -> channel, if they differ.
-        filter: None: chosen for the fastest input, or without inputs for the fastest motion.
+        filter: the filter; None: chosen for the fastest input, or without inputs for the fastest
+            motion.
 
     Raises:
-        ValueError: missing channels, unequal intervals.
+        ValueError: channels are missing, or intervals are unequal.
     """
     step = record.uniform().step
     known = ca.vertcat(ca.SX(0, 1) if model.ode is None else model.ode, model.alg)
@@ -207,12 +209,12 @@ def measure(
 
 
 class Piece(NamedTuple):
-    """A record with its decimation.
+    """Measured motion of a record with its decimation.
 
     Attributes:
         motion: the measured motion.
-        decimation: low-pass filter and decimation of its samples.
-        kept: for each row of the balance the decimated samples in use.
+        decimation: low-pass filter and decimation of the samples.
+        kept: for each row of the balance, the indices of the decimated samples that are used.
     """
 
     motion: Motion
@@ -220,12 +222,12 @@ class Piece(NamedTuple):
     kept: tuple[NDArray[np.int64], ...]
 
     def equations(self, row: int, signals: Array) -> Array:
-        """Return the columns of `signals`, shape (n, k), decimated to the equations in use."""
+        """Return the columns of `signals`, shape (n, k), decimated to the equations of a row."""
         return self.decimation.columns(signals[self.motion.inside])[self.kept[row]]
 
     @property
     def fewest(self) -> int:
-        """Least number of equations of a row."""
+        """Number of equations of the row that has the fewest."""
         return min((kept.size for kept in self.kept), default=FEWEST)
 
 
@@ -235,8 +237,8 @@ def _piece(made: Balance, motion: Motion, model: Model, p: Array, adapts: bool) 
     Args:
         made, motion, model: balance, measured motion and model.
         p: start values of the unknown parameters.
-        adapts: the filter was chosen automatically; if it leaves too few equations, as for a
-            motion with many reversals, the decimation is lowered.
+        adapts: True if the filter was chosen automatically; its decimation is then lowered if too
+            few equations remain, as for a motion with many reversals.
 
     Raises:
         ValueError: too few equations remain.
@@ -275,7 +277,7 @@ def _decimated(rows: Sequence[Row], motion: Motion, slow: Sequence[Mask]) -> Pie
 
 
 def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
-    """Return a mask for each contact: samples where its (static) law is undetermined."""
+    """Return a mask for each contact of the samples at which its static law is undetermined."""
     if not model.contacts:
         return []
     n = motion.t.size
@@ -289,7 +291,7 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
 
 
 def _channels(rows: Sequence[Row], pieces: Sequence[Piece]) -> Iterator[Channel]:
-    """Yield each balance of each record."""
+    """Yield a channel for each balance of each record."""
     first = 0
     for number, part in enumerate(pieces):
         motion = part.motion
@@ -318,7 +320,7 @@ class InverseRows(Blocks):
     pieces: tuple[Piece, ...]
 
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
-        """Yield the residuals of each balance of each record; `own` are dead times."""
+        """Yield the residuals of each balance of each record; `own` contains the dead times."""
         for number, part in enumerate(self.pieces):
             motion = part.motion
             w, rates = _shifted(motion, float(own[number])) if own.size else (motion.w, motion.w)
@@ -336,7 +338,7 @@ class InverseRows(Blocks):
 
 
 def _shifted(motion: Motion, delay: float) -> tuple[Array, Array]:
-    """Return `w` with the acting force u(t - delay), and du/dt there (inputs, n)."""
+    """Return `w` with the acting force u(t - delay), and du/dt at t - delay, shape (inputs, n)."""
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 (slow to import)
 
     spline: Any = CubicSpline(motion.t, motion.w[motion.inputs], axis=1)

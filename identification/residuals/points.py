@@ -1,4 +1,4 @@
-"""Friction forces at given velocities: points of a friction curve, or a record over time."""
+"""Residuals of friction forces at given velocities: points of a curve, or a record over time."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -31,22 +31,22 @@ class Points:
     """Residuals F(v, N) - F_measured of velocities and forces, with or without time.
 
     A static law is a curve through the points, and so is a law with states in steady sliding. Over
-    time, its states follow the measured velocity instead, z' = rate(z, v(t), N(t)), from steady
-    sliding at the first sample, or relaxed if it is slower than a twentieth of the usual speed. A
-    record that begins slowly under load is modelled wrongly until the contact has slid once; the
-    verdict reports it if it is visible. Points without time at exactly v = 0 are break-away forces,
-    compared with the static level of the law.
+    time, the states of a law follow the measured velocity instead, z' = rate(z, v(t), N(t)). They
+    start in steady sliding at the first sample, or relaxed if it is slower than a twentieth of the
+    usual speed. A record that begins slowly under load is modelled wrongly until the contact has
+    slid once; the verdict reports this if it is visible. Points without time at exactly v = 0 are
+    break-away forces, compared with the static level of the law.
 
     Attributes:
         v, F: channels of the sliding velocity and of the friction force, of equal sign in sliding.
-        N: channel of the normal force, or a number [N]; None: the channel "N" if there is one,
-            else the normal force of the fit.
+        N: channel of the normal force, or a number [N]; None: the channel "N" if it exists,
+            otherwise the normal force of the fit.
         weight: channel of weights, such as the number of samples of a mean: rows are multiplied by
             sqrt(weight / mean weight). None: equal weights.
-        states: of a law with states: "steady" sliding, "imposed" velocity over time, or "auto":
-            imposed if every record has a time.
-        offset: also fit a constant force, such as the zero of a load cell: an own unknown
-            "offset" of all records together. It requires motion in both directions.
+        states: treatment of law states: "steady" for steady sliding, "imposed" for the velocity
+            over time, or "auto": imposed if every record has times.
+        offset: also fit a constant force, such as the zero of a load cell, as an unknown "offset"
+            common to all records. It requires motion in both directions.
     """
 
     v: str = "v"
@@ -66,7 +66,11 @@ class Points:
         checks.flag("Points: offset", self.offset)
 
     def imposed(self, law: Law, data: Dataset) -> bool:
-        """Return True if the states of `law` follow the velocity over time."""
+        """Return True if the states of `law` follow the velocity over time.
+
+        Raises:
+            ValueError: `states` is "imposed", but a record has no times.
+        """
         timed = all(record.t is not None for record in data)
         if self.states == "imposed" and not timed:
             raise ValueError(
@@ -81,8 +85,8 @@ class Points:
         """Return the residuals of `data`.
 
         Raises:
-            ValueError: a subject without a law, missing channels, a law that needs an applied force
-                or whose static level is unknown although break-away needs it.
+            ValueError: the subject has no law, channels are missing, or break-away points need a
+                static level that the law does not have or that depends on an applied force.
         """
         del start
         law = subject.law
@@ -128,7 +132,7 @@ class Points:
 
 
 class Table(NamedTuple):
-    """A record: imposed values (2 + inputs, n), measured forces, weights, break-away points."""
+    """Imposed values (2 + inputs, n), forces, weights and break-away points of a record."""
 
     t: Array | None
     w: Array
@@ -148,7 +152,7 @@ class PointRows(Blocks):
     imposed: bool
 
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
-        """Yield the residuals of each record and their derivatives."""
+        """Yield the residuals of each record, and their derivatives."""
         for table in self.tables:
             F, J = np.zeros(table.F.size), np.ones((table.F.size, p.size + own.size))
             h = np.diff(table.t) if table.t is not None and self.imposed else 1.0
@@ -169,7 +173,7 @@ class PointRows(Blocks):
 
 
 def _sliding(law: Law, p: ca.SX, imposed: bool) -> Sampled:
-    """Return the force at one sample; `p` are symbols in `law`."""
+    """Return the force in sliding at one sample; `p` are the symbols in `law`."""
     where = f"Points: {type(law).__name__}"
     w = ca.SX.sym("w", 2 + len(law.inputs))
     given = {i.name: w[2 + k] for k, i in enumerate(law.inputs)}
@@ -185,7 +189,7 @@ def _sliding(law: Law, p: ca.SX, imposed: bool) -> Sampled:
 
 
 def _break_away(law: Law, p: ca.SX) -> Sampled:
-    """Return the break-away force, with the direction of the pull as the last entry of `w`."""
+    """Return the break-away force; the last entry of `w` is the direction of the pull."""
     w = ca.SX.sym("w", 3 + len(law.inputs))
     given = {i.name: w[2 + k] for k, i in enumerate(law.inputs) if i.name != FORCE}
     side = w[w.numel() - 1]
@@ -197,7 +201,7 @@ def _break_away(law: Law, p: ca.SX) -> Sampled:
 
 
 def _middle(tables: tuple[Table, ...]) -> float:
-    """Return the force half-way between both directions [N]."""
+    """Return the force half-way between the medians of both directions [N]."""
     v, F = (np.concatenate(part) for part in zip(*((t.w[0], t.F) for t in tables), strict=True))
     if not v.min() < 0 < v.max():
         got = "got one: an offset cannot be separated from friction"

@@ -1,4 +1,4 @@
-"""Setup of the compared simulations from a model and data: names, windows, start values."""
+"""Set up the simulations of `Shooting` from a model and data: names, windows, start values."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -24,28 +24,28 @@ from symfric.model import Model
 SUBSTEPS = (1, 2, 4, 8, 16, 32)
 """Candidate numbers of steps per sample of the sampled engine."""
 SHARE = 1e-5
-"""Tolerable error over the spread of a signal if the engine is requested: laws err more."""
+"""Tolerable error relative to the spread of a signal, if the engine is requested explicitly."""
 RTOLS, FINEST = (1e-6, 1e-7, 1e-8), 1e-9
-"""Candidate tolerances, and the reference tolerance."""
+"""Candidate tolerances of simulations, and the reference tolerance."""
 BIAS = 0.1
-"""Shift of an estimate by simulation errors that is tolerated, in standard errors."""
+"""Largest shift of an estimate by simulation errors, in standard errors."""
 LEAST_WINDOWS, FEWEST_SAMPLES = 5, 20
-"""Windows of a record for distant starts, and samples of each window."""
+"""Least number of windows of a record for distant starts, and least samples of such a window."""
 MOST_STARTS = 60
-"""Largest number of start values of such windows: a part of the data is sufficient."""
+"""Largest number of start values in such windows; a part of the data is sufficient for them."""
 NOISELESS = 1e-9
-"""Noise over the size of a signal below which the signal counts as noise-free."""
+"""Noise relative to the size of a signal below which the signal counts as noise-free."""
 
 
 @final
 class Preparation:
-    """Make the residuals of a model on data.
+    """Setup of the residuals of a model on data.
 
     Args:
-        kind: a `Shooting`, with the settings; `Shooting.prepare` is the only caller.
-        model: of the motion.
-        data: whose records are compared.
-        start: parameter -> value where simulations choose tolerances.
+        kind: settings, a `Shooting`; only `Shooting.prepare` creates this class.
+        model: model of the motion.
+        data: records to compare.
+        start: parameter -> value at which simulations choose tolerances.
         every: use every n-th window of a record.
     """
 
@@ -94,9 +94,9 @@ class Preparation:
         return shots
 
     def easier(self) -> tuple[float, int] | None:
-        """Return a window length [s] in which motions stay near the data, and a stride of windows.
+        """Return a window length [s] with motions near the data, and a stride between windows.
 
-        None if the windows are already that short.
+        Return None if the windows are already as short as that.
         """
         spans = [float(r.time[-1] - r.time[0]) for r in self.records]
         found = [
@@ -115,7 +115,7 @@ class Preparation:
     # ---- compared signals and inputs
 
     def _signals(self) -> dict[str, str]:
-        """Return signal of the model -> channel, for all signals in some record."""
+        """Return signal of the model -> channel, for all signals present in some record."""
         where, given = "Shooting: signals", self.kind.signals
         here = sorted({name for record in self.records for name in record.signals})
         driven = {v.name for v in self.model.u}
@@ -145,7 +145,7 @@ class Preparation:
                 raise ValueError(f"{where}: expected {name} in {unit}, got {got}")
 
     def _inputs(self) -> dict[str, Any]:
-        """Return input of the model -> channel, or an input for `simulate`."""
+        """Return input of the model -> channel, or an input of `simulate`."""
         where = "Shooting: inputs"
         units = {v.name: v.unit for v in self.model.u}
         given = checks.named(where, self.kind.inputs, units)
@@ -166,7 +166,10 @@ class Preparation:
         return found
 
     def _timeless(self) -> bool:
-        """Return True if the motion is independent of the time origin (no step resolves 1e9 s)."""
+        """Return True if the motion does not depend on the origin of time.
+
+        Windows then start near t = 0, because steps are not resolved at times such as 1e9 s.
+        """
         model, outputs = self.model, self.model.outputs
         given = [outputs[n].expression for n in self.signals if n in outputs]
         parts = [e for e in (model.ode, model.alg, model.residual, *given) if e is not None]
@@ -174,9 +177,9 @@ class Preparation:
         return not timed and not model.events and all(map(is_number, self.others.values()))
 
     def _check_span(self, where: str, source: Hold | Linear) -> None:
-        """Raise ValueError for input samples that do not cover a record."""
+        """Raise ValueError if the samples of an input do not cover a record."""
         t = np.ravel(np.asarray(source.t, dtype=float))
-        slack = float(np.median(np.diff(t))) if t.size > 1 else np.inf  # one number holds always
+        slack = float(np.median(np.diff(t))) if t.size > 1 else np.inf  # one number is constant
         for record in self.records:
             first, last = record.time[0], record.time[-1]
             if first < t[0] - slack or last > t[-1] + slack:
@@ -200,7 +203,7 @@ class Preparation:
     # ---- windows of records
 
     def _cut(self, number: int, record: Record, row: int) -> Iterator[Shot]:
-        """Yield the windows of one record; residuals begin at `row`, one signal after the other."""
+        """Yield the windows of one record, whose residuals begin at `row`, sorted by signal."""
         origin = float(record.time[0]) if self.timeless else 0.0
         t = record.time - origin
         measured = {s: record[c] for s, c in self.signals.items() if c in record}
@@ -228,12 +231,12 @@ class Preparation:
     def _start(
         self, number: int, sensed: Sensed, k: int, label: str
     ) -> tuple[dict[str, float], dict[str, int]]:
-        """Return the held start values, and the columns of the estimated ones."""
+        """Return the held start values, and the columns of the estimated start values."""
         given = self.kind.x0
         if given == "given" and k == 0:
             return {}, {}
         begin = sensed.at(k)
-        if k > 0:  # the model's start values do not apply to later times
+        if k > 0:  # the start values of the model do not apply to later times
             begin |= {n: Begin(None) for n in self.hidden if n not in begin}
         held, free = dict[str, float](), dict[str, int]()
         for v in self.model.x:
@@ -250,7 +253,7 @@ class Preparation:
             ):
                 held[v.name] = value
             else:
-                if value is None:  # without data it starts as in the model
+                if value is None:  # without data, the state has the start of the model
                     known = {n: b.value for n, b in begin.items() if b.value is not None}
                     starts = self.model.initial_state(known, self.values)
                     value = float(starts[self.states.index(v.name)])
@@ -273,9 +276,9 @@ class Preparation:
     # ---- accuracy
 
     def _substeps(self, shots: Shots, values: NDArray[np.float64]) -> int:
-        """Return the steps per sample of the sampled engine; 0 if `simulate` runs.
+        """Return the steps per sample of the sampled engine; 0 if `simulate` is used.
 
-        It is the smallest number whose error is tolerable.
+        This is the smallest number of steps with a tolerable error.
         """
         engine = self.kind.engine
         why = "" if engine == "simulate" else self._why_not_sampled()
@@ -287,7 +290,7 @@ class Preparation:
         most = list[float]()
         for c in shots.channels:
             noise, share = noise_of(c.measured), SHARE * float(np.std(c.measured))
-            exact = BIAS * noise / np.sqrt(shots.rows)  # as `_rtol` requires of `simulate`
+            exact = BIAS * noise / np.sqrt(shots.rows)  # the same requirement as in `_rtol`
             most.append(exact if engine == "auto" else max(noise, share))
         coarse = replace(shots, substeps=SUBSTEPS[0]).predicted(values)
         for substeps in SUBSTEPS:
@@ -301,7 +304,7 @@ class Preparation:
         return 0 if engine == "auto" else SUBSTEPS[-1]
 
     def _why_not_sampled(self) -> str:
-        """Return the reason why the sampled engine does not suit the windows; "" if it does."""
+        """Return why the sampled engine does not support the windows; "" if it does."""
         if why := why_not_sampled(self.model):
             return why
         if others := ", ".join(name for name in self.signals if name not in self.states):
@@ -311,10 +314,10 @@ class Preparation:
 
 
 def _rtol(shots: Shots, values: NDArray[np.float64]) -> float:
-    """Return the loosest tolerance that biases no estimate by a tenth of its standard error.
+    """Return the largest tolerance that biases no estimate by a tenth of its standard error.
 
-    An error e of the simulation moves estimates by at most |e / noise| standard errors,
-    independent of the number of samples. It is evaluated at the start values.
+    A simulation error e shifts estimates by at most |e / noise| standard errors, regardless of the
+    number of samples. The error is evaluated at the start values.
     """
     fine = replace(shots, rtol=FINEST).predicted(values)
     if isinstance(fine, str):

@@ -1,4 +1,4 @@
-"""Equations evaluated at the samples of a record, with exact derivatives by the parameters.
+"""Equations at the samples of a record, with exact derivatives by the parameters.
 
 States of laws follow the imposed velocity and normal force from sample to sample (`imposed_step`).
 """
@@ -20,7 +20,7 @@ from symfric.laws import Law
 Array = NDArray[np.float64]
 
 NEAR_REST = 0.05
-"""First velocity, over the usual one, below which a record starts at rest."""
+"""Initial velocity relative to the usual one below which a record starts at rest."""
 
 
 def imposed_step(
@@ -35,21 +35,21 @@ def imposed_step(
 
         z' = rate(z, v(t), N(t)),   v, N and further inputs linear between the samples
 
-    Two steps, each with its mean velocity and load held: exact exponentials for bristles, exact
-    event steps for yielding elements, second order otherwise
-    (`symfric.codegen.blocks.held_step`). They meet in the middle, or where the velocity passes
-    through zero, so that no step includes two directions. The smooth form of GMS takes the step of
-    its event form, which slips later by up to the share rho of the limit.
+    The sample consists of two steps, each with its mean velocity and load held. A step is an exact
+    exponential for bristles, an exact event step for yielding elements, and of second order
+    otherwise (`symfric.codegen.blocks.held_step`). The steps meet in the middle, or where the
+    velocity passes through zero, so that no step includes two directions. The smooth form of GMS
+    takes the step of its event form, which slips later by up to the share rho of the limit.
 
     Args:
-        law: with states; its parameters may be symbols.
+        law: law with states; its parameters may be symbols.
         z: SX symbols of its states.
         before, after: velocity, normal force and further inputs at the two samples.
         h: sample interval [s].
-        where: start of the error message.
+        where: beginning of the error message.
 
     Raises:
-        ValueError: a law whose modes or states are coupled: only a simulation can follow it.
+        ValueError: modes or states of the law are coupled, so that only a simulation can follow it.
     """
     from symfric.codegen.blocks.held_step import advanced  # noqa: PLC0415 (slow to import)
     from symfric.laws import GMS  # noqa: PLC0415 (slow to import)
@@ -81,19 +81,19 @@ def imposed_step(
 
 
 def moving_start(v: Array) -> float:
-    """Return the initial velocity of the states: the first one, or 0 if it is near rest.
+    """Return the initial velocity for the states: the first sample, or 0 if it is near rest.
 
-    A bristle that has slid far is fully bent at the smallest speed; at rest it is taken as relaxed.
+    A bristle that has slid far is fully bent at the smallest speed; at rest it is assumed relaxed.
     """
     return float(v[0]) if abs(v[0]) > NEAR_REST * float(np.sqrt(np.mean(v**2))) else 0.0
 
 
 NEWTON = 20
-"""Newton steps for the algebraic unknowns of all samples together."""
+"""Largest number of Newton steps for the algebraic unknowns of all samples together."""
 ROUNDS = 40
-"""Largest number of passes between algebraic unknowns and states along the record."""
+"""Largest number of alternations between algebraic unknowns and states along the record."""
 SETTLED = 1e-9
-"""Change of the algebraic unknowns, over their size, below which they are converged."""
+"""Relative change of the algebraic unknowns below which they have converged."""
 
 
 class Path(NamedTuple):
@@ -112,13 +112,13 @@ class Sampled:
         z_{k+1} = step(z_k, w_k, y_k, w_{k+1}, y_{k+1}, h, p),   z_0 = start(w_0, y_0, p)
         r = rows(w, z, y, p)
 
-    Laws with states run in compiled code if there is a compiler, all others in CasADi's virtual
-    machine; both give the same bits.
+    Laws with states run in compiled code if there is a compiler, all other laws in CasADi's virtual
+    machine; the results are bit-identical.
 
     Attributes:
         rows, g, start: Functions of (w, y), z, p with derivatives by (z, y, p).
-        step, tangent: the step, and the step of z with its derivatives by p.
-        sizes: of w, z, y and p.
+        step, tangent: the step of z, and the same with derivatives by p.
+        sizes: numbers of w, z, y and p.
         guess: start values of y, shape (ny,).
     """
 
@@ -137,12 +137,14 @@ class Sampled:
         later: ca.SX | None = None, h: ca.SX | None = None,
         y: ca.SX | None = None, g: ca.SX | None = None, guess: Sequence[float] = (),
     ) -> "Sampled":  # fmt: skip
-        """Return the Functions of SX expressions.
+        """Return the Functions for SX expressions.
 
         Args:
-            w, z, y, p: symbols of measured quantities, law states, unknowns, parameters.
-            rows, g, start: expressions in them.
-            step: expression in z, w, y, p, `h` and `later`, the symbols of w_{k+1} and y_{k+1}.
+            w, z, y, p: symbols of measured quantities, law states, unknowns and parameters.
+            rows, g, start: expressions in these symbols.
+            step: expression in z, w, y, p, `h` and `later`.
+            later: symbols of w_{k+1} and y_{k+1}.
+            h: symbol of the sample interval.
             guess: start values of y, shape (ny,).
         """
         none = ca.SX(0, 1)
@@ -156,7 +158,7 @@ class Sampled:
             slopes = ca.vec(ca.densify(ca.jacobian(of, along)))
             return ca.Function(f"sampled_{name}", [here, z, p], [ca.densify(of), slopes])
 
-        # derivatives by p: S of the states, Y of y at the sample, Y_later at the next one
+        # derivatives by p: S of the states, Y of y at this sample, Y_later of y at the next sample
         S, Y, Y_later = (ca.SX.sym(n, k, count) for n, k in (("S", nz), ("Y", ny), ("Yl", ny)))
         slope = (
             ca.mtimes(ca.jacobian(step, z), S)
@@ -177,7 +179,7 @@ class Sampled:
         )
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields; a copy compiles or loads its own code."""
+        """Return the fields without compiled code; a copy compiles or loads its own code."""
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     @cached_property
@@ -186,22 +188,22 @@ class Sampled:
         return {n: Columns(getattr(self, n), n in ("step", "tangent")) for n in names}
 
     def run(self, name: str, rows: list[Any], first: Array | None = None) -> list[Array]:
-        """Return the results of a Function for all `rows`, see `Columns`."""
+        """Return the results of a Function for all `rows`; see `Columns`."""
         if self.sizes[1] and name != "start" and find_compiler() is not None:
             try:
                 return self._columns[name](rows, first, "compiled")
-            except CompileError:  # a broken compiler is no reason not to evaluate
+            except CompileError:  # a broken compiler does not prevent the evaluation
                 pass
         return self._columns[name](rows, first, "vm")
 
     def along(self, w: Array, h: float | Array, p: Array, begin: Array | None = None) -> Path | str:
-        """Return rows at all samples and their derivatives by p, or a message on a failure.
+        """Return rows at all samples and their derivatives by p, or a message on failure.
 
         Args:
-            w: measured, shape (nw, n).
-            begin: values of w for the start of the states, shape (nw,); None: the first sample.
+            w: measured quantities, shape (nw, n).
             h: sample interval [s], one or (n - 1,); not used without states.
             p: parameters, shape (n_p,).
+            begin: values of w for the start of the states, shape (nw,); None: the first sample.
         """
         return _Along(self, w.T, h, p, w[:, 0] if begin is None else begin).path()
 
@@ -259,7 +261,7 @@ class _Along:
         return value, slopes.reshape(n, -1, value.shape[1]).transpose(0, 2, 1)
 
     def solve(self) -> str:
-        """Solve for the algebraic unknowns of all samples by Newton's method; or say why not."""
+        """Solve for the unknowns of all samples by Newton's method; return a message on failure."""
         y_columns = slice(self.nz, self.nz + self.ny)
         for _ in range(NEWTON):
             g, slopes = self.at("g")
@@ -275,7 +277,7 @@ class _Along:
         return "the reactions were not found by Newton's method at some samples"
 
     def chained(self, name: str, first: Array, *given: Array) -> Array:
-        """Return all results of a Function that is applied from sample to sample, `first` first."""
+        """Return all results of a Function applied from sample to sample, starting at `first`."""
         here = np.hstack([self.w, self.y])
         rows = [here[:-1], here[1:], self.h, *given, _same(self.p, self.n - 1)]
         return np.vstack([first[None, :], self.of.run(name, rows, first)[0]])
@@ -303,7 +305,7 @@ class _Along:
         return dz, dy
 
     def tangent(self, dy: Array) -> Array:
-        """Return the derivatives of the states by the parameters, given those of y, dy."""
+        """Return the derivatives of the states by the parameters, given those of y, `dy`."""
         nz, ny = self.nz, self.ny
         first = self.first()[1]
         S = first[:, nz + ny :] + first[:, nz : nz + ny] @ dy[0]
@@ -314,11 +316,11 @@ class _Along:
 
 
 def _same(p: Array, n: int) -> tuple[Array, NDArray[np.intp]]:
-    """Return one parameter row shared by all samples."""
+    """Return the parameters as one row shared by n samples."""
     return p[None, :], np.zeros(n, np.intp)
 
 
 def _settled(old: Array, new: Array) -> bool:
-    """Return True if only rounding has changed."""
+    """Return True if two values differ only by rounding."""
     size = max(float(np.abs(new).max(initial=0.0)), 1e-12)
     return bool(np.abs(new - old).max(initial=0.0) <= SETTLED * size)

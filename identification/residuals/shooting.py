@@ -1,19 +1,19 @@
-"""Simulated motions compared with measured ones, over whole records or windows of them.
+"""Residuals of simulated motions, over whole records or windows of records.
 
     r_s(t_i) = y_s(t_i; p, x0, tau) - measured_s(t_i),    x' = f(x, u(t - tau), p),  x(t_0) = x0
 
-with the derivatives of the simulation's steps by parameters p, start values x0 of every record and
-window, and the dead time tau of the inputs. Any model is supported: laws with states, several
-bodies, friction from reactions, laws by modes.
+The derivatives by parameters p, start values x0 of every record and window, and the dead time tau
+of the inputs are those of the steps of the simulation. Any model is supported: laws with states,
+several bodies, friction from reactions, laws by modes.
 
-Short windows limit the effect of slow model errors; long windows expose them. Candidate lengths are
-compared (`choose`):
+Short windows limit the effect of slow model errors; long windows expose them. `choose` compares
+candidate lengths:
 
-    for each quarter of every record: fit to the others in windows of that length,
+    for each quarter of every record: fit to the other quarters in windows of that length,
     simulate the quarter freely, from the start that the data determine;
     error^2 = mean over signals and quarters of  mean r^2 / variance of the signal
 
-The length of the least error is used. The procedure is deterministic.
+It selects the length with the smallest error. The procedure is deterministic.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -31,29 +31,29 @@ from identification.unknowns.subject import Subject
 from symfric.foundation import checks
 
 Solve = Callable[["Shooting", Dataset], Mapping[str, float] | None]
-"""Fit parameters to data by windows; None on failure."""
+"""Function that fits parameters to data by windows; it returns None on failure."""
 BLOCKS = 4
 RTOL = 1e-6
 """Default tolerance of simulations."""
 LENGTHS, LEAST = 5, 2.5
-"""Lengths to try in addition to whole records, each half the previous one; windows of fewer
-samples than `LEAST` times the fewest determine their start values poorly.
+"""Number of lengths tried in addition to whole records, each half the previous one; and least
+samples of a window, relative to the fewest, because short ones determine starts poorly.
 """
 
 
 def choose(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -> "Shooting":
-    """Return `kind` with windows of the length that predicts left-out quarters best.
+    """Return `kind` with the window length that best predicts left-out quarters.
 
     Args:
         kind: residuals whose windows are chosen.
-        subject: fitted law, machine or model.
+        subject: law, machine or model to fit.
         data: records; each is divided in time.
-        solve: fits parameters to some of the data.
+        solve: function that fits the parameters to a part of the data.
 
     Raises:
-        ValueError: no length gives a fit that can be simulated.
+        ValueError: for no length can the fits be simulated.
     """
-    # parts of a record begin anywhere; the tolerance of usual data saves a search
+    # parts of a record have unknown starts; a tolerance sufficient for usual data saves a search
     x0 = "data" if kind.x0 == "data" else "estimate"
     fixed = replace(kind, x0=x0, rtol=kind.rtol or RTOL)
     span = max(float(r.time[-1] - r.time[0]) for r in data)
@@ -71,7 +71,7 @@ def choose(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -> "
 
 
 def _left_out(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -> float:
-    """Return the mean square error of predicted quarters over the variance of each signal."""
+    """Return the mean square error of predicted quarters, relative to the signal variances."""
     found = list[float]()
     for block in range(BLOCKS):
         rest, other = list[Record](), list[Record]()
@@ -83,7 +83,7 @@ def _left_out(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -
             values = solve(kind, Dataset(tuple(rest), data.name))
             quarters = Dataset(tuple(other), data.name)
             found.append(np.inf if values is None else _free_run(kind, subject, quarters, values))
-        except ValueError:  # a remainder with short windows or without motion
+        except ValueError:  # the remaining data have short windows or no motion
             found.append(np.inf)
     return float(np.mean(found))
 
@@ -91,7 +91,7 @@ def _left_out(kind: "Shooting", subject: Subject, data: Dataset, solve: Solve) -
 def _free_run(
     kind: "Shooting", subject: Subject, data: Dataset, values: Mapping[str, float]
 ) -> float:
-    """Return the mean square error of simulated records over the variance of each signal."""
+    """Return the mean square error of simulated records, relative to the signal variances."""
     shots = replace(kind, windows=None, x0="data").prepare(subject, data, values)
     own = {u.name: values[u.name] if u.name == DEAD_TIME else u.start for u in shots.own}
     predicted = shots.predicted(np.array([{**values, **own}[name] for name in shots.names]))
@@ -112,43 +112,43 @@ ENGINES = ("auto", "simulate", "sampled")
 @final
 @dataclass(frozen=True, eq=False)
 class Shooting:
-    """Simulate the motion and compare named signals.
+    """Residuals of the simulated motion in named signals.
 
     Attributes:
         signals: compared states and outputs of the model: names, or signal -> channel of the data;
-            None: all in the data. A record may lack some of them.
-        windows: None: each record is simulated from its start; a length [s]: it is cut into windows
-            of about that length, each with its own start values, so that motions do not drift away
-            from the measured ones; "choose": the length that predicts best on the given data
-            (`choose`).
-        x0: "estimate": start values of measured states and of rates of measured states are own
-            unknowns, "x0.v[2]" of record 2, "x0.v[2,3]" of its window 3, and so is the bristle of
-            a law with one; several bristles start in steady sliding or, if the contact sticks,
-            unstrained; other states start as in the model at the start of a record, and are
-            unknown at the start of later windows. "data": start values determined by the data are
-            held there. "given": records start as in the model. Or, for records, state -> number,
-            numbers (one per record) or "estimate"; others as "estimate".
-        inputs: input of the model -> channel, or an input for `simulate` (a number, samples, a
+            None: all signals in the data. A record may lack some of them.
+        windows: None: each record is simulated from its start; a length [s]: each record is cut
+            into windows of about that length with separate start values, so that motions do not
+            drift away from the measured ones; "choose": the length that predicts best on the given
+            data (`choose`).
+        x0: "estimate": start values of measured states and of their rates are unknowns, "x0.v[2]"
+            for record 2, "x0.v[2,3]" for its window 3. So is a bristle if the law has only one;
+            several bristles start in steady sliding or, if the contact sticks, unstrained. Other
+            states start as in the model at the start of a record, and are unknown at the start of
+            later windows. "data": start values determined by the data are held there. "given":
+            records start as in the model. Or a mapping for records: state -> number, numbers (one
+            per record) or "estimate"; other states as with "estimate".
+        inputs: input of the model -> channel, or an input of `simulate` (a number, samples, a
             function of time); by default the channel of the same name.
-        interpolation: of sampled inputs: "linear" for a measured one, "hold" for one that a
-            controller holds from each sample to the next.
-        dead_time: delay of sampled inputs [s]; (low, high): estimated between these bounds, as
-            "dead_time". Requires linear inputs; a held input is approximately a linear one delayed
-            by half a sample.
-        every: compare every n-th sample; inputs are sampled in full.
+        interpolation: interpolation of sampled inputs: "linear" for a measured input, "hold" for
+            an input that a controller holds from each sample to the next.
+        dead_time: delay of sampled inputs [s]; (low, high): estimated between these bounds as
+            "dead_time". Requires linear inputs; a held input is approximately a linear input
+            delayed by half a sample.
+        every: compare every n-th sample; inputs use all samples.
         engine: "simulate" supports any model; "sampled" steps one mass under friction without
             states, such as a `Drive` with a static law, from sample to sample (`stepper`), about a
-            hundred times faster and accurate to 1e-5 of the signals or to their noise; "auto": the
-            latter if it supports the model and is as accurate as `simulate` has to be (`rtol`).
-        rtol: of the simulation; None: the loosest of 1e-6, 1e-7, 1e-8 whose error moves no estimate
-            by more than a tenth of its standard error.
+            hundred times faster and accurate to 1e-5 of the signals or to their noise; "auto":
+            "sampled" if it supports the model and has the accuracy required of `simulate` (`rtol`).
+        rtol: tolerance of the simulation; None: the largest of 1e-6, 1e-7, 1e-8 whose error shifts
+            no estimate by more than a tenth of its standard error.
 
     Raises:
-        ValueError: bad input.
+        ValueError: invalid arguments.
 
-    Limits: over a long record the motion from a wrong start may diverge from the measured one
-    (chaos, a contact that sticks in one and slides in the other): use windows, or many starts.
-    Dead time is common to all inputs and records.
+    Limits: over a long record, the motion from a wrong start may diverge from the measured motion
+    (chaos, a contact that sticks in one motion and slides in the other): use windows or many
+    starts. The dead time is common to all inputs and records.
     """
 
     signals: Sequence[str] | Mapping[str, str] | None = None
@@ -211,7 +211,7 @@ class Shooting:
         """Length of windows [s]; None: whole records.
 
         Raises:
-            ValueError: the length is not chosen yet.
+            ValueError: the length has not been chosen yet.
         """
         if isinstance(self.windows, str):
             raise ValueError(
@@ -223,7 +223,7 @@ class Shooting:
         """Return the residuals of `data`; simulations that select the tolerance run at `start`.
 
         Raises:
-            ValueError: names that model or data do not have, windows that are too short.
+            ValueError: names that the model or the data do not have, or windows too short.
         """
         preparation = Preparation(self, subject.model, data, start)
         shots, easier = preparation.shots(), preparation.easier()

@@ -1,16 +1,16 @@
-"""Simulations of windows of records, and their difference from the data.
+"""Simulations of windows of records, and their residuals.
 
-One mass under friction without states is stepped by the sampled engine (`stepper`): about a hundred
+The sampled engine (`stepper`) steps one mass under friction without states. It is about a hundred
 times faster than error control, with exact sensitivities, and as accurate as the samples of the
-inputs. All other models are simulated.
+inputs permit. All other models are simulated.
 
-Dead time of inputs: a model is driven by the input recorded a time tau earlier,
+With a dead time tau, a model is driven by the input recorded a time tau earlier,
 
     u(t) = recorded(t - tau),     du/dtau = -recorded'(t - tau)
 
-Between samples an input is linear, so its rate is constant there and jumps at the samples. With an
-additional parameter theta = 0, the model is driven by u - theta u_rate: the derivative by theta
-equals the derivative of the motion by tau, for any model.
+Between samples an input is linear; its rate is therefore constant there and jumps at the samples.
+With an additional parameter theta = 0, the model is driven by u - theta u_rate. For any model, the
+derivative of the motion by theta then equals that by tau.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -31,9 +31,9 @@ from symfric.model import Model, Output
 
 Array = NDArray[np.float64]
 DEAD_TIME = "dead_time"
-"""Name of the unknown and of the parameter of a delayed model."""
+"""Name of the unknown, and of the parameter of a delayed model."""
 RATE = "_rate"
-"""Suffix of an input's name for its rate."""
+"""Suffix that turns the name of an input into the name of its rate."""
 
 
 def delayed(model: Model, inputs: Sequence[str]) -> Model:
@@ -71,7 +71,7 @@ def delayed(model: Model, inputs: Sequence[str]) -> Model:
 
 
 def plain(model: Model, signals: Iterable[str]) -> Model:
-    """Return the equations of `model` with the outputs in `signals` only."""
+    """Return the equations of `model` with only the outputs in `signals`."""
     outputs = {name: output for name, output in model.outputs.items() if name in signals}
     return replace(
         model, outputs=outputs, contacts=(), opening=None, details=dict[str, Output], sketch=None
@@ -79,7 +79,7 @@ def plain(model: Model, signals: Iterable[str]) -> Model:
 
 
 HOLDS = ("linear", "held")
-"""Between two samples an input is linear (the step uses its mean) or held from the first one."""
+"""Inputs between two samples: linear, where steps use their mean, or held from the first sample."""
 
 KEY = "identification.sampled"
 """Key of the chain in the memory of a model."""
@@ -92,20 +92,20 @@ def sampled_motion(
     """Return the motion at the instants `t` with its derivatives, or a message if there is none.
 
     Args:
-        model: two states x' = v and v' = a(x, v, u, p), such as a `Drive` with a static law
-            (`why_not_sampled` explains why others are unsuitable); all of `model.p` are free.
+        model: model with two states x' = v and v' = a(x, v, u, p), such as a `Drive` with a static
+            law (see `why_not_sampled`); all parameters in `model.p` are free.
         t: instants [s], shape (n,); not necessarily equidistant.
-        inputs: of the model at these instants, shape (n, inputs) or (n,).
+        inputs: inputs of the model at these instants, shape (n, inputs) or (n,).
         p: values of `model.p`.
         start: position and velocity at t[0].
         hold: inputs between samples: "linear", or "held" as by a digital amplifier.
-        substeps: equal steps per sample, each with the mean of the input over it.
+        substeps: equal steps per sample, each with the mean of the input over the step.
 
     Returns:
         A `Motion`: states (n, 2) and slopes (n, 2, parameters + 2), the last two by the start.
 
     Raises:
-        ValueError: an unsuitable model, or arrays of the wrong size.
+        ValueError: the model is unsuitable, or an array has the wrong size.
     """
     checks.choice("sampled_motion: hold", hold, HOLDS)
     u = np.asarray(inputs, dtype=float).reshape(t.size, -1)
@@ -121,13 +121,13 @@ def sampled_motion(
 
 
 def refined(t: Array, substeps: int) -> Array:
-    """Return the instants `t` with `substeps` equal steps between consecutive ones."""
+    """Return the instants `t` with `substeps` equal steps between consecutive instants."""
     shares = np.arange(substeps) / substeps
     return np.append((t[:-1, None] + np.diff(t)[:, None] * shares).ravel(), t[-1])
 
 
 def stepped(model: Model, t: Array, between: list[Array], p: Array, start: Array) -> Motion | str:
-    """Return `sampled_motion` for means of each input from each instant to the next, (n - 1,)."""
+    """Return the motion for the mean of each input from each instant to the next, (n - 1,)."""
     rows = np.column_stack([np.diff(t), *between])
     start_slopes = np.hstack([np.zeros((2, p.size)), np.eye(2)])
     motion = _chain(model)(rows, p, start, start_slopes)
@@ -139,9 +139,9 @@ def means(t: Array, samples: Array, at: Array, held: bool) -> Array:
 
     Args:
         t: sample times [s], shape (n,).
-        samples: shape (n,); constant before the first and after the last one.
+        samples: samples, shape (n,); constant before the first and after the last one.
         at: instants [s], shape (k,).
-        held: samples are held until the next one; else linear between them.
+        held: True if samples are held until the next one; False if linear between them.
     """
     k = np.clip(np.searchsorted(t, at, "right") - 1, 0, t.size - 2)
     dt = np.diff(t)
@@ -154,7 +154,7 @@ def means(t: Array, samples: Array, at: Array, held: bool) -> Array:
 
 
 def _chain(model: Model) -> Chain:
-    """Return the chain of a model, built once."""
+    """Return the chain of a model, which is built only once."""
     if KEY not in model.memory:
         mass = Mass(model)
         count = len(mass.inputs)
@@ -163,23 +163,23 @@ def _chain(model: Model) -> Chain:
 
 
 METHOD = "radau5"
-"""Method of `simulate` for derivatives; without them it would choose another one."""
+"""Method of `simulate` with derivatives, also used without them for equal results."""
 LEAST_STEPS, STEPS = 20_000, 50
-"""Largest number of simulation steps, in total and for each sample: with distant values a motion
-may need a million.
+"""Largest number of simulation steps: a constant, and an addition for each sample. At distant
+values a motion may need a million steps.
 """
 LISTED = 6
-"""Largest number of values in a failure message."""
+"""Largest number of values shown in a failure message."""
 
 
 class Drives(NamedTuple):
     """Inputs of one record.
 
     Attributes:
-        t: sample times from the origin of the shots [s], shape (n,).
+        t: sample times relative to the origin of the shots [s], shape (n,).
         sampled: input -> samples, shape (n,).
-        others: input -> input for `simulate`.
-        held: samples are held until the next one; else linear between them.
+        others: input -> input of `simulate`.
+        held: True if samples are held until the next one; False if linear between them.
     """
 
     t: Array
@@ -207,7 +207,7 @@ class Drives(NamedTuple):
     def mean(self, name: str, at: Array) -> Array:
         """Return the mean of an input, or of its rate, from each of the instants `at` to the next.
 
-        Times of the instants are reduced by the dead time.
+        The dead time is already subtracted from the instants.
         """
         if name in self.sampled:
             return means(self.t, self.sampled[name], at, self.held)
@@ -218,12 +218,12 @@ class Drives(NamedTuple):
 
 
 class Shot(NamedTuple):
-    """A simulation: a window of a record, or a whole one.
+    """Simulation of a window of a record or of a whole record.
 
     Attributes:
-        record: its name.
-        origin: time of the record from which the others are counted [s].
-        t: compared times [s], shape (m,); the simulation starts at the first.
+        record: name of the record.
+        origin: time in the record at which all other times are zero [s].
+        t: compared times [s], shape (m,); the simulation starts at the first one.
         end: end of the simulation [s].
         measured: signal -> values at `t`.
         places: signal -> slice of its residuals among the rows.
@@ -255,10 +255,10 @@ class Shots(Blocks):
     Attributes:
         model: plain equations, with a parameter for the dead time if it is estimated.
         shots: the simulations.
-        dead_time: of the inputs [s]; None: it is the first of the own unknowns.
-        rtol, backend: as `simulate` takes them.
-        substeps: steps per sample of the sampled engine; 0: `simulate` runs.
-        easier: the same data in short windows, for distant starts.
+        dead_time: dead time of the inputs [s]; None: it is the first of the own unknowns.
+        rtol, backend: arguments of `simulate`.
+        substeps: steps per sample of the sampled engine; 0: `simulate` is used.
+        easier: residuals of the same data in short windows, for distant starts.
     """
 
     model: Model
@@ -271,7 +271,7 @@ class Shots(Blocks):
 
     @property
     def rows(self) -> int:
-        """Number of residuals, of all channels."""
+        """Number of residuals of all channels."""
         return self.channels[-1].rows.stop
 
     def at(self, values: Array) -> Evaluation | str:
@@ -295,7 +295,7 @@ class Shots(Blocks):
         return Evaluation(r, J)
 
     def predicted(self, values: Array) -> Array | str:
-        """Return the simulated values alone, shape (rows,)."""
+        """Return the simulated values without derivatives, shape (rows,)."""
         found = np.empty(self.rows)
         for shot in self.shots:
             run = self._run(shot, values, ())
@@ -306,7 +306,7 @@ class Shots(Blocks):
         return found
 
     def _run(self, shot: Shot, values: Array, names: tuple[str, ...]) -> Run | str:
-        """Return the motion of one window with derivatives by `names`, or a failure message."""
+        """Return the motion of one window with derivatives by `names`, or a message on failure."""
         count = len(self.parameters)
         tau = float(values[count]) if self.dead_time is None else self.dead_time
         x0 = {**shot.held, **{state: float(values[i]) for state, i in shot.free.items()}}
@@ -314,7 +314,7 @@ class Shots(Blocks):
             run = (self._sampled if self.substeps else self._simulated)(
                 shot, x0, values[:count], tau, names
             )
-        except ValueError as error:  # no consistent start, or a motion without derivative
+        except ValueError as error:  # no consistent start, or a motion without derivatives
             run = str(error)
         return self._failed(shot, values, run) if isinstance(run, str) else run
 
@@ -347,7 +347,7 @@ class Shots(Blocks):
         self, shot: Shot, x0: Mapping[str, float], p: Array, tau: float, names: tuple[str, ...]
     ) -> Run | str:
         model, drives = self.model, shot.drives
-        p = np.append(p, [0.0] * (self.dead_time is None))  # the derivative by a dead time
+        p = np.append(p, [0.0] * (self.dead_time is None))  # theta, for derivatives by a dead time
         first, last = np.searchsorted(drives.t, [shot.t[0], shot.end])
         t, states = drives.t[first : last + 1], [v.name for v in model.x]
         known = dict(zip([v.name for v in model.p], p.tolist(), strict=True))

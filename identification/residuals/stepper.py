@@ -1,22 +1,23 @@
 """Sampled motion of one mass under friction, with exact sensitivities.
 
-One step of length H solves an implicit equation for the velocity, with a length stretched by the
-result (friction of slope -a_v is a decay, which one implicit step would underestimate):
+One step of length H solves an implicit equation for the velocity. Its length is stretched according
+to the result, because friction of slope -a_v is a decay that one implicit step underestimates:
 
     vb = v + H a(vb),   v1 = v + S a(v1),   S = H phi(-H a_v(vb)),   x1 = x + H (v + v1)/2
 
 phi(z) = (e^z - 1)/z for z within +-1. The step is of second order in sliding, and exact under
 constant force for Coulomb with viscous friction. A dissipative friction law does not reverse the
-velocity by itself, so v1 lies between 0 and v + S a(0): a guarded Newton iteration finds it for any
-slope at rest. Friction that holds the mass at rest is detected directly, at the speed `CREEP`: a
-jump at v = 0 is the exact impulse clamp, and sticking needs no events and no small steps.
+velocity by itself. Therefore v1 lies between 0 and v + S a(0), and a guarded Newton iteration finds
+it for any slope at rest. Friction that holds the mass at rest is detected directly, at the speed
+`CREEP`: a jump at v = 0 is the exact impulse clamp, and sticking needs no events or small steps.
 
-The iteration is not differentiated: by the implicit function theorem
+The derivatives follow from the implicit function theorem, not from the iteration:
 
     (1 - S a_v) dv1 = dv + S (a_x dx + a_u du + a_p dp) + a dS,
 
-and dv1 = 0 if the mass is held. The step is one CasADi Function of a sample, whose chain runs as
-compiled C if there is a compiler, else in CasADi's virtual machine: both give the same bits.
+and dv1 = 0 if the mass is held. The step is one CasADi Function of a sample. The chain of samples
+runs as compiled C if there is a compiler, otherwise in CasADi's virtual machine, with identical
+bits.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,11 +36,11 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 
 SEARCH, POLISH = 9, 5
-"""Evaluations of the law to find vb, and v1 from it; two or three are usually sufficient."""
+"""Law evaluations to find vb, and to find v1 from it; two or three are usually sufficient."""
 CREEP = 1e-12
-"""Speed over the model's typical velocity below which a mass held by friction is at rest."""
+"""Speed relative to the typical velocity below which a mass held by friction is at rest."""
 LOOSE = 2e-2
-"""Largest residual of the implicit equation, over its velocities, that counts as solved."""
+"""Largest residual of the implicit equation, relative to its velocities, that is acceptable."""
 
 
 class Mass:
@@ -50,13 +51,13 @@ class Mass:
         slopes: (x, v, u, p) -> a, a_x, a_v, a_u, a_p.
         bends: (x, v, u, p) -> derivatives of a_v by x, v, u, p.
         newton: (x, v, u, p) -> a, a_v.
-        inputs: names of u.
-        parameters: number of p.
+        inputs: names of the inputs u.
+        parameters: number of parameters p.
         creep: speed [velocity unit] below which a held mass is at rest.
 
     Raises:
-        ValueError: states other than a position and its velocity (a law with own states), algebraic
-            variables, events, or equations with time.
+        ValueError: the model has states other than a position and its velocity (such as those of a
+            law), algebraic variables, events, or equations that depend on time.
     """
 
     def __init__(self, model: Model) -> None:
@@ -76,7 +77,7 @@ class Mass:
 
 
 def why_not_sampled(model: Model) -> str:
-    """Return the reason why a model cannot be stepped as one mass; "" if it can."""
+    """Return why a model cannot be stepped as one mass; "" if it can."""
     states, algebraic = ([v.name for v in group] for group in (model.x, model.z))
     if len(states) != 2 or model.z or model.ode is None:
         more = f" and algebraic {', '.join(algebraic)}" if algebraic else ""
@@ -98,7 +99,7 @@ def why_not_sampled(model: Model) -> str:
 
 
 class Tangent(NamedTuple):
-    """A value with its derivatives by the start and the parameters: a row (1, n) of SX."""
+    """Value with its derivatives by the parameters and the start, a row (1, n) of SX."""
 
     value: ca.SX
     slope: ca.SX
@@ -107,7 +108,7 @@ class Tangent(NamedTuple):
 def advance(
     mass: Mass, at: Sequence[Tangent], p: Tangent, H: ca.SX
 ) -> tuple[Tangent, Tangent, ca.SX]:
-    """Return position and velocity after one step from (x, v, u), and the equation's residual."""
+    """Return position and velocity after a step from (x, v, u), and the equation's residual."""
     x, v, u = at
     middle = Tangent(x.value + H / 2 * v.value, x.slope + H / 2 * v.slope)
     here = (middle.value, u.value, p.value)
@@ -135,13 +136,13 @@ def advance(
 
 
 def _along(slopes: Any, sides: Sequence[ca.SX]) -> ca.SX:
-    """Return a_x dx + a_u du + a_p dp, where `slopes` are those by x, v, u, p."""
+    """Return a_x dx + a_u du + a_p dp for `slopes` by x, v, u, p."""
     by_x, _, by_u, by_p = slopes
     return sum((ca.mtimes(s, d) for s, d in zip((by_x, by_u, by_p), sides, strict=True)), ca.SX(0))
 
 
 def _phi(z: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return phi(z) = (e^z - 1)/z and its derivative, by their series near 0."""
+    """Return phi(z) = (e^z - 1)/z and its derivative, near 0 by their series."""
     small = ca.fabs(z) < 1e-2
     safe = ca.if_else(small, 1, z)
     series = 1 + z / 2 * (1 + z / 3 * (1 + z / 4 * (1 + z / 5)))
@@ -153,10 +154,10 @@ def _phi(z: ca.SX) -> tuple[ca.SX, ca.SX]:
 def _velocity(
     mass: Mass, here: Sequence[ca.SX], v: ca.SX, S: ca.SX, guess: ca.SX, evaluations: int
 ) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return if friction holds the mass; w = v + S a(w), between 0 and v + S a(0); and the latter.
+    """Return whether friction holds the mass, the velocity w = v + S a(w), and v + S a(0).
 
-    Newton's method inside a bracket. A step that leaves the bracket towards rest continues there,
-    where friction is steep and curves away from the step; otherwise the bracket is halved.
+    Newton's method runs inside a bracket between 0 and v + S a(0). If its first step leaves the
+    bracket, a step from rest is used, where friction is steep; otherwise the bracket is halved.
     """
     x, u, p = here
     free = v + S * mass.a(x, 0, u, p)
@@ -185,11 +186,11 @@ def _inside(w: ca.SX, low: ca.SX, high: ca.SX, side: ca.SX) -> ca.SX:
 
 
 Feedback = Callable[[Sequence[Tangent], ca.SX], tuple[list[Tangent], list[Tangent]]]
-"""(x, v, controller's states; row of a sample) -> (inputs, controller's states)."""
+"""Function (x, v, controller states; row of a sample) -> (inputs, controller states)."""
 
 
 def given_inputs(count: int) -> Feedback:
-    """Return a feedback without controller: the inputs come from the rows."""
+    """Return a feedback without a controller, whose inputs are those in the rows."""
 
     def feedback(state: Sequence[Tangent], row: ca.SX) -> tuple[list[Tangent], list[Tangent]]:
         still = ca.SX(1, state[0].slope.shape[1])
@@ -199,14 +200,14 @@ def given_inputs(count: int) -> Feedback:
 
 
 class Motion(NamedTuple):
-    """A motion at n + 1 instants, the inputs in the n samples between, and all their derivatives.
+    """Motion at n + 1 instants, inputs in the n samples between them, and all derivatives.
 
     Attributes:
         states: x, v and the states of the controller, shape (n + 1, states).
-        slopes: by the parameters and the unknowns of the start, shape (n + 1, states, unknowns).
-        inputs: of the mass, shape (n, inputs).
-        input_slopes: shape (n, inputs, unknowns).
-        gap: residual of the implicit equations over their velocities, in the 4-norm.
+        slopes: derivatives by the parameters and the start, shape (n + 1, states, unknowns).
+        inputs: inputs of the mass, shape (n, inputs).
+        input_slopes: derivatives of the inputs, shape (n, inputs, unknowns).
+        gap: residual of the implicit equations relative to their velocities, in the 4-norm.
     """
 
     states: Array
@@ -216,20 +217,20 @@ class Motion(NamedTuple):
     gap: float
 
     def every(self, k: int) -> "Motion":
-        """Return the motion at every k-th instant, and the inputs that begin there."""
+        """Return the motion at every k-th instant, with the inputs that begin there."""
         return Motion(*(part[::k] for part in self[:4]), gap=self.gap)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """A mass stepped from sample to sample, with the controller that acts at each of them.
+    """Mass stepped from sample to sample, with a controller that acts at each sample.
 
     Attributes:
-        sample: (state, row, p) -> (state after the sample, inputs in it). The state holds x, v,
-            the controller's states, the gaps so far, and the derivatives of all but the gaps; the
-            row holds the length of the sample [s] and the arguments of the feedback.
-        inputs, states, slopes: their numbers.
+        sample: (state, row, p) -> (state after the sample, inputs in it). The state contains x, v,
+            the states of the controller, the accumulated gap, and the derivatives of all but the
+            gap. The row contains the length of the sample [s] and the arguments of the feedback.
+        inputs, states, slopes: numbers of inputs, states and derivatives.
     """
 
     sample: ca.Function
@@ -241,12 +242,13 @@ class Chain:
     def of(
         cls, mass: Mass, feedback: Feedback, *, row: int, memory: int = 0, substeps: int = 2
     ) -> "Chain":
-        """Return the chain of `mass`, with derivatives by its parameters, x and v at the start.
+        """Return the chain of `mass`, with derivatives by its parameters and the initial x and v.
 
         Args:
-            feedback: its controller or inputs.
+            mass: equations of the mass.
+            feedback: controller of the mass, or given inputs.
             row: count of numbers per sample in addition to its length.
-            memory: states of the controller.
+            memory: number of controller states.
             substeps: steps per sample.
         """
         count, n = mass.parameters, 2 + memory
@@ -260,7 +262,7 @@ class Chain:
         x, v, most = before[0], before[1], gap
         for _ in range(substeps):
             x, v, left = advance(mass, (x, v, u), Tangent(p, by_p), length / substeps)
-            most = most + left**4  # a norm that keeps NaN
+            most = most + left**4  # unlike a maximum, this norm keeps NaN
         new = _stacked([x, v, *after])
         arguments = [ca.vertcat(values, gap, ca.vec(slope)), ca.vertcat(length, given), p]
         state, acting = [new.value, most, ca.vec(new.slope)], [u.value, ca.vec(u.slope)]
@@ -275,13 +277,13 @@ class Chain:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def __call__(self, rows: Array, p: Array, start: Array, start_slopes: Array) -> Motion:
-        """Return the motion from `start`.
+        """Return the motion that begins at `start`.
 
         Args:
             rows: length of each sample [s] and arguments of the feedback, shape (n, 1 + row).
             p: parameters.
             start: states at the first instant, shape (states,).
-            start_slopes: their derivatives, shape (states, slopes).
+            start_slopes: derivatives of `start`, shape (states, slopes).
         """
         n, k, many = self.states, self.inputs, self.slopes
         first = np.concatenate([start, [0.0], start_slopes.ravel("F")])
@@ -299,13 +301,13 @@ class Chain:
 
 
 def _stacked(parts: Sequence[Tangent]) -> Tangent:
-    """Stack values and dense derivatives."""
+    """Return values and dense derivatives stacked in columns."""
     value, slope = zip(*parts, strict=True) if parts else ((), ())
     return Tangent(ca.vertcat(*value), ca.densify(ca.vertcat(*slope)))
 
 
 def why_no_motion(motion: Motion) -> str:
-    """Return the reason why a motion is unusable; "" if it is usable."""
+    """Return why a motion is unusable; "" if it is usable."""
     finite = np.isfinite(motion.states).all(axis=1)
     if not finite.all():
         return f"the simulated motion is not finite from sample {int(np.argmin(finite))} on"

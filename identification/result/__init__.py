@@ -1,1 +1,1 @@
-"""Result of a fit, and its numbers as text, JSON and figures."""
+"""Result of a fit, and its output as text, JSON, page and figures."""

@@ -1,4 +1,4 @@
-"""Assembly of the result of a fit from the end of the search and the verdict on the residuals."""
+"""Assembly of the result of a fit from its problem, its starts and its verdict."""
 
 import platform
 from collections.abc import Mapping, Sequence
@@ -38,16 +38,16 @@ from symfric.model import Model
 from symfric.scenes import Drive
 
 SHOWN = 6
-"""Longest array that is written out."""
+"""Size of the longest array that is written out."""
 PLAIN = (str, int, float, tuple)
 """Types of values that are compared with defaults."""
 
 
 def written(value: object) -> str:
-    """Return Python code for `value`, without defaults; data and models by a name.
+    """Return Python code for `value`, without defaults.
 
-    Long arrays become three dots.
-    Fields without a default come first, without their names.
+    Data and models are represented by a name, long arrays by three dots. Fields without a default
+    precede the others and have no names.
     """
     if isinstance(value, Dataset):
         return "data"
@@ -75,7 +75,7 @@ def written(value: object) -> str:
 
 
 def _rule(rule: Range | Above | Tied) -> str:
-    """Return the call of `log`, `linear`, `above` or `tied` that made the rule."""
+    """Return the call of `log`, `linear`, `above` or `tied` that created the rule."""
     if isinstance(rule, Tied):
         name, factor = (getattr(rule.rule, n, None) for n in ("name", "factor"))
         return f"tied({name!r}, {factor!r})" if name else f"tied({written(rule.rule)})"
@@ -105,18 +105,18 @@ def fitted(
     call: str = "",
     asked: Asked | None = None,
 ) -> Fitted:
-    """Return the result.
+    """Return the result of a fit.
 
     Args:
-        live: the problem with the final noise levels, and the end of the best start.
-        starts: all of them.
+        live: problem with the final noise levels, and the end of the best start.
+        starts: all starts.
         verdict: assessment of the residuals at the best end.
         findings: warnings on the data.
-        status: of the fit, verdict included.
-        message: more about the end; the sentence of `status` precedes it.
-        seconds: of all starts.
+        status: status of the fit, including the verdict.
+        message: details of the end; the sentence of `status` precedes it.
+        seconds: duration of all starts.
         call: Python code of the call.
-        asked: restores the problem, also from a file.
+        asked: arguments that restore the problem, also from a file.
     """
     task, certain, kind = live.task, live.covariance, written(live.kind)
     records = tuple(r.name for r in live.data)
@@ -152,7 +152,7 @@ def fitted(
 
 
 def _estimates(live: Live) -> dict[str, Estimate]:
-    """Return the estimates of every parameter in the order of the subject, then of the records."""
+    """Return the estimates of all parameters in the order of the subject, then of the records."""
     subject, task, made, found = live.subject, live.task, live.covariance, live.values
     own = {u.name: u for u in (*task.unknowns.unknowns, *task.residuals.own)}
     notes = dict(made.notes) | dict.fromkeys(made.at_bound, "at its bound")
@@ -181,7 +181,7 @@ def _estimates(live: Live) -> dict[str, Estimate]:
 
 
 def _in_forces(subject: Subject, name: str, unit: str, turning: bool) -> str:
-    """Return the unit of a coefficient under a load of 1 N, where it is a force."""
+    """Return the unit of a coefficient, which is a force under a load of 1 N."""
     whole = subject.scene or subject.law
     known = {} if whole is None else parameters(whole)
     if load_of(subject) != 1.0 or name not in known or not is_coefficient(known[name]):
@@ -190,12 +190,12 @@ def _in_forces(subject: Subject, name: str, unit: str, turning: bool) -> str:
 
 
 def levels_of(subject: Subject, largest: float | None, turning: bool) -> Levels | None:
-    """Return the friction levels of a law under a known load; None if there are other forces."""
+    """Return the friction levels of a law under a known load; None if the load is not known."""
     whole, load = subject.drive or subject.law, load_of(subject)
     if whole is None or load is None or largest is None or subject.law is None:
         return None
     if subject.law.inputs:
-        return None  # the loads of its levels are not known from the friction alone
+        return None  # friction alone does not determine the loads of its levels
     force = turned("N") if turning else "N"
     levels = {n: p for n, p in parameters(whole).items() if p.role == "level"}
     loads = {n: load if is_coefficient(p) else 1.0 for n, p in levels.items()}
@@ -205,7 +205,7 @@ def levels_of(subject: Subject, largest: float | None, turning: bool) -> Levels 
 
 
 def load_of(subject: Subject) -> float | None:
-    """Return the normal force of a drive or of points [N]; None if there are other loads."""
+    """Return the normal force of a drive or of points [N]; None if there is no single load."""
     if subject.drive is not None:
         return float(subject.drive.N)
     loads = [v.start for v in subject.model.u if v.name == "N"] if subject.scene is None else []
@@ -234,7 +234,7 @@ def _series(live: Live, records: Sequence[str], verdict: Verdict) -> tuple[Serie
 
 
 def _curve(live: Live) -> Curve | None:
-    """Return friction over velocity for a law in a drive or fitted to points."""
+    """Return friction over velocity of a law in a drive or fitted to points; None for others."""
     law, machine, data = live.closed.law, live.closed.scene, live.data
     if isinstance(machine, Drive):
         return of_drive(machine, data.records)
@@ -250,7 +250,7 @@ def _curve(live: Live) -> Curve | None:
 
 def _made(call: str, kind: str) -> dict[str, str]:
     """Return the versions and the call of the fit."""
-    import scipy  # noqa: PLC0415  (SciPy is loaded by those who fit)
+    import scipy  # noqa: PLC0415  (slow to import)
 
     return {
         "call": call,

@@ -1,4 +1,4 @@
-"""Result of a fit: parameters with intervals, verdict, errors, law and model."""
+"""Class `Fitted`: parameters with intervals, verdict, errors, law and model of a fit."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -33,48 +33,48 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Fitted(packed.Portable, Outcome):
-    """The result of a fit.
+    """Result of a fit.
 
-    `print(fit)` prints a one-page report; `fit.to_html("out.html")` writes one with figures;
-    `fit.plot()` returns the figures. `fit.save("fit.npz")` stores everything, data included, and
-    `load_fit` reads it; a pickle does the same. A fit from JSON has neither data nor the model of
-    a machine other than a `Drive`.
+    `print(fit)` prints a one-page report, `fit.to_html("out.html")` writes a report with figures,
+    and `fit.plot()` returns the figures. `fit.save("fit.npz")` stores everything including the
+    data; `load_fit` reads the file. A pickle has the same content. A fit from JSON has neither data
+    nor the model of a machine other than a `Drive`.
 
     Attributes:
-        name: of the law or the model.
+        name: name of the law or the model.
         kind: Python code of the residuals.
-        records: their names.
-        parameters: name -> estimate: fitted, held, start values, dead times.
+        records: names of the records.
+        parameters: name -> estimate of a fitted or held parameter, a start value or a dead time.
         names, correlation: fitted values, and the correlation of their estimates, shape (n, n);
             NaN where undetermined. Start values are left out if there are many.
-        undetermined: groups of parameters that the data do not separate, and `directions`, the
-            same as messages.
+        undetermined: groups of parameters that the data do not separate.
+        directions: messages on parameters that are not or poorly identifiable.
         status, message: end of the fit. Only SOLVED means that the residuals are noise.
         verdict: tests of the residuals.
         errors: (record, signal) -> size of the residuals.
-        validation: the same for other data with the same parameters; None without them.
-        noise: signal -> standard deviation of the noise that weighted it.
+        validation: the same for other data with the same parameters; None without other data.
+        noise: signal -> standard deviation of the noise that weights it.
         starts: ends of the starts, best first.
         findings: warnings on the data.
         series: signals for plots.
         curve: friction over velocity; None for a model without a law.
-        law: with the fitted numbers; None for a model with none or several.
-        machine: the drive or scene with them; None for a law alone or a model.
-        seconds, evaluations: of all starts together.
+        law: law with the fitted numbers; None for a model with no law or several.
+        machine: drive or scene with the fitted numbers; None for a law alone or a model.
+        seconds, evaluations: totals of all starts.
         made: versions and the call.
         live: problem and minimum; a stored fit restores them from `asked`.
         asked: arguments of the fit and its end; None from JSON.
     """
 
     def to_pack(self) -> dict[str, Any]:
-        """Return the fields; without `asked` if it holds functions that a file cannot store."""
+        """Return the fields, without `asked` if it holds functions that a file cannot store."""
         asked = self.asked if packed.holds(self.asked) else None
         return packed.state_of(self) | {"live": None, "asked": asked}
 
     def save(self, path: str | Path) -> None:
         """Write the fit with its data to one file, which `identification.load_fit` reads.
 
-        Numbers are stored exactly. A loaded fit does everything that this one does: `validate`,
+        Numbers are stored exactly. A loaded fit has all functions of this one: `validate`,
         `profile` and `model` restore the problem. They cannot if the fit was called with functions
         that a file cannot store, such as a lambda in `tied`.
 
@@ -87,7 +87,7 @@ class Fitted(packed.Portable, Outcome):
         return f"<Fitted {self.name}: {self.status.name}>"
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
-        """Return the notebook view: verdict, fitted values, figures."""
+        """Return the notebook view with verdict, fitted values and figures."""
         named = [(n, e) for n, e in self.parameters.items() if not (e.fixed or e.nuisance)]
         rows = tuple((n, *map(_six_digits, (e.value, e.low, e.high)), e.unit) for n, e in named)
         table = Table(("parameter", "value", "95 % from", "to", "unit"), rows, (1, 2, 3))
@@ -96,10 +96,10 @@ class Fitted(packed.Portable, Outcome):
 
     @property
     def model(self) -> Model:
-        """The model with the fitted numbers; your model keeps its parameters, starting at them.
+        """Model with the fitted numbers; a model of the user keeps its parameters, starting there.
 
         Raises:
-            ValueError: for a fit from JSON, except one of a drive.
+            ValueError: the fit is from JSON and not one of a drive.
         """
         if isinstance(self.machine, Scene):
             return self.machine.model()
@@ -109,28 +109,28 @@ class Fitted(packed.Portable, Outcome):
         """Return the errors on other data with these parameters; start values are estimated there.
 
         Raises:
-            ValueError: data without the signals of the fit, or a fit from JSON.
+            ValueError: the data lack the signals of the fit, or the fit is from JSON.
         """
         return self.alive("validate").errors_on(data)
 
     def profile(self, name: str, points: int = 5) -> Profile:
-        """Return the profile likelihood of one parameter, see `verdict.profile`.
+        """Return the profile likelihood of one parameter; see `verdict.profile`.
 
         Args:
-            name: of a fitted parameter.
+            name: name of a fitted parameter.
             points: approximate number of points to each side.
 
         Raises:
-            ValueError: a parameter that was not fitted, or a fit from JSON.
+            ValueError: the parameter was not fitted, or the fit is from JSON.
         """
         live = self.alive("profile")
         return profile(live.task, live.point, live.covariance, name, points)
 
     def alive(self, what: str) -> Live:
-        """Return the problem and its minimum, for the operation `what`.
+        """Return the problem and its minimum; `what` names the operation in messages.
 
         Raises:
-            ValueError: a fit from JSON, or a stored one that was called with functions.
+            ValueError: the fit is from JSON, or was stored and had been called with functions.
         """
         if self.live is not None:
             return self.live
@@ -143,22 +143,22 @@ class Fitted(packed.Portable, Outcome):
         return self.asked.live
 
     def plot(self, path: str | Path | None = None, names: Sequence[str] = ()) -> "Figure":
-        """Plot friction over velocity; data and fit, residuals and their autocorrelation.
+        """Plot friction over velocity, data and fit, and residuals with their autocorrelation.
 
         Args:
-            path: image file; its extension selects the format.
-            names: signals to show, of all records; the first ones if none is given.
+            path: image file to write; its extension selects the format.
+            names: signals to show, of all records; none: the first signals.
         """
         from identification.result.picture import picture  # noqa: PLC0415  (matplotlib is slow)
 
         return picture(self, names, path)
 
     def to_html(self, path: str | Path, ranking: "Ranking | None" = None) -> None:
-        """Write one self-contained HTML page with everything: no network, no scripts.
+        """Write one self-contained HTML page with all results, without network or scripts.
 
         Args:
-            path: of the page.
-            ranking: of several laws, from `select`.
+            path: file to write.
+            ranking: ranking of several laws by `select`.
         """
         from identification.result.page import page_of  # noqa: PLC0415 (slow to import)
 
@@ -168,7 +168,7 @@ class Fitted(packed.Portable, Outcome):
         """Return the parameters as a pandas table: value, unit, standard error, interval, note.
 
         Raises:
-            ImportError: no pandas.
+            ImportError: pandas is not installed.
         """
         from symfric.results import stored  # noqa: PLC0415 (slow to import)
 
@@ -180,7 +180,7 @@ class Fitted(packed.Portable, Outcome):
         return frame
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all fields but `live` as plain data, ready for JSON."""
+        """Return all fields except `live` as plain data for JSON."""
         from identification.result.stored import to_dict  # noqa: PLC0415 (slow to import)
 
         return to_dict(self)
@@ -191,10 +191,10 @@ class Fitted(packed.Portable, Outcome):
 
     @staticmethod
     def from_json(path: str | Path, own: Mapping[str, type[Parametric]] | None = None) -> "Fitted":
-        """Read the fit that `to_json` wrote, without its data.
+        """Read a fit written by `to_json`; it has no data.
 
         Args:
-            path: of the file.
+            path: file to read.
             own: classes of user-defined laws by name; a law of an unknown class is None.
 
         Raises:
@@ -209,11 +209,11 @@ FIT = Format("symfric fit", 2, "load_fit", "a saved fit", Fitted)
 
 
 def load_fit(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Fitted:
-    """Read the fit that `fit.save(path)` wrote, exactly.
+    """Read a fit written by `fit.save(path)`, exactly.
 
     Args:
-        path: the file.
-        own: user-defined classes and functions in it, such as a law.
+        path: file to read.
+        own: user-defined classes and functions in the file, such as a law.
 
     Raises:
         ValueError: no such file, another file format, a damaged file, a newer version, or
@@ -223,5 +223,5 @@ def load_fit(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) ->
 
 
 def _six_digits(value: float | None) -> str:
-    """Return six digits; a dash for None."""
+    """Return a number with six digits; a dash for None."""
     return "–" if value is None else f"{value:.6g}"

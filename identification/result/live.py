@@ -1,4 +1,4 @@
-"""Live part of a fit: its problem, its minimum, its model."""
+"""Live part of a fit: its problem, its minimum and its model."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,15 +24,15 @@ Array = NDArray[np.float64]
 
 
 class Kind(Protocol):
-    """A type of residuals: points, inverse dynamics, shooting, closed loop."""
+    """Type of residuals, such as points, inverse dynamics, shooting or closed loop."""
 
     def prepare(self, subject: Subject, data: Dataset, start: Mapping[str, float]) -> Residuals:
-        """Return the residuals of `subject` on `data`; start values are guessed near `start`."""
+        """Return the residuals of `subject` on `data`; start values are estimated near `start`."""
         ...
 
 
 class Question(Protocol):
-    """Arguments of a fit, `identification.fit.Fit`."""
+    """Arguments of a fit, implemented by `identification.fit.Fit`."""
 
     def live(self, noise: dict[str, float], w: Array) -> "Live":
         """Return the problem with its end at the coordinates `w`."""
@@ -56,20 +56,20 @@ class Asked:
 
     @cached_property
     def live(self) -> "Live":
-        """The problem and its end."""
+        """Problem and end, restored on first use."""
         return self.question.live(self.noise, self.w)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Live:
-    """The problem of a fit and its end.
+    """Problem of a fit with its end.
 
     Attributes:
         kind, subject, data: arguments of the fit.
-        task: with the noise levels at the end.
+        task: least-squares problem with the noise levels at the end.
         point: the minimum.
-        covariance: of the values there.
+        covariance: covariance of the values at the minimum.
     """
 
     kind: Kind
@@ -91,7 +91,7 @@ class Live:
         return dict(zip(names, self.point.values.tolist(), strict=True))
 
     def errors_on(self, data: Dataset) -> Errors:
-        """Return the errors of the parameters on other data, see `left_on`."""
+        """Return the errors of the parameters on other data; see `left_on`."""
         residuals, r = self.left_on(data)
         return errors_of(residuals, [r.name for r in data], r, {})
 
@@ -101,7 +101,7 @@ class Live:
         Start values of the other data are estimated there.
 
         Raises:
-            ValueError: data without the signals of the fit, or that cannot be simulated.
+            ValueError: the data lack the signals of the fit, or cannot be simulated.
         """
         data = checks.kind("validate", data, Dataset, "data, such as Dataset.read('v.csv')")
         start = {n: v for n, v in self.values.items() if n in self.subject.names}
@@ -119,7 +119,7 @@ class Live:
 
 
 def _settled(kind: Kind, residuals: Residuals, data: Dataset) -> Kind:
-    """Return `kind` with the filter chosen on the data of the fit, to filter other data alike."""
+    """Return `kind` with the filter chosen for the data of the fit, for equal filtering."""
     if not isinstance(kind, InverseDynamics) or not isinstance(residuals, InverseRows):
         return kind
     if kind.filter is not None:
@@ -132,12 +132,12 @@ def _settled(kind: Kind, residuals: Residuals, data: Dataset) -> Kind:
 def errors_of(
     residuals: Residuals, records: Sequence[str], r: Array, effective: Mapping[str, float]
 ) -> Errors:
-    """Return (record, signal) -> errors [SI]; `effective` samples by label of the channel."""
+    """Return (record, signal) -> errors [SI]; `effective` gives samples by label of the channel."""
     both = zip(residuals.channels, labels(residuals), strict=True)
     return {(records[c.record], c.signal): error(c, r, effective.get(n, nan)) for c, n in both}
 
 
 def labels(residuals: Residuals) -> list[str]:
-    """Return the labels of the channels: "force", or with several records "force[0]"."""
+    """Return the labels of the channels, such as "force", or "force[0]" for several records."""
     several = len({c.record for c in residuals.channels}) > 1
     return [f"{c.signal}[{c.record}]" if several else c.signal for c in residuals.channels]

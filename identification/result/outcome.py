@@ -1,4 +1,4 @@
-"""Fields of a fit and their text: the verdict first, then estimates and their uncertainty."""
+"""Fields of a fit and their report as text: verdict first, then estimates with uncertainty."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -25,11 +25,11 @@ WIDTH = 80
 CLOSE = 0.9
 """Magnitude of the correlation of two estimates above which it is listed."""
 SAME = 1.0
-"""Difference of -2 log-likelihood below which two starts ended at the same minimum."""
+"""Difference of -2 log-likelihood below which two starts have reached the same minimum."""
 NOTHING = 1e8
-"""Ratio of the ends of an interval above which a value is not identifiable."""
+"""Ratio of the interval ends above which a value is not identifiable."""
 MANY = 12
-"""Largest number of listed start values and dead times."""
+"""Largest number of start values, dead times and pairs that are listed."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,22 +67,22 @@ class Outcome:
 
     @property
     def values(self) -> dict[str, float]:
-        """Values of the parameters by name, fitted or held."""
+        """Values of the fitted and held parameters by name."""
         return {name: e.value for name, e in self.parameters.items()}
 
     @property
     def drive(self) -> Drive | None:
-        """The machine, if it is a mass with a force input."""
+        """The machine if it is a `Drive`, otherwise None."""
         return self.machine if isinstance(self.machine, Drive) else None
 
     def check_fields(self) -> None:
-        """Raise an error if the estimates do not match the names; for files."""
+        """Raise an error if the estimates do not match the names, for example from a file."""
         n = len(self.names)
         agree("Fitted", self.correlation.shape == (n, n), {*self.names} <= self.parameters.keys())
 
 
 def text_of(fit: Outcome) -> str:
-    """Return the text of `print(fit)`, within 80 columns."""
+    """Return the text of `print(fit)` within 80 columns."""
     blocks = [
         [f"{fit.name} fitted by {fit.kind}: {fit.status.name}", *_indented(sentences(fit))],
         [*_head(fit)],
@@ -96,10 +96,10 @@ def text_of(fit: Outcome) -> str:
 
 
 def sentences(fit: Outcome) -> list[str]:
-    """Return the messages on the whole fit, most important first, without repetition."""
+    """Return the messages on the whole fit in order of importance, without repetition."""
     messages = [*fit.verdict.sentences, *fit.directions]
     message = fit.message
-    for sentence in messages:  # the message repeats those of the verdict
+    for sentence in messages:  # the message repeats the sentences of the verdict
         message = message.replace(sentence, "")
     return [text for text in dict.fromkeys([" ".join(message.split()), *messages]) if text]
 
@@ -115,7 +115,7 @@ def count_of(value: float) -> str:
 
 
 def rounded(value: float, error: float | None) -> str:
-    """Return `value` with the digits that its standard error allows, two of them uncertain."""
+    """Return `value` with the digits that its standard error permits, two of them uncertain."""
     if error is None or not isfinite(error) or error <= 0.0 or value == 0.0:
         return number(value)
     digits = floor(log10(abs(value))) - floor(log10(error)) + 2
@@ -123,7 +123,7 @@ def rounded(value: float, error: float | None) -> str:
 
 
 def interval(e: Estimate) -> str:
-    """Return the 95 % interval, with the digits of the value; "" without one."""
+    """Return the 95 % interval with the digits of the value; "" if there is none."""
     if e.low is None or e.high is None:
         return ""
     if e.high > NOTHING * e.low > 0.0:
@@ -132,7 +132,7 @@ def interval(e: Estimate) -> str:
 
 
 def _end(value: float, e: Estimate) -> str:
-    """Return an end of an interval, with few digits if its magnitude differs from the value's."""
+    """Return an interval end, with few digits if its magnitude differs from that of the value."""
     far = not 1e-2 * abs(e.value) < abs(value) < 1e2 * abs(e.value)
     return number(value, 3) if far and e.value else rounded(value, e.standard_error)
 
@@ -147,12 +147,12 @@ def percent(value: float | None, digits: int = 2) -> str:
 
 
 def unit_of(unit: str) -> str:
-    """Return a unit as text; "" for pure numbers."""
+    """Return a unit as text; "" for dimensionless numbers."""
     return "" if unit == "1" else unit
 
 
 def with_unit(text: str, unit: str) -> str:
-    """Return a number with its unit, if it has one."""
+    """Return a number with its unit, if there is one."""
     return f"{text} {unit_of(unit)}".rstrip()
 
 
@@ -216,7 +216,7 @@ def _head(fit: Outcome) -> Iterator[str]:
 
 
 def parted(fit: Outcome) -> tuple[dict[str, Estimate], dict[str, Estimate], dict[str, Estimate]]:
-    """Return requested and held parameters, and start values and dead times of records."""
+    """Return requested parameters, held parameters, and start values and dead times of records."""
     every = fit.parameters.items()
     fitted = {n: e for n, e in every if not e.fixed}
     requested = {n: e for n, e in fitted.items() if not e.nuisance}
@@ -259,7 +259,7 @@ def _correlations(fit: Outcome) -> Iterator[str]:
 
 
 def errors_table(title: str, errors: Errors) -> Iterator[str]:
-    """Yield one line for each signal of each record."""
+    """Yield a header, and a line for each signal of each record."""
     if errors:
         rows = [(title, "signal", "rms", "of the signal", "largest")]
         for (record, signal), e in errors.items():

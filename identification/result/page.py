@@ -1,4 +1,4 @@
-"""A fit as one self-contained HTML page: tables and charts."""
+"""Report of a fit as one self-contained HTML page with tables and charts."""
 
 from collections.abc import Iterator, Sequence
 from math import isfinite
@@ -30,9 +30,9 @@ from symfric.page import html
 from symfric.page.svg import Axis, Band, Dots, Level, Mark, Path, Stems, around, chart
 
 WINDOWS = 60
-"""Largest number of drawn starts of windows."""
+"""Largest number of window starts that are drawn."""
 FLOOR = 1e-3
-"""Smallest difference shown in the waterfall."""
+"""Smallest difference shown in the chart of the starts."""
 
 
 def _across(one: Series) -> Axis:
@@ -44,7 +44,7 @@ def _across(one: Series) -> Axis:
 
 
 def _windows(one: Series) -> list[Mark]:
-    """Return marks where windows start; none if there are too many to distinguish."""
+    """Return marks at the starts of windows; none if there are too many to distinguish."""
     if one.breaks.size > WINDOWS:
         return []
     return [Level("window", float(t), upright=True) for t in one.breaks]
@@ -75,7 +75,7 @@ def left(one: Series) -> str:
 
 
 def lags(one: Series) -> str:
-    """Return the chart of the autocorrelation with the limits of white noise; "" without order."""
+    """Return the chart of the autocorrelation with the limits of white noise; "" if unordered."""
     if not one.correlation.size:
         return ""
     x = Axis("lag", "samples", 0.0, float(one.lags.max()) + 0.5, whole=True)
@@ -93,7 +93,7 @@ def lags(one: Series) -> str:
 
 
 def friction(curve: Curve, name: str) -> str:
-    """Return the chart of friction over velocity: dots of the data, line of the law."""
+    """Return the chart of friction over velocity, with dots for the data and a line for the law."""
     dots = [Dots("measured", line.t, line.y) for line in curve.measured.values()]
     low, high = limits(curve)
     x = around("v", curve.v_unit, [curve.law.t, *(line.t for line in curve.measured.values())])
@@ -143,15 +143,15 @@ WORDS = {"good": "Good", "doubtful": "Doubtful", "bad": "No result"}
 
 
 class Ranking(Protocol):
-    """Result of `select`, as far as it is shown here."""
+    """Result of `select`, restricted to what the page shows."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return a dictionary with "rows": for each law a dictionary of its results."""
+        """Return a dictionary with "rows", a list with a dictionary of results for each law."""
         ...
 
 
 def page_of(fit: Outcome, ranking: Ranking | None = None) -> str:
-    """Return the page as text."""
+    """Return the page as HTML text."""
     parts = {
         "parameters": html.section("parameters", "Parameters", *_parameters(fit)),
         "data": html.section("data", "Data and fit", *_data(fit)),
@@ -218,7 +218,7 @@ def _estimates(caption: str, estimates: dict[str, Estimate]) -> str:
 
 
 def _unit(unit: str) -> str:
-    """Return a unit that stays on one line."""
+    """Return a unit as text that stays on one line."""
     return unit_of(unit).replace(" ", "\N{NO-BREAK SPACE}")
 
 
@@ -303,7 +303,7 @@ def _starts(fit: Outcome) -> Iterator[str]:
 
 
 def above(value: float) -> str:
-    """Return how far a start ended above the best one; rounding errors count as 0."""
+    """Return as text how far a start ended above the best one; rounding errors count as 0."""
     return "0" if abs(value) < 1e-6 else number(value, 3)
 
 

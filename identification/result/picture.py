@@ -1,4 +1,4 @@
-"""Figures of a fit, and of a ranking of laws."""
+"""Figures of a fit and of a ranking of laws."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,16 +15,16 @@ from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.style import colour
 
 SHOWN = 4
-"""Number of signals drawn by default; each takes three panels."""
+"""Number of signals that are drawn by default, each in three panels."""
 
 
 def picture(fit: Outcome, names: Sequence[str] = (), path: str | Path | None = None) -> Figure:
-    """Plot data, fit, residuals and their autocorrelation for each signal; friction over velocity.
+    """Plot friction over velocity, and data, fit, residuals and autocorrelation of each signal.
 
     Args:
         fit: the fit.
-        names: signals; of all records. None: the first ones.
-        path: image file.
+        names: signals to show, of all records; none: the first signals.
+        path: image file to write.
     """
     known = list(dict.fromkeys(s.signal for s in fit.series))
     wanted = checks.names("plot", names, known) or known
@@ -100,7 +100,7 @@ def _lags(axis: Axes, one: Series) -> None:
 
 
 def plot_ranking(found: Mapping[str, Any], path: str | Path | None = None) -> Figure:
-    """Plot errors and BIC of several laws as bars, the best law on top."""
+    """Plot errors and BIC of several laws as bars, with the best law on top."""
     rows = [row for row in found["rows"] if row["status"]]
     figure, ((errors, criterion),) = grid(1, 2, 8.5, 1.2 + 0.42 * max(1, len(rows)), sharey=True)
     places = np.arange(len(rows))[::-1]

@@ -1,4 +1,4 @@
-"""Parts of a result: estimates, errors, signals for plots, friction over velocity."""
+"""Parts of a result: estimates, errors, signals for plots, and friction over velocity."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,19 +24,19 @@ from symfric.scenes import Drive
 @final
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter, start value or dead time.
+    """Estimate of a parameter, start value or dead time.
 
     Attributes:
-        value, unit: the estimate, in the unit of the user.
-        standard_error: accounts for autocorrelated residuals; None if the parameter is held, at
-            a bound, or not separable from others.
-        low, high: 95 % interval; symmetric in the logarithm of a value that is fitted by it, so
-            that a stiffness stays positive. None with `standard_error`.
-        white_error: standard error for white residuals: much less than `standard_error` if
+        value, unit: estimate in the unit of the user.
+        standard_error: standard error with autocorrelated residuals; None if the parameter is
+            held, at a bound, or not separable from others.
+        low, high: 95 % interval; symmetric in the logarithm if the value is fitted by its
+            logarithm, so that a stiffness stays positive. None if `standard_error` is.
+        white_error: standard error for white residuals; much less than `standard_error` if
             neighbouring samples are correlated.
-        fixed: not fitted.
-        note: reason why it is held or has no interval, or that it is tied.
-        nuisance: fitted, but not requested: a start value, a dead time.
+        fixed: True if the value was not fitted.
+        note: reason why the parameter is held or has no interval, or that it is tied.
+        nuisance: True for a start value or a dead time, which is fitted but not requested.
     """
 
     value: float
@@ -51,7 +51,7 @@ class Estimate:
 
     @property
     def relative_error(self) -> float | None:
-        """Standard error over the magnitude of the value [%]; None at zero or without an error."""
+        """Standard error relative to the value [%]; None for zero or without a standard error."""
         if self.standard_error is None or self.value == 0.0:
             return None
         return 100.0 * self.standard_error / abs(self.value)
@@ -60,12 +60,12 @@ class Estimate:
 @final
 @dataclass(frozen=True)
 class Error:
-    """Residuals of one signal of one record.
+    """Size of the residuals of one signal of one record.
 
     Attributes:
-        unit: of the signal.
+        unit: unit of the signal.
         rms: root mean square of predicted - measured.
-        relative: norm of the difference over the norm of the signal [%], as in the EMPS
+        relative: norm of the difference relative to the norm of the signal [%], as in the EMPS
             benchmark; not informative for a signal far from zero, such as an offset position.
         largest: largest magnitude of the difference.
         rows: number of differences.
@@ -83,16 +83,16 @@ class Error:
 @final
 @dataclass(frozen=True)
 class Tried:
-    """A start and its end.
+    """Start with the end of its descent.
 
     Attributes:
-        number: of the start.
-        above: -2 log-likelihood above that of the best start; below 1 both reached the same
-            minimum.
+        number: number of the start.
+        above: -2 log-likelihood above that of the best start; if less than 1, both reached the
+            same minimum.
         cost: sum of weighted squares, or of the robust losses.
-        status, message: of the end.
-        evaluations: of the residuals.
-        values: at the end.
+        status, message: status of the end.
+        evaluations: number of residual evaluations.
+        values: values at the end.
     """
 
     number: int
@@ -105,24 +105,24 @@ class Tried:
 
 
 Errors = dict[tuple[str, str], Error]
-"""(record, signal) -> its errors."""
+"""Errors of each signal of each record, (record, signal) -> error."""
 
 
 Array = NDArray[np.float64]
 
 MOST = 2000
-"""Largest number of points of a line, two for each column of pixels."""
+"""Largest number of points of a line, about two for each column of pixels."""
 GAP = 3.0
-"""Smallest gap in time, over the usual step."""
+"""Smallest gap in time, relative to the usual step."""
 LEAST = 300
 TOGETHER = 24_000
-"""Points of all channels for one type of line: with many channels each is coarser."""
+"""Total number of points of one type of line; with many channels, each line has fewer points."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Points of a line: t (n,), y (n,)."""
+    """Points of a line, t (n,) and y (n,)."""
 
     t: Array
     y: Array
@@ -133,14 +133,14 @@ class Line:
 @final
 @dataclass(frozen=True, eq=False)
 class Series:
-    """A signal of a record.
+    """Signal of a record for plots.
 
     Attributes:
-        record, signal, unit: names.
-        abscissa: quantity of `t`: "t [s]", a velocity, a number.
-        ordered: whether neighbours in t are neighbours in time; drawn as a line, else as dots.
-        rows: number of compared samples; the lines hold their envelope.
-        measured, predicted, residual: predicted - measured is the residual.
+        record, signal, unit: names of record and signal, and unit.
+        abscissa: quantity of `t`, such as "t [s]", a velocity, or an index.
+        ordered: True if neighbours in t are neighbours in time; drawn as a line, otherwise as dots.
+        rows: number of compared samples, of which the lines contain the envelope.
+        measured, predicted, residual: lines; the residual is predicted - measured.
         breaks: times at which windows begin.
         lags, correlation: autocorrelation of the residuals at lags 1, 2, ... samples; empty if
             they are unordered.
@@ -166,10 +166,10 @@ class Series:
 
 
 def envelope(t: Array, y: Array, most: int = MOST) -> Line:
-    """Return a line with at most `most` points that covers the same area.
+    """Return a line of at most `most` points that covers the same area as the signal.
 
-    The smallest and the largest value in each of most / 2 equal intervals are kept, and the ends:
-    no spike is lost. Non-finite values are left out.
+    The ends and the extreme values in each of most / 2 equal intervals are kept, so that no spike
+    is lost. Non-finite values are left out.
     """
     finite = np.isfinite(y)
     t, y = t[finite], y[finite]
@@ -184,7 +184,7 @@ def envelope(t: Array, y: Array, most: int = MOST) -> Line:
 
 
 def cut_envelope(t: Array, y: Array, most: int = MOST) -> Line:
-    """Return the same for a signal over time, with a NaN in every gap to interrupt the line."""
+    """Return the envelope of a signal over time, with a NaN in every gap to interrupt the line."""
     steps = np.diff(t)
     gaps = np.flatnonzero(steps > GAP * np.median(steps)) + 1 if steps.size else steps.astype(int)
     if not 0 < gaps.size <= most // 10:
@@ -205,11 +205,11 @@ def series(
 
     Args:
         channel: compared samples.
-        record: its name.
+        record: name of the record.
         r: residuals of all rows of all channels.
         white: autocorrelation of the residuals of this channel.
-        abscissa: quantity of its `t`.
-        most: points of a line.
+        abscissa: quantity of `t` of the channel.
+        most: largest number of points of a line.
     """
     order = slice(None) if channel.ordered else np.argsort(channel.t, kind="stable")
     t, measured, left = channel.t[order], channel.measured[order], r[channel.rows][order]
@@ -223,12 +223,12 @@ def series(
 
 
 def points_each(channels: int) -> int:
-    """Return the number of points of a line for a number of channels: fewer if there are many."""
+    """Return the number of points of a line, which decreases with the number of channels."""
     return int(np.clip(TOGETHER // max(1, channels), LEAST, MOST))
 
 
 def error(channel: Channel, r: Array, effective: float = nan) -> Error:
-    """Return the errors of one channel; `r` holds the residuals of all rows."""
+    """Return the errors of one channel; `r` contains the residuals of all rows."""
     left = r[channel.rows]
     size = float(np.linalg.norm(channel.measured))
     rms = float(np.sqrt(np.mean(left**2))) if left.size else 0.0
@@ -238,19 +238,19 @@ def error(channel: Channel, r: Array, effective: float = nan) -> Error:
 
 
 SIDE = 300
-"""Points of the law's curve in each direction, down to a millionth of the largest speed."""
+"""Number of points of the curve in each direction, down to a millionth of the largest speed."""
 DOTS = 4000
-"""Largest number of measured points drawn, over all records."""
+"""Largest number of measured points that are drawn, over all records."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Friction over velocity.
+    """Friction over velocity of a law and of measured points.
 
     Attributes:
-        v_unit, F_unit: units.
-        law: force of the fitted law in steady sliding, a point for each velocity.
+        v_unit, F_unit: units of velocity and friction.
+        law: force of the fitted law in steady sliding over velocity.
         measured: record -> points (velocity, friction).
         says: origin of the points.
     """
@@ -263,13 +263,13 @@ class Curve:
 
 
 def of_points(law: Law, N: float, points: dict[str, tuple[Array, Array]], turning: bool) -> Curve:
-    """Return the curve with measured points (v, F) of each record."""
+    """Return the curve of a law with measured points (v, F) of each record."""
     lines = {name: Line(v, F) for name, (v, F) in points.items()}
     return _curve(law, N, lines, turning, "measured points")
 
 
 def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
-    """Return the curve of a drive's law with force - m a - offset of its records.
+    """Return the curve of the law of a drive, with force - m a - offset of the records.
 
     Records without position, force or equal intervals have no points.
     """
@@ -279,7 +279,7 @@ def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
             continue
         try:
             signals = differentiate(record)
-        except ValueError:  # unequal intervals, too short: there is no acceleration
+        except ValueError:  # no acceleration: unequal intervals, or too short
             continue
         friction = signals.force - float(drive.m) * signals.a - float(drive.offset)
         lines[record.name] = Line(signals.equations(signals.v), signals.equations(friction))
@@ -288,7 +288,7 @@ def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
 
 
 def _curve(law: Law, N: float, lines: dict[str, Line], turning: bool, says: str) -> Curve:
-    """Return the curve with every n-th point of the lines: in total about `DOTS` at most."""
+    """Return the curve with every n-th point of the lines, at most about `DOTS` in total."""
     every = max(1, -(-sum(line.t.size for line in lines.values()) // DOTS))
     measured = {name: Line(line.t[::every], line.y[::every]) for name, line in lines.items()}
     top = max([float(np.abs(line.t).max(initial=0.0)) for line in measured.values()], default=0.0)
@@ -302,7 +302,7 @@ def _curve(law: Law, N: float, lines: dict[str, Line], turning: bool, says: str)
 
 
 def limits(curve: Curve) -> tuple[float, float]:
-    """Return a range of forces that shows the curve and all but the farthest points."""
+    """Return a range of forces that contains the curve and all but the farthest points."""
     dots = np.concatenate([line.y for line in curve.measured.values()] or [np.zeros(0)])
     ends = [*np.percentile(dots, [0.2, 99.8])] if dots.size else []
     low, high = min([*ends, curve.law.y.min()]), max([*ends, curve.law.y.max()])

@@ -1,9 +1,9 @@
-"""JSON form of a fit: everything for a page, and the law, without data and equations.
+"""JSON form of a fit: all that a page shows, and the law, without data and equations.
 
-Dataclasses are coded by the types of their fields: arrays become lists; non-finite numbers become
-null if that reads back as NaN, else "inf" and "-inf"; pairs as keys become two levels; members of
-an `Enum` their names. Laws and drives become class name, numbers, options and parts, because their
-text (`law_name`) is not complete.
+Dataclasses are coded by the types of their fields. Arrays become lists. Non-finite numbers become
+null if this is read as NaN, otherwise "inf" and "-inf". Pairs as keys become two levels, members
+of an `Enum` their names. Laws and drives become class name, numbers, options and parts, because
+their text (`law_name`) is not complete.
 """
 
 import re
@@ -28,14 +28,14 @@ from symfric.scenes import Drive
 
 INFINITE = {"inf": inf, "-inf": -inf}
 DIGITS = 6
-"""Digits of arrays, which are only drawn."""
+"""Significant digits of arrays, which are used only for drawing."""
 
 
 def plain(value: Any) -> Any:
     """Return `value` as JSON-compatible data.
 
     Raises:
-        TypeError: a value that is neither a number, a text, a collection nor a dataclass.
+        TypeError: the value is neither a number, a text, a collection nor a dataclass.
     """
     if value is None or isinstance(value, str | bool | int):
         return value
@@ -68,10 +68,10 @@ def _mapping(value: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def revived(kind: Any, data: Any) -> Any:
-    """Return the value of the type `kind` that `plain` wrote.
+    """Return the value of the type `kind` from the output of `plain`.
 
     Raises:
-        ValueError, TypeError, KeyError: data that `plain` did not write of such a value.
+        ValueError, TypeError, KeyError: the data are not the output of `plain` for this type.
     """
     origin, inner = get_origin(kind), get_args(kind)
     meant = getattr(origin or kind, "__value__", None)  # NDArray is an alias since NumPy 2.5
@@ -114,7 +114,7 @@ def _one_of(kinds: tuple[Any, ...], data: Any) -> Any:
 
 
 def _real(value: Any) -> Any:
-    """Return a number, or a list of them, that `plain` wrote."""
+    """Return a number or a list of numbers from the output of `plain`."""
     if isinstance(value, list):
         return [_real(one) for one in value]  # pyright: ignore[reportUnknownVariableType]
     return nan if value is None else INFINITE[value] if isinstance(value, str) else value
@@ -124,16 +124,16 @@ KINDS: dict[str, type[Parametric]] = {
     **ALL_LAWS, **WRAPPERS, "sum": Sum, "asymmetric": Asymmetric, "table": Table,
     "element": Element, "slider": Slider, "drive": Drive,
 }  # fmt: skip
-"""Classes that a file can restore, by name."""
+"""Name -> class that can be restored from a file."""
 
 
 def to_data(held: Parametric) -> dict[str, Any]:
     """Return a law or a drive with numbers as a dictionary for JSON.
 
-    A user-defined class is stored by its name.
+    A user-defined class is represented by its name.
 
     Raises:
-        ValueError: a parameter that is a symbol.
+        ValueError: a parameter is a symbol.
     """
     name = next((name for name, kind in KINDS.items() if kind is type(held)), type(held).__name__)
     return {"kind": name} | {
@@ -156,7 +156,7 @@ def _plain(where: str, value: Any) -> Any:
 
 
 def source_of(law: Law) -> str:
-    """Return Python code that makes this law; it imports the class from symfric if it is there."""
+    """Return Python code that creates the law, with an import if the class is in symfric."""
     text = repr(law)
     known = sorted({kind.__name__ for kind in KINDS.values()})
     names = [name for name in known if re.search(rf"\b{name}\(", text)]
@@ -165,7 +165,7 @@ def source_of(law: Law) -> str:
 
 
 def known(data: Any, own: Mapping[str, type[Parametric]]) -> bool:
-    """Return True if all classes that `to_data` wrote are known, here or in `own`."""
+    """Return True if all classes in the output of `to_data` are in `KINDS` or in `own`."""
     if isinstance(data, Mapping):
         named = data.get("kind") in KINDS or data.get("kind") in own  # pyright: ignore
         return named and all(known(one, own) for one in data.values())  # pyright: ignore
@@ -173,14 +173,14 @@ def known(data: Any, own: Mapping[str, type[Parametric]]) -> bool:
 
 
 def from_data(data: Any, own: Mapping[str, type[Parametric]] | None = None) -> Parametric:
-    """Return the law or drive that `to_data` wrote.
+    """Return the law or drive from the output of `to_data`.
 
     Args:
         data: output of `to_data`.
         own: further classes by name.
 
     Raises:
-        ValueError: unknown class or field, or refused numbers.
+        ValueError: an unknown class or field, or refused numbers.
     """
     known = {**KINDS, **(own or {})}
     given = checks.named("law from data", data)
@@ -201,14 +201,14 @@ def _made_of(value: Any, known: Mapping[str, type[Parametric]]) -> Any:
 
 FILE = "symfric fit"
 FORMAT = 1
-"""Raised when older programs cannot read the file or would misread it."""
+"""Format number, increased when older programs cannot read the file or would misread it."""
 
 APART = ("law", "machine", "live", "asked")
-"""Fields that are not plain data."""
+"""Fields that are not stored as plain data."""
 
 
 def to_dict(fit: Outcome) -> dict[str, Any]:
-    """Return all fields but the problem; the law as text and as data, and the drive."""
+    """Return all fields except the problem, with the law as text and as data, and the drive."""
     data = {f.name: plain(getattr(fit, f.name)) for f in fields(fit) if f.name not in APART}
     return {
         "file": FILE,
@@ -221,7 +221,7 @@ def to_dict(fit: Outcome) -> dict[str, Any]:
 
 
 def _data(held: Parametric | None) -> dict[str, Any] | None:
-    """Return a law or a drive as data; None for a user's class that holds more than numbers."""
+    """Return a law or a drive as data; None for a user-defined class with more than numbers."""
     try:
         return None if held is None else to_data(held)
     except ValueError:
@@ -229,7 +229,7 @@ def _data(held: Parametric | None) -> dict[str, Any] | None:
 
 
 def read(kind: type[Outcome], path: str | Path, own: Mapping[str, type[Parametric]] | None) -> Any:
-    """Read the fit that was written to `path`; see `Fitted.from_json`."""
+    """Read a fit that was written to `path`; see `Fitted.from_json`."""
     what = "a file that fit.to_json(path) wrote"
     data = read_json("fit", path, what)
     if data.get("file") != FILE:
@@ -262,5 +262,5 @@ def _made(kind: type[Outcome], data: dict[str, Any], own: Mapping[str, type[Para
 
 
 def _known(data: Any, own: Mapping[str, type[Parametric]] | None) -> Any:
-    """Return the law or machine; None if its class, or the class of a part, is unknown."""
+    """Return the law or machine; None if its class or the class of a part is unknown."""
     return None if data is None or not known(data, own or {}) else from_data(data, own)

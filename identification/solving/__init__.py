@@ -1,1 +1,1 @@
-"""Weighted least squares from many starts."""
+"""Solution of the weighted least-squares problem from many starts."""

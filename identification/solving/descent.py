@@ -1,16 +1,16 @@
 """Descent from one start to a minimum, with a status of the result.
 
-The trust region is SciPy's (`least_squares`, method "trf"): it keeps iterates inside the bounds,
+The trust-region method of SciPy (`least_squares`, method "trf") keeps iterates inside the bounds,
 scales by the derivatives and is deterministic. Robust losses and weights are applied to the rows
-before they are reduced to a triangle, so its linear algebra has n + 1 rows.
+before these are reduced to a triangle; its linear algebra therefore has n + 1 rows.
 
 The end is accepted as a minimum by the predicted gain of a full Gauss-Newton step:
 
     fall = max over s of  f'f - |f + J s|^2     in the coordinates not held by a bound
 
-A simulation over a whole record has many minima far from the truth; one that restarts from the data
-in every window has few. All starts but the first therefore begin on the `easier` problems of the
-task (multiple shooting) and end on the task itself.
+A simulation over a whole record has many minima far from the truth; a simulation that restarts from
+the data in every window has few. All starts except the first therefore begin on the `easier`
+problems of the task (multiple shooting) and end on the task itself.
 
 Sources: M. A. Branch, T. F. Coleman, Y. Li, SIAM J. Sci. Comput. 21, 1999; J. Nocedal, S. J.
 Wright, Numerical Optimization, 2nd ed., 2006, chapter 10; H. G. Bock, in Modelling of Chemical
@@ -33,34 +33,34 @@ Array = NDArray[np.float64]
 Tell = Callable[[int], None]
 
 GAIN, NEAR = 1e-6, 1e-2
-"""Fall of the cost over the variance: for a minimum, and for an acceptable end (a tenth of a
-standard error).
+"""Predicted fall of the cost relative to the variance: at a minimum, and at an acceptable end (a
+tenth of a standard error).
 """
 KINKS = 1.0
-"""Accepted predicted fall that no step achieves, due to kinks of a law with switches."""
+"""Acceptable predicted fall that no step achieves because of kinks of a law with switches."""
 FAR = 15.0
-"""Largest trusted step; a factor of three million for a logarithmic coordinate."""
+"""Largest trusted step; for a logarithmic coordinate a factor of three million."""
 NOWHERE = 1e-13
-"""Largest change of a coordinate that does not count as a step."""
+"""Largest change of a coordinate that is not a step."""
 ROUNDS = 12
 """Largest number of estimates of the noise levels."""
 SETTLED = 0.02
-"""Change of the noise levels below which the weights are converged."""
+"""Change of the noise levels below which the weights have converged."""
 ROUGH = 0.1
-"""Fall over the variance that is sufficient while noise levels still change."""
+"""Fall relative to the variance that is sufficient while noise levels still change."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A start and its end.
+    """Start with the end of its descent.
 
     Attributes:
-        number: of the start, in order of generation.
+        number: number of the start in order of generation.
         w: coordinates at the end, shape (n,).
-        cost: sum of the losses at the end, under the noise levels of the best start.
-        status, message: of the end.
-        evaluations: of the residuals.
+        cost: sum of the losses at the end, with the noise levels of the best start.
+        status, message: status of the end.
+        evaluations: number of evaluations of the residuals.
         noise: noise levels at the end [SI].
         objective: -2 log-likelihood, by which starts are compared.
     """
@@ -76,13 +76,13 @@ class Start:
 
 
 class _EndedError(Exception):
-    """Raised when no further gain is possible."""
+    """End of a search that cannot gain more."""
 
 
 @final
 @dataclass(eq=False)
 class _Search:
-    """Evaluated points, for SciPy and for interruptions."""
+    """Search by SciPy that keeps the evaluated points, also for interruptions."""
 
     task: Task
     best: Point
@@ -98,7 +98,7 @@ class _Search:
         for known in (self.best, self.last):
             if isinstance(known, Point) and np.array_equal(known.w, w):
                 return known
-        near = not np.abs(w - self.best.w).max() > NOWHERE  # failures shrank the region; also NaN
+        near = not np.abs(w - self.best.w).max() > NOWHERE  # region shrunk by failures, or NaN
         if self.left <= 0 or near:
             raise _EndedError
         self.left -= 1
@@ -113,16 +113,19 @@ class _Search:
         return self.last
 
     def residuals(self, w: Array) -> Array:
-        """Return reduced residuals; infinite ones on failure, for which SciPy shrinks the step."""
+        """Return the reduced residuals; infinite on failure, for which SciPy shrinks the step."""
         found = self.at(w)
         if isinstance(found, str):
             return np.full(len(self.task.unknowns.names) + 1, np.inf)
         return found.reduced[0]
 
     def slopes(self, w: Array) -> Array:
-        """Return their derivatives, or end the search; SciPy calls it at accepted points only."""
+        """Return the derivatives of the reduced residuals, or end the search at a minimum.
+
+        SciPy calls this only at accepted points.
+        """
         found = self.at(w)
-        if isinstance(found, str):  # never: SciPy asks only where residuals are finite
+        if isinstance(found, str):  # unreachable: residuals are finite at accepted points
             raise _EndedError
         if remaining(self.task, found) <= self.goal * variance(self.task, found):
             raise _EndedError
@@ -130,10 +133,10 @@ class _Search:
 
     def run(self) -> None:
         """Minimise from `best` under the noise levels of the task."""
-        optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
+        optimize: Any = import_module("scipy.optimize")  # slow to import
         box = self.task.unknowns
         try:
-            with np.errstate(all="ignore"):  # for a region of zero size
+            with np.errstate(all="ignore"):  # for a trust region of zero size
                 optimize.least_squares(
                     self.residuals, self.best.w, self.slopes, bounds=(box.lower, box.upper),
                     x_scale="jac", ftol=1e-15, xtol=1e-12, gtol=1e-15, max_nfev=self.left + 9,
@@ -151,8 +154,8 @@ def descend(
 
     `tell` is called with the number of each evaluation before it.
 
-    The best point is returned in any case, also after an interruption or if the start has no
-    residuals; see `status` and `message`.
+    The best point is always returned, also after an interruption or if the start has no residuals;
+    see `status` and `message`.
     """
     try:
         first = task.at(task.unknowns.inside(w0))
@@ -181,9 +184,9 @@ def descend(
 
 
 def _back(search: _Search) -> int:
-    """Replace values that count as zero or infinite by finite limits if the cost allows it.
+    """Replace values that count as zero or infinite by finite limits if the cost permits it.
 
-    Return the number of evaluations.
+    Return the number of evaluations that this takes.
     """
     box, old = search.task.unknowns, search.best
     w = np.clip(old.w, *box.limits)
@@ -196,7 +199,7 @@ def _back(search: _Search) -> int:
 
 
 def _renew(search: _Search) -> float:
-    """Estimate noise levels at the best point; return their change."""
+    """Estimate the noise levels at the best point, and return their change."""
     old = search.task.noise
     search.task = search.task.with_noise(levels(search.task, search.best))
     search.best = search.task.again(search.best)
@@ -205,7 +208,7 @@ def _renew(search: _Search) -> float:
 
 
 def variance(task: Task, point: Point) -> float:
-    """Return the variance of the weighted residuals, at least 1 for given noise."""
+    """Return the variance of the weighted residuals; at least 1 if a noise level is given."""
     freedom = max(1, point.sigma.size - point.w.size)
     least = 1.0
     if set(task.noise) == set(task.estimated):
@@ -216,8 +219,8 @@ def variance(task: Task, point: Point) -> float:
 def remaining(task: Task, point: Point) -> float:
     """Return the fall of the cost that a Gauss-Newton step in the free coordinates predicts.
 
-    The step is limited to `FAR` in any principal direction: beyond, derivatives are not reliable,
-    and a coordinate that has lost its influence would need an unlimited step.
+    The step is limited to `FAR` in any principal direction. Beyond, derivatives are not reliable,
+    and a coordinate without influence would need an unlimited step.
     """
     f, J = point.reduced
     g, box = np.einsum("ij,i->j", J, f), task.unknowns
@@ -251,15 +254,15 @@ def _verdict(search: _Search) -> tuple[Status, str]:
 
 
 ENOUGH = 40
-"""Evaluations on an easier problem, which need not converge."""
+"""Number of evaluations on an easier problem, which need not converge."""
 REACH = 100.0
-"""Largest factor by which it may change a logarithmic value."""
+"""Largest factor by which an easier problem may change a logarithmic value."""
 
 
 def descend_easier_first(
     task: Task, w0: Array, number: int, evaluations: int, tell: Tell | None = None
 ) -> Start:
-    """Descend; all but the first start solve the easier problems of the task first."""
+    """Descend to a minimum; all starts except the first solve the task's easier problems first."""
     w, spent = w0, 0
     for other in task.easier if number else ():
         shared = set(task.unknowns.fitted) & set(other.unknowns.fitted)
@@ -280,6 +283,6 @@ def descend_easier_first(
 
 
 def _parameters(task: Task, w: Array, shared: set[str]) -> dict[str, float]:
-    """Return the values that both problems fit, without those of records and windows."""
+    """Return the values that both problems fit, except those of single records and windows."""
     values, own = task.unknowns.named(w), set(task.unknowns.nuisance)
     return {name: x for name, x in values.items() if name in shared and name not in own}

@@ -1,12 +1,12 @@
-"""Multiple starts on any executor, with bit-identical results.
+"""Descents from many starts on any executor, with bit-identical results.
 
-Starts are a Latin hypercube around the first one: positive values are multiplied by factors up to
-`REACH`, values bounded by the user cover their range, values of either sign change by up to half
-their magnitude; start values of records stay.
+Starts are a Latin hypercube around the first one. Positive values are multiplied by factors up to
+`REACH`, values bounded by the user cover their range, and values of either sign change by up to
+half their magnitude; start values of records are unchanged.
 
-Results are processed in the order of the start numbers. The search ends early if another start is
-unnecessary: one left only white noise, or `AGREE` of them found the same lowest minimum. Further
-results are dropped, so that the outcome does not depend on the executor.
+Results are processed in the order of the start numbers. The search ends early if the best start
+leaves only white noise, or if `AGREE` starts find the same lowest minimum. Further results are
+dropped, so that the outcome does not depend on the executor.
 
 Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21, 1979.
 """
@@ -36,13 +36,13 @@ WIDE = 1e3
 
 
 def scattered(at: Unknowns, centre: Array, count: int, seed: int = 0) -> list[Array]:
-    """Return `count` coordinates, the first one the `centre`; deterministic for a given `seed`.
+    """Return `count` starts, the first at `centre`, deterministic for a given `seed`.
 
     Args:
-        at: the unknowns with their box.
+        at: unknowns with their box.
         centre: coordinates, shape (n,).
         count: number of starts.
-        seed: of the random numbers.
+        seed: seed of the random numbers.
     """
     rng = np.random.default_rng(seed)
     n, others = centre.size, max(count - 1, 0)
@@ -54,7 +54,7 @@ def scattered(at: Unknowns, centre: Array, count: int, seed: int = 0) -> list[Ar
 
 
 def _moved(unknown: Unknown, w: float, lower: float, upper: float, share: float) -> float:
-    """Return one moved coordinate, for `share` in (0, 1)."""
+    """Return one coordinate moved according to `share` in (0, 1)."""
     side, bounded = 2 * share - 1, np.isfinite(upper) and np.isfinite(lower)
     if unknown.nuisance and not bounded:
         return w
@@ -69,14 +69,14 @@ def _moved(unknown: Unknown, w: float, lower: float, upper: float, share: float)
 
 
 Progress = Callable[[str, float], None]
-"""Callback of the current activity and the fraction done."""
+"""Callback that is given the current activity and the completed fraction."""
 
 AGREE = 3
-"""Starts that must find the same lowest minimum before the search ends."""
+"""Number of starts that must find the same lowest minimum for an early end."""
 SAME = 1.0
 """Difference of minus twice the log-likelihood below which two minima are the same."""
 WHITE = 3.0
-"""Correlation of neighbours, over its standard deviation, that white noise rarely exceeds."""
+"""Correlation of neighbours, relative to its standard deviation, rarely exceeded by white noise."""
 
 
 def many_starts(
@@ -90,16 +90,17 @@ def many_starts(
     """Descend from each of `starts`, shape (n,) each.
 
     Args:
-        task: the problem; for an executor it must pickle.
-        executor: threads or processes, or None: one after the other here.
+        task: the problem; it must be picklable if there is an executor.
+        starts: coordinates of the starts.
+        executor: executor of threads or processes; None: one start after the other in this thread.
         progress: called after each start; without an executor also before each evaluation.
-        evaluations: of the residuals, allowed to each start; if the best start has used them up,
-            it gets as many again.
-        agree: starts that must find the same minimum for an early end; 0: all starts are made.
+        evaluations: limit of residual evaluations for each start; if the best start reaches the
+            limit, it continues with as many again.
+        agree: number of starts that must find the same minimum for an early end; 0: never.
 
     Returns:
-        In the order of their numbers, costs under the noise levels of the best. After Ctrl-C the
-        starts finished until then, and the state of the interrupted one.
+        The ends in the order of the start numbers, with costs for the noise levels of the best
+        one. After Ctrl-C, the starts finished so far and the state of the interrupted start.
     """
     done: list[Start] = []
     found = _in_turn(task, starts, executor, progress, evaluations)
@@ -139,7 +140,7 @@ def _mark_interrupted(done: list[Start], why: str) -> None:
 
 
 def _go_on(task: Task, done: list[Start], evaluations: int) -> None:
-    """Continue the best of the starts `done` if it has used up its evaluations."""
+    """Continue the best start in `done` if it has used up its evaluations."""
     best = best_of(done)
     if best.status is not Status.MAX_ITERATIONS:
         return  # at a minimum, or failed
@@ -150,7 +151,7 @@ def _go_on(task: Task, done: list[Start], evaluations: int) -> None:
 
 
 def best_of(starts: Sequence[Start]) -> Start:
-    """Return the start of the highest likelihood; of equal ones the first."""
+    """Return the start with the highest likelihood, the first one if several are equal."""
     return min(starts, key=lambda s: (s.objective, s.number))
 
 
@@ -161,7 +162,7 @@ def _in_turn(
     progress: Progress | None,
     evaluations: int,
 ) -> Generator[Start]:
-    """Yield results in the order of the numbers."""
+    """Yield the ends in the order of the start numbers."""
     for number, w in enumerate(starts if executor is None else ()):
         tell = None if progress is None else partial(_tell, progress, number, len(starts))
         yield descend_easier_first(task, w, number, evaluations, tell)
@@ -190,7 +191,7 @@ def _descend_packed(packed: bytes, w: Array, number: int, evaluations: int) -> S
 
 @lru_cache(maxsize=4)
 def _unpacked(packed: bytes, thread: int) -> Task:
-    """Return the task of this thread, unpickled once, because compilation is expensive."""
+    """Return the task of this thread, unpickled only once because compilation is expensive."""
     del thread
     return pickle.loads(packed)
 

@@ -1,17 +1,18 @@
-"""The weighted least-squares problem of residuals and unknowns.
+"""Weighted least-squares problem of residuals and unknowns.
 
     minimise over w   sum_signals [ n_s ln sigma_s ] + 1/2 sum_rows loss(r_i(p(w)) / sigma_s(i))
 
-Losses: C^2 rho((r/C)^2) = e^2 with e = C sign(r) sqrt(rho((r/C)^2)) and C the residual, in standard
-deviations, above which an outlier costs less; e is smooth, so the problem stays one of least
-squares with exact derivatives e' = rho' r / e.
+A loss C^2 rho((r/C)^2) equals e^2 with e = C sign(r) sqrt(rho((r/C)^2)). C is the residual, in
+standard deviations, above which an outlier costs less. e is smooth, so the problem remains one of
+least squares, with exact derivatives e' = rho' r / e.
 
-Noise levels by maximum likelihood; d_s are the degrees of freedom that the fit takes from signal s:
+Noise levels are those of maximum likelihood; d_s are the degrees of freedom that the fit takes from
+signal s:
 
     sigma_s^2 = sum r^2 / (n_s - d_s),   d_s = tr (J'J)^-1 J_s'J_s
 
 Rows are reduced block by block to the triangle R of a QR factorisation (a sequential TSQR). Blocks
-are small enough that BLAS does not use several threads: bits do not depend on their number.
+are so small that BLAS uses only one thread, and the bits do not depend on the number of threads.
 
 Sources: P. J. Huber, E. M. Ronchetti, Robust Statistics, 2nd ed., 2009; B. Triggs et al., Bundle
 Adjustment, 2000, section 3; Y. Bard, Nonlinear Parameter Estimation, 1974, section 4-9; J. Demmel,
@@ -34,11 +35,11 @@ from symfric.foundation import checks
 Array = NDArray[np.float64]
 
 THRESHOLD = {"squares": np.inf, "huber": 1.345, "soft_l1": 1.0, "cauchy": 2.385, "arctan": 3.0}
-"""Loss -> C. huber and cauchy have 95 % efficiency on normal noise."""
+"""Loss -> C. huber and cauchy have 95 % efficiency for normal noise."""
 
 
 def shaped(r: Array, loss: str) -> tuple[Array, Array]:
-    """Return e and de/dr of residuals r in standard deviations, shape of r both."""
+    """Return e and de/dr of residuals r in standard deviations, both of the shape of r."""
     C = THRESHOLD[loss]
     if loss == "squares":
         return r, np.ones_like(r)
@@ -51,7 +52,7 @@ def shaped(r: Array, loss: str) -> tuple[Array, Array]:
 
 
 def influence(r: Array, loss: str) -> Array:
-    """Return the weight rho' of each residual in the normal equations, 1 for small ones."""
+    """Return the weight rho' of each residual in the normal equations, 1 for small residuals."""
     if loss == "squares":
         return np.ones_like(r)
     return _rho((r / THRESHOLD[loss]) ** 2, loss)[1]
@@ -71,9 +72,9 @@ def _rho(z: Array, loss: str) -> tuple[Array, Array]:
 
 
 ENTRIES = 8192
-"""Entries of a block and its triangle; OpenBLAS uses threads from 9216 on (matrix times vector)."""
+"""Entries of a block and its triangle; OpenBLAS uses threads from 9216 entries on (gemv)."""
 FEWEST = 32
-"""Fewest new rows of a block, however many columns there are."""
+"""Smallest number of new rows in a block, for any number of columns."""
 
 
 def triangle(columns: Array) -> Array:
@@ -101,13 +102,13 @@ Guard = Callable[[Mapping[str, float]], object]
 @final
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Coordinates with their evaluated residuals.
+    """Coordinates with the residuals evaluated at them.
 
     Attributes:
         w: coordinates, shape (n,).
-        values: in the order of `names` of the residuals, shape (k,).
+        values: values in the order of `names` of the residuals, shape (k,).
         evaluation: residuals in SI units with their derivatives by the values.
-        sigma: noise level of every row, in SI units, shape (rows,).
+        sigma: noise level of every row in SI units, shape (rows,).
         slope: dvalues/dw, shape (k, n).
         loss: loss function.
     """
@@ -121,7 +122,7 @@ class Point:
 
     @cached_property
     def r(self) -> Array:
-        """Residuals over their noise level, shape (rows,)."""
+        """Residuals relative to their noise level, shape (rows,)."""
         return self.evaluation.r / self.sigma
 
     @cached_property
@@ -131,14 +132,14 @@ class Point:
 
     @cached_property
     def weights(self) -> Array:
-        """Weight of each row in the normal equations: 1, less for outliers under a robust loss."""
+        """Weights of the rows in the normal equations: 1, less for outliers under a robust loss."""
         return influence(self.r, self.loss)
 
     @cached_property
     def reduced(self) -> tuple[Array, Array]:
         """Residuals (k + 1,) and derivatives (k + 1, n) with the same cost, gradient and J'J.
 
-        With the loss-shaped rows e: |f|^2 = |e|^2, J'f = J'e.
+        With the loss-shaped rows e: |f|^2 = |e|^2 and J'f = J'e.
         """
         e, de = shaped(self.r, self.loss)
         J = self.evaluation.J * (de / self.sigma)[:, None]
@@ -147,23 +148,23 @@ class Point:
 
     @cached_property
     def cost(self) -> float:
-        """Sum of the losses; of squares r'r."""
+        """Sum of the losses; r'r for squares."""
         return square(shaped(self.r, self.loss)[0])
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A weighted least-squares problem.
+    """Weighted least-squares problem.
 
     Attributes:
         residuals: residuals of the model on the data.
         unknowns: coordinates of the fitted values.
-        noise: signal -> standard deviation [SI], at present.
+        noise: signal -> present standard deviation [SI].
         estimated: signals whose noise level is estimated.
-        loss: "squares", or a robust one: "huber", "soft_l1", "cauchy", "arctan".
-        guard: raises ValueError for inadmissible values (by name).
-        easier: problems of the same parameters, solved first for distant starts.
+        loss: "squares", or a robust loss: "huber", "soft_l1", "cauchy", "arctan".
+        guard: function of the values by name that raises ValueError if they are inadmissible.
+        easier: problems of the same parameters that distant starts solve first.
     """
 
     residuals: Residuals
@@ -193,7 +194,7 @@ class Task:
         return replace(self, noise=dict(noise))
 
     def at(self, w: Array) -> Point | str:
-        """Return the point at `w`, or a message on the failure."""
+        """Return the point at `w`, or a message on failure."""
         w = np.array(w, float)
         values = self.unknowns.values(w)
         names = self.unknowns.names
@@ -214,11 +215,14 @@ class Task:
         return Point(w, values, found, self.sigma, self.unknowns.slope(w), self.loss)
 
     def again(self, point: Point) -> Point:
-        """Return the point under the noise levels of this task."""
+        """Return the point with the noise levels of this task."""
         return replace(point, sigma=self.sigma)
 
     def spread(self, signal: str) -> float:
-        """Return the standard deviation of a measured signal over all records, or its magnitude."""
+        """Return the standard deviation of a measured signal, the largest of all records.
+
+        If the signal is constant, return its magnitude.
+        """
         values = [c.measured for c in self.channels if c.signal == signal]
         spread = max(float(np.std(v)) for v in values)
         return spread or max(float(np.abs(v).max()) for v in values) or 1.0
@@ -233,10 +237,10 @@ def task(
 ) -> Task:
     """Return the problem with noise levels: "estimate", or signal -> standard deviation [SI].
 
-    Signals that are not in `noise` are estimated.
+    Noise levels of signals that are not in `noise` are estimated.
 
     Raises:
-        ValueError: an unknown loss or signal, a noise level that is not above 0.
+        ValueError: an unknown loss or signal, or a noise level that is not above 0.
     """
     chosen = checks.choice("Fit: loss", loss, THRESHOLD)
     signals = list(dict.fromkeys(c.signal for c in residuals.channels))
@@ -257,13 +261,13 @@ def _shown(names: Sequence[str], values: Array) -> str:
 
 
 NOISELESS = 1e-8
-"""Least noise level over the spread of a signal: the accuracy limit of simulations."""
+"""Least noise level relative to the spread of a signal, the accuracy limit of simulations."""
 NORMAL = 1.4826
 """Ratio of the standard deviation of normal noise to the median of its magnitude."""
 
 
 def levels(task: Task, point: Point) -> dict[str, float]:
-    """Return the noise levels [SI] by signal: given ones, and estimates from the residuals."""
+    """Return signal -> noise level [SI]: the given levels, and estimates from the residuals."""
     found = dict(task.noise)
     shares = _shares(task, point)
     for signal in task.estimated:
@@ -282,7 +286,7 @@ def change(old: dict[str, float], new: dict[str, float]) -> float:
 
 
 def objective(task: Task, point: Point) -> float:
-    """Return -2 log-likelihood without its constant: lower is likelier."""
+    """Return -2 log-likelihood without its constant; lower is more likely."""
     rows = {s: sum(c.t.size for c in _of(task, s)) for s in task.noise}
     return point.cost + sum(2 * n * log(task.noise[s]) for s, n in rows.items())
 

@@ -1,10 +1,10 @@
-"""Maxwell-slip elements from force against path: a convex problem, then refined radii.
+"""Maxwell-slip elements from force and path: a convex problem, then a refinement of the radii.
 
     F = sum_i k_i e_i + sigma_2 v + offset,   e_i: path x kept within +-r_i by its slider
 
 For given radii r_i (break-away displacements) the e_i are known, and k_i >= 0 is a non-negative
 least-squares problem with one minimum. A dense set of radii gives the virgin curve
-f(x) = sum k_i min(x, r_i). A few elements start where it bends; they are refined together with
+f(x) = sum k_i min(x, r_i). A few elements are placed where it bends, and then refined together with
 their radii, with exact derivatives. They are start values for laws with elements (GMS, Leuven).
 Source: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003 (elements from a hysteresis curve);
 Rizos and Fassois, Chaos 14(2), 2004 (regression on Maxwell-slip elements).
@@ -24,15 +24,15 @@ Array = NDArray[np.float64]
 CANDIDATES = 60
 """Number of radii of the dense set, in geometric progression."""
 MOST = 6000
-"""Default number of samples used."""
+"""Default number of samples that are used."""
 SHORTEST = 1e-4
-"""Smallest radius over the travel, unless the steps of the record are larger."""
+"""Smallest radius relative to the travel, unless the steps of the record are larger."""
 SPARE = 4
-"""Additional elements, merged with their neighbours later."""
+"""Number of additional elements, which are merged with their neighbours later."""
 LEAST_EXPLAINED = 0.1
 """Least share of the force that elements must explain."""
 STEPS, QUICK = 40, 8
-"""Evaluations to refine the radii, and those of a start."""
+"""Largest number of evaluations to refine the radii, and the same for start values only."""
 
 
 @final
@@ -42,10 +42,10 @@ class Elements:
 
     Attributes:
         k: stiffnesses [N/m], shape (n,), > 0.
-        radii: paths after which an element slips [m], shape (n,).
+        radii: displacements at which the elements slip [m], shape (n,).
         sigma_2: viscous coefficient [N s/m].
         offset: constant force [N].
-        loaded: state at the first sample: all elements slipping forwards (1), backwards (-1), or
+        loaded: state at the first sample: all elements slipping forwards (1) or backwards (-1), or
             unloaded (0).
         rms: root mean square error [N] over the samples used.
     """
@@ -59,12 +59,12 @@ class Elements:
 
     @property
     def levels(self) -> Array:
-        """Forces k_i r_i [N] at which they slip."""
+        """Forces k_i r_i [N] at which the elements slip."""
         return self.k * self.radii
 
     @property
     def shares(self) -> Array:
-        """Shares alpha_i of the friction, sum 1."""
+        """Shares alpha_i of the elements in the friction, with sum 1."""
         return self.levels / self.levels.sum()
 
     def force(self, measured: Measured) -> Array:
@@ -74,9 +74,9 @@ class Elements:
 
 
 def stretches(x: Array, radii: Array, loaded: int = 0) -> tuple[Array, Array]:
-    """Return the stretch e of each element along the path `x`, from e = r `loaded`, and de/dr.
+    """Return the stretch e of each element along the path `x`, and de/dr, (samples, radii).
 
-    e <- clip(e + dx, -r, r), exact for any dx in one direction; shapes (samples, radii).
+    e <- clip(e + dx, -r, r) from e = r `loaded`; exact for any dx in one direction.
     """
     e, slope = np.zeros((x.size, radii.size)), np.zeros((x.size, radii.size))
     e[0], slope[0] = loaded * radii, loaded
@@ -101,12 +101,12 @@ def fit_elements(
     """Fit `count` elements, or fewer if they explain the data equally well, by least squares.
 
     Args:
-        measured: with positions or times. The record begins unloaded, or in sliding in either
-            direction: the best fit of the three.
-        count: requested elements.
+        measured: data with positions or times. The record begins unloaded, or sliding in either
+            direction; the best fit of the three is returned.
+        count: requested number of elements.
         viscous: also fit sigma_2 >= 0.
         offset: also fit a constant force.
-        most: samples to use; from more, every n-th and all turning points.
+        most: number of samples to use; of more samples, every n-th and all turning points.
         thorough: start from two sets of radii and refine both to convergence.
 
     Raises:
@@ -166,7 +166,7 @@ def _path(measured: Measured) -> Array:
 
 
 def _thinned(measured: Measured, most: int) -> Measured:
-    """Return about `most` samples, the turning points among them."""
+    """Return about `most` samples, including the turning points."""
     every = -(-measured.v.size // most)
     if every == 1:
         return measured
@@ -194,13 +194,13 @@ def _quantiles(radii: Array, k: Array, count: int) -> Array:
 
 
 def _merged(elements: Elements, count: int) -> Array:
-    """Return `count` radii, merging the neighbours that change the virgin curve least."""
+    """Return `count` radii after merging the neighbours that change the virgin curve least."""
     k, levels = elements.k, elements.levels
     while k.size > count:
         pair = np.add(k[:-1], k[1:]), np.add(levels[:-1], levels[1:])
         mean = pair[1] / pair[0]
         first, second = levels[:-1] / k[:-1], levels[1:] / k[1:]
-        bend = k[:-1] * (mean - first) * (second - mean)  # lost force times its path
+        bend = k[:-1] * (mean - first) * (second - mean)  # lost force times path
         i = int(np.argmin(bend))
         k = np.concatenate([k[:i], pair[0][i : i + 1], k[i + 2 :]])
         levels = np.concatenate([levels[:i], pair[1][i : i + 1], levels[i + 2 :]])
@@ -210,7 +210,7 @@ def _merged(elements: Elements, count: int) -> Array:
 def _improved(
     measured: Measured, others: Array, radii: Array, kinds: tuple[bool, bool, int], steps: int
 ) -> Elements:
-    """Refine stiffnesses, log radii and the other coefficients by a trust region."""
+    """Refine stiffnesses, log radii and the other coefficients by a trust-region method."""
     from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
 
     viscous, offset, loaded = kinds

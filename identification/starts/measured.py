@@ -1,4 +1,4 @@
-"""Friction samples for start values: break-away forces from ramps, stiffness from reversals."""
+"""Friction samples for start values: break-away forces of ramps, stiffness after reversals."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,26 +15,26 @@ from symfric.foundation import checks
 Array = NDArray[np.float64]
 
 LEAST = 3
-"""Fewest samples for an estimate."""
+"""Smallest number of samples for an estimate."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Samples of friction, in SI units; for a rotary axis in rad/s, N m and rad.
+    """Samples of friction in SI units; for a rotary axis in rad/s, N m and rad.
 
     Attributes:
         v: sliding velocity [m/s], shape (n,).
         F: force that moves the body, or friction itself if no mass is moved [N], shape (n,).
-        x: position [m], shape (n,); from v and t if omitted.
+        x: position [m], shape (n,); integrated from v and t if omitted.
         t: increasing times [s], shape (n,); None for points without time.
         a: acceleration [m/s^2], shape (n,), if F also moves a mass.
-        N: normal force [N]; with 1 N the coefficients of a law read as forces.
+        N: normal force [N]; with 1 N the coefficients of a law are forces.
         breaks: first samples of the second and later records.
 
     Raises:
         ValueError: arrays of different shapes, numbers that are not finite, fewer than 3 samples,
-            times that do not increase.
+            or times that do not increase.
     """
 
     v: Array
@@ -62,12 +62,12 @@ class Measured:
 
     @property
     def records(self) -> tuple[slice, ...]:
-        """Samples of each record."""
+        """Slices of the samples of each record."""
         edges = (0, *self.breaks, np.size(self.v))
         return tuple(slice(a, b) for a, b in pairwise(edges))
 
     def at(self, rows: Sequence[NDArray[np.intp]], F: Array | None = None) -> "Measured":
-        """Return samples `rows` of each record, with other forces `F`, shape (n,), if given."""
+        """Return the samples `rows` of each record, with other forces `F`, shape (n,), if given."""
         taken = np.concatenate(rows)
         x, t = (None if y is None else y[taken] for y in (self.x, self.t))
         breaks = tuple(np.cumsum([r.size for r in rows])[:-1].tolist())
@@ -98,11 +98,11 @@ def _samples(name: str, given: object, size: int) -> Array:
 REST = 0.02
 """Share of the largest speed below which a body counts as at rest."""
 SHORTEST = 5
-"""Fewest samples of a rest."""
+"""Smallest number of samples of a rest."""
 RISE = (0.3, 0.9)
-"""Shares of the break-away force between which its rate is evaluated."""
+"""Shares of the break-away force between which the loading rate is evaluated."""
 APART = 2.0
-"""Least ratio of the rates for which their effect is evaluated."""
+"""Smallest ratio of loading rates for which their effect is evaluated."""
 
 
 @final
@@ -112,8 +112,8 @@ class BreakAway:
 
     Attributes:
         t: time of the largest force [s].
-        force: that force in the direction of the motion that follows [N].
-        rate: loading rate before it [N/s].
+        force: largest force, in the direction of the subsequent motion [N].
+        rate: loading rate before that time [N/s].
         side: direction of the motion, 1 or -1.
     """
 
@@ -126,12 +126,12 @@ class BreakAway:
 @final
 @dataclass(frozen=True, eq=False)
 class BreakAways:
-    """Break-aways of a data set.
+    """Break-away events of a data set.
 
     Attributes:
-        events: in order of time.
+        events: events in order of time.
         level: median force of both directions [N].
-        scatter: median absolute deviation of the force over its median.
+        scatter: median absolute deviation of the force, relative to its median.
         per_decade: change of the force per decade of the loading rate [N], by linear regression on
             the logarithm of the rate; None if the rates differ by less than a factor of 2.
         error: standard error of `per_decade` [N].
@@ -145,7 +145,7 @@ class BreakAways:
 
     @property
     def note(self) -> str:
-        """Message on the effect of the loading rate."""
+        """Message about the effect of the loading rate."""
         rates = [event.rate for event in self.events]
         span = f"{min(rates):.3g} to {max(rates):.3g} N/s"
         if self.per_decade is None:
@@ -163,16 +163,16 @@ def break_away(measured: Measured, *, rest: float = REST, offset: float = 0.0) -
     """Find the break-away forces of all ramps in a record.
 
     A rest is an interval of at least 5 samples below `rest` times the largest speed that ends in
-    motion; the break-away force is the largest one in that direction during the rest. The samples
-    must resolve the rise, or the maximum is missed.
+    motion. The break-away force is the largest force in the direction of that motion during the
+    rest. The samples must resolve the rise of the force; otherwise the maximum is missed.
 
     Args:
-        measured: with times; the force without inertia, or of slow ramps.
+        measured: samples with times; the force excludes inertia, or the ramps are slow.
         rest: share of the largest speed.
         offset: constant force [N] in addition to friction.
 
     Raises:
-        ValueError: no times; no rest that ends in motion.
+        ValueError: no times, or no rest that ends in motion.
     """
     rest = checks.number("break_away: rest", rest, above=0.0, upper=0.9)
     if measured.t is None:
@@ -210,7 +210,7 @@ def _events(measured: Measured, record: slice, rest: float, offset: float) -> It
             continue
         low, high = (share * ramp[top] for share in RISE)
         below = np.flatnonzero(ramp[:top] <= low)
-        rise = slice(below[-1] + 1 if below.size else 0, top)  # the last one
+        rise = slice(below[-1] + 1 if below.size else 0, top)  # the last rise
         times, force = t[begin : begin + top][rise], ramp[rise]
         rising = force < high
         rate = float(np.polyfit(times[rising], force[rising], 1)[0]) if rising.sum() > 1 else 0.0
@@ -219,23 +219,23 @@ def _events(measured: Measured, record: slice, rest: float, offset: float) -> It
 
 
 DEAD = 2e-3
-"""Displacement back that counts as a reversal, over the travel."""
+"""Backward displacement that counts as a reversal, relative to the travel."""
 PART = 0.3
-"""Least force at both ends of a branch, over the typical force."""
+"""Least force at both ends of a branch, relative to the typical force."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """Force against path after one reversal, up to the next one.
+    """Force as a function of path between two consecutive reversals.
 
     Attributes:
-        first, last: samples of the reversal and of the branch's end.
+        first, last: samples at the beginning and the end of the branch.
         side: direction of motion, 1 or -1.
-        level: force [N] before the reversal, positive.
-        half: path [m] from the reversal until the force is zero.
+        level: magnitude of the force [N] before the reversal.
+        half: path [m] from the reversal to zero force.
         slope: least-squares slope of the force over this path [N/m].
-        damping: least-squares coefficient of velocity, fitted with it [N s/m], >= 0.
+        damping: least-squares coefficient of the velocity, fitted together with it [N s/m], >= 0.
     """
 
     first: int
@@ -250,14 +250,14 @@ class Branch:
 @final
 @dataclass(frozen=True, eq=False)
 class Hysteresis:
-    """Medians over all `branches`.
+    """Pre-sliding stiffness and damping, medians over all `branches`.
 
     Attributes:
         branches: branches on which the force changes its sign.
-        half: path [m] from a reversal until the force is zero.
-        level: force [N] from which it falls.
-        damping: coefficient of velocity on this path [N s/m].
-        scatter: median absolute deviation of `half` over its median.
+        half: path [m] from a reversal to zero force.
+        level: magnitude of the force [N] at the reversal.
+        damping: coefficient of the velocity on this path [N s/m].
+        scatter: median absolute deviation of `half`, relative to its median.
     """
 
     branches: tuple[Branch, ...]
@@ -275,8 +275,8 @@ class Hysteresis:
     def bristle(self) -> float:
         """Stiffness level ln(2)/half [N/m] of a bristle (LuGre, Dahl).
 
-        From z = -g/sigma_0 it returns as z = g/sigma_0 (1 - 2 exp(-sigma_0 x/g)), so its slope is
-        2 sigma_0 at the reversal and sigma_0 where the force is zero.
+        After a reversal at z = -g/sigma_0, z = g/sigma_0 (1 - 2 exp(-sigma_0 x/g)); the slope of
+        the force is 2 sigma_0 at the reversal and sigma_0 at zero force.
         """
         return self.level * log(2) / self.half
 
@@ -299,7 +299,7 @@ def turning_points(x: Array, dead: float) -> list[int]:
 
 
 def travelled(measured: Measured) -> Array:
-    """Return the path [m] since the last reversal at each sample; inf before the first one."""
+    """Return the path [m] since the last reversal at each sample; inf before the first reversal."""
     found = np.full(measured.v.size, np.inf)
     if measured.x is None:
         return found
@@ -315,12 +315,13 @@ def hysteresis(measured: Measured, *, offset: float = 0.0, dead: float = DEAD) -
     """Estimate stiffness and damping of pre-sliding from the branches after each reversal.
 
     Args:
-        measured: with positions or times; the force without inertia.
+        measured: samples with positions or times; the force excludes inertia.
         offset: constant force [N] in addition to friction.
-        dead: displacement back that counts as a reversal, over the travel.
+        dead: backward displacement that counts as a reversal, relative to the travel.
 
     Returns:
-        None without a path or a reversal after which the force changes sign.
+        The estimates; None without a path, or without a reversal after which the force changes
+        sign.
     """
     if measured.x is None:
         return None
@@ -341,7 +342,7 @@ def hysteresis(measured: Measured, *, offset: float = 0.0, dead: float = DEAD) -
 
 def _branches(x: Array, F: Array, v: Array, dead: float, shift: int) -> Iterator[Branch]:
     typical = float(np.quantile(np.abs(F), 0.75))
-    middle = np.median([F[:-2], F[1:-1], F[2:]], axis=0)  # of three, against single spikes
+    middle = np.median([F[:-2], F[1:-1], F[2:]], axis=0)  # median of three, against single spikes
     smooth = np.concatenate([F[:1], middle, F[-1:]])
     for first, last in pairwise([*turning_points(x, dead * float(np.ptp(x))), x.size - 1]):
         side = 1 if x[last] > x[first] else -1
@@ -360,7 +361,7 @@ def _branches(x: Array, F: Array, v: Array, dead: float, shift: int) -> Iterator
 
 
 def _slopes(along: Array, speed: Array, force: Array) -> tuple[float, float]:
-    """Return the slopes of the force over path and speed; only over path if speed is useless."""
+    """Return the slopes of the force over path and speed; 0 over speed if it is not usable."""
     one = np.ones(along.size)
     if along.size > 4 and np.ptp(speed) > 0:
         scale = np.array([1.0, along.max(), np.abs(speed).max()])

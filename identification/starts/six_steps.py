@@ -1,4 +1,4 @@
-"""The six-step procedure for the static parameters of LuGre.
+"""Six-step procedure for the static parameters of LuGre.
 
     F = F_C + (F_S - F_C) exp(-(v/v_s)^delta) + sigma_2 v
 
@@ -6,11 +6,11 @@
     2  F_C + sigma_2 v        smallest force, at v_min
     3  m^2 = 1/v_s^2          exponential part, up to v_min, with delta = 2
     4  sigma_2                linear part, from v_min on
-    5  F_C                    step 2 less step 4
+    5  F_C                    force of step 2 minus sigma_2 v_min of step 4
     6  delta, v_s             exponential part again, with a free exponent
 
-Each step uses only a part of the curve; a fit of all points at once (`identification.Fit`) has the
-smaller error. `doubts` lists what the points do not determine.
+Each step uses only a part of the curve; a fit of all points at once (`identification.Fit`) has a
+smaller error. `doubts` lists the values that the points do not determine.
 Source: A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, section 4.2; after
 Olsson, Control Systems with Friction, PhD thesis, Lund 1996.
 """
@@ -29,19 +29,19 @@ Array = NDArray[np.float64]
 
 NAMES = ("F_S", "F_C", "v_s", "sigma_2", "delta")
 SHARE = (0.02, 0.98)
-"""Shares of F_S - F_C between which a force counts for the exponential part."""
+"""Shares of F_S - F_C between which a force belongs to the exponential part."""
 EXPONENTS = (0.3, 10.0)
 """Bounds of the exponent."""
 LOOSE = 0.3
-"""Relative standard error above which a parameter counts as not determined."""
+"""Relative standard error above which a parameter is not determined."""
 LEAST = 4
-"""Speeds of one direction required for a curve."""
+"""Least number of speeds in one direction for a curve."""
 
 
 @final
 @dataclass(frozen=True)
 class Step:
-    """A step: its number, its result, the number of points used, and the values."""
+    """Step of the procedure with number, meaning, number of points used, and values."""
 
     number: int
     what: str
@@ -59,13 +59,13 @@ class SixSteps:
     """Result of the six-step procedure.
 
     Attributes:
-        steps: in the order of their numbers.
+        steps: steps in order of their numbers.
         values: F_S, F_C [N], v_s [m/s], sigma_2 [N s/m], delta; v_s and delta are NaN if no
             falling part was found.
         errors: relative standard errors of a simultaneous fit of all points around these values,
             from the scatter around the curve; inf if the points do not determine a value.
-        rms: root mean square error over the mean force [%], of F_C + sigma_2 v without a
-            falling part.
+        rms: root mean square error relative to the mean force [%]; without a falling part, that of
+            F_C + sigma_2 v.
         curve: mean force at each speed.
         doubts: messages on undetermined values, one sentence each.
     """
@@ -79,10 +79,10 @@ class SixSteps:
 
     @property
     def law(self) -> SteadyStateLuGre:
-        """The law with these values.
+        """Law with these values.
 
         Raises:
-            ValueError: no falling part was found, so there is no v_s.
+            ValueError: no falling part was found, and v_s is unknown.
         """
         if not np.isfinite(self.values["v_s"]):
             such = "six_steps: law: expected points that determine v_s"
@@ -102,16 +102,16 @@ class SixSteps:
 def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
     """Estimate the static parameters of LuGre from points in sliding at constant speeds.
 
-    Both directions count equally: points of negative velocity are mirrored.
+    Both directions have equal weight: points of negative velocity are mirrored.
 
     Args:
         v: sliding velocities [m/s], shape (n,).
         F: friction forces with the sign of v [N], shape (n,).
         unstable: speed [m/s] up to which the measured motion was stick-slip, if any; the points
-            are used, and values that depend on them are doubted.
+            are used, and values that depend on them are listed in `doubts`.
 
     Raises:
-        ValueError: fewer than four speeds, or forces against the sign of the velocity.
+        ValueError: fewer than four speeds, or forces of the sign opposite to the velocity.
     """
     velocity, friction = samples("six_steps", v, F)
     unstable = checks.number("six_steps: unstable", unstable, unit="m/s", lower=0.0)
@@ -125,7 +125,7 @@ def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
     low = int(np.argmin(force))
     top = int(np.argmax(force[: low + 1]))
     F_S, F_min, v_min = float(force[top]), float(force[low]), float(speed[low])
-    sigma_2 = 0.0  # of one point
+    sigma_2 = 0.0  # one point has no slope
     if speed.size - low > 1:
         sigma_2 = max(float(np.polyfit(speed[low:], force[low:], 1)[0]), 0.0)
     F_C = max(F_min - sigma_2 * v_min, 0.0)
@@ -158,8 +158,8 @@ def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
 def standard_errors(curve: StribeckCurve, speed: Array, noise: float) -> dict[str, float]:
     """Return relative standard errors of a least-squares fit of all five parameters (Cramer-Rao).
 
-    They are the smallest of any unbiased method for white noise of standard deviation `noise` [N]
-    in each point; inf for values of 0 and for undetermined ones.
+    No unbiased method has smaller errors for white noise of standard deviation `noise` [N] in each
+    point. Errors are inf for values of 0 and for undetermined values.
     """
     F_S, F_C, v_s, delta = curve.F_S, curve.F_C, curve.v_s, curve.delta
     power = (speed / v_s) ** delta
@@ -180,7 +180,7 @@ def standard_errors(curve: StribeckCurve, speed: Array, noise: float) -> dict[st
 def _exponential(
     curve: Curve, top: int, low: int, F_S: float, F_C: float, sigma_2: float
 ) -> tuple[Array, Array]:
-    """Return speeds and -log of the remaining share of F_S - F_C, where it is significant."""
+    """Return speeds and -log of the remaining share of F_S - F_C, where this is significant."""
     speed = curve.v[top : low + 1]
     share = (curve.F[top : low + 1] - F_C - sigma_2 * speed) / max(F_S - F_C, 1e-300)
     inside = (share > SHARE[0]) & (share < SHARE[1])
@@ -188,10 +188,11 @@ def _exponential(
 
 
 def _exponents(speed: Array, power: Array) -> tuple[float, float, float]:
-    """Return v_s for delta = 2; v_s and delta: straight lines of power = (v/v_s)^delta; else NaN.
+    """Return v_s for delta = 2, and v_s and delta, from lines through power = (v/v_s)^delta.
 
-    With a free exponent it is a line through the logarithms. The weight of each point is the
+    With a free exponent, the line passes through the logarithms. The weight of a point is the
     inverse effect of a force error: share = exp(-power), d log(power) = d share / (share power).
+    Without points, all values are NaN.
     """
     if speed.size < 2:
         scale = float(speed[0] / np.sqrt(power[0])) if speed.size else float("nan")
@@ -228,7 +229,7 @@ def _doubts(found: StribeckCurve, curve: Curve, low: int, count: int, unstable: 
 
 
 def _of_line(curve: Curve, low: int) -> list[str]:
-    """Return messages on the linear part, from the smallest force on."""
+    """Return messages on the linear part, which begins at the smallest force."""
     if low == curve.v.size - 1:
         return ["the force falls up to the fastest point: no linear part, sigma_2 is set to 0"]
     if curve.v.size - low < LEAST:
@@ -237,7 +238,7 @@ def _of_line(curve: Curve, low: int) -> list[str]:
 
 
 def _no_fall(curve: Curve, top: int, low: int) -> str:
-    """Return the message that no point shows how friction falls, so v_s and delta are unknown."""
+    """Return the message that no point shows the fall of friction, so v_s and delta are unknown."""
     F, v = curve.F, curve.v
     if top == low:
         return (

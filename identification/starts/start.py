@@ -1,4 +1,4 @@
-"""Start values of any law from data, assigned by the roles of its parameters."""
+"""Start values of any law from data, assigned by the roles of the parameters."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
@@ -20,28 +20,28 @@ from symfric.scenes.blocks import Drive
 Array = NDArray[np.float64]
 
 STEADY = ("level", "viscous", "velocity scale", "")
-"""Roles that the steady curve of a law determines."""
+"""Roles of parameters that the steady curve of a law determines."""
 ELASTIC = ("MaxwellSlip", "GMS", "Leuven", "BoucWen", "HaessigFriedland", "StickSlip", "Armstrong")
-"""Laws whose elements unload elastically; bristles unload at twice their stiffness."""
+"""Laws whose elements unload elastically; bristles initially unload at twice their stiffness."""
 DAMPED = 0.6
 """Ratio of bristle damping to sqrt(stiffness mass) if the data do not determine it."""
 BEYOND = 5.0
-"""Distance after a reversal beyond which a body counts as sliding, in paths to zero force."""
+"""Path after a reversal beyond which a body slides, relative to the path to zero force."""
 APART = 1.05
-"""Least ratio of velocities that must differ."""
+"""Least ratio of strictly ordered velocities."""
 SPIKE = 0.3
-"""Bristle damping force at the largest speed over the sliding force, without a mass."""
+"""Bristle damping force at the largest speed relative to the sliding force, without a mass."""
 
 
 class Facts(NamedTuple):
-    """Information from the data, independent of the law.
+    """Law-independent information from the data.
 
     Attributes:
-        stribeck: curve through the bins.
-        curve: the bins, without mass and offset.
-        friction: the samples without inertia.
+        stribeck: curve fitted to the bins.
+        curve: the bins, without the forces of mass and offset.
+        friction: samples without inertia.
         reversals: branches after reversals, or None.
-        m: moving mass [kg], 0 without a mass or a known acceleration.
+        m: moving mass [kg]; 0 without a mass or a known acceleration.
         offset: constant force [N].
     """
 
@@ -61,22 +61,22 @@ class Facts(NamedTuple):
 def start_values(
     what: Law | Drive, measured: Measured, *, free: Collection[str]
 ) -> dict[str, float]:
-    """Return start values of the parameters `free` of a law, or a drive with mass and offset.
+    """Return start values of the parameters `free` of a law, or of a drive with mass and offset.
 
-    Levels, viscous coefficients and velocity scales: least squares of the law's own steady curve
-    in bins of the velocity (`fit_law`). Stiffness and damping of bristles: branches after
-    reversals (`hysteresis`). Mass and offset: linear regression together with the Stribeck curve.
-    Undetermined parameters keep the value of `what`. The result is deterministic, and
-    `with_values` accepts it.
+    Levels, viscous coefficients and velocity scales result from least squares of the steady curve
+    of the law in bins of the velocity (`fit_law`). Stiffness and damping of bristles result from
+    branches after reversals (`hysteresis`), mass and offset from linear regression together with
+    the Stribeck curve. Undetermined parameters keep the value of `what`. The result is
+    deterministic, and `with_values` accepts it.
 
     Args:
-        what: with numbers; parameters that are not free keep their value.
+        what: law or drive with numbers; parameters that are not free keep their value.
         measured: velocity and force; positions or times for laws with states; accelerations for
             the mass of a drive.
         free: names of parameters.
 
     Raises:
-        ValueError: unknown names; data without motion.
+        ValueError: unknown names, or data without motion.
     """
     names = checks.names("start_values: free", tuple(free), parameters(what))
     law = what.law if isinstance(what, Drive) else what
@@ -87,7 +87,7 @@ def start_values(
     shift = facts.stribeck.offset
     elements = element_values(law, facts.friction, facts.stribeck, offset=shift, free=names)
     values |= {n: value for n, value in elements.items() if n in values}
-    own = parameters(law)  # elements that share a level are not told apart by the steady curve
+    own = parameters(law)  # the steady curve cannot separate elements that share a level
     mine = [n for n in names if n in own and known[n].role in STEADY]
     mine = [n for n in mine if known[n].field != "mu" or "mu_s" not in own]
     values |= fit_law(law, mine, facts.curve, N, values)
@@ -97,10 +97,10 @@ def start_values(
 
 
 def facts_of(measured: Measured, *, mass: bool = False, offset: bool = False) -> Facts:
-    """Return levels, stiffness, mass and offset of the data, as far as they determine them.
+    """Return level, stiffness, mass and offset as far as the data determine them.
 
-    The Stribeck curve is fitted twice: to all samples, and, if reversals show the length of
-    pre-sliding, to samples more than `BEYOND` times this length after the last reversal.
+    The Stribeck curve is fitted to all samples. If reversals show the length of pre-sliding, it is
+    fitted again to samples more than `BEYOND` times this length after the last reversal.
     """
     m = _mass(measured) if mass else 0.0
     friction = measured.F if measured.a is None else measured.F - m * measured.a
@@ -120,10 +120,10 @@ def facts_of(measured: Measured, *, mass: bool = False, offset: bool = False) ->
 
 
 def noise_speed(measured: Measured) -> float:
-    """Return the speed [m/s] below which noise hides the direction: three standard deviations.
+    """Return the speed [m/s] below which noise hides the direction, three standard deviations.
 
-    Estimated from second differences of records with times, which nearly remove smooth motion; 0
-    for points without time.
+    The noise is estimated from second differences of records with times, which nearly remove smooth
+    motion; the result is 0 for points without time.
     """
     if measured.t is None or measured.v.size < 5:
         return 0.0
@@ -135,7 +135,7 @@ def noise_speed(measured: Measured) -> float:
 def _mass(measured: Measured) -> float:
     """Return the slope of the force over the acceleration inside bins of velocity [kg], >= 0.
 
-    Friction is similar inside a bin and cancels with the mean of the bin.
+    Friction is nearly constant inside a bin and cancels with the mean of the bin.
     """
     if measured.a is None:
         return 0.0
@@ -147,7 +147,7 @@ def _mass(measured: Measured) -> float:
 
 
 def _guess(parameter: Parameter, facts: Facts, law: Law) -> float:
-    """Return the start of one parameter from its role and unit; its own value if unknown."""
+    """Return the start of a parameter by its role and unit; its present value if undetermined."""
     value, unit = float(parameter.value), parameter.unit
     parted = shared(parameter, law)
     match parameter.role:
@@ -179,7 +179,7 @@ def _guess(parameter: Parameter, facts: Facts, law: Law) -> float:
 
 
 def _level(parameter: Parameter, facts: Facts, law: Law) -> float:
-    """Return a friction level in the unit of the parameter: static for the upper ones of a pair."""
+    """Return a friction level in the unit of the parameter, the static level for upper levels."""
     if parameter.unit not in ("1", "N", "N m"):
         return float(parameter.value)
     per = facts.N if parameter.unit == "1" else 1.0
@@ -187,7 +187,7 @@ def _level(parameter: Parameter, facts: Facts, law: Law) -> float:
     upper = {high for part in parts(law) for _, high in type(part).ordered}
     if parameter.field in upper:
         return max(facts.stribeck.F_S, sliding) / per
-    if parameter.field == "mu" and "mu_s" in parameters(law):  # the elements must carry mu_s
+    if parameter.field == "mu" and "mu_s" in parameters(law):  # the elements have to carry mu_s
         return HEADROOM * facts.stribeck.F_S / per
     known = [p for p in parameters(law).values() if p.role == "level" and p.field not in upper]
     largest = max(float(p.value) for p in known if p.unit == parameter.unit)
@@ -203,7 +203,7 @@ def _stiffness(facts: Facts, law: Law) -> float:
 
 
 def _damping(facts: Facts, stiffness: float) -> float:
-    """Return the damping of a bristle [N s/m]: from reversals, .6 of critical, or small."""
+    """Return bristle damping [N s/m]: .6 of critical with a mass, from reversals, or small."""
     if facts.m > 0:
         return DAMPED * sqrt(stiffness * facts.m)
     if facts.reversals is not None and facts.reversals.damping > facts.stribeck.sigma_2:
@@ -212,10 +212,10 @@ def _damping(facts: Facts, stiffness: float) -> float:
 
 
 def _constructible(what: Law | Drive, values: Mapping[str, float]) -> dict[str, float]:
-    """Return `values` inside bounds and in order, so that `with_values` accepts them."""
+    """Return `values` moved inside bounds and into order, so that `with_values` accepts them."""
     known = parameters(what)
     found = {n: _inside(known[n], value) for n, value in values.items()}
-    for _ in range(3):  # ordering one pair may break another
+    for _ in range(3):  # ordering one pair can violate another order
         for low, high, strictly in orders(what):
             ratio = APART if strictly else 1.0
             at = {n: found.get(n, float(known[n].value)) for n in (low, high)}
@@ -229,7 +229,10 @@ def _constructible(what: Law | Drive, values: Mapping[str, float]) -> dict[str, 
 
 
 def _inside(parameter: Parameter, value: float) -> float:
-    """Return `value` inside the bounds; if positive, at least a millionth of the default."""
+    """Return `value` inside the bounds.
+
+    A positive lower bound is raised to a millionth of the parameter's value if it is smaller.
+    """
     own = float(parameter.value)
     least = parameter.lower
     if 0 < least < 1e-6 * abs(own):
@@ -238,23 +241,23 @@ def _inside(parameter: Parameter, value: float) -> float:
 
 
 FIELDS = ("k", "mu", "alpha")
-"""Fields of an element: stiffness, friction coefficient or share."""
+"""Fields of elements: stiffness, friction coefficient or share."""
 ENOUGH = 1500
-"""Samples sufficient for a start."""
+"""Number of samples sufficient for start values."""
 SLOW = 0.75
-"""Median share of the static level that friction keeps in a record of pre-sliding."""
+"""Median share of the static level above which a record shows pre-sliding or slow motion."""
 LEAST = 0.05
-"""Lower bound of this share as a divisor of forces."""
+"""Lower limit of this share when forces are divided by it."""
 SPLIT = 1.25
-"""Ratio of radii into which an element is split if the law has more elements than the fit."""
+"""Factor between the radius of an element and those of the two elements it is split into."""
 HEADROOM = 1.1
-"""Sum of a law's elements over its static level, if it has one."""
+"""Ratio of the sum of the element coefficients to the static level of the law, if it has one."""
 
 
 def element_names(law: Law) -> dict[str, tuple[str, ...]]:
-    """Return field of an element -> names of the parameters of all elements, in their order.
+    """Return field of an element -> names of the parameters of all elements, in order.
 
-    Empty for a law without elements, or with two sets of them (one for each direction).
+    The result is empty for a law without elements, or with separate elements for each direction.
     """
     sets = [e for part in parts(law) if isinstance(e := getattr(part, "elements", None), tuple)]
     if len(sets) != 1:
@@ -269,17 +272,17 @@ def element_values(
 ) -> dict[str, float]:
     """Return stiffness and level of each element of `law`, in the order in which they slip.
 
-    They come from `fit_elements`. For a law with a Stribeck curve the force is first divided by
-    this curve, so that pre-sliding and sliding are comparable. Empty if the data or the law have no
-    elements.
+    They result from `fit_elements`. For a law with a Stribeck curve, the force is first divided by
+    this curve, so that pre-sliding and sliding are comparable. The result is empty if data or law
+    have no elements.
 
     Args:
-        law: with N = measured.N.
-        measured: friction alone, with positions or times.
-        curve: its Stribeck curve.
+        law: law with N = measured.N.
+        measured: friction without inertia, with positions or times.
+        curve: Stribeck curve of the friction.
         offset: constant force [N] in addition to friction.
-        free: names of requested parameters. Only the ratios of the shares alpha_i count; if some
-            are held, the others are scaled relative to the first held one.
+        free: names of requested parameters. Only the ratios of the shares alpha_i are relevant; if
+            some are held, the others are scaled relative to the first held share.
     """
     names = element_names(law)
     if not names or measured.x is None:
@@ -294,7 +297,7 @@ def element_values(
     try:
         found = fit_elements(friction, count, viscous=viscous and not falls, most=ENOUGH)
     except ValueError:
-        return {}  # no hysteresis in these data: keep the values of the law
+        return {}  # without hysteresis in the data, keep the values of the law
     k, levels = _as_many(found, count)
     total = float(levels.sum())
     carried = HEADROOM * curve.F_S / total if falls else 1.0
@@ -308,7 +311,10 @@ def element_values(
 
 
 def _as_if_slow(friction: Measured, curve: StribeckCurve) -> Measured:
-    """Return forces over the Stribeck curve, times its maximum; only slow records if any."""
+    """Return the forces scaled as if all sliding were at the maximum of the Stribeck curve.
+
+    If there are slow records, only their samples are returned.
+    """
     side = np.where(friction.v == 0, 1.0, np.sign(friction.v))
     sliding = np.abs(curve.force(np.where(friction.v == 0, side * 1e-300, friction.v)))
     sliding = np.maximum(sliding - curve.sigma_2 * np.abs(friction.v), 0.0)
@@ -320,7 +326,7 @@ def _as_if_slow(friction: Measured, curve: StribeckCurve) -> Measured:
 
 
 def carrying(law: Law, values: Mapping[str, float]) -> dict[str, float]:
-    """Return coefficients of elements, scaled up to carry mu_s if the law requires it."""
+    """Return coefficients of elements, scaled up to carry mu_s if the law requires this."""
     mine, known = element_names(law).get("mu", ()), parameters(law)
     if "mu_s" not in known or not set(mine) & values.keys():
         return {}
@@ -332,7 +338,7 @@ def carrying(law: Law, values: Mapping[str, float]) -> dict[str, float]:
 
 
 def _as_many(elements: Elements, count: int) -> tuple[Array, Array]:
-    """Return stiffnesses and levels of `count` elements: the strongest ones are split."""
+    """Return stiffnesses and levels of `count` elements; the strongest ones are split if needed."""
     levels, radii = elements.levels, elements.radii
     while levels.size < count:
         i = int(np.argmax(levels))
@@ -343,13 +349,13 @@ def _as_many(elements: Elements, count: int) -> tuple[Array, Array]:
 
 
 def shared(parameter: Parameter, law: Law) -> int:
-    """Return the number of elements that share a parameter's field; else 1."""
+    """Return the number of elements that share a parameter's field, or 1."""
     if parameter.field not in FIELDS:
         return 1
     return max(len(getattr(part, "elements", "1")) for part in parts(law))
 
 
 def scaled(values: Mapping[str, Parameter], field: str, count: int) -> float:
-    """Return the sum of the values of one field over `count` elements."""
+    """Return `count` times the mean value of the parameters of one field."""
     same = [float(p.value) for p in values.values() if p.field == field]
     return sum(same) * count / len(same)

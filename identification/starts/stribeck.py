@@ -1,4 +1,4 @@
-"""The Stribeck curve of measured points, and the parameters of any law from its bins."""
+"""Stribeck curve of measured points, and steady parameters of any law from the bins of a curve."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,24 +19,24 @@ from symfric.laws.base.law import Law
 Array = NDArray[np.float64]
 
 BINS = 40
-"""Bins of each direction, logarithmically spaced in speed."""
+"""Number of bins in each direction, logarithmically spaced in speed."""
 SLOWEST = 1e-4
-"""Speeds below this share of the largest one count as rest."""
+"""Speed relative to the largest one below which samples are at rest."""
 SCALES = 24
 """Number of Stribeck velocities tried, logarithmically spaced between slowest and fastest bin."""
 EXPONENTS = (0.5, 1.0, 2.0, 4.0)
-"""Exponents tried by default."""
+"""Exponents that are tried by default."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Force against velocity in bins, sorted by velocity.
+    """Force as a function of velocity in bins, sorted by velocity.
 
     Attributes:
         v, F: medians of each bin [m/s], [N], shape (bins,).
         error: standard error of F [N] from the median absolute deviation; 0 for single points.
-        count: samples in each bin.
+        count: number of samples in each bin.
     """
 
     v: Array
@@ -46,12 +46,12 @@ class Curve:
 
     @property
     def both(self) -> bool:
-        """True if the motion has both directions, which separates an offset from friction."""
+        """True if the motion has both directions, so that an offset is separable from friction."""
         return bool(self.v.min() < 0 < self.v.max())
 
 
 def samples(where: str, v: object, F: object) -> tuple[Array, Array]:
-    """Return velocities and forces as columns of one length.
+    """Return velocities and forces as arrays of equal length.
 
     Raises:
         ValueError: arrays of different lengths.
@@ -65,15 +65,15 @@ def samples(where: str, v: object, F: object) -> tuple[Array, Array]:
 
 
 def binned(v: Array, F: Array, *, bins: int = BINS, slowest: float = SLOWEST) -> Curve:
-    """Return medians over bins of speed, logarithmically spaced, separately for each direction.
+    """Return medians over logarithmically spaced bins of speed, separately for each direction.
 
-    Points at few velocities, such as a staircase, are grouped by velocity instead. A median ignores
-    a few spikes, and pre-sliding as long as most samples of a bin slide.
+    Points at few velocities, such as a staircase, are grouped by velocity instead. A median is not
+    affected by a few spikes, nor by pre-sliding as long as most samples of a bin slide.
 
     Args:
         v, F: samples, shape (n,).
-        bins: per direction.
-        slowest: share of the largest speed below which samples count as rest.
+        bins: number of bins per direction.
+        slowest: speed relative to the largest one below which samples are at rest.
 
     Raises:
         ValueError: no motion.
@@ -93,7 +93,7 @@ def binned(v: Array, F: Array, *, bins: int = BINS, slowest: float = SLOWEST) ->
 
 
 def _by_speed(v: Array, bins: int, fastest: float) -> list[NDArray[np.bool_]]:
-    """Return masks of the bins with enough samples."""
+    """Return masks of the bins that contain enough samples."""
     speed, least = np.abs(v), max(3, v.size // 5000)
     edges = np.geomspace(max(np.quantile(speed, 0.005), 1e-12 * fastest), fastest, bins + 1)
     place = np.clip(np.digitize(speed, edges) - 1, 0, bins - 1)
@@ -102,7 +102,7 @@ def _by_speed(v: Array, bins: int, fastest: float) -> list[NDArray[np.bool_]]:
 
 
 def _median(v: Array, F: Array) -> tuple[float, float, float, float]:
-    """Return the medians of a bin, the error 1.2533 MAD / .6745 / sqrt(n) of F's median, and n."""
+    """Return the medians of a bin, the error 1.2533 MAD / .6745 / sqrt(n) of F, and n."""
     middle = float(np.median(F))
     spread = 1.4826 * float(np.median(np.abs(F - middle)))
     return float(np.median(v)), middle, 1.2533 * spread / np.sqrt(F.size), F.size
@@ -111,7 +111,7 @@ def _median(v: Array, F: Array) -> tuple[float, float, float, float]:
 @final
 @dataclass(frozen=True, eq=False)
 class StribeckCurve:
-    """F = sign(v) [F_C + (F_S - F_C) exp(-|v/v_s|^delta)] + sigma_2 v + offset.
+    """Curve F = sign(v) [F_C + (F_S - F_C) exp(-|v/v_s|^delta)] + sigma_2 v + offset.
 
     Attributes:
         F_S, F_C: static and dynamic level [N].
@@ -139,12 +139,12 @@ class StribeckCurve:
 def fit_curve(curve: Curve, *, delta: float | None = None) -> StribeckCurve:
     """Fit a Stribeck curve to the bins by least squares with equal weights.
 
-    For each of 24 Stribeck velocities (and exponents .5, 1, 2, 4 unless `delta` is given) the
-    levels F_C, F_S - F_C, sigma_2 >= 0 and the offset come from non-negative least squares, which
-    has one minimum; the best is refined in v_s and delta with the levels eliminated. The order
-    F_S >= F_C >= 0 holds by construction.
+    For each of 24 Stribeck velocities (and exponents .5, 1, 2, 4 unless `delta` is given), the
+    levels F_C, F_S - F_C, sigma_2 >= 0 and the offset result from non-negative least squares, which
+    has one minimum. The best result is refined in v_s and delta with the levels eliminated. The
+    order F_S >= F_C >= 0 holds by construction.
 
-    For a curve that does not fall, F_S = F_C and v_s is meaningless.
+    If the curve does not fall, F_S = F_C and v_s is meaningless.
     """
     from scipy.optimize import least_squares, nnls  # noqa: PLC0415 (slow to import)
 
@@ -180,7 +180,7 @@ def _columns(curve: Curve, v_s: float, delta: float) -> Array:
 
 
 def _levels(curve: Curve, v_s: float, delta: float) -> tuple[list[float], float]:
-    """Return F_C, F_S - F_C, sigma_2 and both signs of the offset, and the norm of the error."""
+    """Return F_C, F_S - F_C, sigma_2 and both parts of the offset, and the norm of the error."""
     from scipy.optimize import nnls  # noqa: PLC0415 (slow to import)
 
     w, cost = nnls(_columns(curve, v_s, delta), curve.F)
@@ -191,15 +191,15 @@ def _levels(curve: Curve, v_s: float, delta: float) -> tuple[list[float], float]
 TRIED = {0: 1, 1: 16, 2: 8}
 """Number of values tried for each velocity scale, by the number of scales; 5 for more scales."""
 STEPS = 2
-"""Linear least-squares steps at each; one is exact if a law is linear in its levels."""
+"""Linear least-squares steps at each trial; one is exact if a law is linear in its levels."""
 POLISHED = 3
-"""Number of best trials refined by nonlinear least squares."""
+"""Number of best trials that are refined by nonlinear least squares."""
 PULL = 1e-3
-"""Weight of the guess against the points; it fixes undetermined parameters."""
+"""Weight of the guess relative to the points; it determines parameters that the points do not."""
 HIGHEST = 3.0
-"""Factor by which levels may exceed the guess."""
+"""Factor by which levels may exceed their guess."""
 WIDE = 10.0
-"""Factor by which velocity scales may exceed the range of speeds of the data."""
+"""Factor by which velocity scales may lie outside the range of speeds in the data."""
 
 
 def fit_law(
@@ -207,18 +207,18 @@ def fit_law(
 ) -> dict[str, float]:
     """Return the parameters of the steady curve with the smallest sum of squares over the bins.
 
-    At each combination of velocity scales between the slowest and the fastest bin the levels come
-    from linear least squares within their bounds; the best combinations are refined in all
+    At each combination of velocity scales between the slowest and the fastest bin, the levels
+    result from linear least squares within their bounds. The best combinations are refined in all
     parameters together. Parameters that the points do not determine stay at `guess`.
 
     Args:
-        law: with numbers; its further inputs have their steady values.
-        names: of parameters; those on which the steady curve does not depend are left out.
+        law: law with numbers; its further inputs have their steady values.
+        names: names of parameters; those without effect on the steady curve are left out.
         points: bins of velocity [m/s] and force [N].
         N: normal force [N].
         guess: name -> value.
     """
-    if names:  # those that the steady force depends on
+    if names:  # keep those on which the steady force depends
         model, variables = symbolise(law, *names)
         p = symbols_of(variables)
         found = ca.which_depends(_steady(model, ca.SX.sym("v"), N), p, 1, False)
@@ -246,11 +246,11 @@ def _steady(law: Law, v: ca.SX, N: float) -> ca.SX:
 class _LawFit:
     """Least squares of the steady curve of a law in coordinates w of its parameters p.
 
-        p = exp(w) for velocity scales, scale w for the others, p_low + scale w for ordered ones
+        p = exp(w) for velocity scales, scale w for others, p_low + scale w for ordered parameters
 
     Attributes:
-        force: function of p: forces (points,), slopes (points, p).
-        floors: (high, low, value): p[high] >= p[low], or >= value if low is -1.
+        force: function of p that returns forces (points,) and slopes (points, p).
+        floors: (high, low, value): p[high] >= p[low], or p[high] >= value if low is -1.
         strict: (high, low): velocities p[high] > p[low].
     """
 
@@ -296,7 +296,7 @@ class _LawFit:
         return np.clip(np.where(self.logarithmic, safe, p / self.scale), self.lower, self.upper)
 
     def at(self, w: Array) -> tuple[Array, Array]:
-        """Return errors of the force and their derivatives; not finite where it is undefined."""
+        """Return relative force errors and their derivatives; not finite where F is undefined."""
         p, slope = self.p(w)
         F, J = self.force(p)
         return (F.full().ravel() - self.F) / self.size, J.full() @ slope / self.size
@@ -307,7 +307,7 @@ class _LawFit:
         return float(np.sum(error**2)) if np.isfinite(error).all() else np.inf
 
     def trials(self) -> Iterator[Array]:
-        """Yield starts at all velocity scales (one for each field), the guess, the law's values."""
+        """Yield starts at combinations of velocity scales (one per field), guess and law values."""
         fields = sorted({p.field for p in self.known if is_scale(p)})
         values = np.geomspace(*self.ends, TRIED.get(len(fields), 5))
         starts = [*zip(self.known, self.start, strict=True)]
@@ -320,7 +320,7 @@ class _LawFit:
         yield from (self.w(p) for p in trials if self.apart(p))
 
     def apart(self, p: Array) -> bool:
-        """Return True if strictly ordered velocities differ by at least a twentieth."""
+        """Return True if strictly ordered velocities differ by more than a twentieth."""
         return all(p[high] > 1.05 * p[low] for high, low in self.strict)
 
     def levels(self, w: Array) -> Array:
@@ -371,7 +371,7 @@ class _LawFit:
 
 
 def _forces(law: Law, p: ca.SX, v: Array, N: float) -> ca.Function:
-    """Return a function of the parameters: forces at velocities `v`, and their derivatives."""
+    """Return a function of the parameters to forces at velocities `v` and their derivatives."""
     speed, at = ca.SX.sym("v"), ca.MX.sym("p", p.numel())
     F = _steady(law, speed, N)
     one = ca.Function("curve", [speed, p], [F, ca.jacobian(F, p)])
@@ -382,7 +382,7 @@ def _forces(law: Law, p: ca.SX, v: Array, N: float) -> ca.Function:
 def _orders(
     law: Law, symbols: Sequence[ca.SX]
 ) -> tuple[list[tuple[int, int, float]], list[tuple[int, int]]]:
-    """Return ordered pairs of values (or a value and a number), and strictly ordered pairs."""
+    """Return ordered pairs of values (or of a value and a number), and strictly ordered pairs."""
 
     def place(value: object) -> int:
         return next((i for i, symbol in enumerate(symbols) if symbol is value), -1)

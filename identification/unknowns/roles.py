@@ -1,4 +1,4 @@
-"""Roles of law parameters: which ones are fitted, and the reasons why others are held."""
+"""Roles of law parameters: which parameters are fitted, and why others are held."""
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, fields
@@ -16,12 +16,12 @@ Array = NDArray[np.float64]
 
 VELOCITIES = ("m/s", "rad/s")
 STEEPNESSES = ("s/m", "s/rad")
-"""Units of a feature's position on the velocity axis, and of its inverse."""
+"""Units of positions and widths on the velocity axis, and of their inverses."""
 
 FITTED = ("mass", "inertia", "offset", "level", "viscous", "velocity scale", "")
-"""Roles that are fitted unless named in `fixed`; "" is an undeclared role."""
+"""Roles of parameters that are fitted unless named in `fixed`; "" is an undeclared role."""
 BRISTLE = ("stiffness", "damping", "length")
-"""Roles that are fitted for a law with internal states if the data show their motion."""
+"""Roles of parameters that are fitted if the data show the motion of the internal states."""
 
 REASONS = {
     "width": "smoothing width, small against the speeds",
@@ -31,16 +31,16 @@ STEADY = "steady sliding does not depend on it"
 MACHINE = "of the machine, fitted only on request"
 
 ALIKE = 1e-7
-"""Share of a parameter's effect on the force below which other parameters reproduce it."""
+"""Share of a parameter's effect on the force below which the other parameters reproduce it."""
 WIDTH, BLEND = 1e-3, 1e-4
-"""Smoothing widths, over the largest speed in the data; the blend is the narrower one."""
+"""Smoothing widths of jumps and of narrower blends, relative to the largest speed in the data."""
 SMALL = 0.1
-"""The same over the least speed, for points at low speeds."""
+"""Smoothing width relative to the smallest speed, for points at low speeds."""
 SLOWEST, NARROWEST = 2e-3, 1e-5
-"""Least velocity scale, and least smoothing width, over the largest speed, that data resolve."""
+"""Smallest velocity scale and smoothing width that data resolve, relative to the largest speed."""
 
 LINEAR = ("level", "viscous", "offset", "temperature", "motion")
-"""Roles on which the force depends linearly, or of unknown sign: fitted by their value."""
+"""Roles of parameters fitted by value: the force is linear in them, or their sign is unknown."""
 
 
 def parts(obj: Parametric) -> Iterator[Parametric]:
@@ -60,7 +60,7 @@ def orders(obj: Parametric) -> Iterator[tuple[str, str, bool]]:
 
 
 def symbols_in_order(obj: Parametric) -> Iterator[tuple[str, str, bool]]:
-    """Yield the same pairs by symbol name, if both values are symbols."""
+    """Yield the pairs (low, high, strictly) of symbol names, if both values are symbols."""
     for part in parts(obj):
         for pairs, strictly in ((type(part).ordered, False), (type(part).strictly_ordered, True)):
             for pair in pairs:
@@ -70,7 +70,7 @@ def symbols_in_order(obj: Parametric) -> Iterator[tuple[str, str, bool]]:
 
 
 def is_coefficient(parameter: Parameter) -> bool:
-    """Return True if a parameter is a friction coefficient: times N it is a force level."""
+    """Return True if a parameter is a friction coefficient, which times N is a force level."""
     return parameter.role == "level" and parameter.unit == "1"
 
 
@@ -83,8 +83,8 @@ def is_velocity(parameter: Parameter) -> bool:
 def is_logarithmic(parameter: Parameter) -> bool:
     """Return True if a parameter is fitted by its logarithm.
 
-    Such parameters are positive scales of unknown magnitude. Friction levels of laws that divide by
-    them (lower bound above zero) are included; other levels may vanish.
+    Such parameters are positive scales of unknown magnitude, including friction levels with a
+    positive lower bound, by which laws divide; other levels may vanish.
     """
     if float(parameter.value) <= 0 or parameter.lower < 0:
         return False
@@ -92,19 +92,19 @@ def is_logarithmic(parameter: Parameter) -> bool:
 
 
 def is_scale(parameter: Parameter) -> bool:
-    """Return True if a parameter is a positive velocity scale, or the inverse of one."""
+    """Return True if a parameter is a positive velocity scale or its inverse."""
     return parameter.role == "velocity scale" and parameter.lower >= 0
 
 
 def velocity(parameter: Parameter, scale: float) -> float:
-    """Return a velocity scale in the unit of the parameter: itself, or its inverse."""
+    """Return a velocity scale, or its inverse, in the unit of the parameter."""
     return scale if parameter.unit in VELOCITIES else 1 / scale
 
 
 @final
 @dataclass(frozen=True)
 class Speeds:
-    """Speeds in the data [m/s or rad/s]: the largest and the least one, 0 if unknown."""
+    """Largest and smallest speed in the data [m/s or rad/s]; 0 if unknown."""
 
     largest: float = 0.0
     least: float = 0.0
@@ -115,13 +115,13 @@ class Speeds:
         return self.largest > 0 and np.isfinite(self.largest)
 
     def share(self, of_largest: float, of_least: float = 1.0) -> float:
-        """Return a share of the largest speed, or of the least one if that is less."""
+        """Return a share of the largest speed, or of the smallest one if that is less."""
         small = of_largest * self.largest
         return min(small, of_least * self.least) if self.least > 0 else small
 
 
 def window(parameter: Parameter, speeds: Speeds) -> tuple[float, float]:
-    """Return the range of the parameter that data with these speeds resolve, in its unit."""
+    """Return the range of a parameter that data with these speeds resolve, in its unit."""
     low, high = parameter.lower, parameter.upper
     if is_velocity(parameter) and speeds.known:
         slow = speeds.share(NARROWEST if parameter.role == "width" else SLOWEST)
@@ -133,12 +133,13 @@ def window(parameter: Parameter, speeds: Speeds) -> tuple[float, float]:
 
 
 def reason(parameter: Parameter, *, directions: bool, bristle: bool | None, machine: bool) -> str:
-    """Return the reason why a parameter is not fitted by default; "" if it is.
+    """Return the reason why a parameter is not fitted by default; "" if it is fitted.
 
     Args:
-        directions: the law has two directions, whose levels include the offset.
-        bristle: whether the data show the internal states of the law; None if it has none.
-        machine: the parameter belongs neither to the law nor to a `Drive`.
+        parameter: parameter of a law or a machine.
+        directions: True if the law has two directions, whose levels include the offset.
+        bristle: True if the data show the internal states of the law; None if it has no states.
+        machine: True if the parameter belongs neither to the law nor to a `Drive`.
     """
     if parameter.name == "N":
         return "given"
@@ -159,7 +160,7 @@ def has_directions(obj: Parametric) -> bool:
 
 
 def held_value(parameter: Parameter, speeds: Speeds) -> float:
-    """Return the value of a held parameter; a smoothing width changed by the user is kept."""
+    """Return the value of a held parameter; smoothing widths set by the user are unchanged."""
     value = float(parameter.value)
     if parameter.role != "width" or parameter.unit not in VELOCITIES:
         return value
@@ -169,7 +170,7 @@ def held_value(parameter: Parameter, speeds: Speeds) -> float:
 
 
 def one_digit(value: float) -> float:
-    """Return `value` > 0 rounded to one significant digit."""
+    """Return the positive number `value` rounded to one significant digit."""
     digits = -floor(log10(value))
     return round(value, digits)
 
@@ -177,12 +178,12 @@ def one_digit(value: float) -> float:
 def inseparable(
     law: Law, load: float, names: Sequence[str], asked: Collection[str], bristle: bool
 ) -> dict[str, str]:
-    """Return those of `names` that only a change of load or temperature separates from others.
+    """Return name -> reason for parameters that only another load or temperature can separate.
 
-    Each is compared with those before it, by sensitivities of the force (and of the rates of the
-    states, if the data show them; else of the force in steady sliding) at many speeds and at a
-    generic point of the parameters; those in `asked` are kept. Parameters that no change separates
-    are left to the fit, which reports them.
+    The effect of each parameter is compared with combinations of those before it at many speeds and
+    at a generic point of the parameters. Effects are sensitivities of the force and of the rates of
+    the states if the data show them, otherwise of the force in steady sliding. Parameters in
+    `asked` are kept. Parameters that no change separates are left to the fit, which reports them.
     """
     known = parameters(law)
     mine = [n for n in names if n in known]
@@ -209,9 +210,9 @@ def inseparable(
 def _effects(
     law: Law, load: float, mine: Sequence[str], around: Sequence[str], bristle: bool
 ) -> list[Array]:
-    """Return derivatives by the parameters `mine` at many speeds (rows, parameters), four times.
+    """Return derivatives by the parameters `mine` at many speeds, four arrays (rows, parameters).
 
-    The first has the given load and temperature, the others have different ones.
+    The first array is for the given load and temperature, the others are for different ones.
     """
     law, variables = symbolise(law, *mine, *around)
     v, N = ca.SX.sym("v"), ca.SX.sym("N")
@@ -237,7 +238,7 @@ def _effects(
 
 
 def _by_parameter(slopes: ca.DM, count: int) -> Array:
-    """Return mapped derivatives as columns, one for each of `count` parameters."""
+    """Return mapped derivatives as scaled columns, one for each of `count` parameters."""
     outputs = slopes.shape[0] // count
     values = slopes.full().reshape(count, outputs, -1)
     size = np.abs(values).max(axis=(0, 2), where=np.isfinite(values), initial=1e-300)
@@ -245,7 +246,7 @@ def _by_parameter(slopes: ca.DM, count: int) -> Array:
 
 
 def _same_effect(columns: Array, kept: Sequence[int], i: int) -> list[int] | None:
-    """Return the columns of `kept` that combine to column i; None if there are none."""
+    """Return the columns of `kept` whose combination equals column i; None if there are none."""
     columns = columns[np.isfinite(columns).all(axis=1)]
     column, others = columns[:, i], columns[:, list(kept)]
     others = others / np.maximum(np.linalg.norm(others, axis=0), 1e-300)

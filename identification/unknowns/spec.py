@@ -1,4 +1,4 @@
-"""Unknowns of a fit, and specifications of free parameters: a range, an order, a tie.
+"""Unknowns of a fit, and specifications of free parameters: ranges, orders and ties.
 
 free={"sigma_0": log(1e3, 1e7), "mu_s": above("mu_d"), "sigma_1": tied(lambda p: ...)}
 """
@@ -16,18 +16,19 @@ from symfric.foundation.parameters import Parameter, Variable
 @final
 @dataclass(frozen=True, eq=False)
 class Unknown:
-    """A fitted number, in the unit of the user.
+    """A number to be fitted, in the unit of the user.
 
     Attributes:
-        name: of a parameter of the model; for a value of one record with its index: "x0.v[2]",
-            "dead_time[0]".
+        name: name of a parameter of the model; for a value of one record with the index of the
+            record: "x0.v[2]", "dead_time[0]".
+        unit: unit of all values.
         start: value from which the fit starts.
         lower, upper: bounds.
         scale: typical magnitude; a linear coordinate is value / scale.
-        logarithmic: fitted by its logarithm, for positive scales of unknown magnitude.
+        logarithmic: True if fitted by its logarithm, for positive scales of unknown magnitude.
         above: name of the value that is a lower bound of this one, or "".
         below: name of the value that is an upper bound of this one, or "".
-        nuisance: a start value or dead time: fitted, but not requested.
+        nuisance: True for a start value or a dead time, which is fitted but not requested.
     """
 
     name: str
@@ -43,19 +44,19 @@ class Unknown:
 
     @property
     def partner(self) -> str:
-        """The value that this one is ordered with, or ""."""
+        """Name of the value that bounds this one, or ""."""
         return self.above or self.below
 
 
 @final
 @dataclass(frozen=True)
 class Range:
-    """A parameter between bounds.
+    """Specification of a parameter between bounds.
 
     Attributes:
-        lower, upper: bounds in the unit of the parameter; its own bounds hold, too.
+        lower, upper: bounds in the unit of the parameter, in addition to its declared bounds.
         start: start value of the fit; None: from the data or the law.
-        logarithmic: fitted by its logarithm or by its value; None: by its role.
+        logarithmic: True for the logarithm, False for the value; None: according to its role.
     """
 
     lower: float = -inf
@@ -67,7 +68,7 @@ class Range:
 @final
 @dataclass(frozen=True)
 class Above:
-    """A parameter that is at least another one, and at most `upper`."""
+    """Specification of a parameter at least as large as another one, and at most `upper`."""
 
     name: str
     upper: float = inf
@@ -77,7 +78,10 @@ class Above:
 @final
 @dataclass(frozen=True)
 class Tied:
-    """A parameter computed from the others: `rule` takes them by name, as symbols or numbers."""
+    """Specification of a parameter computed by `rule` from a mapping of the other values by name.
+
+    The values are symbols or numbers.
+    """
 
     rule: Callable[[Mapping[str, Any]], Any]
 
@@ -89,7 +93,7 @@ def log(lower: float, upper: float, start: float | None = None) -> Range:
     """Fit a parameter by its logarithm between 0 < lower < upper, for scales of unknown magnitude.
 
     Raises:
-        ValueError: bounds that are not positive or not in order, a start outside them.
+        ValueError: bounds are not positive or not in order, or the start is outside them.
     """
     low = checks.number("log: lower", lower, above=0.0)
     checks.number("log: upper", upper, above=low)
@@ -100,7 +104,7 @@ def linear(lower: float = -inf, upper: float = inf, start: float | None = None) 
     """Fit a parameter by its value between lower < upper, which may be infinite.
 
     Raises:
-        ValueError: bounds that are not in order, a start outside them.
+        ValueError: bounds are not in order, or the start is outside them.
     """
     return _range("linear", lower, upper, start, False)
 
@@ -113,9 +117,9 @@ def above(name: str, upper: float = inf, start: float | None = None) -> Above:
 
 
 def tied(to: str | Callable[[Mapping[str, Any]], Any], factor: float = 1.0) -> Tied:
-    """Tie a parameter to `factor` times the parameter `to`, or to a function `to` of all of them.
+    """Tie a parameter to `factor` times the parameter `to`, or to a function `to` of parameters.
 
-    The function takes values by name and returns an expression in them: `lambda p: p["m"] * 9.81`.
+    The function maps values by name to an expression in them: `lambda p: p["m"] * 9.81`.
     """
     if isinstance(to, str):
         times = checks.number("tied: factor", factor)
@@ -126,7 +130,7 @@ def tied(to: str | Callable[[Mapping[str, Any]], Any], factor: float = 1.0) -> T
 @final
 @dataclass(frozen=True)
 class _Multiple:
-    """Picklable function: a multiple of a named value."""
+    """Picklable function that returns a multiple of a named value."""
 
     name: str
     factor: float
@@ -138,10 +142,12 @@ class _Multiple:
 
 
 def as_spec(where: str, value: object) -> Spec:
-    """Return the specification of a user's entry: a class above, two bounds, a start, or None.
+    """Return the specification for an entry of the user.
+
+    The entry is a `Range`, `Above` or `Tied`, two bounds, a start value, or None.
 
     Raises:
-        ValueError: any other entry.
+        ValueError: another entry.
     """
     if isinstance(value, Range | Above | Tied):
         return value
@@ -177,14 +183,14 @@ def _is_infinite(value: object) -> bool:
 
 
 OTHERS = "others"
-"""`fixed="others"`: every parameter that is not in `free` is held at its value."""
+"""Value of `fixed` that holds every parameter that is not in `free`."""
 APART = 1.2
-"""Ratio of the start values of two ordered parameters after one was moved."""
+"""Ratio of the start values of two ordered parameters after one of them was moved."""
 Order = tuple[str, str, bool]
 
 
 class Requests:
-    """Arguments `free` and `fixed` of a fit.
+    """Checked arguments `free` and `fixed` of a fit.
 
     Attributes:
         free: name -> specification.
@@ -193,7 +199,7 @@ class Requests:
         problems: errors in the specifications and values, which `check` raises.
 
     Raises:
-        ValueError: an argument that is neither names nor values by name.
+        ValueError: an argument is neither a list of names nor a mapping.
     """
 
     def __init__(self, free: object, fixed: object, start: Iterable[str] = ()) -> None:
@@ -221,16 +227,16 @@ class Requests:
 
     @property
     def started(self) -> frozenset[str]:
-        """Names with a given start value."""
+        """Names of parameters with a given start value."""
         return frozenset(n for n, s in self.free.items() if getattr(s, "start", None) is not None)
 
     @property
     def ties(self) -> dict[str, Tied]:
-        """Parameters computed from others."""
+        """Parameters computed from other parameters."""
         return {n: s for n, s in self.free.items() if isinstance(s, Tied)}
 
     def check(self, known: Sequence[str]) -> None:
-        """Raise one error for all names that are not `known` and all other problems."""
+        """Raise one error for all names that are not in `known` and all other problems."""
         problems = list[str]()
         for where, given in self.names.items():
             try:
@@ -241,15 +247,15 @@ class Requests:
 
 
 def refuse(problems: Sequence[str]) -> None:
-    """Raise one error for all problems of a fit, if there are any."""
+    """Raise one error for all problems of a fit; do nothing without problems."""
     if problems:
         raise ValueError("Fit: " + "; ".join(problems))
 
 
 class Draft(NamedTuple):
-    """An unknown with the bounds of its definition.
+    """Unknown together with the declared bounds of its parameter.
 
-    Its own bounds are those of what the data can resolve, used if the user gives no bounds.
+    The bounds of the unknown are the range that the data can resolve, used by default.
     """
 
     unknown: Unknown
@@ -258,7 +264,7 @@ class Draft(NamedTuple):
 
 
 def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds) -> Draft:
-    """Return the draft of a parameter of a law or a scene, by its role."""
+    """Return the draft of a parameter of a law or a scene according to its role."""
     value = float(parameter.value)
     unknown = Unknown(
         parameter.name, unit, value, *roles.window(parameter, speeds),
@@ -269,7 +275,7 @@ def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds) -> Draft
 
 
 def of_variable(v: Variable) -> Draft:
-    """Return the draft of a model parameter: logarithmic if it starts and stays positive."""
+    """Return the draft of a model parameter, logarithmic if its start and bounds are positive."""
     value, logarithmic = float(v.start), v.lower >= 0 and float(v.start) > 0
     scale = abs(value) or v.nominal
     unknown = Unknown(v.name, v.unit, value, v.lower, v.upper, scale, logarithmic)
@@ -279,10 +285,10 @@ def of_variable(v: Variable) -> Draft:
 def drafted(
     free: Sequence[Draft], requests: Requests, held: Mapping[str, float], orders: Iterable[Order]
 ) -> dict[str, Unknown]:
-    """Return the unknowns of the `free` parameters, by name; tied ones included, for their start.
+    """Return name -> unknown of the `free` parameters, including tied ones for their start.
 
     Raises:
-        ValueError: all bounds, starts and orders that contradict each other.
+        ValueError: bounds, starts and orders that contradict each other, in one error.
     """
     problems: list[str] = []
     specs = requests.free
@@ -310,7 +316,7 @@ def drafted(
 
 
 def _first(draft: Draft, spec: Spec, problems: list[str]) -> Unknown:
-    """Return one unknown, without orders."""
+    """Return one unknown without its orders."""
     unknown, lowest, highest = draft
     low, high, start = unknown.lower, unknown.upper, unknown.start
     logarithmic = unknown.logarithmic
@@ -342,7 +348,7 @@ def _order(
     found: dict[str, Unknown], requests: Requests, held: Mapping[str, float], order: Order,
     problems: list[str],
 ) -> None:  # fmt: skip
-    """Enforce low <= high by a bound, or by a coordinate if both are free."""
+    """Enforce low <= high by a bound, or by a coordinate if both parameters are free."""
     low, high, strictly = order
     step = 1 + 1e-6 * strictly
     if high in found and low in found and not {low, high} & requests.ties.keys():
@@ -362,12 +368,12 @@ def _order(
 def _put_above(
     found: dict[str, Unknown], requests: Requests, low: str, high: str, strictly: bool
 ) -> None:
-    """Express `high` relative to `low`, or `low` relative to `high` if `high` has a lower bound."""
+    """Express `high` relative to `low`, or the opposite if `high` has a lower bound."""
     a, b = found[low], found[high]
     spec = requests.free.get(high)
     if isinstance(spec, Range) and spec.lower > a.lower:
-        # a lower value with its own upper bound keeps its box: no coordinate satisfies both,
-        # and trials out of order are refused when the law is made
+        # `low` keeps a smaller upper bound of its own, because no coordinate satisfies bound and
+        # order; the law then refuses trials that are out of order
         if a.upper >= b.upper:
             start = min(a.start, _between(b))
             found[low] = replace(a, below=high, start=start, logarithmic=False)
@@ -387,5 +393,5 @@ def _put_above(
 
 
 def _between(unknown: Unknown) -> float:
-    """Return the start value, clipped to the bounds."""
+    """Return the start value clipped to the bounds."""
     return min(max(unknown.start, unknown.lower), unknown.upper)

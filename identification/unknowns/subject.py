@@ -1,4 +1,4 @@
-"""Subject of a fit: a law, a machine or a model, with its free parameters as symbols."""
+"""Class `Subject`: the law, machine or model of a fit, with its free parameters as symbols."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ from symfric.scenes.base import Scene
 
 
 class Closed(NamedTuple):
-    """The subject with numbers: law and machine if it has them, and the model."""
+    """Law and machine (None if there is none) and model of a subject, with numbers."""
 
     law: Law | None
     scene: Scene | None
@@ -40,23 +40,23 @@ class Closed(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """A law, machine or model to be fitted, with symbols for its free parameters.
+    """Law, machine or model to be fitted, with symbols for its free parameters.
 
     Attributes:
-        name: of the law, or of the model.
-        names: free parameters, tied ones included; all are among the symbols `model.p`.
-        model: its equations with the free parameters as symbols `p`; for a law fitted to points
-            with inputs v, N and further inputs of the law, and the output F. Held parameters of a
-            model are symbols, too; their start is their value.
-        law: the law with numbers; None for a model that does not have exactly one law.
-        scene: the machine with numbers; None for a law alone or a model.
-        unknowns: free parameters with a coordinate, starting at the values of the law.
+        name: name of the law or the model.
+        names: free parameters including tied ones; all are among the symbols `model.p`.
+        model: equations with the free parameters as symbols `p`. For a law fitted to points, the
+            inputs are v, N and the further inputs of the law, and the output is F. Held parameters
+            of a model are symbols, too; their start is their value.
+        law: law with numbers; None for a model that does not have exactly one law.
+        scene: machine with numbers; None for a law alone or a model.
+        unknowns: free parameters that have a coordinate, starting at the values of the law.
         ties: free parameters computed from others.
         reasons: held parameter -> reason.
         held: held parameter -> value.
         variables: parameter -> name, unit, bounds and doc, for all parameters.
-        guard: function of free values by name that returns the law or the machine; it raises
-            ValueError if a law refuses them; without symbols.
+        guard: function from free values by name to the law or machine with numbers; raises
+            ValueError if a law refuses them.
         started: parameters with a start value given by the user.
     """
 
@@ -75,14 +75,14 @@ class Subject:
 
     @property
     def drive(self) -> Drive | None:
-        """The machine, if it is a mass with a force input."""
+        """The machine if it is a `Drive`, otherwise None."""
         return self.scene if isinstance(self.scene, Drive) else None
 
     def close(self, values: Mapping[str, float]) -> Closed:
-        """Insert numbers for the symbols; the model keeps them as starts of its parameters.
+        """Replace the symbols by numbers; in the model, they become starts of its parameters.
 
         Raises:
-            ValueError: values that the law refuses.
+            ValueError: the law refuses the values.
         """
         mine = {n: float(values[n]) for n in self.names}
         p = tuple(replace(v, start=mine.get(v.name, v.start)) for v in self.model.p)
@@ -95,7 +95,7 @@ class Subject:
 
 
 def _open(opening: Callable[[], Model], p: Variables) -> Model:
-    """Return a model with open contacts that starts at the values of `p`."""
+    """Return the model with open contacts, starting at the values of `p`."""
     made, known = opening(), {v.name: v for v in p}
     return replace(made, p=tuple(known.get(v.name, v) for v in made.p))
 
@@ -116,17 +116,17 @@ def subject(
     """Decide which parameters are fitted, and formulate the model with symbols.
 
     Args:
-        what: a law or its text, which becomes a `Drive` (with `points`: the law alone); a scene; a
-            model, of which all parameters are free.
+        what: a law or its text, which is fitted as a `Drive` (with `points` as a law alone); a
+            scene; or a model, of which all parameters are free.
         free: names, or name -> specification, fitted in addition to those fitted by their role.
         fixed: name -> value of held parameters; "others": all that are not in `free`.
         start: names of parameters with a start given elsewhere, to be checked with the others.
-        normal_force: N of a law [N]; with 1 N coefficients read as forces.
-        points: the data are forces at given velocities, not a motion.
-        moving: the data show how the states of a law change; None: True unless they are points.
-        turning: positions are angles.
+        normal_force: N of a law [N]; with 1 N, coefficients are forces.
+        points: True if the data are forces at given velocities, not a motion.
+        moving: True if the data show changes of the states of a law; None: True unless `points`.
+        turning: True if positions are angles.
         v_max: largest speed in the data [m/s or rad/s]; 0: unknown.
-        v_min: least speed of measured points; 0: unknown, or a motion through rest.
+        v_min: smallest speed of measured points; 0: unknown, or a motion through rest.
 
     Raises:
         ValueError: all problems, in one error.
@@ -156,7 +156,7 @@ def _of_parts(
     whole: Scene | Law, requests: Requests, load: float, moving: bool, turning: bool,
     speeds: roles.Speeds,
 ) -> Subject:  # fmt: skip
-    """Return the subject for a law (with points) or a scene (with a motion)."""
+    """Return the subject of a law (for points) or of a scene (for a motion)."""
     from symfric.laws import law_name  # noqa: PLC0415 (slow to import)
 
     known = parameters(whole)
@@ -189,7 +189,7 @@ def _unknowns(
     drafts: Sequence[Draft], requests: Requests, held: Mapping[str, float],
     orders: Iterable[tuple[str, str, bool]],
 ) -> dict[str, Unknown]:  # fmt: skip
-    """Return the unknowns of at least one free parameter."""
+    """Return the unknowns of the free parameters; raise ValueError if there are none."""
     if not drafts:
         raise ValueError("Fit: expected at least one free parameter, got all fixed")
     return drafted(drafts, requests, held, orders)
@@ -210,7 +210,7 @@ def _subject(
 
 
 def _reasons(whole: Scene | Law, requests: Requests, load: float, moving: bool) -> dict[str, str]:
-    """Return the held parameters with the reason for each."""
+    """Return held parameter -> reason."""
     known = parameters(whole)
     if requests.only:
         return {n: "given" for n in known if n not in requests.free}
@@ -229,7 +229,7 @@ def _reasons(whole: Scene | Law, requests: Requests, load: float, moving: bool) 
 
 
 def points_model(law: Law, load: float, p: Variables) -> Model:
-    """Return a model of the force F of a law at given v, N and inputs; states in steady sliding."""
+    """Return a model of the force F of a law in steady sliding, with inputs v, N and others."""
     v, N = Variable("v", "m/s", nominal=0.1), Variable("N", "N", start=load, nominal=load)
     further = tuple(Variable(i.name, i.unit, start=i.steady, nominal=i.nominal) for i in law.inputs)
     inputs = {x.name: x.symbol for x in further}
@@ -239,7 +239,7 @@ def points_model(law: Law, load: float, p: Variables) -> Model:
 
 
 def _of_model(model: Model, requests: Requests) -> Subject:
-    """Return the subject for a model: all its parameters are free unless fixed."""
+    """Return the subject of a model, with all its parameters free unless fixed."""
     variables = {v.name: v for v in model.p}
     if not variables:
         raise ValueError("Fit: expected a model with parameters, got none; scene.model(free=[...])")
@@ -265,7 +265,7 @@ def _of_model(model: Model, requests: Requests) -> Subject:
 @final
 @dataclass(frozen=True, eq=False)
 class Laws:
-    """The laws of a model's contacts as functions of its parameters."""
+    """Laws of the contacts of a model as functions of the parameters of the model."""
 
     laws: tuple[tuple[Law, ca.Function, tuple[str, ...]], ...]
     starts: dict[str, float]
@@ -285,7 +285,7 @@ class Laws:
         return cls(tuple(plain), starts)
 
     def __call__(self, values: Mapping[str, float]) -> Law | None:
-        """Return the only law with numbers, None if there are several; ValueError if refused."""
+        """Return the law with numbers if there is only one, otherwise None; check all laws."""
         p = [values.get(name, start) for name, start in self.starts.items()]
         made = [
             with_values(law, dict(zip(names, at(p).full().ravel().tolist(), strict=True)))

@@ -2,15 +2,15 @@
 
     p = scale w                      linear
     p = exp(w)                       logarithmic: positive scales
-    p = low + s (exp(w) - 1), w >= 0 at least another value: linear near it, logarithmic beyond s,
-                                     twice its scale; low + exp(w) if it is logarithmic
+    p = low + s (exp(w) - 1), w >= 0 at least another value `low`: linear near it, logarithmic
+                                     beyond s, twice its scale; low + exp(w) if logarithmic
     p = low + (upper - low) w        at least another value, at most a bound, 0 <= w <= 1
-    p = low (upper / low)^w          the same if it is logarithmic and strictly above
-    p = lower + (high - lower) w     at most another value, 0 <= w <= 1
+    p = low (upper / low)^w          the same, if logarithmic and strictly above `low`
+    p = lower + (high - lower) w     at most another value `high`, 0 <= w <= 1
     p = high - scale (1 - w)         the same without a lower bound, w <= 1
-    p = rule(p)                      tied: no coordinate of its own
+    p = rule(p)                      tied to other values, without a coordinate
 
-A solver only has to respect a box in w; orders and ties hold at every trial.
+The solver only has to respect a box in w; orders and ties hold at every trial.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,38 +29,38 @@ from symfric.foundation.numeric import evaluate_all
 Array = NDArray[np.float64]
 
 DECADES = 6.0
-"""Decades from the start beyond which the solver ignores a bound of a logarithmic value: its
-steps depend on distant bounds, too. The law itself still checks the bound.
+"""Decades from the start beyond which the solver ignores a bound of a logarithmic value, because
+its steps depend on distant bounds, too. The law still checks the bound.
 """
 VANISHED = 12.0 * float(np.log(10.0))
-"""Logarithmic distance from the start at which a value that tends to zero or infinity is at its
-bound.
+"""Logarithmic distance from the start at which a value that tends to zero or infinity is treated as
+being at its bound.
 """
 WITHIN = 1e-6
-"""Relative distance to a bound within which a value counts as at it, so rounding cannot pass it."""
+"""Relative distance at which a value counts as being at its bound; covers rounding."""
 NEAR = 2.0
-"""Excess over a lower value, over the scale, up to which it is fitted by its value: in their
-logarithms, the excess of static friction and the Stribeck velocity are strongly correlated.
+"""Excess over a lower value, relative to the scale, up to which it is fitted by its value, because
+the logarithms of static friction's excess and of the Stribeck velocity are strongly correlated.
 """
 MARGIN = 1e-3
-"""Distance of a start to its bounds, over their width or one."""
+"""Distance of a start from its bounds, relative to their width (at most one)."""
 STRICTLY = 1e-4
-"""Least share of the range between a lower value and the bound for a value strictly above it."""
+"""Smallest share of the range between a lower value and the bound for a strictly larger value."""
 AT_BOUND = 1e-5
-"""Distance to a bound, over the width of the box or one, below which a value is at the bound."""
+"""Distance below which a value is at a bound, relative to the width of the box (at most one)."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Coordinate:
-    """A coordinate w of a value p whose partner in an order, if any, has the value q.
+    """Coordinate w of a value p; q is the value of its partner in an order, if any.
 
     Attributes:
         value: (w, q) -> p, symbolic.
         inverse: (p, q) -> w.
         lower, upper: bounds of w.
         floor, ceiling: coordinates beyond which p counts as zero or infinite. The search does not
-            use them, since its steps depend on distant bounds, too.
+            use them, because its steps depend on distant bounds, too.
     """
 
     value: Callable[[Any, Any], Any]
@@ -102,7 +102,7 @@ def coordinate(unknown: Unknown) -> Coordinate:
 
 
 def _above(high: float, scale: float, logarithmic: bool) -> Coordinate:
-    """Return the coordinate of a value at least another one and at most `high`."""
+    """Return the coordinate of a value that is at least another one and at most `high`."""
 
     def excess(p: float, q: float) -> float:
         return max(p - q, 1e-3 * max(abs(q), 1e-12))
@@ -145,7 +145,7 @@ class Unknowns:
 
     Attributes:
         unknowns: one for each coordinate, in the order of w, shape (n,).
-        names: of the values, shape (k,), tied ones included.
+        names: names of the values, including tied ones, shape (k,).
         lower, upper: box of w, shape (n,).
         function: w -> values (k,), dvalues/dw (k, n).
     """
@@ -158,7 +158,7 @@ class Unknowns:
 
     @property
     def fitted(self) -> tuple[str, ...]:
-        """Names of the values with a coordinate."""
+        """Names of the values that have a coordinate."""
         return tuple(u.name for u in self.unknowns)
 
     @property
@@ -176,7 +176,7 @@ class Unknowns:
         return slope.reshape(len(self.names), len(self.unknowns))
 
     def named(self, w: Array) -> dict[str, float]:
-        """Return the values at w by name."""
+        """Return name -> value at w."""
         return dict(zip(self.names, self.values(w).tolist(), strict=True))
 
     @property
@@ -185,12 +185,12 @@ class Unknowns:
         return self.of({})
 
     def of(self, values: Mapping[str, float]) -> Array:
-        """Return the coordinates of `values`, moved inside the box; others are at their start."""
+        """Return the coordinates of `values` inside the box; other values are at their start."""
         known = {u.name: u.start for u in self.unknowns} | dict(values)
         if any(u.partner and u.partner not in known for u in self.unknowns):
             free = [replace(u, above="", below="") for u in self.unknowns]
             found = self.named(self._inverse(free, known, {}))
-            for _ in range(2):  # a tied value may follow from one with an order of its own
+            for _ in range(2):  # a tied value may depend on an ordered one
                 found = self.named(self._inverse(self.unknowns, known, found))
             known = found | known
         return self._inverse(self.unknowns, known, known)
@@ -202,7 +202,7 @@ class Unknowns:
         return self.inside(np.array(w))
 
     def inside(self, w: Array) -> Array:
-        """Return `w` moved inside the box by a thousandth of its width or of one."""
+        """Return `w` moved inside the box by a thousandth of its width, or of one if wider."""
         margin = MARGIN * np.minimum(1.0, self.upper - self.lower)
         return np.clip(w, self.lower + margin, self.upper - margin)
 
@@ -215,7 +215,7 @@ class Unknowns:
 
     @cached_property
     def limits(self) -> tuple[Array, Array]:
-        """Coordinates beyond which values count as zero or infinite, see `Coordinate`."""
+        """Coordinates beyond which values count as zero or infinite; see `Coordinate`."""
         each = [coordinate(u) for u in self.unknowns]
         floor, ceiling = np.array([(c.floor, c.ceiling) for c in each]).reshape(-1, 2).T
         return (
@@ -232,11 +232,11 @@ def unknowns_of(
 ) -> Unknowns:
     """Return the coordinates of `unknowns` and the tied values, in the order of `names`.
 
-    Values of `held` parameters are constants, available to ties and residuals.
+    Values of `held` parameters are constants, which ties and residuals can use.
 
     Raises:
-        ValueError: a tie or an order to an absent name or in a cycle; a name that is neither an
-            unknown nor tied.
+        ValueError: a tie or an order refers to an absent name or forms a cycle, or a name is
+            neither an unknown nor tied.
     """
     w = ca.SX.sym("w", len(unknowns))
     each = [coordinate(u) for u in unknowns]

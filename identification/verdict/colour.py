@@ -1,14 +1,14 @@
-"""Autocorrelation of residuals: an autoregressive model of a channel, a test for white noise.
+"""Autocorrelation of residuals: autoregressive model of a channel, and test for white noise.
 
     e_i = phi_1 e_(i-1) + ... + phi_p e_(i-p) + u_i,     u white with variance s^2
     rho_k = sum e_i e_(i-k) / sum e_i^2,     Q = sum_k (rho_k - E rho_k)^2 / var rho_k  ~  chi2(L)
 
-The order p comes from Burg's recursion and BIC. The coefficients are those of the largest
-restricted likelihood, which corrects for the n fitted unknowns; otherwise correlations, and with
-them all standard errors, are too small (by a quarter for 200 samples of AR(1) 0.9 noise and three
-unknowns). Mean and variance of rho_k are those of residuals r = M e of white noise e, with M the
-projection that a fit makes: Q keeps its L degrees of freedom when a fit takes much of a short
-record. No degrees are subtracted for the unknowns of the model.
+The order p results from Burg's recursion and BIC. The coefficients maximise the restricted
+likelihood, which corrects for the n fitted unknowns; otherwise correlations and therefore all
+standard errors are too small (by a quarter for 200 samples of AR(1) 0.9 noise and three unknowns).
+Mean and variance of rho_k are those of residuals r = M e of white noise e, with the projection M of
+the fit: Q keeps its L degrees of freedom when a fit takes much of a short record. No degrees are
+subtracted for the unknowns of the model.
 
 Sources: Burg, thesis, Stanford 1975; Cooper and Thompson, Biometrika 64(3), 1977 (restricted
 likelihood of ARMA noise); den Haan and Levin, Handbook of Statistics 15, 1997 (order by BIC); Ljung
@@ -26,24 +26,24 @@ from identification.verdict.minimum import Count
 from symfric.foundation.shown import brief
 
 MOST = 30
-"""Largest order."""
+"""Largest order of an autoregressive model."""
 REFINED = 6
-"""Largest order whose coefficients are refined; higher ones are chosen for long records only."""
+"""Largest order whose coefficients are refined; higher orders are chosen for long records only."""
 NEAR_ONE = 0.9995
-"""Largest partial autocorrelation; noise at one (a random walk) has no finite variance."""
+"""Largest partial autocorrelation; at one, noise is a random walk without finite variance."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Colour:
-    """An autoregressive model of the residuals of one channel.
+    """Autoregressive model of the residuals of one channel.
 
     Attributes:
-        partial: partial autocorrelations, shape (p,); they determine phi.
-        variance: s^2 of the innovations.
+        partial: partial autocorrelations, shape (p,), which determine phi.
+        variance: variance s^2 of the innovations.
         freedom: degrees of freedom of s^2.
-        rows: of the channel.
-        white: variance per degree of freedom if the residuals are taken as white.
+        rows: number of rows of the channel.
+        white: variance per degree of freedom under the assumption of white residuals.
     """
 
     partial: Array
@@ -77,7 +77,7 @@ class Colour:
 
             S(w) = s^2 / |A(w)|^2,   A(w) = 1 - sum phi_j exp(-i w j),   dS/dphi_j = 2 S Re(e/A)
 
-        Shapes (places,), (p, places).
+        The shapes are (places,) and (p, places).
         """
         w = 2 * np.pi * np.arange(places) / places
         waves = np.exp(-1j * np.outer(np.arange(1, self.order + 1), w))
@@ -92,7 +92,7 @@ class Colour:
         if not p:
             return np.zeros((0, 0))
         table, spread = predictors(self.partial)
-        inverse = np.zeros((p, p))  # Cholesky factors of Gamma^-1: prediction errors of each order
+        inverse = np.zeros((p, p))  # from the prediction errors of each order
         for k in range(p):
             row = np.zeros(p)
             row[k] = 1.0
@@ -105,9 +105,9 @@ def colour(r: Array, J: Array, position: Count, *, refine: bool = True) -> Colou
     """Fit the autoregressive model to residuals of a fit with sensitivities J.
 
     Args:
-        r: residuals of one channel in the order of time, shape (n,).
-        J: their sensitivities to the fitted values, shape (n, k), of any rank.
-        position: neighbours before each row, see `positions`.
+        r: residuals of one channel in order of time, shape (n,).
+        J: sensitivities of the residuals to the fitted values, shape (n, k), of any rank.
+        position: number of neighbours before each row, see `positions`.
         refine: whether to refine Burg's coefficients by the restricted likelihood.
     """
     basis = span(J)
@@ -125,9 +125,9 @@ def colour(r: Array, J: Array, position: Count, *, refine: bool = True) -> Colou
 
 
 def whitened(x: Array, partial: Array, position: Count) -> Array:
-    """Return the prediction errors of each column of x, shape of x, with the variance of u.
+    """Return the prediction errors of each column of x, shape of x, scaled to the variance of u.
 
-    The first rows of a run are predicted from the rows available.
+    The first rows of a run are predicted from the available rows.
     """
     table, spread = predictors(partial)
     order = np.minimum(position, partial.size)
@@ -141,7 +141,7 @@ def whitened(x: Array, partial: Array, position: Count) -> Array:
 def predictors(partial: Array) -> tuple[Array, Array]:
     """Return the best predictors of order 0 ... p, (p+1, p), and their error variances / s^2.
 
-    Levinson-Durbin recursion from the partial autocorrelations.
+    They result from the partial autocorrelations by the Levinson-Durbin recursion.
     """
     p = partial.size
     table = np.zeros((p + 1, p))
@@ -163,7 +163,7 @@ def span(J: Array, tolerance: float = 1e-9) -> Array:
 
 
 def _burg(r: Array, position: Count, most: int) -> Array:
-    """Return the partial autocorrelations at the order of the smallest BIC."""
+    """Return the partial autocorrelations up to the order with the smallest BIC."""
     f, b = r.copy(), r.copy()
     partial = list[float]()
     total, best, order = 0.0, 0.0, 0
@@ -198,8 +198,8 @@ def _likelihood(partial: Array, r: Array, basis: Array, position: Count) -> tupl
 
 
 def _refined(partial: Array, r: Array, basis: Array, position: Count) -> Array:
-    """Maximise the restricted likelihood over the partial autocorrelations, from those of Burg."""
-    optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
+    """Maximise the restricted likelihood over the partial autocorrelations, starting at Burg's."""
+    optimize: Any = import_module("scipy.optimize")  # slow to import
 
     def cost(z: Array) -> float:
         return _likelihood(NEAR_ONE * np.tanh(z), r, basis, position)[0]
@@ -219,12 +219,12 @@ LAGS = 25
 @final
 @dataclass(frozen=True, eq=False)
 class Whiteness:
-    """Autocorrelations of one channel.
+    """Autocorrelations of one channel with a test for white noise.
 
     Attributes:
         lags: 1 ... L, shape (L,).
         correlation: rho_k, shape (L,).
-        low, high: 95 % limits of white residuals of this fit, shape (L,).
+        low, high: 95 % limits for white residuals of this fit, shape (L,).
         statistic, p: Q and its p-value; 0 and 1 if no lag can be tested.
     """
 
@@ -242,11 +242,12 @@ def whiteness(r: Array, J: Array, position: Count) -> Whiteness:
     """Compute the autocorrelations of residuals and their limits.
 
     Args:
-        r: residuals of one channel in the order of time, shape (n,).
+        r: residuals of one channel in order of time, shape (n,).
         J: sensitivities to the fitted values, shape (n, k), of any rank.
-        position: neighbours before each row, see `positions`; with 0 everywhere no lag is tested.
+        position: number of neighbours before each row, see `positions`; if all are 0, no lag is
+            tested.
     """
-    from scipy.special import chdtrc  # noqa: PLC0415  (SciPy is loaded by those who fit)
+    from scipy.special import chdtrc  # noqa: PLC0415  (slow to import)
 
     Q = span(J)
     n, k = Q.shape
@@ -271,7 +272,7 @@ def whiteness(r: Array, J: Array, position: Count) -> Whiteness:
 
 
 def _moments(Q: Array, pair: Count, lag: int) -> tuple[float, float]:
-    """Return mean and deviation of r'S r / r'r for r = M e, S the symmetric shift by `lag`.
+    """Return mean and deviation of r'S r / r'r for r = M e and the symmetric shift S by `lag`.
 
     With f = n - k:  E = tr(MS)/f,  var = 2 (f tr(MSMS) - tr(MS)^2) / (f^2 (f + 2)).
     """

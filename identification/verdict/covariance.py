@@ -1,12 +1,13 @@
-"""Covariance of fitted values under autocorrelated residuals, 95 % intervals, and warnings.
+"""Covariance of fitted values with autocorrelated residuals, 95 % intervals, and warnings.
 
     C = B' Sigma B,   B = J (J'J)^-1 (dvalues/dw)',   Sigma = autoregressive model of each channel
 
 C is computed in the frequency domain (Whittle): B on the grid of times is transformed and weighted
 by the spectral density. Missing rows and windows need no special treatment.
 
-A record that only slides shows how friction falls with speed, but not the static level: a law may
-fit it with a static level far above every measured force. Such levels (`Levels`) get no interval.
+A record that only slides shows how friction falls with speed, but not the static level. A law may
+then fit it with a static level far above every measured force. Such levels (`Levels`) have no
+interval.
 """
 
 from collections.abc import Iterator, Mapping
@@ -23,19 +24,19 @@ from identification.verdict.minimum import Minimum, Shift, groups, minimum, plac
 from symfric.foundation.shown import brief
 
 RANK = 1e-7
-"""Smallest singular value of the scaled sensitivities that counts, relative to the largest."""
+"""Smallest nonzero singular value of the scaled sensitivities, relative to the largest."""
 
 
 class Sandwich(NamedTuple):
     """Linearised uncertainty of k values that depend on n coordinates.
 
-    Directions that the residuals do not determine contribute nothing here; `null` lists them.
+    Directions that the residuals do not determine are listed in `null` and do not contribute.
 
     Attributes:
         coloured: covariance of the values with the autocorrelation of each channel, shape (k, k).
         white: the same for white residuals with the variance of each channel.
-        freedom: effective degrees of freedom of the variances on the diagonal (Satterthwaite;
-            includes the uncertainty of the estimated autocorrelation), shape (k,).
+        freedom: effective degrees of freedom of the variances on the diagonal (Satterthwaite,
+            including the uncertainty of the estimated autocorrelation), shape (k,).
         null: directions of the coordinates along which the residuals do not change, (n, nullity).
         colours: autoregressive models of the channels.
     """
@@ -48,7 +49,7 @@ class Sandwich(NamedTuple):
 
 
 def sandwich(found: Minimum) -> Sandwich:
-    """Compute the uncertainty of a least-squares fit with independent noise of the channels."""
+    """Compute the uncertainty of a least-squares fit with independent noise in the channels."""
     free = ~found.held
     size = np.linalg.norm(found.J * free, axis=0)
     size = np.where(size > 0, size, 1.0)
@@ -58,7 +59,7 @@ def sandwich(found: Minimum) -> Sandwich:
     inverse = (Vt[kept].T / s[kept] ** 2) @ Vt[kept]
     bread = scaled @ (inverse @ (found.slope / size).T)  # (rows, k)
     reach = np.abs(bread).max(axis=0, initial=0.0)
-    reach = np.where(reach > 0, reach, 1.0)  # variances of variances would overflow
+    reach = np.where(reach > 0, reach, 1.0)  # scaling; variances of variances would overflow
     bread = bread / reach
     sensitivity = scaled * found.gain[:, None]
     k = len(found.names)
@@ -73,7 +74,7 @@ def sandwich(found: Minimum) -> Sandwich:
         colours.append(seen)
     total = np.diag(coloured) ** 2
     freedom = 2 * np.divide(total, spread, where=spread > 0, out=np.ones(k))
-    inside = Vt[kept][:, free]  # directions of the free coordinates orthogonal to it are null
+    inside = Vt[kept][:, free]  # free directions orthogonal to `inside` are null
     null = np.zeros((free.size, inside.shape[1] - inside.shape[0]))
     null[free] = np.linalg.svd(inside, full_matrices=True)[2][inside.shape[0] :].T
     back = np.outer(reach, reach)
@@ -83,7 +84,7 @@ def sandwich(found: Minimum) -> Sandwich:
 
 
 def _meat(found: Colour, bread: Array, place: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return B' Sigma B of one channel, and the variance of the estimates on its diagonal.
+    """Return B' Sigma B of one channel, and the variances of its estimated diagonal.
 
     var c_ii = 2 c_ii^2 / freedom + (dc_ii/dphi)' cov(phi) (dc_ii/dphi)
     """
@@ -108,12 +109,13 @@ FAR = 3.0
 @final
 @dataclass(frozen=True)
 class Levels:
-    """Friction levels among the values, and the forces in the data.
+    """Friction levels among the values, and the largest force in the data.
 
     Attributes:
-        loads: name of a level -> its force over its value: 1, or the normal force of a coefficient.
+        loads: name of a level -> ratio of its force to its value: 1, or the normal force for a
+            coefficient.
         largest: largest friction force in the data [N or N m].
-        unit: of the forces.
+        unit: unit of the forces.
     """
 
     loads: Mapping[str, float]
@@ -135,20 +137,20 @@ LEVEL = 0.95
 TOGETHER = 0.98
 """Correlation above which two estimates are reported as strongly correlated."""
 FEW = 3.0
-"""Effective samples for each unknown below which intervals are unreliable."""
+"""Effective samples per unknown below which intervals are unreliable."""
 HARDLY = 0.5
-"""Standard error over the value above which a value is reported as poorly identified."""
+"""Ratio of standard error to value above which a value is reported as poorly identified."""
 DECADES = 8.0
-"""Width of the interval of a logarithmic value above which it is dropped [decades]."""
+"""Width of the interval of a logarithmic value above which the interval is dropped [decades]."""
 WIDE = 1e4
-"""Width of other intervals above which they are dropped, over the value and its usual magnitude."""
+"""Width of other intervals, relative to value and scale, above which the interval is dropped."""
 ROUNDING = 1e-14
-"""Slope of a value over its largest one below which it is rounding error."""
+"""Slope of a value relative to its largest slope below which it is rounding error."""
 CLEAN = 1e-13
-"""Entry of a pseudo-inverse over its largest one below which it is rounding error, set to zero."""
+"""Entry of a pseudo-inverse relative to the largest one below which it is rounded to zero."""
 LOST = "not identifiable: effect below the noise"
 BEYOND = "not identifiable: far above all forces"
-"""Notes of values without an interval."""
+"""Notes on values without an interval."""
 
 
 @final
@@ -157,16 +159,16 @@ class Covariance:
     """Uncertainty of k values; NaN where a value is not identifiable or at a bound.
 
     Attributes:
-        names: of the values.
+        names: names of the values.
         matrix: covariance with the autocorrelation of the residuals, shape (k, k).
-        white: the same for white residuals, shape (k, k).
+        white: covariance for white residuals, shape (k, k).
         freedom: effective degrees of freedom, for quantiles of Student's t, shape (k,).
         low, high: 95 % intervals, shape (k,). For logarithmic unknowns they are symmetric in the
             logarithm: a stiffness known to a factor of 2 stays positive.
-        at_bound: values at a bound.
+        at_bound: names of values at a bound.
         undetermined: groups of names with fewer identifiable combinations than names; a group of
-            one has no influence at all.
-        effective: number of independent samples of each channel, by its name.
+            one name has no influence.
+        effective: name of a channel -> number of independent samples.
         sentences: messages on values that are not identifiable or poorly identified.
         notes: name of a value without an interval that is in no group and at no bound -> reason.
     """
@@ -192,24 +194,24 @@ class Covariance:
 
     @property
     def white_errors(self) -> Array:
-        """Standard errors as if the residuals were white, shape (k,)."""
+        """Standard errors for white residuals, shape (k,)."""
         return np.sqrt(np.diag(self.white))
 
     @property
     def correlation(self) -> Array:
-        """Correlation of the estimates, NaN where undefined, shape (k, k)."""
+        """Correlation of the estimates, shape (k, k); NaN where undefined."""
         return correlation(self.matrix)
 
 
 def correlation(matrix: Array) -> Array:
-    """Return the correlation of a covariance, NaN where undefined."""
+    """Return the correlation matrix of a covariance; NaN where undefined."""
     error = np.sqrt(np.diag(matrix))
     both = np.outer(error, error)
     return np.divide(matrix, both, out=np.full_like(both, np.nan), where=both > 0)
 
 
 def covariance(task: Task, point: Point, levels: Levels | None = None) -> Covariance:
-    """Compute the uncertainty of the values of a solved task, see `covariance_of`."""
+    """Compute the uncertainty of the values of a solved task; see `covariance_of`."""
     found = minimum(task, point)
     return covariance_of(found, shift(task, found), levels)
 
@@ -217,14 +219,14 @@ def covariance(task: Task, point: Point, levels: Levels | None = None) -> Covari
 def covariance_of(found: Minimum, change: Shift, levels: Levels | None = None) -> Covariance:
     """Compute the uncertainty of the values at a minimum.
 
-    Limits: linear in the values (in logarithms where an unknown is logarithmic), see `profile` for
-    nonlinear ones; channels are independent; with fewer effective samples than three times the
-    unknowns the intervals are too small, and a message says so.
+    Limits: linear in the values, or in the logarithms of logarithmic unknowns; see `profile` for
+    nonlinear intervals. Channels are independent. With fewer effective samples than three times the
+    number of unknowns, the intervals are too small, and a message says so.
 
     Args:
         found: the minimum.
-        change: change of the weighted residuals at other values, used to word the messages.
-        levels: friction levels among the values; those far above every force get no interval.
+        change: norm of the change of the weighted residuals at other values, for the messages.
+        levels: friction levels among the values; levels far above every force have no interval.
     """
     inside = sandwich(found)
     names, values = found.names, found.values
@@ -232,7 +234,7 @@ def covariance_of(found: Minimum, change: Shift, levels: Levels | None = None) -
     own = [names.index(u.name) for u in found.unknowns]
     size = _sensitivity(found, own)
     wanders = np.abs(moved * size[:, None]).max(axis=1, initial=0.0) > 1e-4
-    size_of = np.abs(found.slope)  # one at an upper bound moves with its partner by rounding alone
+    size_of = np.abs(found.slope)  # a value at its upper bound moves by rounding with its partner
     fixed = ~np.any((size_of > ROUNDING * size_of.max(axis=1, keepdims=True)) & ~found.held, axis=1)
     matrix, white = (_without(C, wanders | fixed) for C in (inside.coloured, inside.white))
     low, high = _intervals(found, np.sqrt(np.diag(matrix)), inside.freedom)
@@ -270,12 +272,12 @@ def covariance_of(found: Minimum, change: Shift, levels: Levels | None = None) -
 
 
 def _without(matrix: Array, out: NDArray[np.bool_]) -> Array:
-    """Return a matrix with NaN in some rows and columns."""
+    """Return a matrix with the rows and columns in `out` set to NaN."""
     return np.where(out[:, None] | out, np.nan, matrix)
 
 
 def _unlimited(found: Minimum, lows: Array, highs: Array) -> Iterator[tuple[str, str]]:
-    """Yield the values whose interval is nearly unlimited, with a message (empty for nuisances)."""
+    """Yield values with a nearly unlimited interval and a message, which is empty for nuisances."""
     for unknown in found.unknowns:
         i = found.names.index(unknown.name)
         low, high, value = lows[i], highs[i], found.values[i]
@@ -289,7 +291,7 @@ def _unlimited(found: Minimum, lows: Array, highs: Array) -> Iterator[tuple[str,
 
 
 def _sensitivity(found: Minimum, own: list[int]) -> Array:
-    """Return norms of dr/dvalue with the other unknowns held; inverse values if tied, (k,)."""
+    """Return norms of dr/dvalue with other unknowns held, shape (k,); 1/value for tied values."""
     size = 1 / np.maximum(np.abs(found.values), 1e-300)
     alone = np.linalg.norm(found.J @ _inverse(found.slope[own]), axis=0)
     for i, s in zip(own, alone, strict=True):
@@ -298,7 +300,7 @@ def _sensitivity(found: Minimum, own: list[int]) -> Array:
 
 
 def _spread(found: Minimum, own: list[int], some: Array) -> Array:
-    """Return all values for given values of the unknowns: tied ones follow in first order."""
+    """Return all values for given values of the unknowns; tied values follow to first order."""
     w = _inverse(found.slope[own]) @ (some - found.values[own])
     there = found.values + found.slope @ w
     there[own] = some
@@ -306,7 +308,7 @@ def _spread(found: Minimum, own: list[int], some: Array) -> Array:
 
 
 def _inverse(slope: Array) -> Array:
-    """Return dw/dvalues, shape (n, n); zero for a coordinate without effect, such as exp(-800)."""
+    """Return dw/dvalues, shape (n, n); zero for coordinates without effect, such as exp(-800)."""
     size = np.abs(slope).max(axis=1)
     size[size == 0.0] = 1.0
     inverse = np.linalg.pinv(slope / size[:, None])
@@ -315,7 +317,7 @@ def _inverse(slope: Array) -> Array:
 
 
 def _intervals(found: Minimum, error: Array, freedom: Array) -> tuple[Array, Array]:
-    from scipy.special import stdtrit  # noqa: PLC0415  (SciPy is loaded by those who fit)
+    from scipy.special import stdtrit  # noqa: PLC0415  (slow to import)
 
     reach = stdtrit(freedom, 0.5 + LEVEL / 2) * error
     low, high = found.values - reach, found.values + reach
@@ -330,7 +332,7 @@ def _intervals(found: Minimum, error: Array, freedom: Array) -> tuple[Array, Arr
 def _weak(
     found: Minimum, matrix: Array, low: Array, high: Array, mentioned: set[str]
 ) -> Iterator[str]:
-    """Yield a message for each poorly identified value outside `mentioned`."""
+    """Yield a message for each poorly identified value that is not in `mentioned`."""
     error, related = np.sqrt(np.diag(matrix)), np.nan_to_num(np.abs(correlation(matrix)))
     np.fill_diagonal(related, 0.0)
     mentioned = mentioned | {u.name for u in found.unknowns if u.nuisance}

@@ -1,14 +1,14 @@
-"""Models for optimal experiment design, with the Fisher information of a motion as states.
+"""Models for optimal experiment design, whose states include the Fisher information of a motion.
 
     S' = df/dx S + df/dp diag(p),           S(0) = dx0/dp diag(p)
     Y  = dg/dx S + dg/dp diag(p)
     I' = sum_y Y_y' Y_y / (sigma_y^2 h),    I(0) = 1/prior^2
 
-S are the sensitivities of the states to relative changes of the parameters, Y those of the measured
-signals y = g(x, u, p), sampled every h with noise sigma_y, and I is the Fisher information.
-The smallest relative standard errors of any unbiased estimator under white noise are the square
-roots of the diagonal of I^-1 (Cramer and Rao). `information`, log det I over the number of
-parameters, is an output that an optimal control problem can maximise:
+S are the sensitivities of the states to relative changes of the parameters. Y are those of the
+measured signals y = g(x, u, p), sampled every h with noise sigma_y. I is the Fisher information.
+Under white noise, the smallest relative standard errors of any unbiased estimator are the square
+roots of the diagonal of I^-1 (Cramer and Rao). The output `information`, log det I divided by the
+number of parameters, can be maximised by an optimal control problem:
 `Problem(Phase(informative(model, ...), T=2.0), -at_end(lambda s: s.information), bounds=...)`.
 Source: Mehra, IEEE Trans. Autom. Control 19(6), 1974; Swevers et al., IEEE Trans. Robotics 13(5),
 1997 (excitation of robots).
@@ -28,7 +28,7 @@ from symfric.model import Model, Output, check_model
 
 
 class Motion(Protocol):
-    """Signals by name, such as a trajectory."""
+    """Signals by name, such as those of a trajectory."""
 
     def __getitem__(self, name: str, /) -> Any:
         """Return all values of a signal over time."""
@@ -47,21 +47,21 @@ def informative(
     """Return `model` with sensitivities and information as states, and the output "information".
 
     Args:
-        model: explicit, without algebraic variables and events, smooth enough to be optimised; the
-            free parameters are among its `p`, with prior estimates as start values.
+        model: explicit model without algebraic variables and events, smooth enough for
+            optimisation; its parameters `p` include the free ones, with prior estimates as starts.
         free: parameters to be identified, none of them zero.
         measured: signal (state or output) -> standard deviation of its noise in SI units.
         step: sample time of the measurement [s].
         prior: relative standard error of the prior estimates.
-        aim: desired relative standard error; it scales the information, which an optimiser needs
-            to converge.
+        aim: desired relative standard error; it scales the information so that an optimiser
+            converges.
 
-    Limits: noise is white and the start state known; the information is evaluated at the start
-    values of the parameters, so a design for a wide range needs `scenarios` of the problem.
+    Limits: noise is white and the start state is known. The information is evaluated at the start
+    values of the parameters; a design for a wide range needs `scenarios` of the problem.
 
     Raises:
         ValueError: an unknown parameter or signal, a parameter that is zero, a noise that is not
-            above zero, an unsupported model.
+            above zero, or an unsupported model.
     """
     check_model("informative", model)
     if model.ode is None or model.z or model.events:
@@ -112,8 +112,8 @@ def expected_errors(free: Sequence[str], motion: Motion) -> dict[str, float]:
     """Return the smallest relative standard errors of the parameters after a motion.
 
     Args:
-        free: the parameters, in the order given to `informative`.
-        motion: of the informative model; its last values are used.
+        free: parameters in the order given to `informative`.
+        motion: motion of the informative model, whose last values are used.
     """
     I = np.zeros((len(free), len(free)))  # noqa: E741  (the letter of the literature)
     for i, a in enumerate(free):
@@ -136,7 +136,7 @@ def _name(a: str, b: str) -> str:
 
 
 def _log_det(A: ca.SX) -> ca.SX:
-    """Return log det A of a symmetric positive matrix, by its Cholesky factor."""
+    """Return log det A of a symmetric positive matrix by its Cholesky factor."""
     n = A.shape[0]
     L, total = ca.SX(n, n), ca.SX(0)
     for j in range(n):

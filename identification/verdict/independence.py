@@ -1,8 +1,8 @@
-"""Tests of residuals for dependence on inputs and motion: added variables, autocorrelated noise.
+"""Tests for dependence of residuals on inputs and motion: added variables, autocorrelated noise.
 
-Inputs and the predicted motion (the measured one shares its noise with the residuals) give families
-of columns. A correct model leaves no trace of them in the residuals; each family corresponds to
-one type of model error:
+Inputs and the predicted motion (the measured motion shares its noise with the residuals) define
+families of columns. The residuals of a correct model do not depend on them. Each family corresponds
+to one type of model error:
 
 | family | columns | missing in the model |
 |---|---|---|
@@ -17,9 +17,9 @@ projected out of both, and the remaining residuals are regressed on the columns:
 
     F = (explained / q) / (rest / (n - k - q))  ~  F(q, n - k - q)     if there is no dependence
 
-For one column this is a cross-correlation with the variance of Bartlett's formula. The
-autoregressive model is first fitted to the residuals, where it may absorb a missing harmonic. So
-unless F is large already, it is fitted to the residuals after the regression on the columns.
+For one column, this is a cross-correlation with the variance of Bartlett's formula. The
+autoregressive model is first fitted to the residuals, where it may absorb a missing harmonic.
+Unless F is already large, it is therefore fitted again to the residuals of the regression.
 Sources: Haugh, J. Am. Stat. Assoc. 71, 1976; Godfrey, Econometrica 46(6), 1978 (added variables);
 Ljung, System Identification, 1999, section 16.6.
 """
@@ -37,19 +37,19 @@ from identification.verdict.minimum import Count, Minimum, lagged, positions
 Kind = Literal["position", "velocity", "acceleration", ""]
 
 DELAYS = (0, 1, 2, 4, 8, 16, 32)
-"""Tested delays of a regressor [samples]."""
+"""Delays of a regressor that are tested [samples]."""
 BINS = 8
-"""Bins of speed and of the distance since a reversal, in each direction."""
+"""Number of bins of speed and of the distance since a reversal, in each direction."""
 HARMONICS = 12
 """Largest number of harmonics of the position over its range."""
 ROWS_EACH = 12
-"""Least number of rows for each column."""
+"""Smallest number of rows per column."""
 MOVING = 1e-3
-"""Speed below which there is no direction of motion, over the largest one."""
+"""Speed relative to the largest one below which there is no direction of motion."""
 
 
 class Regressor(NamedTuple):
-    """A signal that residuals may depend on, shape (n,), with its name and type."""
+    """Signal that residuals may depend on, shape (n,), with its name and type."""
 
     name: str
     signal: Array
@@ -61,9 +61,9 @@ class Family(NamedTuple):
 
     Attributes:
         what: name of the dependence in a message: "the residuals of x depend on ...".
-        hint: likely cause of such a dependence.
-        columns: shape (n, q).
-        smoothed: whether they come from a smoothed signal, which leaves systematic errors.
+        hint: likely cause of the dependence.
+        columns: columns of the regression, shape (n, q).
+        smoothed: True for columns from a smoothed signal, which leaves systematic errors.
     """
 
     what: str
@@ -107,7 +107,7 @@ def families(regressors: Sequence[Regressor], position: Count) -> Iterator[Famil
 
 
 def _bins(signal: Array, way: Array, count: int) -> Array:
-    """Return one column for each quantile bin of `signal` and direction, (n, up to 2 count)."""
+    """Return a column for each quantile bin of `signal` and each direction, (n, up to 2 count)."""
     moving = way != 0
     if not moving.any():
         return np.zeros((signal.size, 0))
@@ -118,7 +118,7 @@ def _bins(signal: Array, way: Array, count: int) -> Array:
 
 
 def _since_reversal(v: Array, position: Count) -> Array:
-    """Return the sum of abs(v) over the samples since the last sign change or start of a run."""
+    """Return the sum of abs(v) since the last sign change or start of a run, shape (n,)."""
     way = np.sign(v)
     turned = np.ones(v.size, dtype=bool)
     turned[1:] = (way[1:] != way[:-1]) | (position[1:] == 0)
@@ -133,7 +133,7 @@ KINDS: Mapping[str, Kind] = {"x": "position", "v": "velocity", "a": "acceleratio
 
 
 def inputs_of(found: Minimum, channel: Channel) -> list[Regressor]:
-    """Return the regressors of a channel, and the simulated motion of its record."""
+    """Return the regressors of a channel and the predicted motion of its record."""
     regressors = dict[str, Regressor]()
     for name, signal in channel.regressors.items():
         stem = name.replace(".", "_").replace("[", "_").split("_")[0]
@@ -153,7 +153,7 @@ def inputs_of(found: Minimum, channel: Channel) -> list[Regressor]:
 
 
 def _rate(x: Array, t: Array, position: Count) -> Array:
-    """Return the time derivative of x, computed inside each run."""
+    """Return the time derivative of x, computed separately in each run."""
     slope = np.zeros_like(x)
     starts = np.flatnonzero(position == 0)
     for first, last in zip(starts, [*starts[1:], x.size], strict=True):
@@ -163,19 +163,19 @@ def _rate(x: Array, t: Array, position: Count) -> Array:
 
 
 SURE, UNSURE = 1e-6, 0.02
-"""p-values: below SURE the first test suffices; below UNSURE the second model is refined."""
+"""p-values: below SURE, the first test is sufficient; below UNSURE, the second model is refined."""
 
 MANY = 25
-"""Rows for each column above which a model of the remaining residuals is reliable."""
+"""Rows per column above which a model of the remaining residuals is reliable."""
 
 
 class Dependence(NamedTuple):
-    """Part of the residuals of one channel that added columns explain.
+    """Part of the residuals of one channel that is explained by added columns.
 
     Attributes:
-        statistic: F.
+        statistic: statistic F.
         p: probability of a larger F without dependence.
-        size: root mean square of the explained part of the residuals, in their unit.
+        size: root mean square of the explained part, in the unit of the residuals.
     """
 
     statistic: float
@@ -193,7 +193,7 @@ def dependences(
         J: sensitivities, shape (n, k), of any rank.
         colour: autoregressive model of r.
         regressors: signals that r may depend on.
-        position: neighbours before each row, see `positions`.
+        position: number of neighbours before each row, see `positions`.
     """
     if not np.any(r):
         return
@@ -218,8 +218,8 @@ def dependences(
 def _added(
     r: Array, basis: Array, columns: Array, partial: Array, position: Count
 ) -> Dependence | None:
-    """Return F of `columns` added to `basis`, in noise with partial autocorrelations `partial`."""
-    from scipy.special import fdtrc  # noqa: PLC0415  (SciPy is loaded by those who fit)
+    """Return F of `columns` added to `basis` for noise with partial autocorrelations `partial`."""
+    from scipy.special import fdtrc  # noqa: PLC0415  (slow to import)
 
     known = span(whitened(basis, partial, position))
     rest = _without(known, whitened(r, partial, position))
@@ -233,7 +233,7 @@ def _added(
     left = max(float(rest @ rest) - explained, np.finfo(float).tiny)
     statistic = explained / q / (left / free)
     weights, *_ = np.linalg.lstsq(clean, rest, rcond=1e-6)
-    part = _without(basis, columns @ weights)  # of the residuals before whitening
+    part = _without(basis, columns @ weights)  # explained part before whitening
     size = float(np.sqrt(np.mean(part**2)))
     return Dependence(statistic, float(fdtrc(q, free, statistic)), size)
 

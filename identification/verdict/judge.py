@@ -1,14 +1,15 @@
-"""Assess a fit by its residuals.
+"""Assessment of a fit by its residuals.
 
-A least-squares fit reaches a minimum for any model. The residuals of a correct model are noise,
-independent of inputs and motion; ideally white noise with the size of the sensor noise. Therefore
+A least-squares fit reaches a minimum for any model. The residuals of a correct model are noise that
+is independent of inputs and motion, ideally white noise with the size of the sensor noise.
+Therefore
 
-* dependence on inputs, speed, direction, position or history makes a fit doubtful: the model is
-  wrong;
-* so do residuals larger than a given noise level;
-* so does a signal that is almost entirely unexplained, even if its residuals look like noise, and
-  a value at its bound if much is unexplained;
-* autocorrelation alone does not: the intervals account for it, see `covariance`;
+* dependence on inputs, speed, direction, position or history makes a fit doubtful, because the
+  model is wrong;
+* residuals larger than a given noise level make it doubtful;
+* a signal that is almost entirely unexplained makes it doubtful, even if its residuals look like
+  noise; so does a value at its bound if much is unexplained;
+* autocorrelation alone does not, because the intervals account for it, see `covariance`;
 * errors in the data, a mass at its bound, or residuals as large as the signal make a result
   implausible.
 
@@ -36,16 +37,16 @@ from identification.verdict.minimum import Minimum, minimum, positions
 from symfric.foundation.status import Status
 
 ROUNDING = 1e-6
-"""Error of simulation and interpolation, over the range of a signal."""
+"""Error of simulation and interpolation, relative to the range of a signal."""
 BALANCE = 1e-3
-"""The same for a force, limited by filtering and differentiation of the motion."""
+"""The same error for a force, limited by filtering and differentiation of the motion."""
 FORCES = ("N", "N m")
 
 
 def resolution(measured: Array, unit: str) -> float:
-    """Return the rms error of rounding and of simulation, in the unit of the signal.
+    """Return the rms error of rounding and simulation, in the unit of the signal.
 
-    A signal is rounded if its values are multiples of the smallest step between two of them.
+    A signal is rounded if its values are multiples of the smallest step between them.
     """
     values = np.unique(measured)
     reach = float(values[-1] - values[0])
@@ -62,20 +63,21 @@ def resolution(measured: Array, unit: str) -> float:
 
 
 FIRST = 0.05
-"""Initial share of a record that is compared with the rest."""
+"""Initial share of a record that is compared with the remaining record."""
 FEWEST = 8
-"""Fewest samples of that share for the test."""
+"""Smallest number of initial samples for the comparison."""
 LARGER = 4.0
-"""Ratio of initial residuals to the others above which a message is given; Gaussian residuals,
+"""Ratio of initial residuals to later ones above which a message is given; Gaussian residuals,
 white or autocorrelated, exceed it in 1 of 10 000 cases.
 """
 
 
 def beginnings(found: Minimum) -> Iterator[str]:
-    """Yield a message for each channel whose first residuals are much larger than the others.
+    """Yield a message for each channel whose first residuals are much larger than later ones.
 
-    Limits: records in order of time with a velocity among the regressors. A model that is wrong
-    at the beginning for another reason, such as a decay from its largest swing, looks the same.
+    Limits: only records in order of time with a velocity among the regressors. A model that is
+    wrong at the beginning for another reason, such as a decay from its largest swing, gives the
+    same message.
     """
     for channel in found.channels:
         v, r = channel.regressors.get("v"), found.r[channel.rows]
@@ -95,20 +97,20 @@ def beginnings(found: Minimum) -> Iterator[str]:
 ALARM = 0.02
 """Probability of a false alarm over all tests of a fit."""
 WHITE = 0.05
-"""Level of the test for white noise of one channel, which does not affect the verdict."""
+"""Level of the test of one channel for white noise, which does not affect the verdict."""
 SHARE = 0.05
-"""Share of the variance of the residuals above which a dependence counts."""
+"""Share of the variance of the residuals below which a dependence is ignored."""
 SMOOTHED = 5e-3
-"""Size of a dependence on a smoothed acceleration that is ignored, over the range of a signal."""
+"""Size of an ignored dependence on a smoothed acceleration, relative to the range of a signal."""
 UNEXPLAINED = 0.7
-"""Residuals over the spread of the signal above which a model explains almost nothing."""
+"""Ratio of residuals to the spread of the signal above which a model explains almost nothing."""
 LITTLE = 0.9
-"""The same without a value at a bound: the fit rests on a fifth of the variance."""
+"""The same ratio without a value at a bound; the fit then explains a fifth of the variance."""
 CHANCE = 10.0
-"""Smallest ratio of explained variance to that of as many regressors of pure noise."""
+"""Smallest ratio of the explained variance to that of as many regressors of pure noise."""
 INERTIA = ("kg", "kg m^2")
 NEARLY = 0.1
-"""Largest remaining gain of an unfinished search, over the cost, at which failed tests count."""
+"""Predicted gain of an unfinished search, relative to the cost, below which tests are valid."""
 
 
 @final
@@ -117,16 +119,16 @@ class Test:
     """Result of one test of the residuals.
 
     Attributes:
-        channel: signal, with the number of its record if there are several: "force[2]".
+        channel: signal, with the index of its record if there are several: "force[2]".
         name: "whiteness", "independence of ...", "size", "explained", "bound".
         statistic, p: statistic, and the probability of a larger one if the model is correct.
         limit: p below which the test fails; for `size` and `explained` the limit of the statistic.
         passed: True unless the test failed.
-        decides: whether failing makes the fit doubtful.
-        sentence: the finding.
+        decides: True if failing makes the fit doubtful.
+        sentence: result as a sentence.
     """
 
-    __test__ = False  # not one of pytest
+    __test__ = False  # this class is no test for pytest
 
     channel: str
     name: str
@@ -145,10 +147,10 @@ class Verdict:
 
     Attributes:
         tests: all tests.
-        effective: number of independent samples of each channel.
-        whiteness: autocorrelations of each channel with their limits, for a plot over lags.
-        nonsense: reasons why the result is physically implausible; empty if there are none.
-        sentences: messages for the reader, worst first.
+        effective: channel -> number of independent samples.
+        whiteness: channel -> autocorrelations and their limits, for a plot over lags.
+        nonsense: reasons why the result is physically implausible; empty without such reasons.
+        sentences: messages for the user in order of decreasing severity.
     """
 
     tests: tuple[Test, ...]
@@ -163,13 +165,13 @@ class Verdict:
         return not self.nonsense and all(t.passed for t in self.tests if t.decides)
 
     def status(self, solved: Status, gain: float = inf) -> Status:
-        """Return the status of the fit from that of the solver.
+        """Return the status of the fit, given that of the solver.
 
         Args:
             solved: status of the solver.
-            gain: predicted gain of a further step, over the cost, if the solver ran out of
-                evaluations. If it is small, a model that fails its tests is doubtful, as at
-                a minimum; if it is large, or the tests pass, the fit is unfinished.
+            gain: predicted gain of a further step relative to the cost, if the solver ran out of
+                evaluations. If the gain is small, a model that fails its tests is doubtful, as at
+                a minimum. If it is large, or if the tests pass, the fit is unfinished.
         """
         if self.good:
             return solved
@@ -255,11 +257,11 @@ def _independent(
 
 
 def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
-    """Compare residuals with a given noise level: chi2 with the effective number of samples.
+    """Compare residuals with a given noise level by chi2 with the effective number of samples.
 
-    With a robust loss, outliers count with their reduced weight.
+    With a robust loss, outliers have their reduced weight.
     """
-    from scipy.special import chdtrc  # noqa: PLC0415  (SciPy is loaded by those who fit)
+    from scipy.special import chdtrc  # noqa: PLC0415  (slow to import)
 
     sigma = found.noise.get(channel.signal)
     if sigma is None:
@@ -280,7 +282,7 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
 
 
 def _left(found: Minimum) -> Iterator[tuple[str, float, float]]:
-    """Yield each signal, the sum of squares of its residuals, and that of the centred signal."""
+    """Yield each signal with the sums of squares of its residuals and of the centred signal."""
     for signal in dict.fromkeys(c.signal for c in found.channels):
         some = [c for c in found.channels if c.signal == signal]
         left = sum(float(np.sum(found.raw[c.rows] ** 2)) for c in some)
@@ -305,7 +307,7 @@ def _explained(found: Minimum) -> Iterator[Test]:
 def _unexplained(found: Minimum, effective: Mapping[str, float]) -> Iterator[str]:
     """Yield a message for each signal that is almost entirely unexplained.
 
-    A correct model leaves much of a mostly noisy signal unexplained; but it explains many times the
+    A correct model, too, leaves much of a noisy signal unexplained. But it explains many times the
     share k / n_eff that any k parameters explain of n_eff independent samples of noise.
     """
     for signal, left, there in _left(found):

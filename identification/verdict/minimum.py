@@ -1,8 +1,8 @@
 """Arrays at the minimum of a fit, and the combinations of parameters that are not identifiable.
 
-Along a null direction the residuals do not change. If two values grow by the same factor along it,
-only their ratio is identifiable; if they grow by the same amount, only their difference. If both
-descriptions fit at one point, the residuals are evaluated at a small distance along both.
+The residuals do not change along a null direction. If two values grow by the same factor along it,
+only their ratio is identifiable; if they grow by the same amount, only their difference is. If both
+descriptions fit at one point, the residuals are evaluated a small distance away along both.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,15 +19,15 @@ from identification.unknowns.spec import Unknown
 Count = NDArray[np.int64]
 
 JITTER = 0.5
-"""Relative deviation from the usual step above which the next row is no neighbour."""
+"""Relative deviation from the usual step above which consecutive rows are not neighbours."""
 
 
 def positions(channel: Channel, *, across_windows: bool = False) -> Count:
     """Return the number of consecutive neighbours in time before each row, shape (n,).
 
-    0 starts a run: at the first row, at a break, where time jumps or repeats, and everywhere if the
-    channel is unordered. `across_windows` continues a run over the breaks of windows if time
-    continues: the noise of a sensor does not depend on windows.
+    A run starts with 0: at the first row, at a break, where time jumps or repeats, and everywhere
+    if the channel is unordered. With `across_windows`, a run continues over the breaks of windows
+    if time continues, because the noise of a sensor does not depend on windows.
     """
     n = channel.t.size
     if not channel.ordered:
@@ -42,9 +42,10 @@ def positions(channel: Channel, *, across_windows: bool = False) -> Count:
 
 
 def places(channel: Channel) -> Count:
-    """Return the index of each row on the grid of the usual step, shape (n,); equal times share it.
+    """Return the index of each row on the grid of the usual step, shape (n,).
 
-    If the times are not on a grid, rows are counted, with one number left out at every gap.
+    Rows of equal time have the same index. If the times are not on a grid, rows are counted, with
+    one index left out at every gap.
     """
     n = channel.t.size
     if not channel.ordered or n < 2:
@@ -57,13 +58,13 @@ def places(channel: Channel) -> Count:
 
 
 def lagged(signal: Array, position: Count, lag: int) -> Array:
-    """Return `signal` delayed by `lag` rows; before the start of a run, its first value."""
+    """Return `signal` delayed by `lag` rows; before the start of a run it has its first value."""
     back = np.minimum(position, lag)
     return signal[np.arange(signal.shape[0]) - back]
 
 
 def _step(t: Array) -> float:
-    """Return the usual distance of two rows."""
+    """Return the usual step between consecutive rows."""
     steps = np.diff(t)
     steps = steps[steps > 0]
     return float(np.median(steps)) if steps.size else 1.0
@@ -72,19 +73,19 @@ def _step(t: Array) -> float:
 @final
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """A minimum of weighted least squares over n coordinates w, with k values that depend on them.
+    """Minimum of weighted least squares over n coordinates w, with k values that depend on them.
 
     Attributes:
         channels: groups of rows.
         unknowns: one for each coordinate, shape (n,).
         names, values: arguments of the residuals, shape (k,).
         slope: dvalues/dw, shape (k, n).
-        held: whether each coordinate is at a bound, shape (n,).
-        r: weighted residuals; with a robust loss their influence function, shape (rows,).
+        held: mask of coordinates at a bound, shape (n,).
+        r: weighted residuals; with a robust loss, their influence function, shape (rows,).
         J: dr/dw of the weighted residuals before the loss, shape (rows, n).
         gain: derivative of the influence function; one for squares, shape (rows,).
         raw: predicted - measured in SI units, shape (rows,).
-        noise: signal -> standard deviation of its noise, if known.
+        noise: signal -> standard deviation of its noise, if given.
     """
 
     channels: Sequence[Channel]
@@ -100,7 +101,7 @@ class Minimum:
     noise: Mapping[str, float]
 
     def label(self, channel: Channel) -> str:
-        """Return the name of a channel for a message."""
+        """Return the name of a channel for messages."""
         records = {c.record for c in self.channels}
         return channel.signal if len(records) == 1 else f"{channel.signal}[{channel.record}]"
 
@@ -126,7 +127,7 @@ def minimum(task: Task, point: Point) -> Minimum:
 
 
 def shift(task: Task, found: Minimum) -> Callable[[Array], float]:
-    """Return a function of the values: norm of the change of the weighted residuals."""
+    """Return a function of the values: the norm of the change of the weighted residuals."""
 
     def change(values: Array) -> float:
         there = task.residuals.at(values)
@@ -137,14 +138,14 @@ def shift(task: Task, found: Minimum) -> Callable[[Array], float]:
 
 
 Shift = Callable[[Array], float]
-"""Values -> norm of the change of the residuals."""
+"""Function from values to the norm of the change of the residuals."""
 
 SHARE = 1e-4
-"""Share of a direction below which a value does not take part in it."""
+"""Component of a direction below which a value does not take part in it."""
 NEAR = 1e-2
-"""Distance from whole numbers that is ignored."""
+"""Deviation from integers that is ignored."""
 STEP = 0.05
-"""Relative change of values used to compare two descriptions."""
+"""Relative change of values at which two descriptions are compared."""
 
 
 def groups(
@@ -153,11 +154,11 @@ def groups(
     """Yield each group of values that the residuals do not determine, with a message.
 
     Args:
-        names: of the values.
-        values: at the minimum, shape (k,).
+        names: names of the values.
+        values: values at the minimum, shape (k,).
         null: independent directions of the values that leave the residuals unchanged, (k, nullity).
         size: sensitivity of the residuals to each value alone, above zero, shape (k,).
-        change: norm of the change of the residuals, evaluated at nearby values.
+        change: norm of the change of the residuals, a function of the values.
     """
     scaled = null * size[:, None]
     scaled = scaled / np.maximum(np.linalg.norm(scaled, axis=0), 1e-300)
@@ -195,7 +196,7 @@ def groups(
 
 
 def _combination(names: Sequence[str], here: Array, g: Array, moved: Shift) -> str:
-    """Return the combination g'values of the values `here` as text."""
+    """Return as text the combination whose gradient at the values `here` is g."""
     powers, weights = _small_integers(g * here), _small_integers(g)
     if powers is not None and weights is not None:
         factor, amount = np.zeros(here.size), np.zeros(here.size)
@@ -228,7 +229,7 @@ def _combination(names: Sequence[str], here: Array, g: Array, moved: Shift) -> s
 
 
 def _small_integers(g: Array) -> Array | None:
-    """Return g over its smallest entry if that gives small integers, the first one positive."""
+    """Return g over its smallest entry if all are small integers, the first one positive."""
     smallest = float(np.abs(g).min())
     if not smallest > 1e-12 * float(np.abs(g).max()):
         return None

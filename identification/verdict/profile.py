@@ -1,11 +1,11 @@
-"""Profile likelihood: increase of the cost when one value is held elsewhere and the others adapt.
+"""Profile likelihood: increase of the cost when one value is held and the other values adapt.
 
     rise(c) = min over the others of  [cost(value = c) - cost at the minimum] / (s^2 kappa)
 
-s^2 is the variance of the weighted residuals and kappa the factor by which their autocorrelation
+s^2 is the variance of the weighted residuals. kappa is the factor by which their autocorrelation
 widens the linear interval. The interval in which rise <= t^2 (Student's t, 95 %) agrees with that
-of `Covariance` if the model is linear, and also holds if it is not. Noise levels stay those of the
-fit. The value moves away from its minimum to both sides; each point starts from the previous one.
+of `Covariance` if the model is linear, and is also valid if it is not. Noise levels are those of
+the fit. The value moves away from its minimum to both sides; each point starts at the previous one.
 Sources: Bates and Watts, Nonlinear Regression Analysis, 1988, chapter 6; Raue et al.,
 Bioinformatics 25(15), 2009.
 """
@@ -28,31 +28,31 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FARTHEST = 12
-"""Largest number of additional steps to one side."""
+"""Largest number of additional steps to each side."""
 FLAT = 0.02
-"""Share of the limit below which a profile counts as flat."""
+"""Rise relative to the limit below which a profile is flat."""
 BLIND = 0.1
-"""First step, over the value, without a linear standard error."""
+"""First step relative to the value, if there is no linear standard error."""
 EVALUATIONS = 30
-"""Largest number of residual evaluations for one point."""
+"""Largest number of residual evaluations at one point."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """The profile of one value.
+    """Profile of one value.
 
     Attributes:
-        name, unit: of the value.
-        best: the value of the fit.
-        values: in increasing order, `best` among them, shape (n,).
+        name, unit: name and unit of the value.
+        best: value of the fit.
+        values: values in increasing order, including `best`, shape (n,).
         rise: increase of the cost in variances, shape (n,).
         others: all values at each point, shape (n, k).
-        names: of the columns of `others`.
-        limit: of the rise, at the ends of the 95 % interval.
+        names: names of the columns of `others`.
+        limit: rise at the ends of the 95 % interval.
         low, high: 95 % interval; None if the limit was not reached.
-        logarithmic: whether steps are taken in the logarithm.
-        sentences: messages for the reader: open or flat sides, a better minimum.
+        logarithmic: True if steps are taken in the logarithm.
+        sentences: messages for the user: open or flat sides, a better minimum.
     """
 
     name: str
@@ -83,15 +83,15 @@ class Profile:
         return " ".join([text, *self.sentences])
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all fields as plain data, ready for JSON."""
+        """Return all fields as plain data for JSON."""
         arrays = {n: getattr(self, n).tolist() for n in ("values", "rise", "others")}
         return self.__dict__ | arrays | {n: list(getattr(self, n)) for n in ("names", "sentences")}
 
     def plot(self, path: str | Path | None = None) -> "Figure":
-        """Plot the rise over the value, with the 95 % limit.
+        """Plot the rise over the value with the 95 % limit.
 
         Args:
-            path: image file.
+            path: image file to write.
         """
         from symfric.foundation.panels import panels, save  # noqa: PLC0415 (Matplotlib is slow)
         from symfric.foundation.style import colour  # noqa: PLC0415
@@ -117,12 +117,12 @@ class Profile:
 def profile(
     task: Task, point: Point, covariance: Covariance, name: str, points: int = 5
 ) -> Profile:
-    """Move one value away from its minimum until the fit is worse than the 95 % limit.
+    """Move one value away from its minimum until the rise of the cost reaches the 95 % limit.
 
     Args:
-        task, point: the solved task and its minimum.
-        covariance: its linear intervals; they give steps and the limit.
-        name: of the value.
+        task, point: solved task and its minimum.
+        covariance: linear intervals, which determine steps and limit.
+        name: name of the value.
         points: approximate number of points to each side.
 
     Raises:
@@ -145,14 +145,14 @@ def profile(
 
 
 Station = tuple[float, float, Array]
-"""Value, rise, all values."""
+"""Value, rise, and all values at a point of a profile."""
 
 
 class _Walk:
-    """A profile on its way away from the minimum."""
+    """Computation of a profile, step by step away from the minimum."""
 
     def __init__(self, task: Task, point: Point, covariance: Covariance, name: str) -> None:
-        from scipy.special import stdtrit  # noqa: PLC0415  (SciPy is loaded by those who fit)
+        from scipy.special import stdtrit  # noqa: PLC0415  (slow to import)
 
         box = task.unknowns
         self.task, self.point, self.name = task, point, name
@@ -172,7 +172,7 @@ class _Walk:
         self.limit = t**2
 
     def side(self, direction: int, points: int) -> tuple[list[Station], float | None, str]:
-        """Return the stations on one side, nearest first, the value at the limit, or why not."""
+        """Return the stations of one side, nearest first; the value at the limit; or a message."""
         stations, w = list[Station](), self.point.w
         distance, step, why = 0.0, self.step / (points - 1), "the end of the search"
         for count in range(FARTHEST + points):
@@ -194,7 +194,7 @@ class _Walk:
             stations.append((c, rise, found.values))
             if rise >= self.limit:
                 return stations, self.crossing(stations), ""
-            if count >= points:  # the linear theory was too short: increase the step
+            if count >= points:  # the linear interval was too short
                 step *= 1.6
         where = "below" if direction < 0 else "above"
         if not stations:
@@ -205,7 +205,7 @@ class _Walk:
         return stations, None, f"{self.name} is {how} {where}: at {value:.4g}, near {why}, {share}."
 
     def crossing(self, stations: list[Station]) -> float:
-        """Return the value at the limit, by interpolation of the square root of the rise."""
+        """Return the value at the limit by interpolation of the square root of the rise."""
         (last, before, _), (value, rise, _) = [(self.best, 0.0, self.point.w), *stations][-2:]
         a, b = (float(np.sqrt(max(x, 0.0))) for x in (before, rise))
         share = (float(np.sqrt(self.limit)) - a) / max(b - a, 1e-300)
@@ -215,12 +215,12 @@ class _Walk:
 
 
 def held_at(task: Task, w: Array, index: int, own: int, c: float) -> Point | str:
-    """Minimise over the others with value `index` held at c, from `w`; a reason if impossible.
+    """Minimise over the other values with value `index` held at c; return a message on failure.
 
-    The coordinate of the value is eliminated: w_own solves value(w) = c. The derivatives become
-    J_j - J_own (dvalue/dw_j) / (dvalue/dw_own).
+    The search starts at `w`. The coordinate of the value is eliminated: w_own solves value(w) = c.
+    The derivatives become J_j - J_own (dvalue/dw_j) / (dvalue/dw_own).
     """
-    optimize: Any = import_module("scipy.optimize")  # slow to import, and seldom needed
+    optimize: Any = import_module("scipy.optimize")  # slow to import
     box, others = task.unknowns, np.arange(w.size) != own
     best: list[Point] = []
     why = ""
@@ -262,7 +262,7 @@ def held_at(task: Task, w: Array, index: int, own: int, c: float) -> Point | str
 
 
 def _solved(task: Task, near: Array, index: int, own: int, c: float) -> Array | None:
-    """Return `near` with coordinate `own` solved for value c; None outside its bounds."""
+    """Return `near` with coordinate `own` solved for the value c; None if outside its bounds."""
     box, w = task.unknowns, near.copy()
     for _ in range(30):
         miss = c - float(box.values(w)[index])
