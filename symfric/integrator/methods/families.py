@@ -1,8 +1,9 @@
 """Families of methods: Rosenbrock, Radau IIA, backward Euler, explicit Runge-Kutta, exponential.
 
-Rosenbrock methods have linearly implicit stages with one factorisation a step; Radau IIA
-collocation is solved by simplified Newton iterations in the eigenbasis of its matrix; backward
-Euler, by Newton's method, is for plants in fixed steps. The others have no iteration matrix.
+Rosenbrock methods have linearly implicit stages and one factorisation per step. Radau IIA
+collocation is solved by simplified Newton iterations in the eigenbasis of its matrix. Backward
+Euler, solved by Newton's method, is for plants in fixed steps. The other families have no iteration
+matrix.
 """
 
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ class Rosenbrock(Method):
 
         W k_i = f(y_0 + sum_j a_ij k_j) + M sum_j (c_ij / h) k_j,      i = 1 ... s
 
-    y_1 is the last stage's argument plus k_s, and k_s is the error estimate.
+    y_1 is the argument of the last stage plus k_s, and k_s is the error estimate.
 
     Attributes:
         gamma: diagonal coefficient of all stages.
@@ -46,15 +47,15 @@ class Rosenbrock(Method):
         return self.gamma
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
+        """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
         return len(self.A), 1, 1
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Return the factors of the iteration matrix, and for a tiny step."""
+        """Return the factors of the iteration matrix W, and of W for a tiny step."""
         return blocks(system, self.gamma).factors, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
-        """Return its steps on a system."""
+        """Return the steps of the method on `system`."""
         block, A, C = blocks(system, self.gamma), self.A, self.C
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
@@ -79,16 +80,17 @@ class Rosenbrock(Method):
 class Radau(Method):
     """Radau IIA with three stages and a fixed number of Newton iterations.
 
-        M Z_i = h sum_j a_ij f(y_0 + Z_j),      y_1 = y_0 + Z_3
+            M Z_i = h sum_j a_ij f(y_0 + Z_j),      y_1 = y_0 + Z_3
 
-    The polynomial through y_0 and all y_0 + Z_i is the dense output. The error estimate is
-    (gamma M / h - J)^-1 [f(y_0) + M sum_j (e_j / h) Z_j].
+    The polynomial through y_0 and all y_0 + Z_i is the dense output. The error estimate is (gamma M
+    / h - J)^-1 [f(y_0) + M sum_j (e_j / h) Z_j].
 
     Attributes:
         c: nodes, shape (3,).
-        E: error weights, shape (3,).
-        iterations: simplified Newton iterations a step. Each gains two orders in the states and one
-            in the algebraic unknowns, so these get one more.
+        E: error weights e_j, shape (3,).
+        iterations: simplified Newton iterations per step. Each iteration gains two orders in the
+            states and one in the algebraic unknowns; systems with algebraic unknowns therefore get
+            one more.
     """
 
     c: Array
@@ -105,28 +107,32 @@ class Radau(Method):
 
     @property
     def diagonal(self) -> float:
-        """Coefficient gamma of its real block."""
+        """Coefficient gamma of the real block."""
         return 1 / eigenbasis(self.A).gamma
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
+        """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
         return 3 * self._iterations(system) - 2, 1, 2
 
     def _iterations(self, system: System) -> int:
         return self.iterations + bool(system.algebraic[0])
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Return the factors of the real and the complex iteration matrix, and for a tiny step."""
+        """Return the factors of the real and the complex iteration matrix, and of W for a tiny
+        step.
+        """
         basis = eigenbasis(self.A)
         own = blocks(system, self.diagonal).factors, pair(system, basis.alpha, basis.beta).factors
         return *own, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
-        """Return its steps on a system: z = T w is iterated from 0 with the Jacobian at y_0."""
+        """Return the steps of the method on `system`; z = T w, iterated from 0 with the Jacobian at
+        y_0.
+        """
         basis = eigenbasis(self.A)
         block, other = blocks(system, self.diagonal), pair(system, basis.alpha, basis.beta)
         n, T, inverse = system.n, basis.T, np.linalg.inv(basis.T)
-        # the residual of algebraic equations at the start of a step is not an error of the step
+        # residuals of algebraic equations at the start are not errors of the step
         rates = ca.DM([float(i not in system.algebraic[0]) for i in range(n)])
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
@@ -180,9 +186,9 @@ class Pair(NamedTuple):
     """Complex iteration matrix W = (alpha - i beta) M/h - J as a real one of twice the size.
 
     Attributes:
-        factor: (y, h, d) -> its factors.
+        factor: (y, h, d) -> factors of W.
         solve: (factors, right, memory) -> k with W k = right + M memory.
-        factors: W, and its pivots.
+        factors: W and the pivot order of its factors.
     """
 
     factor: ca.Function
@@ -218,14 +224,14 @@ def pair(system: System, alpha: float, beta: float) -> Pair:
 class BackwardEuler(Method):
     """Backward Euler, M (y_1 - y_0) = h f(y_1), by a fixed number of Newton iterations from y_0.
 
-    The Jacobian is new in every iteration: if a contact changes between sticking and sliding, the
-    Jacobian at the start does not describe the end.
+    Every iteration evaluates the Jacobian anew: if a contact changes between sticking and sliding,
+    the Jacobian at the start of the step does not describe the end.
     """
 
     iterations: int
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
+        """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
         return self.iterations, self.iterations, self.iterations
 
     def factors(self, system: System) -> tuple[Factors, ...]:
@@ -233,7 +239,7 @@ class BackwardEuler(Method):
         return (blocks(system, 1.0).factors,)
 
     def trials(self, system: System) -> Trials:
-        """Return its steps on a system."""
+        """Return the steps of the method on `system`."""
         block = blocks(system, 1.0)
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
@@ -251,15 +257,15 @@ class BackwardEuler(Method):
 class Explicit(Method):
     """Explicit Runge-Kutta pair.
 
-        k_i = h f(y_0 + sum_j a_ij k_j),      i = 1 ... s
+            k_i = h f(y_0 + sum_j a_ij k_j),      i = 1 ... s
 
-    y_1 is the last stage's argument, sum_j e_j k_j the error estimate. Accelerations and
-    multipliers are solved for at each stage if they are linear (`eliminated`): they have no error
-    estimate, and are interpolated linearly between steps.
+    y_1 is the argument of the last stage, and sum_j e_j k_j is the error estimate. Accelerations
+    and multipliers are solved for at each stage if the equations are linear in them (`eliminated`).
+    They have no error estimate, and are interpolated linearly between steps.
 
     Attributes:
         A: strictly lower triangular, shape (s, s).
-        E: error weights, shape (s,).
+        E: error weights e_j, shape (s,).
     """
 
     A: Array
@@ -267,15 +273,15 @@ class Explicit(Method):
     dae: ClassVar[bool] = False
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
+        """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
         return len(self.A), 0, 0 if system.is_ode else len(self.A)
 
     def trials(self, system: System) -> Trials:
-        """Return its steps on a system.
+        """Return the steps of the method on `system`.
 
         Raises:
-            ValueError: algebraic unknowns other than those of a mechanism in which they are
-                linear, or a mass matrix.
+            ValueError: the system has a mass matrix, or algebraic unknowns other than those of a
+                mechanism whose equations are linear in them.
         """
         settle, rates = eliminated(system) or (None, None)
         if rates is None:
@@ -297,12 +303,14 @@ class Explicit(Method):
 
 @lru_cache(maxsize=2)
 def eliminated(system: System) -> tuple[ca.Function, ca.Function] | None:
-    """Return (y, d) -> y with the algebraic unknowns of its states, and (y, d) -> f, zero in the
-    algebraic rows; None without such unknowns, or if these are not linear or lack known pivots.
+    """Return the elimination of algebraic unknowns, (y, d) -> y, and the rates, (y, d) -> f.
 
-    Accelerations and multipliers of a mechanism without friction from its reactions satisfy
+    The first Function sets the algebraic unknowns to those of the states; f is zero in the
+    algebraic rows. The result is None for a system without algebraic unknowns, or if its equations
+    are not linear in them or have no known pivots. In a mechanism without friction from its
+    reactions, accelerations and multipliers satisfy
 
-        0 = g(x, z) = G(x) z + g(x, 0),        z = -G(x)^-1 g(x, 0)
+            0 = g(x, z) = G(x) z + g(x, 0),        z = -G(x)^-1 g(x, 0)
 
     A singular G gives numbers that are not finite, and the step is rejected.
     """
@@ -330,7 +338,7 @@ def need_ode(system: System, method: str) -> None:
     """Check that a method without iteration matrix can integrate `system`.
 
     Raises:
-        ValueError: algebraic unknowns, or a mass matrix other than the identity.
+        ValueError: the system has algebraic unknowns, or a mass matrix other than the identity.
     """
     if system.is_ode:
         return
@@ -343,16 +351,16 @@ def need_ode(system: System, method: str) -> None:
 
 
 SMALL = 1e-2
-"""Below this |x| the series replaces the quotient; its next term is 4e-14 of the sum."""
+"""Value of |x| below which the series replaces the quotient; its next term is 4e-14 of the sum."""
 
 
 def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Return exp x, phi1 = (exp(x) - 1) / x and phi2 = (phi1 - 1) / x, element by element.
 
-    They are the weights of the rate in the end value and in the mean of a solution of
-    dz/dt = a + b z over a step: z(h) = z + h phi1(b h) dz/dt, mean z = z + h phi2(b h) dz/dt.
-    Values and derivatives are correct at zero, too; exp is 0 far below zero, and its error is one
-    unit in the last place of 1, not of exp itself.
+    They weight the rate in the end value and in the mean of a solution of dz/dt = a + b z over a
+    step: z(h) = z + h phi1(b h) dz/dt, mean z = z + h phi2(b h) dz/dt. Values and derivatives are
+    correct at zero, too. Far below zero exp is 0; its error is one unit in the last place of 1, not
+    of exp itself.
     """
     near = ca.fabs(x) < SMALL
     divisor, beyond = ca.if_else(near, 1.0, x), ca.expm1(x)
@@ -366,25 +374,26 @@ def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Exponential(Method):
-    """Exponential Euler, each equation linearised in its own unknown.
+    """Exponential Euler, with each equation linearised in its own unknown.
 
-        y_i+ = y_i + h phi1(h df_i/dy_i) f_i(y)
+            y_i+ = y_i + h phi1(h df_i/dy_i) f_i(y)
 
-    It is exact if an equation is linear in its unknown and nothing else changes, however fast it is
-    (the bristles of LuGre at a given velocity); the coupling of unknowns is explicit.
+    The method is exact, however fast the equation, if an equation is linear in its unknown and
+    nothing else changes (the bristles of LuGre at a given velocity). The coupling of unknowns is
+    explicit.
     """
 
     dae: ClassVar[bool] = False
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
+        """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
         return 1, 1, 0
 
     def trials(self, system: System) -> Trials:
-        """Return its steps on a system.
+        """Return the steps of the method on `system`.
 
         Raises:
-            ValueError: algebraic unknowns, or a mass matrix other than the identity.
+            ValueError: the system has algebraic unknowns, or a mass matrix other than the identity.
         """
         need_ode(system, self.name)
         h = ca.SX.sym("h")
