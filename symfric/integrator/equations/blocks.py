@@ -47,8 +47,8 @@ NONE = ca.SX(0, 1)
 class Slopes(NamedTuple):
     """Jacobian of a system, bordered by the derivatives of its inner unknowns l, if any.
 
-            [ f_y  f_l     ]
-            [ g_y  g_l - I ]
+        [ f_y  f_l     ]
+        [ g_y  g_l - I ]
 
     Attributes:
         J: bordered Jacobian with a symbol for every entry that is not constant.
@@ -226,7 +226,7 @@ class Following(NamedTuple):
     contraction: float
 
     def __call__(self, y: Array, d: Array) -> Array | None:
-        """Return `y` with its algebraic unknowns at run data `d`; None if this needs a full search."""
+        """Return `y` updated to the run data `d`; None if a full search is needed."""
         now, after, look = y.copy(), np.empty(y.size), np.empty(3)
         data = np.ascontiguousarray(d, dtype=float)
         call = bound(self.round, (now, data), (after, look))

@@ -145,7 +145,7 @@ def divided_once(expression: ca.SX) -> ca.SX:
 
 Array = NDArray[np.float64]
 MOST_NUMBERS = 1000
-"""Count of numbers above which an expression is a table, and stays unchanged."""
+"""Count of numbers above which an expression is treated as a table, and stays unchanged."""
 
 
 def lifted(expression: ca.SX, known: ca.SX, name: str) -> tuple[ca.SX, ca.SX, Array]:
@@ -295,8 +295,7 @@ def _peaks(level: NDArray[np.intp], values: Array) -> list[int]:
 
 
 def levels(values: Array) -> NDArray[np.intp]:
-    """Return, for each interval of a grid, how often the span is halved to get a nearly linear
-    piece.
+    """Return the number of halvings of the span for a nearly linear piece at each grid interval.
 
     The grid has 2^k + 1 values.
     """

@@ -12,9 +12,9 @@ Each accepted step ends on the constraints:
 
 Limits: impacts are excluded, and so are tangential shocks (Painleve), in which friction makes the
 reactions grow a thousandfold (`SHOCK`): both end a run. A step across a position in which phi_q
-loses rank is rejected, because the motion beyond it is not determined; the sign of det(phi_q(q1)
-phi_q(q0)') changes there. Two such positions within one step are not detected, nor is a step that
-ends on another branch.
+loses rank is rejected, because the motion beyond it is not determined; there the sign of
+det(phi_q(q1) phi_q(q0)') changes. Two such positions within one step are not detected, nor is a
+step that ends on another branch.
 """
 
 from dataclasses import dataclass
@@ -31,12 +31,13 @@ from symfric.model.holonomic import Holonomic
 
 Array = NDArray[np.float64]
 DEPENDENT = 1e-4
-"""Ratio of singular values of phi_q below which a mechanism that cannot continue is reported as
-singular: at tight tolerances, rounding stops the run at this distance from the singularity.
+"""Ratio of singular values of phi_q below which a mechanism that cannot continue is called
+singular.
+
+At tight tolerances, rounding stops a run at this distance from the singularity.
 """
 PULLING = 1e-3
-"""Fraction of the typical size up to which a negative normal force counts as an integration error.
-"""
+"""Fraction of their typical size up to which negative normal forces are integration errors."""
 SHOCK = 1e-3
 """Smallest accepted pivot of I - dN/dN, which is 1 without friction.
 
@@ -46,8 +47,9 @@ sliding velocity: without this limit the tolerance would decide which runs pass.
 stay above 0.4, machines near jamming above 0.02 (`tests/symfric/stress/test_jamming.py`).
 """
 ITERATIONS, NEARBY = (4, 3), (2, 2)
-"""Numbers of Newton iterations with frozen derivatives, on positions and on velocities: they reduce
-an error of 1e-3, or of 1e-5, to 1e-13.
+"""Numbers of Newton iterations with frozen derivatives, on positions and on velocities.
+
+They reduce an error of 1e-3, or of 1e-5, to 1e-13.
 """
 
 

@@ -2,8 +2,7 @@
 
 Rosenbrock methods have linearly implicit stages and one factorisation per step. Radau IIA
 collocation is solved by simplified Newton iterations in the eigenbasis of its matrix. Backward
-Euler, solved by Newton's method, is for plants in fixed steps. The other families have no iteration
-matrix.
+Euler is solved by Newton's method, for plants in fixed steps. The others have no iteration matrix.
 """
 
 from dataclasses import dataclass
@@ -51,7 +50,7 @@ class Rosenbrock(Method):
         return len(self.A), 1, 1
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Return the factors of the iteration matrix W, and of W for a tiny step."""
+        """Return the factors of the iteration matrix, and for a tiny step."""
         return blocks(system, self.gamma).factors, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
@@ -80,17 +79,16 @@ class Rosenbrock(Method):
 class Radau(Method):
     """Radau IIA with three stages and a fixed number of Newton iterations.
 
-            M Z_i = h sum_j a_ij f(y_0 + Z_j),      y_1 = y_0 + Z_3
+        M Z_i = h sum_j a_ij f(y_0 + Z_j),      y_1 = y_0 + Z_3
 
-    The polynomial through y_0 and all y_0 + Z_i is the dense output. The error estimate is (gamma M
-    / h - J)^-1 [f(y_0) + M sum_j (e_j / h) Z_j].
+    The polynomial through y_0 and all y_0 + Z_i is the dense output. The error estimate is
+    (gamma M / h - J)^-1 [f(y_0) + M sum_j (e_j / h) Z_j].
 
     Attributes:
         c: nodes, shape (3,).
         E: error weights e_j, shape (3,).
-        iterations: simplified Newton iterations per step. Each iteration gains two orders in the
-            states and one in the algebraic unknowns; systems with algebraic unknowns therefore get
-            one more.
+        iterations: simplified Newton iterations per step. Each gains two orders in the states and
+            one in the algebraic unknowns; systems with algebraic unknowns get one more.
     """
 
     c: Array
@@ -118,17 +116,13 @@ class Radau(Method):
         return self.iterations + bool(system.algebraic[0])
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Return the factors of the real and the complex iteration matrix, and of W for a tiny
-        step.
-        """
+        """Return the factors of the real and the complex iteration matrix, and for a tiny step."""
         basis = eigenbasis(self.A)
         own = blocks(system, self.diagonal).factors, pair(system, basis.alpha, basis.beta).factors
         return *own, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
-        """Return the steps of the method on `system`; z = T w, iterated from 0 with the Jacobian at
-        y_0.
-        """
+        """Return the steps of the method on `system`; z = T w, from 0, with the Jacobian at y_0."""
         basis = eigenbasis(self.A)
         block, other = blocks(system, self.diagonal), pair(system, basis.alpha, basis.beta)
         n, T, inverse = system.n, basis.T, np.linalg.inv(basis.T)
@@ -257,7 +251,7 @@ class BackwardEuler(Method):
 class Explicit(Method):
     """Explicit Runge-Kutta pair.
 
-            k_i = h f(y_0 + sum_j a_ij k_j),      i = 1 ... s
+        k_i = h f(y_0 + sum_j a_ij k_j),      i = 1 ... s
 
     y_1 is the argument of the last stage, and sum_j e_j k_j is the error estimate. Accelerations
     and multipliers are solved for at each stage if the equations are linear in them (`eliminated`).
@@ -280,8 +274,7 @@ class Explicit(Method):
         """Return the steps of the method on `system`.
 
         Raises:
-            ValueError: the system has a mass matrix, or algebraic unknowns other than those of a
-                mechanism whose equations are linear in them.
+            ValueError: a mass matrix, or algebraic unknowns other than linear ones of a mechanism.
         """
         settle, rates = eliminated(system) or (None, None)
         if rates is None:
@@ -303,14 +296,12 @@ class Explicit(Method):
 
 @lru_cache(maxsize=2)
 def eliminated(system: System) -> tuple[ca.Function, ca.Function] | None:
-    """Return the elimination of algebraic unknowns, (y, d) -> y, and the rates, (y, d) -> f.
+    """Return (y, d) -> y with the algebraic unknowns of its states, and (y, d) -> f, zero there.
 
-    The first Function sets the algebraic unknowns to those of the states; f is zero in the
-    algebraic rows. The result is None for a system without algebraic unknowns, or if its equations
-    are not linear in them or have no known pivots. In a mechanism without friction from its
-    reactions, accelerations and multipliers satisfy
+    The result is None without algebraic unknowns, or if they are not linear or lack known pivots.
+    Accelerations and multipliers of a mechanism without friction from its reactions satisfy
 
-            0 = g(x, z) = G(x) z + g(x, 0),        z = -G(x)^-1 g(x, 0)
+        0 = g(x, z) = G(x) z + g(x, 0),        z = -G(x)^-1 g(x, 0)
 
     A singular G gives numbers that are not finite, and the step is rejected.
     """
@@ -351,16 +342,16 @@ def need_ode(system: System, method: str) -> None:
 
 
 SMALL = 1e-2
-"""Value of |x| below which the series replaces the quotient; its next term is 4e-14 of the sum."""
+"""Largest |x| at which the series replaces the quotient; its next term is 4e-14 of the sum."""
 
 
 def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Return exp x, phi1 = (exp(x) - 1) / x and phi2 = (phi1 - 1) / x, element by element.
 
-    They weight the rate in the end value and in the mean of a solution of dz/dt = a + b z over a
-    step: z(h) = z + h phi1(b h) dz/dt, mean z = z + h phi2(b h) dz/dt. Values and derivatives are
-    correct at zero, too. Far below zero exp is 0; its error is one unit in the last place of 1, not
-    of exp itself.
+    They are the weights of the rate in the end value and in the mean of a solution of
+    dz/dt = a + b z over a step: z(h) = z + h phi1(b h) dz/dt, mean z = z + h phi2(b h) dz/dt.
+    Values and derivatives are correct at zero, too. Far below zero, exp is 0; its error is one unit
+    in the last place of 1, not of exp itself.
     """
     near = ca.fabs(x) < SMALL
     divisor, beyond = ca.if_else(near, 1.0, x), ca.expm1(x)
@@ -376,10 +367,10 @@ def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
 class Exponential(Method):
     """Exponential Euler, with each equation linearised in its own unknown.
 
-            y_i+ = y_i + h phi1(h df_i/dy_i) f_i(y)
+        y_i+ = y_i + h phi1(h df_i/dy_i) f_i(y)
 
-    The method is exact, however fast the equation, if an equation is linear in its unknown and
-    nothing else changes (the bristles of LuGre at a given velocity). The coupling of unknowns is
+    The method is exact if an equation is linear in its unknown and nothing else changes, however
+    fast the equation is (the bristles of LuGre at a given velocity). The coupling of unknowns is
     explicit.
     """
 

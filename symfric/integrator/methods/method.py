@@ -76,11 +76,7 @@ class Method(ABC):
 
     @property
     def diagonal(self) -> float | None:
-        """Coefficient gamma of the iteration matrix W = M / (gamma h) - J; None without such a
-        matrix.
-
-        Implicit methods with error control have one.
-        """
+        """Coefficient gamma of W = M / (gamma h) - J; None if explicit or without error control."""
         return None
 
     @property
@@ -93,7 +89,7 @@ class Method(ABC):
         """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Return the factors of all matrices of the steps on `system`; none for an explicit method."""
+        """Return the factors of all matrices in steps on `system`; none for an explicit method."""
         return ()
 
     def bends(self, k: Sequence[Any]) -> tuple[Any, ...]:

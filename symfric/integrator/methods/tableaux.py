@@ -36,16 +36,14 @@ def shampine(b: Array, D: Array) -> Array:
 
     With the increment r = sum_j b_j k_j and the free term q = sum_j D_j k_j, the quartic is
 
-            y_0 + theta [r + (1 - theta) (k_1 - r + theta (2 r - k_1 - k_s + (1 - theta) q))]
+        y_0 + theta [r + (1 - theta) (k_1 - r + theta (2 r - k_1 - k_s + (1 - theta) q))]
     """
     first, last = np.eye(b.size)[[0, -1]]
     return np.array([first - b, 2 * b - first - last + D, -D])
 
 
 def through(c: Array) -> Array:
-    """Return the coefficients H of the cubic through 0 and the increments at nodes; the last node
-    is 1.
-    """
+    """Return the coefficients H of the cubic through 0 and the increments at nodes c; c_s = 1."""
     inner, rows = c[:-1], np.eye(c.size)
     values = (rows[:-1] - inner[:, None] * rows[-1]) / (inner * (1 - inner))[:, None]
     vandermonde: Array = np.vander(inner, increasing=True)
