@@ -86,12 +86,12 @@ class Derivatives:
         return [t, y, d]
 
     def forward(self, which: Seeds, linked: bool) -> Columns:
-        """Return (X, y, h, d) -> (X of the next step, Z of its end and of each row of dense
-        output).
+        """Return (X, y, h, d) -> (X of the next step, Z).
 
-        X holds the derivatives of the start of the step, shape (n, names). If steps are `linked`
-        (`links`), X has one more row, for the time of the start, and there are additional
-        arguments: share, fall, by_state transposed, by_data d'.
+        X holds the derivatives of the start of the step, shape (n, names), and Z those of its end
+        and of each row of its dense output. If steps are `linked` (`links`), X has one more row,
+        for the time of the start, and there are additional arguments: share, fall, by_state
+        transposed, by_data d'.
         """
         return self._kept(
             ("forward", linked, which.parameters), lambda: self._forward(which, linked)
@@ -117,7 +117,7 @@ class Derivatives:
         return Columns(function, chained=True, source=source)
 
     def _by_one(self, linked: bool) -> ca.Function:
-        """Return (X, y, h, d, d', ...) -> the same for one name, with the derivative d' of d."""
+        """Return (X, y, h, d, d', ...) -> the same for one name; d' is the derivative of d."""
         n, (y, h, d) = self.system.n, self.symbols
         X, of_d = ca.SX.sym("X", n + linked), ca.SX.sym("of_d", d.numel())
         of_h = -X[n:] if linked else ca.SX(1, 1)
@@ -181,9 +181,7 @@ class Derivatives:
 
     @cached_property
     def assembly(self) -> ca.Function | None:
-        """Function (y, d) -> derivatives of the start of a mechanism by y and by d; None for
-        others.
-        """
+        """Function (y, d) -> derivatives of a mechanism's start by y and by d; None for others."""
         if self.system.manifold is None:
             return None
         y, _, d = self.symbols
@@ -192,8 +190,7 @@ class Derivatives:
 
     @cached_property
     def rates(self) -> ca.Function:
-        """Function (y, d) -> matrix and right-hand side for all rates y', also of algebraic
-        unknowns.
+        """Function (y, d) -> matrix and right-hand side for all rates y', algebraic ones too.
 
         Equations without rates are differentiated with respect to time: M y' = f and g_y y' = 0.
         """

@@ -187,9 +187,7 @@ class Path:
         return [self.dense.y0, self.size, self.data(self.interval)]
 
     def shares(self, theta: Array) -> Array:
-        """Return the weights of start, end and dense output in the value of a step, one row per
-        theta.
-        """
+        """Return the weights of start, end and dense output in a step's values, a row per theta."""
         found = np.empty((theta.size, self.dense.D.shape[1] + 2))
         found[:, 0], found[:, 1] = 1 - theta, theta
         for row in range(2, found.shape[1]):

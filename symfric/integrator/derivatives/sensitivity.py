@@ -38,9 +38,7 @@ class Slopes(NamedTuple):
 
 
 def forward(path: Path, which: Seeds) -> Slopes:
-    """Return the derivatives of the solution with respect to all names, by one sweep over the
-    steps.
-    """
+    """Return the derivatives of the solution with respect to all names, in one sweep over steps."""
     n, names, linked = path.integrator.system.n, len(which.names), path.linked
     state, of_d = np.zeros((n + 1, names)), which.of_data(path.steps[2].shape[1])
     state[: which.start.shape[0]] = which.start
@@ -217,8 +215,7 @@ class _Looks:
         self.weights = total.reshape(steps, -1)
 
     def ahead(self, every: Links) -> Array:
-        """Return the derivative of the sum by the start time of each step, from times within the
-        step.
+        """Return the derivative of the sum by the start time of each step, from times within it.
 
         It is nonzero only for steps after jumps; other steps start at fixed times.
         """

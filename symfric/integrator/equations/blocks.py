@@ -166,9 +166,7 @@ def _residual(system: System) -> ca.Function:
 
 
 Signs = Callable[[Any, Any, Any], tuple[Any, Any, Any]]
-"""(y, h, d) -> sign of det W, sign of det W for a tiny step, pivots of watched rows for a tiny
-step.
-"""
+"""(y, h, d) -> sign of det W; for a tiny step, sign of det W and pivots of the watched rows."""
 
 
 def signs(system: System, gamma: float, watched: Sequence[int] = ()) -> Signs:
@@ -209,8 +207,7 @@ of the largest terms.
 NEARER, ANY = 0.5, 1e10
 """Largest ratio of s_2 to s_1 at which the iteration continues: in general, and for mechanisms."""
 INLINE = 7000
-"""Number of instructions above which rounds consist of calls of blocks, which compile much faster.
-"""
+"""Number of instructions above which rounds call blocks, which compile much faster."""
 
 
 class Following(NamedTuple):

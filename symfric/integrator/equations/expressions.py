@@ -37,9 +37,7 @@ Rule = Callable[[int, list[ca.SX]], ca.SX | None]
 
 
 def rewritten(function: ca.Function, arguments: list[ca.SX], rule: Rule) -> list[ca.SX]:
-    """Return the results of an SX `function` at columns of symbols, with the replacements of
-    `rule`.
-    """
+    """Return the results of an SX `function` at columns of symbols, rewritten by `rule`."""
     symbols = [ca.vertsplit(ca.vec(argument)) for argument in arguments]
 
     def made(k: int, operands: list[ca.SX]) -> ca.SX:
@@ -65,8 +63,9 @@ Beyond it, 1 - 2/(e^2|x| + 1) loses less than a bit to cancellation.
 """
 U = (-0.3333333333333333, -0.02049522886753235, -0.00019901990913769401)
 V = (1.0, 0.46148568660258626, 0.023286572463946293, 0.00020636437984939814)
-"""Coefficients of the rational function that interpolates (tanh x / x - 1) / x^2 at Chebyshev nodes
-in x^2.
+"""Coefficients of the rational function for (tanh x / x - 1) / x^2.
+
+It interpolates at Chebyshev nodes in x^2.
 """
 
 LARGE = 300

@@ -73,9 +73,7 @@ class Sampled:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Hold(Sampled):
-    """Zero-order hold: `values[k]` from t[k] until t[k+1], like the output of a digital
-    controller.
-    """
+    """Zero-order hold, like the output of a digital controller: `values[k]` from t[k] to t[k+1]."""
 
     def coefficients(self, breaks: Array) -> Array:
         """Return the value at the start of each interval; slope 0."""

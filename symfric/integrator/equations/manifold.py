@@ -31,8 +31,7 @@ from symfric.model.holonomic import Holonomic
 
 Array = NDArray[np.float64]
 DEPENDENT = 1e-4
-"""Ratio of singular values of phi_q below which a mechanism that cannot continue is called
-singular.
+"""Ratio of singular values of phi_q below which a stopped mechanism is called singular.
 
 At tight tolerances, rounding stops a run at this distance from the singularity.
 """

@@ -224,8 +224,7 @@ def null_space(A: Array) -> Array:
 
 
 def equilibrated(A: Array) -> tuple[Array, Array]:
-    """Return matrices (..., m, n) scaled to largest row and column entries near 1, and column
-    scales.
+    """Return matrices (..., m, n) with largest row and column entries near 1, and column scales.
 
     Each column of the result was multiplied by its column scale.
     """

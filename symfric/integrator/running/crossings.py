@@ -29,7 +29,9 @@ Array = NDArray[np.float64]
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Relative places at which each step, and each doubtful piece of a step, is evaluated."""
 FINER = 64
-"""Maximum number of subdivisions per step; only crossings close to the event tolerance need them.
+"""Maximum number of subdivisions per step.
+
+Only crossings whose distance is close to the event tolerance need as many.
 """
 AT_ONCE = 8
 """Number of steps that one call of `Crossings.possible` tests."""
@@ -151,8 +153,7 @@ class Crossings:
 
     @cached_property
     def possible(self) -> ca.Function:
-        """Function (values before, `AT_ONCE` rows, their d) -> values at ends, 1 for possible
-        events.
+        """(values before, `AT_ONCE` rows, their d) -> values at their ends, 1 for possible events.
 
         It makes the tests of `Isolation` without noise. They save the virtual machine most
         searches.
@@ -308,8 +309,7 @@ class Isolation:
         self.roots, self.left = np.full(directions.size, np.inf), FINER
 
     def first(self, at: Sequence[float], g: Array, doubts: Array) -> float:
-        """Return the first root between the places `at` with values g, or a value beyond these
-        places.
+        """Return the first root between the places `at` with values g, or a value beyond them.
 
         If a root is certain, doubtful events without a root of their own are searched once more
         before it, because events that jump with it do not jump earlier. All other doubtful events

@@ -50,16 +50,13 @@ SPEEDS = np.array([1e-6, 1e-3, 1.0, 1e3])
 LOADS = (1.0, 1e3)
 """Loads [N] of the first check."""
 SHARE = 1e-3
-"""Allowed energy gain, as a fraction of the energy turnover, for errors of rounding and quadrature.
-"""
+"""Allowed energy gain, as a fraction of the energy turnover, for rounding and quadrature errors."""
 REMEMBERED = 16
 """Number of parameter sets whose first check is cached."""
 MARGIN = 0.05
 """Fraction by which integration errors may raise friction above its level."""
 WIDE = 0.25
-"""The same for a varying load: laws that follow the load with a delay exceed their level for a
-while.
-"""
+"""The same for a varying load, which some laws follow with a delay and exceed for a while."""
 LOOKS = 200
 """Maximum number of peaks checked in a run with a varying load."""
 
@@ -207,9 +204,7 @@ class Held:
         return bool(ca.is_linear(self.force, symbols_of(self.contact.states)))
 
     def ratios(self, screen: ca.Function, z: Array, p: Array) -> Array:
-        """Return the ratio of force to level at the extreme states `z` of runs; z and p are (n,
-        runs).
-        """
+        """Return the ratio of force to level at extreme states `z` of runs; a column per run."""
         force, level, _ = (rows.full() for rows in screen(z, p))
         return np.abs(force[0]) / np.where(level[0] > 0, level[0], np.inf)
 

@@ -93,9 +93,7 @@ class Work:
         self.enter(0)
 
     def interval(self, times: Array) -> NDArray[np.intp]:
-        """Return the index of the input interval of each time; at a break, that of the later
-        interval.
-        """
+        """Return the index of the input interval of each time; at a break, the later interval."""
         return np.searchsorted(self.breaks[1:-1], times, side="right")
 
     def enter(self, interval: int) -> None:
@@ -257,9 +255,7 @@ class CompiledEngine:
         self.library.symfric_march.argtypes = [ctypes.c_void_p]
 
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
-        """Advance `work`; return records in its buffer, the number of attempts and the reason to
-        stop.
-        """
+        """Advance `work`; return records in its buffer, number of attempts and reason to stop."""
         loop, outputs = work.loop, work.outputs
         loop.max_attempts, loop.found = attempts, outputs.found
         reason = self.library.symfric_march(work.address)

@@ -137,9 +137,7 @@ class Search:
         self._possible = bound(self.crossings.possible, inputs, (self._ends, self._some))
 
     def without(self, rows: Array, R: Array) -> int:
-        """Return the number of accepted steps, from the first of `rows` on, that surely have no
-        event.
-        """
+        """Return the number of leading accepted steps among `rows` that surely have no event."""
         if self.memory[Memory.PHASE] != Memory.ON or self.memory[Memory.RESUME]:
             return 0
         self._data[:] = R[R.size - self.crossings.data :]

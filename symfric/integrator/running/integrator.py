@@ -42,8 +42,7 @@ INLINE = 7000
 Both engines run the same form.
 """
 EVENT_BATCH = 8
-"""Attempts per virtual machine call for models with events; attempts after an event are discarded.
-"""
+"""Attempts per virtual machine call with events; attempts after an event are discarded."""
 SPARE = 2
 """Number of buffer sets kept: one for a run, one for a run within its callback."""
 REMEMBERED = 16
@@ -142,9 +141,7 @@ class Integrator:
 
     @cached_property
     def follow(self) -> Following | None:
-        """Update of the algebraic unknowns after a jump of inputs or states; None if there are
-        none.
-        """
+        """Update of the algebraic unknowns after a jump of inputs or states, if there are any."""
         return following(self.system)
 
     @property
@@ -161,8 +158,7 @@ class Integrator:
         return self.refined(self._every)
 
     def refined(self, expression: ca.SX) -> ca.Function:
-        """Return `expression` as a Function (t, y, d), evaluated at refined unknowns for a
-        mechanism.
+        """Return `expression` as a Function (t, y, d), for a mechanism at refined unknowns.
 
         Between steps, the constraints of a mechanism hold only to the tolerance; in results they
         hold exactly.
@@ -180,9 +176,7 @@ class Integrator:
 
     @cached_property
     def plain_signal_columns(self) -> Columns:
-        """Evaluation of the signals at many times without refinement, with the drift of
-        constraints.
-        """
+        """Evaluation of the signals at many times, not refined, with the drift of constraints."""
         return Columns(self.of_time("signals", self._every))
 
     @cached_property
@@ -198,8 +192,7 @@ class Integrator:
         return Columns(ca.Function("states", [s.y, s.d], [projected], {"cse": True}))
 
     def start(self, y: Array, d: Array) -> Array:
-        """Return `y` with consistent algebraic unknowns; cached for further runs from the same
-        start.
+        """Return `y` with consistent algebraic unknowns; cached for runs from the same start.
 
         Raises:
             ValueError: no consistent values were found nearby.

@@ -48,8 +48,7 @@ It returns the number of plants that did not reach their sample.
 @final
 @dataclass(eq=False)
 class Plants:
-    """Data of plants of one model; mutable. Both engines work on these arrays, row by row in
-    memory.
+    """Data of plants of one model; mutable, and shared by both engines.
 
     Attributes:
         S, R: columns of an attempt, one row per plant (`symfric.integrator.step.attempt`).
@@ -208,9 +207,7 @@ class InPython:
         return int(np.count_nonzero(plants.why > 0))
 
     def _takes_over(self, b: int) -> bool:
-        """Take over inputs and the next sample time; return False if unknowns could not follow
-        them.
-        """
+        """Take over inputs and the next sample time; return False if unknowns could not follow."""
         plants, S, R, ready = self.plants, self.work.S, self.work.R, bool(self.plants.ready[b])
         plants.count[b] += S[State.T] >= R[Given.T_END]
         plants.made[b] = plants.ready[b] = 0

@@ -328,9 +328,7 @@ class Run:
 
     @property
     def seen(self) -> tuple[Array, Array]:
-        """Times (k,) and unknowns (k, n) at the start and step ends; a long run has its result
-        times.
-        """
+        """Start and ends of steps, (k,) and (k, n); for a long run, the times of the result."""
         if not self.complete:
             return self.outputs.times[: self.outputs.found], self.outputs.reached.T
         times = [self.t], *(rows[:, 1] for rows in self._rows)

@@ -60,8 +60,7 @@ ATTEMPTS = {"vm": 2_000, "compiled": 50_000}
 MOST_ORDERS = 8
 """Maximum number of pivot replacements in a run."""
 MANY_STEPS, MOST_STEPS = 10_000_000, 1e9
-"""Attempts after which the progress of a run is checked, and the most that it may still need then.
-"""
+"""Attempts after which the progress of a run is checked, and the most that it may still need."""
 
 
 @final

@@ -51,7 +51,7 @@ def in_c(
     real: Real = DOUBLE,
     head: str = "static ",
 ) -> Written:
-    """Return a Function as the C `head` void `name`(const real *S, ..., real *next, ...).
+    """Return the C of a Function, `head` void `name`(const real *S, ..., real *next, ...).
 
     Args:
         function: Function of columns, SX, or MX, which is inlined; sparse results are filled with
@@ -93,7 +93,7 @@ def in_c(
 
 
 def macros(written: Iterable[Written], real: Real = DOUBLE) -> str:
-    """Return the definitions of the macros that these functions call, as `#define SF_EXP exp`."""
+    """Return the definitions of the macros that these functions call, e.g. `#define SF_EXP exp`."""
     calls = sorted({call for one in written for call in one.calls})
     return "".join(f"#define {macro(call, real)} {call}{real.letter}\n" for call in calls)
 

@@ -195,9 +195,7 @@ class Tangent:
         return ca.sparsify(ca.vertcat(rates, moved, ca.SX(t.numel(), y_c.numel())))
 
     def _open(self) -> ca.Function:
-        """Return the Function `open`; it makes the projection of V onto the tangent space
-        orthonormal.
-        """
+        """Return the Function `open`; Gram-Schmidt makes the projection of V orthonormal."""
         y, d, before = self.system.y, self.system.d, ca.SX.sym("before", self.n, self.nv)
         columns: list[ca.SX] = []
         for v in ca.horzsplit(before - self.across(self.phi_q @ before)):
