@@ -190,7 +190,7 @@ class Derivatives:
 
     @cached_property
     def rates(self) -> ca.Function:
-        """Function (y, d) -> matrix and right-hand side for all rates y', algebraic ones too.
+        """Function (y, d) -> matrix and right-hand side for the rates y' of all unknowns.
 
         Equations without rates are differentiated with respect to time: M y' = f and g_y y' = 0.
         """

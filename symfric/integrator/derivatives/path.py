@@ -197,7 +197,7 @@ class Path:
     def place(self, jump: Jump) -> int:
         """Return the input interval in which events happened.
 
-        At a break, it is the earlier interval, unless the events happened at once.
+        At a break, it is the earlier interval if the events cut a step, else the later one.
         """
         if jump.size:
             return int(self.interval[jump.step - 1])

@@ -46,7 +46,7 @@ GRAZING = 1e-6
 """Relative rate of an event expression below which it touches zero without crossing it.
 
 The rate is relative to the mean rate in the step before. The square is the limit of the rate
-relative to its terms.
+relative to the sum of its terms.
 """
 SAME = 1e-6
 """Relative difference of results that counts as equal, such as those of two orders of events."""
@@ -301,7 +301,7 @@ class _Instants(NamedTuple):
         return by_t[:, 0], by_y, by_d
 
     def delay(self, which: Which, y: Array, rate: Array) -> Array:
-        """Return the derivative of one event time each by y at a fixed time and by d, (m, n + n_d).
+        """Return the derivatives of event times by y at a fixed time and by d, shape (m, n + n_d).
 
         Raises:
             ValueError: an expression only touches zero.
@@ -356,7 +356,7 @@ class _Instants(NamedTuple):
         return after
 
     def reset(self, y: Array, which: Which, found: Array) -> Array:
-        """Return the passages at y of the resets of events `which` (m, events), to y = `found`."""
+        """Return the passages of the resets of events `which` (m, events) from y to `found`."""
         n, every, jumps = y.shape[1], self._resets, self.nothing
         if not every:
             return self.followed(jumps, found)
@@ -369,7 +369,7 @@ class _Instants(NamedTuple):
         return self.consistent(jumps, self.jumped(y, which), found)
 
     def consistent(self, jumps: Array, y: Array, found: Array) -> Array:
-        """Return passages to y and on to the consistent `found`; mechanisms have one instant."""
+        """Return passages to y and on to the consistent `found`; for mechanisms at one instant."""
         made, n = derivatives(self.path.integrator), y.shape[-1]
         manifold = made.system.manifold
         if manifold is not None and made.assembly is not None:

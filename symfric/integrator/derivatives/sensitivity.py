@@ -149,7 +149,7 @@ def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array
 def gradient(
     path: Path, which: Seeds, times: Array, weights: Mapping[int, Array]
 ) -> dict[str, float]:
-    """Return derivatives of sum_ij weights_ij signal_i(t_j), of the discrete solution.
+    """Return the derivatives of sum_ij weights_ij signal_i(t_j), of the discrete solution.
 
     They are exact to rounding.
 

@@ -147,7 +147,7 @@ def blocks(system: System, gamma: float) -> Blocks:
 
 @lru_cache(maxsize=2)
 def at_rest(system: System) -> tuple[SymbolicLU, Factors]:
-    """Return the factors of W for a tiny step, as expressions and with the matrix.
+    """Return the factors of W for a tiny step as expressions, and the matrix with its pivot order.
 
     The matrix consists of M and of the derivatives of the rows without rates. It is singular if the
     algebraic equations do not determine their unknowns.
@@ -362,9 +362,9 @@ def _sizes(
 def _guard(system: System, lu: SymbolicLU, place: dict[int, int]) -> ca.Function:
     """Return (factors, y, d) -> a value that is negative if friction has jammed or a bearing pulls.
 
-    The loop from normal forces over friction and reactions back to normal forces is I - dN/dN. The
-    product of all pivots has, up to (-1)^n, the sign of its determinant. None of the pivots of the
-    loop may fall below `SHOCK`.
+    The matrix of the loop from normal forces over friction and reactions back to normal forces is
+    I - dN/dN. The sign of its determinant is, up to (-1)^n, that of all pivots together. None of
+    the pivots of this matrix may fall below `SHOCK`.
     """
     manifold, conditions = system.manifold, [NONE]
     if manifold is not None:

@@ -184,7 +184,7 @@ def lifted(expression: ca.SX, known: ca.SX, name: str) -> tuple[ca.SX, ca.SX, Ar
 
 
 DEPTH = 13
-"""Number of halvings that give the grid, of 2^13 intervals; shorter features may be missed."""
+"""Number of halvings of the span into grid intervals; shorter features may be missed."""
 
 STRAIGHT = 1e-3
 """Allowed deviation of a piece from a line, relative to the range of the function."""

@@ -225,7 +225,7 @@ def consistent_many(
         return y, failed
     guess, y, alone = y, y.copy(), list[int]()
     if system.manifold is not None:
-        # ensembles of mechanisms are small, and their equations large: solve one by one
+        # ensembles of mechanisms are small and have large equations: solve one by one
         alone = list(range(y.shape[0]))
     todo = np.arange(0 if alone else y.shape[0])
     before, last = np.full((2, y.shape[0]), np.inf)

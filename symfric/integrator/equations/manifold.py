@@ -36,7 +36,7 @@ DEPENDENT = 1e-4
 At tight tolerances, rounding stops a run at this distance from the singularity.
 """
 PULLING = 1e-3
-"""Fraction of their typical size up to which negative normal forces are integration errors."""
+"""Fraction of their typical size up to which negative normal forces count as integration errors."""
 SHOCK = 1e-3
 """Smallest accepted pivot of I - dN/dN, which is 1 without friction.
 

@@ -184,7 +184,7 @@ ROUNDS = 4
 
 
 def echelon(A: Array) -> tuple[list[int], Array]:
-    """Return indices of columns that span those of A, and B with A = A[:, columns] B.
+    """Return indices of columns that span the columns of A, and B with A = A[:, columns] B.
 
     B[:, columns] is the identity. The elimination uses complete pivoting of scaled rows and
     columns.
@@ -241,7 +241,7 @@ def equilibrated(A: Array) -> tuple[Array, Array]:
 SOUND = 1e-9
 """Largest omega of a stable order; steps at the tightest tolerances need no higher accuracy."""
 REGULAR = 1e-13
-"""Ratio of the singular values of a scaled matrix above which the matrix counts as regular."""
+"""Smallest ratio of smallest to largest singular value of a scaled matrix that is regular."""
 THRESHOLD = 0.1
 """Smallest size of a pivot, relative to its column."""
 
@@ -320,7 +320,7 @@ def regular(A: Array) -> bool:
 
 
 def best_order(pattern: NDArray[np.bool_], samples: Array) -> Order:
-    """Return the pivot order of threshold pivoting in all samples (s, n, n) at once.
+    """Return the pivot order found by threshold pivoting in all samples (s, n, n) at once.
 
     In every sample, each pivot is at least `THRESHOLD` times the largest remaining entry of its
     column. Among such entries, the one with least fill is chosen; if there is none, the entry that

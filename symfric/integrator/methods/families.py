@@ -50,7 +50,7 @@ class Rosenbrock(Method):
         return len(self.A), 1, 1
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Return the factors of the iteration matrix, and for a tiny step."""
+        """Return the factors of the iteration matrix W, and of W for a tiny step."""
         return blocks(system, self.gamma).factors, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
@@ -116,13 +116,13 @@ class Radau(Method):
         return self.iterations + bool(system.algebraic[0])
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Return the factors of the real and the complex iteration matrix, and for a tiny step."""
+        """Return the factors of the real and the complex W, and of W for a tiny step."""
         basis = eigenbasis(self.A)
         own = blocks(system, self.diagonal).factors, pair(system, basis.alpha, basis.beta).factors
         return *own, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
-        """Return the steps of the method on `system`; z = T w, from 0, with the Jacobian at y_0."""
+        """Return the steps of the method on `system`, iterated from 0 with the Jacobian at y_0."""
         basis = eigenbasis(self.A)
         block, other = blocks(system, self.diagonal), pair(system, basis.alpha, basis.beta)
         n, T, inverse = system.n, basis.T, np.linalg.inv(basis.T)

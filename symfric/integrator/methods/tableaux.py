@@ -81,9 +81,10 @@ RADAU5 = Radau(
 FOR_DERIVATIVES = replace(RADAU5, finer=8.0)
 """Method for derivatives of runs.
 
-A step across the whole steep part of a law gives the right motion, but a wrong derivative. Steps of
-half the width of that part are a quarter more, and reduce the error of derivatives of a pump at
-rtol 1e-6 from 6e-3 to 1.5e-4. Derivatives by Rodas5P have twenty times the error of Rodas5P itself.
+A step across the whole steep part of a law gives the right motion, but a wrong derivative. Limiting
+steps to half the width of that part takes a quarter more steps, and reduces the error of
+derivatives of a pump at rtol 1e-6 from 6e-3 to 1.5e-4. Derivatives by Rodas5P have twenty times the
+error of Rodas5P itself.
 """
 BACKWARD_EULER = BackwardEuler(
     name="backward Euler",

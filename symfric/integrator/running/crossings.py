@@ -55,7 +55,7 @@ KEPT = 100
 ALIKE = 4
 """Number of consecutive equal events whose intervals are examined for a storm."""
 SOON = 2.0
-"""Delay after a jump, in event tolerances, after which the new signs are evaluated."""
+"""Delay after a jump, in event tolerances, at which the new signs are evaluated."""
 RESTART, LEAST = 1e3, 1e-3
 """Step after an event, in event tolerances, and its smallest ratio to the step that was cut.
 
@@ -68,9 +68,9 @@ cut, if error control allows: motion after a friction event is usually as smooth
 class Memory:
     """Event data kept between steps, a column of numbers that both engines share.
 
-    Layout: phase, tolerance [s], number of jumps, number of last jumps that were of one kind, step
-    [s] to resume after a jump, times of the last jumps. Then follow, for all events, the values
-    before the next step, and flags that are 1 for events of the last jump, else 0.
+    Layout: phase, tolerance [s], number of jumps, number of consecutive last jumps of one kind,
+    step [s] to resume after a jump, times of the last jumps. Then follow, for all events, the
+    values before the next step, and flags that are 1 for events of the last jump, else 0.
     """
 
     PHASE, TOLERANCE, COUNT, ALIKE, RESUME = range(5)
@@ -356,7 +356,7 @@ class Isolation:
 
 
 def passed(before: Any, after: Any, directions: Any) -> Any:
-    """Return a mask of the events that pass through zero in their directions; arrays, SX or DM."""
+    """Return a mask of the events that pass zero in their directions, for arrays, SX and DM."""
     rising = (before < 0) * (after >= 0) * (directions >= 0)
     return rising + (before > 0) * (after <= 0) * (directions <= 0)
 

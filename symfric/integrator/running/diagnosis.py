@@ -66,10 +66,10 @@ def _causes(
 
 
 def chattering(model: Model) -> str:
-    """Return advice for user equations that contain a sign, in which steps never end; else "".
+    """Return advice for user equations that contain a sign; an empty text for others.
 
-    During sticking the sign changes from step to step, although the true friction is between -1 and
-    1.
+    Runs with such equations never end: during sticking the sign changes from step to step, although
+    the true friction is between -1 and 1.
     """
     if model.contacts or model.holonomic is not None:
         return ""

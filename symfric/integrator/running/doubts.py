@@ -7,8 +7,9 @@ Energy: a law whose force has the wrong sign adds energy to the motion. Two cond
 The steady force is first checked over decades of speed and load, once for each set of its
 parameters. Most laws pass, and their runs need no further check. Bristles return stored energy, and
 laws with an offset push within their smoothing velocity, so both conditions are required. The
-integral uses the trapezoidal rule over steps, since only its sign matters. Limits: a wrong sign in
-hand-written equations outside the law is not detected; ensembles are not checked.
+integral uses the trapezoidal rule over steps, since only its sign matters.
+Limits: a wrong sign in hand-written equations outside the law is not detected; ensembles are not
+checked.
 
 Overload: the states of a law carry more than in any possible motion, usually its static level.
 
@@ -17,10 +18,10 @@ Overload: the states of a law carry more than in any possible motion, usually it
 A bristle that creeps below its smoothing velocity, or below the rounding of the velocities whose
 difference is the slip, does not relax but stretches further. With a constant load, the check uses
 only the extreme values of the states over all accepted steps. With a varying load, a state may
-exceed the level because the load fell, and only a state that still grows is an overload. Limits:
-laws that take the applied force, and laws without a static level, are not checked. Long runs whose
-steps are not kept are checked at the times of the result if the load varies, ensembles only if it
-is constant.
+exceed the level because the load fell, and only a state that still grows is an overload.
+Limits: laws that take the applied force, and laws without a static level, are not checked. Long
+runs whose steps are not kept are checked at the times of the result if the load varies, ensembles
+only if it is constant.
 """
 
 from collections.abc import Callable, Collection, Hashable, Iterator, Mapping
@@ -56,7 +57,7 @@ REMEMBERED = 16
 MARGIN = 0.05
 """Fraction by which integration errors may raise friction above its level."""
 WIDE = 0.25
-"""The same for a varying load, which some laws follow with a delay and exceed for a while."""
+"""The same for a varying load, since laws that follow it with a delay exceed their level."""
 LOOKS = 200
 """Maximum number of peaks checked in a run with a varying load."""
 

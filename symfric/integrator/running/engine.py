@@ -37,7 +37,7 @@ MOST_ROWS, LEAST_ROWS, BYTES = 2048, 64, 2**20
 The buffer is kept between runs.
 """
 BATCH, FEW = 32, 8
-"""Attempts per call of the virtual machine, and on intervals that need only a few attempts."""
+"""Attempts per call of the virtual machine, in general and on intervals that need only a few."""
 
 
 class Loop(ctypes.Structure):
@@ -138,7 +138,7 @@ class VmEngine:
         self._batches: dict[int, list[_Batch]] = {}
 
     def _attempts(self, work: Work, rows: int, attempts: int, size: int) -> tuple[Array, int, Stop]:
-        """Return the records, the attempts made and the reason to stop, after advancing S.
+        """Advance S; return the records, the attempts made and the reason to stop.
 
         S advances up to the end time in R, by `size` attempts per call.
         """

@@ -154,7 +154,7 @@ class Integrator:
 
     @cached_property
     def signals(self) -> ca.Function:
-        """All signals of the model as a Function (t, y, d), `refined`."""
+        """All signals of the model as a Function (t, y, d), with refined unknowns."""
         return self.refined(self._every)
 
     def refined(self, expression: ca.SX) -> ca.Function:

@@ -163,7 +163,7 @@ def plants_source(integrator: Integrator) -> str:
 
 @final
 class InPython:
-    """Loop in Python over the plants, an `Advance`.
+    """Loop in Python over the plants, used as an `Advance`.
 
     Args:
         integrator, plants: integrator of the model, and data of the plants.

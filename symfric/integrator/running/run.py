@@ -27,7 +27,7 @@ from symfric.integrator.step.attempt import Given, State
 
 Array = NDArray[np.float64]
 SMALL, REST = 1e-3, 1e-12
-"""Sizes, in nominal values, below which a motion gets its own scale, and below which it is zero.
+"""Sizes, in nominal values, below which a motion gets its own scale, or counts as zero.
 
 Values below the second limit are rounding errors of coupled states.
 """

@@ -121,7 +121,7 @@ def routine(function: ca.Function, name: str) -> str:
 
 @final
 class _Pieces:
-    """C functions of an MX Function and of the blocks that it calls.
+    """Writer of the C functions of an MX Function and of the blocks that it calls.
 
     Attributes:
         name: name of the C function, and prefix of the names of its blocks.

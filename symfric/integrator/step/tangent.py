@@ -163,7 +163,7 @@ class Tangent:
     def _slope(self, y_c: ca.SX, first: int) -> ca.SX:
         """Return the Jacobian of the reduced equations at the origin of the chart.
 
-        Accelerations begin at row `first`.
+        Accelerations begin at index `first` of the unknowns.
         """
         n, nv, d, f = self.n, self.nv, self.system.d, self.system.f[self.others]
         (_, wd, own, t), count = self.parts(y_c), nv + self.t.numel()
