@@ -1,1 +1,1 @@
-"""Derivatives of the steps that were taken, forward and reverse."""
+"""Derivatives of the steps of a run, forward and reverse."""

@@ -1,9 +1,9 @@
 """Functions that differentiate the steps of an integrator, one name at a time or in lanes.
 
-A step differentiated by one name contains the step itself, the same for all names, and a part
-linear in the derivatives. On vectors with one lane per name the former costs as much as alone, and
-the latter is done for all names at once, in the same operations as one after another: with the same
-bits.
+A step differentiated with respect to one name contains the step itself, which is the same for all
+names, and a part that is linear in the derivatives. With vectors of one lane per name, the step
+costs as much as for a single name, and the linear part is evaluated for all names at once. The
+operations are the same as name by name, and so are the bits.
 """
 
 from collections.abc import Callable, Hashable, Sequence
@@ -24,15 +24,15 @@ from symfric.integrator.step.attempt import build_dense_step
 
 Array = NDArray[np.float64]
 FEW, MANY = 4, 8
-"""Lanes for up to as many names, and for more."""
+"""Numbers of lanes: for up to four names, and for more."""
 
 
 def lanes_source(one: ca.Function, of_d: Array) -> str:
-    """Return the C of a sweep over rows (`compiled.columns`) by the names of `of_d` (n_d, names).
+    """Return the C of a sweep over rows (`compiled.columns`) for the names of `of_d` (n_d, names).
 
-    `one` is (X, y, h, d, d', ...) -> (X of the next step, column) of one name. The last of any
-    further arguments also differs from name to name. In the column of all names, the columns of
-    each name follow each other in parts as long as y.
+    `one` is (X, y, h, d, d', ...) -> (X of the next step, column) for one name. If there are
+    further arguments, the last of them also differs between names. The column of all names consists
+    of parts as long as y; each part holds the columns of all names, one after another.
     """
     text, slots = vector_source("symfric_one", one)
     names, sizes = of_d.shape[1], [one.numel_in(i) for i in range(one.n_in())]
@@ -57,12 +57,12 @@ def lanes_source(one: ca.Function, of_d: Array) -> str:
 
 
 LARGE = 5000
-"""Functions with more instructions stay unchanged: rewriting takes time."""
+"""Number of instructions above which a Function stays unchanged, since rewriting takes time."""
 
 
 @final
 class Derivatives:
-    """Functions that differentiate the steps of one integrator, made when first needed."""
+    """Functions that differentiate the steps of one integrator, created when first needed."""
 
     def __init__(self, integrator: Integrator) -> None:
         self.integrator, self.system = integrator, integrator.system
@@ -86,11 +86,11 @@ class Derivatives:
         return [t, y, d]
 
     def forward(self, which: Seeds, linked: bool) -> Columns:
-        """Return (X, y, h, d) -> (X of the next step, Z of its end and of each row of its dense
-        output).
+        """Return (X, y, h, d) -> (X of the next step, Z).
 
-        X holds the derivatives of the start, shape (n, names). If steps are `linked` (`links`), it
-        has one more row, of the time of the start, and there are arguments share, fall, by_state
+        X holds the derivatives of the start of the step, shape (n, names), and Z those of its end
+        and of each row of its dense output. If steps are `linked` (`links`), X has one more row,
+        for the time of the start, and there are additional arguments: share, fall, by_state
         transposed, by_data d'.
         """
         return self._kept(
@@ -117,9 +117,7 @@ class Derivatives:
         return Columns(function, chained=True, source=source)
 
     def _by_one(self, linked: bool) -> ca.Function:
-        """Return (X, y, h, d, d', ...) -> the same by one name, with the derivatives d' of d by
-        it.
-        """
+        """Return (X, y, h, d, d', ...) -> the same for one name; d' is the derivative of d."""
         n, (y, h, d) = self.system.n, self.symbols
         X, of_d = ca.SX.sym("X", n + linked), ca.SX.sym("of_d", d.numel())
         of_h = -X[n:] if linked else ca.SX(1, 1)
@@ -135,7 +133,7 @@ class Derivatives:
         return fast("one", [X, y, h, d, of_d, *more], results)
 
     def _link(self) -> list[ca.SX]:
-        """Return the arguments share, fall, by_state transposed of a link after a step."""
+        """Return the arguments share, fall and by_state transposed of the link after a step."""
         n = self.system.n
         share = ca.SX.sym("share", self.step.numel_out(0) // n + 1)
         return [share, ca.SX.sym("fall", n), ca.SX.sym("by_state", n, n + 1)]
@@ -144,8 +142,8 @@ class Derivatives:
         """Return (adjoint of the next X, y, h, d, weights) -> (adjoint of X, of d).
 
         `weights` are those of the start and of all results of the step, end first. If steps are
-        `linked`, there are arguments weight of the time of the start, share, fall, by_state and
-        by_data transposed.
+        `linked`, there are additional arguments: weight of the time of the start, share, fall,
+        by_state, and by_data transposed.
         """
         return self._kept(("reverse", linked), lambda: self._reverse(linked))
 
@@ -171,19 +169,19 @@ class Derivatives:
         return Columns(function, chained=True)
 
     def many(self, function: ca.Function, rows: Sequence[Array], backend: str) -> list[Array]:
-        """Return results of one of the Functions here for the rows of arrays."""
+        """Return the results of one of these Functions for the rows of arrays."""
         return self._kept(function.name(), lambda: Columns(function))(rows, backend=backend)
 
     @cached_property
     def algebraic(self) -> ca.Function:
-        """Derivatives of the algebraic equations (y, d) -> (by y, by d)."""
+        """Function (y, d) -> derivatives of the algebraic equations with respect to y and to d."""
         s = self.system
         alg = s.f[s.algebraic[0]]
         return ca.Function("algebraic", [s.y, s.d], [ca.jacobian(alg, s.y), ca.jacobian(alg, s.d)])
 
     @cached_property
     def assembly(self) -> ca.Function | None:
-        """Derivatives of the start of a mechanism (y, d) -> (by y, by d); None for others."""
+        """Function (y, d) -> derivatives of a mechanism's start by y and by d; None for others."""
         if self.system.manifold is None:
             return None
         y, _, d = self.symbols
@@ -192,9 +190,9 @@ class Derivatives:
 
     @cached_property
     def rates(self) -> ca.Function:
-        """(y, d) -> matrix and right-hand side of all rates y', also of algebraic unknowns.
+        """Function (y, d) -> matrix and right-hand side for the rates y' of all unknowns.
 
-        Equations without rates are differentiated by time: M y' = f and g_y y' = 0.
+        Equations without rates are differentiated with respect to time: M y' = f and g_y y' = 0.
         """
         s, (rows, _) = self.system, self.system.algebraic
         matrix, right = ca.SX(s.mass), ca.SX(s.f)
@@ -205,12 +203,12 @@ class Derivatives:
 
     @cached_property
     def of_events(self) -> ca.Function:
-        """Derivatives of the event expressions (t, y, d) -> (by t, by y, by d)."""
+        """Function (t, y, d) -> derivatives of the event expressions with respect to t, y and d."""
         return self._slopes("of_events", self.integrator.events)
 
     @cached_property
     def of_resets(self) -> ca.Function:
-        """Derivatives of the values of all resets, likewise."""
+        """Function (t, y, d) -> derivatives of all reset values with respect to t, y and d."""
         return self._slopes("of_resets", self.integrator.resets)
 
     def _slopes(self, name: str, function: ca.Function) -> ca.Function:
@@ -218,7 +216,7 @@ class Derivatives:
         return ca.Function(name, arguments, [ca.jacobian(values, x) for x in arguments])
 
     def of_signals(self, which: Seeds) -> Columns:
-        """Return derivatives of all signals (t, y, d, S) -> (signals, names)."""
+        """Return (t, y, d, S) -> derivatives of all signals, shape (signals, names)."""
         return self._kept(("signals", which.parameters), lambda: self._of_signals(which))
 
     def _of_signals(self, which: Seeds) -> Columns:
@@ -230,9 +228,10 @@ class Derivatives:
         return Columns(fast("of_signals", [*arguments, S], [ca.densify(pushed)]))
 
     def weighted(self, used: tuple[int, ...]) -> Columns:
-        """Return derivatives of a weighted sum of signals (t, y, d, weights) -> (by y, by d).
+        """Return (t, y, d, weights) -> derivatives of a weighted sum of signals by y and by d.
 
-        Only signals in `used` are included: others may have no derivative, such as a norm at zero.
+        Only signals in `used` are included: other signals may have no derivative, such as a norm at
+        zero.
         """
         return self._kept(("weighted", used), lambda: self._weighted(used))
 
@@ -246,7 +245,7 @@ class Derivatives:
 def fast(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
     """Return the Function with fewer divisions and tanh written out; unchanged if it is large.
 
-    A step divides several times by one number and calls tanh, and its derivatives more often.
+    A step divides several times by one number and calls tanh; its derivatives do so more often.
     """
     function = ca.Function(name, arguments, ca.cse(results))
     if function.n_instructions() > LARGE:
@@ -259,7 +258,7 @@ def fast(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function
 
 
 def derivatives(integrator: Integrator) -> Derivatives:
-    """Return the Functions for `integrator`, which keeps them."""
+    """Return the Functions for `integrator`, which caches them."""
     if "derivatives" not in integrator.memory:
         integrator.memory["derivatives"] = Derivatives(integrator)
     return integrator.memory["derivatives"]

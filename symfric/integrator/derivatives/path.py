@@ -1,4 +1,4 @@
-"""Steps and jumps of a run for its derivatives, and the names to differentiate by."""
+"""Steps and jumps of a run to be differentiated, and the names to differentiate with respect to."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Seeds:
-    """Names to differentiate with respect to.
+    """Parameters and start values to differentiate with respect to.
 
     Attributes:
-        names: as the user wrote them: a parameter, or "x0.v" for the start value of a state.
+        names: as the user wrote them: a parameter, or "x0.v" for the start value of the state v.
         parameters: row in p of each name, -1 for a start value.
-        start: derivative of the start values of x by each name, shape (nx, names).
+        start: derivative of the start values of x with respect to each name, shape (nx, names).
     """
 
     names: tuple[str, ...]
@@ -33,7 +33,7 @@ class Seeds:
     start: Array
 
     def of_data(self, n_d: int) -> Array:
-        """Return the derivative of the run data d by each name, shape (n_d, names)."""
+        """Return the derivative of the run data d with respect to each name, shape (n_d, names)."""
         return np.array(np.arange(n_d)[:, None] == self.parameters, dtype=float)
 
 
@@ -44,13 +44,13 @@ def seeds(
     p: Mapping[str, float] | None,
     t: float = 0.0,
 ) -> Seeds:
-    """Return the seeds of the names; `x0` and `p` as in `simulate`, which starts at `t` [s].
+    """Return the seeds of the names; `x0` and `p` as in `simulate`, for a start at `t` [s].
 
-    A start value that depends on others, such as a bristle's in steady sliding, is differentiated
-    along with them.
+    A start value that depends on names, such as that of a bristle in steady sliding, is
+    differentiated as well.
 
     Raises:
-        ValueError: a name that is neither a free parameter nor "x0." and a state.
+        ValueError: a name that is neither a free parameter nor "x0." followed by a state.
     """
     free, states = [v.name for v in model.p], [v.name for v in model.x]
     known = [*free, *(f"x0.{name}" for name in states)]
@@ -68,11 +68,11 @@ class Jump(NamedTuple):
     """Events that happened together.
 
     Attributes:
-        step: number of accepted steps before.
+        step: number of accepted steps before the events.
         t: time [s].
-        size: full size of the step that they cut [s]; 0 if they cut none.
-        at_once: True if another jump led to them instead of motion.
-        before, after: unknowns before and after them, shape (n,).
+        size: full size of the step that the events cut [s]; 0 if they cut none.
+        at_once: True if another jump led to the events instead of motion.
+        before, after: unknowns before and after the events, shape (n,).
         which: numbers of the events.
     """
 
@@ -86,10 +86,10 @@ class Jump(NamedTuple):
 
 
 class Break(NamedTuple):
-    """New input data, which algebraic unknowns follow.
+    """Time at which input data change and algebraic unknowns follow.
 
     Attributes:
-        step: number of the first step with them.
+        step: number of the first step with the new data.
         t: time [s].
     """
 
@@ -98,20 +98,20 @@ class Break(NamedTuple):
 
 
 Opening = tuple[int, tuple[Jump | Break | None, ...]]
-"""Number of a step, and the jumps right before it in their order; None is the start."""
+"""Number of a step, and the jumps right before it in their order; None stands for the start."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Accepted steps of a run and the data they were made with.
+    """Accepted steps of a run, and the data with which they were made.
 
     Attributes:
-        integrator, inputs, p, backend: of the run.
-        dense: the continuous solution.
+        integrator, inputs, p, backend: those of the run.
+        dense: continuous solution.
         guess: initial guess of the consistent start values.
         happened: events that were carried out.
-        tolerance: of their location [s].
+        tolerance: tolerance of event times [s].
         known: times of the result [s] and unknowns there, shape (n, times).
     """
 
@@ -126,14 +126,14 @@ class Path:
     known: tuple[Array, Array] | None = None
 
     def at(self, times: Array) -> list[Array]:
-        """Return times, unknowns y and run data d there, a row each."""
+        """Return the times, and the unknowns y and run data d at these times, one row each."""
         y = self.dense(times)
         if self.known is not None and times is self.known[0]:
             y = self.known[1]
         return [times, y.T, self.data(self._intervals(times))]
 
     def data(self, interval: NDArray[np.intp]) -> Array:
-        """Return run data d on input intervals, shape (intervals, n_d)."""
+        """Return the run data d on input intervals, shape (intervals, n_d)."""
         if self.inputs.values.shape[1] == 1:
             d = np.concatenate([self.p, self.inputs.values[:, 0]])
             return np.ndarray((interval.size, d.size), float, d, 0, (0, d.itemsize))
@@ -164,12 +164,12 @@ class Path:
 
     @cached_property
     def interval(self) -> NDArray[np.intp]:
-        """Input interval of every step."""
+        """Input interval of each step."""
         return self._intervals((self.dense.t0 + self.dense.t1) / 2)
 
     @cached_property
     def size(self) -> Array:
-        """Size of every step [s]; the full size if an event cut it."""
+        """Size of each step [s]; the full size if an event cut the step."""
         size = self.dense.t1 - self.dense.t0
         for jump in self.jumps:
             if jump.size:
@@ -178,18 +178,16 @@ class Path:
 
     @cached_property
     def theta(self) -> Array:
-        """Part of every step up to the event that cut it."""
+        """Fraction of each step up to the event that cut it."""
         return (self.dense.t1 - self.dense.t0) / self.size
 
     @cached_property
     def steps(self) -> list[Array]:
-        """Start y, size h and run data d of every step."""
+        """Start values y, sizes h and run data d of all steps."""
         return [self.dense.y0, self.size, self.data(self.interval)]
 
     def shares(self, theta: Array) -> Array:
-        """Return the weights of start, end and dense output of a step in its values, a row per
-        theta.
-        """
+        """Return the weights of start, end and dense output in a step's values, a row per theta."""
         found = np.empty((theta.size, self.dense.D.shape[1] + 2))
         found[:, 0], found[:, 1] = 1 - theta, theta
         for row in range(2, found.shape[1]):
@@ -197,8 +195,9 @@ class Path:
         return found
 
     def place(self, jump: Jump) -> int:
-        """Return the input interval in which events happened, at a break the earlier one unless
-        at once.
+        """Return the input interval in which events happened.
+
+        At a break, it is the earlier interval if the events cut a step, else the later one.
         """
         if jump.size:
             return int(self.interval[jump.step - 1])
@@ -214,16 +213,16 @@ class Path:
 
     @property
     def linked(self) -> bool:
-        """True if there are jumps between its steps."""
+        """True if there are jumps between the steps."""
         return bool(self.happened) or len(self.openings) > 1
 
     @cached_property
     def openings(self) -> list[Opening]:
-        """The start, and all jumps by the step that they precede."""
+        """Start of the run, and all jumps grouped by the step that they precede."""
         marks: list[Jump | Break] = []
         breaks = self.breaks
         for jump in self.jumps:
-            # an event right on a break was before it, unless the break caused it
+            # an event at the time of a break comes before it, unless the break caused the event
             before = [b for b in breaks if b.step <= jump.step and (b.t < jump.t or jump.at_once)]
             breaks = breaks[len(before) :]
             marks += [*before, jump]

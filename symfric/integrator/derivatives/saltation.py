@@ -1,26 +1,27 @@
-"""Derivatives across jumps: saltation matrices, and the links that they make between steps.
+"""Derivatives across jumps: saltation matrices, and the links that they form between steps.
 
 The time of an event g(t, y, d) = 0 depends on the parameters. With S the derivatives of y at a
-fixed time before it, f the rate of y and a reset r,
+fixed time before the event, f the rate of y, and r a reset,
 
     t*' = -(g_y S + g_d d') / (g_y f + g_t)
     S   <- S + f t*'                                of y at the event, which moves
     S   <- C (r_y S + r_t t*' + r_d d') + C_d d'     after the reset
 
-where C updates the algebraic unknowns, and the next step starts at the event, so it is shorter by
-t*'. An event caused by another jump shares the time of that jump. Events at one instant whose times
-differ in their derivatives are taken one after another, with f between them; if another order leads
-to another state, the motion has no derivative.
+where C updates the algebraic unknowns. The next step starts at the event, so it is shorter by t*'.
+An event caused by another jump shares the time of that jump. Events at one instant whose times have
+different derivatives are taken one after another, with f between them. If another order leads to
+another state, the motion has no derivative.
 
 A passage is the matrix [A B] of X -> A X + B d' across a jump, shape (n + 1, n + 1 + n_d): X holds
-the derivatives of y and, in its last row, of the time at which y is evaluated. After every step of
-a run with jumps, from the derivatives Z_i of its start, its end and each row of its dense output,
-and T of the time of its start,
+the derivatives of y and, in its last row, of the time at which y is evaluated. After each step of a
+run with jumps, the derivatives Z_i of its start, of its end and of each row of its dense output,
+and T of the time of its start, give
 
     F = sum_i share_i Z_i + fall T,      X = A F + B d'
 
-where X holds those of the start of the next step and of its time. Without a jump F is Z of the end,
-and X is the same; an event cuts the step, and F is the dense output there at a fixed time.
+where X holds the derivatives of the start of the next step and of its time. Without a jump, F is Z
+of the end, and X is the same. An event cuts the step; F is then Z of the dense output at a fixed
+time there.
 
 Source: Aizerman and Gantmakher, Quart. J. Mech. Appl. Math., 1958; Leine and Nijmeijer, Dynamics
 and Bifurcations of Non-Smooth Mechanical Systems, 2004 (saltation matrix).
@@ -42,26 +43,28 @@ from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, consiste
 Array = NDArray[np.float64]
 Which = Sequence[int] | NDArray[np.intp]
 GRAZING = 1e-6
-"""Rate of an event expression over its mean rate in the step before, below which it touches zero
-without crossing it; the square is the limit of the rate over its terms.
+"""Relative rate of an event expression below which it touches zero without crossing it.
+
+The rate is relative to the mean rate in the step before. The square is the limit of the rate
+relative to the sum of its terms.
 """
 SAME = 1e-6
-"""Relative difference of two orders of events that counts as equal."""
+"""Relative difference of results that counts as equal, such as those of two orders of events."""
 MOST = 4
-"""Simultaneous events up to which all orders are tried; for more, neighbours are exchanged."""
+"""Simultaneous events up to which all orders are tried; for more, only exchanges of neighbours."""
 
 
 class Links(NamedTuple):
-    """Links of a run; tables have one row per distinct jump, the first one for no jump.
+    """Links of a run; tables have one row per distinct jump, and the first row is for no jump.
 
     Attributes:
-        start: passage of the start.
-        of: number of the row after each step, shape (steps,).
+        start: passage at the start.
+        of: number of the row that applies after each step, shape (steps,).
         share: shape (rows, 2 + rows of the dense output).
         fall: shape (rows, n).
         by_state: A without its last column, shape (rows, n + 1, n).
         by_data: B, shape (rows, n + 1, n_d).
-        alone: passages of each jump of the run.
+        alone: passages of the single jumps of the run.
     """
 
     start: Array
@@ -77,8 +80,8 @@ def links(path: Path) -> Links:
     """Return the links of a run.
 
     Raises:
-        ValueError: an event that only touches zero, events at one instant that do not commute, or
-            one that coincides with a jump of the inputs.
+        ValueError: an event only touches zero, events at one instant do not commute, or an event
+            coincides with a jump of the inputs.
     """
     every, dense, n = _passages(path), path.dense, path.integrator.system.n
     own = dict(zip(map(id, path.jumps), every, strict=True))
@@ -102,7 +105,7 @@ def links(path: Path) -> Links:
 
 
 def then(first: Array, *others: Array) -> Array:
-    """Return passages one after another as one."""
+    """Return the passage that combines passages one after another."""
     m = first.shape[-2]
     for other in others:
         first = other[..., :m] @ first
@@ -111,7 +114,7 @@ def then(first: Array, *others: Array) -> Array:
 
 
 def at_start(path: Path) -> Array:
-    """Return the passage from given to consistent start values."""
+    """Return the passage from the given to the consistent start values."""
     here = _Instants(path, path.dense.t0[:1], path.data(np.zeros(1, dtype=np.intp)))
     return here.consistent(here.nothing, path.guess, path.dense.y0[:1])[0]
 
@@ -132,7 +135,7 @@ def _passages(path: Path) -> Array:
 
 
 def _is_single(path: Path, jump: Jump) -> bool:
-    """Return True if a single event cut a step, away from breaks and without constraints."""
+    """Return True if a single event cut a step, away from breaks, and there are no constraints."""
     if len(jump.which) > 1 or not jump.size or path.integrator.system.manifold is not None:
         return False
     breaks, k = path.inputs.breaks, path.place(jump)
@@ -140,9 +143,7 @@ def _is_single(path: Path, jump: Jump) -> bool:
 
 
 def _passage(here: "_Instants") -> Array:
-    """Return the passage of events at one instant, from derivatives of y at its time; from a fixed
-    time if they cut a step.
-    """
+    """Return the passage of events at one instant; from a fixed time if they cut a step."""
     (jump,), path = here.jumps, here.path
     if jump.at_once:
         return here.reset(here.before, jump.which, here.after)
@@ -165,7 +166,7 @@ def _passage(here: "_Instants") -> Array:
 
 
 def _crossed(here: "_Instants", rate: Array) -> Array:
-    """Return the passage of crossed events from derivatives at a fixed time before them."""
+    """Return the passage of crossed events, from derivatives at a fixed time before them."""
     which, groups = here.jumps[0].which, list[tuple[Array, list[int]]]()
     for i in which:
         delay = here.delay([i], here.before, rate)
@@ -194,7 +195,7 @@ def _crossed(here: "_Instants", rate: Array) -> Array:
 
 
 def _one_by_one(here: "_Instants", order: Sequence[list[int]], rate: Array) -> Array | None:
-    """Return the passage of ordered simultaneous events; None if one prevents another."""
+    """Return the passage of simultaneous events in this order; None if one prevents another."""
     y, through, system = here.before, here.nothing, here.path.integrator.system
 
     def speeds(events: Sequence[int]) -> Array:
@@ -228,14 +229,14 @@ NOTHING = np.zeros(0)
 
 
 class _Instants(NamedTuple):
-    """Instants of a run, m in number, with a row of each array for each.
+    """Instants of a run, m in number; each array has one row per instant.
 
     Attributes:
         path: the run.
         t: times [s].
         d: run data.
         jumps: events at these times, if any.
-        before, after: unknowns on both sides of these.
+        before, after: unknowns before and after the events.
     """
 
     path: Path
@@ -260,7 +261,7 @@ class _Instants(NamedTuple):
         return np.tile(np.eye(n + 1, n + 1 + n_d), (m, 1, 1))
 
     def where(self, which: Sequence[int], row: int = 0) -> str:
-        """Return the location of events for messages."""
+        """Return the start of messages about events."""
         model = self.path.integrator.model
         names = listed(f"'{model.events[i].name}'" for i in which)
         return f"sensitivities of '{model.name}': event {names} at t = {self.t[row]:.9g} s"
@@ -280,8 +281,9 @@ class _Instants(NamedTuple):
         return np.linalg.solve(matrix, right[:, :, None])[:, :, 0].astype(float)
 
     def rates_before(self) -> Array:
-        """Return the rates just before the events, from the equations: in a step that a jump of the
-        force ended, dense output has a mean rate.
+        """Return the rates just before the events, from the equations.
+
+        In a step that a jump of the force ended, the dense output has only a mean rate.
         """
         y, dense = self.before.copy(), self.path.dense
         cut = np.array([jump.size > 0 for jump in self.jumps])
@@ -292,15 +294,14 @@ class _Instants(NamedTuple):
         return self.rate(y)
 
     def slopes(self, which: Which, y: Array) -> tuple[Array, Array, Array]:
-        """Return the derivatives of the expression of one event each by t, y and d."""
+        """Return the derivatives of one event expression per instant with respect to t, y and d."""
         found = self._values(derivatives(self.path.integrator).of_events, self.t, y)
         m, every, own = self.t.size, len(self.path.integrator.model.events), np.asarray(which)
         by_t, by_y, by_d = (a.reshape(m, -1, every)[np.arange(m), :, own] for a in found)
         return by_t[:, 0], by_y, by_d
 
     def delay(self, which: Which, y: Array, rate: Array) -> Array:
-        """Return the derivative of the time of one event each by y at a fixed time and by d, shape
-        (m, n + n_d).
+        """Return the derivatives of event times by y at a fixed time and by d, shape (m, n + n_d).
 
         Raises:
             ValueError: an expression only touches zero.
@@ -342,12 +343,12 @@ class _Instants(NamedTuple):
 
     @property
     def _resets(self) -> tuple[tuple[int, int], ...]:
-        """Numbers of event and state of each reset."""
+        """Numbers of the event and of the state of each reset."""
         crossings = self.path.integrator.crossings
         return () if crossings is None else crossings.resets
 
     def jumped(self, y: Array, which: Which) -> Array:
-        """Return unknowns y after the resets of events, algebraic ones as before."""
+        """Return y after the resets of events, with algebraic unknowns unchanged."""
         (fresh,), after = self._values(self.path.integrator.resets, self.t, y), y.copy()
         for k, (event, state) in enumerate(self._resets):
             here = (np.atleast_2d(which) == event).any(axis=1)
@@ -355,9 +356,7 @@ class _Instants(NamedTuple):
         return after
 
     def reset(self, y: Array, which: Which, found: Array) -> Array:
-        """Return the passages of the resets of the events `which`, (m, events), at y; `found` is y
-        after them.
-        """
+        """Return the passages of the resets of events `which` (m, events) from y to `found`."""
         n, every, jumps = y.shape[1], self._resets, self.nothing
         if not every:
             return self.followed(jumps, found)
@@ -370,9 +369,7 @@ class _Instants(NamedTuple):
         return self.consistent(jumps, self.jumped(y, which), found)
 
     def consistent(self, jumps: Array, y: Array, found: Array) -> Array:
-        """Return passages to y followed by those of `consistent` from y to `found`; of mechanisms
-        at one instant only.
-        """
+        """Return passages to y and on to the consistent `found`; for mechanisms at one instant."""
         made, n = derivatives(self.path.integrator), y.shape[-1]
         manifold = made.system.manifold
         if manifold is not None and made.assembly is not None:
@@ -388,7 +385,7 @@ class _Instants(NamedTuple):
         return self.followed(jumps, found)
 
     def followed(self, jumps: Array, found: Array) -> Array:
-        """Return passages with algebraic unknowns updated at `found`."""
+        """Return passages followed by the update of the algebraic unknowns at `found`."""
         made = derivatives(self.path.integrator)
         n, m, free = made.system.n, self.t.size, made.system.free
         if free.size:

@@ -1,11 +1,11 @@
 """Derivatives of a run: forward, and reverse by one sweep.
 
-The accepted steps are differentiated with their sizes held fixed. The step-size controller takes no
-part (internal numerical differentiation), so the derivatives are those of the discrete solution and
-exact to rounding. An event moves with the parameters: the step that it cuts ends, and the next one
-begins, where the dense output has the event (`saltation`); all other steps end at fixed times. The
-rate of the solution there comes from the equations; the rate of the dense output differs from it by
-its error, or more across a jump of the force.
+The accepted steps are differentiated with their sizes held fixed. The step-size controller is not
+differentiated (internal numerical differentiation), so the derivatives are those of the discrete
+solution and exact to rounding. An event moves with the parameters: the step that it cuts ends, and
+the next one begins, where the dense output has the event (`saltation`). All other steps end at
+fixed times. At an event, the rate of the solution comes from the equations. The rate of the dense
+output differs from it by the error of the dense output, or by more across a jump of the force.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,9 +28,9 @@ class Slopes(NamedTuple):
     """Derivatives of a run.
 
     Attributes:
-        dense: of the solution at fixed times, as dense output of names * n columns, those of a name
-            together.
-        times: of the times of its jumps, shape (jumps, names).
+        dense: derivatives of the solution at fixed times, as dense output of names * n columns,
+            those of a name together.
+        times: derivatives of the times of the jumps, shape (jumps, names).
     """
 
     dense: Dense
@@ -38,7 +38,7 @@ class Slopes(NamedTuple):
 
 
 def forward(path: Path, which: Seeds) -> Slopes:
-    """Return derivatives of the solution by all names, in one sweep over the steps."""
+    """Return the derivatives of the solution with respect to all names, in one sweep over steps."""
     n, names, linked = path.integrator.system.n, len(which.names), path.linked
     state, of_d = np.zeros((n + 1, names)), which.of_data(path.steps[2].shape[1])
     state[: which.start.shape[0]] = which.start
@@ -59,14 +59,12 @@ def forward(path: Path, which: Seeds) -> Slopes:
 
 
 def _after(passage: Array, state: Array, of_d: Array) -> Array:
-    """Return the derivatives behind a passage."""
+    """Return the derivatives after a passage."""
     return passage @ np.vstack([state, of_d])
 
 
 def _dense(path: Path, start: Array, behind: Array, inner: Array) -> Dense:
-    """Return derivatives over all steps, from those of the start and the sweep's results per
-    step.
-    """
+    """Return the derivatives over all steps, from those of the start and the sweep's results."""
     steps, size = inner.shape[0], start.size
     parts = inner.reshape(steps, -1, size)
     begin = np.vstack([start.T.reshape(1, -1), behind[:-1].reshape(steps - 1, size)])
@@ -74,10 +72,10 @@ def _dense(path: Path, start: Array, behind: Array, inner: Array) -> Dense:
 
 
 def _at_fixed_times(path: Path, found: Dense, states: Array) -> Dense:
-    """Return derivatives at fixed times, up to the events that cut steps.
+    """Return the derivatives at fixed times, up to the events that cut steps.
 
-    `found` holds them at fixed places in full steps; `states` those of the starts of steps, with
-    those of their times in the last column.
+    `found` holds the derivatives at fixed places in full steps; `states` holds those of the starts
+    of steps and, in the last column, of their times.
     """
     cut = np.array([jump.step - 1 for jump in path.jumps if jump.size], dtype=np.intp)
     begin, end, bend = found.y0, found.y1.copy(), found.D.copy()
@@ -101,10 +99,10 @@ def _cut(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Array]
 
 
 def _ahead(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Array, Array]:
-    """Return (1 - theta s) y'(s) of pieces in the form of `Dense`, with the place s in them.
+    """Return (1 - theta s) y'(s) of pieces in the form of `Dense`, where s is the place in them.
 
-    This is the delay of the solution at a fixed time if a step starts later and ends at its time;
-    the piece is the part of the step up to theta.
+    This is the delay of the solution at a fixed time if a step starts later and ends at its fixed
+    time; the piece is the part of the step up to theta.
     """
     D, h = dense.D[k], (dense.t1 - dense.t0)[k, None]
     rows = D.shape[1]
@@ -121,7 +119,7 @@ def _ahead(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Arra
 
 
 def _times(path: Path, every: Links, dense: Dense, states: Array, of_d: Array) -> Array:
-    """Return derivatives of the times of all jumps, shape (jumps, names)."""
+    """Return the derivatives of the times of all jumps, shape (jumps, names)."""
     found, own, names = list[Array](), iter(every.alone), of_d.shape[1]
     for step, marks in path.openings:
         jumps = [mark for mark in marks if isinstance(mark, Jump)]
@@ -134,13 +132,13 @@ def _times(path: Path, every: Links, dense: Dense, states: Array, of_d: Array) -
 
 
 def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array:
-    """Return derivatives of all signals at times, shape (names, signals, times).
+    """Return the derivatives of all signals at times, shape (names, signals, times).
 
     Args:
         path: the run.
         which: names to differentiate with respect to.
         solution: derivatives of the solution, from `forward`.
-        times: of the result [s].
+        times: times of the result [s].
     """
     rows = [*path.at(times), solution(times).T]
     (found,) = derivatives(path.integrator).of_signals(which)(rows, backend=path.backend)
@@ -151,7 +149,7 @@ def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array
 def gradient(
     path: Path, which: Seeds, times: Array, weights: Mapping[int, Array]
 ) -> dict[str, float]:
-    """Return derivatives of sum_ij weights_ij signal_i(t_j), of the discrete solution.
+    """Return the derivatives of sum_ij weights_ij signal_i(t_j), of the discrete solution.
 
     They are exact to rounding.
 
@@ -159,7 +157,7 @@ def gradient(
         path: the run.
         which: names to differentiate with respect to.
         times: t_j [s], increasing, shape (m,).
-        weights: number of a signal -> its weights, shape (m,); no others need a derivative.
+        weights: signal number -> its weights, shape (m,); other signals do not need a derivative.
     """
     s, used = path.integrator.system, tuple(weights)
     if not used:
@@ -173,7 +171,7 @@ def gradient(
 
 
 def _swept_back(path: Path, looks: "_Looks") -> tuple[Array, Array]:
-    """Return adjoints of the start, before it is made consistent, and of d."""
+    """Return the adjoints of the start, before it is made consistent, and of d."""
     n, made = path.integrator.system.n, derivatives(path.integrator)
     steps = [a[::-1] for a in (*path.steps, looks.weights)]
     if path.linked:
@@ -196,10 +194,10 @@ class _Looks:
     Args:
         path: the run.
         times: t_j [s], increasing, shape (m,).
-        by_y: weights of y there, shape (m, n).
+        by_y: weights of y at these times, shape (m, n).
 
     Attributes:
-        weights: of start, end and dense output of each step, a row each.
+        weights: weights of start, end and dense output, one row per step.
     """
 
     def __init__(self, path: Path, times: Array, by_y: Array) -> None:
@@ -219,7 +217,7 @@ class _Looks:
     def ahead(self, every: Links) -> Array:
         """Return the derivative of the sum by the start time of each step, from times within it.
 
-        It is nonzero for steps after jumps only; others start at fixed times.
+        It is nonzero only for steps after jumps; other steps start at fixed times.
         """
         path, found = self.path, np.zeros(self.path.dense.t0.size)
         moves = np.append(path.openings[0][1] != (None,), every.of[:-1] > 0)
@@ -238,9 +236,9 @@ class Differentiated:
     """Derivatives along the steps of a run.
 
     Attributes:
-        make: returns the run, when it is first needed.
+        make: function that returns the run; it is called when the run is first needed.
         which: names to differentiate with respect to.
-        names: of the signals.
+        names: names of the signals.
         t: times of the result [s].
     """
 
@@ -268,12 +266,12 @@ class Differentiated:
         }
 
     def pull_back(self, weights: Mapping[str, Array]) -> dict[str, float]:
-        """Return derivatives of a weighted sum of signals at `t`."""
+        """Return the derivatives of a weighted sum of signals at `t`."""
         used = {self.names.index(name): w for name, w in weights.items() if w.any()}
         return gradient(self.path, self.which, self.t, used)
 
     def delays(self) -> dict[str, Array]:
-        """Return derivatives of the times of events."""
+        """Return the derivatives of the times of events: name -> values, shape (events,)."""
         jumps = [len(jump.which) for jump in self.path.jumps]
         times = np.repeat(self.solution.times, jumps, axis=0)
         return dict(zip(self.which.names, times.T, strict=True))

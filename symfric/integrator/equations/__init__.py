@@ -1,3 +1,1 @@
-"""Equations of a model in the form that a step needs: unknowns, inputs, constraints, start
-values.
-"""
+"""Equations of a model in the form that steps need: unknowns, inputs, constraints, start values."""

@@ -1,24 +1,26 @@
-"""Functions that make up an implicit step, and the update of algebraic unknowns after a jump.
+"""Functions from which implicit steps are built, and the update of algebraic unknowns after a jump.
 
-With SX they are inlined, with MX they stay calls.
+The Functions are inlined in SX expressions and remain calls in MX expressions.
 
-When input data jump, states and time stay, and algebraic unknowns move to the solution near the
-previous one. With W = -dg/dz of the algebraic equations 0 = g(y, d), factorised once a round,
+When input data jump, states and time stay constant, and the algebraic unknowns move to the solution
+near the previous one. With W = -dg/dz of the algebraic equations 0 = g(y, d), factorised once per
+round, the iteration
 
     W s_1 = g(y),        W s_2 = g(y + s_1),        y <- y + s_1 + s_2
 
-is of order 3; equations that are linear in their unknowns, such as those of a machine without
+is of order 3. Equations that are linear in their unknowns, such as those of a machine without
 friction, need one round. The iteration has converged if
 
     |W| |s_2| <= DONE |W| |z|
 
-in every equation. Without a mechanism there may be many solutions, and the iteration has to stay
-near the previous one: it continues only while s_2 is at most half of s_1 (Deuflhard's monotonicity
-test with frozen derivatives, which is invariant to units of equations and of unknowns). Normal
-forces N = |R(N)| of a mechanism are convex and Newton's method converges from far away; the guard
-rejects invalid solutions. The two loops, in Python and in C (`follow.c`), make the same comparisons
-of the same numbers, so that engines agree bit for bit. On failure the unknowns stay unchanged, and
-the damped search of `symfric.integrator.equations.initial` begins at the same guess.
+in every equation. A system other than a mechanism may have many solutions, and the iteration has to
+stay near the previous one: it continues only while s_2 is at most half of s_1 (Deuflhard's
+monotonicity test with frozen derivatives, which is invariant to the units of equations and of
+unknowns). The normal forces N = |R(N)| of a mechanism are convex, and Newton's method converges
+from far away; the guard rejects invalid solutions. The loops in Python and in C (`follow.c`) make
+the same comparisons of the same numbers, so both engines give the same bits. On failure the
+unknowns stay unchanged, and the damped search of `symfric.integrator.equations.initial` begins at
+the same guess.
 
 Source: Deuflhard, Newton Methods for Nonlinear Problems, 2004, sections 2.1 and 3.3.
 """
@@ -43,13 +45,13 @@ NONE = ca.SX(0, 1)
 
 
 class Slopes(NamedTuple):
-    """Jacobian of a system, bordered by that of its inner unknowns l if there are any.
+    """Jacobian of a system, bordered by the derivatives of its inner unknowns l, if any.
 
         [ f_y  f_l     ]
         [ g_y  g_l - I ]
 
     Attributes:
-        J: with a symbol for every entry that is not a constant.
+        J: bordered Jacobian with a symbol for every entry that is not constant.
         entries: these symbols.
         values: (y, d) -> values of these symbols.
         pivots: groups of rows as in `factorise`.
@@ -69,7 +71,7 @@ class Slopes(NamedTuple):
 
 @lru_cache(maxsize=2)
 def slopes(system: System) -> Slopes:
-    """Return the Jacobian of `system`."""
+    """Return the Jacobian of `system`, bordered by the derivatives of its inner unknowns."""
     y, d, inner = system.y, system.d, system.inner
     slope, pivots, hidden = system.J, system.pivots, NONE
     if inner is not None:
@@ -92,7 +94,7 @@ def slopes(system: System) -> Slopes:
 
 
 def _inner(system: System) -> ca.SX:
-    """Return inner unknowns in terms of y and d."""
+    """Return the inner unknowns in terms of y and d."""
     if system.inner is None:
         return NONE
     (values,), _ = ca.substitute_inplace([system.inner.l], [system.inner.values], [NONE])
@@ -100,15 +102,15 @@ def _inner(system: System) -> ca.SX:
 
 
 class Blocks(NamedTuple):
-    """Right-hand side, iteration matrix W = M/(gamma h) - J and solutions with it.
+    """Right-hand side of a system, iteration matrix W = M/(gamma h) - J, and solutions with W.
 
     Attributes:
         f: (y, d) -> right-hand side.
         slopes: (y, d) -> entries of J.
         pack: (entries of J, h) -> factors of W.
         solve: (factors, right, memory) -> k with W k = right + M memory.
-        lu: the factors as expressions.
-        factors: W, and the order in which it is factorised.
+        lu: factors of W as expressions.
+        factors: W and the pivot order of its factors.
     """
 
     f: ca.Function
@@ -145,9 +147,10 @@ def blocks(system: System, gamma: float) -> Blocks:
 
 @lru_cache(maxsize=2)
 def at_rest(system: System) -> tuple[SymbolicLU, Factors]:
-    """Return the factors of W for a tiny step: M, and the derivatives of the rows without rates.
+    """Return the factors of W for a tiny step as expressions, and the matrix with its pivot order.
 
-    The matrix is singular if the algebraic equations do not determine their unknowns.
+    The matrix consists of M and of the derivatives of the rows without rates. It is singular if the
+    algebraic equations do not determine their unknowns.
     """
     own, (rows, _) = slopes(system), system.algebraic
     matrix = own.matrix(system.mass, [i for i in range(system.n) if i not in rows])
@@ -163,15 +166,15 @@ def _residual(system: System) -> ca.Function:
 
 
 Signs = Callable[[Any, Any, Any], tuple[Any, Any, Any]]
-"""(y, h, d) -> signs of det W and of det W for a tiny step, pivots of rows in the latter."""
+"""(y, h, d) -> sign of det W; for a tiny step, sign of det W and pivots of the watched rows."""
 
 
 def signs(system: System, gamma: float, watched: Sequence[int] = ()) -> Signs:
-    """Return the signs of det W and of the same for a tiny step, which only algebraic rows have.
+    """Return the signs of det W for the step and for a tiny step, where only algebraic rows count.
 
-    Where they differ, a mode grows faster than exp(t / (gamma h)), which an L-stable method of this
-    step wrongly damps. The pivots of the rows `watched`, available without further work, show how
-    far the latter is from zero.
+    If they differ, a mode grows faster than exp(t / (gamma h)), and an L-stable method of this step
+    wrongly damps it. The pivots of the rows `watched`, which require no further work, show how far
+    the determinant for a tiny step is from zero.
     """
     block, (rows, _) = blocks(system, gamma), system.algebraic
     lu, entries = block.lu, block.factors.symbols[0]
@@ -192,35 +195,35 @@ def signs(system: System, gamma: float, watched: Sequence[int] = ()) -> Signs:
 
 
 DONE = 1e-10
-"""Largest last correction, relative to the terms of the equations; beyond it is rounding."""
+"""Largest last correction, relative to the terms of the equations; smaller errors are rounding."""
 ROUNDS = 6
-"""Most rounds; a solution that takes more is not near."""
+"""Largest number of rounds; a solution that takes more is not near."""
 FAINT = 1e-3
-"""Equations of a mechanism with terms this small compared with the largest are solved to the
-rounding of the largest: out of its plane, or where loads cancel, all terms are rounding.
+"""Ratio to the largest terms below which the terms of an equation of a mechanism are rounding.
+
+Such equations, out of the plane of the mechanism or where loads cancel, are solved to the rounding
+of the largest terms.
 """
 NEARER, ANY = 0.5, 1e10
-"""Largest s_2 over s_1 to continue with: for general systems, and for mechanisms."""
+"""Largest ratio of s_2 to s_1 at which the iteration continues: in general, and for mechanisms."""
 INLINE = 7000
-"""Rounds with more instructions are calls of blocks, which compile much faster."""
+"""Number of instructions above which rounds call blocks, which compile much faster."""
 
 
 class Following(NamedTuple):
-    """Update of the unknowns after a jump.
+    """Update of the algebraic unknowns after a jump.
 
     Attributes:
         round: (y, d) -> y after one round, and (sizes of s_1 and s_2, guard). A negative guard
             rejects the solution: friction has jammed, or a bearing pulls.
-        contraction: largest s_2 over s_1 to continue with.
+        contraction: largest ratio of s_2 to s_1 at which the iteration continues.
     """
 
     round: ca.Function
     contraction: float
 
     def __call__(self, y: Array, d: Array) -> Array | None:
-        """Return `y` with its algebraic unknowns at run data `d`; None if a full search is
-        needed.
-        """
+        """Return `y` updated to the run data `d`; None if a full search is needed."""
         now, after, look = y.copy(), np.empty(y.size), np.empty(3)
         data = np.ascontiguousarray(d, dtype=float)
         call = bound(self.round, (now, data), (after, look))
@@ -236,9 +239,10 @@ class Following(NamedTuple):
 
     @property
     def c_source(self) -> str:
-        """C of the update, `int symfric_follow(double *y, const double *d)`.
+        """C source of the update, `int symfric_follow(double *y, const double *d)`.
 
-        It returns 0, or 1 and leaves y unchanged. The C of `round` must precede it.
+        The C function returns 0; on failure it returns 1 and leaves y unchanged. The C source of
+        `round` must precede it.
         """
         return filled(
             Path(__file__).with_name("follow.c"), self.round, n=self.round.numel_in(0),
@@ -259,9 +263,9 @@ def following(system: System) -> Following | None:
 
 @lru_cache(maxsize=2)
 def corrected(system: System) -> ca.Function:
-    """Return the Function (y, d) -> y with its algebraic unknowns after a step of Newton's method.
+    """Return the Function (y, d) -> y with its algebraic unknowns after one Newton step.
 
-    A mechanism is first projected onto its constraints, and makes two steps.
+    A mechanism is first projected onto its constraints, and takes two Newton steps.
     """
     y, d, parts, manifold = system.y, system.d, _parts(system), system.manifold
     end = y if manifold is None else ca.SX(manifold.project(y, d))
@@ -272,15 +276,15 @@ def corrected(system: System) -> ca.Function:
 
 
 class _Parts(NamedTuple):
-    """Functions of a round.
+    """Functions that make up a round.
 
     Attributes:
         residual: (y, d) -> g in its rows of y, 0 elsewhere.
         entries: (y, d) -> entries of W.
         pack: entries -> factors.
-        solve: (factors, residual) -> s, and its part in y.
-        sizes: (entries, s_1, s_2, y after, inner unknowns) -> their sizes.
-        guard: (factors, y after, d) -> least value that must not be negative.
+        solve: (factors, residual) -> s, and the change of y by s.
+        sizes: (entries, s_1, s_2, y after the round, inner unknowns) -> sizes of s_1 and s_2.
+        guard: (factors, y after the round, d) -> smallest of the values that must not be negative.
     """
 
     residual: ca.Function
@@ -292,7 +296,7 @@ class _Parts(NamedTuple):
 
 
 def _round(system: System, parts: _Parts, kind: Any) -> ca.Function:
-    """Return one round; SX inlines everything, MX keeps the parts as calls."""
+    """Return the Function of one round; SX inlines everything, MX keeps the parts as calls."""
     y, d = kind.sym("y", system.n), kind.sym("d", system.d.numel())
     inner = ca.Function("inner", [system.y, system.d], [_inner(system)], {"cse": True})
     entries = parts.entries(y, d)
@@ -338,8 +342,9 @@ def _parts(system: System) -> _Parts:
 def _sizes(
     system: System, W: ca.SX, symbols: ca.SX, moved: Sequence[int], rows: Sequence[int]
 ) -> ca.Function:
-    """Return (entries, s_1, s_2, y, inner unknowns) -> largest |W| |s| / |W| |z|, for s_1 and
-    s_2.
+    """Return the Function for the largest |W| |s| / |W| |z|, of s_1 and of s_2.
+
+    Its arguments are (entries, s_1, s_2, y, inner unknowns).
     """
     count, inner = W.size1(), W.size1() - len(moved)
     first, second = ca.SX.sym("s_1", count), ca.SX.sym("s_2", count)
@@ -347,7 +352,7 @@ def _sizes(
     size = ca.fabs(W[list(rows), :])
     unknowns = ca.vertcat(y[list(moved)], hidden + (first + second)[len(moved) :, 0])
     scale = size @ ca.fabs(unknowns)
-    # in a mechanism, values that are zero (out of its plane) are rounding of the others
+    # terms out of the plane of a mechanism are rounding errors of terms in the plane
     scale += 1e-300 if system.manifold is None else FAINT * ca.mmax(scale) + 1e-300
     found = [ca.mmax((size @ ca.fabs(s)) / scale) for s in (first, second)]
     arguments = [symbols, first, second, y, hidden]
@@ -355,10 +360,11 @@ def _sizes(
 
 
 def _guard(system: System, lu: SymbolicLU, place: dict[int, int]) -> ca.Function:
-    """Return (factors, y, d) -> a value, negative if friction has jammed or a bearing pulls.
+    """Return (factors, y, d) -> a value that is negative if friction has jammed or a bearing pulls.
 
-    The loop from normal forces over friction and reactions back to them is I - dN/dN: its
-    determinant has the sign of all others together, and no pivot of it may fall below `SHOCK`.
+    The matrix of the loop from normal forces over friction and reactions back to normal forces is
+    I - dN/dN. The sign of its determinant is, up to (-1)^n, that of all pivots together. None of
+    the pivots of this matrix may fall below `SHOCK`.
     """
     manifold, conditions = system.manifold, [NONE]
     if manifold is not None:

@@ -1,21 +1,22 @@
 """Expressions rewritten operation by operation, and discontinuities of expressions in time alone.
 
-Tanh: the branch that the C library takes depends on the argument, processors mispredict it, and a
-small step spends a third of its time there. Written out in the graph, both engines do the same
-operations, and so can vectors of members.
+Tanh: the C library branches on the argument, processors mispredict the branch, and a small step
+spends a third of its time there. The graph therefore contains tanh written out without branches.
+Both engines then do the same operations, and so do vectors of members.
 
-Quotients by one divisor become products with its reciprocal: a division costs as much as ten other
-operations. Compilers do so only if they may round differently from the virtual machine.
+Quotients with the same divisor become products with its reciprocal, because a division costs as
+much as ten other operations. Compilers do this only if they may round differently from the virtual
+machine.
 
 Numbers as data: each number becomes a symbol where it is read, so another amplitude gives the same
 equations. Exponents of constant powers stay, since they are structure: x^2 is x x, and x^0.5 has no
-slope at 0. Limits: numbers that CasADi simplifies away are not lifted: sin(t) for 1 sin(t), 0 for
+slope at 0. Limits: numbers that CasADi simplifies away are not replaced: sin(t) for 1 sin(t), 0 for
 0 sin(t).
 
-Step limit: at equilibrium steps grow until they are longer than a future pulse, and no stage falls
+Step limit: at equilibrium, steps grow until they are longer than a future pulse, and no stage falls
 on it. A function of time is known in advance and cheap, so it is sampled on a grid, and the span is
-halved until each piece is straight. Where the length of pieces changes much from one to the next, a
-step has to end. A sine has pieces of one length and no such times.
+halved until each piece is nearly linear. A step has to end where the length of the pieces changes
+much from one to the next. A sine has pieces of equal length and no such times.
 """
 
 from collections import Counter
@@ -32,13 +33,11 @@ from symfric.foundation.numeric import applied, reciprocal, walk
 from symfric.integrator.compiled.columns import Columns
 
 Rule = Callable[[int, list[ca.SX]], ca.SX | None]
-"""(number of an instruction, its operands) -> its replacement; None to keep it."""
+"""(index of an instruction, its operands) -> its replacement; None to keep the instruction."""
 
 
 def rewritten(function: ca.Function, arguments: list[ca.SX], rule: Rule) -> list[ca.SX]:
-    """Return the results of an SX `function` at `arguments`, columns of symbols, rewritten by
-    `rule`.
-    """
+    """Return the results of an SX `function` at columns of symbols, rewritten by `rule`."""
     symbols = [ca.vertsplit(ca.vec(argument)) for argument in arguments]
 
     def made(k: int, operands: list[ca.SX]) -> ca.SX:
@@ -58,25 +57,29 @@ def rewritten(function: ca.Function, arguments: list[ca.SX], rule: Rule) -> list
 
 
 MIDDLE = 0.7
-"""Up to this |x| tanh x = x + x^3 U(x^2)/V(x^2), accurate to 1e-17; beyond it 1 - 2/(e^2|x| + 1)
-loses less than a bit to cancellation.
+"""Largest |x| for tanh x = x + x^3 U(x^2)/V(x^2), which is accurate to 1e-17.
+
+Beyond it, 1 - 2/(e^2|x| + 1) loses less than a bit to cancellation.
 """
 U = (-0.3333333333333333, -0.02049522886753235, -0.00019901990913769401)
 V = (1.0, 0.46148568660258626, 0.023286572463946293, 0.00020636437984939814)
-"""Coefficients of the rational function that interpolates (tanh x / x - 1) / x^2 at Chebyshev nodes
-in x^2.
+"""Coefficients of the rational function for (tanh x / x - 1) / x^2.
+
+It interpolates at Chebyshev nodes in x^2.
 """
 
 LARGE = 300
-"""Functions with more instructions stay unchanged: tanh is a small part of them, and rewriting
-takes time.
+"""Number of instructions above which a function stays unchanged.
+
+Tanh is a small part of such a function, and rewriting takes time.
 """
 
 
 def tanh(x: ca.SX) -> ca.SX:
-    """Return tanh x to 3.5e-16, relative; odd, NaN for NaN; the same operations for all x.
+    """Return tanh x with a relative error of 3.5e-16, by the same operations for all x.
 
-    Its derivatives are correct but long: differentiate tanh itself first.
+    The result is odd, and NaN for NaN. Its derivatives are correct but long: differentiate the
+    original tanh first.
     """
     size = ca.fabs(x)
     square = x * x
@@ -93,10 +96,10 @@ def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
 
 
 def branchless(function: ca.Function, most: int = LARGE) -> ca.Function:
-    """Return the SX `function` with every tanh written out; itself if it has none or is large.
+    """Return the SX `function` with every tanh written out; unchanged if it has none or is large.
 
     Args:
-        function: of columns, or matrices.
+        function: SX Function of columns or matrices.
         most: largest number of instructions to rewrite.
     """
     count = function.n_instructions()
@@ -141,16 +144,17 @@ def divided_once(expression: ca.SX) -> ca.SX:
 
 Array = NDArray[np.float64]
 MOST_NUMBERS = 1000
-"""Expressions with more numbers are tables, and stay unchanged."""
+"""Count of numbers above which an expression is treated as a table, and stays unchanged."""
 
 
 def lifted(expression: ca.SX, known: ca.SX, name: str) -> tuple[ca.SX, ca.SX, Array]:
     """Return a scalar expression with symbols for its numbers, these symbols, and the numbers.
 
-    Evaluated at these numbers it gives the same bits: same operations, same order.
+    Evaluated at these numbers, the result has the same bits: the operations and their order are the
+    same.
 
     Args:
-        expression: in the symbols `known`.
+        expression: scalar expression in the symbols `known`.
         known: column of symbols.
         name: prefix of the new symbols.
     """
@@ -180,40 +184,41 @@ def lifted(expression: ca.SX, known: ca.SX, name: str) -> tuple[ca.SX, ca.SX, Ar
 
 
 DEPTH = 13
-"""The grid has 2^13 intervals; shorter features may be missed."""
+"""Number of halvings of the span into grid intervals; shorter features may be missed."""
 
 STRAIGHT = 1e-3
-"""Allowed deviation of a straight piece, relative to the range of the function."""
+"""Allowed deviation of a piece from a line, relative to the range of the function."""
 
 LEVELS = 3
-"""Difference in halvings of neighbours that is a discontinuity; error control handles smaller
-ones."""
+"""Difference in halvings between neighbours that counts as a discontinuity.
+
+Error control handles smaller differences.
+"""
 
 
 PULSE = 10.0
-"""Least height of a pulse within a jump, relative to that of the jump."""
+"""Smallest height of a pulse within a jump, relative to the height of the jump."""
 BRIEF = 16
-"""Length of a pulse, in grid intervals, that may lie between two stages of a step."""
+"""Largest length, in grid intervals, of a pulse that may lie between two stages of a step."""
 MOST_JUMPS = 64
-"""Number of jumps of a function above which it is sampled on the grid only."""
+"""Number of jumps above which a function is sampled on the grid only."""
 HALVINGS = 60
-"""Halvings of a grid interval, down to rounding."""
+"""Number of halvings of a grid interval, down to rounding."""
 
 HUGE = 1e300
-"""Bound of values, so that their differences are finite."""
+"""Bound of the values of functions, which keeps their differences finite."""
 
 QUICKEST = 1.0
-"""Percentage of the span with the shortest pieces that is ignored, so that a few jumps do not
-count."""
+"""Percentage of the span, with the shortest pieces, that is ignored: a few jumps do not count."""
 
 
 class Pieces(NamedTuple):
-    """Straight pieces of a function of time.
+    """Nearly linear pieces of a function of time.
 
     Attributes:
         onsets: increasing times [s] inside the span at which a step has to end.
-        pace: length [s] of the shortest pieces, a fiftieth to a hundredth of the period of a sine;
-            inf for a straight line.
+        pace: length [s] of the shortest pieces; inf for a straight line. For a sine it is a
+            fiftieth to a hundredth of the period.
     """
 
     onsets: tuple[float, ...] = ()
@@ -222,9 +227,9 @@ class Pieces(NamedTuple):
 
 @lru_cache(64)
 def pieces(function: str, t_start: float, t_end: float) -> Pieces:
-    """Return the pieces of a function of time, a serialised SX.
+    """Return the nearly linear pieces of a function of time, given as a serialised SX.
 
-    A jump between two grid points may hide a pulse, such as the derivative of a ramp of a
+    A jump between two grid points may hide a pulse, such as the derivative of a ramp that lasts a
     picosecond: the middle of such a pulse is one of the onsets.
     """
     expression = ca.SX.deserialize(function)
@@ -249,10 +254,11 @@ def pieces(function: str, t_start: float, t_end: float) -> Pieces:
 
 
 def pulses(values_at: Callable[[Array], Array], grid: Array, values: Array) -> tuple[float, ...]:
-    """Return times [s] in the middle of pulses within jumps of a function with `values` on `grid`.
+    """Return the times [s] in the middle of pulses that are hidden in jumps of a function.
 
-    The start and the end of a jump are found by bisection. It hides a pulse if the distance of the
-    function in the middle exceeds `PULSE` times the height of the jump.
+    `values` are those of the function on `grid`. The start and the end of a jump are found by
+    bisection. The jump hides a pulse if, in its middle, the function differs from the value before
+    the jump by more than `PULSE` times the height of the jump.
     """
     jumps = np.flatnonzero(np.abs(np.diff(values)) > STRAIGHT * np.ptp(values))
     if not 0 < jumps.size <= MOST_JUMPS:
@@ -275,9 +281,7 @@ def pulses(values_at: Callable[[Array], Array], grid: Array, values: Array) -> t
 
 
 def _peaks(level: NDArray[np.intp], values: Array) -> list[int]:
-    """Return grid points at the peaks of pulses of up to `BRIEF` intervals, which stages may
-    miss.
-    """
+    """Return grid points at peaks of pulses of up to `BRIEF` intervals, which stages may miss."""
     deepest = np.flatnonzero(level == DEPTH)
     found: list[int] = []
     for run in np.split(deepest, np.flatnonzero(np.diff(deepest) > 1) + 1):
@@ -290,8 +294,9 @@ def _peaks(level: NDArray[np.intp], values: Array) -> list[int]:
 
 
 def levels(values: Array) -> NDArray[np.intp]:
-    """Return how often each interval of a grid of 2^k + 1 values is halved to get a straight
-    piece.
+    """Return the number of halvings of the span for a nearly linear piece at each grid interval.
+
+    The grid has 2^k + 1 values.
     """
     cells = values.size - 1
     depth = cells.bit_length() - 1

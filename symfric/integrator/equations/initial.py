@@ -1,4 +1,4 @@
-"""Consistent start values: algebraic variables that satisfy their equations, a first step size."""
+"""Start of a run: consistent algebraic variables and the size of the first step."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,37 +20,37 @@ ITERATIONS = 50
 ASSEMBLED = 1e-12
 """Largest constraint error, relative to the largest state."""
 NEAR, CONVERGED = 1e-4, 1e-10
-"""Relative Newton steps below which no damping is needed, and below which it has converged."""
+"""Relative Newton steps below which damping is not needed, and below which Newton has converged."""
 
 HALVINGS, MARQUARDT = 12, 200
-"""Lengths that damped Newton tries, and iterations of a descent across corners."""
+"""Largest numbers of step lengths of damped Newton, and of Levenberg-Marquardt iterations."""
 LAST_DIGITS = 1e-15
-"""Relative change of numbers that are equal to rounding."""
+"""Relative difference of two numbers that are equal up to rounding."""
 FLOOR = 10 * float(np.finfo(float).eps)
-"""Smallest step relative to t: a few of the last digits of t itself."""
+"""Smallest step relative to t: a few units in the last place of t."""
 SURE = 10 * FLOOR
-"""First step relative to t: it may fail and be cut once or twice."""
+"""First step relative to t: large enough to be reduced once or twice."""
 
 
 Follow = Callable[[Array, Array], Array | None]
-"""(y, d) -> y with its algebraic unknowns; None if a full search is needed."""
+"""(y, d) -> y with consistent algebraic unknowns; None if a full search is needed."""
 
 
 class JammedError(ValueError):
-    """Algebraic equations that have no valid solution because of friction."""
+    """Error for algebraic equations that have no valid solution because of friction."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """Algebraic equations of a system, for a worker process without the system.
+    """Algebraic equations of a system, for a worker process that does not have the system.
 
     Attributes:
-        names: of all unknowns.
+        names: names of all unknowns.
         nx: number of differential states.
-        free: as `System.free`.
-        constraints: as `System.constraints`.
-        manifold: as `System.manifold`.
+        free: see `System.free`.
+        constraints: see `System.constraints`.
+        manifold: see `System.manifold`.
     """
 
     names: tuple[str, ...]
@@ -64,8 +64,9 @@ def first_guess(system: System, model: Model, x: Array, t: float = 0.0) -> Array
     """Return the initial guess of the unknowns, shape (..., n).
 
     Args:
-        system: the equations of `model`.
-        model: gives the start values of its algebraic variables; all other unknowns start at zero.
+        system: equations of `model`.
+        model: model with the start values of the algebraic variables; all other unknowns start at
+            zero.
         x: states, shape (..., nx).
         t: time [s].
     """
@@ -84,16 +85,16 @@ def first_guess(system: System, model: Model, x: Array, t: float = 0.0) -> Array
 def consistent(
     system: System | Equations, where: str, y: Array, d: Array, follow: Follow | None = None
 ) -> Array:
-    """Return `y` with its algebraic unknowns solved for, by damped Newton from the given guess.
+    """Return `y` with consistent algebraic unknowns, by damped Newton from the given guess.
 
     Args:
-        system: whose algebraic equations.
-        where: for messages.
+        system: system with the algebraic equations.
+        where: start of messages.
         y, d: guess and run data.
         follow: fast update for mechanisms, tried first (`symfric.integrator.equations.blocks`).
 
     Raises:
-        ValueError: no solution near the guess.
+        ValueError: no solution was found near the guess.
     """
     manifold = system.manifold
     if manifold is not None:
@@ -108,7 +109,7 @@ def consistent(
 
 
 def _searched(system: System | Equations, where: str, y: Array, d: Array) -> Array:
-    """Return `y` with its algebraic unknowns solved for, by Newton, then by Levenberg-Marquardt."""
+    """Return `y` with consistent algebraic unknowns, by Newton, then by Levenberg-Marquardt."""
     manifold = system.manifold
     try:
         return _solved(system, where, y, d)
@@ -121,7 +122,7 @@ def _searched(system: System | Equations, where: str, y: Array, d: Array) -> Arr
 
 
 def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array:
-    """Return `y` with its algebraic unknowns solved for, by damped Newton."""
+    """Return `y` with consistent algebraic unknowns, by damped Newton."""
     rows, along = _moved(system)
     if not rows.size:
         return y
@@ -134,7 +135,7 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
             break
         if size < NEAR:
             y[rows] -= step
-            if size < CONVERGED or size > last / 2:  # no longer quadratic: rounding
+            if size < CONVERGED or size > last / 2:  # rounding ends quadratic convergence
                 return y
         elif np.isfinite(last) and residual <= _rounding(system, y, d):
             return y  # the unknown is zero up to rounding
@@ -155,7 +156,7 @@ def _solved(system: System | Equations, where: str, y: Array, d: Array) -> Array
 
 
 def _newton_steps(g: Array, J: Array) -> Array:
-    """Return full steps, (members, n); NaN for all if the derivatives of one are singular."""
+    """Return full Newton steps, (members, n); all NaN if the matrix of any member is singular."""
     try:
         return np.linalg.solve(J, g[:, :, None])[:, :, 0].astype(float)
     except np.linalg.LinAlgError:
@@ -163,11 +164,10 @@ def _newton_steps(g: Array, J: Array) -> Array:
 
 
 def _descended(system: System | Equations, y: Array, d: Array) -> Array:
-    """Return `y` with algebraic unknowns of smaller residual, by Levenberg's and Marquardt's
-    method.
+    """Return `y` with a smaller residual of the algebraic equations, by Levenberg-Marquardt.
 
-    Where contacts start to stick, their loads change suddenly and by much, with corners in between
-    at which damped Newton stalls.
+    When contacts start to stick, their loads change abruptly and by much. Damped Newton stalls at
+    the kinks of the equations in between.
     """
     (rows, along), damping = _moved(system), 1e-3
     g, slope = evaluate_all(system.constraints, y, d)
@@ -187,7 +187,7 @@ def _descended(system: System | Equations, y: Array, d: Array) -> Array:
 
 
 def _moved(system: System | Equations) -> tuple[NDArray[np.intp], Array]:
-    """Return the unknowns that algebraic equations may change, and their rows of `free`."""
+    """Return the unknowns that the algebraic equations determine, and their rows of `free`."""
     rows = np.flatnonzero(system.free.any(axis=1))
     return rows, system.free[rows]
 
@@ -197,7 +197,7 @@ def _residual(system: System | Equations, y: Array, d: Array) -> float:
 
 
 def _rounding(system: System | Equations, y: Array, d: Array) -> float:
-    """Return the change of the residual when the last digits of its arguments change."""
+    """Return the change of the residual when the last digits of `y` and `d` change."""
     here, rng = evaluate(system.constraints, y, d), np.random.default_rng(0)
     found: list[float] = []
     for _ in range(4):
@@ -209,23 +209,23 @@ def _rounding(system: System | Equations, y: Array, d: Array) -> float:
 def consistent_many(
     system: System | Equations, together: Columns, where: str, y: Array, d: Array
 ) -> tuple[Array, dict[int, str]]:
-    """Return rows of `y` (members, n) with algebraic unknowns solved for, and number -> failure.
+    """Return rows of `y` (members, n) with consistent algebraic unknowns, and member -> failure.
 
-    Full Newton steps are made for all members at once while they reduce the residual; the others
-    are solved one by one.
+    All members make full Newton steps at once while these reduce the residual; the remaining
+    members are solved one by one.
 
     Args:
-        system: whose algebraic equations.
-        together: its constraints, for many columns.
-        where: for messages.
-        y, d: guesses and run data, a row for each member.
+        system: system with the algebraic equations.
+        together: its `constraints`, evaluated for many columns at once.
+        where: start of messages.
+        y, d: guesses and run data, one row per member.
     """
     (rows, along), failed = _moved(system), dict[int, str]()
     if not rows.size:
         return y, failed
     guess, y, alone = y, y.copy(), list[int]()
     if system.manifold is not None:
-        # mechanisms are few and large: solve one by one
+        # ensembles of mechanisms are small and have large equations: solve one by one
         alone = list(range(y.shape[0]))
     todo = np.arange(0 if alone else y.shape[0])
     before, last = np.full((2, y.shape[0]), np.inf)
@@ -265,7 +265,7 @@ def _assembled(
     """Return `y` with positions and velocities projected onto the constraints of a mechanism.
 
     Raises:
-        ValueError: no such positions near.
+        ValueError: no such positions were found nearby.
     """
     defect = np.inf
     for _ in range(ITERATIONS):
@@ -280,18 +280,20 @@ def _assembled(
 
 
 LONGEST_FIRST = 1e-5
-"""Limit of the first step [s], however long the run; no machine moves much within it."""
+"""Limit of the first step [s], for runs of any length; no machine moves much within it."""
 
 
 def first_step(span: float | Array, t_start: float = 0.0) -> Any:
-    """Return a first step [s], or one for each span, so small that the controller decides: it grows
-    eightfold per step.
+    """Return the first step [s] for each span, so small that error control decides.
+
+    The controller can enlarge the step eightfold per step.
     """
     return np.maximum(np.minimum(1e-8 * span, LONGEST_FIRST), SURE * abs(t_start))
 
 
 def smallest_step(span: float | Array) -> Any:
-    """Return the step [s], or one for each span, below which a run stops if t is near 0; elsewhere
-    rounding of t limits it.
+    """Return the step [s] for each span below which a run stops while t is near 0.
+
+    Elsewhere the rounding of t limits the step.
     """
     return 1e-15 * first_step(span)

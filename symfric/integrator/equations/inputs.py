@@ -1,4 +1,4 @@
-"""Inputs of a model over time: constants, expressions, sampled signals, and their rates."""
+"""Inputs of a model over time: constants, expressions and sampled signals, and their rates."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ Array = NDArray[np.float64]
 RAMP = "linear"
 """Structure of an input that is linear in time on each interval."""
 NO_ROWS = ca.SX(0, 1)
-"""Empty column, made once."""
+"""Empty column, created once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Signal given by samples: polynomial between the sample times, of degree 0 or 1.
+    """Signal given by samples, with a polynomial of degree 0 or 1 between the sample times.
 
     Attributes:
         t: increasing sample times [s], shape (n,).
         values: samples, shape (n,); (members, n) for an ensemble with different samples per member.
 
-    Both are copied and read-only, so they stay valid. Before the first and after the last sample
-    the end value holds.
+    Both arrays are copied and read-only. Before the first sample and after the last one the signal
+    is constant.
     """
 
     t: ArrayLike
@@ -62,22 +62,18 @@ class Sampled:
 
     @property
     def rows(self) -> int | None:
-        """Number of members with their own samples; None for one signal."""
+        """Number of members with their own samples; None for a single signal."""
         return np.shape(self.values)[0] if np.ndim(self.values) == 2 else None
 
     def coefficients(self, breaks: Array) -> Array:
-        """Return value and slope at the start of each interval between `breaks`, shape (2, ...,
-        n - 1).
-        """
+        """Return value and slope at the start of each interval, shape (2, ..., len(breaks) - 1)."""
         raise NotImplementedError
 
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Hold(Sampled):
-    """Zero-order hold: `values[k]` from t[k] until t[k+1], like the output of a digital
-    controller.
-    """
+    """Zero-order hold, like the output of a digital controller: `values[k]` from t[k] to t[k+1]."""
 
     def coefficients(self, breaks: Array) -> Array:
         """Return the value at the start of each interval; slope 0."""
@@ -94,7 +90,7 @@ class Linear(Sampled):
     """Linear interpolation between the samples, as for a measured signal."""
 
     def coefficients(self, breaks: Array) -> Array:
-        """Return value and slope at the start of each interval."""
+        """Return the value and the slope at the start of each interval."""
         t, values = np.asarray(self.t), np.asarray(self.values)
         ends = np.array([np.interp(breaks, t, row) for row in np.atleast_2d(values)])
         ends = ends if values.ndim == 2 else ends[0]
@@ -116,8 +112,8 @@ class InputData:
         data: SX symbols that are constant on each interval.
         breaks: interval ends in [t_start, t_end], shape (n + 1,).
         values: `data` on each interval, shape (n_data, n).
-        key: the structure; two of a model with one key have the same equations.
-        pace: length [s] of the shortest straight pieces of functions of time, or inf.
+        key: structure; inputs of one model with equal keys have the same equations.
+        pace: length [s] of the shortest nearly linear pieces of functions of time, or inf.
     """
 
     expression: ca.SX
@@ -133,7 +129,7 @@ class InputData:
         return float(self.breaks[0]), float(self.breaks[-1])
 
     def interval(self, times: Array) -> NDArray[np.intp]:
-        """Return the index of the interval of each time; at a break the later one."""
+        """Return the index of the interval of each time; at a break, that of the later interval."""
         return np.searchsorted(self.breaks[1:-1], times, side="right")
 
     def stopping_at(self, times: ArrayLike) -> InputData:
@@ -149,13 +145,13 @@ class InputData:
 def input_data(
     model: Model, given: Mapping[str, Input] | None, t_start: float, t_end: float
 ) -> InputData:
-    """Collect the inputs `given` by name; the others keep their start value.
+    """Collect the inputs `given` by name; the other inputs keep their start values.
 
-    Numbers and samples become data, expressions go into the equations with their numbers as data.
-    There are breaks at all samples, and at discontinuities of functions of time.
+    Numbers and samples become data. Expressions become part of the equations, with their numbers as
+    data. Breaks are at all sample times and at discontinuities of functions of time.
 
     Raises:
-        ValueError: unknown name or a value of another type.
+        ValueError: unknown name, or a value of an unsupported type.
     """
     if not model.u and not given:
         return _undriven(t_start, t_end)
@@ -183,9 +179,10 @@ def input_data(
 
 
 def paced(inputs: InputData, model: Model) -> InputData:
-    """Return the same inputs with breaks at discontinuities of the model's own functions of time.
+    """Return the same inputs with breaks at discontinuities of functions of time in the model.
 
-    An example is the ramp of a road. States are zero and parameters at their start values.
+    An example is the ramp of a road. The discontinuities are those at zero states and inputs, with
+    parameters at their start values.
     """
     if (rows := model.memory.get("rows of time")) is None:
         of_time = np.flatnonzero(ca.which_depends(model.residual, model.t, 1, True)).tolist()
@@ -201,19 +198,19 @@ def paced(inputs: InputData, model: Model) -> InputData:
 
 @lru_cache
 def _undriven(t_start: float, t_end: float) -> InputData:
-    """Return the inputs of a model without any."""
+    """Return the input data of a model without inputs."""
     return InputData(NO_ROWS, NO_ROWS, np.array([t_start, t_end]), np.zeros((0, 1)), ())
 
 
 class _Part(NamedTuple):
-    """One input.
+    """Expression and data of one input.
 
     Attributes:
-        key: its structure.
+        key: structure of the input.
         expression: in terms of time and data; a `RAMP` counts time from the start of an interval.
         data: symbols, scalars or columns.
-        values: of the data on the intervals.
-        pieces: of a function of time.
+        values: values of the data on each interval.
+        pieces: nearly linear pieces of a function of time.
     """
 
     key: str
@@ -224,7 +221,7 @@ class _Part(NamedTuple):
 
 
 def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: ca.SX) -> _Part:
-    """Return the input `variable`; `begin` is the start of an interval."""
+    """Return expression and data of the input `variable`; `begin` is the start of an interval."""
     where, name = f"input '{variable.name}'", variable.name
     held = ca.SX.sym(f"{name}_k")
     if isinstance(signal, Sampled):
@@ -239,15 +236,15 @@ def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: c
         slope = ca.SX.sym(f"{name}_dot")
         return _Part(RAMP, held + slope * (model.t - begin), (held, slope), (value, rise))
     if not callable(signal):
-        # a number is data too: a new value must not need a new integrator
+        # numbers are data, so that a new value does not require a new integrator
         number = checks.number(where, signal, hint=KINDS)
         return _Part("hold", held, (held,), (np.full(breaks.size - 1, number),))
     others = stacked(model.vector(letter) for letter in "xzp")
     expression = _evaluated(where, signal, model, ca.vertcat(model.t, others))
     of_time = ca.substitute(expression, others, ca.SX.zeros(others.numel()))
     made, data, numbers = lifted(expression, ca.vertcat(model.t, others), name)
-    # key by the structure of the expression, not by the function that wrote it: variables that it
-    # refers to may have changed since, and its numbers are data
+    # the key is the structure of the expression, not the Python function, whose variables may have
+    # changed since the last call; numbers are data
     key = sha256(ca.SX.serialize(made).encode()).hexdigest()
     values = tuple(np.full(breaks.size - 1, number) for number in numbers)
     found = pieces(ca.SX.serialize(of_time), float(breaks[0]), float(breaks[-1]))
@@ -255,9 +252,7 @@ def _part(model: Model, variable: Variable, signal: Any, breaks: Array, begin: c
 
 
 def _evaluated(where: str, signal: Callable[[ca.SX], Any], model: Model, known: ca.SX) -> ca.SX:
-    """Return the expression in `known` symbols that the function `signal` returns for the symbolic
-    time.
-    """
+    """Return the expression of the function `signal` at the symbolic time, in `known` symbols."""
     what = "a function of the symbolic time that returns one expression"
     hint = (
         "write casadi.sin(t) for math.sin(t), casadi.if_else(t > 1, a, b) for a Python if, "
@@ -282,13 +277,13 @@ def _evaluated(where: str, signal: Callable[[ca.SX], Any], model: Model, known: 
 
 
 def rate_of(signal: Input) -> Input:
-    """Return the derivative of an input in time, exact for the interpolated signal.
+    """Return the time derivative of an input, exact for the interpolated signal.
 
-    A number has the rate 0, a function its derivative, and `Linear` samples the slopes between them
-    as `Hold`, 0 before the first and after the last sample.
+    A number has the rate 0, and a function its derivative. The rate of `Linear` samples is a `Hold`
+    of the slopes between them, with 0 before the first and after the last sample.
 
     Raises:
-        ValueError: `Hold` samples, which jump, or not an input.
+        ValueError: `Hold` samples, which jump, or a value that is not an input.
     """
     if isinstance(signal, Linear):
         t, values = np.asarray(signal.t), np.asarray(signal.values)

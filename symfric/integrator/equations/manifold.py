@@ -1,20 +1,20 @@
 """Constraints of a mechanism, enforced on positions, velocities and accelerations.
 
-A holonomic model is integrated with its accelerations as unknowns in addition to multipliers and
-normal forces, so no mass matrix is inverted and no derivative goes through a factorisation:
+The unknowns of a holonomic model include its accelerations, in addition to multipliers and normal
+forces. Therefore no mass matrix is inverted, and no derivative goes through a factorisation:
 
     x' = (q', a, ...),   M a + phi_q' lam = Q,   phi_q a + gamma = 0,   normal forces
 
-Every accepted step ends on the constraints:
+Each accepted step ends on the constraints:
 
     q  <- q  - phi_q' (phi_q phi_q')^-1 phi(q)       repeated with one factorisation
     q' <- q' - phi_q' (phi_q phi_q')^-1 (phi_q q' + phi_t)
 
-Limits: impacts are excluded, and so are tangential shocks, in which friction makes the reactions
-grow a thousandfold (`SHOCK`, Painleve): both end a run. A step across a position in which phi_q
-loses rank is rejected, because the motion beyond is not determined; there det(phi_q(q1) phi_q(q0)')
-changes its sign. Two such positions within one step, and a step that ends on another branch, are
-not detected.
+Limits: impacts are excluded, and so are tangential shocks (Painleve), in which friction makes the
+reactions grow a thousandfold (`SHOCK`): both end a run. A step across a position in which phi_q
+loses rank is rejected, because the motion beyond it is not determined; there the sign of
+det(phi_q(q1) phi_q(q0)') changes. Two such positions within one step are not detected, nor is a
+step that ends on another branch.
 """
 
 from dataclasses import dataclass
@@ -31,21 +31,24 @@ from symfric.model.holonomic import Holonomic
 
 Array = NDArray[np.float64]
 DEPENDENT = 1e-4
-"""Ratio of singular values of phi_q below which a mechanism that cannot continue is called
-singular: at tight tolerances rounding stops it that far ahead.
+"""Ratio of singular values of phi_q below which a stopped mechanism is called singular.
+
+At tight tolerances, rounding stops a run at this distance from the singularity.
 """
 PULLING = 1e-3
-"""Negative normal forces up to this fraction of their typical size are integration errors."""
+"""Fraction of their typical size up to which negative normal forces count as integration errors."""
 SHOCK = 1e-3
-"""Smallest pivot of I - dN/dN that is accepted; without friction it is 1. Its inverse is the factor
-by which friction multiplies a load on a bearing. As it approaches 0 that load stops the sliding
-within microseconds, while the pivot falls exponentially with the sliding velocity: without this
-limit the tolerance would decide which runs pass. Moving machines stay above 0.4, near jamming above
-0.02 (`tests/symfric/stress/test_jamming.py`).
+"""Smallest accepted pivot of I - dN/dN, which is 1 without friction.
+
+Its inverse is the factor by which friction multiplies a load on a bearing. As the pivot approaches
+0, that load stops the sliding within microseconds, while the pivot falls exponentially with the
+sliding velocity: without this limit the tolerance would decide which runs pass. Moving machines
+stay above 0.4, machines near jamming above 0.02 (`tests/symfric/stress/test_jamming.py`).
 """
 ITERATIONS, NEARBY = (4, 3), (2, 2)
-"""Newton iterations with frozen derivatives, on positions and velocities: from 1e-3 to 1e-13, and
-from 1e-5.
+"""Numbers of Newton iterations with frozen derivatives, on positions and on velocities.
+
+They reduce an error of 1e-3, or of 1e-5, to 1e-13.
 """
 
 
@@ -55,19 +58,20 @@ class Manifold:
     """Functions that project a column of unknowns onto the constraints of a holonomic model.
 
     Attributes:
-        project: (y, d) -> y with positions and velocities on the constraints; y itself without
+        project: (y, d) -> y with positions and velocities on the constraints; unchanged y without
             constraints.
-        polish: the same from nearby.
+        polish: the same for y near the constraints, with fewer iterations.
         defect: (y, d) -> constraints and their rates.
-        n, m, first: numbers of accelerations, of multipliers and of states. The algebraic unknowns
-            are accelerations, multipliers, forces carried in stick, normal forces, in this order
-            after the states.
-        applied: number of the forces carried in stick.
+        n, m, first: numbers of accelerations, of multipliers and of states. After the states, the
+            algebraic unknowns are in this order: accelerations, multipliers, forces carried in
+            stick, normal forces.
+        applied: number of forces carried in stick.
         basis: rows of y that hold V, a basis of the tangent space, column by column.
-        slope: (y, d) -> derivatives of the algebraic equations by the algebraic unknowns.
+        slope: (y, d) -> derivatives of the algebraic equations with respect to the algebraic
+            unknowns.
         branch: (y0, y1, d) -> sign of det(phi_q(q1) phi_q(q0)'), which changes if a step crosses a
             position in which constraints depend on each other.
-        pressing: (y, d) -> normal forces over their typical size, which must not be negative.
+        pressing: (y, d) -> normal forces divided by their typical size; they must not be negative.
         pressed: names of these normal forces.
     """
 
@@ -91,7 +95,7 @@ class Manifold:
 
     @property
     def charted(self) -> bool:
-        """True if it is integrated in charts of the tangent space."""
+        """True if the mechanism is integrated in charts of the tangent space."""
         return len(self.basis) > 0
 
 
@@ -99,7 +103,7 @@ def holonomic_columns(model: Model, mechanics: Holonomic) -> tuple[ca.SX, ca.SX,
     """Return unknowns (x, a, z, V) of a holonomic model, right-hand sides, mass matrix and names.
 
     V is a basis of the tangent space of the constraints, column by column, at the start of the
-    previous step; it has no rates. Without constraints it has no rows.
+    previous step. Its rates are zero. Without constraints it has no rows.
     """
     n, x, V = mechanics.n, model.vector("x"), ca.SX.sym("V", _of_basis(mechanics))
     f = ca.vertcat(x[n : 2 * n], mechanics.a, mechanics.rates, mechanics.implicit)
@@ -111,7 +115,7 @@ def holonomic_columns(model: Model, mechanics: Holonomic) -> tuple[ca.SX, ca.SX,
 
 
 def _of_basis(mechanics: Holonomic) -> int:
-    """Return the length of V: a column of n for each degree of freedom, 0 without a chart."""
+    """Return the number of entries of V: n for each degree of freedom, 0 without a chart."""
     n, m = mechanics.n, mechanics.phi.numel()
     return n * (n - m) if m and mechanics.index == 0 else 0
 
@@ -122,7 +126,7 @@ def manifold(
     """Return the constraints of a holonomic model as Functions of the unknowns of its system.
 
     Args:
-        model, mechanics: its equations.
+        model, mechanics: holonomic model and its equations.
         y, d: unknowns and constants of a run.
         f: right-hand sides.
         u: inputs in terms of y and d.
@@ -167,7 +171,7 @@ def manifold(
 def jammed(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array) -> str:
     """Return a message if friction jams or a bearing pulls at y; empty otherwise.
 
-    The motion is valid where det(I - dN/dN) > SHOCK and N > 0.
+    The motion is valid if det(I - dN/dN) > SHOCK and N > 0.
     """
     return grows(manifold, names, y, d, SHOCK) or pulls(manifold, y, d, 0.0)
 

@@ -1,16 +1,16 @@
 """Linear algebra of small matrices: symbolic factors, stable pivot orders, rank.
 
-Sparse LU factors are written out as expressions: no pivot search and no index at run time.
-
-The order of pivots is part of the written-out factors (`factorise`), chosen by fill alone if no
-numbers are known. Here it is checked with numbers: eliminate in that order, solve, and compute the
-backward error
+Sparse LU factors are written out as expressions: at run time there is neither a pivot search nor an
+index. The order of the pivots is therefore part of the expressions (`factorise`). It is chosen by
+fill alone if no numbers are known. To check an order with numbers, `backward_error` eliminates in
+this order, solves, and computes the backward error
 
     omega = max_i |b - A x|_i / (|A| |x| + |b|)_i        (Oettli and Prager, 1964)
 
-which is invariant to units of equations and of unknowns. It detects zero and tiny pivots, and
-harmful growth. If an order fails, threshold pivoting finds one that is good in all samples of the
-matrix at once, from any row and column, with least fill (Markowitz).
+which is invariant to the units of equations and of unknowns. It detects zero and tiny pivots, and
+harmful growth. If an order fails, `best_order` finds one by threshold pivoting that is good in all
+samples of the matrix at once. Its pivots may be in any row and column, and cause least fill
+(Markowitz).
 """
 
 from collections.abc import Container, Sequence
@@ -26,18 +26,18 @@ from symfric.foundation.numeric import reciprocal
 
 Array = NDArray[np.float64]
 Order = tuple[tuple[int, int], ...]
-"""(row, column) of each pivot."""
+"""(row, column) of each pivot, in the order of elimination."""
 
 
 class Pivot(NamedTuple):
-    """One elimination.
+    """Elimination of one column.
 
     Attributes:
-        row, column: of the pivot.
+        row, column: position of the pivot.
         others: columns of the remaining entries of its row.
-        below: rows that are eliminated with it.
-        at: index in the packed factors of its inverse, which its row and then the multipliers of
-            its column follow.
+        below: rows from which the column is eliminated.
+        at: index of the inverse pivot in the packed factors. The entries of its row follow, then
+            the multipliers of its column.
     """
 
     row: int
@@ -48,12 +48,12 @@ class Pivot(NamedTuple):
 
 
 class SymbolicLU(NamedTuple):
-    """Factors of a sparse matrix in elimination order.
+    """Factors of a sparse matrix A in elimination order.
 
     Attributes:
         packed: all factor entries as a column.
-        symbols: for these; results of the methods are in terms of them.
-        eliminations: one for each pivot.
+        symbols: symbols for these entries; the methods return expressions in them.
+        eliminations: one `Pivot` for each column.
     """
 
     packed: ca.SX
@@ -69,8 +69,8 @@ class SymbolicLU(NamedTuple):
         """Return the sign of the determinant.
 
         Args:
-            leading: only of the block that this many first pivots eliminate, whose rows and columns
-                are the same; all by default.
+            leading: number of leading pivots; the result is the sign of the block that they
+                eliminate, whose rows and columns are the same. All pivots by default.
         """
         pivots = self.eliminations[:leading]
         rows, columns = (np.argsort(np.argsort([p[i] for p in pivots])) for i in (0, 1))
@@ -99,27 +99,27 @@ class SymbolicLU(NamedTuple):
         return ca.vertcat(ca.SX(0, 1), *x)
 
     def solver(self, name: str) -> ca.Function:
-        """Return (factors, right) -> x as a Function."""
+        """Return the Function (factors, right) -> x."""
         right = ca.SX.sym("right", len(self.eliminations))
         return ca.Function(name, [self.symbols, right], [self.solve(right)])
 
     def inserted(self, *expressions: ca.SX) -> list[ca.SX]:
-        """Return expressions of the factors with `packed` in place of the symbols."""
+        """Return expressions of the factors with `packed` inserted for the symbols."""
         return ca.substitute(list(expressions), [self.symbols], [self.packed])
 
 
 def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = (), order: Order = ()) -> SymbolicLU:
     """Factorise a structurally nonsingular sparse matrix.
 
-    Pivots are chosen once, at build time: those of `order`, if given. Otherwise the rows of each
-    group pivot on the diagonal, group by group, within a group by least fill (Markowitz):
-    differential equations, whose pivot 1/(gamma h) dominates for small steps; a mass matrix;
-    constraints, whose pivot is the definite Schur complement of the mass matrix before. Rows in no
-    group come last and pivot anywhere; `symfric.integrator.methods.method` checks numerically if
-    that is stable.
+    Pivots are chosen once, at build time; `order` is used if it is given. Otherwise the rows of
+    each group pivot on the diagonal, group by group, and within a group by least fill (Markowitz).
+    Groups are, for example, differential equations, whose pivot 1/(gamma h) dominates for small
+    steps; a mass matrix; constraints, whose pivot is the definite Schur complement of the mass
+    matrix before them. Rows in no group come last and pivot anywhere;
+    `symfric.integrator.methods.method` checks numerically if that is stable.
 
     Raises:
-        ValueError: structurally singular.
+        ValueError: the matrix is structurally singular.
     """
     n = matrix.size1()
     rows: list[dict[int, ca.SX]] = [{} for _ in range(n)]
@@ -153,12 +153,12 @@ def factorise(matrix: ca.SX, groups: Sequence[Sequence[int]] = (), order: Order 
 def _pivot(
     rows: list[dict[int, ca.SX]], holders: list[set[int]], grouped: list[set[int]]
 ) -> tuple[int, int]:
-    """Return the entry whose elimination causes least fill, in the first group that has one.
+    """Return the entry whose elimination causes least fill, in the first group that has a pivot.
 
     Args:
-        rows, holders: remaining entries by row, and rows that hold them, by column.
-        grouped: remaining rows; those of the last group may pivot off the diagonal. The row found
-            is removed.
+        rows, holders: remaining entries by row, and the rows with an entry, by column.
+        grouped: remaining rows; those of the last group may pivot off the diagonal. The row of the
+            result is removed.
     """
     for group in grouped:
         candidates = (
@@ -178,15 +178,16 @@ def _pivot(
 
 
 VANISHES = 1e-11
-"""Remaining size of an entry, with rows and columns scaled near 1, that counts as zero."""
+"""Size of a remaining entry that counts as zero, with rows and columns scaled near 1."""
 ROUNDS = 4
-"""Rounds of scaling rows and columns in turn."""
+"""Number of times that rows and columns are scaled in turn."""
 
 
 def echelon(A: Array) -> tuple[list[int], Array]:
-    """Return columns that span those of A, and B with A = A[:, columns] B, B[:, columns] = I.
+    """Return indices of columns that span the columns of A, and B with A = A[:, columns] B.
 
-    Uses elimination with complete pivoting of scaled rows and columns.
+    B[:, columns] is the identity. The elimination uses complete pivoting of scaled rows and
+    columns.
     """
     left, unit = equilibrated(A)
     pivots, done = list[int](), list[int]()
@@ -225,7 +226,7 @@ def null_space(A: Array) -> Array:
 def equilibrated(A: Array) -> tuple[Array, Array]:
     """Return matrices (..., m, n) with largest row and column entries near 1, and column scales.
 
-    Each column was multiplied by its scale.
+    Each column of the result was multiplied by its column scale.
     """
     scaled, unit = A.copy(), np.ones(A.shape[-1])
     for _ in range(ROUNDS):
@@ -238,22 +239,22 @@ def equilibrated(A: Array) -> tuple[Array, Array]:
 
 
 SOUND = 1e-9
-"""Largest omega of a stable order; steps at the tightest tolerances need no more digits."""
+"""Largest omega of a stable order; steps at the tightest tolerances need no higher accuracy."""
 REGULAR = 1e-13
-"""Smallest ratio of singular values of a scaled matrix that is regular."""
+"""Smallest ratio of smallest to largest singular value of a scaled matrix that is regular."""
 THRESHOLD = 0.1
-"""Least size of a pivot, relative to its column."""
+"""Smallest size of a pivot, relative to its column."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """Matrix that a step solves with, and the pivot order of its factors.
+    """Matrix A of the linear systems of a step, and the pivot order of its factors.
 
     Attributes:
-        name: of the matrix, among those of a method.
-        entries: (y, d) -> values of its symbols.
-        symbols: these and h, as SX.
+        name: name of the matrix among those of a method.
+        entries: (y, d) -> values of the symbols of A.
+        symbols: these symbols and h, as SX.
         matrix: SX, A.
         order: (row, column) of each pivot.
     """
@@ -274,14 +275,14 @@ class Factors:
 
     @cached_property
     def pattern(self) -> NDArray[np.bool_]:
-        """Mask of the entries of A."""
+        """Mask of the structural nonzeros of A."""
         return ca.DM(self.matrix.sparsity(), 1).full() != 0
 
 
 def backward_error(A: Array, order: Order) -> float:
-    """Return omega of two solutions by elimination in this order, infinite for a zero pivot.
+    """Return omega of two solutions by elimination in this order; infinite for a zero pivot.
 
-    For several matrices (..., n, n) it is the largest omega.
+    For several matrices (..., n, n) the result is the largest omega.
     """
     n = len(order)
     rows, columns = np.array(order, dtype=np.intp).reshape(n, 2).T
@@ -311,7 +312,7 @@ def _eliminated(A: Array, right: Array) -> Array:
 
 
 def regular(A: Array) -> bool:
-    """Return True if A, with scaled rows and columns, is numerically nonsingular."""
+    """Return True if A is numerically nonsingular after its rows and columns are scaled."""
     if not A.size:
         return True
     values = np.linalg.svd(equilibrated(A)[0], compute_uv=False)
@@ -319,13 +320,14 @@ def regular(A: Array) -> bool:
 
 
 def best_order(pattern: NDArray[np.bool_], samples: Array) -> Order:
-    """Return the order of threshold pivoting in all samples (s, n, n) at once.
+    """Return the pivot order found by threshold pivoting in all samples (s, n, n) at once.
 
-    Each pivot is at least `THRESHOLD` of the rest of its column, in every sample; among those the
-    one with least fill; if there is none, the one that is largest in its worst sample.
+    In every sample, each pivot is at least `THRESHOLD` times the largest remaining entry of its
+    column. Among such entries, the one with least fill is chosen; if there is none, the entry that
+    is largest in its worst sample.
 
     Raises:
-        ValueError: structurally singular.
+        ValueError: the matrix is structurally singular.
     """
     n, left, (A, _) = pattern.shape[0], pattern.copy(), equilibrated(samples)
     rows, columns = np.ones(n, dtype=bool), np.ones(n, dtype=bool)

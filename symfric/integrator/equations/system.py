@@ -1,23 +1,24 @@
-"""Equations of a model in the form M y' = f(y, d), which a step takes.
+"""Conversion of the equations of a model to the form M y' = f(y, d), which steps integrate.
 
-There is one column of unknowns, one right-hand side and a constant mass matrix, also for fully
-implicit models, whatever the rank of their mass matrix. A constant matrix dF/dx' stays the mass
-matrix, singular or not: nothing is inverted. Only rows that depend on others are replaced by their
-combination without rates,
+A system has one column of unknowns, one right-hand side and a constant mass matrix, which may be
+singular. If the matrix dF/dx' of a fully implicit model is constant, it becomes the mass matrix;
+nothing is inverted. Only rows that depend on other rows are replaced by the combination of
+equations that contains no rates,
 
     M_i = sum_k c_k M_k   =>   0 = f_i - sum_k c_k f_k,
 
-because in M / (gamma h) - J these equations, as small as J, would be lost in the rounding of M / h.
-(A capacitor between two nodes of a circuit: its current leaves one and enters the other.)
+because these equations are as small as J, and in M / (gamma h) - J they would be lost in the
+rounding of M / h. (Example: a capacitor between two nodes of a circuit, whose current leaves one
+node and enters the other.)
 
-If dF/dx' is not constant, the rates v = B x' that the equations depend on are unknowns,
+If dF/dx' is not constant, the rates v = B x' on which the equations depend become unknowns,
 
     B x' = v,   0 = F(v, x, z),
 
-with the same combination of equations that never depend on rates.
+and dependent equations are combined in the same way.
 
-Limits: the null space of the matrix must not turn with states or parameters. Write such a charge
-q(x) as a state of its own, q' = i, 0 = q - q(x).
+Limits: the null space of the matrix must not change with states or parameters. Write a charge q(x)
+that makes it change as an additional state, q' = i, 0 = q - q(x).
 """
 
 from collections.abc import Mapping
@@ -42,17 +43,17 @@ Array = NDArray[np.float64]
 Columns = tuple[ca.SX, ca.SX, ca.SX, list[str]]
 """Unknowns without time, right-hand side, mass matrix and names."""
 SAMPLES = 4
-"""Random points at which a non-constant matrix is evaluated."""
+"""Number of random points at which a non-constant matrix is evaluated."""
 
 
 def check_index(where: str, y: ca.SX, f: ca.SX, mass: ca.SX, names: list[str]) -> None:
-    """Check that in M y' = f(y) the equations without rates determine their unknowns.
+    """Check that in M y' = f(y) the equations without rates determine the remaining unknowns.
 
-    Rates determine M y; the rest has to follow from the equations without rates. Constraints on
-    positions alone, for example, do not determine their multipliers (index 3).
+    The rates determine M y; the equations without rates must determine the rest of y. Constraints
+    on positions alone, for example, do not determine their multipliers (index 3).
 
     Raises:
-        ValueError: structurally undetermined, whatever the numbers.
+        ValueError: the unknowns are structurally undetermined, for any numerical values.
     """
     pattern, every = ca.DM(mass.sparsity(), 1), range(f.numel())
     still = [i for i in every if not pattern[i, :].nnz()]
@@ -72,7 +73,7 @@ def check_index(where: str, y: ca.SX, f: ca.SX, mass: ca.SX, names: list[str]) -
 
 
 def implicit_columns(model: Model) -> Columns:
-    """Return unknowns, right-hand side, mass matrix and names of a model with a residual."""
+    """Return the unknowns, right-hand side, mass matrix and names of a model with a residual."""
     x, z, F = model.vector("x"), model.vector("z"), model.residual
     nx, names = x.numel(), [v.name for v in (*model.x, *model.z)]
     matrix = ca.jacobian(F, model.xdot)
@@ -95,12 +96,12 @@ def implicit_columns(model: Model) -> Columns:
 
 
 def _padded(M: Array, columns: int) -> ca.SX:
-    """Return M as a sparse matrix with this number of columns."""
+    """Return M as a sparse matrix, extended by zero columns to this number of columns."""
     return ca.sparsify(ca.horzcat(ca.SX(ca.DM(M)), ca.SX(M.shape[0], columns - M.shape[1])))
 
 
 def _dependent(M: Array) -> dict[int, ca.DM]:
-    """Return dependent rows of M, row -> coefficients of all rows; 0 for itself."""
+    """Return the dependent rows of M: row -> coefficients of all rows, 0 for the row itself."""
     rows, B = echelon(M.T)
     coefficients = np.zeros((M.shape[0], M.shape[0]))
     coefficients[:, rows] = B.T
@@ -108,7 +109,7 @@ def _dependent(M: Array) -> dict[int, ca.DM]:
 
 
 def _combined(F: ca.SX, at_rest: ca.SX, dependent: Mapping[int, ca.DM]) -> ca.SX:
-    """Return F, with dependent equations freed of rates; `at_rest` is F without rates."""
+    """Return F with rates eliminated from `dependent` equations; `at_rest` is F at zero rates."""
     found = ca.SX(F)
     for i, coefficients in dependent.items():
         found[i] = at_rest[i] - ca.dot(coefficients, at_rest)
@@ -116,7 +117,7 @@ def _combined(F: ca.SX, at_rest: ca.SX, dependent: Mapping[int, ca.DM]) -> ca.SX
 
 
 def _samples(model: Model, matrix: ca.SX) -> list[Array]:
-    """Return the matrix at random points near the start; random entries if it is not finite."""
+    """Return the matrix at random points near the start; random entries if it is finite at none."""
     rng = np.random.default_rng(0)
     starts = {"x": model.initial_state(), "z": np.array([float(v.start) for v in model.z])}
     starts |= {"u": model.values("u"), "p": model.values("p")}
@@ -141,8 +142,8 @@ def _samples(model: Model, matrix: ca.SX) -> list[Array]:
 class System:
     """System M y' = f(y, d) with y = (x, z, t): states, algebraic variables, time.
 
-    Time is an unknown with rate 1, only if the equations depend on it, so that no method needs
-    terms for explicit time.
+    Time is an unknown with rate 1, present only if the equations depend on it. Methods therefore
+    need no terms for explicit time.
 
     Attributes:
         y: SX symbols (n, 1).
@@ -151,21 +152,23 @@ class System:
         mass: SX (n, n), constant.
         nx: number of differential states, the first rows of y.
         timed: True if y ends with time.
-        names: of the unknowns, for messages.
+        names: names of the unknowns, for messages.
         nominal: typical magnitude of each differential state, shape (nx,).
-        monitors: SX (m, 1), expressions whose relative error is controlled too: those of the model
-            and its algebraic variables.
-        monitor_nominal: SX (m, 1), their typical magnitudes, in terms of d.
+        monitors: SX (m, 1), further expressions whose relative error is controlled: the monitors of
+            the model and its algebraic variables.
+        monitor_nominal: SX (m, 1), typical magnitudes of the monitors, in terms of d.
         manifold: constraint manifold of a holonomic model.
-        pivots: groups of rows with a safe pivot on the diagonal, each once those before it are
-            eliminated: rates of their own unknown and mass matrices, constraints, normal forces.
-        slips: number of monitors from the model, which come first.
-        inner: f with inner unknowns, whose derivatives are sparse; None if f is used directly. Its
-            groups replace `pivots`.
-        orders: pivots of the factors of each matrix by its name, where those with least fill are
-            unstable (`symfric.integrator.equations.matrices`).
-        slope: Jacobian of f if it is not to be derived from f.
-        branchless: True if its steps write tanh out (`symfric.integrator.equations.expressions`).
+        pivots: groups of rows whose diagonal is a safe pivot after the groups before are
+            eliminated: rows with the rate of their own unknown and mass matrices, constraints,
+            normal forces.
+        slips: number of monitors that come from the model; they are the first ones.
+        inner: f in terms of inner unknowns, with sparse derivatives; None if f is used directly.
+            Its groups replace `pivots`.
+        orders: matrix name -> pivot order, for matrices whose order of least fill is unstable
+            (`symfric.integrator.equations.matrices`).
+        slope: Jacobian of f; None to derive it from f.
+        branchless: True if steps evaluate tanh without branches
+            (`symfric.integrator.equations.expressions`).
     """
 
     y: ca.SX
@@ -203,11 +206,11 @@ class System:
 
     @cached_property
     def plain(self) -> "System":
-        """Same system with tanh unchanged, for steps that are differentiated."""
+        """The same system with tanh unchanged, for steps that are differentiated."""
         return replace(self, slope=self.J, branchless=False)
 
     def in_steps(self, function: ca.Function) -> ca.Function:
-        """Return a `function` of the equations as its steps call it."""
+        """Return a `function` of the equations in the form that steps call."""
         return branchless(function) if self.branchless else function
 
     @cached_property
@@ -222,8 +225,10 @@ class System:
 
     @cached_property
     def has_pivots(self) -> bool:
-        """True if pivots have to be chosen by numbers. Those of differential equations alone
-        (1/(gamma h) dominates for small steps) and of mechanisms (definite matrices) are stable.
+        """True if pivots have to be chosen numerically.
+
+        Pivots of pure differential equations (1/(gamma h) dominates for small steps) and of
+        mechanisms (definite matrices) are stable.
         """
         return self.manifold is None and not self.is_ode
 
@@ -241,16 +246,16 @@ class System:
 
     @cached_property
     def free(self) -> NDArray[np.float64]:
-        """Directions of y that the algebraic equations may change, as columns: M times it is zero.
+        """Directions of y that the algebraic equations determine, as columns; M maps them to zero.
 
-        They are unit vectors of unknowns without rates if the mass matrix is no wider than its
-        rank.
+        They are unit vectors of the unknowns without rates if the nonzero columns of M are linearly
+        independent.
         """
         return null_space(self.M)
 
     @cached_property
     def constraints(self) -> ca.Function:
-        """(y, d) -> algebraic equations, and their derivatives along `free`; dense."""
+        """Function (y, d) -> algebraic equations and their derivatives along `free`; dense."""
         g = self.f[self.algebraic[0]]
         slope = ca.jacobian(g, self.y)
         columns = self.algebraic[1]
@@ -262,12 +267,12 @@ class System:
 def system(model: Model, inputs: InputData) -> System:
     """Insert the inputs into the model and convert it to M y' = f(y, d).
 
-    An implicit model that is linear in x' with a constant matrix keeps that matrix as mass, even if
-    singular; any other one gets its rates as additional algebraic unknowns, a holonomic one its
-    accelerations.
+    An implicit model that is linear in x' with a constant matrix keeps that matrix as its mass
+    matrix, even if it is singular. Any other implicit model gets its rates as additional algebraic
+    unknowns, and a holonomic model its accelerations.
 
     Raises:
-        ValueError: a model without unknowns, or of an index above 1.
+        ValueError: the model has no unknowns, or its index is above 1.
     """
     mechanics, nx, u = model.holonomic, len(model.x), model.vector("u")
     if mechanics is not None:
@@ -294,7 +299,7 @@ def system(model: Model, inputs: InputData) -> System:
         mass = ca.diagcat(mass, 1)
         names.append("t")
     n, m = (mechanics.n, phi.numel()) if mechanics else (0, 0)
-    # error control also for algebraic unknowns without influence on the states, or they would drift
+    # algebraic unknowns need error control even if no state depends on them, or they would drift
     watched = [*((m.expression, m.nominal) for m in model.monitors)]
     idle = range(m - mechanics.norms, m) if mechanics else ()
     watched += [(v.symbol, v.nominal) for i, v in enumerate(model.z) if i not in idle]

@@ -1,8 +1,8 @@
 """Families of methods: Rosenbrock, Radau IIA, backward Euler, explicit Runge-Kutta, exponential.
 
-Rosenbrock methods have linearly implicit stages with one factorisation a step; Radau IIA
-collocation is solved by simplified Newton iterations in the eigenbasis of its matrix; backward
-Euler, by Newton's method, is for plants in fixed steps. The others have no iteration matrix.
+Rosenbrock methods have linearly implicit stages and one factorisation per step. Radau IIA
+collocation is solved by simplified Newton iterations in the eigenbasis of its matrix. Backward
+Euler is solved by Newton's method, for plants in fixed steps. The others have no iteration matrix.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Rosenbrock(Method):
 
         W k_i = f(y_0 + sum_j a_ij k_j) + M sum_j (c_ij / h) k_j,      i = 1 ... s
 
-    y_1 is the last stage's argument plus k_s, and k_s is the error estimate.
+    y_1 is the argument of the last stage plus k_s, and k_s is the error estimate.
 
     Attributes:
         gamma: diagonal coefficient of all stages.
@@ -46,15 +46,15 @@ class Rosenbrock(Method):
         return self.gamma
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
+        """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
         return len(self.A), 1, 1
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Return the factors of the iteration matrix, and for a tiny step."""
+        """Return the factors of the iteration matrix W, and of W for a tiny step."""
         return blocks(system, self.gamma).factors, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
-        """Return its steps on a system."""
+        """Return the steps of the method on `system`."""
         block, A, C = blocks(system, self.gamma), self.A, self.C
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
@@ -86,9 +86,9 @@ class Radau(Method):
 
     Attributes:
         c: nodes, shape (3,).
-        E: error weights, shape (3,).
-        iterations: simplified Newton iterations a step. Each gains two orders in the states and one
-            in the algebraic unknowns, so these get one more.
+        E: error weights e_j, shape (3,).
+        iterations: simplified Newton iterations per step. Each gains two orders in the states and
+            one in the algebraic unknowns; systems with algebraic unknowns get one more.
     """
 
     c: Array
@@ -105,28 +105,28 @@ class Radau(Method):
 
     @property
     def diagonal(self) -> float:
-        """Coefficient gamma of its real block."""
+        """Coefficient gamma of the real block."""
         return 1 / eigenbasis(self.A).gamma
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
+        """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
         return 3 * self._iterations(system) - 2, 1, 2
 
     def _iterations(self, system: System) -> int:
         return self.iterations + bool(system.algebraic[0])
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Return the factors of the real and the complex iteration matrix, and for a tiny step."""
+        """Return the factors of the real and the complex W, and of W for a tiny step."""
         basis = eigenbasis(self.A)
         own = blocks(system, self.diagonal).factors, pair(system, basis.alpha, basis.beta).factors
         return *own, at_rest(system)[1]
 
     def trials(self, system: System) -> Trials:
-        """Return its steps on a system: z = T w is iterated from 0 with the Jacobian at y_0."""
+        """Return the steps of the method on `system`, iterated from 0 with the Jacobian at y_0."""
         basis = eigenbasis(self.A)
         block, other = blocks(system, self.diagonal), pair(system, basis.alpha, basis.beta)
         n, T, inverse = system.n, basis.T, np.linalg.inv(basis.T)
-        # the residual of algebraic equations at the start of a step is not an error of the step
+        # residuals of algebraic equations at the start are not errors of the step
         rates = ca.DM([float(i not in system.algebraic[0]) for i in range(n)])
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
@@ -180,9 +180,9 @@ class Pair(NamedTuple):
     """Complex iteration matrix W = (alpha - i beta) M/h - J as a real one of twice the size.
 
     Attributes:
-        factor: (y, h, d) -> its factors.
+        factor: (y, h, d) -> factors of W.
         solve: (factors, right, memory) -> k with W k = right + M memory.
-        factors: W, and its pivots.
+        factors: W and the pivot order of its factors.
     """
 
     factor: ca.Function
@@ -218,14 +218,14 @@ def pair(system: System, alpha: float, beta: float) -> Pair:
 class BackwardEuler(Method):
     """Backward Euler, M (y_1 - y_0) = h f(y_1), by a fixed number of Newton iterations from y_0.
 
-    The Jacobian is new in every iteration: if a contact changes between sticking and sliding, the
-    Jacobian at the start does not describe the end.
+    Every iteration evaluates the Jacobian anew: if a contact changes between sticking and sliding,
+    the Jacobian at the start of the step does not describe the end.
     """
 
     iterations: int
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
+        """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
         return self.iterations, self.iterations, self.iterations
 
     def factors(self, system: System) -> tuple[Factors, ...]:
@@ -233,7 +233,7 @@ class BackwardEuler(Method):
         return (blocks(system, 1.0).factors,)
 
     def trials(self, system: System) -> Trials:
-        """Return its steps on a system."""
+        """Return the steps of the method on `system`."""
         block = blocks(system, 1.0)
 
         def trial(y: Any, h: Any, d: Any) -> Trial:
@@ -253,13 +253,13 @@ class Explicit(Method):
 
         k_i = h f(y_0 + sum_j a_ij k_j),      i = 1 ... s
 
-    y_1 is the last stage's argument, sum_j e_j k_j the error estimate. Accelerations and
-    multipliers are solved for at each stage if they are linear (`eliminated`): they have no error
-    estimate, and are interpolated linearly between steps.
+    y_1 is the argument of the last stage, and sum_j e_j k_j is the error estimate. Accelerations
+    and multipliers are solved for at each stage if the equations are linear in them (`eliminated`).
+    They have no error estimate, and are interpolated linearly between steps.
 
     Attributes:
         A: strictly lower triangular, shape (s, s).
-        E: error weights, shape (s,).
+        E: error weights e_j, shape (s,).
     """
 
     A: Array
@@ -267,15 +267,14 @@ class Explicit(Method):
     dae: ClassVar[bool] = False
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
+        """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
         return len(self.A), 0, 0 if system.is_ode else len(self.A)
 
     def trials(self, system: System) -> Trials:
-        """Return its steps on a system.
+        """Return the steps of the method on `system`.
 
         Raises:
-            ValueError: algebraic unknowns other than those of a mechanism in which they are
-                linear, or a mass matrix.
+            ValueError: a mass matrix, or algebraic unknowns other than linear ones of a mechanism.
         """
         settle, rates = eliminated(system) or (None, None)
         if rates is None:
@@ -297,9 +296,9 @@ class Explicit(Method):
 
 @lru_cache(maxsize=2)
 def eliminated(system: System) -> tuple[ca.Function, ca.Function] | None:
-    """Return (y, d) -> y with the algebraic unknowns of its states, and (y, d) -> f, zero in the
-    algebraic rows; None without such unknowns, or if these are not linear or lack known pivots.
+    """Return (y, d) -> y with the algebraic unknowns of its states, and (y, d) -> f, zero there.
 
+    The result is None without algebraic unknowns, or if they are not linear or lack known pivots.
     Accelerations and multipliers of a mechanism without friction from its reactions satisfy
 
         0 = g(x, z) = G(x) z + g(x, 0),        z = -G(x)^-1 g(x, 0)
@@ -330,7 +329,7 @@ def need_ode(system: System, method: str) -> None:
     """Check that a method without iteration matrix can integrate `system`.
 
     Raises:
-        ValueError: algebraic unknowns, or a mass matrix other than the identity.
+        ValueError: the system has algebraic unknowns, or a mass matrix other than the identity.
     """
     if system.is_ode:
         return
@@ -343,7 +342,7 @@ def need_ode(system: System, method: str) -> None:
 
 
 SMALL = 1e-2
-"""Below this |x| the series replaces the quotient; its next term is 4e-14 of the sum."""
+"""Largest |x| at which the series replaces the quotient; its next term is 4e-14 of the sum."""
 
 
 def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
@@ -351,8 +350,8 @@ def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
 
     They are the weights of the rate in the end value and in the mean of a solution of
     dz/dt = a + b z over a step: z(h) = z + h phi1(b h) dz/dt, mean z = z + h phi2(b h) dz/dt.
-    Values and derivatives are correct at zero, too; exp is 0 far below zero, and its error is one
-    unit in the last place of 1, not of exp itself.
+    Values and derivatives are correct at zero, too. Far below zero, exp is 0; its error is one unit
+    in the last place of 1, not of exp itself.
     """
     near = ca.fabs(x) < SMALL
     divisor, beyond = ca.if_else(near, 1.0, x), ca.expm1(x)
@@ -366,25 +365,26 @@ def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
 @final
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Exponential(Method):
-    """Exponential Euler, each equation linearised in its own unknown.
+    """Exponential Euler, with each equation linearised in its own unknown.
 
         y_i+ = y_i + h phi1(h df_i/dy_i) f_i(y)
 
-    It is exact if an equation is linear in its unknown and nothing else changes, however fast it is
-    (the bristles of LuGre at a given velocity); the coupling of unknowns is explicit.
+    The method is exact if an equation is linear in its unknown and nothing else changes, however
+    fast the equation is (the bristles of LuGre at a given velocity). The coupling of unknowns is
+    explicit.
     """
 
     dae: ClassVar[bool] = False
 
     def work(self, system: System) -> tuple[int, int, int]:
-        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
+        """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
         return 1, 1, 0
 
     def trials(self, system: System) -> Trials:
-        """Return its steps on a system.
+        """Return the steps of the method on `system`.
 
         Raises:
-            ValueError: algebraic unknowns, or a mass matrix other than the identity.
+            ValueError: the system has algebraic unknowns, or a mass matrix other than the identity.
         """
         need_ode(system, self.name)
         h = ca.SX.sym("h")

@@ -25,14 +25,14 @@ Array = NDArray[np.float64]
 
 
 class Trial(NamedTuple):
-    """One step from y over h, as SX or MX columns (n, 1).
+    """One step of length h from y, as SX or MX columns (n, 1).
 
     Attributes:
-        end: the solution after the step.
-        error: estimate of its error; None for a method of fixed steps.
+        end: solution at the end of the step.
+        error: estimate of the error of `end`; None for a method of fixed steps.
         dense: coefficients d_1, d_2, ... of the dense output (see `Dense`).
-        corrections: the last two Newton corrections of `end`; empty without iterations.
-        shift: displacement of `end` onto the constraints of a mechanism; None without any.
+        corrections: last two Newton corrections of `end`; empty without iterations.
+        shift: displacement of `end` onto the constraints of a mechanism; None without constraints.
     """
 
     end: Any
@@ -43,25 +43,23 @@ class Trial(NamedTuple):
 
 
 Trials = Callable[[Any, Any, Any], Trial]
-"""(y, h, d) -> the step of a method on one system; with SX its blocks are inlined, with MX they
-stay calls.
-"""
+"""(y, h, d) -> the step of a method on one system; its blocks are inlined in SX, calls in MX."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Method(ABC):
-    """Integration method: coefficients, known properties, and its steps.
+    """Integration method: its coefficients, its known properties, and its steps.
 
     Attributes:
-        name: as papers write it.
-        order: of the solution, for ODEs and (`dae`) index-1 DAEs.
+        name: name in the literature.
+        order: order of the solution, for ODEs and (if `dae`) for index-1 DAEs.
         embedded: order of the solution behind the error estimate; 0 for methods of fixed steps.
         dense: order of the dense output for ODEs; 0 if there is none.
         dense_dae: order of the dense output for index-1 DAEs.
-        H: dense output from the stages, shape (r, s).
+        H: coefficients of the dense output in terms of the stages, shape (r, s).
         finer: factor by which the change of a sliding velocity near zero in one step is limited
             more than usual (`step.attempt`).
-        source: where the coefficients are from.
+        source: publication of the coefficients.
     """
 
     name: str
@@ -74,28 +72,24 @@ class Method(ABC):
     source: str
 
     dae: ClassVar[bool] = True
-    """True if algebraic unknowns and mass matrices are allowed."""
+    """True if the method accepts algebraic unknowns and mass matrices."""
 
     @property
     def diagonal(self) -> float | None:
-        """Coefficient gamma of the iteration matrix W = M / (gamma h) - J of an implicit method
-        with error control.
-        """
+        """Coefficient gamma of W = M / (gamma h) - J; None if explicit or without error control."""
         return None
 
     @property
     def adaptive(self) -> bool:
-        """True if it estimates its error, as `simulate` needs it."""
+        """True if the method estimates its error, as `simulate` requires."""
         return self.embedded > 0
 
     @abstractmethod
     def work(self, system: System) -> tuple[int, int, int]:
-        """Return the number of right-hand sides, Jacobians and factorisations of a step."""
+        """Return the numbers of right-hand sides, Jacobians and factorisations per step."""
 
     def factors(self, system: System) -> tuple[Factors, ...]:
-        """Return the factors of all matrices that its steps on a system use; none for an
-        explicit method.
-        """
+        """Return the factors of all matrices in steps on `system`; none for an explicit method."""
         return ()
 
     def bends(self, k: Sequence[Any]) -> tuple[Any, ...]:
@@ -104,7 +98,7 @@ class Method(ABC):
 
     @abstractmethod
     def trials(self, system: System) -> Trials:
-        """Return its steps on a system.
+        """Return the steps of the method on `system`.
 
         Raises:
             ValueError: the system has algebraic unknowns or a mass matrix, and `dae` is False.
@@ -112,7 +106,7 @@ class Method(ABC):
 
 
 def combination(weights: Iterable[float], columns: Iterable[Any], kind: Any) -> Any:
-    """Return the weighted sum of columns of the given type, without the terms of weight zero."""
+    """Return the weighted sum of columns of the given type, without terms of weight zero."""
     terms = (float(w) * c for w, c in zip(weights, columns, strict=True) if w != 0.0)
     return sum(terms, start=kind(0))
 
@@ -121,21 +115,20 @@ Point = tuple[Array, Array]
 """Unknowns y and run data d."""
 
 STEPS = (1e-8, 1e-5, 1e-2)
-"""Steps relative to the span at which matrices are evaluated: the first one, and usual ones."""
+"""Steps, relative to the span, at which matrices are evaluated: a first step and typical ones."""
 ASIDE = 1e-2
-"""Relative distance of samples from a point, so that entries that vanish only there are not
-ignored."""
+"""Relative distance of samples from a point, at which some entries may vanish by chance."""
 
 
 def suited(system: System, method: Method, points: Sequence[Point], span: float) -> System:
     """Return `system` with other pivots if its own are unstable at the last of `points`.
 
-    Stable orders stay: they have least fill.
+    Stable orders are kept, since they have least fill.
 
     Args:
-        system: the system to integrate.
-        method: gives the matrices that its steps solve with.
-        points: that a run has to pass, the newest last.
+        system: system to integrate.
+        method: method with the matrices that its steps solve with.
+        points: points that a run has to pass, the newest last.
         span: duration of the run [s].
     """
     if not system.has_pivots:
@@ -154,12 +147,12 @@ def suited(system: System, method: Method, points: Sequence[Point], span: float)
 
 
 def suited_to_start(system: System, method: Method, model: Model) -> System:
-    """Return `system` with stable pivots at the model's own start, for fixed steps.
+    """Return `system` with stable pivots at the start values of the model, for fixed steps.
 
     Args:
-        system: whose run data are parameters and inputs.
+        system: system whose run data are parameters and inputs.
         method: as in `suited`.
-        model: its equations and start values; if these are not consistent nothing changes.
+        model: model with the start values; if these are not consistent, nothing changes.
     """
     if not system.has_pivots:
         return system
@@ -171,7 +164,7 @@ def suited_to_start(system: System, method: Method, model: Model) -> System:
 
 
 def _samples(factors: Factors, points: Sequence[Point], span: float) -> Array:
-    """Return the matrix at points and steps (samples, n, n), where it is finite."""
+    """Return the matrix at all points and steps (samples, n, n) at which it is finite."""
     every = np.stack([factors.at(y, step * span, d) for y, d in points for step in STEPS])
     return every[np.isfinite(every).all(axis=(1, 2))]
 

@@ -1,4 +1,4 @@
-"""Methods by their public names; `tableaux.toml` holds the coefficients."""
+"""Integration methods by their public names; their coefficients are in `tableaux.toml`."""
 
 import tomllib
 from dataclasses import replace
@@ -18,7 +18,7 @@ from symfric.integrator.methods.method import Array, Method
 
 
 def _array(rows: list[Any]) -> Array:
-    """Return a vector, or a matrix whose short rows end with zeros."""
+    """Return a vector, or a matrix whose short rows are filled with zeros."""
     if rows and isinstance(rows[0], list):
         width = len(rows[-1]) + (not rows[0])
         return np.array([[*map(_number, row)] + [0.0] * (width - len(row)) for row in rows])
@@ -26,15 +26,15 @@ def _array(rows: list[Any]) -> Array:
 
 
 def _number(value: str | float) -> float:
-    """Return a number or a quotient of two."""
+    """Return the value of a number or of a quotient of two numbers."""
     above, _, below = str(value).partition("/")
     return float(above) / float(below or 1)
 
 
 def shampine(b: Array, D: Array) -> Array:
-    """Return the coefficients H of the quartic with the slopes k_1 and k_s at its ends.
+    """Return the coefficients H of the quartic that has the slopes k_1 and k_s at its ends.
 
-    With the increment r = sum_j b_j k_j and the free term q = sum_j D_j k_j it is
+    With the increment r = sum_j b_j k_j and the free term q = sum_j D_j k_j, the quartic is
 
         y_0 + theta [r + (1 - theta) (k_1 - r + theta (2 r - k_1 - k_s + (1 - theta) q))]
     """
@@ -43,7 +43,7 @@ def shampine(b: Array, D: Array) -> Array:
 
 
 def through(c: Array) -> Array:
-    """Return coefficients H of the cubic through 0 and the increments at nodes, the last one 1."""
+    """Return the coefficients H of the cubic through 0 and the increments at nodes c; c_s = 1."""
     inner, rows = c[:-1], np.eye(c.size)
     values = (rows[:-1] - inner[:, None] * rows[-1]) / (inner * (1 - inner))[:, None]
     vandermonde: Array = np.vander(inner, increasing=True)
@@ -51,12 +51,12 @@ def through(c: Array) -> Array:
 
 
 def _explicit(A: Array, D: Array, **fields: Any) -> Explicit:
-    """Return an explicit method; its dense output has the free term of the increments D."""
+    """Return an explicit method whose dense output has the free term with the increments D."""
     return Explicit(A=A, H=shampine(A[-1], D), **fields)
 
 
 def _read(family: Any, key: str) -> Any:
-    """Return a method of `tableaux.toml`."""
+    """Return the method `key` of `tableaux.toml`."""
     fields = _TABLEAUX[key].items()
     return family(**{k: _array(v) if isinstance(v, list) else v for k, v in fields})
 
@@ -79,10 +79,12 @@ RADAU5 = Radau(
     source="Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5 and IV.8, 1996",
 )
 FOR_DERIVATIVES = replace(RADAU5, finer=8.0)
-"""Method for derivatives of runs. A step across the whole steep part of a law gives the right
-motion, but a wrong derivative. Steps of half the width of that part, a quarter more of them, reduce
-the error of derivatives of a pump at rtol 1e-6 from 6e-3 to 1.5e-4. Derivatives of Rodas5P have
-twenty times the error of Rodas5P itself.
+"""Method for derivatives of runs.
+
+A step across the whole steep part of a law gives the right motion, but a wrong derivative. Limiting
+steps to half the width of that part takes a quarter more steps, and reduces the error of
+derivatives of a pump at rtol 1e-6 from 6e-3 to 1.5e-4. Derivatives by Rodas5P have twenty times the
+error of Rodas5P itself.
 """
 BACKWARD_EULER = BackwardEuler(
     name="backward Euler",
@@ -107,7 +109,7 @@ METHODS: dict[str, Method] = {
 }
 """All methods by their public names; the order test covers each of them."""
 ADAPTIVE = {name: method for name, method in METHODS.items() if method.adaptive}
-"""Methods with step size control, for `simulate`."""
+"""Methods with step size control, which `simulate` accepts."""
 
 
 def key_of(method: Method) -> str:

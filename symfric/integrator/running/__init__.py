@@ -1,1 +1,1 @@
-"""Runs of an integrator: attempts in a loop, events, dense output, and failure diagnosis."""
+"""Runs of an integrator: loops of attempts, events, dense output, and failure diagnosis."""

@@ -1,13 +1,13 @@
-"""Zero crossings within an accepted step: the Functions of both engines, and roots in Python.
+"""Zero crossings within an accepted step: Functions for both engines, and root search in Python.
 
 All arithmetic on many numbers is in Functions, so that virtual machine and compiled code agree bit
-for bit. Only the signs and the Illinois method are written twice, in the same operations: in Python
-(`Isolation` and `events`) and in C (`search.c`).
+for bit. Only the tests of signs and the Illinois method are written twice, with the same
+operations: in Python (`Isolation` and `events`) and in C (`search.c`).
 
-Roots are isolated. Values at five places bound the expression between them if it is a polynomial of
-degree 4 or has one corner (an expression linear in the states is such a polynomial on the dense
-output of all methods). A piece that may have more roots than its end signs show is divided into
-quarters, down to the event tolerance.
+The search isolates roots. Values at five places bound an expression between these places if it is a
+polynomial of degree 4 or has one corner (an expression that is linear in the states is such a
+polynomial on the dense output of all methods). A piece that may have more roots than the signs at
+its ends show is divided into quarters, down to the event tolerance.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,33 +27,40 @@ from symfric.model import Model
 
 Array = NDArray[np.float64]
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Relative places at which each step, and each doubtful piece, is evaluated."""
+"""Relative places at which each step, and each doubtful piece of a step, is evaluated."""
 FINER = 64
-"""Maximum number of subdivisions per step: needed only for crossings close to the event
-tolerance."""
+"""Maximum number of subdivisions per step.
+
+Only crossings whose distance is close to the event tolerance need as many.
+"""
 AT_ONCE = 8
-"""Steps that one call of `Crossings.possible` tests."""
+"""Number of steps that one call of `Crossings.possible` tests."""
 ROUNDING = 64 * float(np.finfo(float).eps)
-"""Bends of an expression below this fraction of its terms are rounding: no sign there is a
-crossing."""
+"""Ratio of bends to terms of an expression below which its bends are rounding errors.
+
+A sign change by such a bend is not a crossing.
+"""
 STRAIGHT = 3.01
-"""If all values exceed this multiple of all bends at five places, there is no doubt: 3 by the
-formulas, and a margin for rounding. Compiled code makes this test first.
+"""Ratio of all values to all bends at five places above which no root is hidden.
+
+The formulas require 3; the rest is a margin for rounding. Compiled code makes this test first.
 """
 SHARPER = 1e-3
-"""Events are located to this fraction of the tolerance. A ball whose impacts are all late gains
-energy, and might bounce for ever if its impacts lose little.
+"""Fraction of the tolerance to which events are located.
+
+A ball whose impacts are all late gains energy. It might bounce forever if its impacts lose little.
 """
 KEPT = 100
-"""Event times that are stored to detect a storm."""
+"""Number of event times that are stored to detect an event storm."""
 ALIKE = 4
 """Number of consecutive equal events whose intervals are examined for a storm."""
 SOON = 2.0
 """Delay after a jump, in event tolerances, at which the new signs are evaluated."""
 RESTART, LEAST = 1e3, 1e-3
-"""Step after an event, in event tolerances, and its least fraction of the step that was cut. It
-only determines the signs after the event; the next one is as long as the step cut, if error control
-allows: motion after a friction event is usually as smooth as before.
+"""Step after an event, in event tolerances, and its smallest ratio to the step that was cut.
+
+This step only determines the signs after the event. The next one is as long as the step that was
+cut, if error control allows: motion after a friction event is usually as smooth as before.
 """
 
 
@@ -61,26 +68,28 @@ allows: motion after a friction event is usually as smooth as before.
 class Memory:
     """Event data kept between steps, a column of numbers that both engines share.
 
-    Layout: phase, tolerance [s], number of jumps, how many of the last ones were of one kind, the
-    step [s] to resume after a jump, times of the last jumps, then for each event its value before
-    the next step, and its part in the last jump (0 or 1).
+    Layout: phase, tolerance [s], number of jumps, number of consecutive last jumps of one kind,
+    step [s] to resume after a jump, times of the last jumps. Then follow, for all events, the
+    values before the next step, and flags that are 1 for events of the last jump, else 0.
     """
 
     PHASE, TOLERANCE, COUNT, ALIKE, RESUME = range(5)
     TIMES = slice(5, 5 + KEPT)
     FRESH, JUMPED, ON = 0.0, 1.0, 2.0
-    """Phases: event values are those at the start of the step; before a jump there, NaN for events
-    that took part in it; or at the end of the step before.
+    """Phases of the event values.
+
+    FRESH: they are computed at the start of the step. JUMPED: they are those before a jump at the
+    start, NaN for events of that jump. ON: they are those at the end of the previous step.
     """
 
     @staticmethod
     def before(count: int) -> slice:
-        """Slice of the values of `count` events."""
+        """Return the slice of the values of `count` events."""
         return slice(5 + KEPT, 5 + KEPT + count)
 
     @staticmethod
     def last(count: int) -> slice:
-        """Slice of the flags of `count` events that took part in the last jump."""
+        """Return the slice of the flags of `count` events that took part in the last jump."""
         return slice(5 + KEPT + count, 5 + KEPT + 2 * count)
 
     @staticmethod
@@ -94,7 +103,7 @@ class Memory:
 @final
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """Events of a model on one accepted step, a record row (t0, t1, y0, y1, D).
+    """Functions for the events of a model in one accepted step, a row (t0, t1, y0, y1, D).
 
     Attributes:
         looks: (low, row, d) -> event values at all `LOOKS` but the first, between low and 1, place
@@ -102,14 +111,14 @@ class Crossings:
         noise: (row, d) -> rounding level of each event in the step.
         doubts: (values at five places, place by place, noise) -> for each piece, nonzero if it may
             have further roots.
-        doubt: the same for one event.
+        doubt: the same for a single event.
         values: (theta, row, d) -> event values within the step.
-        cut: (theta, row) -> the row up to there, the same polynomial.
-        jump: (row, d) -> event values at its end, and all resets from there.
+        cut: (theta, row) -> the row up to theta, with the same polynomial.
+        jump: (row, d) -> event values at the end of the row, and values of all resets there.
         record: layout of a row.
-        directions, terminal: of each event.
-        resets: of each reset, in order: number of the event and of the state that it sets.
-        follows: True if algebraic unknowns follow a reset.
+        directions, terminal: direction of each event, and True if it is terminal.
+        resets: event number and state number of each reset, in order.
+        follows: True if algebraic unknowns have to follow a reset.
         closes: True if loops have to be closed again after a reset.
     """
 
@@ -139,14 +148,15 @@ class Crossings:
 
     @property
     def data(self) -> int:
-        """Number of run data d."""
+        """Number of entries of d."""
         return self.jump.numel_in(1)
 
     @cached_property
     def possible(self) -> ca.Function:
-        """(values before, `AT_ONCE` rows, their d) -> values at their ends, and if one may happen.
+        """(values before, `AT_ONCE` rows, their d) -> values at their ends, 1 for possible events.
 
-        The tests of `Isolation`, without noise; the virtual machine saves most searches by it.
+        It makes the tests of `Isolation` without noise. They save the virtual machine most
+        searches.
         """
         five, directions = ca.SX.sym("five", len(LOOKS) * self.count), ca.DM(self.directions)
         none, pieces = ca.SX.zeros(self.count), ca.vertsplit(five, self.count)
@@ -173,12 +183,12 @@ def crossings(
     """Build the Functions of `Crossings`.
 
     Args:
-        model: gives the events.
+        model: model with the events.
         values: (t, y, d) -> value of each event.
         sizes: (t, y, d) -> for each event, the sum of the magnitudes of the contributions of t and
             y.
         resets: (t, y, d) -> value of each reset, event after event.
-        rows: of the dense output.
+        rows: number of rows of the dense output.
         follows, closes: as in `Crossings`.
     """
     events, states = model.events, [v.name for v in model.x]
@@ -212,11 +222,11 @@ def _function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Fun
 def _doubtful(name: str, count: int) -> ca.Function:
     """Return a Function that tests each piece between five values for hidden roots.
 
-    An expression is off its chord by at most S x (1 - x), 0 <= x <= 1, on inner pieces, and by
-    S (1 - x) from an outer end, if it is a polynomial of degree 4, or a line with one corner. On
-    inner pieces S is the sum of the second differences at their ends and an eighth of the third
-    one, on outer ones it bounds half the second derivative. An expression above that bound has one
-    sign, or is monotonic. A bend below the noise is rounding.
+    If an expression is a polynomial of degree 4, or a line with one corner, it is off its chord by
+    at most S x (1 - x), 0 <= x <= 1, on inner pieces, and by S (1 - x) from the outer end on outer
+    pieces. On inner pieces, S is the sum of the second differences at their ends and an eighth of
+    the third one; on outer pieces, it bounds half the second derivative. An expression above that
+    bound has one sign, or is monotonic. A bend below the noise is rounding.
     """
     five, noise = ca.SX.sym("values", len(LOOKS) * count), ca.SX.sym("noise", count)
     values = ca.vertsplit(five, count)
@@ -243,15 +253,15 @@ def _place(at: Record, row: ca.SX, theta: Any) -> tuple[ca.SX, ca.SX]:
 
 
 def _inside(at: Record, row: ca.SX, theta: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return the same as `_place`, with the time limited to the end of the step."""
+    """Return time and unknowns as `_place` does, with the time limited to the end of the step."""
     t, y = _place(at, row, theta)
     return ca.if_else(theta < 1, ca.fmin(t, row[at.T1]), row[at.T1]), y
 
 
 def cutting(at: Record) -> ca.Function:
-    """Return the Function (theta, row) -> the row up to theta, the same polynomial.
+    """Return the Function (theta, row) -> the row up to theta, with the same polynomial.
 
-    Its coefficients satisfy d'_k - d'_(k+1) = theta^(k+1) [d_k - d_(k+1)], d_(r+1) = 0.
+    The new coefficients satisfy d'_k - d'_(k+1) = theta^(k+1) [d_k - d_(k+1)], d_(r+1) = 0.
     """
     row, theta = ca.SX.sym("row", at.width), ca.SX.sym("theta")
     t, y = _inside(at, row, theta)
@@ -279,12 +289,12 @@ class Isolation:
         values: theta -> value of each event.
         doubts: (values at five places) -> for each piece and event, nonzero if it may have more
             roots than the signs show.
-        directions: of the events.
-        tolerance: of event times, as a fraction of the step.
+        directions: directions of the events.
+        tolerance: tolerance of event times, as a fraction of the step.
 
     Attributes:
         roots: first root found of each event, inf if there is none.
-        left: subdivisions still allowed.
+        left: number of subdivisions that are still allowed.
     """
 
     def __init__(
@@ -301,8 +311,8 @@ class Isolation:
     def first(self, at: Sequence[float], g: Array, doubts: Array) -> float:
         """Return the first root between the places `at` with values g, or a value beyond them.
 
-        If there is a certain root, doubtful events are searched once more before it, because those
-        that jump with its event do not jump earlier. Otherwise, or if the root is their own, they
+        If a root is certain, doubtful events without a root of their own are searched once more
+        before it, because events that jump with it do not jump earlier. All other doubtful events
         are searched piece by piece.
         """
         hits = passed(g[:-1], g[1:], self.directions) & (self.roots > at[0])
@@ -337,7 +347,7 @@ class Isolation:
         return float(self.values(theta)[event])
 
     def _again(self, a: float, b: float, before: Array, suspects: NDArray[np.bool_]) -> float:
-        """Repeat `first` from a, with the values there, to b, for the doubtful events only."""
+        """Repeat `first` from a to b for the doubtful events; `before` holds the values at a."""
         self.left -= 1
         b = max(a, b)
         at = [a, *(a + s * (b - a) for s in LOOKS[1:])]
@@ -346,7 +356,7 @@ class Isolation:
 
 
 def passed(before: Any, after: Any, directions: Any) -> Any:
-    """Return where events pass through zero in their directions; for arrays, SX and DM."""
+    """Return a mask of the events that pass zero in their directions, for arrays, SX and DM."""
     rising = (before < 0) * (after >= 0) * (directions >= 0)
     return rising + (before > 0) * (after <= 0) * (directions <= 0)
 
@@ -354,9 +364,9 @@ def passed(before: Any, after: Any, directions: Any) -> Any:
 def locate(
     value: Callable[[float], float], a: float, b: float, ends: tuple[float, float], tolerance: float
 ) -> float:
-    """Return the root in [a, b] of a function with values of two signs at the `ends`, rounded up.
+    """Return the root in [a, b] of a function, rounded up.
 
-    Uses the Illinois method.
+    Its values at a and b, the `ends`, differ in sign. The Illinois method is used.
     """
     fa, fb = ends
     if fb == 0.0:

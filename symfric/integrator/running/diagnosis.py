@@ -18,9 +18,9 @@ from symfric.model import Model
 
 Array = NDArray[np.float64]
 NEARLY = 0.1
-"""If a step shrinks to nothing with det(I - dN/dN) below this, the mechanism has jammed."""
+"""Value of det(I - dN/dN) below which a mechanism whose step shrinks to nothing has jammed."""
 COARSE = 1e-10
-"""Time resolution [s] above which rounding of t may be the cause of a failed step."""
+"""Resolution of time [s] above which rounding of t may be the cause of a failed step."""
 
 
 def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> tuple[Status, str]:
@@ -49,7 +49,7 @@ def explain(integrator: Integrator, t: float, y: Array, d: Array, h: float) -> t
 def _causes(
     integrator: Integrator, y: Array, d: Array, h: float, f: Array, advice: str
 ) -> Iterator[tuple[Status, str]]:
-    """Yield status and message of each possible cause; the message is empty if it is none."""
+    """Yield status and message of each possible cause; an empty message rules the cause out."""
     system, manifold = integrator.system, integrator.system.manifold
     if manifold is not None:
         yield Status.SINGULAR, singular(manifold, system.names, y, d)
@@ -66,10 +66,10 @@ def _causes(
 
 
 def chattering(model: Model) -> str:
-    """Return advice for user equations with a sign, in which steps never end; else an empty text.
+    """Return advice for user equations that contain a sign; an empty text for others.
 
-    During sticking a sign changes from step to step, although the true friction is between -1 and
-    1.
+    Runs with such equations never end: during sticking the sign changes from step to step, although
+    the true friction is between -1 and 1.
     """
     if model.contacts or model.holonomic is not None:
         return ""
@@ -80,7 +80,7 @@ def chattering(model: Model) -> str:
 
 
 def _unbounded(system: System, y: Array, f: Array, h: float) -> str:
-    """Return a message if states are huge, or large and growing ever faster."""
+    """Return a message if states are huge, or if they are large and grow ever faster."""
     x, rate = y[: system.nx], np.nan_to_num(f[: system.nx], posinf=0.0, neginf=0.0)
     huge = np.abs(x) > 1e10 * system.nominal
     runaway = (
@@ -111,7 +111,7 @@ def _not_finite(integrator: Integrator, y: Array, d: Array, h: float, f: Array) 
 
 
 def _steep(system: System, y: Array, d: Array) -> str:
-    """Return a message if derivatives of equations are not finite."""
+    """Return a message if derivatives of the equations are not finite."""
     J = ca.Function("J", [system.y, system.d], [ca.jacobian(system.f, system.y)])(y, d).full()
     rows, columns = np.nonzero(~np.isfinite(J))
     if not rows.size:
@@ -124,9 +124,7 @@ def _steep(system: System, y: Array, d: Array) -> str:
 
 
 def _singular(system: System, y: Array, d: Array, h: float, advice: str) -> str:
-    """Return a message if algebraic equations have no solution or do not determine their
-    unknowns.
-    """
+    """Return a message if algebraic equations are singular, or have no solution nearby."""
     names = _named(system, np.array(system.algebraic[1], dtype=int))
     matrix = blocks(system, 1.0).factors.at(y, max(h, 1e-12), d)
     if np.isfinite(matrix).all() and not regular(matrix):

@@ -1,24 +1,24 @@
 """Warnings about successful runs: friction above its static level, and friction that adds energy.
 
-Energy: a law whose force has the wrong sign adds energy to the motion.
+Energy: a law whose force has the wrong sign adds energy to the motion. Two conditions are checked:
 
     F(v, N, z_ss(v, N)) v < 0  at a slip v of the run,  and  integral F v dt < 0
 
 The steady force is first checked over decades of speed and load, once for each set of its
 parameters. Most laws pass, and their runs need no further check. Bristles return stored energy, and
 laws with an offset push within their smoothing velocity, so both conditions are required. The
-integral is the trapezoidal rule over steps: only its sign matters.
-Limits: a wrong sign in equations written by hand, outside the law, is not detected; ensembles are
-not checked.
+integral uses the trapezoidal rule over steps, since only its sign matters.
+Limits: a wrong sign in hand-written equations outside the law is not detected; ensembles are not
+checked.
 
-Overload: the states of a law carry more than they can in any motion, usually its static level.
+Overload: the states of a law carry more than in any possible motion, usually its static level.
 
     |F(0, N, z)| > (1 + MARGIN) most_held(N)
 
 A bristle that creeps below its smoothing velocity, or below the rounding of the velocities whose
-difference is the slip, does not relax but stretches on. With a constant load the check uses only
-the extreme values of the states over all accepted steps. With a varying load a state may exceed the
-level because the load fell, and only a state that still grows is an overload.
+difference is the slip, does not relax but stretches further. With a constant load, the check uses
+only the extreme values of the states over all accepted steps. With a varying load, a state may
+exceed the level because the load fell, and only a state that still grows is an overload.
 Limits: laws that take the applied force, and laws without a static level, are not checked. Long
 runs whose steps are not kept are checked at the times of the result if the load varies, ensembles
 only if it is constant.
@@ -51,19 +51,19 @@ SPEEDS = np.array([1e-6, 1e-3, 1.0, 1e3])
 LOADS = (1.0, 1e3)
 """Loads [N] of the first check."""
 SHARE = 1e-3
-"""Energy gain allowed, as a fraction of the energy turnover: rounding, and quadrature."""
+"""Allowed energy gain, as a fraction of the energy turnover, for rounding and quadrature errors."""
 REMEMBERED = 16
-"""Parameter sets whose first check is cached."""
+"""Number of parameter sets whose first check is cached."""
 MARGIN = 0.05
 """Fraction by which integration errors may raise friction above its level."""
 WIDE = 0.25
-"""The same for a varying load: laws that follow it with a delay exceed their level for a while."""
+"""The same for a varying load, since laws that follow it with a delay exceed their level."""
 LOOKS = 200
 """Maximum number of peaks checked in a run with a varying load."""
 
 
 def doubts(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> list[UserWarning]:
-    """Return warnings about a run that ended well; empty if there are none."""
+    """Return the warnings about a run that ended well; empty if there are none."""
     if not run.status.ok:
         return []
     overloads = [OverloadWarning(text) for text in _overloads(integrator, inputs, run, p)]
@@ -73,7 +73,10 @@ def doubts(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> lis
 def _over_time(
     integrator: Integrator, inputs: InputData, name: str, rows: ca.SX, t: Array, y: Array, p: Array
 ) -> Array:
-    """Return `rows` of this name at the times `t` with the unknowns `y` (times, n), row by row."""
+    """Return the values of `rows` at times `t` with unknowns `y` (times, n), row by row.
+
+    The evaluation is cached under `name`.
+    """
     if name not in integrator.memory:
         integrator.memory[name] = Columns(integrator.of_time("doubts", rows))
     d = np.hstack([np.tile(p, (t.size, 1)), inputs.values[:, inputs.interval(t)].T])
@@ -81,8 +84,9 @@ def _over_time(
 
 
 def _determined(model: Model, write: Callable[[], list[Any]]) -> ca.SX | None:
-    """Return the expressions of a law with the forces of all laws inserted; None if the law or the
-    model's unknowns do not determine them.
+    """Return the expressions of a law with the forces of all laws inserted; None if undetermined.
+
+    The law or the unknowns of the model may not determine them.
     """
     try:
         found = by_laws(model, ca.vertcat(*write()))
@@ -95,13 +99,13 @@ def _determined(model: Model, write: Callable[[], list[Any]]) -> ca.SX | None:
 @final
 @dataclass(frozen=True, eq=False)
 class Sliding:
-    """Friction of one contact, actual and in steady sliding.
+    """Actual friction of one contact, and its friction in steady sliding.
 
     Attributes:
         contact: the contact.
         power: (v, N, p) -> power [W] dissipated by steady friction.
-        needs: parameters that the power depends on.
-        rows: slip, friction and steady friction of the model.
+        needs: indices of the parameters on which the power depends.
+        rows: slip, friction and steady friction in the model.
     """
 
     contact: Contact
@@ -147,7 +151,7 @@ def sliding_places(model: Model) -> tuple[Sliding, ...]:
 
 
 def _sliding(model: Model, contact: Contact) -> Sliding | None:
-    """Return the friction of a contact; None if the model's unknowns do not determine it."""
+    """Return the friction of a contact; None if the unknowns of the model do not determine it."""
     law, v, N, p = contact.law, ca.SX.sym("v"), ca.SX.sym("N"), model.vector("p")
 
     def steady(slip: Any, load: Any, given: Mapping[str, Any]) -> ca.SX:
@@ -175,8 +179,8 @@ class Held:
     Attributes:
         contact: the contact.
         rows: indices of its states among those of the model.
-        force: of the states at zero slip [N].
-        level: largest possible force, in either direction [N].
+        force: force of the states at zero slip [N].
+        level: largest possible force in either direction [N].
         screen: (z, p) -> force, level and the slope of the force; None if the load depends on the
             motion.
     """
@@ -190,7 +194,7 @@ class Held:
 
     @cached_property
     def watched(self) -> ca.SX:
-        """Force, level, and force times its rate: positive while it grows."""
+        """Force, level, and force times its rate, which is positive while the force grows."""
         z = symbols_of(self.contact.states)
         growth = self.force * ca.jtimes(self.force, z, self.contact.rate)
         return ca.vertcat(self.force, self.level, growth)
@@ -201,7 +205,7 @@ class Held:
         return bool(ca.is_linear(self.force, symbols_of(self.contact.states)))
 
     def ratios(self, screen: ca.Function, z: Array, p: Array) -> Array:
-        """Return force over level at the extreme states `z` of runs, both (n, runs)."""
+        """Return the ratio of force to level at extreme states `z` of runs; a column per run."""
         force, level, _ = (rows.full() for rows in screen(z, p))
         return np.abs(force[0]) / np.where(level[0] > 0, level[0], np.inf)
 
@@ -238,12 +242,12 @@ def _overloads(integrator: Integrator, inputs: InputData, run: Run, p: Array) ->
         k = int(ratio.argmax())
         if ratio[k] > allowed:
             yield overload(held, ratio[k], f" at t = {t[k]:.6g} s")
-        elif fixed and most > allowed and not run.complete:  # between the result times
+        elif fixed and most > allowed and not run.complete:  # overload between result times
             yield overload(held, most)
 
 
 def overload(held: Held, ratio: float, when: str = "") -> str:
-    """Return the message about friction of `ratio` times its level."""
+    """Return the message about friction that is `ratio` times its level."""
     law = type(held.contact.law).__name__
     return (
         f"In contact '{held.contact.name}' {law} carries {ratio:.3g} times its static level{when}: "
@@ -253,14 +257,14 @@ def overload(held: Held, ratio: float, when: str = "") -> str:
 
 
 def places(model: Model) -> tuple[Held, ...]:
-    """Return the contacts of a model whose law sticks by its states."""
+    """Return the contacts of a model whose law sticks through its states."""
     if "held" not in model.memory:
         model.memory["held"] = tuple(h for c in model.contacts if (h := _held(model, c)))
     return model.memory["held"]
 
 
 def _held(model: Model, contact: Contact) -> Held | None:
-    """Return the force that its states carry; None if the force or the level is unknown."""
+    """Return the force that the states of a contact carry; None if force or level are unknown."""
     if not contact.states or APPLIED in contact.given:
         return None
     z, p = symbols_of(contact.states), model.vector("p")
@@ -276,7 +280,7 @@ def _held(model: Model, contact: Contact) -> Held | None:
 
 
 def _peaks(z: Array) -> NDArray[np.intp]:
-    """Return indices of peaks of a state and the points before them; about `LOOKS` at most."""
+    """Return indices of peaks of a state and of the points before them; about `LOOKS` at most."""
     size = np.abs(z)
     inner = (size[1:-1] >= size[:-2]) & (size[1:-1] >= size[2:])
     k = np.flatnonzero(inner.any(axis=1)) + 1
@@ -290,9 +294,10 @@ def of_members(
     """Return member -> message, for runs with these extreme states.
 
     Args:
-        reach: state -> least and greatest value, (2, members); NaN for members that did not start.
+        reach: state -> smallest and largest value, (2, members); NaN for members that did not
+            start.
         p: parameters, (members, np).
-        given: states with start values of the user, which may be anywhere.
+        given: states with start values of the user, which may have any size.
     """
     found: dict[int, str] = {}
     for held in places(model):

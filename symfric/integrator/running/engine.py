@@ -1,11 +1,11 @@
-"""Run many step attempts per call, either in CasADi's virtual machine or in compiled C.
+"""Engines that make many attempts per call, in CasADi's virtual machine or in compiled C.
 
-Both engines advance S in place and write a row (t0, t1, y0, y1, D) per accepted step.
+Both engines advance S in place and write one row (t0, t1, y0, y1, D) per accepted step.
 
 The C is assembled from templates. `attempts.c` makes steps with one set of run data and searches
 them for events with `search.c`, which matches `running.events` in Python. `march.c` advances over
 the input intervals and writes the unknowns at the times of the result. All data are in one struct,
-so a call from Python passes a single address (`Work`).
+so that a call from Python passes a single address (`Work`).
 """
 
 import ctypes
@@ -30,11 +30,14 @@ from symfric.integrator.step.attempt import GROWTH_MEMORY, Given, State
 
 Array = NDArray[np.float64]
 STOPS = tuple(Stop)
-"""Reasons by number."""
+"""Reasons to stop, by number."""
 MOST_ROWS, LEAST_ROWS, BYTES = 2048, 64, 2**20
-"""Limits of accepted steps in a buffer, and its size in bytes; the buffer is kept between runs."""
+"""Largest and smallest number of accepted steps in a buffer, and its size in bytes.
+
+The buffer is kept between runs.
+"""
 BATCH, FEW = 32, 8
-"""Attempts per call of the virtual machine, and in intervals that need only a few."""
+"""Attempts per call of the virtual machine, in general and on intervals that need only a few."""
 
 
 class Loop(ctypes.Structure):
@@ -90,7 +93,7 @@ class Work:
         self.enter(0)
 
     def interval(self, times: Array) -> NDArray[np.intp]:
-        """Return the index of the input interval of each time; at a break the later one."""
+        """Return the index of the input interval of each time; at a break, the later interval."""
         return np.searchsorted(self.breaks[1:-1], times, side="right")
 
     def enter(self, interval: int) -> None:
@@ -110,9 +113,7 @@ class Work:
 
 
 class _Batch:
-    """Buffers and mapped function for a fixed number of attempts in one call of the virtual
-    machine.
-    """
+    """Buffers and mapped Function for a fixed number of attempts per virtual machine call."""
 
     def __init__(self, step: ca.Function, size: int) -> None:
         self.S, self.S_out = np.zeros(step.numel_in(0)), np.zeros((size, step.numel_in(0)))
@@ -123,10 +124,11 @@ class _Batch:
 
 @final
 class VmEngine:
-    """Engine in CasADi's virtual machine: batches of attempts in one call; needs no compiler.
+    """Engine in CasADi's virtual machine, with a batch of attempts per call; it needs no compiler.
 
     It makes the same attempts as the compiled loop, bit for bit: both evaluate one graph operation
-    by operation, each rounded once (`compiled.compiler.FLAGS`), with one math library.
+    by operation, round each operation once (`compiled.compiler.FLAGS`), and use the same math
+    library.
     """
 
     name = "vm"
@@ -136,8 +138,9 @@ class VmEngine:
         self._batches: dict[int, list[_Batch]] = {}
 
     def _attempts(self, work: Work, rows: int, attempts: int, size: int) -> tuple[Array, int, Stop]:
-        """Advance S, by `size` attempts in one call, up to the end in R; return the records, the
-        attempts made and the reason to stop.
+        """Advance S; return the records, the attempts made and the reason to stop.
+
+        S advances up to the end time in R, by `size` attempts per call.
         """
         try:
             batch = self._batches.setdefault(size, []).pop()
@@ -185,7 +188,7 @@ class VmEngine:
         return records, made, request
 
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
-        """Advance `work`; return the records, the attempts made and the reason to stop."""
+        """Advance `work`; return the records, the number of attempts and the reason to stop."""
         loop, found, count, made = work.loop, list[Array](), 0, 0
         size = self.size
         if work.events is not None:
@@ -215,13 +218,13 @@ class VmEngine:
 def _searched(
     search: Search, records: Array, S_out: Array, took: NDArray[np.bool_], used: int, R: Array
 ) -> tuple[Array, int, Stop | None]:
-    """Return the records of a batch up to its first events, the attempts used and the request of
-    events.
+    """Return the records of a batch up to its first events, the attempts used, and any request.
 
     Args:
-        search: the search.
-        records, S_out: of the batch; the attempt that led to events continues after them.
-        took, used: mask of accepted attempts, and how many attempts count.
+        search: event search.
+        records, S_out: accepted steps and states of the batch; the state of the attempt with events
+            is changed to continue after them.
+        took, used: mask of accepted attempts, and number of attempts that count.
         R: run data of the batch.
     """
     accepted, i = np.flatnonzero(took), 0
@@ -235,13 +238,13 @@ def _searched(
 
 
 def _large(S: Array, h_min: float) -> NDArray[np.bool_]:
-    """Return True if the steps of columns S (..., MEMORY + n) are long enough; False for NaN."""
+    """Return a mask of the columns S (..., MEMORY + n) with long enough steps; False for NaN."""
     return S[..., State.H] >= np.maximum(h_min, FLOOR * np.abs(S[..., State.T]))
 
 
 @final
 class CompiledEngine:
-    """Engine in a compiled loop around the generated C of the step; releases the GIL."""
+    """Engine in compiled C, a loop around the generated C of the step; it releases the GIL."""
 
     name = "compiled"
 
@@ -252,9 +255,7 @@ class CompiledEngine:
         self.library.symfric_march.argtypes = [ctypes.c_void_p]
 
     def march(self, work: Work, attempts: int) -> tuple[Array, int, Stop]:
-        """Advance `work`; return records in its buffer, the attempts made and the reason to
-        stop.
-        """
+        """Advance `work`; return records in its buffer, number of attempts and reason to stop."""
         loop, outputs = work.loop, work.outputs
         loop.max_attempts, loop.found = attempts, outputs.found
         reason = self.library.symfric_march(work.address)
@@ -265,8 +266,10 @@ class CompiledEngine:
 
 
 Engine = VmEngine | CompiledEngine
-"""Engine that makes attempts until the end, a full record, an attempt limit, an event that needs
-the caller, or a step below `h_min` or the resolution of t (`FLOOR`).
+"""Engine that makes attempts until it has to stop.
+
+It stops at the end, a full record, an attempt limit, an event that the caller has to handle, or a
+step below `h_min` or the resolution of t (`FLOOR`).
 """
 FOLDER = Path(__file__).parent
 
@@ -274,10 +277,10 @@ FOLDER = Path(__file__).parent
 def c_source(
     step: ca.Function, dense_rows: int, *others: ca.Function, crossings: Crossings | None = None
 ) -> str:
-    """Return the CasADi C of the step with the attempt loop that calls it until it must stop.
+    """Return the CasADi C of the step, with the attempt loop that calls it until it must stop.
 
-    `others` are Functions that further C calls by name. Without events, the code has no event
-    search.
+    `others` are Functions that other C code calls by name. Without events, the code contains no
+    event search.
     """
     generator = ca.CodeGenerator("symfric_step.c", {"static_aux": True})
     called = (step, *(crossings.functions if crossings else ()))
@@ -304,10 +307,10 @@ def loop_source(
     """Return the C of the whole loop.
 
     Args:
-        step, dense_rows: one attempt.
-        crossings: events.
-        follows: True if there are algebraic unknowns, which follow a jump of inputs.
-        follow: update of these unknowns; without it the loop returns at each jump and each event.
+        step, dense_rows: Function of one attempt, and number of rows of its dense output.
+        crossings: Functions of the events, if any.
+        follows: True if there are algebraic unknowns, which have to follow a jump of inputs.
+        follow: update of these unknowns; without it, the loop returns at each jump and each event.
     """
     settles = follow is not None and crossings is not None and not crossings.closes
     march = filled(

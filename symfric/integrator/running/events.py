@@ -1,7 +1,7 @@
 """Events: zero crossings in accepted steps, located and carried out.
 
-This is the search for the virtual machine, and the types that both engines share. `search.c`
-repeats the search in C, operation by operation.
+This file contains the search of the virtual machine, and the types that both engines share.
+`search.c` repeats the search in C, operation by operation.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,14 +30,14 @@ from symfric.model.parts import Event
 
 Array = NDArray[np.float64]
 JUMPS = 512
-"""Jumps recorded between two returns of an engine."""
+"""Number of jumps recorded between two returns of an engine."""
 
 
 class Stop(IntEnum):
-    """Reason why an engine returned, some of them requests of events.
+    """Reason why an engine returned; some of the reasons are requests of events.
 
-    `SEARCH`: algebraic unknowns need a full search after a jump of inputs; `FOLLOW`: they have to
-    follow an event.
+    `SEARCH`: algebraic unknowns need a full search after a jump of inputs. `FOLLOW`: algebraic
+    unknowns have to follow an event.
     """
 
     END = 0
@@ -51,7 +51,7 @@ class Stop(IntEnum):
 
 
 class Change(IntEnum):
-    """Change of a step by the search."""
+    """Change of a step by the event search."""
 
     NOTHING = 0
     RESUMED = 1
@@ -61,14 +61,14 @@ class Change(IntEnum):
 
 @final
 class Eventful:
-    """Event data of a run in progress, which engines read and write.
+    """Event data of a run in progress, which the engines read and write.
 
     Attributes:
-        crossings: of the model.
-        tolerance: of event times [s].
-        steps: accepted steps in the current engine call.
+        crossings: Functions of the events of the model.
+        tolerance: tolerance of event times [s].
+        steps: number of accepted steps in the current engine call.
         memory: see `Memory`.
-        rows: records of jumps, the first `count` of them in use.
+        rows: records of jumps; the first `count` rows are in use.
     """
 
     def __init__(self, crossings: Crossings, tolerance: float) -> None:
@@ -79,7 +79,7 @@ class Eventful:
 
     @cached_property
     def search(self) -> "Search":
-        """The search of the virtual machine, with its buffers."""
+        """Event search of the virtual machine, with its buffers."""
         return Search(self)
 
     @property
@@ -97,15 +97,17 @@ class Eventful:
         return Jumps.of(self.rows[: self.count], self.crossings.record.n, steps)
 
     def entered(self) -> None:
-        """Mark a jump of the run data: the stored values are those at the end of the last step, or
-        before a jump there.
+        """Record that the run data have jumped.
+
+        The stored values are then those at the end of the last step, or before another jump there.
         """
         if self.memory[Memory.PHASE] == Memory.ON:
             self.memory[Memory.PHASE] = Memory.JUMPED
 
     def started(self, events: Sequence[Event], values: Array) -> None:
-        """Give events that have already happened at the start, with these values, the values just
-        before them.
+        """Store values just before the start for events that have already happened at the start.
+
+        The other events keep their `values` at the start.
         """
         if any(event.at_start for event in events):
             self.memory[Memory.PHASE] = Memory.JUMPED
@@ -116,7 +118,7 @@ class Eventful:
 
 @final
 class Search:
-    """Event search after each accepted step, equal to that of the compiled loop."""
+    """Event search after each accepted step, equal to the search of the compiled loop."""
 
     def __init__(self, eventful: Eventful) -> None:
         self.eventful, self.crossings = eventful, eventful.crossings
@@ -135,7 +137,7 @@ class Search:
         self._possible = bound(self.crossings.possible, inputs, (self._ends, self._some))
 
     def without(self, rows: Array, R: Array) -> int:
-        """Return how many accepted steps from the first of `rows` on have no event for certain."""
+        """Return the number of leading accepted steps among `rows` that surely have no event."""
         if self.memory[Memory.PHASE] != Memory.ON or self.memory[Memory.RESUME]:
             return 0
         self._data[:] = R[R.size - self.crossings.data :]
@@ -157,9 +159,9 @@ class Search:
     def __call__(self, row: Array, S: Array, R: Array) -> tuple[Change, Stop | None]:
         """Search the accepted step `row`, which led to S, for events.
 
-        The first events are carried out: the row is cut there and S continues after them. If they
-        happen at the very start of the step, the row is dropped. Without events the step in S may
-        be lengthened if a previous event shortened it.
+        The first events are carried out: the row is cut there, and S continues after them. If they
+        happen at the very start of the step, the row is dropped. Without events, the next step in S
+        may be lengthened if an earlier event shortened it.
         """
         d = R[R.size - self.crossings.data :]
         found = self._crossing(row, d)
@@ -189,8 +191,8 @@ class Search:
         steps = self.eventful.steps
         self.eventful.rows[self.eventful.count] = [steps, t, size, *before, *after, *which]
         self.eventful.count += 1
-        # the step size after an event is a guess: the earlier ones are no guide, dynamics may be
-        # faster
+        # the step size after an event is a guess: earlier steps are no guide, since the dynamics
+        # may be faster
         again = max(min(h, limits.RESTART * self.tolerance), limits.LEAST * h, SURE * abs(t))
         S[:] = State.at(t, again, after)
         return (Change.CUT if kept else Change.DROPPED), self._request(t, which)
@@ -206,7 +208,7 @@ class Search:
     def _crossing(self, row: Array, d: Array) -> tuple[float, NDArray[np.bool_]] | None:
         """Return the place of the first events in the step and a mask of them; None without events.
 
-        Just after a jump, signs are evaluated a few tolerances later; an expression that the jump
+        After a jump, the signs are evaluated a few tolerances later. An expression that the jump
         carried through zero, not just to zero, is an event at the very start.
         """
         memory, count = self.memory, self.crossings.count
@@ -240,12 +242,12 @@ class Search:
         return self._values(np.array([theta]), row, d)[0].copy()
 
     def _doubted(self, noise: Array, g: Array) -> Array:
-        """Return, for each piece between five places and each event, nonzero if it is in doubt."""
+        """Return an array over pieces and events, nonzero where a piece is doubtful."""
         return self._doubts(g.ravel(), noise)[0].reshape(-1, g.shape[1]).copy()
 
 
 def _called(function: ca.Function) -> Callable[..., list[Array]]:
-    """Return `function` as a callable of flat arrays that reuses one result buffer."""
+    """Return `function` as a callable of flat arrays that reuses its result buffers."""
     arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
     results = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
     call = bound(function, arguments, results)
@@ -262,11 +264,11 @@ def _called(function: ca.Function) -> Callable[..., list[Array]]:
 def storm(memory: Array, t: float, which: NDArray[np.bool_]) -> bool:
     """Record the events `which` at time `t`; return True if they complete a storm.
 
-    Events that accumulate at one time (Zeno) must not stop the clock. A storm is four consecutive
-    events of one kind whose intervals shrink like a geometric series with less than a thousand
-    event tolerances still to come, or a hundred events less than a few tolerances, or roundings of
-    the clock, apart. Frequent events of a fast machine, or many events in a long run, are not a
-    storm.
+    Events that accumulate at one time (Zeno) must not stop the clock. Four consecutive events of
+    one kind are a storm if their intervals shrink like a geometric series with less than a thousand
+    event tolerances still to come. A hundred events are a storm if they are less than a few
+    tolerances, or roundings of the clock, apart. Frequent events of a fast machine, or many events
+    in a long run, are not a storm.
     """
     last, times = memory[Memory.last(which.size)], memory[Memory.TIMES]
     memory[Memory.ALIKE] = memory[Memory.ALIKE] + 1 if (last == which).all() else 1

@@ -1,4 +1,4 @@
-"""Adaptive integrator of one model: built once, run for any numbers."""
+"""Adaptive integrator of one model, built once and run for any numerical values."""
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
@@ -37,15 +37,16 @@ Array = NDArray[np.float64]
 JUDGED = 4
 """Number of argument sets of `Integrator.suited` whose results are cached."""
 INLINE = 7000
-"""Steps with more instructions are calls of blocks, which compile much faster; both engines run the
-same form.
+"""Number of instructions above which a step consists of calls of blocks, which compile much faster.
+
+Both engines run the same form.
 """
 EVENT_BATCH = 8
-"""Attempts per virtual machine call with events; attempts after an event are wasted."""
+"""Attempts per virtual machine call with events; attempts after an event are discarded."""
 SPARE = 2
-"""Buffer sets kept: one for a run, one for a run within its callback."""
+"""Number of buffer sets kept: one for a run, one for a run within its callback."""
 REMEMBERED = 16
-"""Integrators cached per model; the oldest is dropped first."""
+"""Number of integrators cached per model; the oldest is dropped first."""
 
 
 @final
@@ -53,16 +54,16 @@ REMEMBERED = 16
 class Integrator:
     """System, step and Functions of a model with one structure of inputs.
 
-    The engine affects speed only: both give the same bits.
+    The engine affects speed only: both engines give the same bits.
 
-    Mutable state is only a cache: engines, the time spent in the virtual machine (from which it
-    decides when compiling saves time), the last start, and integrators of the same system with
-    other pivots.
+    Mutable state is only a cache: engines, the time spent in the virtual machine (which decides
+    when compiling saves time), the last start, and integrators of the same system with other
+    pivots.
 
     Attributes:
         model, inputs, tableau: model, structure of its inputs, and method.
-        whole: the system, if its pivots are not those chosen by default.
-        memory: what is derived from it elsewhere.
+        whole: system, if its pivots are not those chosen by default; else None.
+        memory: objects that other modules derive from the integrator.
         step: attempt as in `step.attempt`.
         f: (y, d) -> right-hand sides.
         events, resets: (t, y, d) -> event expressions, and values of all resets.
@@ -100,12 +101,12 @@ class Integrator:
         self.build_time = perf_counter() - begin
 
     def _event_functions(self) -> tuple[ca.Function, ca.Function]:
-        """Return the event expressions (t, y, d), with algebraic unknowns that solve their
-        equations, and the magnitudes of the contributions of t and y to them.
+        """Return the Functions (t, y, d) of the event expressions and of their magnitudes.
 
-        Within a step these unknowns are accurate to the tolerance, and after an event exact.
-        Without one step of Newton's method an event that depends on them may pass through zero a
-        second time there. Those of a mechanism are unchanged.
+        A magnitude is the sum of the magnitudes of the contributions of t and y to an expression.
+        Within a step, algebraic unknowns are accurate to the tolerance, and after an event exact.
+        Without one Newton step, an event that depends on them could pass through zero a second time
+        there. The event expressions therefore contain this step, except for mechanisms.
         """
         s, t = self.system, ca.SX.sym("time")
         values = stacked(ca.SX(e.expression) for e in self.model.events)
@@ -121,9 +122,7 @@ class Integrator:
 
     @cached_property
     def schedules(self) -> tuple[str, ...]:
-        """Event expressions that depend on time only, serialised; error control does not see
-        them.
-        """
+        """Serialised event expressions in time only, which error control does not see."""
         own, t = [ca.SX(event.expression) for event in self.model.events], self.model.t
         alone = (e for e in own if all(ca.is_equal(s, t) for s in ca.symvar(e)))
         return tuple(ca.SX.serialize(e) for e in alone)
@@ -137,12 +136,12 @@ class Integrator:
 
     @cached_property
     def follows(self) -> bool:
-        """True if there are algebraic unknowns, which follow jumps."""
+        """True if there are algebraic unknowns, which have to follow jumps."""
         return bool(self.system.free.any()) or self.system.manifold is not None
 
     @cached_property
     def follow(self) -> Following | None:
-        """Update of algebraic unknowns after a jump of inputs or states; None without any."""
+        """Update of the algebraic unknowns after a jump of inputs or states, if there are any."""
         return following(self.system)
 
     @property
@@ -155,13 +154,14 @@ class Integrator:
 
     @cached_property
     def signals(self) -> ca.Function:
-        """All signals of the model as a Function (t, y, d), refined."""
+        """All signals of the model as a Function (t, y, d), with refined unknowns."""
         return self.refined(self._every)
 
     def refined(self, expression: ca.SX) -> ca.Function:
-        """Return `expression` as a Function (t, y, d), for a mechanism with refined unknowns.
+        """Return `expression` as a Function (t, y, d), for a mechanism at refined unknowns.
 
-        Between steps the constraints of a mechanism hold to the tolerance only, in results exactly.
+        Between steps, the constraints of a mechanism hold only to the tolerance; in results they
+        hold exactly.
         """
         signals, s = self.of_time("signals", expression), self.system
         if s.manifold is None:
@@ -171,19 +171,19 @@ class Integrator:
 
     @cached_property
     def signal_columns(self) -> Columns:
-        """Signals at many times."""
+        """Evaluation of the signals at many times."""
         return Columns(self.signals)
 
     @cached_property
     def plain_signal_columns(self) -> Columns:
-        """Signals at many times without refinement, drift of constraints included."""
+        """Evaluation of the signals at many times, not refined, with the drift of constraints."""
         return Columns(self.of_time("signals", self._every))
 
     @cached_property
     def states(self) -> Columns | None:
-        """Projection of states at many times from (y, d); None if y needs none.
+        """Projection (y, d) -> states at many times; None if the states need no projection.
 
-        Between steps the loops of a mechanism are closed to the tolerance only.
+        Between steps, the loops of a mechanism are closed only to the tolerance.
         """
         s, manifold = self.system, self.system.manifold
         if manifold is None or not manifold.m:
@@ -192,15 +192,15 @@ class Integrator:
         return Columns(ca.Function("states", [s.y, s.d], [projected], {"cse": True}))
 
     def start(self, y: Array, d: Array) -> Array:
-        """Return `y` with consistent algebraic unknowns; cached, for runs from one start.
+        """Return `y` with consistent algebraic unknowns; cached for runs from the same start.
 
         Raises:
-            ValueError: no consistent values near.
+            ValueError: no consistent values were found nearby.
         """
         if not self.follows:
             return y
         key, last = (y.tobytes(), d.tobytes()), self._start
-        if last[:2] != key:  # another thread may cache another one meanwhile
+        if last[:2] != key:  # another thread may replace the cached start meanwhile
             last = self._start = (*key, self.consistent(f"model '{self.model.name}'", y, d))
         return last[2]
 
@@ -208,7 +208,7 @@ class Integrator:
         """Return `y` with consistent algebraic unknowns.
 
         Raises:
-            ValueError: no consistent values near; the message begins with `where`.
+            ValueError: no consistent values were found nearby; the message begins with `where`.
         """
         manifold = self.system.manifold
         # normal forces need the full search; models without inputs seldom need a second start
@@ -221,8 +221,8 @@ class Integrator:
         The result depends on the arguments only, not on earlier runs.
 
         Args:
-            points: (y, d) that a run has to pass, the newest last; algebraic unknowns of the first
-                one are computed.
+            points: (y, d) that a run has to pass, the newest last; the algebraic unknowns of the
+                first one are computed here.
             span: duration of the run [s].
         """
         if not self.system.has_pivots:
@@ -242,7 +242,7 @@ class Integrator:
         return found
 
     def borrow(self) -> Work:
-        """Return buffers for exclusive use by a run; threads and callbacks may run another one."""
+        """Return buffers for exclusive use by a run; threads and callbacks may start other runs."""
         try:
             return self._spare.pop()
         except IndexError:
@@ -260,7 +260,7 @@ class Integrator:
         return VmEngine(self.step, size, self.follows)
 
     def _source(self) -> str:
-        """Return the C of the loop."""
+        """Return the C source of the loop."""
         # models without inputs and events seldom jump: not worth the compile time
         jumps = bool(self.model.u or self.model.events)
         follow = self.follow if self.follows and jumps else None
@@ -268,7 +268,7 @@ class Integrator:
 
     @cached_property
     def compiled(self) -> Engine:
-        """Compiled engine; compiled, or loaded from the cache, on first use.
+        """Engine in compiled C; the library is compiled, or loaded from the cache, on first use.
 
         Raises:
             CompileError: no compiler was found, or it failed.
@@ -283,7 +283,7 @@ class Integrator:
 
         Args:
             backend: "vm", "compiled" or "auto".
-            left: predicted time [s] that the virtual machine still needs, 0 if unknown.
+            left: estimated time [s] that the virtual machine still needs, 0 if unknown.
         """
         if backend == "vm":
             return self.vm
@@ -301,7 +301,7 @@ def built(model: Model, inputs: InputData, method: Method) -> tuple[Integrator, 
     """Return the integrator of this model, input structure and method, and True if it is new.
 
     The cache belongs to the model: an integrator refers to its model, and a global table would keep
-    both alive for ever.
+    both alive forever.
     """
     known: dict[Hashable, Integrator] = model.memory.setdefault("integrators", {})
     key = (method.name, method.finer, inputs.key)

@@ -1,7 +1,8 @@
-"""Sampled plants with held inputs: all of them advance by one call, without records.
+"""Sampled plants with held inputs; one call advances all of them, without records.
 
-As in `symfric.integrator.running.engine` there are two engines, which do the same operations in one
-order: a loop in C around the generated step, and one in Python around CasADi's virtual machine.
+As in `symfric.integrator.running.engine`, there are two engines, which do the same operations in
+the same order: a loop in C around the generated step, and a loop in Python around CasADi's virtual
+machine.
 """
 
 import ctypes
@@ -25,37 +26,41 @@ from symfric.integrator.step.attempt import Given, State
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 END, ATTEMPTS, STEP_TOO_SMALL, SEARCH, AGAIN, STORM, OVER = 0, 2, 3, 4, 5, 6, -1
-"""State of a plant: at its sample; out of attempts; steps too small; algebraic unknowns too far
-from the last ones to follow (`symfric.integrator.equations.blocks`); resolved by the caller, to
-be continued; event storm; ended by a terminal event.
+"""States of a plant.
+
+END: the plant is at its sample. ATTEMPTS: it is out of attempts. STEP_TOO_SMALL: its steps are too
+small. SEARCH: its algebraic unknowns are too far from the last ones to follow
+(`symfric.integrator.equations.blocks`). AGAIN: the caller has resolved this, and the plant is to be
+continued. STORM: event storm. OVER: a terminal event has ended the plant.
 """
 SAMPLES = 1000
-"""The first step of a plant is that of a run of this many samples."""
+"""Number of samples of a run whose first step is that of a plant."""
 REFUSED = -1
 """Return value of `Advance` if an input is not finite; nothing has changed then."""
 
 Advance = Callable[[int], int]
-"""Function that takes over inputs and goes to the next sample (1), or continues plants marked AGAIN
-(0); returns the number of plants that did not get there.
+"""Function that takes over inputs and goes to the next sample (1), or continues AGAIN plants (0).
+
+It returns the number of plants that did not reach their sample.
 """
 
 
 @final
 @dataclass(eq=False)
 class Plants:
-    """Mutable data of plants of one model; both engines work on these arrays, row by row in memory.
+    """Data of plants of one model; mutable, and shared by both engines.
 
     Attributes:
         S, R: columns of an attempt, one row per plant (`symfric.integrator.step.attempt`).
-        u: inputs to hold next, shape (plants, nu); the last run data are those held now.
+        u: inputs to hold next, shape (plants, nu); the last run data in R are those held now.
         begin: start times [s]; the k-th sample of a plant is at begin + k dt.
-        count: k; unchanged for a plant that has not reached its sample.
-        ready: 1 if its algebraic unknowns already match the inputs to hold next.
-        why: END ... OVER.
-        made: attempts in its last interval.
-        dt: interval [s].
-        attempts: allowed in one interval.
-        h_min: least step [s].
+        count: k of each plant; unchanged for a plant that has not reached its sample.
+        ready: 1 if the algebraic unknowns already match the inputs to hold next.
+        why: state of each plant, END ... OVER.
+        made: number of attempts in the last interval.
+        dt: sampling interval [s].
+        attempts: number of attempts allowed in one interval.
+        h_min: smallest step [s].
         memory: event memory, one row per plant; without columns if there are no events.
         happened: (plant, time [s], name) of the events of the last interval.
     """
@@ -75,22 +80,22 @@ class Plants:
     happened: list[tuple[int, float, str]] = field(default_factory=list[tuple[int, float, str]])
 
     def first_step(self) -> float:
-        """Return the first step [s] to try: that of a run of `SAMPLES` samples."""
+        """Return the first step [s] to try, that of a run over `SAMPLES` samples."""
         return min(first_step(SAMPLES * self.dt, self.begin[0]), float(self.R[0, Given.H_MAX]))
 
     def copy(self) -> "Plants":
-        """Return a copy with its own memory."""
+        """Return a copy with its own arrays."""
         own = {name: getattr(self, name).copy() for name in (*SHARED, "memory", "happened")}
         return replace(self, **own)
 
     def back_to(self, before: "Plants") -> None:
-        """Restore the state `before`, a copy, in the same memory."""
+        """Restore the state of `before`, a copy, in the same arrays."""
         for name in (*SHARED, "memory", "happened"):
             getattr(self, name)[:] = getattr(before, name)
 
 
 MEMBERS = (FOLDER / "members.h").read_text(encoding="utf-8")
-"""C struct of the arrays."""
+"""C declaration of the struct of the arrays."""
 SHARED = ("S", "R", "u", "begin", "count", "ready", "why", "made")
 """Arrays that C reads and writes, in this order."""
 
@@ -106,7 +111,7 @@ class _Members(ctypes.Structure):
 
     @classmethod
     def of(cls, plants: Plants) -> "_Members":
-        """Return the struct with the addresses of arrays; the caller keeps them alive."""
+        """Return the struct with the addresses of the arrays; the caller keeps the arrays alive."""
         addresses = (getattr(plants, name).ctypes.data for name in SHARED)
         return cls(plants.S.shape[0], plants.attempts, plants.dt, plants.h_min, *addresses)
 
@@ -123,7 +128,7 @@ def compiled(integrator: Integrator, plants: Plants) -> Advance:
 def loaded(
     integrator: Integrator, plants: Plants, name: str, source: Callable[[Integrator], str]
 ) -> Advance:
-    """Return the C function `symfric_plants` bound to arrays; the integrator caches its library."""
+    """Return the C function `symfric_plants` bound to arrays; the integrator caches the library."""
     if name not in integrator.memory:
         library = load(source(integrator), "symfric_plants")
         library.symfric_plants.restype = ctypes.c_longlong
@@ -158,12 +163,13 @@ def plants_source(integrator: Integrator) -> str:
 
 @final
 class InPython:
-    """Loop in Python, one plant after the other, as `Advance`.
+    """Loop in Python over the plants, used as an `Advance`.
 
     Args:
-        integrator, plants: model and data.
-        engine: of models with events, for which it searches (`symfric.integrator.running.events`).
-        tolerance: of event times [s].
+        integrator, plants: integrator of the model, and data of the plants.
+        engine: engine for models with events, which it searches for
+            (`symfric.integrator.running.events`).
+        tolerance: tolerance of event times [s].
     """
 
     def __init__(
@@ -265,14 +271,12 @@ def _large(S: Array, h_min: float) -> bool:
 
 
 EVENTFUL_ATTEMPTS = 50_000
-"""Attempts per call of an engine."""
+"""Attempts per call of an engine for models with events."""
 WHY = {Stop.END: END, Stop.STEP_TOO_SMALL: STEP_TOO_SMALL, Stop.TERMINAL: OVER, Stop.STORM: STORM}
 
 
 def looking(integrator: Integrator, plants: Plants, backend: str) -> Callable[[], Array]:
-    """Return a function that computes the signals of all plants at their current times, shape
-    (plants, signals).
-    """
+    """Return a function for the signals of all plants at their times, shape (plants, signals)."""
     S, d = plants.S, plants.R[:, Given.d(integrator.system.nx)]
     if len(S) > 1:
         rows = [S[:, State.T], S[:, State.Y], d]

@@ -18,7 +18,7 @@ class Record(NamedTuple):
 
     Attributes:
         n: number of unknowns.
-        rows: of the dense output D, each of length n.
+        rows: number of rows of the dense output D, each of length n.
     """
 
     n: int
@@ -57,8 +57,8 @@ class Dense:
 
     Attributes:
         t0, t1: start and end of each piece, shape (k,).
-        y0, y1: values there, shape (k, n); y0 differs from the y1 before it after an event.
-        D: coefficients, shape (k, r, n).
+        y0, y1: values there, shape (k, n); after an event, y0 differs from the y1 before it.
+        D: coefficients d_1, ..., d_r, shape (k, r, n).
     """
 
     t0: Array
@@ -69,19 +69,19 @@ class Dense:
 
     @classmethod
     def of(cls, rows: Array, n: int) -> "Dense":
-        """Return pieces as views of the rows (t0, t1, y0, y1, D) that an engine writes."""
+        """Return the pieces as views of the rows (t0, t1, y0, y1, D) that an engine writes."""
         y0, y1, D = rows[:, 2 : 2 + n], rows[:, 2 + n : 2 + 2 * n], rows[:, 2 + 2 * n :]
         return cls(rows[:, 0], rows[:, 1], y0, y1, D.reshape(len(rows), D.shape[1] // n, n))
 
     @property
     def rows(self) -> Array:
-        """Rows of `of`."""
+        """Rows (t0, t1, y0, y1, D) of the pieces, as for `of`."""
         k, r, n = self.D.shape
         ends = self.t0[:, None], self.t1[:, None], self.y0, self.y1
         return np.hstack([*ends, self.D.reshape(k, r * n)])
 
     def __call__(self, times: Array) -> Array:
-        """Return values at `times`, shape (n, m); at an event the value after it."""
+        """Return the values at `times`, shape (n, m); at an event, the value after it."""
         k = np.searchsorted(self.t0[1:], times, side="right")
         return self.piece(k, (times - self.t0[k]) / (self.t1[k] - self.t0[k])).T
 
@@ -122,8 +122,8 @@ class Outputs:
     The compiled loop repeats `fill` operation by operation (`symfric_outputs` in `march.c`).
 
     Attributes:
-        times: of the result [s], shape (m,).
-        values: unknowns there, shape (n, m), known for the first `found` times.
+        times: times of the result [s], shape (m,).
+        values: unknowns at these times, shape (n, m), known for the first `found` times.
         found: number of times reached.
     """
 
@@ -140,8 +140,8 @@ class Outputs:
     def fill(self, piece: Dense, last: bool = False) -> None:
         """Fill in the values at the times within `piece`.
 
-        A time at its very end belongs to the next piece, since an event or a break may change the
-        values there, unless this is the `last` piece of the run.
+        A time at the very end of the piece belongs to the next piece, since an event or a break may
+        change the values there. In the `last` piece of a run it belongs to that piece.
         """
         end = int(np.searchsorted(self.times, piece.t1[-1], side="right" if last else "left"))
         if end > self.found:
@@ -149,7 +149,7 @@ class Outputs:
             self.found = end
 
     def stand(self, t: float, y: Array) -> None:
-        """Set the remaining times up to `t` [s] to the constant unknowns `y`."""
+        """Set the unknowns at the remaining times up to `t` [s] to the constant `y`."""
         end = int(np.searchsorted(self.times, t, side="right"))
         self.values[:, self.found : end] = y[:, None]
         self.found = max(self.found, end)
@@ -170,12 +170,12 @@ class Jumps:
     """Events of a run, one row per time.
 
     Attributes:
-        step: number of accepted steps before it, shape (k,).
+        step: number of accepted steps before the events, shape (k,).
         t: time [s], shape (k,).
-        size: full size of the step that it cut [s]; negative if nothing of the step is left, 0 if a
-            jump led there instead of motion, shape (k,).
-        before, after: unknowns just before and after it, shape (k, n).
-        which: the events that happened together, shape (k, events).
+        size: full size of the step that the events cut [s]; negative if nothing of the step is
+            left, 0 if a jump led to the events instead of motion, shape (k,).
+        before, after: unknowns just before and after the events, shape (k, n).
+        which: mask of the events that happened together, shape (k, events).
     """
 
     step: NDArray[np.intp]
@@ -187,8 +187,9 @@ class Jumps:
 
     @classmethod
     def of(cls, rows: Array, n: int, steps: int = 0) -> "Jumps":
-        """Build from records (steps before, t, size, y before, y after, which), `steps` already
-        made.
+        """Return the jumps of records (steps before, t, size, y before, y after, which).
+
+        `steps` accepted steps were made before the records.
         """
         rows, after = rows.copy(), 3 + n
         return cls(
@@ -202,13 +203,15 @@ class Jumps:
 
 
 MOST_BYTES = 64 * 2**20
-"""Memory limit of the accepted steps of a run. A longer run keeps only the values at its result
-times; dense output is then recomputed by a second run with the same bits.
+"""Memory limit of the accepted steps of a run.
+
+A longer run keeps only the values at its result times. Its dense output is then recomputed by a
+second run, which gives the same bits.
 """
 
 
 class Extent(NamedTuple):
-    """Shortest and longest accepted step [s], least and greatest unknowns (2, n)."""
+    """Shortest and longest accepted step [s], smallest and largest unknowns (2, n)."""
 
     shortest: float
     longest: float
@@ -218,21 +221,21 @@ class Extent(NamedTuple):
 @final
 @dataclass(eq=False)
 class Run:
-    """Mutable record of a run; it survives interrupts and failures.
+    """Record of a run; mutable, and available after interrupts and failures.
 
     Attributes:
-        t, y: start.
+        t, y: start time and start values.
         outputs: unknowns at the times of the result.
-        jumps: the events that happened, with the unknowns on both sides.
+        jumps: events that happened, with the unknowns on both sides.
         happened: (time, name) of every event.
-        steps, attempts: number of accepted steps and of all attempts.
+        steps, attempts: numbers of accepted steps and of all attempts.
         engine: name of the engine.
-        again: (times, bytes) -> another run with these outputs and this memory limit; None if this
-            run has kept all steps.
-        status, message: how it ended.
+        again: (times, bytes) -> another run with outputs at these times and this memory limit; None
+            if this run has kept all steps.
+        status, message: status at the end, and a sentence about it.
         most: memory limit of the accepted steps [bytes].
-        kept: rows of accepted steps (`Dense.of`), batch by batch; only the last row of those that
-            exceeded the limit.
+        kept: rows of accepted steps (`Dense.of`), batch by batch. Once the limit is exceeded, only
+            the last row.
     """
 
     t: float
@@ -272,14 +275,14 @@ class Run:
 
     @property
     def _rows(self) -> list[Array]:
-        """Kept rows, or one for a start without steps."""
+        """Kept rows; a single one for a start without steps."""
         if self.kept:
             return self.kept
         return [np.concatenate([[self.t, np.nextafter(self.t, np.inf)], self.y, self.y])[None]]
 
     @cached_property
     def dense(self) -> Dense:
-        """Continuous solution over all accepted steps; a long run is recomputed."""
+        """Continuous solution over all accepted steps; recomputed for a long run."""
         if self.again is not None:
             return self.again(np.zeros(0), np.inf).dense
         rows = self._rows
@@ -317,7 +320,7 @@ class Run:
 
     @property
     def reach(self) -> Array:
-        """Least and greatest unknowns at the start and at the ends of steps, shape (2, n)."""
+        """Smallest and largest unknowns at the start and at the ends of steps, shape (2, n)."""
         first = self._rows[0][:1, 2 : 2 + self.y.size]
         ends = [first if self._before is None else self._before.reach, *self._ends]
         least, most = ([f(y, axis=0) for y in ends] for f in (np.min, np.max))
@@ -325,7 +328,7 @@ class Run:
 
     @property
     def seen(self) -> tuple[Array, Array]:
-        """Start and ends of steps, (k,) and (k, n); for a long run the times of the result."""
+        """Start and ends of steps, (k,) and (k, n); for a long run, the times of the result."""
         if not self.complete:
             return self.outputs.times[: self.outputs.found], self.outputs.reached.T
         times = [self.t], *(rows[:, 1] for rows in self._rows)

@@ -1,9 +1,9 @@
-"""Drive an integrator from start to end: input intervals, events, progress, failures.
+"""Run of an integrator from start to end: input intervals, events, progress, failures.
 
-Absolute tolerances are fractions of each state's nominal value, which the model only guesses (a
-decimetre, a turn). With them a motion of a micrometre would be resolved to a hundredth of its size,
-one of a nanometre not at all. A run with such a small motion is therefore repeated on its own
-scale.
+Absolute tolerances are fractions of the nominal value of each state, which the model only guesses
+(a decimetre, a turn). With such tolerances, a motion of a micrometre would be resolved to a
+hundredth of its size, and one of a nanometre not at all. A run with such a small motion is
+therefore repeated with tolerances on the scale of the motion.
 """
 
 from collections.abc import Callable
@@ -27,40 +27,40 @@ from symfric.integrator.step.attempt import Given, State
 
 Array = NDArray[np.float64]
 SMALL, REST = 1e-3, 1e-12
-"""Sizes, in nominal values, below which a motion gets its own scale, and below which it is treated
-as zero: such values are rounding errors of the states that it is coupled to.
+"""Sizes, in nominal values, below which a motion gets its own scale, or counts as zero.
+
+Values below the second limit are rounding errors of coupled states.
 """
 ROUNDS = 3
 """Maximum number of repetitions: an unresolved motion may have seemed larger than it is."""
 
 
 def own_scale(size: Array, nominal: Array) -> Array:
-    """Return typical magnitudes: `nominal`, or `size` where a state moves far less."""
+    """Return typical magnitudes: `nominal`, or `size` for states that move far less."""
     small = (size < SMALL * nominal) & (size > REST * nominal)
     return np.where(small, size, nominal)
 
 
 def finer(scale: Array, size: Array, nominal: Array) -> Array | None:
-    """Return the scale for another run of a motion of this `size`, None if `scale` is fine
-    enough.
-    """
+    """Return the scale for another run of a motion of `size`; None if `scale` is fine enough."""
     own = np.minimum(scale, own_scale(size, nominal))
     return own if (own < 0.1 * scale).any() else None
 
 
 PACES = 8
-"""Linear pieces of an input that one step may span in models with events (checked at its
-quarters)."""
+"""Number of nearly linear pieces of an input that one step may span in models with events.
+
+Events are checked at the quarters of a step.
+"""
 
 NOWHERE = np.zeros(0)
 """Empty array of result times."""
 ATTEMPTS = {"vm": 2_000, "compiled": 50_000}
-"""Attempts between two checks of progress and interrupts: tens of milliseconds."""
+"""Attempts between two checks of progress and interrupts; they take tens of milliseconds."""
 MOST_ORDERS = 8
 """Maximum number of pivot replacements in a run."""
 MANY_STEPS, MOST_STEPS = 10_000_000, 1e9
-"""Attempts after which the progress rate of a run is checked, and the most it may still need
-then."""
+"""Attempts after which the progress of a run is checked, and the most that it may still need."""
 
 
 @final
@@ -72,10 +72,10 @@ class Tolerances:
         rtol: relative tolerance.
         atol: absolute tolerance of each state, shape (nx,).
         event: tolerance of event times [s].
-        max_steps: attempts allowed.
+        max_steps: number of attempts allowed.
         max_step: longest step [s].
-        follow: True if `atol` shrinks to the size of a tiny motion.
-        extends: True if more attempts are allowed while the run will reach its end.
+        follow: True if `atol` shrinks to the size of tiny motions.
+        extends: True if more attempts are allowed as long as the run is going to reach its end.
     """
 
     rtol: float
@@ -137,7 +137,7 @@ def integrate(
 @final
 @dataclass(eq=False)
 class _March:
-    """Run to be made; its `integrator` is replaced if pivots fail."""
+    """Run in progress; its `integrator` is replaced if pivots fail."""
 
     integrator: Integrator
     inputs: InputData
@@ -186,7 +186,7 @@ class _March:
 
     @property
     def y(self) -> Array:
-        """Unknowns; a view of S."""
+        """Unknowns, as a view of S."""
         return self.work.S[State.Y]
 
     @property
@@ -215,9 +215,7 @@ class _March:
                 self.progress((self.t - t_start) / (t_end - t_start))
 
     def _attempts(self, left: float, t_end: float) -> tuple[Array, Stop, float]:
-        """Make a batch of attempts; return records, reason to stop, remaining time of the VM
-        [s].
-        """
+        """Make attempts; return records, reason to stop, and remaining time of the VM [s]."""
         run, engine = self.made, self.integrator.choose(self.backend, left)
         run.engine = engine.name
         if run.attempts >= self.limit and self.tolerances.extends:
@@ -243,10 +241,10 @@ class _March:
         return records, reason, left
 
     def _found_pivots(self) -> bool:
-        """Return True if steps failed because of unstable pivots, after replacing these.
+        """Replace unstable pivots after a failed step; return True if pivots were the cause.
 
-        No step size compensates for unstable pivots: steps shrink to nothing. The check is
-        therefore made there, at the same place for every engine.
+        No step size compensates for unstable pivots, and steps shrink to nothing. Pivots are
+        therefore checked when this happens, at the same place for every engine.
         """
         if len(self.places) > MOST_ORDERS:
             return False
@@ -261,7 +259,7 @@ class _March:
         return True
 
     def _act(self, reason: Stop) -> None:
-        """Act on the `reason` to stop."""
+        """Handle the `reason` for which an engine returned."""
         run, events = self.made, self.integrator.model.events
         if reason is Stop.STEP_TOO_SMALL:
             h = self.work.S[State.H]
@@ -282,7 +280,7 @@ class _March:
     def _make_consistent(self, moved: bool = False) -> None:
         """Update the algebraic unknowns after a jump, or stop the run if that fails.
 
-        If states `moved`, the states of a mechanism are projected back onto its constraints, too.
+        If states `moved`, the states of a mechanism are also projected back onto its constraints.
         """
         follow, manifold = self.integrator.follow, self.integrator.system.manifold
         if follow is None and manifold is None:

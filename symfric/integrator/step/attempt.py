@@ -1,28 +1,29 @@
 """Attempt of a step: its error control, and its form as a CasADi Function.
 
 Error control also monitors sliding velocities and algebraic unknowns. A sliding velocity s is the
-difference of two velocities that may be a thousand times larger, so its error is measured on the
-velocity scale w of the law instead. In addition, a step must not jump across that scale: friction
-that acts near zero velocity only (a peak without a Coulomb level) has no effect on a step that
-passes over it. No stage falls on the peak, no error is estimated, and a block that should stick
-moves on. Whatever the estimate,
+difference of two velocities that may be a thousand times larger, so its error is measured relative
+to the velocity scale w of the law instead. In addition, a step must not jump across that scale.
+Friction that acts near zero velocity only (a peak without a Coulomb level) has no effect on a step
+that passes over it: no stage falls on the peak, no error is estimated, and a block that should
+stick moves on. Whatever the error estimate,
 
     travel <= REACH (w + nearest) / finer
 
-holds for every step, where `nearest` is its least |s|, or 0 if s changes sign: steps shrink
-geometrically towards zero and cross it in steps of a few w. The parabola through both ends and the
-middle of the dense output approximates s. A method whose steps are differentiated has a larger
-`finer`: the derivative of friction, a peak of width w, needs several stages, while the state needs
-only its integral. A model without monitors has none of this.
+holds for every step, where `travel` is the distance that s covers and `nearest` is its smallest
+|s|, or 0 if s changes sign. Steps thus shrink geometrically towards zero and cross it in steps of a
+few w. The parabola through both ends and the middle of the dense output approximates s. A method
+whose steps are differentiated has a larger `finer`: the derivative of friction, a peak of width w,
+needs several stages, while the state needs only its integral. A model without monitors has no such
+limit.
 
-An attempt is ONE CasADi Function, whatever the method, of two columns:
+For every method, an attempt is one CasADi Function of two columns:
 
     S = (t, h, h_old, growth_old, rejected, y)     changed by an attempt
     R = (t_end, rtol, h_max, atol[nx], d)          not changed
 
-`step(S, R) -> (S_next, D)` tries h, and either accepts (t, y advance; D holds the dense output) or
-rejects (h shrinks). Columns of many members are the rows of a matrix. `fixed(y, h, d) -> y_next` is
-the bare step, for derivatives and C code.
+`step(S, R) -> (S_next, D)` tries the step h. It either accepts the step (t and y advance; D holds
+the dense output) or rejects it (h shrinks). The columns of many members are the rows of a matrix.
+`fixed(y, h, d) -> y_next` is the bare step, for derivatives and C code.
 """
 
 from collections.abc import Callable
@@ -46,7 +47,7 @@ GROWTH_MEMORY = 2.5
 
 @final
 class State:
-    """Rows of S: time, step to try, last accepted step, its growth, 1 if the last was rejected."""
+    """Rows of S: time, step to try, last accepted step, its growth, 1 after a rejected attempt."""
 
     T, H, H_OLD, GROWTH_OLD, REJECTED = range(5)
     MEMORY = 5
@@ -54,13 +55,13 @@ class State:
 
     @staticmethod
     def at(t: float, h: float, y: ArrayLike) -> Array:
-        """Return S at the time `t` without history, to try the step `h`; y (..., n)."""
+        """Return S at time `t` without history, with the step `h` to try; y has shape (..., n)."""
         return _joined([t, h, h, GROWTH_MEMORY, 0.0], np.asarray(y, dtype=float))
 
 
 @final
 class Given:
-    """Rows of R: end, relative tolerance, longest step, absolute tolerances, run data."""
+    """Rows of R: end time, relative tolerance, longest step, absolute tolerances, run data."""
 
     T_END, RTOL, H_MAX = range(3)
     FIXED = 3
@@ -82,29 +83,32 @@ class Given:
 
 
 def _joined(common: list[float], own: Array) -> Array:
-    """Prepend the same first entries to every row of `own`."""
+    """Prepend the same leading entries to every row of `own`."""
     first = np.broadcast_to(np.array(common), (*own.shape[:-1], len(common)))
     return np.concatenate([first, own], axis=-1)
 
 
 REACH = 4.0
-"""Largest travel in units of w: the stages of such a step resolve friction that rises over w and
-then falls.
+"""Largest travel of a sliding velocity in one step, in units of w.
+
+The stages of such a step resolve friction that rises over w and then falls.
 """
 
 FINEST = 1e-14
-"""Step relative to the end time below which limits on the step are ignored: the run is about to
-end."""
+"""Step, relative to the end time, below which limits on the step are ignored.
+
+The run is then about to end.
+"""
 
 
 class Watch(NamedTuple):
-    """Monitored expressions of a system over one trial.
+    """Monitored expressions of a system over one trial step.
 
     Attributes:
-        before, half, after: their values at the start, in the middle and at the end.
-        nominal: their typical magnitudes.
-        change: (y, direction, d) -> their change with y, to first order.
-        slips: how many of them, the first ones, are sliding velocities.
+        before, half, after: values at the start, in the middle and at the end of the step.
+        nominal: typical magnitudes.
+        change: (y, direction, d) -> change of the expressions with y, to first order.
+        slips: number of sliding velocities, which are the first expressions.
         finer: factor by which their travel near zero is limited more than usual.
     """
 
@@ -117,18 +121,17 @@ class Watch(NamedTuple):
     finer: float = 1.0
 
     def error(self, y: Any, error: Any, d: Any, rtol: Any) -> Any:
-        """Return the sum of squares of the monitored errors caused by an error of y, in units of
-        rtol.
+        """Return the sum of squares of the monitored errors due to an error of y, in units of rtol.
 
-        A value is scaled by rtol (nominal + min|value|): where a contact sticks, its sliding
-        velocity is resolved relative to the velocity scale of the law instead of the velocity of
-        the body; otherwise breakaway comes too late or not at all.
+        A value is scaled by rtol (nominal + min|value|). The sliding velocity of a sticking contact
+        is therefore resolved relative to the velocity scale of the law instead of the velocity of
+        the body; otherwise breakaway would come too late or not at all.
         """
         smallest = ca.fmin(ca.fabs(self.before), ca.fabs(self.after))
         return ca.sumsqr(self.change(y, error, d) / (rtol * (self.nominal + smallest)))
 
     def leap(self) -> Any:
-        """Return the largest travel of a sliding velocity, in units of the limit."""
+        """Return the largest travel of a sliding velocity, in units of its limit."""
         before, half, after, scale = (x[range(self.slips)] for x in self[:4])
         bow = ca.fabs(half - (before + after) / 2)
         nearest = ca.fmax(0, ca.fmax(ca.fmin(before, after), -ca.fmax(before, after)) - bow)
@@ -159,8 +162,9 @@ E_FLOOR = 1e-6
 """Smallest error estimate that the controller uses."""
 
 FAR = 100.0
-"""Shift onto the constraints, in tolerances, above which it is not counted as an error of the
-method: near a singular position it is a jump to another branch.
+"""Shift onto the constraints, in tolerances, above which a step is rejected.
+
+Near a singular position such a shift is not an error of the method but a jump to another branch.
 """
 
 KAPPA = 0.1
@@ -168,7 +172,7 @@ KAPPA = 0.1
 
 
 def steps(system: System, method: Method) -> Trials:
-    """Return the steps of a method; those of a mechanism end on its constraints."""
+    """Return the steps of a method; the steps of a mechanism end on its constraints."""
     chart, manifold = tangent(system), system.manifold
     if chart is not None:
         inside = method.trials(chart.reduced)
@@ -191,14 +195,14 @@ def steps(system: System, method: Method) -> Trials:
 
 
 def obstacles(system: System, method: Method) -> Callable[[Any, Any, Any], Any] | None:
-    """Return a test that rejects a step despite a small error; None if it cannot fail.
+    """Return a test that rejects a step despite a small error estimate; None if it cannot fail.
 
     Returns:
         (y, h, d) -> a number, negative if the step over h must not end at y.
 
-    Breakaway would be missed without notice: where a contact turns unstable, a long step stays on
-    the sticking solution, with a small error estimate; `signs` detects that. Where the loop from
-    normal forces over friction to reactions and back, det(I - dN/dN), is negative, friction has
+    Without the test, breakaway would be missed: where a contact becomes unstable, a long step stays
+    on the sticking solution with a small error estimate; `signs` detects that. Where det(I - dN/dN)
+    of the loop from normal forces over friction to reactions and back is negative, friction has
     jammed: that solution is not physical, nor is one in which a bearing pulls. A pivot of I - dN/dN
     below `SHOCK` is close to that. Mechanisms without friction need no test.
     """
@@ -228,9 +232,7 @@ def build_fixed(system: System, method: Method) -> ca.Function:
 
 
 def build_dense_step(system: System, method: Method) -> ca.Function:
-    """Return the bare step with its dense output, (y, h, d) -> all = (y_next, D), for
-    sensitivities.
-    """
+    """Return the step with its dense output, (y, h, d) -> all = (y_next, D), for sensitivities."""
     arguments, trial = _bare(system, method)
     every = ca.vertcat(trial.end, *trial.dense)
     return ca.Function("dense", arguments, [every], list("yhd"), ["all"], {"cse": True})
@@ -244,9 +246,9 @@ def _bare(system: System, method: Method) -> tuple[list[ca.SX], Trial]:
 def error_norm(
     system: System, y: Any, y_new: Any, atol: Any, rtol: Any, d: Any, watch: Watch | None
 ) -> Callable[[Any], Any]:
-    """Return the mean square norm of an error of y_new in states and monitored expressions, scaled.
+    """Return the scaled mean square norm of an error of y_new, in states and monitored expressions.
 
-    A state is scaled by atol + rtol max|x|, monitored expressions as in `Watch.error`.
+    A state is scaled by atol + rtol max|x|, a monitored expression as in `Watch.error`.
     """
     nx, count = system.nx, system.nx + system.monitors.numel()
     per_scale = reciprocal(atol + rtol * ca.fmax(ca.fabs(y[:nx]), ca.fabs(y_new[:nx])))
@@ -261,8 +263,8 @@ def error_norm(
 def converged(before: Any, last: Any) -> Any:
     """Return True if Newton's method has converged, from the norms of its last two corrections.
 
-    The last correction is small, or the sum of the remaining ones, a geometric series with their
-    ratio.
+    It has converged if the last correction is small, or the sum of the remaining corrections, a
+    geometric series with the ratio of the last two.
     """
     last, rate = ca.sqrt(last), ca.sqrt(last / (before + 1e-300))
     return ca.logic_or(last <= KAPPA, last * rate <= KAPPA * (1 - rate))
@@ -272,10 +274,10 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
     """Return the adaptive attempt (S, R) -> (S_next, D).
 
     Args:
-        system: the system to integrate.
-        method: must estimate its error.
-        kind: SX inlines everything (virtual machine, small systems), MX keeps the blocks as calls,
-            which compile faster if they are large.
+        system: system to integrate.
+        method: method that estimates its error.
+        kind: SX inlines everything (for the virtual machine and small systems). MX keeps the blocks
+            as calls, which compile faster if the blocks are large.
     """
     n, nx = system.n, system.nx
     S = kind.sym("S", State.MEMORY + n)
@@ -340,8 +342,8 @@ def build_step(system: System, method: Method, kind: Any = ca.SX) -> ca.Function
 def written(system: System, method: Method, inline: int) -> tuple[ca.Function, int]:
     """Return the attempt, inlined up to `inline` instructions, and its number of instructions.
 
-    A step that is certainly too large is not inlined just to be counted: for a long chain that took
-    half of the build time.
+    A step that is certainly too large is not inlined just to count its instructions: for a long
+    chain, that took half of the build time.
     """
     if least(system, method) <= inline:
         step = build_step(system, method)
@@ -352,8 +354,9 @@ def written(system: System, method: Method, inline: int) -> tuple[ca.Function, i
 
 
 def least(system: System, method: Method) -> int:
-    """Return the instructions of an attempt's blocks, without the code between; 0 without
-    blocks.
+    """Return the number of instructions in the blocks of an attempt; 0 without blocks.
+
+    The code between the blocks is not counted.
     """
     gamma, chart = method.diagonal, tangent(system)
     if gamma is None:

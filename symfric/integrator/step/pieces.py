@@ -1,14 +1,14 @@
-"""Attempts as C for other programs and devices.
+"""C code of attempts, for other programs and devices.
 
-Functions of columns become C on arrays, by symfric's own emitter, for FMUs and graphics processors.
-The C needs only `math.h` and `stdbool.h` (C++ and CUDA have both): no work arrays, no CasADi
-integers, no calls between functions. Double precision has CasADi's bits.
+Functions of columns become C functions of arrays, written by symfric's own emitter, for FMUs and
+graphics processors. The C needs only `math.h` and `stdbool.h` (available in C++ and CUDA), neither
+work arrays nor CasADi integers. In double precision it gives the same bits as CasADi.
 
-An SX Function becomes one C function (`in_c`). An MX Function that calls others, such as the step
-of a large mechanism, becomes a C function for each of those and one that calls them; the code
-between two calls is written out. Code size and compile time then grow with the blocks and not with
-how often a step calls them: those of a six-joint arm in 0.5 MB and 3 s. The bits are CasADi's in
-both forms.
+An SX Function becomes one C function without calls (`in_c`). An MX Function that calls others, such
+as the step of a large mechanism, becomes one C function for each called Function, and one that
+calls these; the code between two calls is written out. Code size and compile time then grow with
+the blocks, not with the number of calls: those of a six-joint arm are 0.5 MB and 3 s. Both forms
+give the same bits as CasADi.
 """
 
 from collections.abc import Iterable, Sequence
@@ -22,13 +22,14 @@ from symfric.foundation.graph import graph
 
 
 class Written(NamedTuple):
-    """C function.
+    """C function as text.
 
     Attributes:
-        head: without a semicolon.
-        body: statements, a line each.
-        calls: functions of `math.h` that it reaches through macros (`macros`), by double's name.
-        operations: number of operations, calls included.
+        head: declaration without a semicolon.
+        body: statements, one per line.
+        calls: functions of `math.h` that it calls through macros (`macros`), by their names for
+            double.
+        operations: number of operations, including calls.
     """
 
     head: str
@@ -50,19 +51,20 @@ def in_c(
     real: Real = DOUBLE,
     head: str = "static ",
 ) -> Written:
-    """Return the C `head` void `name`(const real *S, ..., real *next, ...) of a Function.
+    """Return the C of a Function, `head` void `name`(const real *S, ..., real *next, ...).
 
     Args:
-        function: of columns, SX or MX (inlined then); sparse results are filled with zeros.
-        name: of the C function.
-        arguments: C names of the arguments, the Function's own by default.
-        results: C names of the results likewise; an empty name omits a result and the code for it.
+        function: Function of columns, SX, or MX, which is inlined; sparse results are filled with
+            zeros.
+        name: name of the C function.
+        arguments: C names of the arguments; by default, those of the Function.
+        results: C names of the results, likewise; an empty name omits a result and the code for it.
             Results may not overlap arguments.
         real: floating point type.
         head: text before `void`.
 
     Raises:
-        ValueError: operations that C does not have.
+        ValueError: the Function contains operations that C does not have.
     """
     arguments, results = arguments or function.name_in(), results or function.name_out()
     kept = [k for k, result in enumerate(results) if result]
@@ -91,13 +93,13 @@ def in_c(
 
 
 def macros(written: Iterable[Written], real: Real = DOUBLE) -> str:
-    """Return definitions of the macros that these functions call, such as `#define SF_EXP exp`."""
+    """Return the definitions of the macros that these functions call, e.g. `#define SF_EXP exp`."""
     calls = sorted({call for one in written for call in one.calls})
     return "".join(f"#define {macro(call, real)} {call}{real.letter}\n" for call in calls)
 
 
 def all_macros() -> str:
-    """Return definitions of all macros through which written functions call transcendental ones."""
+    """Return the definitions of the macros for all transcendental functions."""
     called = sorted(set(TRANSCENDENTAL.values()))
     return "".join(f"#define {macro(name, DOUBLE)} {name}\n" for name in called)
 
@@ -108,7 +110,7 @@ def routine(function: ca.Function, name: str) -> str:
     Columns are dense. Results must not share memory with arguments.
 
     Raises:
-        ValueError: operations that C does not have; calls with sparse arguments.
+        ValueError: operations that C does not have, or calls with sparse arguments.
     """
     if function.is_a("MXFunction"):
         return _Pieces(name).written(function)
@@ -119,13 +121,13 @@ def routine(function: ca.Function, name: str) -> str:
 
 @final
 class _Pieces:
-    """C functions of the blocks that an MX Function calls, and its own C.
+    """Writer of the C functions of an MX Function and of the blocks that it calls.
 
     Attributes:
-        name: of the function in C, prefix of the names of its blocks.
-        blocks: C of the blocks; `known` has their names by the hash of their Functions.
-        arrays: symbols (n, 1) and the C arrays that hold them.
-        lines: statements.
+        name: name of the C function, and prefix of the names of its blocks.
+        blocks: C of the blocks; `known` maps the hashes of their Functions to their names.
+        arrays: symbols (n, 1) and the C arrays that hold their values.
+        lines: C statements.
     """
 
     def __init__(self, name: str) -> None:
@@ -133,7 +135,7 @@ class _Pieces:
         self.known, self.arrays = dict[int, str](), list[tuple[ca.SX, str]]()
 
     def written(self, function: ca.Function) -> str:
-        """Return the C of `function` and of all functions that it calls."""
+        """Return the C of `function` and of all Functions that it calls."""
         slots: dict[int, ca.SX] = {}
         results: dict[int, list[tuple[int, ca.SX]]] = {}
         for k in range(function.n_instructions()):
@@ -165,7 +167,7 @@ class _Pieces:
         return "".join(self.blocks) + f"{head}\n{{\n{body}}}\n\n"
 
     def _array(self, name: str, sparsity: ca.Sparsity) -> ca.SX:
-        """Return symbols for the numbers of a C array."""
+        """Return symbols for the entries of a C array."""
         if not sparsity.is_dense():
             raise ValueError(f"codegen '{self.name}': expected calls of dense columns, got sparse")
         symbols = ca.SX.sym(name, sparsity.numel())
@@ -173,7 +175,7 @@ class _Pieces:
         return ca.reshape(symbols, sparsity.size1(), sparsity.size2())
 
     def _call(self, function: ca.Function, arguments: list[ca.SX], number: int) -> list[ca.SX]:
-        """Return the results of a call; the block is written at the first one."""
+        """Return the results of a call; the first call of a block also writes its C."""
         key = function.__hash__()
         if key not in self.known:
             self.known[key] = f"{self.name}_{len(self.known) + 1}_{function.name()}"

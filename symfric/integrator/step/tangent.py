@@ -1,24 +1,24 @@
-"""Tangent-space form of a constrained mechanism: index 0, in a chart made for every step.
+"""Tangent-space form of a constrained mechanism (index 0), in a new chart for every step.
 
-At (q0, t0) on the constraints, with U = phi_q(q0)', B = (U'U)^-1 and the columns of V an
-orthonormal basis of the tangent space, phi_q(q0) V = 0, positions and velocities near it are
-functions of as many numbers w, w' as there are degrees of freedom:
+At (q0, t0) on the constraints, let U = phi_q(q0)' and B = (U'U)^-1, and let the columns of V be an
+orthonormal basis of the tangent space, phi_q(q0) V = 0. Positions and velocities nearby are
+functions of coordinates w and w', of which there are as many as degrees of freedom:
 
     q  = q0 + V w - U u,    u with phi(q, t) = 0:            u  <- u + B phi
     q' = V w' - U s,        s with phi_q q' + phi_t = 0:     s  <- s + B (phi_q q' + phi_t)
 
-and since V'V = I and V'U = 0, a method integrates
+Since V'V = I and V'U = 0, a method integrates
 
     (w)' = w',    (w')' = V' a,    M a + phi_q' lam = Q,   phi_q a + gamma = 0,   normal forces
 
-with as many differential equations as degrees of freedom; accelerations a, multipliers lam and
-normal forces are linearly solved unknowns. B stays frozen over the step. Derivatives at its start
-follow from the implicit-function theorem,
+with as many second-order differential equations as degrees of freedom. Accelerations a, multipliers
+lam and normal forces are algebraic unknowns. B is constant over the step. The derivatives at the
+start of the step follow from the implicit-function theorem,
 
     dq = V dw - U B phi_t dt,    dq' = V dw' - U B [r_q dq + r_t dt],    r = phi_q q' + phi_t,
 
-so none goes through a factorisation. The next step gets V and projects it onto its own tangent
-space: no basis is ever chosen, and none turns singular.
+so none of them goes through a factorisation. The next step takes over V and projects it onto its
+own tangent space. No step has to choose a basis, and no basis becomes singular.
 
 Source: Haug, Mech. Based Des. Struct. Mach., 2016-2018 (tangent-space index-0 DAE).
 """
@@ -35,8 +35,10 @@ from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Trial
 
 POSITION, VELOCITY = 3, 4
-"""Frozen iterations of q and q' from the origin of the chart: each gains an order in |w|, from 2
-and from 1, and the stages of a method of order 5 need 5.
+"""Numbers of iterations with constant B, for q and for q', from the origin of the chart.
+
+Each iteration gains an order in |w|, from order 2 for q and from order 1 for q'. The stages of a
+method of order 5 need order 5.
 """
 
 
@@ -44,22 +46,22 @@ and from 1, and the stages of a method of order 5 need 5.
 class Tangent:
     """Chart of a mechanism with y = (q, q', s, a, lam and normal forces, V, t).
 
-    Its unknowns are y_c = (w, w', other unknowns).
+    The unknowns in the chart are y_c = (w, w', other unknowns).
 
     Attributes:
         n, nv, m: numbers of coordinates, degrees of freedom and constraints.
-        others: rows that a chart leaves unchanged, s, a, lam and normal forces; `time` likewise.
+        others: rows of s, a, lam and normal forces, which a chart leaves unchanged, as it does
+            `time`.
         phi: (q, t, d) -> constraints.
         rate: (q, q', t, d) -> r = phi_q q' + phi_t.
         slopes: (q, q', t, d) -> phi_q, phi_t, r_q, r_t.
         q0, V, phi_q, lu: symbols for point, basis, Jacobian of the constraints and its factors.
-        reduced: the system in the chart, with its Jacobian at the origin; its run data are
-            (d, chart).
+        reduced: system in the chart, with its Jacobian at the origin; its run data are (d, chart).
         open: (y, d) -> (d, chart) for the chart at y.
-        enter: (y, data) -> y_c at its origin.
+        enter: (y, data) -> y_c at the origin of the chart.
         leave: (y_c, data) -> y, on the constraints to the order of the method.
         lift: (e_c, data) -> change of y, to first order.
-        bend: (y0, y1, h, data) -> correction of the dense output, normal to the chart: two columns,
+        bend: (y0, y1, h, data) -> correction of the dense output normal to the chart: two columns,
             of a cubic with the values and rates at both ends.
     """
 
@@ -129,7 +131,7 @@ class Tangent:
         return [q, qd, others, t]
 
     def _reduced(self, states: int) -> System:
-        """Return the equations in the chart; `states` is the number of unknowns s."""
+        """Return the system in the chart; `states` is the number of unknowns s."""
         system, n, nv, t = self.system, self.n, self.nv, self.t
         y_c = ca.vertcat(ca.SX.sym("w", nv), ca.SX.sym("w_dot", nv), self.own, t)
         arguments = [self.q, self.qd, self.own, t, system.d]
@@ -159,8 +161,9 @@ class Tangent:
         )
 
     def _slope(self, y_c: ca.SX, first: int) -> ca.SX:
-        """Return the Jacobian of the reduced equations at the origin of the chart; accelerations
-        begin at `first`.
+        """Return the Jacobian of the reduced equations at the origin of the chart.
+
+        Accelerations begin at index `first` of the unknowns.
         """
         n, nv, d, f = self.n, self.nv, self.system.d, self.system.f[self.others]
         (_, wd, own, t), count = self.parts(y_c), nv + self.t.numel()
@@ -192,9 +195,7 @@ class Tangent:
         return ca.sparsify(ca.vertcat(rates, moved, ca.SX(t.numel(), y_c.numel())))
 
     def _open(self) -> ca.Function:
-        """Return the chart at y: its V projected onto the tangent space there and made
-        orthonormal.
-        """
+        """Return the Function `open`; Gram-Schmidt makes the projection of V orthonormal."""
         y, d, before = self.system.y, self.system.d, ca.SX.sym("before", self.n, self.nv)
         columns: list[ca.SX] = []
         for v in ca.horzsplit(before - self.across(self.phi_q @ before)):
@@ -209,7 +210,7 @@ class Tangent:
         return ca.Function("open", [y, d], [chart], {"cse": True})
 
     def _bend(self) -> ca.Function:
-        """Return cubics through positions and velocities at both ends, normal to the chart."""
+        """Return the Function `bend`, with cubics through positions and velocities at both ends."""
         n, h = self.n, ca.SX.sym("h")
         y0, y1 = self.system.y, ca.SX.sym("y1", self.system.n)
         first, second = ca.SX.zeros(self.system.n), ca.SX.zeros(self.system.n)
@@ -223,12 +224,12 @@ class Tangent:
 
 
 def _entries(matrix: ca.SX) -> ca.SX:
-    """Return the nonzeros as a column."""
+    """Return the nonzeros of a matrix as a column."""
     return ca.vec(ca.SX(matrix.nz[:]))
 
 
 @lru_cache(maxsize=2)
 def tangent(system: System) -> Tangent | None:
-    """Return the tangent-space form of a mechanism that requests it; None for any other system."""
+    """Return the tangent-space form of a mechanism that requests it; None for other systems."""
     manifold = system.manifold
     return Tangent(system, manifold) if manifold is not None and manifold.charted else None
