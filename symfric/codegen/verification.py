@@ -46,12 +46,11 @@ class Check:
             rounding is not counted as an error of the C.
         foreign: undefined names of the object file other than functions of math.h in its own type;
             None without `nm`.
-        runs_away: the step after which a state is huge or not finite in CasADi, too; None if none.
-        worst: the signal that differs most, "" without a difference.
-        rounding: change of that signal, in the unit of `error`, when every operation of CasADi in
-            that step is rounded to float, to nearest and randomly up or down; an error of that
-            size is caused by the type, not by the C. None if unknown, in double, and if the error
-            is small.
+        runs_away: first step after which a state is huge or not finite in CasADi; None if none.
+        worst: signal with the largest difference; "" if there is no difference.
+        rounding: change of that signal, relative as `error`, if every operation of CasADi in that
+            step is rounded to float, to nearest and randomly up or down; the type, not the C,
+            causes an error of this size. None if unknown, in double, and if the error is small.
         ties: in float, number of steps in which a mode of 0 or 1 differs because its decision ties:
             with rounded operations, CasADi also gives the mode of the C. The other signals of these
             steps are compared as usual.

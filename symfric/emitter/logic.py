@@ -150,7 +150,7 @@ class _Algebra:
         return i if self.logical[i] else self.compared(ca.OP_NE, i, self.constant(0.0))
 
     def negated(self, i: int) -> int:
-        """Return the negation of a bool; it is moved into `and` or `or` if this saves a negation."""
+        """Return the negation of a bool, moved into `and` or `or` if this saves a negation."""
         node, value = self.nodes[i], self.value(i)
         if value is not None:
             return self.constant(float(value == 0.0))
@@ -208,7 +208,7 @@ class _Algebra:
         return self.logical[i] or self.value(i) in (0.0, 1.0)
 
     def compared(self, op: int, a: int, b: int) -> int:
-        """Return a comparison; that of a select of constants with a constant becomes a condition."""
+        """Return a comparison; for a select of constants and a constant, a condition."""
         x, y = self.value(a), self.value(b)
         if x is not None and y is not None:
             return self.constant(float(COMPARISONS[op](x, y)))

@@ -1,6 +1,6 @@
 """Isomorphic parts of a graph, one for each element of an array.
 
-A law of n elements repeats the same part of CasADi's graph n times. Two kinds of rows indicate this:
+A law of n elements repeats a part of CasADi's graph n times. Two kinds of rows indicate this:
 
     stores   next_1, next_2, ..., next_n            consecutive rows of a result
     sums     start + term_1 + term_2 + ... + term_n

@@ -193,7 +193,7 @@ class Plan:
         return frozenset(kept)
 
     def _goals(self, bools: Sequence[bool], uses: Counter[int]) -> dict[int, int | Store]:
-        """Return the goals of selects without a variable, which are used once, as result or side."""
+        """Return the goals of selects without a variable: each is used once, as result or side."""
         once = {i for i in self.placed.labels if uses[i] == 1}
         goals: dict[int, int | Store] = {
             i: outer
