@@ -28,7 +28,7 @@ from symfric.laws import AnyLaw, Population
 @final
 @dataclass(frozen=True, eq=False)
 class Generated:
-    """Files that `generate` wrote.
+    """Files written by `generate`.
 
     Attributes:
         block: the block that the C computes.

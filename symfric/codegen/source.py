@@ -67,8 +67,8 @@ def routines(c: CBlock) -> tuple[Routine, ...]:
     """Return the C functions of a block: `_init`, `_reset`, its resets and `_step`.
 
     A block without states and with one output is a single function of scalars instead. With guards,
-    `_step` returns the status of `symfric.codegen.guards`, and a function of scalars sets its bits
-    in an argument.
+    the resets and `_step` return the status of `symfric.codegen.guards`, and a function of scalars
+    sets its bits in an argument.
 
     Raises:
         ValueError: an operation without counterpart in C99, or a constant outside the type.

@@ -135,7 +135,7 @@ class Verification:
         }
 
     def table(self) -> str:
-        """Return the result as a table of text."""
+        """Return the result as a text table."""
         head = f"{self.name}: {self.status}" + (f" ({self.compiler})" if self.compiler else "")
         if not self.checks:
             return head
@@ -231,7 +231,7 @@ def _sequences(block: Block, guards: bool) -> Sequences:
     if block.parameters:
         parameters, bare = varied(block, FEWER, 10.0), CBlock(block, DOUBLE, guards=False)
         if runs_away(bare, run_vm(bare, few, parameters=parameters)) is not None:
-            parameters = varied(block, FEWER, 1.0)  # a plant needs no steps longer than its own
+            parameters = varied(block, FEWER, 1.0)  # longer steps than its own may diverge
         found.append((few, parameters))
     return found
 

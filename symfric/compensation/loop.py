@@ -341,7 +341,7 @@ def _run(
     rows = np.zeros((4, steps + 1, count))  # position, velocity, acting and added force
     rows[:2, 0] = plant.x[:, places].T
     control.state[:, 0] = rows[0, 0]
-    forces = np.zeros((steps + 1 + setup.delay, len(added), count))  # of each block, when it acts
+    forces = np.zeros((steps + 1 + setup.delay, len(added), count))  # by sample of action
     queue = [np.zeros(count) for _ in range(setup.delay)]
     ended, k = "", 0
     try:

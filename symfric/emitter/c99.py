@@ -170,7 +170,7 @@ class Expression(NamedTuple):
 
 @final
 class Writer:
-    """Writer of nodes as formulas of named nodes.
+    """Writer of nodes as C formulas, in which other nodes appear by name.
 
     Attributes:
         names: names of nodes.

@@ -126,7 +126,7 @@ class Stores:
 
 @final
 class Plan:
-    """Function as statements.
+    """Statements of a function, region by region.
 
     Attributes:
         placed: graph with its branches.

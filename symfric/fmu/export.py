@@ -126,8 +126,8 @@ def export_fmu(
         step: length [s] of fixed steps without error control, as of `plant_block`. A communication
             step is divided into equal steps of at most this length.
         method: formula of the steps, as in `simulate`; with `step`, as in `plant_block`.
-        free: parameters of a scene that become tunable; by default all except those that are zero,
-            which omit terms. The tunable parameters of a model are `Model.p`.
+        free: parameters of a scene that become tunable; by default all except those with the value
+            0, which omits a term. The tunable parameters of a model are `Model.p`.
         t_end: stop time [s] of the default experiment; default that of the scene, or 1 s.
         name: model identifier; default the name of the model.
 

@@ -1,4 +1,4 @@
-"""Parts of a self-contained page and its style sheet; every function escapes its texts."""
+"""Parts of a self-contained page and its style sheet; plain texts are escaped here."""
 
 from collections.abc import Iterable, Sequence
 from html import escape

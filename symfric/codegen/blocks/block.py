@@ -194,7 +194,7 @@ class Block:
 
     @cached_property
     def step(self) -> ca.Function:
-        """Function (state, param, in) -> (state_next, out) of columns."""
+        """Function (state, param, in) -> (state_next, out); all are columns."""
         return self._function("step", {"state_next": self.next, "out": self._out})
 
     @property
@@ -210,7 +210,7 @@ class Block:
 
     @cached_property
     def fingerprint(self) -> str:
-        """Sixteen hexadecimal digits that change with names, units, numbers, operations, ranges."""
+        """Sixteen hexadecimal digits that identify names, units, numbers, operations and ranges."""
         content = (
             self.name,
             [

@@ -49,7 +49,7 @@ def law_block(
     fold: Fold = None,
     turning: bool = False,
 ) -> Block:
-    """Return the discrete-time block of `law` with inputs v, N, those of the law, and output F.
+    """Return the discrete-time block of `law`; inputs v, N and those of the law, output F.
 
     A law without states becomes F(v, N). A law with states makes a step with v and N held, stable
     for any product of rate and h (for LuGre, sigma_0 |v| h / g is often far above 2, where explicit
@@ -242,7 +242,7 @@ def _described(law: Law, idle: Iterable[str]) -> dict[str, Any]:
 
 
 def contact_block(law: Population, *, name: str | None = None, h: float | None = None) -> Block:
-    """Return the discrete-time block of one contact of `law` with inputs v, N, r and its force F.
+    """Return the discrete-time block of one contact of `law`; inputs v, N, r, output F.
 
     The step is that of `Population.advance`, so that a loop in C over the contacts of
     `Population.begin` agrees with NumPy up to rounding. Keep |v| h below `Population.step`.

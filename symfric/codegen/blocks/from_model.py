@@ -30,7 +30,7 @@ from symfric.model import Model, Output, Variables, check_model
 
 
 class Machine(Protocol):
-    """Scene: an object whose `model` accepts free parameters."""
+    """Protocol of scenes: objects whose `model` accepts free parameters."""
 
     def model(self, free: Iterable[str] = ()) -> Model:
         """Return the model with the parameters in `free` as symbols."""
@@ -165,7 +165,7 @@ def _opened(
 
 
 def _held(model: Model) -> System:
-    """Return the equations with the inputs as data of the run."""
+    """Return the equations with held inputs, which are data of the run."""
     u = model.vector("u")
     return system(model, InputData(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("plant",)))
 

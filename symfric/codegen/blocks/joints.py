@@ -156,9 +156,9 @@ def _together(body: Body, load: Body, frame: Frame) -> Body:
 
 
 def with_gravity(mechanism: Mechanism) -> tuple[Mechanism, Variables]:
-    """Return a copy whose gravity [m/s^2], in the axes of the ground, has parameters g_1, g_2, g_3.
+    """Return a copy with variable gravity, and its parameters g_1, g_2, g_3 [m/s^2].
 
-    Also returns these parameters.
+    The axes are those of the ground.
     """
     weights = [force for force in mechanism.forces if isinstance(force, Gravity)]
     start = stacked(vector(force.g) for force in weights[:1])

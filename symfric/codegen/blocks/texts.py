@@ -80,7 +80,7 @@ def _text(law: Parametric) -> LawText:
 
 
 def _formulas(paragraphs: Sequence[str], forms: Iterable[Option]) -> Iterator[str]:
-    """Yield the formulas, without those whose introduction names an option not in `forms`."""
+    """Yield the formulas, except those whose introduction names another value of an option."""
     others = "|".join(rf'{o.name} = "(?!{o.value}")' for o in forms) or "(?!)"
     before = ""
     for paragraph in paragraphs:
