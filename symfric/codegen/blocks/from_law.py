@@ -69,13 +69,13 @@ def law_block(
 
     F h is the impulse and F v h the work of the step. F_end, the force at the end of the step, is
     force(v, N, z+) with the rate exp(x) dz/dt; laws without states have no F_end, since it equals
-    F. A controller holds F over the next step if v is planned for that step. If v is the encoder
-    increment of the last step, F_end is the better estimate: for LuGre at 1 kHz, 2 mm/s at 1 Hz
-    under 10 N, its error is 0.026 N, and that of F is 0.050 N. At 0.3 m/s, F and F_end agree with
-    the true mean and end values to 1e-4 N, except in the step of a reversal, in which the bristle
-    reverses completely: there the error of F is 0.022 N and that of F_end 0.36 N, because the mean
-    velocity does not determine the velocity at the end, on which the damping depends; the error of
-    the bristle force without damping is 0.0095 N.
+    F. A controller holds F over the next step if v is planned for that step. If v comes from the
+    encoder increment of the last step, F_end is the better estimate: for LuGre at 1 kHz, 2 mm/s at
+    1 Hz under 10 N, its error is 0.026 N, and that of F is 0.050 N. At 0.3 m/s, F and F_end agree
+    with the true mean and end values to 1e-4 N, except in the step of a reversal, in which the
+    bristle reverses completely: there the error of F is 0.022 N and that of F_end 0.36 N, because
+    the mean velocity does not determine the velocity at the end, on which the damping depends; the
+    error of the bristle force without damping is 0.0095 N.
     In F the bristle damping uses r = (z+ - z) / h, which is bounded by the bristle's travel, and
     not the rate at one instant, which after a jump is as large as v. Use the mean velocity of the
     step, such as the encoder increment over h; with the velocity at its start the error is of first
