@@ -2,10 +2,10 @@
 
 Rounding errors of float are relative to the magnitude of the terms of a signal. A signal that is
 the small difference of large numbers, such as the stroke between two bodies, has the rounding
-errors of those. Its magnitude m is that of its terms: m(a + b) is the larger of m(a) and m(b),
-m(-a) = m(|a|) = m(a), m(a^2) = m(a)^2, m(sqrt(a)) = sqrt(m(a)), and of any other operation it is
-the absolute value. Residuals of closing equations are judged by all their terms: there m(a b) is
-the larger of m(a) |b| and |a| m(b), and m(a / b) = m(a) / |b|.
+errors of these numbers. Its magnitude m is that of its terms: m(a + b) is the larger of m(a) and
+m(b), m(-a) = m(|a|) = m(a), m(a^2) = m(a)^2, m(sqrt(a)) = sqrt(m(a)), and for any other operation
+m is the absolute value of the result. Residuals of closing equations also pass on the terms of
+products: m(a b) is the larger of m(a) |b| and |a| m(b), and m(a / b) = m(a) / |b|.
 """
 
 from collections.abc import Sequence
@@ -34,7 +34,7 @@ TOLERANCE = 1e-5
 """Largest error of float, relative to the magnitude of each signal."""
 
 RARE = 0.01
-"""Largest fraction of steps in which modes may differ by ties; with more, none is accepted."""
+"""Largest fraction of steps in which ties may change modes; above it, no tie is accepted."""
 
 
 @final
@@ -43,8 +43,8 @@ class Run:
     """One sequence of inputs, run by C and by CasADi.
 
     Attributes:
-        inputs: as given, shape (steps, inputs).
-        parameters: of every step, shape (steps, parameters); None: the defaults.
+        inputs: inputs of every step, shape (steps, inputs).
+        parameters: parameters of every step, shape (steps, parameters); None for the defaults.
         rows, expected: results of C and CasADi, see `run_c`.
     """
 
@@ -56,7 +56,7 @@ class Run:
 
     @cached_property
     def relative(self) -> Array:
-        """Differences relative to the magnitude of each signal, shape (steps, columns), no ties."""
+        """Differences divided by the magnitude of each signal, (steps, columns); 0 for ties."""
         with np.errstate(invalid="ignore"):
             difference = np.abs(self.rows - self.expected)
         if not difference.any():
@@ -70,7 +70,7 @@ class Run:
     def tied(self) -> NDArray[np.bool_]:
         """Mask of modes that differ in float because their decision ties, shape (steps, columns).
 
-        A tie means that CasADi's own operations give the mode of the C when each is rounded to
+        A tie means that CasADi's operations give the mode of the C if each result is rounded to
         float, to nearest or randomly up or down. Other differences in that step are not accepted.
         """
         found = np.zeros(self.rows.shape, bool)
@@ -85,16 +85,14 @@ class Run:
         return found
 
     def _rounded(self, rows: NDArray[np.int64]) -> Array:
-        """Return results of CasADi's operations in float for some of the steps, see `rounded`."""
+        """Return results of CasADi's operations in float for the steps `rows`, see `rounded`."""
         states, parameters, inputs = self._arguments
         own = np.broadcast_to(parameters, (len(inputs), parameters.shape[-1]))
         return rounded(self.c.block, states[rows], own[rows], inputs[rows])
 
     @property
     def _overflows(self) -> NDArray[np.bool_]:
-        """Mask of steps in which float overflows, as the status of the C reports, but double does
-        not.
-        """
+        """Mask of steps that overflow in float, as the C reports, but not in double."""
         if self.c.real.size == 8 or not self.c.guards:
             return np.zeros(len(self.rows), bool)
         said = (self.rows[:, -1].astype(int) & int(Status.OUTPUT)) != 0
@@ -107,14 +105,14 @@ class Run:
 
     @property
     def worst(self) -> str:
-        """Signal with the largest difference, "" without a difference."""
+        """Signal with the largest difference; "" if there is none."""
         return self.c.signals[self._place[1]] if self.error else ""
 
     @property
     def rounding(self) -> float | None:
-        """Largest change of the worst signal by rounding to float in the worst step, see `rounded`.
+        """Largest relative change of the worst signal in the worst step by rounding to float.
 
-        None if it is the status.
+        See `rounded`. None if the worst signal is the status.
         """
         row, column = self._place
         made = self._rounded(np.array([row]))
@@ -132,7 +130,7 @@ class Run:
 
     @cached_property
     def _arguments(self) -> tuple[Array, Array, Array]:
-        """States before every step, parameters and inputs, as arguments of the step."""
+        """States before every step, parameters and inputs, as arguments of the step function."""
         count, model = len(self.c.block.states), GuardModel(self.c)
         inputs, parameters = self.c.real.rounded(self.inputs), self.c.default
         if self.parameters is not None:
@@ -145,7 +143,7 @@ class Run:
 
     @cached_property
     def _scale(self) -> Array:
-        """Magnitude of every column: of its terms, its nominal value or its peak."""
+        """Magnitude of every column: the largest of its terms, its nominal value and its peak."""
         block = self.c.block
         found = magnitudes(block, *self._arguments)
         states = found[: len(block.states)]
@@ -164,13 +162,13 @@ def ulp(a: Array, b: Array) -> int:
 
 
 def _ordered(values: Array) -> NDArray[np.int64]:
-    """Return integers in the order of the floats, neighbours one apart, both zeros 0."""
+    """Return integers that sort like the floats; neighbours differ by 1, and both zeros are 0."""
     bits = np.ascontiguousarray(values).view(np.int64)
     return np.where(bits < 0, np.iinfo(np.int64).min - bits, bits)
 
 
 SAMPLES = 1000
-"""Number of steps examined."""
+"""Number of steps that `magnitudes` examines."""
 
 SUMS = {ca.OP_ADD, ca.OP_SUB}
 SAME = {ca.OP_NEG, ca.OP_FABS}
@@ -180,7 +178,7 @@ PRODUCTS = {ca.OP_MUL, ca.OP_DIV}
 
 @lru_cache(maxsize=4)
 def terms(block: Block) -> ca.Function:
-    """Return (state, param, in) of a step -> the magnitudes of its states and outputs, a column."""
+    """Return the function (state, param, in) -> magnitudes of next states and outputs (column)."""
     source = graph(block.step)
     arguments = [ca.SX.sym("x", len(group)) for group in block.groups.values()]
     everything = Graph(source.nodes, (tuple(range(len(source.nodes))),))
@@ -197,9 +195,7 @@ def terms(block: Block) -> ca.Function:
 def _found(
     source: Graph, values: Sequence[ca.SX], results: Sequence[int], passes: AbstractSet[int]
 ) -> dict[int, ca.SX]:
-    """Return magnitudes of the nodes between `results` and nodes that do not pass on their
-    terms.
-    """
+    """Return the magnitudes of `results` and of the nodes that they reach through `passes`."""
     reached = set(results)
     for i in reversed(range(len(source.nodes))):
         if i in reached and source.nodes[i].op in passes:
@@ -216,7 +212,7 @@ def _found(
 
 
 def _passed(op: int, own: Sequence[ca.SX], m: Sequence[ca.SX]) -> ca.SX:
-    """Return the magnitude of an operation on numbers `own` of the magnitudes `m`."""
+    """Return the magnitude of the result of `op` on operands `own` with magnitudes `m`."""
     if op == SELECT:
         return ca.if_else(own[0], m[1], m[2])
     if op in SUMS:
@@ -233,11 +229,11 @@ def _passed(op: int, own: Sequence[ca.SX], m: Sequence[ca.SX]) -> ca.SX:
 def magnitudes(block: Block, states: Array, parameters: Array, inputs: Array) -> Array:
     """Return the largest magnitude of every state and output over some steps.
 
-    The shape is (states + outputs,); states have at least the nominal value.
+    The shape is (states + outputs,); the magnitude of a state is at least its nominal value.
 
     Args:
-        states, inputs: before and in every step, shape (steps, ...).
-        parameters: of every step, shape (steps, parameters), or of all, shape (parameters,).
+        states, inputs: states before and inputs in every step, shape (steps, ...).
+        parameters: one set for every step, shape (steps, parameters), or for all, (parameters,).
     """
     every = max(1, len(inputs) // SAMPLES)
     given = (states, np.broadcast_to(parameters, (len(inputs), len(block.parameters))), inputs)
@@ -248,21 +244,20 @@ def magnitudes(block: Block, states: Array, parameters: Array, inputs: Array) ->
 
 
 REPETITIONS = 64
-"""Repetitions of a step, the first rounded to nearest and the others randomly."""
+"""Number of repetitions of a step; the first rounds to nearest, the others randomly."""
 
 AT_ONCE = 2048
-"""Number of steps in memory at once."""
+"""Number of steps in memory at once, repetitions included."""
 
 DECISIONS = {ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_SIGN}
 PASSING = {ca.OP_NEG, ca.OP_FABS, ca.OP_SQ, ca.OP_MUL, ca.OP_FMIN, ca.OP_FMAX}
 
 
 def modes(block: Block) -> NDArray[np.bool_]:
-    """Return a mask of the columns that hold a mode, shape (columns,): a number from decisions
-    only.
+    """Return a mask of the columns that hold a mode, shape (columns,).
 
-    It is the result of a comparison, or one of some constants and modes selected by comparisons. A
-    state is a mode if its next value is one, in the step and in every initialisation.
+    Only decisions determine a mode: it is the result of a comparison, or a constant or mode that
+    comparisons select. A state is a mode if the step and every initialisation set it to a mode.
     """
     sources, count = [graph(function) for function in block.functions], len(block.states)
     states = np.ones(count, bool)
@@ -292,10 +287,10 @@ def rounded(block: Block, states: Array, parameters: Array, inputs: Array) -> Ar
     """Return results of CasADi's operations in float, shape (REPETITIONS, steps, columns).
 
     Args:
-        states, parameters, inputs: before and in every step, shape (steps, ...).
+        states, parameters, inputs: arguments of every step, shape (steps, ...).
 
     Returns:
-        The same at each call.
+        The results; each call with the same arguments returns the same numbers.
     """
     random, parts = np.random.default_rng(0), list[Array]()
     size = max(1, AT_ONCE // REPETITIONS)

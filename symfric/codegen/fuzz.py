@@ -1,14 +1,15 @@
-"""Random steps of guarded C under sanitizers: no crash, and no change of valid data.
+"""Fuzz test of guarded C under sanitizers: random steps neither crash nor change valid data.
 
-The program generates its own inputs. In three steps of four they are valid (including the ends of
-their ranges, zeros, denormals and step sizes of 1e-9 ... 1e3 s); in the others an input, a
-parameter or a state is NaN, infinite, huge, denormal or negative. For every step it checks that
+A C program generates the inputs. In three of four steps they are valid (including the ends of
+their ranges, zeros, denormals and step sizes of 1e-9 ... 1e3 s); in the others, an input, a
+parameter or a state is NaN, infinite, huge, denormal or negative. After every step the program
+checks that
 
-    outputs are finite (a state that is not is detected by the next step),
+    outputs are finite (the next step detects states that are not),
     the status agrees with the ranges of inputs, parameters and states before the step, and
-    if it is 0, all bits are those of the same step generated without guards.
+    if the status is 0, all bits equal those of the same step generated without guards.
 
-The replacement of an output that is not finite with the default parameters is counted.
+It also counts the steps with default parameters in which the guards replace an output.
 """
 
 from collections.abc import Sequence
@@ -42,14 +43,14 @@ class Fuzzed:
     """Result of the fuzz test of one block in one type.
 
     Attributes:
-        valid: steps with a status of 0; their bits were compared.
-        repaired: steps with another status.
-        altered: valid steps whose bits are not those of the C without guards.
+        valid: steps with status 0, whose bits were compared.
+        repaired: steps with a nonzero status.
+        altered: valid steps whose bits differ from those of the C without guards.
         unflagged: steps with a wrong status.
         unfinished: steps after which an output is not finite.
         last_resort: steps with default parameters in which an output was not finite and has been
-            replaced by 0; with others, such as mu_s = 0, an output may be undefined.
-        report: output of a sanitizer, "" if empty.
+            replaced by 0; with other parameters, such as mu_s = 0, an output may be undefined.
+        report: output of a sanitizer, or "".
     """
 
     name: str
@@ -73,7 +74,7 @@ def fuzz(block: Block, real: str, compiler: Compiler, *, steps: int = STEPS) -> 
     """Run `steps` random steps of the guarded C of `block` under sanitizers.
 
     Raises:
-        ValueError: an unknown type, no steps.
+        ValueError: an unknown type, or fewer than one step.
         CompileError: the compiler rejects the C, or has no sanitizers.
     """
     checks.choice("fuzz: real", real, REALS)
@@ -99,7 +100,7 @@ def fuzz(block: Block, real: str, compiler: Compiler, *, steps: int = STEPS) -> 
 
 
 def _program(c: CBlock, bare: CBlock) -> str:
-    """Return the program, with calls and ranges of the block in it."""
+    """Return the C program that calls the block with numbers in and outside its ranges."""
     block = c.block
     inputs = [range_of(v) for v in block.inputs]
     parameters = [parameter_range(v) for v in block.parameters]

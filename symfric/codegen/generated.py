@@ -1,4 +1,4 @@
-"""Files of a block: header and source of each floating point type, and the export package."""
+"""Files of a block: header and source for each floating-point type, and the export package."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -28,12 +28,12 @@ from symfric.laws import AnyLaw, Population
 @final
 @dataclass(frozen=True, eq=False)
 class Generated:
-    """Files that `generate` wrote.
+    """Files written by `generate`.
 
     Attributes:
-        block: source of the C.
-        folder: of the files.
-        reals: floating point types, by name.
+        block: the block that the C computes.
+        folder: folder of the files.
+        reals: names of the floating-point types.
         files: all files, the manifest last.
         manifest: content of NAME_manifest.json.
         guards: True if the C has guards, see `symfric.codegen.guards`.
@@ -47,7 +47,7 @@ class Generated:
     guards: bool = True
 
     def c(self, real: str) -> CBlock:
-        """Return the C of the type `real`."""
+        """Return the block as C in the type `real`."""
         return CBlock(self.block, REALS[real], self.guards)
 
     def header(self, real: str) -> Path:
@@ -79,11 +79,11 @@ def generate(
     `..._vectors.h`, `.csv`), `CMakeLists.txt` and `NAME_block.cmake`, a loader for Python without
     symfric (`NAME_ctypes.py`), an S-function for Simulink (`NAME_sfun.c`) and `NAME_manifest.json`
     with meanings, units, ranges, hashes, operation counts and, if there is a compiler, sizes and
-    stack. All names but CMakeLists.txt, which is the same for all, begin with that of the block, so
-    that several packages may share a folder and a program.
+    stack. All file names except CMakeLists.txt, which is the same for all blocks, begin with the
+    name of the block, so that several packages may share a folder and a program.
 
-    The C allocates nothing, includes only math.h, stdbool.h and, for the guards, stdint.h and
-    string.h, has no data but constants, and compiles without warnings under -Wall -Wextra
+    The C allocates no memory, includes only math.h, stdbool.h and, for the guards, stdint.h and
+    string.h, contains no data except constants, and compiles without warnings under -Wall -Wextra
     -Wpedantic -Wconversion -Wdouble-promotion, also as C++.
 
     Args:
@@ -92,17 +92,17 @@ def generate(
         name: C identifier; default the name of the law.
         real: "double", "float" or both.
         h: step size [s] as a constant instead of a parameter (laws with states).
-        free, fold: parameters that stay variable at run time, or become constants, see `law_block`;
-            by default they are fields of a struct, with a constant struct of defaults. Those of a
-            population are constants.
-        turning: True for a contact that turns: rad/s and N m in its texts.
-        guards: clamp inputs to their ranges, repair values that are not finite, and report it in a
-            status; see `symfric.codegen.guards`. Valid values are not changed by a bit.
-        kit: False writes only sources and manifest, without sizes.
+        free, fold: parameters that remain variable at run time, or that become constants, see
+            `law_block`; by default, parameters are fields of a struct, with a constant struct of
+            defaults. The parameters of a population are always constants.
+        turning: True for a rotary contact: the texts use rad/s and N m.
+        guards: clamp inputs to their ranges, replace values that are not finite, and report both in
+            a status; see `symfric.codegen.guards`. Valid values keep all their bits.
+        kit: False to write only sources and manifest, without sizes.
 
     Raises:
-        ValueError: bad input, a law that has no step, an operation that C99 lacks, a number
-            outside the range of float (a computed one below it becomes the smallest nonzero one).
+        ValueError: bad input, a law that has no step, an operation that C99 lacks, or a number
+            outside the range of float (computed numbers below it become the smallest nonzero one).
     """
     given = (real,) if isinstance(real, str) else checks.many("codegen: real", real, "types")
     checks.check_names("codegen: real", given, REALS)
@@ -140,10 +140,10 @@ def generate(
 
 
 def with_cores(generated: Generated, measured: Sequence[Mapping[str, Any]]) -> Generated:
-    """Add measurements on other cores to the manifest, also in the file.
+    """Add measurements on other cores to the manifest and to its file.
 
     Args:
-        measured: results of `symfric.embedded` for each core and type, as `Measured.to_dict`.
+        measured: results of `symfric.embedded` for each core and type, see `Measured.to_dict`.
     """
     if not measured:
         return generated
@@ -170,8 +170,8 @@ def manifest(several: Sequence[CBlock], texts: Mapping[str, str]) -> dict[str, A
     """Return the content of NAME_manifest.json.
 
     Args:
-        several: the block in all its types.
-        texts: files of the package and their content.
+        several: the block in each of its types.
+        texts: contents of the files of the package, by file name.
     """
     block, guards = several[0].block, several[0].guards
     parameters = [(v, parameter_range(v) if guards else None) for v in block.parameters]
@@ -208,7 +208,7 @@ def manifest(several: Sequence[CBlock], texts: Mapping[str, str]) -> dict[str, A
 
 
 def _variable(variable: Variable, start: str, within: Range | None) -> dict[str, Any]:
-    """Return meaning, unit and range; for guarded variables the range that guards enforce."""
+    """Return the entry of a variable: meaning, unit, range (as enforced by guards) and start."""
     low, high, safe = within or (variable.lower, variable.upper, float(variable.start))
     return {
         "name": variable.name,

@@ -1,17 +1,17 @@
 """Guards in generated C: invalid inputs never crash a step, and always set a bit of its status.
 
-    inputs       outside their range: clamped to it; not finite: their start value, a safe one
-    step size    as inputs, the default in place of values that are not finite
-    states       beyond `HUGE` times their nominal value, or not finite: all restart
-    parameters   outside their ranges: the default set is used
-    outputs      still not finite: 0, and all states restart
+    inputs       outside their range: clamped to it; not finite: replaced by their start value
+    step size    outside its range: clamped to it; not finite: replaced by its default
+    states       beyond `HUGE` times their nominal value, or not finite: all states restart
+    parameters   outside their ranges: replaced by the default set
+    outputs      still not finite: replaced by 0, and all states restart
 
-A bit of the status that a step returns (`Status`) reports each change; a number within its range is
-not changed, nor is a state that is too large for the present load, such as a bristle after the load
-fell. Numbers are compared by their bits, as integers: that is as cheap as floats, and works under
--ffast-math, too, where a compiler assumes that NaN does not exist.
+Each change sets a bit of the status that a step returns (`Status`). Numbers within their range are
+not changed, even if a state is too large for the present load, such as a bristle deflection after
+the load has fallen. The C compares the bits of numbers as integers. This is as fast as comparing
+floats, and also works under -ffast-math, where compilers assume that NaN does not exist.
 
-`symfric.codegen.runner.GuardModel` does the same in NumPy, for the comparison with CasADi.
+`symfric.codegen.runner.GuardModel` implements the guards in NumPy, for comparison with CasADi.
 """
 
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ STEP_SIZE = "h"
 
 
 class Status(IntFlag):
-    """Status bits for repairs by a step; 0 if there are none."""
+    """Bits of the status of a step, one for each kind of repair; 0 if there was no repair."""
 
     CLAMPED = 1
     NOT_FINITE = 2
@@ -78,7 +78,7 @@ def range_of(variable: Variable) -> Range:
 def parameter_range(variable: Variable) -> Range:
     """Return the range of a parameter: its bounds, by default `WIDE` times its default.
 
-    The step size h has `SHORTEST` ... `LONGEST`. A default is always within its range.
+    The range of the step size h is `SHORTEST` ... `LONGEST`. Each range contains the default.
     """
     start = float(variable.start)
     if variable.name == STEP_SIZE:
@@ -99,7 +99,7 @@ def state_limit(variable: Variable) -> float:
 
 
 def constants(c: CBlock) -> str:
-    """Return the bits of the status as macros for the header."""
+    """Return the macros of the status bits, for the header."""
     absent = {Status.STATE: not c.block.states, Status.PARAMETER: not c.block.parameters}
     kinds = [s for s in Status if not absent.get(s)]
     meaning = dict(MEANING)
@@ -110,7 +110,7 @@ def constants(c: CBlock) -> str:
 
 
 def bit(c: CBlock, status: Status) -> str:
-    """Return the macro of one bit."""
+    """Return the name of the macro of one status bit."""
     return f"{c.name.upper()}_{status.name}"
 
 
@@ -138,7 +138,7 @@ def helpers(c: CBlock, text: str) -> str:
 
 
 def _outside(c: CBlock, place: str, low: float, high: float) -> str:
-    """Return the condition that the number at `place` is outside its range, or NaN."""
+    """Return the C condition that the number at `place` is outside its range or NaN."""
     least, most = c.real.literal(low), c.real.literal(high)
     if low >= 0.0:
         return f"{c.name}_outside({place}, {least}, {most})"
@@ -149,7 +149,7 @@ def _outside(c: CBlock, place: str, low: float, high: float) -> str:
 
 
 def _any(c: CBlock, what: str, doc: str, group: str, limits: Sequence[tuple[float, ...]]) -> str:
-    """Return a function that is true if a member of a struct is outside its range."""
+    """Return the C function that is true if a member of a struct is outside its range."""
     single, loops = list[str](), list[str]()
     for member in c.block.members.get(group, ()):
         ranges = limits[member.first : member.first + member.length]
@@ -178,7 +178,7 @@ def _any(c: CBlock, what: str, doc: str, group: str, limits: Sequence[tuple[floa
 
 
 def mended(c: CBlock, variable: Variable, group: str) -> list[str]:
-    """Return statements that bring a local, an input or the step size, into its range.
+    """Return statements that bring a local variable (input or step size) into its range.
 
     Args:
         group: "in" or "param".
@@ -195,12 +195,12 @@ def mended(c: CBlock, variable: Variable, group: str) -> list[str]:
 
 
 def _pointer(c: CBlock) -> str:
-    """Return the pointer to the status: an argument of a function of scalars, else a local."""
+    """Return the pointer to the status, which is an argument only in functions of scalars."""
     return "status" if c.block.is_function else "&status"
 
 
 def _set(c: CBlock, kind: Status) -> str:
-    """Return the statement that adds a bit to the status."""
+    """Return the statement that sets a bit of the status."""
     return f"    {'*' * c.block.is_function}status |= {bit(c, kind)};"
 
 

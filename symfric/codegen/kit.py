@@ -1,8 +1,8 @@
-"""Export package of a block: unit test, build files, wrappers for other tools.
+"""Export package of a block: unit test, build files and wrappers for other tools.
 
 A unit test in plain C verifies the code on its target machine, with test vectors as a header and as
-CSV; CMake builds libraries and tests; a Python loader and a Simulink S-function call the C. Their
-fixed text is in `templates`.
+CSV; CMake builds libraries and tests; a Python loader and a Simulink S-function call the C. The
+folder `templates` contains the fixed text of these files.
 """
 
 import csv
@@ -29,10 +29,10 @@ from symfric.emitter.c99 import Real
 
 
 def kit_files(several: Sequence[CBlock]) -> dict[str, str]:
-    """Return the texts of the files besides header and source, by file name.
+    """Return the texts of all files except header and source, by file name.
 
     Args:
-        several: the same block in all its types.
+        several: the block in each of its types.
     """
     texts, block = dict[str, str](), several[0].block
     for c in several:
@@ -55,7 +55,7 @@ def kit_files(several: Sequence[CBlock]) -> dict[str, str]:
 
 
 def declarations(c: CBlock) -> list[str]:
-    """Return the declared variables `state`, `param`, `in`, `out`, `status` of a step."""
+    """Return the declarations of the variables `state`, `param`, `in`, `out`, `status`."""
     found = [f"{c.name}_{group}_t {group};" for group in GROUPS if group in c.block.members]
     if c.block.is_function:
         found += [f"{c.real.name} in[{len(c.block.inputs)}];"] * bool(c.block.inputs)
@@ -72,8 +72,9 @@ def step(c: CBlock) -> list[str]:
 
 
 def fields(c: CBlock, group: str) -> list[str]:
-    """Return the numbers of a group as C expressions: `state.z`, `in.v`, of a function `in[0]`,
-    `out`.
+    """Return the members of a group as C expressions, such as `state.z` and `in.v`.
+
+    Those of a function of scalars are `in[0]`, `in[1]`, ... and `out`.
     """
     if c.block.is_function and group == "in":
         return [f"in[{i}]" for i in range(len(c.block.inputs))]
@@ -85,8 +86,8 @@ def fields(c: CBlock, group: str) -> list[str]:
 def unit_test(c: CBlock) -> str:
     """Return the text of NAME_test.c.
 
-    The function returns the number of wrong results and needs neither stdio nor memory of its own;
-    with NAME_TEST_PRINT it prints them, with NAME_TEST_NO_MAIN it has no `main`.
+    Its function returns the number of wrong results and uses neither stdio nor allocated memory.
+    NAME_TEST_PRINT makes it print wrong results; NAME_TEST_NO_MAIN omits `main`.
     """
     return filled(
         TEMPLATES / "test.c",
@@ -101,7 +102,7 @@ def unit_test(c: CBlock) -> str:
 
 
 def _body(c: CBlock) -> list[str]:
-    """Return the statements of one row: numbers in, a step, numbers out."""
+    """Return the statements for one row: set the numbers, make a step, compare the results."""
     states = fields(c, "state")
     lines = [f"{place} = vector->state[{i}];" for i, place in enumerate(states)]
     lines += [f"{place} = vector->in[{i}];" for i, place in enumerate(fields(c, "in"))]
@@ -123,7 +124,7 @@ def _body(c: CBlock) -> list[str]:
 
 
 def _compared(c: CBlock, what: str, places: Sequence[str], first: int = 0) -> list[str]:
-    """Return statements that compare results with those of a row."""
+    """Return statements that compare the results at `places` with those of a row."""
     of, tolerance = f"vector->{what}", f"{c.name}_{what}_tolerance"
     return [
         f"failures += {c.name}_wrong({place}, {of}[{i}], {tolerance}[{i}]);"
@@ -189,7 +190,7 @@ def vector_header(found: Vectors) -> str:
 
 
 def vector_table(found: Vectors) -> str:
-    """Return the same rows as CSV, for other tools: columns with names and units."""
+    """Return the text of NAME_vectors.csv: the same rows, with names and units of the columns."""
     c, block = found.c, found.c.block
     names = [v.name for v in block.parameters]
     head = [f"{v.name} before [{v.unit}]" for v in block.states]
@@ -213,7 +214,7 @@ def vector_table(found: Vectors) -> str:
 
 
 def loader(several: Sequence[CBlock]) -> str:
-    """Return the text of NAME_ctypes.py: class `Block` with `step`, `run` on arrays and `reset`."""
+    """Return the text of NAME_ctypes.py, whose class has `step`, `run` (on arrays) and `reset`."""
     block = several[0].block
     types = {c.real.name: c.name for c in several}
     layout = {group: [(m.name, m.size) for m in rows] for group, rows in block.members.items()}
@@ -243,7 +244,7 @@ def loader(several: Sequence[CBlock]) -> str:
 
 
 def wrapper(c: CBlock) -> str:
-    """Return the text of NAME_sfun.c."""
+    """Return the text of NAME_sfun.c, the Simulink S-function."""
     block, states, cast = c.block, fields(c, "state"), f"({c.real.name})" * (c.real.size == 4)
     body = [f"{place} = {cast}ssGetRealDiscStates(S)[{i}];" for i, place in enumerate(states)]
     if block.parameters:

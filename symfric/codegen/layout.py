@@ -1,8 +1,8 @@
-"""Block as C in one floating point type: its names and calls, and shared pieces of text.
+"""Block as C in one floating-point type: names, calls and text shared by the generated files.
 
 Names begin with block and type: struct types `NAME_f32_state_t` (likewise param, in, out), default
 parameters `NAME_f32_default`, functions `NAME_f32_init`, `NAME_f32_step`; `f64` for double, so that
-both types may be used in one program. Nothing is allocated and the only data are the constant
+both types may be used in one program. The C allocates nothing and its only data are the constant
 defaults, so one block serves any number of joints.
 """
 
@@ -25,7 +25,7 @@ from symfric.emitter.c99 import Real
 @final
 @dataclass(frozen=True, eq=False)
 class CBlock:
-    """C of a block in one floating point type.
+    """Block as C in one floating-point type.
 
     Attributes:
         guards: True if the C checks its numbers, see `symfric.codegen.guards`.
@@ -37,28 +37,28 @@ class CBlock:
 
     @property
     def name(self) -> str:
-        """Prefix of all names, and of the files."""
+        """Prefix of all names and files."""
         return f"{self.block.name}_{self.real.suffix}"
 
     @cached_property
     def start(self) -> NDArray[np.float64]:
-        """Start values of the states, in the type."""
+        """Start values of the states, rounded to the type."""
         return self.real.rounded([float(v.start) for v in self.block.states])
 
     @cached_property
     def default(self) -> NDArray[np.float64]:
-        """Default parameters, in the type."""
+        """Default parameters, rounded to the type."""
         return self.real.rounded([float(v.start) for v in self.block.parameters])
 
     def call(
         self, pointers: Mapping[str, str], inputs: Sequence[str], status: str = "&status"
     ) -> str:
-        """Return the call of one step.
+        """Return the C expression that calls one step.
 
         Args:
-            pointers: to each struct, by group.
+            pointers: pointer to each struct, by group.
             inputs: arguments of a function of scalars.
-            status: pointer to the status, to which a guarded function of scalars adds its bits.
+            status: pointer to the status, in which a guarded function of scalars sets bits.
         """
         structs = [pointers[group] for group in GROUPS if group in self.block.members]
         if self.block.is_function:
@@ -79,14 +79,14 @@ class CBlock:
 
     @property
     def signals(self) -> list[str]:
-        """Columns of a run: states after a step, outputs, states by each reset, status."""
+        """Columns of a run: states after a step, outputs, states after each reset, status."""
         states = [v.name for v in self.block.states]
         later = [f"{reset}.{name}" for reset in self.block.resets for name in states]
         return [*states, *self.block.outputs, *later, *["status"] * self.guards]
 
     @property
     def casts(self) -> dict[str, str]:
-        """Pointers `state`, `param`, `in` and `out` to flat numbers as pointers to structs."""
+        """Casts of the pointers `state`, `param`, `in` and `out` from flat arrays to structs."""
         return {
             group: f"({'const ' * (group in GROUPS[1:3])}{self.name}_{group}_t *){group}"
             for group in GROUPS
@@ -94,7 +94,7 @@ class CBlock:
 
     @property
     def flat_step(self) -> str:
-        """One step on flat numbers, which `state`, `param`, `in`, `out` and `status` point to."""
+        """Statement of a step on flat arrays `state`, `param`, `in`, `out`, and on `status`."""
         inputs = [f"in[{k}]" for k in range(len(self.block.inputs))]
         result = "*out = " if self.block.is_function else "*status |= " * self.guards
         return f"{result}{self.call(self.casts, inputs, 'status')};"
@@ -118,7 +118,7 @@ def filled(template: Path, **values: object) -> str:
 
 
 def indented(lines: Sequence[str], depth: int = 1) -> str:
-    """Return lines of C inside so many blocks."""
+    """Return lines of C, indented by `depth` levels."""
     return "\n".join("    " * depth + line for line in lines)
 
 
@@ -132,22 +132,22 @@ def banner(block: Block, file: str) -> list[str]:
 
 
 def head(block: Block, file: str) -> str:
-    """Return the first lines of a C file, an open comment."""
+    """Return the first lines of a C file as a comment that is not closed."""
     return block_comment(banner(block, file)).removesuffix("\n */")
 
 
 def block_comment(lines: Sequence[str]) -> str:
-    """Return lines of text as one comment."""
+    """Return lines of text as one C comment."""
     return "/* " + "\n".join(f" * {comment(line)}".rstrip() for line in lines)[3:] + "\n */"
 
 
 def comment(text: str) -> str:
-    """Return text that cannot end the comment that contains it."""
+    """Return `text` without character pairs that begin or end a C comment."""
     return text.replace("*/", "* /").replace("/*", "/ *")
 
 
 def folded(line: str, margin: str) -> str:
-    """Return a long line broken at blanks, with deeper indentation."""
+    """Return a long line wrapped at blanks; the continuation lines are indented further."""
     text = line.lstrip(" ")
     margin += " " * (len(line) - len(text))
     lines = wrap(

@@ -1,7 +1,7 @@
 """Compilation of generated C, and runs of a block in C, in CasADi's VM and in NumPy.
 
-A run gives one row per step: the states after it, the outputs, the states of each reset for the
-inputs, and with guards the status (`CBlock.signals`).
+A run returns one row per step: the states after the step, the outputs, the states that each reset
+returns for the inputs, and with guards the status (`CBlock.signals`).
 """
 
 import shutil
@@ -33,20 +33,20 @@ WARNINGS = tuple(
 )
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
-"""Flags without contraction to fused multiply-add, so that the C has the bits of CasADi."""
+"""Flags that prevent fused multiply-add, so that the C computes the same bits as CasADi."""
 
 
 def compile_object(compiler: Compiler, source: Path, target: Path) -> list[str]:
     """Compile `source` to an object file; return the warnings.
 
     Raises:
-        CompileError: the compiler rejects it.
+        CompileError: the compiler rejects the C.
     """
     return compiler.warnings(*FLAGS, *WARNINGS, "-c", str(source), "-o", str(target))
 
 
 def needed_symbols(target: Path) -> frozenset[str] | None:
-    """Return the undefined names of an object file; None without `nm`."""
+    """Return the undefined names of an object file; None if `nm` is not available."""
     nm = shutil.which("nm")
     if nm is None:
         return None
@@ -64,20 +64,20 @@ def footprint(c: CBlock, folder: Path, compiler: Compiler) -> dict[str, Any]:
     """Compile the source of a block in `folder` and measure the object file.
 
     Returns:
-        text: bytes of code and of constants; None without the program `size`.
-        data: bytes of variables, always 0.
-        stack: function -> bytes of its own frame, without functions of libm. Empty if the compiler
-            does not report it.
+        text: bytes of code and of constants; None if the program `size` is not available.
+        data: bytes of variables (0 for generated C); None as for `text`.
+        stack: function -> bytes of its frame, without functions of libm; empty if the compiler does
+            not report frames.
 
     Raises:
-        CompileError: the compiler rejects it.
+        CompileError: the compiler rejects the C.
     """
     with TemporaryDirectory(prefix="symfric-") as place:
         target = Path(place) / f"{c.name}.o"
         command = [*FLAGS, "-c", str(folder / f"{c.name}.c"), "-o", str(target)]
         try:
             compiler.run("-fstack-usage", *command)
-        except CompileError:  # clang before 11, and others, lack the option
+        except CompileError:  # some compilers, such as clang before 11, lack the option
             compiler.run(*command)
         said, (text, data) = target.with_suffix(".su"), _sizes(compiler, target)
         stack = _stack(said.read_text(encoding="utf-8")) if said.is_file() else {}
@@ -85,13 +85,13 @@ def footprint(c: CBlock, folder: Path, compiler: Compiler) -> dict[str, Any]:
 
 
 def _stack(text: str) -> dict[str, int]:
-    """Return the frames in a file of -fstack-usage: "file:line:column:function", bytes, kind."""
+    """Return the frames listed by -fstack-usage as "file:line:column:function", bytes, kind."""
     rows = [line.split("\t") for line in text.splitlines() if line.count("\t") >= 2]
     return {row[0].rpartition(":")[2]: int(row[1]) for row in rows}
 
 
 def _sizes(compiler: Compiler, target: Path) -> tuple[int | None, int | None]:
-    """Return bytes of text and of data with bss, by the `size` next to the compiler."""
+    """Return bytes of text and of data with bss, from the program `size` of the compiler."""
     program = Path(compiler.command[0])
     name = program.name.removesuffix("gcc") + "size" if program.name.endswith("gcc") else "size"
     size = shutil.which(str(program.with_name(name))) or shutil.which(name)
@@ -110,14 +110,13 @@ def _sizes(compiler: Compiler, target: Path) -> tuple[int | None, int | None]:
 Array = NDArray[Any]
 
 PER_STEP = 1e-3
-"""Time limit of a step [s]."""
+"""Time limit per step [s], in addition to `PATIENCE`."""
 
 
 def program(c: CBlock) -> str:
-    """Return a C program that reads inputs from standard input and writes a row per step, all
-    binary.
+    """Return a C program that reads inputs and writes a row per step, as binary standard streams.
 
-    With a second argument on its command line it reads the parameters before the inputs.
+    With a second argument on its command line, it reads the parameters before the inputs.
     """
     start = f"{c.name}_init({c.casts['state']}, &{c.name}_start);" if c.block.states else ""
     if c.block.parameters:
@@ -133,7 +132,7 @@ def program(c: CBlock) -> str:
 
 
 def compiled(c: CBlock, parts: Sequence[Path], include: Path, compiler: Compiler) -> Path:
-    """Compile and link the `program` of a block with C or object files; return the executable.
+    """Compile the `program` of a block, link it with C or object files; return the executable.
 
     Raises:
         CompileError: the compiler rejects the C.
@@ -150,10 +149,10 @@ def run_c(c: CBlock, executable: Path, inputs: Array, parameters: Array | None =
     """Return rows (steps, columns) of the compiled `program` for `inputs` (steps, inputs).
 
     Args:
-        parameters: of every step, shape (steps, parameters); by default those of the C.
+        parameters: parameters of every step, shape (steps, parameters); default those of the C.
 
     Raises:
-        CompileError: the program does not run here, or ends too early.
+        CompileError: the program does not run on this machine, or ends too early.
     """
     given = inputs if parameters is None else np.column_stack([parameters, inputs])
     command = [str(executable), str(len(inputs)), *["own"] * (parameters is not None)]
@@ -173,13 +172,14 @@ def run_c(c: CBlock, executable: Path, inputs: Array, parameters: Array | None =
 def run_vm(
     c: CBlock, inputs: Array, states: Array | None = None, parameters: Array | None = None
 ) -> Array:
-    """Return the same rows from CasADi in double, with inputs and parameters rounded to the type.
+    """Return the rows that CasADi computes in double from numbers rounded to the type.
 
-    The guards are those of `GuardModel`.
+    `GuardModel` replaces the guards of the C.
 
     Args:
-        states: shape (steps, states): every step but the first starts from the row before.
-        parameters: of every step, shape (steps, parameters); by default those of the block.
+        states: states after every step, shape (steps, states): each step except the first starts
+            from the row before it; by default the steps start from their own results.
+        parameters: parameters of every step, shape (steps, parameters); default those of the block.
     """
     block, model = c.block, GuardModel(c)
     inputs, said = c.real.rounded(inputs), np.zeros(len(inputs), np.int64)
@@ -216,12 +216,12 @@ def run_vm(
 @final
 @dataclass(frozen=True, eq=False)
 class GuardModel:
-    """Guards of a block in NumPy, on rows of numbers of one type."""
+    """Guards of a block in NumPy, for numbers rounded to its type."""
 
     c: CBlock
 
     def inputs(self, rows: Array) -> tuple[Array, NDArray[np.int64]]:
-        """Return inputs (steps, inputs) after the guards, and the status of every step."""
+        """Return the guarded inputs (steps, inputs) and the status of every step."""
         found, status = rows.copy(), np.zeros(len(rows), np.int64)
         for i, within in self._used.items():
             low, high, safe = self.c.real.rounded(within)
@@ -232,11 +232,11 @@ class GuardModel:
         return found, status
 
     def lost(self, states: Array) -> bool:
-        """Return True if the states (states,) restart before a step."""
+        """Return True if the guards restart the states (states,) before a step."""
         return not bool((np.abs(states) <= self._limits).all())
 
     def parameters(self, values: Array) -> tuple[Array, int]:
-        """Return parameters (parameters,) after the guards, and the status."""
+        """Return the guarded parameters (parameters,) and the status."""
         low, high, is_size = self._ranges
         unfit = ~((values >= low) & (values <= high))
         found = values.copy()
@@ -271,7 +271,7 @@ def _remainder(x: float, y: float) -> float:
 NUMPY = {"pow": "power"} | {
     f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan", "tan2", "sinh", "cosh", "tanh")
 }
-"""Functions with other names in NumPy than in C99."""
+"""Functions whose names differ in NumPy and C99."""
 
 OPERATIONS: dict[int, Callable[..., Any]] = {
     CODES[name]: getattr(np, other)
@@ -285,12 +285,12 @@ OPERATIONS: dict[int, Callable[..., Any]] = {
 } | {
     op: getattr(np, NUMPY.get(name, name))
     for op, name in FUNCTIONS.items()
-    if name not in ("erf", "remainder")  # absent, and another function
+    if name not in ("erf", "remainder")  # NumPy lacks erf, and its remainder is another function
 } | {
     ca.OP_TWICE: partial(np.multiply, 2), CODES["erf"]: erf,
     CODES["remainder"]: np.vectorize(_remainder, otypes=[float]),
 }  # fmt: skip
-"""Functions of arrays by CasADi's numbers of operations."""
+"""Functions of arrays, by the numbers of CasADi's operations."""
 
 
 def in_type(
@@ -299,18 +299,18 @@ def in_type(
     kind: str,
     random: np.random.Generator | None = None,
 ) -> Array:
-    """Return the results of a function, below each other, with every operation rounded to a type.
+    """Return the results of a function, concatenated, with every operation rounded to a type.
 
     Args:
-        function: of SX, with dense arguments and results.
-        arguments: rows of numbers, shape (rows, size of the argument).
+        function: function of SX with dense arguments and results.
+        arguments: rows of each argument, shape (rows, size of the argument).
         kind: NumPy's name of the type, such as "f4".
-        random: rounds each inexact result randomly to one of its two neighbours, instead of to the
-            nearest. Differences between runs are rounding errors.
+        random: generator that rounds each inexact result randomly to one of its two neighbours;
+            None rounds to the nearest. Differences between runs are rounding errors.
             Source: Vignes, Mathematics and Computers in Simulation 35 (1993), CESTAC.
 
     Returns:
-        Shape (rows, results), in double.
+        Results in double, shape (rows, results).
     """
     source, found = graph(function), list[Array]()
     with np.errstate(all="ignore"):
@@ -332,9 +332,9 @@ def in_type(
 
 
 def _up_or_down(exact: Array, kind: str, random: np.random.Generator) -> Array:
-    """Return a random neighbour of the type for each number, or the number itself if exact.
+    """Return each number rounded randomly up or down to the type, unchanged if representable.
 
-    The double nearest to a result of an operation on floats stands for the result itself.
+    The result of an operation on floats is approximated by the nearest double.
     """
     nearest = exact.astype(kind)
     beyond = np.where(exact > nearest, np.inf, -np.inf).astype(kind)

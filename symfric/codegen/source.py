@@ -1,4 +1,4 @@
-"""C functions of a block, its source file, and its header file with the data sheet."""
+"""C functions of a block, its source file and its header file with the data sheet."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
@@ -42,7 +42,7 @@ class Routine(NamedTuple):
 
     Attributes:
         result: return type.
-        calls: function of math.h (double's name) -> number of calls.
+        calls: function of math.h (name for double) -> number of calls.
         operations: number of operations, calls included.
     """
 
@@ -64,11 +64,11 @@ class Routine(NamedTuple):
 
 @lru_cache(maxsize=4)
 def routines(c: CBlock) -> tuple[Routine, ...]:
-    """Return the C functions of a block: `_init`, `_reset`, its resets and `_step`, or a scalar
-    one.
+    """Return the C functions of a block: `_init`, `_reset`, its resets and `_step`.
 
-    With guards they return the status of `symfric.codegen.guards`, and a function of scalars adds
-    its bits to an argument; without they return nothing and check nothing.
+    A block without states and with one output is a single function of scalars instead. With guards,
+    the resets and `_step` return the status of `symfric.codegen.guards`, and a function of scalars
+    sets its bits in an argument.
 
     Raises:
         ValueError: an operation without counterpart in C99, or a constant outside the type.
@@ -151,11 +151,11 @@ def _routine(
 
 
 ALIGNED = 30
-"""Width of values with aligned comments."""
+"""Largest width of values whose comments are aligned [columns]."""
 
 
 def source(c: CBlock) -> str:
-    """Return the text of the source file; raises as `routines`."""
+    """Return the text of the source file; raise the errors of `routines`."""
     functions = routines(c)
     called = sorted({call for r in functions for call in r.calls} & set(TRANSCENDENTAL.values()))
     macros = "".join(
@@ -181,7 +181,7 @@ def source(c: CBlock) -> str:
 
 
 def _constant(c: CBlock, group: str, name: str) -> str:
-    """Return a constant struct with the start value of every variable; arrays in own braces."""
+    """Return a constant struct with the start value of every variable; braces enclose arrays."""
     rows: list[tuple[str, str]] = []
     for member in c.block.members.get(group, ()):
         variables = c.block.groups[group][member.first : member.first + member.length]
@@ -202,14 +202,14 @@ MEANING = {
     "in": "Inputs of a step.",
     "out": "Outputs of a step.",
 }
-"""Comments of the structs."""
+"""Comment of each struct."""
 
 NARROW = 30
-"""Least width of a comment next to a member [columns]."""
+"""Smallest width of a comment next to a member [columns]."""
 
 
 def header(c: CBlock) -> str:
-    """Return the text of the header file; raises as `routines`."""
+    """Return the text of the header file; raise the errors of `routines`."""
     block, name = c.block, c.name
     structs = "".join(_struct(c, group, rows) for group, rows in block.members.items())
     for group, constant, what in (
@@ -229,7 +229,7 @@ def header(c: CBlock) -> str:
 
 
 def _struct(c: CBlock, group: str, rows: Sequence[Member]) -> str:
-    """Return a struct, every member with its meaning, unit, start or default value, and range."""
+    """Return a struct whose members have comments: meaning, unit, start or default, range."""
     width, lines = max(len(row.declared) for row in rows) + 1, ""
     for row in rows:
         own = c.block.groups.get(group, ())[row.first : row.first + row.length]
@@ -241,7 +241,7 @@ def _struct(c: CBlock, group: str, rows: Sequence[Member]) -> str:
 
 
 def _numbers(group: str, variables: Sequence[Variable], guards: bool) -> Iterator[str]:
-    """Yield start or default value, if all are equal, and range."""
+    """Yield the start or default values (first and last, if they differ) and the range."""
     starts = list(dict.fromkeys(f"{float(v.start):g}" for v in variables))
     if starts and group in ("state", "param"):
         shown = starts if len(starts) < 2 else [starts[0], "...", starts[-1]]
@@ -276,7 +276,7 @@ def _wrapped(text: str, columns: int = WIDTH - 3) -> list[str]:
 
 
 def _lines(text: str) -> Iterator[str]:
-    """Yield sentences wrapped; indented formulas are unchanged."""
+    """Yield the lines of a text; sentences are wrapped, indented formulas are not."""
     for line in text.splitlines():
         yield from [line] if line.startswith(" ") else _wrapped(line, WIDTH - 7)
 
@@ -288,7 +288,7 @@ def _list(texts: Sequence[str]) -> Iterator[str]:
 
 
 def _sample_time(block: Block) -> str:
-    """Return the text about the step size and its setting."""
+    """Return the text about the step size and how to set it."""
     h = block.sample_time
     if h is None:
         return ""
@@ -301,7 +301,7 @@ def _sample_time(block: Block) -> str:
 
 
 def _guards(block: Block) -> list[str]:
-    """Return sentences about the repair of invalid numbers, and its report."""
+    """Return sentences about the repair of invalid numbers and about the status."""
     safe = ", ".join(f"{v.name} = {range_of(v).safe:g}" for v in block.inputs)
     sizes, found = [v.name == STEP_SIZE for v in block.parameters], list[str]()
     if safe:
@@ -318,7 +318,7 @@ def _guards(block: Block) -> list[str]:
 
 
 def _constants(block: Block) -> Iterator[str]:
-    """Yield the numbers folded into the formulas, a line each."""
+    """Yield one line for each number that is folded into the formulas."""
     texts = {name: f"{name} = {value:g}" for name, value in block.constants.items()}
     width = max(map(len, texts.values()), default=0)
     about = {"h": "step size [s]"} | dict(block.about)
@@ -326,22 +326,22 @@ def _constants(block: Block) -> Iterator[str]:
 
 
 def _inputs(c: CBlock) -> Iterator[str]:
-    """Yield meaning, unit and range of the arguments of a function, a line each."""
+    """Yield one line for each argument of a function of scalars: meaning, unit and range."""
     width = max((len(v.name) for v in c.block.inputs), default=0)
     for v in c.block.inputs:
         yield f"{v.name:<{width}}  {meaning(v.doc, v.unit, interval([v], 'in', c.guards))}"
 
 
 def meaning(doc: str, unit: str, *more: str) -> str:
-    """Return the meaning of a number, its unit, and further texts."""
+    """Return the meaning of a number, its unit and further texts, separated by commas."""
     return ", ".join(text for text in (f"{doc} [{unit}]".strip(), *more) if text)
 
 
 def interval(variables: Sequence[Variable], group: str, guards: bool) -> str:
-    """Return the closed interval in which each of some variables is valid; "" for all numbers.
+    """Return the closed interval in which all `variables` are valid; "" if it is unbounded.
 
     Args:
-        group: "state", "param" or "in"; guards enforce the latter two.
+        group: "state", "param" or "in"; guards enforce the ranges of "param" and "in".
     """
     ends = [(v.lower, v.upper) for v in variables]
     if guards and group != "state":

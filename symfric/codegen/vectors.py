@@ -1,9 +1,9 @@
 """Test vectors: single steps of a block with CasADi's results.
 
-Each row is an independent step from its own states, so rounding errors do not accumulate over the
-rows. Rows are taken from a run through stick, creep, bursts, reversals and steps of the load, so
-that both outcomes of every comparison in the block occur if they do in that run; then every
-parameter is changed, in the rows in which that matters most; with guards, bad inputs follow.
+Each row is an independent step from given states, so rounding errors do not accumulate over the
+rows. The first rows come from a run through stick, creep, bursts, reversals and steps of the load;
+they contain every outcome of every comparison of the block that occurs in the run. The next rows
+change each parameter where the change has the largest effect; with guards, bad numbers follow.
 """
 
 from collections.abc import Iterator
@@ -24,20 +24,20 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 STEPS = 800
-"""Steps of the run that rows are taken from."""
+"""Number of steps of the run that the rows are taken from."""
 PLAIN, EACH = 32, 2
-"""Number of equidistant rows, in addition to those for comparisons, and rows per changed
+"""Numbers of equidistant rows (in addition to those for comparisons) and of rows per changed
 parameter."""
 PARAMETER_SHARE = 0.25
 """Relative change of a parameter."""
 BASE = {4: 1e-5, 8: 1e-12}
-"""Tolerance relative to the peak of a signal, by the size of the type: rounding of some operations,
-of libm and of fused multiply-add, which differ between compilers and targets.
+"""Tolerance relative to the peak of a signal, by the size of the type. It covers the rounding of
+operations, libm and fused multiply-add, which differs between compilers and targets.
 """
 ROUNDINGS = 8.0
-"""Tolerance in units of the rounding changes in most rows: of the inputs, and in float of every
-operation, as in differences of large numbers. The tenth of the rows in which a result may change by
-more, such as at a jump, is left out.
+"""Tolerance relative to the 90 % quantile of the changes of a result when the arguments of a step
+(in float, also the result of every operation) are rounded. Rows with larger changes, such as at a
+jump, are omitted.
 """
 BAD = (np.nan, np.inf, -np.inf)
 
@@ -46,9 +46,10 @@ class Steps(NamedTuple):
     """Independent steps, one per row, all numbers rounded to the type.
 
     Attributes:
-        states, inputs: before and during the steps, shapes (rows, states) and (rows, inputs).
-        changed: number of the changed parameter, -1 for none, shape (rows,).
-        values: of that parameter, 0 for none, shape (rows,).
+        states: states before the steps, shape (rows, states).
+        inputs: inputs during the steps, shape (rows, inputs).
+        changed: index of the changed parameter, -1 for none, shape (rows,).
+        values: value of that parameter, 0 for none, shape (rows,).
     """
 
     states: Array
@@ -57,7 +58,7 @@ class Steps(NamedTuple):
     values: Array
 
     def chosen(self, rows: Integers) -> "Steps":
-        """Return some of the rows."""
+        """Return the steps with the indices `rows`."""
         return Steps(self.states[rows], self.inputs[rows], self.changed[rows], self.values[rows])
 
 
@@ -69,8 +70,8 @@ class Vectors:
     Attributes:
         results: states after the step, outputs, and the states of each further initialisation for
             the inputs, in double precision, shape (rows, results).
-        status: of the guards, 0 without them, shape (rows,).
-        tolerance: of each result, shape (results,).
+        status: status of the guards, 0 without guards, shape (rows,).
+        tolerance: absolute tolerance of each result, shape (results,).
     """
 
     c: CBlock
@@ -81,7 +82,7 @@ class Vectors:
 
 
 def vectors(c: CBlock) -> Vectors:
-    """Return test vectors of a block in a floating point type, the same at each call."""
+    """Return test vectors of a block in a floating-point type, the same at each call."""
     bare = replace(c, guards=False)
     run = _run(bare)
     results = made(bare, run)
@@ -104,22 +105,24 @@ def vectors(c: CBlock) -> Vectors:
 
 
 def made(c: CBlock, steps: Steps) -> Array:
-    """Return the rows of steps by CasADi, see `run_vm`, which makes one step before them."""
+    """Return CasADi's rows for the steps, see `run_vm`, which makes one more step before them."""
     inputs = np.vstack([np.zeros((1, len(c.block.inputs))), steps.inputs])
     parameters = np.vstack([c.default, _parameters(c, steps)])
     return run_vm(c, inputs, steps.states, parameters)[1:]
 
 
 def excitation(block: Block) -> Array:
-    """Return inputs of a run, shape (STEPS, inputs)."""
+    """Return the inputs of the run, shape (STEPS, inputs)."""
     random = np.random.default_rng(0)
     columns = [_signal(v, random) for v in block.inputs]
     return np.column_stack([np.zeros((STEPS, 0)), *columns])
 
 
 def _signal(variable: Variable, random: np.random.Generator) -> Array:
-    """Return steps of a load; stick, creep, slow and fast motion of other inputs; within the
-    bounds.
+    """Return values of an input within its bounds.
+
+    A load (lower bound of 0 or more) jumps; other inputs alternate between stick, creep, slow and
+    fast motion.
     """
     k = np.arange(STEPS)
     if variable.lower >= 0.0:
@@ -141,7 +144,7 @@ def _signal(variable: Variable, random: np.random.Generator) -> Array:
 
 
 def _run(c: CBlock) -> Steps:
-    """Return the steps of a run, as far as it is finite."""
+    """Return the steps of the run up to the first number that is not finite."""
     inputs, count = c.real.rounded(excitation(c.block)), len(c.block.states)
     after = run_vm(c, inputs)
     states = c.real.rounded(np.vstack([c.start, after[:-1, :count]]))
@@ -164,7 +167,7 @@ def _is_sound(spread: Array, tolerance: Array) -> NDArray[np.bool_]:
 
 
 def _spread(c: CBlock, steps: Steps, results: Array) -> Array:
-    """Return changes of the results by rounding of the inputs, shape (rows, results)."""
+    """Return changes of the results by rounding of the arguments, shape (rows, results)."""
     random, found = np.random.default_rng(1), np.zeros_like(results)
     unit = float(np.finfo(c.real.kind).eps)
     first, given = np.zeros((1, len(c.block.inputs))), _parameters(c, steps)
@@ -185,7 +188,7 @@ def _spread(c: CBlock, steps: Steps, results: Array) -> Array:
 
 
 def _telling(c: CBlock, steps: Steps) -> Integers:
-    """Return rows with each outcome of each comparison, and some equidistant ones."""
+    """Return the indices of rows with each outcome of each comparison, and of equidistant rows."""
     count, seen = len(steps.changed), set[tuple[int, bool]]()
     chosen = set(np.linspace(0, count - 1, min(PLAIN, count)).astype(int).tolist())
     for k, outcomes in enumerate(_outcomes(c, steps).astype(bool).tolist()):
@@ -198,7 +201,7 @@ def _telling(c: CBlock, steps: Steps) -> Integers:
 
 COMPARISONS = frozenset({ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR})
 SIDES = frozenset({ca.OP_FABS, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX})
-"""Operations that have two branches in C: by the sign of a number, or by which one is smaller."""
+"""Operations with two branches in C, chosen by the sign of a number or by the smaller of two."""
 
 
 def _outcomes(c: CBlock, steps: Steps) -> Array:
@@ -221,7 +224,7 @@ def _outcomes(c: CBlock, steps: Steps) -> Array:
 
 
 def _changing(c: CBlock, steps: Steps, before: Array, i: int, tolerance: Array) -> Steps:
-    """Return the rows in which changing parameter `i` changes most, relative to the tolerance."""
+    """Return steps with parameter `i` changed, in the rows with the largest relative effect."""
     value = float(c.real.rounded(changed_value(c.block.parameters[i])))
     values = np.full(len(steps.changed), value)
     new = steps._replace(changed=np.full(len(values), i, np.int64), values=values)
@@ -233,14 +236,14 @@ def _changing(c: CBlock, steps: Steps, before: Array, i: int, tolerance: Array) 
 
 
 def changed_value(variable: Variable) -> float:
-    """Return a parameter's default increased by a quarter, or decreased if a bound requires it."""
+    """Return the default of a parameter plus a quarter; minus a quarter if a bound requires it."""
     start = float(variable.start)
     step = PARAMETER_SHARE * (abs(start) if start else variable.nominal)
     return start + step if start + step <= variable.upper else start - step
 
 
 def _bad(block: Block, steps: Steps) -> Iterator[Steps]:
-    """Yield the last row with each input, state and parameter bad, one at a time."""
+    """Yield copies of the last row, each with one bad input, state or parameter."""
     last = steps.chosen(np.array([-1]))
 
     def spoiled(column: Array) -> Iterator[Array]:

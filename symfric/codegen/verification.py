@@ -25,35 +25,34 @@ Array = NDArray[np.float64]
 
 STEPS = 20_000
 FEWER = 4000
-"""Number of steps with bad inputs, and with other parameters."""
+"""Number of steps with bad inputs, and of steps with other parameters."""
 
 
 @final
 @dataclass(frozen=True)
 class Check:
-    """Result of the verification of one floating point type.
+    """Result of the verification of one floating-point type.
 
     Attributes:
         real: "double" or "float".
         steps: number of steps compared.
-        warnings: of the compiler.
+        warnings: warnings of the compiler.
         ulp: in double, the largest distance from CasADi in units in the last place; 0 means equal
             bits (except for the sign of a zero). None in float.
         error: largest difference from CasADi, which computes in double from the same rounded
-            inputs and parameters, relative to the magnitude of each signal: its nominal value, its
-            peak, or the size of the terms it is the difference of, see `magnitudes`, whichever is
-            the largest. In float every step starts from the states of the C: a contact that breaks
-            away some rounding errors later is not an error of the C.
+            inputs and parameters, relative to the magnitude of each signal. The magnitude is the
+            largest of the nominal value, the peak and the terms of the signal, see `magnitudes`.
+            In float, every step starts from the states of the C, so that a break-away delayed by
+            rounding is not counted as an error of the C.
         foreign: undefined names of the object file other than functions of math.h in its own type;
             None without `nm`.
-        runs_away: the step after which a state is huge or not finite in CasADi, too; None if none.
-        worst: the signal that differs most, "" without a difference.
-        rounding: change of that signal, in the unit of `error`, when every operation of CasADi in
-            that step is rounded to float, to nearest and randomly up or down; an error of that
-            size is caused by the type, not by the C. None if unknown, in double, and if the error
-            is small.
-        ties: in float, steps in which a mode of 0 or 1 differs because its decision ties: with its
-            operations rounded, CasADi also gives the mode of the C. All other signals in these
+        runs_away: first step after which a state is huge or not finite in CasADi; None if none.
+        worst: signal with the largest difference; "" if there is no difference.
+        rounding: change of that signal, relative as `error`, if every operation of CasADi in that
+            step is rounded to float, to nearest and randomly up or down; the type, not the C,
+            causes an error of this size. None if unknown, in double, and if the error is small.
+        ties: in float, number of steps in which a mode of 0 or 1 differs because its decision ties:
+            with rounded operations, CasADi also gives the mode of the C. The other signals of these
             steps are compared as usual.
     """
 
@@ -70,14 +69,12 @@ class Check:
 
     @property
     def near(self) -> bool:
-        """True for equal bits in double, small errors in float."""
+        """True if the bits are equal (double) or the errors are small (float)."""
         return self.error <= TOLERANCE if self.ulp is None else self.ulp == 0
 
     @property
     def ok(self) -> bool:
-        """True if there are no warnings, no foreign names, no differences and only finite
-        values.
-        """
+        """True if results agree and are finite, without warnings and foreign names."""
         return self.near and not self.warnings and not self.foreign and self.runs_away is None
 
     @property
@@ -96,7 +93,7 @@ class Check:
 
     @property
     def row(self) -> tuple[str, ...]:
-        """Cells of the table of a `Verification`."""
+        """Cells of the row in `Verification.table`."""
         bits = "-" if self.ulp is None else "equal" if self.ulp == 0 else f"{self.ulp} ulp"
         foreign = "not checked" if self.foreign is None else " ".join(self.foreign) or "none"
         error = f"{self.error:.1e}" if self.error else "0"
@@ -105,7 +102,7 @@ class Check:
 
 
 ROUNDINGS = 4.0
-"""Safety factor on the observed random rounding, which need not contain the worst case."""
+"""Safety factor on the observed random rounding, which may miss the worst case."""
 
 
 @final
@@ -114,10 +111,10 @@ class Verification:
     """Result of `verify`.
 
     Attributes:
-        name: of the block.
-        status: "verified", or a sentence with the reason.
-        compiler: the command, None without one.
-        checks: one for each floating point type.
+        name: name of the block.
+        status: "verified", or a sentence with the reason of the failure.
+        compiler: command of the compiler; None without a compiler.
+        checks: one check for each floating-point type.
     """
 
     name: str
@@ -138,7 +135,7 @@ class Verification:
         }
 
     def table(self) -> str:
-        """Return a few lines of text."""
+        """Return the result as a text table."""
         head = f"{self.name}: {self.status}" + (f" ({self.compiler})" if self.compiler else "")
         if not self.checks:
             return head
@@ -160,33 +157,33 @@ def verify(
 ) -> Verification:
     """Compile generated C, run it on the same inputs as CasADi and compare.
 
-    There are three fixed pseudo-random sequences: 20 000 steps of `excitation` (slow sines, bursts,
-    reversals, velocities down to 1e-12, exact zeros, loads that jump a thousandfold or vanish); for
-    guarded C 4000 with NaN, infinities and absurd numbers, `spoiled`; and if there are parameters
-    4000 with other values, including step sizes over three decades, `varied`. The guards of the C
-    are repeated in NumPy, and the status is compared as well. The C is compiled with -O2
-    -ffp-contract=off; if a compiler may fuse multiply and add, the last bits differ. A step in
-    which float overflows, such as a plant under an absurd force, and reports it by its status is
-    not compared.
+    The inputs are three fixed pseudo-random sequences: 20 000 steps of `excitation` (slow sines,
+    bursts, reversals, velocities down to 1e-12, exact zeros, loads that jump a thousandfold or
+    vanish); for guarded C, 4000 steps with NaN, infinities and absurd numbers (`spoiled`); for
+    blocks with parameters, 4000 steps with other values, including step sizes over three decades
+    (`varied`). The guards of the C are reimplemented in NumPy, and the status is compared as well.
+    The flags are -O2 -ffp-contract=off; if a compiler fuses multiply and add, the last bits differ.
+    A step is not compared if it overflows in float and its status reports it, such as that of a
+    plant under an absurd force.
 
-    A plant that diverges under these inputs, in CasADi as in C, fails: its step is too long, and
-    the status gives the longest of some shorter ones that is not, if h is a parameter.
+    A plant that diverges under these inputs, in CasADi as in C, fails: its step is too long. If h
+    is a parameter, the status states the longest of some shorter steps that does not diverge.
 
-    In float a signal may exceed the tolerance although the C is correct: where friction is steep,
-    the last bit of the velocity has such an effect. That fails, too, with an explanation in the
-    status. A mode, such as that of an element that returns to its limit exactly, may change one
-    step earlier or later; that is not an error if CasADi rounded to float does the same, and is
-    counted in `ties`.
+    In float, a signal may exceed the tolerance although the C is correct: where friction is steep,
+    the last bit of the velocity may have this effect. This fails as well, and the status explains
+    it. A mode, such as that of an element that returns to its limit exactly, may change one step
+    earlier or later; this is not an error if CasADi rounded to float does the same, and is counted
+    in `ties`.
 
     Args:
         generated: returned by `generate`.
         compiler: command that takes gcc's options; default $CC if it exists, else gcc or clang.
-        adjustable: returns the same block with its step size h as a parameter, to search for a
-            shorter one if it is a constant.
+        adjustable: function that returns the same block with its step size h as a parameter, for
+            the search for a shorter step if h is a constant of the block.
 
     Returns:
-        The findings. Without a compiler, or with one whose programs do not run here, the status
-        begins with "not verified"; nothing is raised.
+        The findings. Without a working compiler on this machine, the status begins with "not
+        verified" and no error is raised.
 
     Raises:
         ValueError: `compiler` is given and does not exist.
@@ -212,7 +209,7 @@ def verify(
 
 
 def _too_long(block: Block, h: float | None, steps: int, inputs: Array) -> str:
-    """Describe a block that diverges, and suggest a remedy."""
+    """Return a description of a block that diverges, with a remedy."""
     if h is None:
         return f"it runs away within {steps} steps, in CasADi as in C; check signs and parameters"
     said = f"after {steps} steps of {h:g} s it runs away, in CasADi as in C: that step is too long"
@@ -223,7 +220,7 @@ def _too_long(block: Block, h: float | None, steps: int, inputs: Array) -> str:
 
 
 Sequences = list[tuple[Array, Array | None]]
-"""Inputs and, if they are not the defaults of the C, parameters of every run."""
+"""Inputs and parameters of every run; None for the default parameters of the C."""
 
 
 def _sequences(block: Block, guards: bool) -> Sequences:
@@ -234,7 +231,7 @@ def _sequences(block: Block, guards: bool) -> Sequences:
     if block.parameters:
         parameters, bare = varied(block, FEWER, 10.0), CBlock(block, DOUBLE, guards=False)
         if runs_away(bare, run_vm(bare, few, parameters=parameters)) is not None:
-            parameters = varied(block, FEWER, 1.0)  # a plant needs no steps longer than its own
+            parameters = varied(block, FEWER, 1.0)  # longer steps than its own may diverge
         found.append((few, parameters))
     return found
 
@@ -267,9 +264,7 @@ def _check(generated: Generated, c: CBlock, compiler: Compiler, sequences: Seque
 
 
 def _allowed(c: CBlock) -> set[str]:
-    """Return the allowed functions: those of math.h, and memcpy, by which compilers copy
-    structs.
-    """
+    """Return the allowed names: functions of math.h, and memcpy, which copies structs."""
     functions = {call for routine in routines(c) for call in routine.calls}
     if {"sin", "cos"} <= functions:
         functions.add("sincos")
@@ -281,10 +276,10 @@ SHORTER = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3)
 
 
 def runs_away(c: CBlock, rows: Array) -> int | None:
-    """Return the first step after which a state is huge or not finite, or restarts; None if none.
+    """Return the first step after which a state is huge, not finite or restarts; None if none.
 
     Args:
-        rows: returned by `run_vm`.
+        rows: results of `run_vm`.
     """
     scale = np.array([v.nominal for v in c.block.states])
     lost = ~(np.abs(rows[:, : scale.size]) <= HUGE * scale).all(axis=1)
@@ -294,12 +289,13 @@ def runs_away(c: CBlock, rows: Array) -> int | None:
 
 
 def longest_step(block: Block, inputs: Array, below: float) -> float | None:
-    """Return the longest step size [s] of a few below `below` that does not diverge.
+    """Return the longest of a few step sizes [s] below `below` with which `block` does not diverge.
+
+    Returns None if there is none, or if the step size h is not a parameter of `block`.
 
     Args:
-        block: with its step size h as a parameter; None for others.
-        inputs: of every step, shape (steps, inputs).
-        below: the step size that is too long [s].
+        inputs: inputs of every step, shape (steps, inputs).
+        below: step size that is too long [s].
     """
     if all(v.name != STEP_SIZE for v in block.parameters):
         return None
@@ -313,22 +309,22 @@ def longest_step(block: Block, inputs: Array, below: float) -> float | None:
 
 
 STRETCH = 100
-"""Number of consecutive steps with one type of motion, or of load."""
+"""Number of consecutive steps with the same type of motion or level of load."""
 
 LOADS = (1.0, 10.0, 0.1, 1.5, 0.0, 1.0, 1e-3, 6.0, 0.5, 0.0, 100.0, 1.0)
-"""Loads in units of the nominal value, in a random order with jumps and zeros."""
+"""Levels of a load relative to its nominal value, drawn at random."""
 
 BAD = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e9, -1e9, 1e-310, -1.0)
-"""Bad values of an input, in units of its nominal value."""
+"""Bad values of an input, relative to its nominal value."""
 
 
 def excitation(block: Block, steps: int) -> Array:
     """Return valid inputs of every step, shape (steps, inputs), the same at each call.
 
     An input with a lower bound of 0 or more, such as a load, fluctuates about levels between which
-    it jumps by factors up to 1e5, including zero; the others get in turn, in units of their nominal
-    value, slow sines, bursts up to 2, tiny values of 1e-12 ... 1e-3, a hundred zeros and abrupt
-    reversals. All stay within their bounds.
+    it jumps by factors up to 1e5, including zero. Other inputs alternate between slow sines, bursts
+    up to 2, tiny values of 1e-12 ... 1e-3, a hundred zeros and abrupt reversals, all relative to
+    the nominal value. All inputs stay within their bounds.
     """
     random = np.random.default_rng(0)
     columns = [_signal(variable, steps, random) for variable in block.inputs]
@@ -352,7 +348,8 @@ def motions(
     """Return slow sines, bursts up to 2, values of 1e-12 ... 1e-3, reversals, and rest.
 
     Args:
-        slow, turning: phase per step of sines and reversals [rad]; the latter begin at `phase`.
+        slow, turning: phase per step of the sines and of the reversals [rad].
+        phase: initial phase of the reversals [rad].
     """
     k = np.arange(steps)
     tiny = 10.0 ** random.uniform(-12.0, -3.0, steps) * random.choice([-1.0, 1.0], steps)
@@ -367,7 +364,7 @@ def _within(variable: Variable, values: Array) -> Array:
 
 
 def spoiled(block: Block, inputs: Array) -> Array:
-    """Return the inputs with a twentieth of the values not finite or out of range."""
+    """Return the inputs with a twentieth of the values replaced by bad values."""
     random = np.random.default_rng(1)
     nominal = np.array([v.nominal for v in block.inputs])
     bad = random.choice(BAD, inputs.shape) * nominal
@@ -377,8 +374,8 @@ def spoiled(block: Block, inputs: Array) -> Array:
 def varied(block: Block, steps: int, longest: float) -> Array:
     """Return parameters of every step, shape (steps, parameters), constant over `STRETCH` steps.
 
-    The step size passes through three decades up to `longest` times its default, the others through
-    +-20 %, or from 0 to a tenth if they are 0, within their bounds.
+    The step size varies over three decades up to `longest` times its default, other parameters by
+    +-20 %, or between 0 and 0.1 if their default is 0, all within their bounds.
     """
     random = np.random.default_rng(2)
     stretches = -(-steps // STRETCH)

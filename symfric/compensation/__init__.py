@@ -1,4 +1,4 @@
-"""Friction compensators and observers as blocks, and their proof in closed loops."""
+"""Friction compensators and observers as blocks, and tests of them in closed loops."""
 
 from typing import TYPE_CHECKING
 

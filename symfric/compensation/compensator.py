@@ -1,4 +1,4 @@
-"""Friction compensator as a block: the force to add to that of a controller."""
+"""Friction compensator as a block: the force to add to the force of a controller."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -47,34 +47,34 @@ def compensator(
         v_c = dead zone of the blend of v_ref + delay a_ref + error_gain e and v
         F   = slew(limit(ramp [scaled law(v_c, N) + inertia a_ref + stick + dither]))
 
-    The law makes the step of `law_block`. Scales act on forces, never on its states, so that they
-    can be turned while the machine moves.
+    The law makes the step of `law_block`. Scales act on forces and not on the states of the law, so
+    that they can be changed while the machine moves.
 
     Limits: a force above the actual friction (a scale above 1, or too high a law) is negative
     damping: with `error_gain` the axis then hunts at rest. A law of the measured velocity alone
     reacts too late at break-away and increases hunting. Bristle damping has a peak where the
     reference jumps; set a `limit`.
 
-    Measured (`symfric bench codegen`: 1 kg, 1 kHz, counts of 1 um, one sample late; LuGre with half
-    the stiffness against four other plants): with `error_gain` and without the term "stribeck" the
-    RMS error of a sine is 10 to 15 times smaller, and hunting of 1100 counts after a step vanishes.
-    With that term, axes that break away at once jump: 350 counts remain on exact Coulomb friction.
-    Levels of 80 % divide the error by 5, levels of 50 % by 2; levels of 120 % cause hunting of 1000
-    counts on exact Coulomb friction. A law without states and a `build_up` of 0.1 mm are as
-    accurate as bristles.
+    Measured results (`symfric bench codegen`: 1 kg, 1 kHz, counts of 1 um, a delay of one sample;
+    LuGre with half the stiffness against four other plants): with `error_gain` and without the term
+    "stribeck", the RMS error of a sine is 10 to 15 times smaller, and hunting of 1100 counts after
+    a step vanishes. With that term, axes that break away at once jump: 350 counts remain on exact
+    Coulomb friction. Levels of 80 % divide the error by 5, levels of 50 % by 2; levels of 120 %
+    cause hunting of 1000 counts on exact Coulomb friction. A law without states and a `build_up` of
+    0.1 mm are as accurate as bristles.
 
     Args:
         law: a law of v and N with numbers as parameters; or a drive, which defines law, load,
             offset and units.
         name: C identifier; default "friction_compensator".
-        h: sample time [s] as a constant; without it a parameter, by default 1 ms.
-        turning: units rad/s and N m.
-        fold: all parameters but h become constants.
-        settings: features, or the fields of `Compensation` by name.
+        h: sample time [s] as a constant; without it h is a parameter, by default 1 ms.
+        turning: True for units rad/s and N m.
+        fold: True if all parameters except h become constants.
+        settings: features; keywords name fields of `Compensation` and replace those in `settings`.
 
     Raises:
-        ValueError: bad input; a law with inputs besides v and N, or without a block; build-up of a
-            law that has states of its own; unknown terms.
+        ValueError: bad input; a law with inputs other than v and N, or without a block; build-up of
+            a law with states; unknown terms.
     """
     where = "compensator"
     s = chosen_settings(where, settings, chosen)
@@ -129,7 +129,7 @@ def compensator(
 
 
 def _velocity(parts: Parts, s: Compensation) -> tuple[ca.SX, ca.SX]:
-    """Return the desired velocity, and the one that moves the law."""
+    """Return the desired velocity and the velocity of the law."""
     wanted = v = ca.SX(0)
     if s.velocity != "measured" or s.stick is not None:
         wanted = parts.given("v_ref")
@@ -150,7 +150,7 @@ def _velocity(parts: Parts, s: Compensation) -> tuple[ca.SX, ca.SX]:
             "up to here the desired velocity, beyond twice it the measured", lower=1e-12,
         )  # fmt: skip
         share = smooth.step5(ca.fabs(v) / width - 1)
-        moved = share * v + (1 - share) * wanted  # at each end exactly one of them
+        moved = share * v + (1 - share) * wanted  # exactly one of them at each end
     if s.dead_zone is not None:
         width = parts.parameter("v_dead", s.dead_zone, "m/s", "velocities up to here count as rest")
         moved = moved - smooth.clip(moved, -width, width)
@@ -158,7 +158,7 @@ def _velocity(parts: Parts, s: Compensation) -> tuple[ca.SX, ca.SX]:
 
 
 def folded(block: Block) -> Block:
-    """Return the block with all its parameters but h as constants."""
+    """Return the block with all parameters except h as constants."""
     gone = [p for p in block.parameters if p.name != "h"]
     symbols, starts = symbols_of(gone), starts_of(gone)
 
@@ -177,12 +177,12 @@ def folded(block: Block) -> Block:
 
 
 def without_end(discretisation: str) -> str:
-    """Return the text about the step of a law without the force at its end."""
+    """Return the text about the step of a law without the lines about `F_end`."""
     return "\n".join(line for line in discretisation.splitlines() if "F_end" not in line)
 
 
 def _of_drive(where: str, drive: Drive, s: Compensation) -> Compensation:
-    """Return the settings with missing numbers from a drive."""
+    """Return the settings with missing numbers taken from a drive."""
     load = checks.number(f"{where}: N of the drive", drive.N, unit="N", lower=0.0)
     offset = checks.number(f"{where}: offset of the drive", drive.offset, unit="N")
     return replace(
@@ -195,10 +195,10 @@ def _of_drive(where: str, drive: Drive, s: Compensation) -> Compensation:
 def built_up(
     parts: Parts, v: ca.SX, h: ca.SX | float, distance: float, table: Sequence[tuple[float, float]]
 ) -> ca.SX:
-    """Return the share b in [-1, 1] of sliding friction that has built up, its mean over the step.
+    """Return the mean over the step of the share b of sliding friction that has built up.
 
-    b+ = b + 2 v h / distance, held within +-1: linear in the travel since the reversal, or shaped
-    by the table. A shorter travel back leaves the rest, as in a Maxwell element.
+    b+ = b + 2 v h / distance, within [-1, 1]: linear in the travel since the reversal, or shaped
+    by the table. A shorter travel back leaves the remaining share, as in a Maxwell element.
     """
     way = parts.parameter(
         "d_build", distance, "m", "way after a reversal until friction has built up", lower=1e-15
@@ -216,7 +216,7 @@ def built_up(
 
 
 def _scaled(parts: Parts, found: Terms, s: Compensation, where: str) -> ca.SX:
-    """Return the force of the law with the scales of its terms."""
+    """Return the force of the law with scaled terms."""
     checks.check_names(f"{where}: without", s.without, found.names)
     scaled = s.scales
     if scaled is None:
@@ -234,7 +234,7 @@ def _scaled(parts: Parts, found: Terms, s: Compensation, where: str) -> ca.SX:
 
 
 def _held(parts: Parts, s: Compensation) -> dict[str, Output]:
-    """Return the output that stops the integrator of the controller, if it is chosen."""
+    """Return the output that stops the integrator of the controller; {} if it is not chosen."""
     if s.hold is None:
         return {}
     v_ref, e, v = map(parts.given, ("v_ref", "e", "v"))
@@ -251,8 +251,8 @@ def freed(
     """Return an additional force that grows while the desired velocity moves and the axis does not.
 
     Its share q in [-1, 1] moves at the rate 1/t_stick towards sign(v_ref) while |v| is below
-    v_stick and |v_ref| beyond 2 v_stick, and towards 0 if |v| is beyond 2 v_stick or |v_ref|
-    below v_stick, with straight lines in between.
+    v_stick and |v_ref| above 2 v_stick, and towards 0 if |v| is above 2 v_stick or |v_ref| below
+    v_stick; the goal is linear in between.
     """
     most = parts.parameter("F_stick", force, "N", "further force while the axis sticks")
     pace = parts.parameter(
@@ -273,7 +273,7 @@ def freed(
 def _added(
     parts: Parts, force: ca.SX, s: Compensation, wanted: ca.SX, h: ca.SX | float, where: str
 ) -> ca.SX:
-    """Return the force of the law with all additional forces, and within its limits."""
+    """Return the force of the law plus all additional forces, within its limits."""
     if s.offset is not None:
         force = force + parts.parameter("offset", s.offset, "N", "constant force", lower=-inf)
     if s.inertia is not None:

@@ -1,4 +1,4 @@
-"""Terms of the friction force of a law, and the variables of blocks that are built in stages.
+"""Terms of the friction force of a law, and variables of blocks that are built in stages.
 
 A stage adds its states, inputs and parameters to the `Parts` of the block, and returns the
 modified force or velocity; the C contains only the chosen stages.
@@ -29,28 +29,28 @@ TERMS = {
     "bristle": "what the states make beyond steady sliding: 0 is the steady curve",
     "force": "the whole force, of a law whose terms cannot be separated",
 }
-"""Terms of friction that have a scale of their own."""
+"""Terms of friction that can be scaled separately."""
 
 
 LEAST = 1e-9
-"""Smallest load [N] of laws with states, which divide by it."""
+"""Smallest load [N] of laws with states, which divide by the load."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """Friction force of the block of a law in terms.
+    """Friction force of the block of a law, divided into terms.
 
         F = dry(coulomb, stribeck, bristle) + viscous
 
     Attributes:
-        law: with the symbols of the block as parameters.
-        v, N: symbols of its inputs.
-        force: all of it [N].
-        dry: force [N] without viscous coefficients.
-        viscous: the rest; None if absent or inseparable.
+        law: the law with the symbols of the block as parameters.
+        v, N: symbols of the inputs.
+        force: total force [N].
+        dry: force without viscous coefficients [N].
+        viscous: viscous force [N]; None if absent or inseparable.
         levels: dry levels among the parameters; empty if inseparable.
-        peaks: level of break-away -> the level in fast sliding.
+        peaks: level of break-away -> level in fast sliding.
     """
 
     law: Law
@@ -64,7 +64,7 @@ class Terms:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Terms that this law has, of `TERMS`."""
+        """Names of the terms of this law, a subset of `TERMS`."""
         viscous = ("viscous",) * (self.viscous is not None)
         if self.dry.is_zero():
             return viscous
@@ -74,10 +74,10 @@ class Terms:
         return ("coulomb", *("stribeck",) * stribeck, *viscous, *("bristle",) * bristle)
 
     def scaled(self, scales: Mapping[str, ca.SX | float]) -> ca.SX:
-        """Return the force [N] with scaled terms; terms that are not named keep their size.
+        """Return the force [N] with scaled terms; the scale of other terms is 1.
 
-        A law without states gets scaled levels. One with states keeps them, and thus the motion of
-        its states: its dry force is scaled by the ratio of the Stribeck curves,
+        In a law without states, the levels are scaled. In a law with states they are not, to keep
+        the motion of the states; the ratio of the Stribeck curves scales the dry force,
 
             F_dry g'(v)/g(v),   g' = N [s_c mu_d + s_s (mu_s - mu_d) fall(v)]
         """
@@ -105,10 +105,10 @@ class Terms:
         return dry + scales.get("viscous", 1.0) * self.viscous
 
     def one_sided(self, built: ca.SX) -> "Terms":
-        """Return the terms with `built` times the sliding force of either side as dry friction.
+        """Return the terms with `built` times the sliding force of its direction as dry friction.
 
         Raises:
-            ValueError: a law without sliding force on one side of rest.
+            ValueError: the law has no sliding force on one side of rest.
         """
         speed = ca.fabs(self.v)
         one = ca.SX(self.law.sliding(speed, self.N, 1))
@@ -129,16 +129,16 @@ class Terms:
         return ca.substitute(expression, stacked(symbols.values()), stacked(values))
 
     def _steady(self) -> ca.SX:
-        """Return the dry force after long sliding at the velocity [N]."""
+        """Return the dry force [N] after long sliding at the velocity v."""
         N = ca.fmax(self.N, LEAST)
         z = ca.SX(self.law.steady_state(self.v, N))
         return _without_viscous(self.law, ca.SX(self.law.force(self.v, N, z)))
 
 
 def level_of(law: Law, v: ca.SX) -> ca.SX | None:
-    """Return the Stribeck curve g(v) > 0 under 1 N that a law with states tends to, if it has one.
+    """Return the Stribeck curve g(v) > 0 of a law with states under 1 N; None if it has none.
 
-    Only its ratios matter, which do not depend on the load.
+    Only ratios of the curve are used, which do not depend on the load.
     """
     if isinstance(law, Wrapper):
         return level_of(law.inner_at(v), v)
@@ -146,7 +146,7 @@ def level_of(law: Law, v: ca.SX) -> ca.SX | None:
 
 
 def terms(law: Law, block: Block) -> Terms:
-    """Return the terms of the `F` of `block`, the block of `law`."""
+    """Return the terms of the output `F` of `block`, the block of `law`."""
     known = parameters(law)
     own = {v.name: v for v in block.parameters if v.name in known}
     v, N = (x.symbol for x in block.inputs[:2])
@@ -172,14 +172,14 @@ def terms(law: Law, block: Block) -> Terms:
 
 
 def _without_viscous(law: Law, force: ca.SX) -> ca.SX:
-    """Return the force with zero for viscous coefficients that are symbols."""
+    """Return the force with the viscous coefficients that are symbols set to zero."""
     values = [p.value for p in parameters(law).values() if p.role == "viscous"]
     symbols = ca.veccat(*(ca.SX(value) for value in values if is_symbolic(value)))
     return ca.substitute(force, symbols, ca.DM.zeros(symbols.numel())) if values else force
 
 
 def _same(a: ca.SX, b: ca.SX) -> bool:
-    """Return True if both are the same function, by values at random points."""
+    """Return True if both expressions have the same values at random points."""
     symbols = ca.symvar(ca.vertcat(a, b))
     look = ca.Function("both", [ca.vertcat(*symbols)], [a, b])
     points = np.random.default_rng(0).uniform(0.1, 2.0, (4, len(symbols)))
@@ -188,7 +188,7 @@ def _same(a: ca.SX, b: ca.SX) -> bool:
 
 
 def _made_of(dry: ca.SX, levels: Variables, block: Block) -> bool:
-    """Return True if the dry force is a sum of levels, each times a function of the velocity."""
+    """Return True if the dry force is a sum of levels times functions of the velocity."""
     if not levels:
         return False
     symbols = symbols_of(levels)
@@ -216,38 +216,38 @@ INPUTS: dict[str, dict[str, Any]] = {
     "N": {"unit": "N", "doc": "normal force", "nominal": 10.0, "lower": 0.0},
     "enable": {"unit": "1", "doc": "above 0.5: on", "lower": 0.0, "upper": 1.0},
 }
-"""Possible inputs of compensators and observers, in their order."""
+"""Possible inputs of compensators and observers, in the order of the block."""
 
 
 @final
 class Parts:
-    """Variables of a block, to which stages add theirs.
+    """Variables of a block, to which each stage adds its own variables.
 
     Attributes:
-        states, inputs, parameters: as in `Block`.
-        next: the states after the step.
+        states, inputs, parameters: variables as in `Block`.
+        next: states after the step.
     """
 
     def __init__(self, inner: Block | None = None, v: Variable | None = None) -> None:
-        """Begin with the states and parameters of the block of a law, and an input `v`."""
+        """Begin with the states and parameters of the block of a law, and with an input `v`."""
         self.states = [*inner.states] if inner else []
         self.parameters = [p for p in inner.parameters if p.name != "h"] if inner else []
         self.inputs, self.next = [v] if v else [], list[ca.SX]()
 
     def state(self, name: str, unit: str, doc: str, nominal: float = 1.0) -> ca.SX:
-        """Add a state; the caller appends its next value to `next`."""
+        """Add a state and return its symbol; the caller appends its next value to `next`."""
         variable = Variable(self._free(name), unit, nominal=nominal, doc=doc)
         self.states.append(variable)
         return variable.symbol
 
     def given(self, name: str) -> ca.SX:
-        """Return an input, one of `INPUTS`; it is added on its first use."""
+        """Return the symbol of an input of `INPUTS`; add the input at its first use."""
         if name not in [v.name for v in self.inputs]:
             self.inputs.append(Variable(name, **INPUTS[name]))
         return next(v.symbol for v in self.inputs if v.name == name)
 
     def parameter(self, name: str, start: float, unit: str, doc: str, lower: float = 0.0) -> ca.SX:
-        """Add a parameter; one whose name a law has gets a number."""
+        """Add a parameter and return its symbol; a number is appended to a name in use."""
         variable = Variable(
             self._free(name), unit, start=start, nominal=abs(start) or 1.0, lower=lower, doc=doc
         )
@@ -276,7 +276,9 @@ def finished(
     h: ca.SX | float,
     where: str,
 ) -> ca.SX:
-    """Return the force faded in over t_ramp, C1, while `enable` is above 1/2, and within +-F_max.
+    """Return the force with fading by `enable` and a limit.
+
+    The force fades in (C1) over t_ramp while `enable` is above 1/2, and stays within +-F_max.
 
     Args:
         ramp, limit: time [s] and largest force [N]; None if not chosen.

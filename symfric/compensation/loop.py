@@ -1,4 +1,4 @@
-"""Drive with friction under its position controller, with the generated C of a compensator."""
+"""Closed loop of a drive with friction, its position controller and compiled compensators."""
 
 import ctypes
 from collections.abc import Mapping, Sequence
@@ -34,14 +34,14 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Cascade(Parametric):
-    """Cascade of position (P) and velocity (PI) with an encoder, at a fixed sample time.
+    """Cascade controller of position (P) and velocity (PI) with an encoder and fixed sample time.
 
         x_m = count round(x / count)                     position of the encoder
         v_m = v_m + share [(x_m - x_m before) / h - v_m]    filtered difference
         v_s = v_ref + kp (r - x_m)                       set velocity
         u   = kv (v_s - v_m) + I + inertia a_ref,   I+ = I + ki kv h (v_s - v_m)
 
-    I and u are held within +-limit; I stops if u has reached it, and on `hold`.
+    I and u are held within +-limit. The integration stops while u is at its limit, and on `hold`.
     """
 
     h: float = param(1e-3, unit="s", role="time", doc="sample time", lower=1e-9)
@@ -56,7 +56,7 @@ class Cascade(Parametric):
     )
 
     def block(self) -> Block:
-        """Return (x, r, v_ref, a_ref, hold) -> u, and what it measures: x_m, v_m, e, v_s."""
+        """Return the block (x, r, v_ref, a_ref, hold) -> u and the signals x_m, v_m, e, v_s."""
         x, r, v_ref, a_ref, hold = inputs = (
             Variable("x", "m", nominal=0.1, doc="position"),
             Variable("r", "m", nominal=0.1, doc="reference position"),
@@ -96,19 +96,19 @@ class Cascade(Parametric):
 
 
 COMPILED: dict[tuple[str, str, str], Any] = {}
-"""Fingerprint of a block, type and compiler -> its compiled function of members."""
+"""Fingerprint of a block, type and compiler -> compiled function that steps all members."""
 
 
 @final
 class Members:
-    """Instances of a block; rows are members, and the arrays may be written between steps.
+    """Instances of a block; rows of the arrays are members and may be written between steps.
 
     Attributes:
         block: the block.
         state, param, input, output: shapes (members, ...), in the order of the block.
-        status: bits of all steps so far, a number each; 0 in the VM, which has no guards.
-        inputs, outputs: columns of these arrays by name.
-        step: makes one step of all members.
+        status: bits of all steps so far for each member; 0 in the VM, which has no guards.
+        inputs, outputs: columns of the arrays `input` and `output`, by name.
+        step: function that makes one step of all members.
     """
 
     def __init__(
@@ -122,7 +122,7 @@ class Members:
 
         Raises:
             ValueError: unknown parameters.
-            CompileError: the compiler rejects the C, or the library does not load here.
+            CompileError: the compiler rejects the C, or the library does not load.
         """
         self.block, count = block, len(values)
         kind = REALS[real].kind
@@ -167,7 +167,7 @@ class Members:
         return found
 
     def _in_vm(self) -> Any:
-        # CasADi's columns are the rows of the arrays
+        # rows of the arrays are columns in CasADi
         arrays = [np.array(a, float) for a in (self.state, self.param, self.input)]
         results = [np.zeros(a.shape) for a in (self.state, self.output)]
         evaluate = bound(self.block.step.map(len(self.state)), arrays, results)
@@ -182,14 +182,14 @@ class Members:
 
 
 KNOWN = ("v_ref", "a_ref", "v", "e", "u", "N", "enable")
-"""Signals of the loop that may be inputs of a block."""
+"""Signals of the loop that can be inputs of a block."""
 WHERE = "close_loop"
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """Settings that all runs of a comparison share; see `close_loop`."""
+    """Settings shared by all runs of a comparison, see `close_loop`."""
 
     controller: Cascade
     delay: int
@@ -221,36 +221,37 @@ def close_loop(
 ) -> Comparison:
     """Simulate a plant in a position loop, without compensation and with it in all `cases`.
 
-    At each sample the encoder counts the position, and the controller and the blocks are called;
-    the sum of their forces, held within the limit of the controller, acts on the plant `delay`
-    samples later for one sample. The plant makes the adaptive steps of `simulate`. The blocks are
-    the compiled C of `generate`; without a compiler CasADi's VM, which gives the same bits in
-    double.
+    At each sample, the encoder counts the position, and the controller and the blocks are called.
+    The sum of their forces, held within the limit of the controller, acts on the plant `delay`
+    samples later for one sample. The plant makes the adaptive steps of `simulate`. The blocks run
+    as the compiled C of `generate`, or, without a compiler, in CasADi's VM, which gives the same
+    bits in double.
 
     Args:
         plant: a model with one input, the force.
-        reference: with the sample time of the controller.
-        blocks: compensators and observers; their outputs `F` are added. An output `hold` stops the
+        reference: reference motion with the sample time of the controller.
+        blocks: compensators and observers, whose outputs `F` are added. An output `hold` stops the
             integrator of the controller.
-        controller: default `Cascade()`.
-        cases: name -> parameters of the blocks other than their defaults; default one case,
+        controller: controller; default `Cascade()`.
+        cases: name -> parameters of the blocks that differ from the defaults; default one case,
             "compensated".
-        delay: samples from a command to its force.
+        delay: number of samples from a command to its force.
         noise: standard deviation [m] of the position before the encoder.
-        seed: of the noise.
+        seed: seed of the noise.
         real: "double" or "float", the type of the C of the blocks.
-        backend: "c", "vm", or "auto", C if there is a compiler.
-        x0, p: start values and parameters of the plant by name.
+        backend: "c", "vm" or "auto", which selects C if there is a compiler.
+        x0, p: start values and parameters of the plant, by name.
         position, velocity: measured states of the plant.
         load: normal force [N] for blocks with an input N.
 
     Returns:
-        All loops. A failed simulation of the plant, or Ctrl-C, ends them early, see `Loop.ended`.
+        All loops. If the simulation fails or is interrupted (Ctrl-C), they end early, see
+        `Loop.ended`.
 
     Raises:
         ValueError: bad input; different sample times of reference, controller and blocks; a block
             with an input that the loop does not have, or without F.
-        CompileError: C was requested without a working compiler.
+        CompileError: C is requested and there is no working compiler.
     """
     check_model(WHERE, plant)
     several = isinstance(blocks, Block)
@@ -327,7 +328,7 @@ def _run(
     names: Sequence[str],
     setup: Setup,
 ) -> dict[str, Loop]:
-    """Return the loops of one set of blocks, all members at once."""
+    """Return the loops of all cases for one set of blocks, simulated together."""
     controller, compiler = setup.controller, setup.compiler
     count, steps = len(names), reference.x.size
     control = Members(controller.block(), [{}] * count, compiler=compiler)
@@ -340,7 +341,7 @@ def _run(
     rows = np.zeros((4, steps + 1, count))  # position, velocity, acting and added force
     rows[:2, 0] = plant.x[:, places].T
     control.state[:, 0] = rows[0, 0]
-    forces = np.zeros((steps + 1 + setup.delay, len(added), count))  # of each block, when it acts
+    forces = np.zeros((steps + 1 + setup.delay, len(added), count))  # by sample of action
     queue = [np.zeros(count) for _ in range(setup.delay)]
     ended, k = "", 0
     try:
@@ -376,9 +377,9 @@ def _commanded(
     forces: Array,
     setup: Setup,
 ) -> Array:
-    """Return the command of controller and blocks together, and write the `forces` of the blocks.
+    """Return the total command of controller and blocks; write the `forces` of the blocks.
 
-    An observer of forces does not see the forces `acted` of other blocks over the last interval.
+    The input u of an observer excludes the forces `acted` of other blocks over the last interval.
     """
     for name in ("x", "r", "v_ref", "a_ref"):
         control.inputs[name][:] = now[name]

@@ -1,4 +1,4 @@
-"""Observers of friction as blocks: its states by a law and an error, or the force by a mass."""
+"""Observers of friction as blocks: states of a law, or the force by the motion of a mass."""
 
 from collections.abc import Callable
 
@@ -21,7 +21,7 @@ from symfric.model import Output
 USE = "Call it once a sample and add F to the force that the controller commands."
 ERROR = "e is the position error, reference less measured, in the direction of v."
 Corrected = tuple[ca.SX, ca.SX]
-"""States after the step, and the mean force."""
+"""States after the step and mean force over the step."""
 ESTIMATE = "estimated friction force, to add to that of the controller; mean over the step"
 
 
@@ -36,35 +36,35 @@ def lugre_observer(
     name: str | None = None,
     turning: bool = False,
 ) -> Block:
-    """Return the bristle deflection of LuGre friction, observed by the position error of a loop.
+    """Return an observer of the bristle deflection of LuGre friction by a position error.
 
         dz/dt = v - sigma_0 |v| z / g(v) + k e,   |z| <= mu_s N / sigma_0
         F     = sigma_0 z + sigma_1 dz/dt + sigma_2 v
 
-    e is the position error, reference less measured. The step is exact for held v and e (see
+    e is the position error, reference minus measured. The step is exact for held v and e (see
     `law_block`), and z stays in the invariant set of the law, so F is bounded for every gain, error
     and step size.
 
     Stability: with F added to the force of a linear controller on a mass m, position and friction
     error go to zero if (sigma_1 s + sigma_0) / (m s^2 + k_v s + k_p) is strictly positive real,
     that is if sigma_1 k_v > sigma_0 m, for any k > 0 (Canudas de Wit et al. 1995, in continuous
-    time). A loop with a sample time, a delay or an integrator bounds k; k = 0 is the compensator.
+    time). A sample time, a delay or an integrator in the loop bounds k; k = 0 is the compensator.
 
     Args:
-        law: with numbers.
-        gain: k [1/s].
+        law: a law with numbers as parameters.
+        gain: gain k [1/s].
         N: normal force [N], a parameter of the C.
-        ramp: time [s] of fading in and out at the input `enable`; None: no such input.
+        ramp: time [s] of fading in and out at the input `enable`; None omits this input.
         limit: largest force [N].
-        h: sample time [s] as a constant; without it a parameter, by default 1 ms.
+        h: sample time [s] as a constant; without it h is a parameter, by default 1 ms.
         name: C identifier; default "lugre_observer".
-        turning: units rad/s and N m.
+        turning: True for units rad/s and N m.
 
     Raises:
-        ValueError: bad input, another law.
+        ValueError: bad input, or another law.
 
     Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE TAC 40(3), 1995, section V; the bound
-    on z is constructed.
+    on z is an addition of symfric.
     """
     kinds: tuple[type[Law], ...] = (LuGre, LuGreNormalised, LuGrePassive)
     where = _check("lugre_observer", law, kinds, "LuGre()", gain)
@@ -101,26 +101,26 @@ def gms_observer(
     name: str | None = None,
     turning: bool = False,
 ) -> Block:
-    """Return the spring forces of GMS friction, observed by the position error of a loop.
+    """Return an observer of the spring forces of GMS friction by a position error.
 
         F_i+ = F_i of the law after the step + k_i h k e,   |F_i| <= alpha_i mu_s N
         F    = F_1 + F_2 + ... + sigma_2 v
 
-    e is the position error, reference less measured; the correction stretches all springs by
+    e is the position error, reference minus measured; the correction stretches all springs by
     h k e, as it does for the bristle of LuGre. Modes are those of the law. The forces stay in the
     invariant set of the law, so F is bounded for every gain, error and step size. Stability is not
     proved; in tests of closed loops, gains far above 10/s increase the error.
 
     Args:
-        law: form = "event", whose step is known exactly.
-        gain: k [1/s].
+        law: a law with form = "event", whose step is known exactly.
+        gain: gain k [1/s].
         N, ramp, limit, h, name, turning: as for `lugre_observer`.
 
     Raises:
-        ValueError: bad input, another law or form.
+        ValueError: bad input, or another law or form.
 
-    Source: the law Al-Bender, Lampaert, Swevers, IEEE TAC 50(11), 2005; the correction is
-    constructed after the observer of LuGre.
+    Source: Al-Bender, Lampaert, Swevers, IEEE TAC 50(11), 2005, for the law; the correction follows
+    the observer of LuGre and is an addition of symfric.
     """
     where = _check("gms_observer", law, (GMS,), "GMS(form='event')", gain)
     if law.form != "event":
@@ -174,8 +174,8 @@ def _observer(
     Args:
         corrected: (law, v, N, states, gain times error, step size) -> states after the step and
             mean force.
-        what: the observed states.
-        formula: of their correction.
+        what: name of the observed states.
+        formula: formula of their correction.
     """
     inner = law_block(law, h=h)
     known = parameters(law)
@@ -217,36 +217,36 @@ def disturbance_observer(
     name: str | None = None,
     turning: bool = False,
 ) -> Block:
-    """Return the observer of all forces that oppose that of a drive, except inertia.
+    """Return an observer of all forces that oppose the force of a drive, except inertia.
 
         d = Q(s) [u - m s v],   Q = (w / (s + w))^order,   F = d
 
-    u is the force that acted up to this sample (with the delay of the drive), less that of a
+    u is the force that acted up to this sample (with the delay of the drive), minus that of a
     compensator in parallel, so that the observer estimates the remaining friction; v is the
-    velocity measured at this sample. In steps
+    velocity measured at this sample. Each step computes
 
-        f  = u - m (v - v before) / h          mean of what opposes over the last interval
+        f  = u - m (v - v before) / h          mean opposing force over the last interval
         d+ = d + (1 - exp(-w h)) (f - d)       once for each order
 
     f is the balance of impulse, exact for a held force; the filter is bounded for every h. The
-    observer needs no law, but lags by order / w, which delays it after a reversal.
+    observer needs no law, but it lags by order / w, which delays the force after a reversal.
 
     Stability: with F added to the force, the loop of observer and mass M is stable for every w, h
-    and delay of the drive if 0 < m < 2 M: its open loop is Q (1 - m/M), below one then (small
-    gain). Velocity from an encoder brings noise of m count / h^2 times (1 - exp(-w h))^order, and a
-    filter or delay on it alone bounds w: keep w below a fifth of the inverse of that lag.
+    and delay of the drive if 0 < m < 2 M, because its open loop Q (1 - m/M) is then below one
+    (small gain). Velocity from an encoder causes noise of m count / h^2 (1 - exp(-w h))^order. A
+    filter or delay of the velocity alone bounds w: keep w below a fifth of the inverse of the lag.
 
     Args:
-        mass: m [kg].
-        bandwidth: w [rad/s].
-        order: of Q, 1 or 2.
+        mass: mass m [kg].
+        bandwidth: bandwidth w [rad/s].
+        order: order of Q, 1 or 2.
         ramp, limit, h, name, turning: as for `lugre_observer`; default name "disturbance_observer".
 
     Raises:
         ValueError: bad input.
 
     Source: Ohnishi, Shibata, Murakami, IEEE/ASME Trans. Mechatronics 1(1), 1996 (Q filter of order
-    1); the balance of impulse in place of a filtered derivative is constructed.
+    1); the balance of impulse in place of a filtered derivative is an addition of symfric.
     """
     where = "disturbance_observer"
     mass = checks.number(f"{where}: mass", mass, unit="kg", above=0.0)

@@ -1,4 +1,4 @@
-"""References of a position loop with friction, and loops without compensation and with it."""
+"""References of a position loop with friction, and results with and without compensation."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,10 +22,10 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Reference of a position loop, sample by sample, each of shape (n,).
+    """Reference of a position loop.
 
     Attributes:
-        x, v, a: position [m], velocity [m/s], acceleration [m/s^2].
+        x, v, a: position [m], velocity [m/s], acceleration [m/s^2] at each sample, shape (n,).
         h: sample time [s].
     """
 
@@ -54,7 +54,7 @@ class Reference:
 
     @property
     def rest(self) -> slice | None:
-        """Second half of the time after the last motion; None without a rest of ten samples."""
+        """Second half of the rest at the end; None if this is less than ten samples."""
         last = int(np.flatnonzero(np.diff(self.x) != 0).max(initial=-1)) + 1
         begin = (last + self.x.size) // 2
         return slice(begin, None) if self.x.size - begin >= 10 else None
@@ -64,9 +64,9 @@ def sine(amplitude: float, frequency: float, t_end: float, h: float = 1e-3) -> R
     """Return the sine A (1 - cos(2 pi f t)) between 0 and 2 A, which begins at rest.
 
     Args:
-        amplitude: A [m].
-        frequency: f [Hz].
-        t_end: [s].
+        amplitude: amplitude A [m].
+        frequency: frequency f [Hz].
+        t_end: end time [s].
         h: sample time [s].
     """
     A = checks.number("sine: amplitude", amplitude, unit="m")
@@ -76,16 +76,16 @@ def sine(amplitude: float, frequency: float, t_end: float, h: float = 1e-3) -> R
 
 
 def step(height: float, t_end: float, t_step: float = 0.1, h: float = 1e-3) -> Reference:
-    """Return a jump of the position at rest."""
+    """Return a jump of the position by `height` [m] at the time `t_step` [s]."""
     height = checks.number("step: height", height, unit="m")
     t = _times("step", t_end, h)
     return Reference(np.where(t >= t_step, height, 0.0), 0 * t, 0 * t, h)
 
 
 def moves(goals: Sequence[float], duration: float, rest: float, h: float = 1e-3) -> Reference:
-    """Return moves from 0 to one goal [m] after the other, each in `duration` and a `rest` [s].
+    """Return moves from 0 to each goal [m] in turn, each of `duration` [s] and then a `rest` [s].
 
-    Each move is of fifth order, with zero velocity and acceleration at both ends.
+    Each move is a polynomial of fifth order, with zero velocity and acceleration at both ends.
     """
     places = checks.array("moves: goals", goals)
     duration = checks.number("moves: duration", duration, unit="s", above=0.0)
@@ -114,17 +114,17 @@ WITHOUT = "without"
 @final
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """One loop; arrays have an entry for each of n samples, position and velocity one more.
+    """Result of one loop over n samples.
 
     Attributes:
-        name: of the case.
+        name: name of the case.
         reference: desired motion.
-        x, v: true position [m] and velocity [m/s] at the samples and at the end.
-        force: that acted after each sample [N].
-        added: force demanded by the compensation at each sample [N].
+        x, v: true position [m] and velocity [m/s] at the samples and at the end, shape (n + 1,).
+        force: force that acted after each sample [N], shape (n,).
+        added: force commanded by the compensation at each sample [N], shape (n,).
         limit: largest force [N].
-        status: bits that the guards of the blocks have set, 0 if nothing was repaired.
-        ended: reason of an early end, "" if there is none.
+        status: bits that the guards of the blocks have set; 0 if nothing was repaired.
+        ended: reason of an early end; "" if there is none.
     """
 
     name: str
@@ -152,41 +152,41 @@ class Loop:
 
     @property
     def error(self) -> Array:
-        """Reference less true position [m]."""
+        """Reference minus true position [m]."""
         return self.reference.x[: self.force.size] - self.x[: self.force.size]
 
     @property
     def rms(self) -> float:
-        """Root of the mean square of the error [m], from the second tenth of the time on."""
+        """Root mean square of the error [m] without the first tenth of the time."""
         return float(np.sqrt(np.mean(self._late**2)))
 
     @property
     def peak(self) -> float:
-        """Largest error [m], from the second tenth of the time on."""
+        """Largest error [m] without the first tenth of the time."""
         return float(np.abs(self._late).max(initial=0.0))
 
     @property
     def hunting(self) -> float:
         """Peak-to-peak motion [m] in the second half of the last rest.
 
-        NaN where the reference does not rest at the end, or the loop ended early.
+        NaN if the reference does not rest at the end, or if the loop ended early.
         """
         rest = self.reference.rest
         return np.nan if rest is None or self.ended else float(np.ptp(self.x[:-1][rest]))
 
     @property
     def standing(self) -> float:
-        """Size of the error at the end [m]."""
+        """Magnitude of the error at the end [m]."""
         return float(np.abs(self.error[-1:]).max(initial=0.0))
 
     @property
     def work(self) -> float:
-        """Work of the force [J], exact for a force that is held."""
+        """Work of the force [J], exact for a held force."""
         return float(self.force @ np.diff(self.x))
 
     @property
     def saturated(self) -> float:
-        """Share of the samples with the largest force."""
+        """Fraction of the samples with the force at its limit."""
         return float(np.mean(np.abs(self.force) >= self.limit))
 
     @property
@@ -197,15 +197,15 @@ class Loop:
 @final
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Loops on the same plant and reference; the first is without compensation.
+    """Loops with the same plant and reference; the first is without compensation.
 
     Attributes:
-        plant: its name.
+        plant: name of the plant.
         reference: desired motion.
         loops: case -> loop.
-        count: of the encoder [m].
-        engine: of the blocks.
-        units: of position and force, such as rad and N m; read them for m and N everywhere.
+        count: one count of the encoder [m].
+        engine: description of the engine that runs the blocks.
+        units: units of position and force, such as rad and N m, which replace m and N everywhere.
     """
 
     plant: str
@@ -224,12 +224,12 @@ class Comparison:
         return self.loops[name]
 
     def reduction(self, name: str) -> float:
-        """Return the ratio of the RMS errors without compensation and in a case."""
+        """Return the RMS error without compensation divided by that of a case."""
         own = self[name].rms
         return self[WITHOUT].rms / own if own else np.inf
 
     def remarks(self) -> tuple[str, ...]:
-        """Return undesirable behaviour of the cases, one sentence each."""
+        """Return sentences about undesirable behaviour of the cases."""
         found: list[str] = []
         before = self[WITHOUT]
         for loop in self.loops.values():
@@ -256,7 +256,7 @@ class Comparison:
         return tuple(found)
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return a row for each case, as plain data."""
+        """Return one row of plain data for each case."""
         return [
             {
                 "case": loop.name,
@@ -274,7 +274,7 @@ class Comparison:
         ]
 
     def table(self) -> str:
-        """Return a table: errors in a unit of their size, hunting in counts."""
+        """Return a table with errors in a suitable unit and hunting in counts."""
         width = max(len(name) for name in self.loops)
         x, force = self.units
         scale, small = _unit_for(max(loop.peak for loop in self.loops.values()))
@@ -295,7 +295,7 @@ class Comparison:
         return "\n".join([*lines, *(f"! {remark}" for remark in self.remarks())])
 
     def to_csv(self, path: str | Path) -> None:
-        """Write time, reference, positions, forces and compensation, a row for each sample."""
+        """Write time, reference, positions, forces and compensation, one row for each sample."""
         x, force = self.units
         columns = {"t [s]": self.reference.t, f"reference [{x}]": self.reference.x}
         for name, loop in self.loops.items():
@@ -350,7 +350,7 @@ class Comparison:
         return save(figure, path)
 
     def _reversal(self) -> range:
-        """Return the samples around the last reversal of the reference, or of its final rest."""
+        """Return the samples of the final rest, or around the last reversal without a rest."""
         rest = self.reference.rest
         size = self.reference.x.size
         if rest is not None:
@@ -365,7 +365,7 @@ def _size(values: Array) -> float:
 
 
 def _unit_for(size: float) -> tuple[float, str]:
-    """Return the factor and prefix with which `size` has digits before the point."""
+    """Return factor and prefix of the unit in which `size` is at least 1."""
     for factor, prefix in ((1.0, ""), (1e3, "m")):
         if size * factor >= 1.0:
             return factor, prefix

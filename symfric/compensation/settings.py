@@ -1,4 +1,4 @@
-"""Settings of a friction compensator, their checks, and the formula they make."""
+"""Settings of a friction compensator, their checks and the resulting formula."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -17,7 +17,7 @@ BOUNDS: dict[str, tuple[str, dict[str, Any]]] = {
     "delay": ("s", {"lower": 0.0}), "error_gain": ("1/s", {"lower": 0.0}),
     "limit": ("N", {"lower": 0.0}), "slew": ("N/s", {"lower": 0.0}),
 }  # fmt: skip
-"""Unit and bound of every setting that is a number."""
+"""Unit and bound of each setting that is a number."""
 
 
 @final
@@ -25,38 +25,41 @@ BOUNDS: dict[str, tuple[str, dict[str, Any]]] = {
 class Compensation:
     """Settings of a friction compensator; its C omits features that are None or empty.
 
-    Every number is a parameter of the C that can be changed while it runs.
+    Each number becomes a parameter of the C, which can be changed at run time.
 
     Attributes:
-        velocity: velocity of the law: "blend" is the desired velocity while the measured one is
-            below `v_blend` and the measured one beyond twice that; "reference" and "measured" are
-            one of them alone. A law of the measured velocity takes damping from the loop and
-            amplifies noise; one of the reference compensates the planned motion.
-        v_blend: [m/s]; several counts of the encoder a sample, and several v_s of the law.
-        N: normal force [N], a parameter of the C; "input" makes it an input. By default that of
-            the drive; 1 with a law alone, whose coefficients are then forces.
+        velocity: velocity of the law: "reference" is the desired velocity, "measured" the measured
+            one; "blend" is the former while the latter is below `v_blend`, and the latter beyond
+            twice `v_blend`. A law of the measured velocity reduces the damping of the loop and
+            amplifies noise; a law of the reference compensates the planned motion.
+        v_blend: velocity of the transition [m/s]; use several counts of the encoder per sample, and
+            several v_s of the law.
+        N: normal force [N], a parameter of the C, or "input" for an input. By default that of the
+            drive; 1 for a law without a drive, whose coefficients are then forces.
         scales: terms of friction with an adjustable scale, 0 to 1: names of `TERMS`, or start
             values by name. By default all terms of the law except "bristle", with start value 1.
-        without: omitted terms.
-        error_gain: [1/s]; the desired velocity is v_ref + error_gain e, e the position error
-            (reference less measured), as the set velocity of a cascade. Without it a constant
-            error at rest remains. Use the position gain.
-        hold: (error [m], velocity [m/s]): an output `hold` that is 1 if reference and axis are
-            slower than the velocity and the error is smaller, else 0. It must stop the integrator
-            of the controller: if the axis jumps by more than a count at break-away, it otherwise
-            hunts permanently.
-        dead_zone: velocities up to this [m/s] count as rest.
-        build_up: travel [m] over which friction builds up after a reversal, of a law without
+        without: names of terms that are omitted.
+        error_gain: gain [1/s] of the position error e (reference minus measured); the desired
+            velocity is v_ref + error_gain e, as the set velocity of a cascade. Without it, a
+            constant error at rest remains. Use the position gain of the controller.
+        hold: (error [m], velocity [m/s]) for an output `hold` that is 1 if reference and axis are
+            slower than the velocity and the error is smaller than the error, else 0. It must stop
+            the integrator of the controller: otherwise an axis that jumps by more than a count at
+            break-away hunts permanently.
+        dead_zone: velocity [m/s] up to which the law is at rest.
+        build_up: travel [m] over which friction builds up after a reversal; for laws without
             states.
-        build_up_table: its shape: (share of the way, share of the force), from (0, 0) to (1, 1).
+        build_up_table: shape of the build-up: pairs (share of the travel, share of the force) from
+            (0, 0) to (1, 1).
         offset: additional constant force [N]; by default that of the drive.
-        inertia: mass [kg], whose product with the reference acceleration is added.
-        delay: time [s] of the look-ahead of the reference by its acceleration: the lag of the
-            drive, and half a step of the law.
-        stick: (force [N], time [s], velocity [m/s]): added while the reference is faster than
-            twice this velocity and the axis slower than it; rises and decays over this time.
-        dither: (amplitude [N], frequency [Hz]) of a sine.
-        ramp: time [s] of fading in and out at the input `enable`; None: no such input.
+        inertia: mass [kg] whose product with the reference acceleration is added.
+        delay: look-ahead time [s] of the reference, by its acceleration; use the lag of the drive
+            plus half a step of the law.
+        stick: (force [N], time [s], velocity [m/s]) of a force that is added while the reference is
+            faster than twice the velocity and the axis slower than it; it rises and decays over the
+            time.
+        dither: (amplitude [N], frequency [Hz]) of an additional sine.
+        ramp: time [s] of fading in and out at the input `enable`; None omits this input.
         limit: largest force [N].
         slew: fastest change of the force [N/s].
     """
@@ -82,7 +85,7 @@ class Compensation:
 
 
 def settings_from_text(texts: Sequence[str]) -> Compensation:
-    """Return settings from texts of a command line.
+    """Return the settings given by arguments of a command line.
 
         v_blend=0.02  scales=coulomb:0.9,stribeck:0  without=viscous  stick=1,0.1,1e-3
 
@@ -119,7 +122,7 @@ def settings_from_text(texts: Sequence[str]) -> Compensation:
 def chosen_settings(
     where: str, settings: Compensation | None, chosen: Mapping[str, Any]
 ) -> Compensation:
-    """Combine settings and keywords, and check them."""
+    """Return settings combined with keywords, after checking them."""
     checks.check_names(where, chosen, [item.name for item in fields(Compensation)])
     settings = Compensation() if settings is None else settings
     s = replace(checks.kind(where, settings, Compensation, "settings, Compensation()"), **chosen)

@@ -1,4 +1,4 @@
-"""Generated C on Cortex-M cores: cross-compiled, run under QEMU, measured."""
+"""Generated C on Cortex-M cores: cross-compilation, runs under QEMU and measurements."""
 
 from typing import TYPE_CHECKING
 

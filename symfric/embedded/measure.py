@@ -1,4 +1,4 @@
-"""Cost of a step of a block on a Cortex-M core, its accuracy, and the unit test of a kit there."""
+"""Cost and accuracy of a step of a block on a Cortex-M core, and unit tests of kits on it."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -41,7 +41,7 @@ STEPS = 400
 MEASURED = "measured"
 
 FAMILY = 1e-3
-"""Smallest divisor of the errors of a signal, relative to the largest peak of its unit."""
+"""Smallest scale of the errors of a signal, relative to the largest peak of its unit."""
 
 
 @final
@@ -50,16 +50,16 @@ class Measured:
     """Measurement of one block on one core.
 
     Attributes:
-        block, real, core, by: subject; see `CORES` and `BY`.
-        status: "measured", or a sentence about absent tools; the numbers are NaN then.
-        average, maximum: instructions of a step, including the call.
+        block, real, core, by: names of block, type, core and author of the C; see `CORES`, `BY`.
+        status: "measured", or a sentence about absent tools; the numbers are then NaN.
+        average, maximum: average and maximum number of instructions of a step, with the call.
         text: bytes of code and constants of the block.
         library: bytes of the linked functions of libm and libgcc.
         data: bytes of RAM of an instance: states and adjustable parameters.
         stack: bytes of stack used by the call, including libraries.
-        error: largest difference from CasADi's double from the same states, relative to the peak
-            of each signal, or to a thousandth of the largest peak of its unit.
-        equal: fraction of numbers with the bits of the host's C; NaN if not compared.
+        error: largest difference from a step of CasADi in double from the same states, relative to
+            the peak of each signal, or to a thousandth of the largest peak of its unit.
+        equal: fraction of numbers with the same bits as the C on the host; NaN if not compared.
         finite: True if all numbers are finite.
     """
 
@@ -80,11 +80,11 @@ class Measured:
 
     @property
     def ok(self) -> bool:
-        """True if it was measured and all numbers are finite."""
+        """True if the block was measured and all numbers are finite."""
         return self.status == MEASURED and self.finite
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all values by name; None for those that were not measured."""
+        """Return all values by name; None for values that were not measured."""
         return {
             name: None if isinstance(value, float) and not isfinite(value) else value
             for name, value in asdict(self).items()
@@ -104,23 +104,24 @@ def measure(
 ) -> Measured:
     """Cross-compile a step of `block`, run it under QEMU and compare it with the host.
 
-    QEMU counts instructions exactly, but no cycles. The inputs are those of `day`. Nothing fuses
-    multiply and add (-ffp-contract=off).
+    QEMU counts instructions exactly, but not cycles. The inputs are those of `day`. The compiler
+    does not fuse multiply and add (-ffp-contract=off).
 
     Args:
+        block: the block.
         real: "float" or "double".
         core: one of `CORES`: "m0plus", "m3", "m4f", "m7".
         by: author of the C, one of `BY`.
-        flags: of the compiler, such as -Os.
+        flags: flags of the compiler, such as -Os.
         steps: number of steps, up to 4000.
-        guards: True if the C of symfric clamps and repairs its numbers.
-        tools: returned by `find_tools`.
+        guards: True if the C of symfric has guards, see `symfric.codegen.guards`.
+        tools: result of `find_tools`.
 
     Returns:
-        The numbers; absent tools with their packages are named in `status`.
+        The measurement; its `status` names absent tools and their packages.
 
     Raises:
-        ValueError: an unknown name; too many steps.
+        ValueError: an unknown name, or too many steps.
         CompileError: the compiler rejects the code, or the program fails under QEMU.
     """
     where = "embedded"
@@ -176,8 +177,8 @@ def measure(
 def _error(block: Block, a: Array, b: Array) -> float:
     """Return the largest difference of a column relative to its peak in `b`.
 
-    A peak counts as at least a thousandth of the largest one of the same unit: the torque of an
-    upright axis under gravity is only rounding.
+    A peak counts as at least a thousandth of the largest peak of the same unit, because a signal
+    such as the torque of an upright axis under gravity may consist of rounding errors.
     """
     units = np.array([v.unit for v in (*block.states, *block.outputs.values())])
     peak = np.abs(b).max(axis=0, initial=0.0)
@@ -188,8 +189,9 @@ def _error(block: Block, a: Array, b: Array) -> float:
 
 
 def _equal(c: CBlock, source: Path, inputs: Array, rows: Array) -> float:
-    """Return the fraction of numbers with the bits of the host; NaN without a compiler, or for C
-    of CasADi.
+    """Return the fraction of numbers with the same bits as on the host.
+
+    NaN without a compiler on the host, or for C of CasADi.
     """
     compiler = find_compiler()
     if compiler is None or source.stem != c.name:
@@ -209,13 +211,14 @@ def wrong_on_target(
     """Return the number of wrong results of the unit test of a kit on a core under QEMU.
 
     Args:
-        generated: returned by `generate`, with the floating point type `real`.
+        generated: result of `generate`, which includes the type `real`.
+        real: floating-point type.
         core: one of `CORES`.
-        flags: of the compiler.
-        tools: returned by `find_tools`.
+        flags: flags of the compiler.
+        tools: result of `find_tools`.
 
     Raises:
-        ValueError: an unknown core, a type that was not generated.
+        ValueError: an unknown core, or a type that was not generated.
         CompileError: tools are absent, the compiler rejects the code, or the program fails.
     """
     where = "embedded"
@@ -236,19 +239,19 @@ def wrong_on_target(
 
 
 STRETCH = 20
-"""Number of consecutive steps with one type of motion."""
+"""Number of consecutive steps with the same type of motion."""
 
 LOADS = (1.0, 1.5, 0.5, 1.0, 0.1, 10.0)
-"""Consecutive levels of a load in units of its nominal value: steps up to a hundredfold."""
+"""Consecutive levels of a load relative to its nominal value, which step up to a hundredfold."""
 
 
 def day(block: Block, steps: int) -> Array:
     """Return inputs of every step, shape (steps, inputs), the same at each call.
 
-    In stretches of 20 steps, in units of the nominal value: a slow sine through zero, bursts up to
-    2, values of 1e-12 ... 1e-3 of either sign, reversals between -0.1 and 0.1, rest: a fifth each,
-    shuffled. A load (lower bound 0 or more) varies by a tenth around levels that jump between the
-    stretches by factors up to 100.
+    Every 20 steps, the type of motion changes; the five types are shuffled and equally frequent.
+    Relative to the nominal value, they are a slow sine through zero, bursts up to 2, values of
+    1e-12 ... 1e-3 of either sign, reversals between -0.1 and 0.1, and rest. A load (lower bound 0
+    or more) varies by a tenth around levels that jump every 20 steps by factors up to 100.
     """
     random = np.random.default_rng(0)
     columns = [np.zeros((steps, 0)), *(_signal(v, steps, random) for v in block.inputs)]

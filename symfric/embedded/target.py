@@ -1,8 +1,8 @@
 """Cortex-M cores, the tools that compile and run code for them, and programs under QEMU.
 
 The main program calls a block step by step and reports cost and results of each step by
-semihosting: numbers as words of eight hexadecimal digits, one a line, after a line with their name.
-Steps are timed by SysTick, which under QEMU's -icount counts instructions only. Start-up code,
+semihosting: a line with a name, then lines with one number each, a word of eight hexadecimal
+digits. SysTick measures the steps; under QEMU's -icount it counts only instructions. Start-up code,
 linker script and main programs are files in `sources`.
 """
 
@@ -25,15 +25,15 @@ from symfric.foundation.files import write_text
 from symfric.foundation.programs import CompileError, Compiler, ProgramError, finished
 
 BY = ("symfric", "casadi", "casadi, functions of float")
-"""Authors of the C: symfric; CasADi, whose code of float calls tanh, exp, fmax of double; CasADi
-after a header that maps them to those of float."""
+"""Authors of the C: symfric; CasADi, whose code for float calls tanh, exp, fmax for double; CasADi
+with a header that replaces these functions by those for float."""
 
 Subject = tuple[Path, dict[str, str]]
-"""File with one step of a block, and its values of the placeholders of `sources/measured.c`."""
+"""File with one step of a block, and values of the placeholders of `sources/measured.c`."""
 
 
 def own(block: Block, real: str, folder: Path, *, guards: bool) -> Subject:
-    """Write the C of symfric into `folder`."""
+    """Write the C of symfric for a step of `block` into `folder`."""
     c = CBlock(block, REALS[real], guards)
     name = c.name
     write_text(folder / f"{name}.h", header(c))
@@ -62,7 +62,7 @@ def own(block: Block, real: str, folder: Path, *, guards: bool) -> Subject:
 
 
 def by_casadi(block: Block, real: str, folder: Path, *, functions_of_float: bool) -> Subject:
-    """Write CasADi's C of the same step into `folder`."""
+    """Write the C of CasADi for a step of `block` into `folder`."""
     options = {"casadi_real": real, "casadi_int": "int", "static_aux": True,
                "include_math": not functions_of_float}  # fmt: skip
     generator = ca.CodeGenerator("casadi_step", options)
@@ -96,7 +96,7 @@ def by_casadi(block: Block, real: str, folder: Path, *, functions_of_float: bool
 
 
 def literals(values: Sequence[float], real: str) -> str:
-    """Return numbers as constants of C."""
+    """Return numbers as C constants, separated by commas."""
     form = "{:.9e}f" if real == "float" else "{:.17e}"
     return ", ".join(form.format(value) for value in values)
 
@@ -106,9 +106,9 @@ class Core(NamedTuple):
 
     Attributes:
         name: short name.
-        title: full name with its floating point unit.
-        options: of gcc.
-        machine: QEMU's board whose core runs this code.
+        title: full name with the floating-point unit.
+        options: options of gcc.
+        machine: QEMU's board whose core runs the code.
     """
 
     name: str
@@ -151,7 +151,7 @@ LIBRARY_PATIENCE = 10.0
 @final
 @dataclass(frozen=True)
 class Tools:
-    """Cross compiler, and the path of the emulator."""
+    """Cross compiler and path of the emulator."""
 
     gcc: Compiler
     qemu: str
@@ -166,7 +166,7 @@ class Absent:
 
     @property
     def advice(self) -> str:
-        """Sentence with the absent tools and their installation."""
+        """Sentence with the absent tools and the command that installs them."""
         packages = " ".join(PACKAGES[name] for name in self.names)
         return (
             f"{', '.join(self.names)} not found; on Debian and Ubuntu: "
@@ -185,7 +185,7 @@ def find_tools() -> Tools | Absent:
 
 
 def _has_library(gcc: str) -> bool:
-    """Return True if the compiler finds libm: it then prints a path and not only the name."""
+    """Return True if the compiler finds libm, and therefore prints its path, not only its name."""
     try:
         said = finished((gcc, "-print-file-name=libm.a"), limit=LIBRARY_PATIENCE).output.strip()
     except ProgramError:
@@ -200,8 +200,8 @@ FLAGS = ("-mthumb", "-std=gnu99", "-ffunction-sections", "-fdata-sections", "-ff
 """Flags for all cores."""
 
 SHIFT = 7
-"""An instruction takes 2^7 ns of QEMU's time, 3.2 ticks of SysTick; its 24 bits count up to
-5 million instructions."""
+"""Binary logarithm of the time of an instruction [ns]: 2^7 ns are 3.2 ticks of SysTick, whose
+24 bits count up to 5 million instructions."""
 
 WORD = "[0-9a-f]{8}"
 
@@ -212,7 +212,7 @@ PATIENCE = 120.0
 @final
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Core, its tools and options of the compiler."""
+    """Core with its tools and the flags of the compiler."""
 
     core: Core
     tools: Tools
@@ -222,7 +222,7 @@ class Target:
         """Return an image of a main program and `sources`, the first of which is measured.
 
         Raises:
-            CompileError: the compiler rejects it.
+            CompileError: the compiler rejects the code.
         """
         write_text(folder / "target.c", main)
         gcc, options = self.tools.gcc, (*self.core.options, *FLAGS, *self.flags, *flags)
@@ -237,10 +237,10 @@ class Target:
         return image
 
     def heard(self, image: Path) -> dict[str, NDArray[np.uint32]]:
-        """Run an image under QEMU; return the words after each name.
+        """Run an image under QEMU; return the words that it reports after each name.
 
         Raises:
-            CompileError: it does not start or end, or ends in a fault.
+            CompileError: the program does not start or end, or ends in a fault.
         """
         core = self.core
         command = (

@@ -1,1 +1,1 @@
-"""CasADi graphs as statements of C: for controllers, FMUs and graphics processors."""
+"""CasADi graphs as C statements for controllers, FMUs and graphics processors."""

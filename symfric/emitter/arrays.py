@@ -1,6 +1,6 @@
-"""C99 statements for a graph whose alike parts become loops over arrays.
+"""C99 statements for a graph whose isomorphic parts become loops over arrays.
 
-    const float u1 = ...;                      straight part: what the loop needs
+    const float u1 = ...;                      straight part: values that the loop needs
     float sum1 = 0.5f * v;
     for (int i = 0; i < 10; i++) {
         const float F_i = state->F[i];
@@ -8,11 +8,11 @@
         state->F[i] = ...;
         sum1 += ...;
     }
-    out->F = sum1;                             straight part: what needs the loop
+    out->F = sum1;                             straight part: values that need the loop
 
-Every part is a graph of its own and written by `emit`. An element's operations and the order in
+Each part is a separate graph, which `emit` writes. The operations of an element and the order in
 which elements are added are those of CasADi, so double precision gives the same bits. Without
-arrays, or if nothing repeats, the text is that of `emit`.
+arrays or repetitions, the text is that of `emit`.
 """
 
 from collections import Counter
@@ -50,13 +50,13 @@ def emit_rolled(
     """Write `source` as C statements with loops over `arrays`.
 
     Args:
-        source, names, targets, real, loads: as for `emit`. A place in `loads` that several parts
-            use, or that a loop overwrites, is loaded first.
-        arrays: rows that loops may index; an argument and a result with the same text are the same
-            memory, all others must not overlap.
+        source, names, targets, real, loads: arguments of `emit`. A place in `loads` that several
+            parts use, or that a loop overwrites, is loaded first.
+        arrays: rows that loops may index; an argument and a result with the same text share memory,
+            all others must not overlap.
 
     Raises:
-        ValueError: as `emit`.
+        ValueError: errors of `emit`.
     """
     if arrays.read or arrays.written:
         plan = planned(_better(source), arrays)
@@ -66,18 +66,19 @@ def emit_rolled(
 
 
 def _better(source: Graph) -> Graph:
-    """Return the graph as `emit` writes it: parts that differ by a known guard only are equal."""
+    """Return the graph that `emit` writes; parts that differ only by a known guard are equal."""
     return settled(simplified(source))
 
 
 class _Part(NamedTuple):
-    """One straight part of a plan.
+    """Straight part of a plan.
 
     Attributes:
-        kept: the operations in it.
-        into: what it takes from earlier parts and from sums.
-        inputs: (argument, row) that it uses.
-        rows: of every result, the rows that it writes; `results` are their nodes.
+        kept: operations of the part.
+        into: nodes that the part takes from earlier parts and from sums.
+        inputs: (argument, row) of the inputs that the part uses.
+        rows: rows of every result that the part writes.
+        results: nodes of these rows.
     """
 
     number: int
@@ -104,7 +105,7 @@ def _part(plan: Plan, number: int) -> _Part:
 
 
 class _Rolled:
-    """Writes a plan with loops."""
+    """Writer of a plan with loops."""
 
     def __init__(
         self,
@@ -147,7 +148,7 @@ class _Rolled:
         self.calls, self.operations, self.outside = Counter[str](), 0, 0
 
     def free(self, name: str) -> str:
-        """Return a name that nothing else has."""
+        """Return an unused name that begins with `name`, and reserve it."""
         while name in self.taken:
             name += "_"
         self.taken.add(name)
@@ -173,14 +174,14 @@ class _Rolled:
         return Code(frozenset(self.used), lines, self.calls, self.operations, self.outside)
 
     def _counted(self, code: Code, times: int = 1) -> tuple[str, ...]:
-        """Return the lines of a part that is executed so often."""
+        """Return the lines of a part; count its operations, which are executed `times` times."""
         self.calls.update({call: times * count for call, count in code.calls.items()})
         self.operations += times * code.operations
         self.outside += times * code.outside
         return code.lines
 
     def _split(self, nodes: Sequence[int]) -> list[list[int]]:
-        """Return the numbers and the conditions among some nodes."""
+        """Return the numbers and the conditions among `nodes`."""
         return [[i for i in nodes if is_truth(self.source, i) == truth] for truth in (False, True)]
 
     def _straight(self, part: _Part) -> Iterator[str]:
@@ -267,12 +268,12 @@ class _Rolled:
 
 
 def _declared(lines: Sequence[str], waiting: Mapping[str, str]) -> Iterator[str]:
-    """Yield the lines with a declaration of every name, at its only assignment or before all.
+    """Yield the lines with a declaration of each name, at its only assignment or before all lines.
 
-    A local whose value another name only copies has that name.
+    If a name only copies a local, the local is renamed to it.
 
     Args:
-        waiting: name -> its type.
+        waiting: type of each name to declare.
     """
     once = {name for name in waiting if any(line.startswith(f"{name} = ") for line in lines)}
     called: dict[str, str] = {}

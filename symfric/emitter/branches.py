@@ -1,7 +1,7 @@
-"""Choice of selects that become `if`, with every operation in the branch that needs it.
+"""Selects that become `if` statements, and the operations that move into their branches.
 
 A select with a costly side becomes a branch that contains the operations that only this side
-needs, nested to any depth; selects of one region with the same condition share a branch.
+needs. Branches may be nested; selects of one region with the same condition share a branch.
 """
 
 from collections import Counter
@@ -17,13 +17,13 @@ from symfric.foundation.graph import LEAVES, SELECT, Graph
 LEAST = 4
 """Smallest cost of a side that becomes a branch [additions]."""
 SHARE = 2
-"""Smallest cost of a side for each select of a branch: cheaper ones only keep operands waiting."""
+"""Smallest cost of a side per select of the branch; cheaper ones only keep operands alive."""
 DEEPEST = 30
-"""Largest depth of branches; selects below are written with `?:`."""
+"""Largest depth of branches; deeper selects are written with `?:`."""
 COSTS = {ca.OP_DIV: 4, ca.OP_INV: 4, ca.OP_SQRT: 4, ca.OP_FLOOR: 8, ca.OP_CEIL: 8} | dict.fromkeys(
     TRANSCENDENTAL, 30
 )
-"""Cost of operations [additions], if it is not 1."""
+"""Cost of the operations whose cost is not 1 [additions]."""
 
 
 class Region(NamedTuple):
@@ -32,7 +32,7 @@ class Region(NamedTuple):
     Attributes:
         parent: number of the region that contains the branch.
         depth: number of enclosing branches.
-        label: of the branch in its parent.
+        label: label of the branch in its parent.
     """
 
     parent: int
@@ -47,11 +47,11 @@ class Placed:
 
     Attributes:
         source: the graph.
-        regions: all, the function first, a parent before its inner regions.
+        regions: all regions; the function is first, and a parent precedes its inner regions.
         place: number of the region of each node.
-        labels: of the selects that are branches; selects in one region with one label are one.
-        inside: (region, label, side) -> number of the region of that side: 1 if the condition
-            holds, 2 if not, as in the arguments of a select.
+        labels: labels of the selects that become branches; equal labels in a region share one.
+        inside: (region, label, side) -> number of the region of that side; the side is 1 if the
+            condition holds and 2 if not, as in the arguments of a select.
     """
 
     source: Graph
@@ -80,7 +80,7 @@ def placed(source: Graph, apart: Iterable[int] = ()) -> Placed:
 
 
 def _placed(source: Graph, labels: Mapping[int, int]) -> Placed:
-    """Put every node into the innermost region that contains all its users."""
+    """Return the graph with every node in the innermost region that contains all its users."""
     regions, inside = [Region(0, 0, 0)], dict[tuple[int, int, int], int]()
     place = [-1] * len(source.nodes)
 
@@ -112,7 +112,7 @@ def _placed(source: Graph, labels: Mapping[int, int]) -> Placed:
 
 
 def _cheap(found: Placed) -> set[int]:
-    """Return selects that are not worth a branch; without it, those around them may not be."""
+    """Return selects whose branches save too little; enclosing branches may depend on them."""
     cost = [0] * len(found.regions)
     for i, node in enumerate(found.source.nodes):
         if node.op not in LEAVES:

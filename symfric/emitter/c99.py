@@ -1,4 +1,4 @@
-"""C99 for CasADi's numbers, operations and expressions."""
+"""C99 text of CasADi's numbers, operations and expressions."""
 
 import math
 from collections.abc import Sequence
@@ -19,13 +19,13 @@ TERNARY, LOGIC, EQUAL, ORDER, SUM, PRODUCT, SIGN, ATOM = range(1, 9)
 
 @dataclass(frozen=True)
 class Real:
-    """Floating point type of C.
+    """Floating-point type of C.
 
     Attributes:
-        name: in C.
+        name: name in C.
         suffix: ending of the names of types and functions.
         letter: ending of literals and of the functions of math.h.
-        size: bytes.
+        size: size in bytes.
     """
 
     name: str
@@ -35,7 +35,7 @@ class Real:
 
     @property
     def kind(self) -> Any:
-        """Same type in NumPy."""
+        """The same type in NumPy."""
         return np.float32 if self.size == 4 else np.float64
 
     def rounded(self, values: object) -> NDArray[np.float64]:
@@ -103,7 +103,7 @@ FORMS: dict[int, Form] = {
 }
 
 CHEAP = {CODES[name]: name for name in ("fabs", "sqrt", "floor", "ceil", "copysign")}
-"""Functions of math.h that are an instruction or a few on most processors."""
+"""Functions of math.h that take one or a few instructions on most processors."""
 
 TRANSCENDENTAL = {ca.OP_CONSTPOW: "pow"} | {
     CODES[name]: name
@@ -113,7 +113,7 @@ TRANSCENDENTAL = {ca.OP_CONSTPOW: "pow"} | {
         *("fmod", "remainder"),
     )
 }
-"""Functions of math.h that cost tens of instructions."""
+"""Functions of math.h that take tens of instructions."""
 
 FUNCTIONS = CHEAP | TRANSCENDENTAL
 
@@ -143,10 +143,10 @@ SMALLEST_FLOAT = float(np.finfo(np.float32).tiny)
 
 
 def representable(whole: Graph, real: Real) -> Graph:
-    """Return the graph with constants that vanish in single precision replaced by the smallest
-    normal number of their sign.
+    """Return the graph without constants that vanish in single precision.
 
-    Robot files contain 1e-67 for 0, and a divisor must not become 0.
+    They become the smallest normal number of their sign: robot files contain 1e-67 for 0, and a
+    divisor must not become 0.
     """
 
     def kept(node: Node) -> Node:
@@ -158,7 +158,7 @@ def representable(whole: Graph, real: Real) -> Graph:
 
 
 class Expression(NamedTuple):
-    """Text and how tightly it binds."""
+    """Text of an expression and its precedence."""
 
     text: str
     binds: int
@@ -170,10 +170,10 @@ class Expression(NamedTuple):
 
 @final
 class Writer:
-    """Writes nodes as formulas of named nodes.
+    """Writer of nodes as C formulas, in which other nodes appear by name.
 
     Attributes:
-        names: of nodes.
+        names: names of nodes.
         logical: for each node, True if it is a bool.
     """
 
@@ -184,7 +184,7 @@ class Writer:
         self.constants = {name: real.literal(value) for name, value in values.items()}
 
     def expression(self, i: int) -> Expression:
-        """Return the value of a node in its own type."""
+        """Return the value of a node, a bool or a number."""
         if i in self.names:
             return Expression(self.names[i], ATOM)
         node = self.source.nodes[i]
@@ -206,7 +206,7 @@ class Writer:
         return Expression(pattern.format(*texts, **self.constants), binds)
 
     def number(self, i: int) -> Expression:
-        """Return the value of a node, of a bool the number 1 or 0."""
+        """Return the value of a node as a number; a bool becomes 1 or 0."""
         value = self.expression(i)
         if not self.logical[i]:
             return value
@@ -214,7 +214,7 @@ class Writer:
         return Expression(f"{value.within(LOGIC)} ? {one} : {zero}", TERNARY)
 
     def negation(self, i: int) -> Expression:
-        """Return the opposite of a bool."""
+        """Return the negation of a bool."""
         node = self.source.nodes[i]
         if i not in self.names and node.op in OPPOSITE:
             return self._operation(i, OPPOSITE[node.op])
@@ -223,7 +223,7 @@ class Writer:
         return Expression(f"!{self.expression(i).within(ATOM)}", SIGN)
 
     def truth(self, i: int) -> Expression:
-        """Return the value of a node that is a bool or one of the numbers 1 and 0."""
+        """Return the value of a node (a bool, or the number 1 or 0) as a bool."""
         node = self.source.nodes[i]
         if node.op == ca.OP_CONST:
             return Expression("true" if node.value else "false", ATOM)
@@ -231,4 +231,4 @@ class Writer:
 
 
 MIRRORED = {ca.OP_LT: "{} > {}", ca.OP_LE: "{} >= {}", ca.OP_EQ: "{} == {}", ca.OP_NE: "{} != {}"}
-"""Comparisons with a constant on the left, written from the right: x > 0 for 0 < x."""
+"""Comparisons that move a constant from the left to the right, such as x > 0 for 0 < x."""

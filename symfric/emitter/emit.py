@@ -1,10 +1,10 @@
 """C99 statements for the graph of a CasADi function.
 
 A shared value becomes a constant local before its first use; a value that is used once is written
-inside the formula that uses it, so formulas stay recognisable. Operations that only one side of a
-select needs are in a branch, see `branches`; cheap sides stay `?:`. The order of the operations in
-a formula is CasADi's, so double precision gives the same bits (for NaN and the sign of zero see
-`logic`).
+inside the formula that uses it, so that formulas remain recognisable. Operations that only one side
+of a select needs are in a branch, see `branches`; selects with cheap sides become `?:`. The
+operations in a formula have CasADi's order, so double precision gives the same bits (for NaN and
+the sign of zero, see `logic`).
 """
 
 from collections import Counter
@@ -28,10 +28,10 @@ class Code:
 
     Attributes:
         used: (argument, row) of the inputs that occur.
-        lines: C, one statement a line; statements inside a branch are indented by four blanks.
-        calls: function of math.h (double's name) -> number of calls, in all branches.
+        lines: lines of C; statements inside a branch are indented by four blanks.
+        calls: function of math.h (name for double) -> number of calls, in all branches.
         operations: number of operations, including calls, in all branches.
-        outside: number of operations outside of branches, which are always executed.
+        outside: number of operations outside branches, which are always executed.
     """
 
     used: frozenset[tuple[int, int]]
@@ -54,25 +54,25 @@ def emit(
 ) -> Code:
     """Write `source` as C statements.
 
-    Results are written as soon as they are known, so arguments and results may share memory only in
-    these ways: a place in `loads` is read before a result with the same text is written; an
-    argument named by an identifier is a local. If an argument that is used has another name
-    (`a[3]`), all results are written after the last read.
+    Results are written as soon as they are known. Therefore an argument and a result may share
+    memory only if the place of the argument in `loads` has the text of the result; it is then read
+    first. An argument named by an identifier is a local variable. If a used argument has another
+    name (`a[3]`), all results are written after the last read.
 
     Args:
-        source: the graph of the function.
-        names: the C identifiers that hold the rows of each argument.
-        targets: a pattern for every row of every result, such as "state->z = {};".
-        real: floating point type.
-        loads: (argument, row) -> text of the places (such as "state->z") whose values are loaded
-            into locals, with the name in `names`, before their first use.
+        source: graph of the function.
+        names: C names of the rows of each argument.
+        targets: pattern for every row of every result, such as "state->z = {};".
+        real: floating-point type.
+        loads: (argument, row) -> text of a place, such as "state->z", whose value is loaded into a
+            local with the name in `names` before its first use.
         stem: first letters of the names of locals.
         conditions: arguments that are bools in C.
         truths: results that are bools in C.
 
     Raises:
-        ValueError: operations without counterpart in C99, all by name, or constants outside the
-            range of the type.
+        ValueError: operations without counterpart in C99 (the message names them all), or constants
+            outside the range of the type.
     """
     unsupported = {node.op for node in source.nodes} - LEAVES - LOWERED - {*FORMS} - {*FUNCTIONS}
     if unsupported:
@@ -120,11 +120,11 @@ def _stores(
 
 
 class _Body:
-    """Writes the statements of a plan.
+    """Writer of the statements of a plan.
 
     Attributes:
         used: (argument, row) of the inputs that occur.
-        loads: inputs that are still to be loaded, with their places.
+        loads: places of the inputs that are still to be loaded, by node.
     """
 
     def __init__(
@@ -160,7 +160,7 @@ class _Body:
         return lines
 
     def _loaded(self, number: int, statement: Statement) -> list[int]:
-        """Return nodes that have to be loaded before a statement of a region."""
+        """Return the nodes that must be loaded before a statement of a region."""
         places, taken = self.plan.placed.place, self.plan.takes[statement]
         stores: list[object] = [statement]
         if isinstance(statement, Branch):
@@ -195,7 +195,7 @@ class _Body:
                 return [self._stored(statement, self.plan.placed.source.results[result][row])]
 
     def _goal(self, select: int) -> int | Store:
-        """Return the result that a select becomes, or the select whose variable it shares."""
+        """Return the result that a select is written to, or the select whose variable it shares."""
         goal = self.plan.goals.get(select)
         return select if goal is None else goal if isinstance(goal, Store) else self._goal(goal)
 
@@ -224,7 +224,7 @@ class _Body:
         return "bool" if self.writer.logical[i] else self.real.name
 
     def _name(self, i: int) -> str:
-        """Return a new name for the local of a node."""
+        """Return a new name for the local of a node, and record it."""
         self.count += 1
         self.writer.names[i] = f"{self.stem}{self.count}"
         return self.writer.names[i]

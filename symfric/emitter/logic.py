@@ -7,21 +7,21 @@ the same values in which
 * conditions (of selects, and in and, or, not) are comparisons and combinations of them, never
   numbers that are compared with 0; negations are innermost and constants are folded;
 * `if_else_zero`, `fmin` and `fmax` are selects;
-* 2 (0.5 / x), by which `reciprocal` keeps CasADi from dividing again, is 1 / x: the same bits for
-  |x| below 2e307 (4e37 in float).
+* 2 (0.5 / x), by which `reciprocal` keeps CasADi from dividing again, is 1 / x, with the same bits
+  for |x| below 2e307 (4e37 in float).
 
 All finite numbers and infinities keep their bits, except for the sign of a zero, which C leaves to
-the library in fmin(0, -0). For NaN, `fmin(x, c)` gives c as CasADi's does if c is known to be a
-number (a constant, or a value clipped to one), so every clip to constant bounds is NaN-proof; of
-two others, `fmin(x, NaN)` is NaN here and x in CasADi. The derivative of `fmin(x, y)` at NaN is
-that of one side and not NaN.
+the library in fmin(0, -0). If x is NaN, `fmin(x, c)` is c, as in CasADi, if c is known to be a
+number (a constant, or a value clipped to one), so a clip to constant bounds is never NaN. For other
+operands, `fmin(x, NaN)` is NaN here and x in CasADi. The derivative of `fmin(x, y)` at NaN is that
+of one side and not NaN.
 
 `settled` then removes selects whose condition is known wherever they are used. An expression with
 correct derivatives guards the branch that is not taken:
 
     near ? series : expm1(x) / (near ? 1 : x)
 
-Here the inner select is used in the second branch alone and is x.
+Only the second branch uses the inner select, which is therefore x.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -46,10 +46,10 @@ LOWERED = frozenset({ca.OP_FMIN, ca.OP_FMAX, ca.OP_IF_ELSE_ZERO})
 def simplified(
     source: Graph, conditions: Collection[int] = (), truths: Collection[int] = ()
 ) -> Graph:
-    """Return the simplified graph of the same values; a simplified one is unchanged.
+    """Return a simplified graph with the same values; a simplified graph is unchanged.
 
     Args:
-        source: of numbers.
+        source: graph of numbers.
         conditions: arguments that are bools.
         truths: results that become bools.
     """
@@ -72,7 +72,7 @@ def logical(nodes: Sequence[Node], conditions: Collection[int] = ()) -> list[boo
 
 
 def is_logical(node: Node, before: Sequence[bool], conditions: Collection[int]) -> bool:
-    """Return True if a node is a bool, given the earlier ones."""
+    """Return True if a node is a bool, given the results `before` of the earlier nodes."""
     if node.op == ca.OP_INPUT:
         return node.entry[0] in conditions
     if node.op == SELECT:
@@ -92,7 +92,7 @@ class _Algebra:
     """True for constants and bools, which are never NaN."""
 
     def of(self, node: Node, args: Sequence[int]) -> int:
-        """Return the number of a node that means `node` with these arguments."""
+        """Return the number of a node with the value of `node` for these arguments."""
         match node.op:
             case ca.OP_FMIN | ca.OP_FMAX:
                 return self.extreme(node.op, *args)
@@ -150,7 +150,7 @@ class _Algebra:
         return i if self.logical[i] else self.compared(ca.OP_NE, i, self.constant(0.0))
 
     def negated(self, i: int) -> int:
-        """Return the opposite of a bool; it moves into and, or if that saves a negation."""
+        """Return the negation of a bool, moved into `and` or `or` if this saves a negation."""
         node, value = self.nodes[i], self.value(i)
         if value is not None:
             return self.constant(float(value == 0.0))
@@ -204,11 +204,11 @@ class _Algebra:
         return node.args[taken] if node.op == SELECT and node.args[0] == condition else side
 
     def _is_boolean(self, i: int) -> bool:
-        """Return True for a bool, and for the numbers 1 and 0."""
+        """Return True if node `i` is a bool or one of the numbers 1 and 0."""
         return self.logical[i] or self.value(i) in (0.0, 1.0)
 
     def compared(self, op: int, a: int, b: int) -> int:
-        """Return a comparison; of a choice between constants with a constant it is the choice."""
+        """Return a comparison; for a select of constants and a constant, a condition."""
         x, y = self.value(a), self.value(b)
         if x is not None and y is not None:
             return self.constant(float(COMPARISONS[op](x, y)))
@@ -232,7 +232,7 @@ class _Algebra:
         return self.add(op, a, b)
 
     def extreme(self, op: int, a: int, b: int) -> int:
-        """Return the smaller or the larger of two."""
+        """Return the smaller (`fmin`) or the larger (`fmax`) of two numbers."""
         if a == b:
             return a
         if self.number[a] and not self.number[b]:
@@ -240,16 +240,14 @@ class _Algebra:
         return self._clip(op, a, b) or self._first_if(op, a, b)
 
     def _first_if(self, op: int, a: int, b: int) -> int:
-        """Return one of two; of equal ones the first, or the one known to be a number."""
+        """Return the extreme as a select; if equal, it is `b` if known as a number, else `a`."""
         if not self.number[b]:
             a, b = b, a
         order = (a, b) if op == ca.OP_FMIN else (b, a)
         return self.select(self.compared(ca.OP_LT, *order), a, b)
 
     def _clip(self, op: int, a: int, b: int) -> int | None:
-        """Return a clip to constants, the second after the first: x > low ? (x < high ? x : high) :
-        low.
-        """
+        """Return the clip x > low ? (x < high ? x : high) : low to constants; None otherwise."""
         node, bound = self.nodes[a], self.value(b)
         if bound is None or node.op != SELECT:
             return None
@@ -264,9 +262,9 @@ class _Algebra:
         return self.add(SELECT, condition, self._first_if(op, x, b), other)
 
     def weight_of_side(self, a: int, b: int) -> int | None:
-        """Return a side's share in the derivative of fmin, fmax: (p <= q) / ((p <= q) + (q <= p)).
+        """Return (p <= q) / ((p <= q) + (q <= p)), the weight of a side in derivatives of fmin.
 
-        It is 1, 1/2 or 0.
+        It is 1, 1/2 or 0. Returns None for other quotients. `fmax` has the same weights.
         """
         total, one = self.nodes[b], self.nodes[a]
         if one.op != ca.OP_LE or total.op != ca.OP_ADD or a not in total.args:
@@ -279,20 +277,20 @@ class _Algebra:
 
 
 Fact = tuple[int, bool]
-"""Node, and True if it holds."""
+"""Condition, and True if it holds or False if it does not."""
 
 NEEDED: Mapping[int, tuple[bool | None, ...]] = {
     SELECT: (None, True, False), ca.OP_IF_ELSE_ZERO: (None, True), ca.OP_AND: (None, True),
     ca.OP_OR: (None, False),
 }  # fmt: skip
-"""Value of the first argument at which each argument is needed; None if always."""
+"""Value of the first argument for which each argument is needed; None if it is always needed."""
 
 
 def settled(source: Graph) -> Graph:
-    """Return the same results without selects whose condition is known where they are used.
+    """Return the graph without selects whose condition is known wherever they are used.
 
-    A node is used in a branch alone if all its users are; since C does not compute a branch that
-    is not taken, its condition is then a fact. Values are the same to the bit.
+    A node belongs to a branch if all its users do. Since C does not compute a branch that is not
+    taken, the condition of the branch is then known. Values keep all their bits.
     """
     while True:
         facts = _facts(source)
@@ -330,7 +328,7 @@ def _branches(source: Graph, node: Node) -> Iterator[tuple[int, frozenset[Fact]]
 
 
 def _implied(source: Graph, number: int, truth: bool) -> Iterator[Fact]:
-    """Yield the fact itself and those of its parts that follow."""
+    """Yield the fact itself and the facts about its operands that it implies."""
     yield number, truth
     node = source.nodes[number]
     if node.op == ca.OP_NOT:

@@ -1,13 +1,13 @@
-"""Parts of a graph that are alike, one per element of an array.
+"""Isomorphic parts of a graph, one for each element of an array.
 
-A law of n elements is the same part of CasADi's graph n times. Two kinds of rows indicate this:
+A law of n elements repeats a part of CasADi's graph n times. Two kinds of rows indicate this:
 
     stores   next_1, next_2, ..., next_n            consecutive rows of a result
     sums     start + term_1 + term_2 + ... + term_n
 
-Their graphs are merged from the top: n nodes with the same operation become one node, until
-all n are the same node (a value from outside the loop), consecutive rows of an array, or constants
-(a table). Graphs that differ in anything else are written out.
+Their graphs are merged from the results down: n nodes with the same operation become one node,
+until all n are the same node (a value from outside the loop), consecutive rows of an array, or
+constants (a table). Graphs with other differences are not merged.
 """
 
 from collections import Counter
@@ -24,10 +24,10 @@ LEAST = 3
 """Smallest number of elements in a loop."""
 
 OUTER, TRUTH, READ, TABLE = range(4)
-"""Arguments of the graph of a loop's body."""
+"""Arguments of the graph of a loop body."""
 
 Lanes = tuple[int, ...]
-"""Alike nodes, one of every element."""
+"""Corresponding nodes, one for each element."""
 
 
 @final
@@ -37,8 +37,8 @@ class Array:
 
     Attributes:
         group: number of the argument or result.
-        text: C in front of the index, such as `state->F`. An argument and a result with the same
-            text are the same memory.
+        text: C text in front of the index, such as `state->F`. An argument and a result with the
+            same text share memory.
     """
 
     group: int
@@ -47,14 +47,14 @@ class Array:
     text: str
 
     def holds(self, entry: tuple[int, int]) -> bool:
-        """Return True if the row (group, row) belongs to it."""
+        """Return True if the array contains the row `entry`, (group, row)."""
         return entry[0] == self.group and self.first <= entry[1] < self.first + self.size
 
 
 @final
 @dataclass(frozen=True)
 class Arrays:
-    """Rows that C can index: of arguments, which are `read`, and of results, `written`."""
+    """Rows that C can index: rows of arguments (`read`) and of results (`written`)."""
 
     read: tuple[Array, ...] = ()
     written: tuple[Array, ...] = ()
@@ -63,7 +63,7 @@ class Arrays:
 @final
 @dataclass(frozen=True)
 class Store:
-    """Rows of a result from `offset` on in `array`."""
+    """Consecutive rows of a result, beginning at `offset` in `array`."""
 
     lanes: Lanes
     array: Array
@@ -73,7 +73,7 @@ class Store:
 @final
 @dataclass(frozen=True)
 class Sum:
-    """Node `total` = `start` + lanes in their order; without a start the lanes alone."""
+    """Node `total`: the sum of `start`, if there is one, and the lanes in their order."""
 
     lanes: Lanes
     start: int | None
@@ -90,11 +90,11 @@ class Body:
 
     Attributes:
         graph: arguments `OUTER`, `TRUTH`, `READ`, `TABLE`; results: rows stored, terms added.
-        outer: the nodes of the whole graph behind the rows of `OUTER`.
-        truths: those behind the rows of `TRUTH`, which are conditions.
-        reads: array and offset of the first element behind the rows of `READ`.
-        tables: constants of all elements behind the rows of `TABLE`.
-        inside: the operations of the whole graph that it does.
+        outer: nodes of the whole graph that the rows of `OUTER` stand for.
+        truths: conditions of the whole graph that the rows of `TRUTH` stand for.
+        reads: array and offset of the first element, for each row of `READ`.
+        tables: constants of all elements, for each row of `TABLE`.
+        inside: operations of the whole graph that the loop computes.
     """
 
     graph: Graph
@@ -106,12 +106,12 @@ class Body:
 
     @property
     def taken(self) -> tuple[int, ...]:
-        """Nodes from outside the loop."""
+        """Nodes that the loop takes from outside."""
         return (*self.outer, *self.truths)
 
 
 def strands(source: Graph, arrays: Arrays) -> list[Strand]:
-    """Return all rows and sums whose graphs are alike over `LEAST` or more elements."""
+    """Return all rows and sums whose graphs are isomorphic for `LEAST` or more elements."""
     found: list[Strand] = []
     for array in arrays.written:
         nodes = source.results[array.group][array.first : array.first + array.size]
@@ -126,7 +126,7 @@ def strands(source: Graph, arrays: Arrays) -> list[Strand]:
 def _runs(
     source: Graph, nodes: Sequence[int], arrays: Arrays, same: bool = False
 ) -> Iterator[tuple[int, int]]:
-    """Yield ranges of alike neighbours: different nodes, or, if requested, the same node."""
+    """Yield ranges of isomorphic neighbours; with `same`, also those of one repeated node."""
 
     def alike(lanes: Lanes) -> bool:
         several = len(set(lanes))
@@ -145,7 +145,7 @@ def _runs(
 
 
 def _chains(source: Graph) -> Iterator[tuple[list[int], list[int]]]:
-    """Yield the terms of every sum of three and more, and the nodes after adding each of them."""
+    """Yield the terms of each sum of `LEAST` or more, and the nodes after adding each term."""
     uses = Counter(i for node in source.nodes for i in node.args)
     uses.update(i for row in source.results for i in row)
 
@@ -167,7 +167,7 @@ def _chains(source: Graph) -> Iterator[tuple[list[int], list[int]]]:
 def _gathered(
     source: Graph, roots: Sequence[Lanes], arrays: Arrays
 ) -> dict[Lanes, tuple[Lanes, ...]] | None:
-    """Return all lanes under the roots with their arguments; None if the graphs are not alike."""
+    """Return all lanes under the roots with their arguments; None if not isomorphic."""
     found: dict[Lanes, tuple[Lanes, ...]] = {}
     waiting = list(roots)
     while waiting:
@@ -194,10 +194,10 @@ def _gathered(
 
 
 def woven(source: Graph, strands: Sequence[Strand], arrays: Arrays) -> Body:
-    """Return the body of the loop that makes all `strands`, which have equally many lanes.
+    """Return the body of the loop that computes all `strands`, which have equal numbers of lanes.
 
     Raises:
-        ValueError: their graphs are not alike.
+        ValueError: the graphs of the strands are not isomorphic.
     """
     gathered = _gathered(source, [strand.lanes for strand in strands], arrays)
     if gathered is None:

@@ -2,8 +2,8 @@
 
     part 0,  loops of stage 1,  part 1,  loops of stage 2,  ...,  last part
 
-A loop belongs to the stage after everything that it takes from outside is known; a straight value
-is computed in the last part that is early enough for all its users.
+A loop belongs to the first stage at which all values that it takes from outside are known. A value
+outside the loops is computed in the last part that precedes all its users.
 """
 
 from collections import Counter
@@ -21,7 +21,7 @@ CALL = 20
 """Cost of a transcendental function [operations]."""
 
 SPARED = 8
-"""Smallest number of operations that a loop must spare."""
+"""Smallest number of operations that a loop must save."""
 
 MORE = 1.1
 """Largest ratio of executed operations with and without loops."""
@@ -39,19 +39,19 @@ class Loop:
 
     @property
     def sums(self) -> list[Sum]:
-        """Sums that it adds up."""
+        """Sums that the loop computes."""
         return [strand for strand in self.strands if isinstance(strand, Sum)]
 
     @property
     def stores(self) -> list[Store]:
-        """Rows that it writes."""
+        """Rows that the loop writes."""
         return [strand for strand in self.strands if isinstance(strand, Store)]
 
 
 @final
 @dataclass(frozen=True)
 class Plan:
-    """Graph with its loops, in the order of their execution."""
+    """Graph with its loops in the order of their execution."""
 
     source: Graph
     loops: tuple[Loop, ...] = ()
@@ -63,12 +63,12 @@ class Plan:
 
     @cached_property
     def totals(self) -> dict[int, Sum]:
-        """Sums of all loops by their node."""
+        """Sums of all loops, by their node in the graph."""
         return {s.total: s for loop in self.loops for s in loop.sums}
 
     @cached_property
     def stored(self) -> set[tuple[int, int]]:
-        """(result, row) of everything that loops write."""
+        """(result, row) of all rows that loops write."""
         return {
             (s.array.group, s.array.first + s.offset + i)
             for loop in self.loops
@@ -83,7 +83,7 @@ class Plan:
 
     @cached_property
     def needed(self) -> dict[int, int]:
-        """Node -> the last straight part that serves all users, of nodes outside the loops."""
+        """Last straight part that serves all users, for each node outside the loops."""
         found: dict[int, int] = {}
 
         def need(nodes: Sequence[int], part: int) -> None:
@@ -103,7 +103,7 @@ class Plan:
 
     @cached_property
     def part(self) -> dict[int, int]:
-        """Operation -> the straight part that computes it; not of sums and inside loops."""
+        """Straight part that computes each operation, without sums and operations in loops."""
         nodes = self.source.nodes
         return {
             i: part
@@ -113,10 +113,11 @@ class Plan:
 
 
 def planned(source: Graph, arrays: Arrays) -> Plan:
-    """Return the graph with all loops that spare statements and cost next to nothing.
+    """Return the graph with all loops that save statements at little cost.
 
-    Omitted are loops that would overwrite what another one has yet to read, unused sums, short
-    loops and, if too much would be computed twice, those that do so.
+    Loops are omitted if they are short, if their sums are unused, or if they would overwrite rows
+    that another loop has yet to read. If too many operations would be repeated, the loops that
+    repeat most of them are omitted as well.
     """
     chosen = {s: woven(source, [s], arrays) for s in strands(source, arrays)}
     while chosen:
@@ -140,7 +141,7 @@ def _loops(source: Graph, chosen: Mapping[Strand, Body], arrays: Arrays) -> tupl
 
 
 def _stages(source: Graph, bodies: Mapping[Strand, Body]) -> dict[Strand, int]:
-    """Return the stage of every strand: after what it needs, stores not before others have read."""
+    """Return the stage of each strand: after the values it needs; stores not before readers."""
     sums = {strand.total: strand for strand in bodies if isinstance(strand, Sum)}
     stages: dict[Strand, int] = {}
     known: list[int] = []
@@ -190,7 +191,7 @@ def _idle(plan: Plan) -> set[Strand]:
 
 
 def _wasteful(plan: Plan, chosen: Mapping[Strand, Body]) -> set[Strand]:
-    """Return the loops that repeat most computations, if too many are repeated."""
+    """Return the strands that repeat most operations, if too many are repeated."""
     nodes = plan.source.nodes
     executed = _cost([nodes[i] for i in plan.part])
     for loop in plan.loops:

@@ -13,22 +13,22 @@ from symfric.emitter.c99 import FORMS
 from symfric.foundation.graph import LEAVES, Graph
 
 IDLE = 2
-"""Growth of a statement that makes and ends no value: others that make one value come first."""
+"""Rank of a statement that neither makes nor ends a value; those that make one come first."""
 
 
 def ordered(takes: Sequence[Iterable[int]], makes: Sequence[Iterable[int]]) -> list[int]:
     """Return an order of statements 0, 1, ... in which a value is made before it is taken.
 
-    The next statement is the ready one that adds least to the live values: it makes some, and ends
-    those without another use. Of several it is the first that takes a single value, which is often
-    a call, else the first. The time is that of sorting all that is taken.
+    The next statement is the ready one that increases the number of live values least: it makes
+    some, and ends those without another use. Among several, the first that takes a single value
+    (often a call) is next, else the first. The time is that of sorting all values taken.
 
     Args:
-        takes: values that each statement takes; those that none makes exist from the beginning.
-        makes: values that each statement makes, each by one.
+        takes: values that each statement takes; those that no statement makes exist initially.
+        makes: values that each statement makes; one statement makes a value.
 
     Returns:
-        The order, without statements that wait for each other in a circle, and their followers.
+        The order, without statements that wait for each other in a cycle, and their followers.
     """
     needs = [set(values) for values in takes]
     maker = {value: i for i, values in enumerate(makes) for value in values}
@@ -80,7 +80,7 @@ class Local:
 @final
 @dataclass(frozen=True)
 class Branch:
-    """`if` with the sides of the selects of `label` in `region`."""
+    """`if` statement for the selects with the label `label` in `region`."""
 
     region: int
     label: int
@@ -99,7 +99,7 @@ class Side:
 @final
 @dataclass(frozen=True)
 class Store:
-    """Row of a result is written."""
+    """Statement that writes a row of a result."""
 
     result: int
     row: int
@@ -114,9 +114,9 @@ class Stores:
     """Rules for writing results.
 
     Attributes:
-        late: True if all are written last.
-        within: those that may be written inside a branch, if it alone decides about them.
-        same: those that are written to the place that an input was loaded from, with its node.
+        late: True if all results are written last.
+        within: stores that may be inside a branch, if it alone determines their values.
+        same: stores to a place that an input is loaded from, with the node of the input.
     """
 
     late: bool = False
@@ -126,13 +126,14 @@ class Stores:
 
 @final
 class Plan:
-    """Function as statements.
+    """Statements of a function, region by region.
 
     Attributes:
-        placed: the graph with its branches.
-        bodies: the statements of each region in order.
-        takes: nodes of its own region that each statement takes, including its inner statements.
-        goals: select -> the select or result that it is a side or all of, whose place it takes.
+        placed: graph with its branches.
+        bodies: statements of each region in order.
+        takes: nodes of its region that each statement, with its inner statements, takes.
+        goals: select -> the select of which it is a side, or the result that it is, whose place it
+            is written to.
         waiting: selects of branches that wait for each other.
     """
 
@@ -164,7 +165,7 @@ class Plan:
         return [*(early[k] for k in order), *last]
 
     def _written(self) -> Iterator[tuple[int, int]]:
-        """Yield every operand that is written somewhere, and the number of times."""
+        """Yield operands of formulas and the number of times that each is written."""
         labels, place = self.placed.labels, self.placed.place
         for i, node in enumerate(self.nodes):
             if i in labels:
@@ -177,7 +178,7 @@ class Plan:
         yield from ((i, 1) for row in self.placed.source.results for i in row)
 
     def _locals(self, uses: Counter[int]) -> frozenset[int]:
-        """Return nodes that are shared, or too long to be read inside a formula."""
+        """Return nodes that are shared or too long to be written inside a formula."""
         labels = self.placed.labels
         whole = {i for row in self.placed.source.results for i in row}
         whole |= {side for i in labels for side in self.nodes[i].args[1:]}
@@ -192,7 +193,7 @@ class Plan:
         return frozenset(kept)
 
     def _goals(self, bools: Sequence[bool], uses: Counter[int]) -> dict[int, int | Store]:
-        """Return branches without a variable: their select is only one result or one side."""
+        """Return the goals of selects without a variable: each is used once, as result or side."""
         once = {i for i in self.placed.labels if uses[i] == 1}
         goals: dict[int, int | Store] = {
             i: outer
@@ -228,7 +229,7 @@ class Plan:
             self.items[0] += (s for s, i in stores if s not in direct and same.get(s) != i)
 
     def _is_there(self, select: int, value: int) -> bool:
-        """Return True if a side of a select is in its place already and need not be written."""
+        """Return True if a side of a select is already in its place and need not be written."""
         if self.goals.get(value) == select:
             return True
         goal: int | Store | None = select
@@ -237,7 +238,7 @@ class Plan:
         return goal is not None and self.stores.same.get(goal) == value
 
     def _connect(self) -> None:
-        """Connect every statement with the nodes that it takes."""
+        """Determine the nodes that each statement takes."""
         homes: dict[int, tuple[Statement, int]] = {}
         for number, statements in enumerate(self.items):
             for statement in statements:
@@ -263,7 +264,7 @@ class Plan:
     def _take(
         self, i: int, statement: Statement, region: int, homes: dict[int, tuple[Statement, int]]
     ) -> None:
-        """Note that `statement` of a region writes out node `i`, or its name."""
+        """Record that `statement` of a region contains node `i` or its name."""
         op = self.nodes[i].op
         if op == ca.OP_CONST:
             return
@@ -293,7 +294,7 @@ def planned(source: Graph, bools: Sequence[bool], stores: Stores) -> Plan:
 
 
 def _made(statement: Statement) -> tuple[int, ...]:
-    """Return the nodes whose value a statement makes."""
+    """Return the nodes whose values a statement computes."""
     match statement:
         case Local(node):
             return (node,)

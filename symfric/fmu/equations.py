@@ -1,6 +1,7 @@
-"""Equations of a unit in C: the step of the integrator, signals, start values, events.
+"""Equations of a unit in C: step of the integrator, signals, start values and events.
 
-The emitter writes the functions that `simulate` runs: the same bits, without CasADi at run time.
+The emitter writes the functions that `simulate` runs. Results have the same bits, and CasADi is not
+needed at run time.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -37,7 +38,7 @@ from symfric.model.start import start_function
 
 Array = NDArray[np.float64]
 MOST_ATTEMPTS = 10**6
-"""Attempts allowed in one communication step."""
+"""Largest number of attempts in one communication step."""
 EVENT_TOLERANCE = 1e-10
 """Tolerance of event times [s], as in `simulate`."""
 
@@ -51,9 +52,9 @@ class Equations:
         model, integrator: sources of the functions.
         y0: consistent unknowns at the start.
         rtol: default of the relative tolerance.
-        step: length [s] of fixed steps, None if the step is adaptive.
-        method: of fixed steps.
-        exchange: True if the importer integrates, from rates of the states.
+        step: length of fixed steps [s]; None if the step is adaptive.
+        method: method of fixed steps.
+        exchange: True if the importer integrates the rates of the states.
         span: first and last time [s] of the default experiment.
     """
 
@@ -99,13 +100,13 @@ def equations(
     """Build the integrator of a model with held inputs.
 
     Raises:
-        ValueError: unknown method; start values without consistent algebraic ones; several rates
-            in one equation, for model exchange.
+        ValueError: an unknown method; start values without consistent algebraic variables; several
+            rates in one equation, for model exchange.
     """
     u = model.vector("u")
     held = InputData(u, u, np.array(span), np.zeros((len(model.u), 1)), ("fmu",))
     rtol = min((event.rtol for event in model.events if event.rtol < rtol), default=rtol)
-    adaptive = "auto" if step is not None else method  # also evaluates signals of fixed steps
+    adaptive = "auto" if step is not None else method  # fixed steps use its signals
     integrator = Integrator(model, held, chosen("export_fmu", adaptive, rtol))
     system = integrator.system
     rates = ca.DM(system.mass).full()[: system.nx]
@@ -155,7 +156,7 @@ def header(own: Equations, token: str) -> str:
         "CLOSES": int(bool(loops) and any(event.reset for event in model.events)),
     }
     span = own.span[1] - own.span[0]
-    # as in `run.integrate`: a few straight pieces of events in time alone
+    # as in `run.integrate`: a step spans few pieces of events that depend on time only
     quickest = min((pieces(f, *own.span).pace for f in own.integrator.schedules), default=inf)
     numbers = {
         "DEFAULT_RTOL": own.rtol, "LEAST_RTOL": LEAST_RTOL,
@@ -192,7 +193,7 @@ def source(own: Equations) -> str:
     if own.step is not None:
         formula = METHODS[own.method]
         functions["model_step"] = build_fixed(suited_to_start(system, formula, model), formula)
-    elif not own.exchange:  # then the importer makes the steps
+    elif not own.exchange:  # in model exchange, the importer makes the steps
         functions["model_attempt"] = integrator.step
     manifold, follow = system.manifold, integrator.follow
     if follow is not None:
@@ -235,7 +236,7 @@ FOLLOWED = "static int symfric_follow(double *y, const double *d);\n"
 
 
 def _called(name: str, of: str, arguments: int, results: int) -> str:
-    """Return the function `of` with the arguments of CasADi's C functions."""
+    """Return a C function `name` with CasADi's signature that calls `of`."""
     given = [*(f"arg[{i}]" for i in range(arguments)), *(f"res[{i}]" for i in range(results))]
     return (
         f"static int {name}(const double **arg, double **res, casadi_int *iw, double *w, int mem)\n"
@@ -245,7 +246,7 @@ def _called(name: str, of: str, arguments: int, results: int) -> str:
 
 
 def _events(own: Equations) -> Iterator[str]:
-    """Yield the C of events: search and effects, values, values at the start, names."""
+    """Yield the C of events: search, effects, values, values at the start and names."""
     events, crossings = own.model.events, own.integrator.crossings
     if crossings is not None and own.exchange:  # the importer searches
         yield routine(own.integrator.resets, "model_resets")
@@ -316,7 +317,7 @@ def _quoted(text: str) -> str:
 
 
 def fingerprint(parts: Mapping[str, str]) -> str:
-    """Return a token of the content of a unit."""
+    """Return a token that identifies the content of a unit."""
     content = "\0".join(f"{name}\0{text}" for name, text in parts.items())
     text = sha256(content.encode()).hexdigest()
     return f"{{{text[:8]}-{text[8:12]}-{text[12:16]}-{text[16:20]}-{text[20:32]}}}"

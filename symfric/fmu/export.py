@@ -1,4 +1,4 @@
-"""Model as a Functional Mock-up Unit, which runs in other tools without Python and CasADi.
+"""Export of a model as a Functional Mock-up Unit for tools without Python and CasADi.
 
 `running` loads a unit of FMI 3.0 through its C interface, as another tool does.
 """
@@ -44,18 +44,18 @@ VERSIONS = (2, 3)
 @final
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """Unit that was written.
+    """Description of an exported unit.
 
     Attributes:
-        path: the archive.
-        size: its length in bytes.
-        fmi, kind: version and kind.
-        identifier: name of its binary.
+        path: path of the archive.
+        size: size of the archive in bytes.
+        fmi, kind: version of FMI and kind of the unit.
+        identifier: name of the binary.
         variables: all variables.
         binary: name of the binary in the archive; empty without a compiler.
         missing: reason of a missing binary.
         method: formula of the steps.
-        times: time [s] to write the C, and to compile it.
+        times: times [s] to write and to compile the C.
     """
 
     path: Path
@@ -70,7 +70,7 @@ class Exported:
     times: tuple[float, float]
 
     def count(self, causality: str) -> int:
-        """Number of variables of a causality."""
+        """Return the number of variables of a causality."""
         return sum(entry.causality == causality for entry in self.variables)
 
     def __str__(self) -> str:
@@ -100,34 +100,34 @@ def export_fmu(
 
     The unit contains the adaptive step of `simulate` as C, with the same bits. Inputs are held over
     a communication step, which may have any length: while no input jumps, steps pass communication
-    points, whose values are those of the polynomial of the step. After a jump of an input or of a
-    tunable parameter the unit repeats the last step up to that point and solves the algebraic
-    equations again. It locates events of the model and applies their resets.
+    points, and the polynomial of the step defines the values there. After a jump of an input or of
+    a tunable parameter, the unit repeats the last step up to the point of the jump and solves the
+    algebraic equations again. It locates events of the model and applies their resets.
 
     All unknowns may be set before the end of the initialisation. The others follow from them as in
     `simulate(x0=...)`: bristles start in steady sliding, algebraic variables solve their equations.
 
-    Directional derivatives are exact; units of mechanisms with loops have none.
+    Directional derivatives are exact; units of mechanisms with loops do not provide them.
 
     Limits: absolute tolerances are 0.1 rtol times the nominal values, also for much smaller motions
-    (`simulate` repeats these); pivots are chosen at the start values; for events that depend on
+    (which `simulate` repeats); pivots are chosen at the start values; for events that depend on
     time only, the default experiment determines the longest step.
 
     Args:
         model: a model, or a scene, whose parameters become tunable.
-        path: the archive, such as "drive.fmu".
-        fmi: 2 or 3.
-        kind: "co-simulation", with its own integrator, or "model-exchange", for the integrator of
-            the importer: rates of the states and event indicators; the unit solves the algebraic
-            equations. Rates of a mechanism with loops are those at the nearest closed state, and
-            lead there within 20 ms; its coordinates stay states.
-        rtol: relative tolerance; the importer may change it, by the parameter `rtol` or the
+        path: path of the archive, such as "drive.fmu".
+        fmi: version of FMI, 2 or 3.
+        kind: "co-simulation", which includes the integrator, or "model-exchange", which provides
+            rates of the states and event indicators to the integrator of the importer and solves
+            the algebraic equations. Rates of a mechanism with loops are those at the nearest closed
+            state and lead to it within 20 ms; all coordinates of the mechanism remain states.
+        rtol: relative tolerance; the importer can change it by the parameter `rtol` or by the
             tolerance of the experiment.
-        step: length [s] of fixed steps instead, without error control, as of `plant_block`. A
-            communication step is divided into equal ones of at most this length.
-        method: formula of the steps, as in `simulate`; with `step` as in `plant_block`.
-        free: parameters of a scene that become tunable; by default all that are not zero, which
-            switch terms off. A model has those in `Model.p`.
+        step: length [s] of fixed steps without error control, as of `plant_block`. A communication
+            step is divided into equal steps of at most this length.
+        method: formula of the steps, as in `simulate`; with `step`, as in `plant_block`.
+        free: parameters of a scene that become tunable; by default all except those with the value
+            0, which omits a term. The tunable parameters of a model are `Model.p`.
         t_end: stop time [s] of the default experiment; default that of the scene, or 1 s.
         name: model identifier; default the name of the model.
 
@@ -184,7 +184,7 @@ def export_fmu(
 def _model(
     where: str, given: Model | Scene, free: Iterable[str] | None, t_end: float | None
 ) -> tuple[Model, tuple[float, float]]:
-    """Return the model and the span of its default experiment."""
+    """Return the model and the first and last time of its default experiment."""
     until = 1.0
     if isinstance(given, Scene):
         until = given.t_end
@@ -224,7 +224,7 @@ LOG = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)
 
 @final
 class Running:
-    """Instance for co-simulation, initialised; made by `running`.
+    """Initialised instance of a unit for co-simulation, created by `running`.
 
     Attributes:
         said: messages of the unit, in their order.
@@ -254,7 +254,7 @@ class Running:
         """Set start values, inputs and parameters by name, and initialise at t = 0.
 
         Raises:
-            RuntimeError: the unit refuses a value; the text has its message.
+            RuntimeError: the unit rejects a value; the text contains its message.
         """
         self.set(start)
         zero = c.c_double(0.0)
@@ -277,30 +277,30 @@ class Running:
         self._call("SetFloat64", references, count, numbers, count)
 
     def get(self, names: Sequence[str]) -> Array:
-        """Values of variables by name, shape (names,)."""
+        """Return the values of variables by name, shape (names,)."""
         references, count = self._named(names)
         numbers = np.empty(len(names))
         self._call("GetFloat64", references, count, c.c_void_p(numbers.ctypes.data), count)
         return numbers
 
     def step(self, size: float) -> None:
-        """One communication step of `size` [s]."""
+        """Make one communication step of `size` [s]."""
         self._call("DoStep", c.c_double(self.t), c.c_double(size), True, *self._out)
         self.t = self._reached.value
 
     def free(self) -> None:
-        """Free its memory."""
+        """Free the memory of the instance."""
         self._library.fmi3FreeInstance(self._self)
         self._self = c.c_void_p(None)
 
 
 @contextmanager
 def running(path: str | Path, **start: float) -> Generator[Running]:
-    """Return an instance of the unit in `path`, initialised with `start` values by name.
+    """Yield an instance of the unit in `path`, initialised with the values `start` by name.
 
     Raises:
         ValueError: an archive without a binary for this platform.
-        RuntimeError: the unit refuses the start values.
+        RuntimeError: the unit rejects the start values.
     """
     with tempfile.TemporaryDirectory(prefix="symfric-fmu-") as folder, ZipFile(path) as archive:
         own = f"binaries/{platform_name(3)}/"

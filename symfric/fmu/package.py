@@ -1,6 +1,6 @@
-"""Archive of a unit: its descriptions, its C, and the binary of this platform.
+"""Archive of a unit: descriptions, C files and the binary of this platform.
 
-modelDescription.xml of both versions of the standard comes from the variables of a unit.
+The variables of a unit define modelDescription.xml for both versions of the standard.
 """
 
 import platform
@@ -21,9 +21,9 @@ from symfric.foundation.programs import CompileError, Compiler, find_compiler
 from symfric.foundation.units import CELSIUS, exponents
 
 CATEGORIES = ("logStatusDiscard", "logStatusError")
-"""Categories of messages: only failures and refusals, in any case."""
+"""Categories of messages: the unit always reports failures and rejected calls, nothing else."""
 INTERVALS = 200
-"""Communication steps of the default experiment."""
+"""Number of communication steps of the default experiment."""
 
 
 def described(
@@ -34,9 +34,9 @@ def described(
     Args:
         own: equations of the unit.
         identifier: C identifier, the name of the binary.
-        token: ties the binary to the description.
-        entries: variables; FMI 2.0 has none for event indicators.
-        fmi: 2 or 3.
+        token: token that links the binary to the description.
+        entries: variables; event indicators are omitted in FMI 2.0.
+        fmi: version, 2 or 3.
     """
     every = tuple(entries)
     listed = [entry for entry in every if fmi == 3 or entry.kind != "indicator"]
@@ -83,7 +83,7 @@ def described(
 
 
 def _element(parent: Xml.Element | None, tag: str, **attributes: object) -> Xml.Element:
-    """Return a new element below `parent`; attributes that are None are left out."""
+    """Return a new element below `parent`; attributes that are None are omitted."""
     element = Xml.Element(tag, _texts(attributes))
     if parent is not None:
         parent.append(element)
@@ -100,7 +100,7 @@ def _texts(attributes: Mapping[str, object]) -> dict[str, str]:
 
 
 def _units(root: Xml.Element, entries: Iterable[Entry]) -> None:
-    """Write every unit once, with its exponents if it is a product of SI units."""
+    """Add each unit once, with its exponents if it is a product of SI units."""
     used = dict.fromkeys(entry.unit for entry in entries if entry.unit not in ("", "1"))
     group = _element(root, "UnitDefinitions") if used else root
     for text in used:
@@ -111,9 +111,7 @@ def _units(root: Xml.Element, entries: Iterable[Entry]) -> None:
 
 
 def _numbers(entries: Iterable[Entry], second: bool) -> dict[str, int]:
-    """Return the number of each variable in references: its place in FMI 2.0, else its value
-    reference.
-    """
+    """Return the number that refers to each variable: its index in FMI 2.0, else its reference."""
     numbered = enumerate(entries, start=1)
     return {entry.name: place if second else entry.reference for place, entry in numbered}
 
@@ -140,8 +138,10 @@ def _variables(root: Xml.Element, entries: Iterable[Entry], second: bool) -> Non
 
 
 def _structure(root: Xml.Element, entries: Iterable[Entry], second: bool, exchange: bool) -> None:
-    """Write outputs with the inputs and states that they depend on, rates, and unknowns of the
-    start: outputs and states that are not set, and rates.
+    """Add outputs with their dependencies, rates, initial unknowns and event indicators.
+
+    Outputs depend on inputs and states. Initial unknowns are outputs and states that are not set,
+    and rates.
     """
     number, group = _numbers(entries, second), _element(root, "ModelStructure")
     kinds = ("state",) if exchange else ()
@@ -172,14 +172,14 @@ FLAGS = (
     "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared",
     "-Werror=implicit-function-declaration",
 )  # fmt: skip
-"""Without contraction to fused multiply-add the steps have the bits of `simulate`."""
+"""Flags of the compiler; without fused multiply-add, steps have the same bits as `simulate`."""
 MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i386": "x86", "i686": "x86"}
 SYSTEMS = {"Linux": "linux", "Darwin": "darwin", "Windows": "windows"}
 OLD = {
     "x86_64-linux": "linux64", "x86-linux": "linux32", "x86_64-windows": "win64",
     "x86-windows": "win32", "x86_64-darwin": "darwin64",
 }  # fmt: skip
-"""Names of platforms in version 2.0; others keep their name of 3.0."""
+"""Names of platforms in version 2.0; other platforms have the same name in both versions."""
 ENDINGS = {"windows": ".dll", "darwin": ".dylib"}
 
 
@@ -198,12 +198,12 @@ def shared_name(identifier: str) -> str:
 
 
 def fixed_text(name: str) -> str:
-    """Return one of the C files that all units share."""
+    """Return the text of a C file that all units share."""
     return (SOURCES / name).read_text(encoding="utf-8")
 
 
 def sources(own: Equations, sizes: str, model: str, fmi: int) -> dict[str, str]:
-    """Return name -> text of the C of a unit; `all.c` includes the others.
+    """Return the texts of the C files of a unit, by name; `all.c` includes the others.
 
     Args:
         sizes, model: C of the model.
@@ -228,7 +228,7 @@ def sources(own: Equations, sizes: str, model: str, fmi: int) -> dict[str, str]:
 
 
 def compiled(texts: Mapping[str, str], target: str) -> tuple[bytes, str]:
-    """Return the library `target` of this platform, or no bytes and the reason.
+    """Return the binary for this platform and "", or no bytes and the reason.
 
     Raises:
         CompileError: the compiler rejects the C.
@@ -250,7 +250,7 @@ def compile_unit(compiler: Compiler, folder: Path, target: Path, *more: str) -> 
     """Compile `all.c` in `folder` to a library; return the warnings.
 
     Raises:
-        CompileError: the compiler rejects it.
+        CompileError: the compiler rejects the C.
     """
     warned = compiler.warnings(*FLAGS, *more, str(folder / "all.c"), "-o", str(target), "-lm")
     if not target.exists():
@@ -259,7 +259,7 @@ def compile_unit(compiler: Compiler, folder: Path, target: Path, *more: str) -> 
 
 
 def packed(path: Path, files: Mapping[str, str | bytes]) -> int:
-    """Write the archive, whole or not at all; return its size in bytes."""
+    """Write the archive atomically; return its size in bytes."""
     with written(path) as temporary:
         with ZipFile(temporary, "w", ZIP_DEFLATED) as archive:
             for name, content in files.items():

@@ -1,7 +1,7 @@
-"""Variables of a unit, as both versions of the standard list them.
+"""Variables of a unit, as listed in both versions of the standard.
 
 Value references count time, all signals of the model in its order (x, z, u, outputs), parameters,
-the relative tolerance, the attempts of the integrator.
+the relative tolerance and the attempts of the integrator.
 """
 
 from collections.abc import Iterator, Mapping
@@ -29,10 +29,10 @@ class Entry:
     Attributes:
         reference: value reference.
         causality, variability, initial: words of the standard; `initial` may be empty.
-        start: None if the unit calculates it.
-        needs: names of the inputs and states that an output depends on directly.
-        of: state of a rate.
-        kind: "rate" or "indicator" in model exchange, "state" of a state.
+        start: start value; None if the unit calculates it.
+        needs: names of the inputs and states on which an output depends directly.
+        of: name of the state whose rate the variable is.
+        kind: "state"; in model exchange also "rate" or "indicator"; "" for other variables.
     """
 
     name: str
@@ -64,8 +64,8 @@ def entries(
         model: source of signals and parameters.
         start: values of states and algebraic variables at the start.
         rtol: default of the relative tolerance; 0 for fixed steps, which have none.
-        given: True if the start values of all states are kept as set; not if the loops of a
-            mechanism have to be closed.
+        given: True if the start values of all states are kept as set; False if the loops of a
+            mechanism must be closed.
         exchange: True to add rates and event indicators.
     """
     found = [*_signals(model, start, given, exchange)]
@@ -118,7 +118,7 @@ def _signals(
 
 
 def _rates(model: Model, first: int) -> Iterator[Entry]:
-    """Yield rates of the states and event indicators of model exchange."""
+    """Yield the rates of the states and the event indicators for model exchange."""
     for number, v in enumerate(model.x, start=first):
         yield Entry(
             f"der({v.name})", number, "local", "continuous", "calculated",
@@ -143,17 +143,17 @@ def _bounded(
 
 
 def _free(name: str, taken: set[str]) -> str:
-    """Return `name`, with a prefix if the model has it already."""
+    """Return `name`, with a prefix if the model already uses it."""
     while name in taken:
         name = f"symfric_{name}"
     return name
 
 
 def direct(model: Model) -> dict[str, tuple[str, ...]]:
-    """Return signal -> inputs and states that it depends on at the same instant, by structure.
+    """Return the inputs and states on which each signal structurally depends at the same instant.
 
-    Algebraic variables depend on all symbols of their equations, and of the equations that are
-    coupled with these.
+    Algebraic variables depend on all symbols of their equations and of all equations coupled with
+    them.
     """
     x, z, u = (model.vector(letter) for letter in "xzu")
     known = ca.vertcat(u, x)
@@ -177,7 +177,7 @@ def direct(model: Model) -> dict[str, tuple[str, ...]]:
 
 
 def _pattern(expression: ca.SX, symbols: ca.SX) -> NDArray[np.bool_]:
-    """Return the sparsity of rows over symbols."""
+    """Return the sparsity of `expression` with respect to `symbols`, shape (rows, symbols)."""
     shape = (expression.numel(), symbols.numel())
     if not all(shape):
         return np.zeros(shape, dtype=bool)
@@ -185,7 +185,7 @@ def _pattern(expression: ca.SX, symbols: ca.SX) -> NDArray[np.bool_]:
 
 
 def _reach(of_unknown: NDArray[np.bool_], of_known: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the mask of symbols in equations that share unknowns with each unknown."""
+    """Return a mask of the known symbols in the equations coupled with each unknown."""
     group = of_unknown.T.astype(int) @ of_unknown.astype(int) > 0
     group |= np.eye(group.shape[0], dtype=bool)
     while ((wider := group.astype(int) @ group.astype(int) > 0) != group).any():

@@ -1,1 +1,1 @@
-"""Pieces of one HTML page that needs nothing from elsewhere: text, tables, charts, a style."""
+"""Parts of a self-contained HTML page: text, tables, charts and a style sheet."""

@@ -1,4 +1,4 @@
-"""Parts of a self-contained page and its style sheet; texts of users are escaped here."""
+"""Parts of a self-contained page and its style sheet; plain texts are escaped here."""
 
 from collections.abc import Iterable, Sequence
 from html import escape
@@ -19,7 +19,7 @@ def page(title: str, language: str, body: str) -> str:
 
 
 def section(anchor: str, heading: str, *parts: str) -> str:
-    """Return a section with a heading that links can refer to; "" if all parts are empty."""
+    """Return a section with a heading and an anchor for links; "" if all parts are empty."""
     inside = "\n".join(part for part in parts if part)
     if not inside:
         return ""
@@ -44,12 +44,12 @@ def title(text: str) -> str:
 
 
 def code(text: str) -> str:
-    """Return a program text."""
+    """Return a preformatted program text; "" for an empty text."""
     return f"<pre><code>{escape(text)}</code></pre>" if text else ""
 
 
 def details(summary: str, *parts: str) -> str:
-    """Return a part that opens on request."""
+    """Return a collapsed part with a summary; "" if all parts are empty."""
     inside = "".join(parts)
     return f"<details><summary>{escape(summary)}</summary>{inside}</details>" if inside else ""
 
@@ -66,14 +66,14 @@ def figure(drawing: str, caption: str = "") -> str:
 
 
 def verdict(kind: str, word: str, sentences: Iterable[str]) -> str:
-    """Return a box with a word and sentences, of the kind "good", "doubtful" or "bad"."""
+    """Return a box of the kind "good", "doubtful" or "bad" with a word and sentences."""
     text = "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
     first = f"<strong>{escape(word)}</strong>" if word else ""
     return f'<div class="verdict {kind}" role="status">{first}{text}</div>'
 
 
 def contents(links: Sequence[tuple[str, str]]) -> str:
-    """Return links to sections, pairs (anchor, text)."""
+    """Return links to sections, given as pairs (anchor, text)."""
     text = "".join(f'<a href="#{anchor}">{escape(name)}</a>' for anchor, name in links)
     return f'<nav aria-label="Sections">{text}</nav>'
 
@@ -85,14 +85,14 @@ def table(
     numbers: Sequence[int] = (),
     kinds: Sequence[str] = (),
 ) -> str:
-    """Return a table whose first column heads the rows; "" without rows.
+    """Return a table whose first column contains the row headers; "" without rows.
 
     Args:
-        caption: text above.
+        caption: text above the table.
         header: names of the columns.
-        rows: texts.
-        numbers: right-aligned columns.
-        kinds: class of the last column by row: "good", "bad", "note", "why" or "".
+        rows: texts of each row.
+        numbers: indices of right-aligned columns.
+        kinds: class of the last cell of each row: "good", "bad", "note", "why" or "".
     """
     lines = list(rows)
     if not lines:
@@ -125,7 +125,7 @@ def _class(number: bool, kind: str = "") -> str:
 
 
 def triangle(caption: str, names: Sequence[str], values: Sequence[Sequence[float | None]]) -> str:
-    """Return correlations below the diagonal, darker if nearer to -1 or 1."""
+    """Return a table of correlations below the diagonal; cells near -1 or 1 are darker."""
     if len(names) < 2:
         return ""
     rows: list[str] = []
@@ -149,7 +149,7 @@ def _shade(value: float | None) -> str:
 
 
 def _lighter(colour: str) -> str:
-    """Return a colour half way to white, for a dark background."""
+    """Return the mean of a colour and white, for a dark background."""
     return "#" + "".join(f"{(int(colour[k : k + 2], 16) + 255) // 2:02x}" for k in (1, 3, 5))
 
 
@@ -159,7 +159,7 @@ def _dashes(k: int) -> str:
 
 
 def _runs(colours: Sequence[str]) -> str:
-    """Return classes run0, run1, ... with the colours and dashes of simulations in figures."""
+    """Return CSS classes run0, run1, ... with the colours and dashes of runs in figures."""
     return "\n".join(
         f"svg .run{k} {{ stroke: {colour}; stroke-dasharray: {_dashes(k)}; }}"
         for k, colour in enumerate(colours)

@@ -1,7 +1,7 @@
-"""Charts as SVG text; colours come from the style of the page, which has a light and a dark form.
+"""Charts as SVG text; the style sheet of the page defines their colours, light and dark.
 
 Every chart has a title and a description for screen readers. Marks are clipped at the frame.
-Coordinates are rounded to a tenth of a pixel, and coincident points are left out.
+Coordinates are rounded to a tenth of a pixel, and coincident points are omitted.
 """
 
 from abc import ABC, abstractmethod
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 SMALL, LARGE = 1e-2, 1e5
-"""Magnitudes of tick labels without a power of ten."""
+"""Range of magnitudes for which tick labels have no power of ten."""
 
 
 @final
@@ -28,9 +28,9 @@ class Axis:
     """Axis of a chart.
 
     Attributes:
-        name, unit: of the quantity; the label is "name [unit]".
-        low, high: range, low < high; if `logarithmic` 0 < low.
-        logarithmic: True for decades.
+        name, unit: name and unit of the quantity; the label is "name [unit]".
+        low, high: range, low < high; 0 < low if `logarithmic`.
+        logarithmic: True for a logarithmic scale.
         whole: True for ticks at whole numbers only.
     """
 
@@ -73,7 +73,7 @@ class Axis:
         return [(k * step, f"{k * step / unit:.{digits}g}") for k in range(first, last + 1)]
 
     def _step(self, most: int) -> float:
-        """Return the coarsest round step that has about `most` ticks, and three at least."""
+        """Return the coarsest round step with about `most` ticks, but at least three."""
         rough = (self.high - self.low) / most
         decade = 10.0 ** floor(log10(rough))
         steps = [s * d for d in (decade / 10, decade) for s in STEPS[:-1]] + [10 * decade]
@@ -85,7 +85,7 @@ class Axis:
 
     def _decades(self, most: int) -> list[tuple[float, str]]:
         first, last = ceil(log10(self.low) - 1e-9), floor(log10(self.high) + 1e-9)
-        if last - first < 1:  # less than a decade: round values
+        if last - first < 1:  # less than a decade
             plain = Axis(self.name, self.unit, self.low, self.high)
             return [(x, f"{x:.3g}") for x, _ in plain.ticks(most) if x > 0]
         stride = max(1, ceil((last - first) / most))
@@ -97,7 +97,7 @@ class Axis:
 def around(
     name: str, unit: str, values: Iterable[Array], margin: float = 0.05, logarithmic: bool = False
 ) -> Axis:
-    """Return an axis that holds all finite numbers in `values` with a margin."""
+    """Return an axis that contains all finite numbers in `values`, with a margin."""
     kept = [y[np.isfinite(y) & ((y > 0) | (not logarithmic))] for y in values]
     every = np.concatenate([*kept, np.zeros(0)])
     if not every.size:
@@ -113,7 +113,7 @@ def around(
 
 
 LEFT, RIGHT, TOP, BOTTOM = 68.0, 14.0, 24.0, 40.0
-"""Margins of the frame for labels [px]."""
+"""Margins around the frame, for labels [px]."""
 LETTER = 6.6
 """Approximate width of a letter of the legend [px]."""
 
@@ -126,13 +126,13 @@ class Mark(ABC):
 
     @abstractmethod
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """Return its SVG inside a frame of this size [px]."""
+        """Return the SVG of the mark inside a frame of the given size [px]."""
 
 
 def _places(
     x: Axis, y: Axis, width: float, height: float, xs: Array, ys: Array
 ) -> NDArray[np.float64]:
-    """Return pixels (n, 2) of the finite points, with far outliers moved near the frame."""
+    """Return the pixels (n, 2) of the finite points; far outliers are moved near the frame."""
     across, up = x.at(xs), y.at(ys)
     good = np.isfinite(across) & np.isfinite(up)
     across, up = np.clip(across[good], -1.0, 2.0), np.clip(up[good], -1.0, 2.0)
@@ -142,14 +142,14 @@ def _places(
 @final
 @dataclass(frozen=True, eq=False)
 class Path(Mark):
-    """Line through points; `entry` is its name in the legend."""
+    """Line through points; `entry` is the name of the line in the legend."""
 
     x: Array
     y: Array
     entry: str = ""
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """Return a polyline for each run of finite points."""
+        """Return a polyline for each sequence of finite points."""
         bad = np.flatnonzero(~np.isfinite(self.y))
         runs = zip(np.split(self.x, bad), np.split(self.y, bad), strict=True)
         places = (_places(x, y, width, height, *run) for run in runs if np.isfinite(run[1]).any())
@@ -157,7 +157,7 @@ class Path(Mark):
 
 
 def _points(at: Array) -> str:
-    """Return the points of a polyline, coincident ones once."""
+    """Return the points of a polyline without consecutive duplicates."""
     kept = np.concatenate([[True], (np.diff(at, axis=0) != 0).any(axis=1)])
     return " ".join(f"{a:g},{b:g}" for a, b in at[kept])
 
@@ -165,14 +165,14 @@ def _points(at: Array) -> str:
 @final
 @dataclass(frozen=True, eq=False)
 class Dots(Mark):
-    """Points, each a short stroke with round ends; `entry` is their name in the legend."""
+    """Points, drawn as short strokes with round ends; `entry` is their name in the legend."""
 
     x: Array
     y: Array
     entry: str = ""
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """Return one path of all points."""
+        """Return one path with all points."""
         at = np.unique(_places(x, y, width, height, self.x, self.y), axis=0)
         points = "".join(f"M{a:g} {b:g}h0" for a, b in at)
         return f'<path class="dots {self.kind}" d="{points}"/>' if points else ""
@@ -187,7 +187,7 @@ class Stems(Mark):
     y: Array
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """Return one path of all lines."""
+        """Return one path with all lines."""
         zero = _places(x, y, width, height, self.x, np.zeros(self.x.size))
         ends = _places(x, y, width, height, self.x, self.y)
         stems = "".join(f"M{a:g} {b:g}V{c:g}" for (a, b), (_, c) in zip(zero, ends, strict=True))
@@ -197,13 +197,13 @@ class Stems(Mark):
 @final
 @dataclass(frozen=True, eq=False)
 class Level(Mark):
-    """Horizontal line at y; with `upright` a vertical one at x."""
+    """Horizontal line at y = value, or, with `upright`, vertical line at x = value."""
 
     value: float
     upright: bool = False
 
     def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """Return one line."""
+        """Return one line; "" if the value is outside the axis."""
         along = x if self.upright else y
         share = float(along.at(np.array([self.value]))[0])
         if not 0.0 <= share <= 1.0:
@@ -216,7 +216,7 @@ class Level(Mark):
 @final
 @dataclass(frozen=True, eq=False)
 class Band(Mark):
-    """Area between two heights."""
+    """Horizontal band between two values of y."""
 
     low: float
     high: float
@@ -241,10 +241,10 @@ def chart(
     """Return one chart.
 
     Args:
-        title: text above it, also for screen readers.
+        title: text above the chart, also for screen readers.
         x, y: axes.
-        marks: from the back to the front.
-        width, height: of the whole chart [px]; the page scales it.
+        marks: marks from back to front.
+        width, height: size of the whole chart [px], which the page scales.
         says: description for screen readers.
     """
     w, h = width - LEFT - RIGHT, height - TOP - BOTTOM
@@ -262,7 +262,7 @@ def chart(
 
 
 def _ticks(x: Axis, y: Axis, w: float, h: float) -> str:
-    """Return grid, numbers and labels."""
+    """Return grid, tick labels and axis labels."""
     text: list[str] = []
     for value, label in x.ticks(max(3, int(w // 90))):
         at = LEFT + w * float(x.at(np.array([value]))[0])
@@ -280,7 +280,7 @@ def _ticks(x: Axis, y: Axis, w: float, h: float) -> str:
 
 
 def _legend(marks: Sequence[Mark], width: float) -> str:
-    """Return the entries to the right of the title."""
+    """Return the entries of the legend, at the right of the line of the title."""
     text: list[str] = []
     at = width - RIGHT
     for mark in reversed([m for m in marks if isinstance(m, Path | Dots) and m.entry]):

@@ -1,7 +1,7 @@
-"""Discrete-time block, the source of C functions on structs.
+"""Discrete-time block, from which C functions on structs are generated.
 
-A struct is in memory the flat column of the block's variables. Neighbouring numbers of identical
-elements, such as the states F_1 ... F_10, are one array member, `float F[10]`.
+In memory, a struct equals the flat column of the block's variables. Neighbouring numbers of
+identical elements, such as the states F_1 ... F_10, form one array member, `float F[10]`.
 """
 
 from collections import Counter
@@ -44,7 +44,7 @@ RESERVED = frozenset(
 
 
 class Elements(NamedTuple):
-    """Neighbouring variables of a group that C holds in one array, one per identical element.
+    """Neighbouring variables of a group that form an array in C, one for each identical element.
 
     Attributes:
         group: one of `GROUPS`.
@@ -64,7 +64,7 @@ class Member(NamedTuple):
 
     Attributes:
         name: C identifier.
-        unit: of each number.
+        unit: unit of each number.
         doc: description, may be "".
         first: row of its first number in the flat struct.
         size: 0 for a single number, else the length of the array.
@@ -83,12 +83,12 @@ class Member(NamedTuple):
 
     @property
     def length(self) -> int:
-        """Number of its values."""
+        """Number of values of the member."""
         return max(self.size, 1)
 
     @property
     def places(self) -> tuple[str, ...]:
-        """C expressions of its numbers: `F[0]`, `F[1]`, ..."""
+        """C expressions of the numbers of the member: `F[0]`, `F[1]`, ..."""
         if not self.size:
             return (self.name,)
         return tuple(f"{self.name}[{i}]" for i in range(self.size))
@@ -97,7 +97,7 @@ class Member(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Discrete-time block, all of whose groups may be empty.
+    """Discrete-time block; each group of variables may be empty.
 
         x+ = next(x, u, p),   y = outputs(x, u, p)
 
@@ -108,20 +108,20 @@ class Block:
             the default of a parameter.
         next: SX (n, 1), the states after the step.
         outputs: named results.
-        resets: further initialisations by name: the states, SX (n, 1), as functions of inputs and
-            parameters, and their purpose.
+        resets: further initialisations, by name: states as functions of inputs and parameters, SX
+            (n, 1), and the purpose.
         constants: numbers folded into the expressions, by name, for the header.
-        about: meaning of constants, with their units, by name.
+        about: meaning and unit of constants, by name.
         equations: formulas that the block solves, line by line, as in a paper.
         discretisation: method of a step, in words and formulas, line by line.
-        use: advice on inputs and results, a sentence each.
-        limits: restrictions, a sentence each.
-        sources: of the formulas, one each.
+        use: sentences of advice on inputs and results.
+        limits: sentences about restrictions.
+        sources: publications of the formulas.
         arrays: variables that are arrays in C, see `symfric.codegen.blocks.variables`.
 
     Raises:
-        ValueError: all problems at once: names that are repeated or invalid, start values that are
-            not numbers, row counts, undeclared symbols.
+        ValueError: all problems at once: repeated or invalid names, start values that are not
+            numbers, wrong numbers of rows, undeclared symbols.
     """
 
     name: str
@@ -171,7 +171,7 @@ class Block:
 
     @property
     def groups(self) -> dict[str, Variables]:
-        """Variables of the structs state, param and in."""
+        """Variables of the structs state, param and in, by struct."""
         return dict(zip(GROUPS, (self.states, self.parameters, self.inputs), strict=False))
 
     @property
@@ -194,23 +194,23 @@ class Block:
 
     @cached_property
     def step(self) -> ca.Function:
-        """(state, param, in) -> (state_next, out), all columns."""
+        """Function (state, param, in) -> (state_next, out); all are columns."""
         return self._function("step", {"state_next": self.next, "out": self._out})
 
     @property
     def sample_time(self) -> float | None:
-        """Step size h [s], a constant or the default of a parameter; None if it has none."""
+        """Step size h [s], a constant or the default of a parameter; None without a step size."""
         starts = {v.name: float(v.start) for v in self.parameters}
         return starts.get("h", self.constants.get("h"))
 
     @property
     def is_function(self) -> bool:
-        """True if it is one C function of scalars: no states and a single output."""
+        """True if the block is a C function of scalars: it has no states and one output."""
         return not self.states and len(self.outputs) == 1
 
     @cached_property
     def fingerprint(self) -> str:
-        """Sixteen hexadecimal digits that change with names, units, numbers, operations, ranges."""
+        """Sixteen hexadecimal digits that identify names, units, numbers, operations and ranges."""
         content = (
             self.name,
             [
@@ -225,7 +225,7 @@ class Block:
 
     @cached_property
     def members(self) -> dict[str, tuple[Member, ...]]:
-        """Struct -> its members, without empty structs."""
+        """Members of each struct, without empty structs."""
         flat = {g: [(v.name, v.unit, v.doc) for v in of] for g, of in self.groups.items()}
         flat["out"] = [(name, output.unit, output.doc) for name, output in self.outputs.items()]
         kept = GROUPS[:2] if self.is_function else GROUPS
@@ -244,16 +244,16 @@ class Block:
             row += max(size, 1)
 
     def places(self, group: str) -> tuple[str, ...]:
-        """Return the numbers of a struct in the block's order, as C writes them after `state->`."""
+        """Return the C expressions that follow `state->` or the like, in the order of the block."""
         return tuple(p for member in self.members.get(group, ()) for p in member.places)
 
     def indexed(self, results: Sequence[str], guards: bool) -> Arrays:
-        """Return the arrays that loops may index: of the structs in the order of `GROUPS`.
+        """Return the arrays that loops may index, for the structs in the order of `GROUPS`.
 
         Args:
-            results: the structs that the results of the function are written to.
-            guards: True if inputs are repaired in locals, one by one; no loop may read the
-                originals.
+            results: structs to which the function writes its results.
+            guards: True if guards repair each input in a local variable, so that loops must not
+                read the arrays of inputs.
         """
 
         def of(groups: Sequence[str]) -> tuple[Array, ...]:
@@ -267,14 +267,12 @@ class Block:
         return Arrays(of(GROUPS[:3]), of(results))
 
     def reset(self, name: str) -> ca.Function:
-        """Return (state, param, in) -> (state_next), the initialisation `name`; the state is
-        not used.
-        """
+        """Return the initialisation (state, param, in) -> (state_next), which ignores state."""
         return self._function(name, {"state_next": self.resets[name][0]})
 
     @property
     def functions(self) -> list[ca.Function]:
-        """Step and further initialisations, whose results are the columns of a run."""
+        """Step and further initialisations; their results are the columns of a run."""
         return [self.step, *map(self.reset, self.resets)]
 
     def _function(self, name: str, results: Mapping[str, ca.SX]) -> ca.Function:

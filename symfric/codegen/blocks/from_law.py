@@ -1,6 +1,6 @@
-"""Friction law as a block: a function, or a step of its states for held inputs.
+"""Friction law as a block: a function, or a step of its states with held inputs.
 
-A population becomes one contact as a block, called in a loop over an array of states.
+The block of a population is one of its contacts; C calls it in a loop over an array of states.
 """
 
 from collections.abc import Iterable, Sequence
@@ -49,55 +49,55 @@ def law_block(
     fold: Fold = None,
     turning: bool = False,
 ) -> Block:
-    """Return the discrete-time block of `law` with inputs v, N, those of the law, and output F.
+    """Return the discrete-time block of `law`; inputs v, N and those of the law, output F.
 
     A law without states becomes F(v, N). A law with states makes a step with v and N held, stable
-    for any product of rate and h (for LuGre sigma_0 |v| h / g is often far above 2, where explicit
-    Euler diverges). If the rates are affine in the states, each by itself, dz/dt = a(v, N) -
-    lambda(v, N) z, the step is exact:
+    for any product of rate and h (for LuGre, sigma_0 |v| h / g is often far above 2, where explicit
+    Euler diverges). If each rate is affine in its own state and independent of other states,
+    dz/dt = a(v, N) - lambda(v, N) z, the step is exact:
 
         phi1(x) = (exp(x) - 1) / x,   phi2(x) = (phi1(x) - 1) / x,   x = -lambda h
         r  = phi1(x) (a - lambda z)          mean rate over the step
         z+ = z + h r
         zm = z + h phi2(x) (a - lambda z)    mean state over the step
-        F  = force(v, N, zm)                 mean force over the step, with r for the rate in it
+        F  = force(v, N, zm)                 mean force over the step, with r as the rate
 
     Otherwise (elasto-plastic, Bouc-Wen, Maxwell-slip, Dahl's law with n != 1 and others) lambda is
-    the derivative at z and the step ends at the equilibrium, if it reaches it: of second order, and
-    bounded for every h. The same holds for a force that is not affine in the states. The event
-    forms of Maxwell-slip, reset integrator and GMS have exact steps.
+    the derivative at z, and the step ends at the equilibrium if it reaches it; the step is of
+    second order and bounded for every h. The same holds for a force that is not affine in the
+    states. The event forms of Maxwell-slip, reset integrator and GMS have exact steps.
 
     F h is the impulse and F v h the work of the step. F_end, the force at the end of the step, is
-    force(v, N, z+) with the rate exp(x) dz/dt in it; laws without states have none, since it equals
-    F. For the next step a controller holds F, if v is planned for it; from the encoder increment of
-    the last step F_end is the better estimate: LuGre at 1 kHz, 2 mm/s at 1 Hz under 10 N errs by
-    0.026 N with it and by 0.050 N with F. At 0.3 m/s both follow the true mean and end to 1e-4 N,
-    except in the step of a reversal, in which the whole bristle turns: there F errs by 0.022 N and
-    F_end by 0.36 N, because the mean velocity does not determine the velocity at the end, on which
-    the damping depends; the bristle's own force errs by 0.0095 N.
-
+    force(v, N, z+) with the rate exp(x) dz/dt; laws without states have no F_end, since it equals
+    F. A controller holds F over the next step if v is planned for that step. If v comes from the
+    encoder increment of the last step, F_end is the better estimate: for LuGre at 1 kHz, 2 mm/s at
+    1 Hz under 10 N, its error is 0.026 N, and that of F is 0.050 N. At 0.3 m/s, F and F_end agree
+    with the true mean and end values to 1e-4 N, except in the step of a reversal, in which the
+    bristle reverses completely: there the error of F is 0.022 N and that of F_end 0.36 N, because
+    the mean velocity does not determine the velocity at the end, on which the damping depends; the
+    error of the bristle force without damping is 0.0095 N.
     In F the bristle damping uses r = (z+ - z) / h, which is bounded by the bristle's travel, and
     not the rate at one instant, which after a jump is as large as v. Use the mean velocity of the
     step, such as the encoder increment over h; with the velocity at its start the error is of first
     order in h.
 
-    Initial states: zero (a machine at rest, bristles relaxed), or by the reset `init_sliding` those
-    of long sliding at v, N (a controller that starts while the machine moves).
+    Initial states are zero (machine at rest, bristles relaxed) or, after the reset `init_sliding`,
+    those of long sliding at v, N (for a controller that starts while the machine moves).
 
     Args:
         law: a law whose parameters are numbers.
         name: C identifier; default the name of the law.
         h: step size [s] as a constant; without it h is a parameter, by default 1 ms. A law without
             states has no step size.
-        free: parameters that stay variable at run time, all others become constants.
-        fold: True makes all parameters constants (not h); or names of those. Parameters whose value
-            selects a cheaper form are constants in any case, see `runtime_parameters`. Parameters
-            without effect never appear.
-        turning: True for a contact that turns: the same C, with units rad/s and N m in its texts.
+        free: parameters that remain variable at run time; all others become constants.
+        fold: True if all parameters (except h) become constants, or the names of those that do.
+            Parameters whose value selects a cheaper form are constants in any case, see
+            `runtime_parameters`. Parameters without effect are omitted.
+        turning: True for a rotary contact: the same C, with units rad/s and N m in the texts.
 
     Raises:
         ValueError: symbols in the law; names in `free` or `fold` that are unknown, repeated or, in
-            `free`, without effect; both of them; a step size of a law without states; states with
+            `free`, without effect; both arguments given; h for a law without states; states with
             circular dependencies (Leuven, smooth GMS), or states that are not affine, depend on
             others and have no known equilibrium; modes that follow zero crossings of v within the
             step (exact Coulomb, Karnopp and Leine by events); a force that is not finite at rest (a
@@ -138,7 +138,7 @@ def law_block(
 
 
 def in_turning(block: Block) -> Block:
-    """Return the block with the units of a contact that turns."""
+    """Return the block with the units of a rotary contact."""
     states, parameters, inputs = (
         tuple(replace(v, unit=turned(v.unit)) for v in group) for group in block.groups.values()
     )
@@ -163,7 +163,7 @@ def _inputs(law: Law) -> Variables:
 
 
 def _given(inputs: Variables) -> dict[str, ca.SX]:
-    """Return the symbols after v and N."""
+    """Return the symbols of the inputs after v and N, by name."""
     return {variable.name: variable.symbol for variable in inputs[2:]}
 
 
@@ -217,7 +217,7 @@ def _step(numeric: Law, law: Law, runtime: Variables, h: float | None, where: st
 
 
 def _at_rest(block: Block, zero: str = "") -> bool:
-    """Return True if force and states are finite at rest, with the parameter `zero` at 0."""
+    """Return True if force and states are finite at rest with the parameter `zero` set to 0."""
     states = [v.start for v in block.states]
     p = [0.0 if v.name == zero else v.start for v in block.parameters]
     rest = [0.0 if v.name == "v" else v.nominal for v in block.inputs]
@@ -227,8 +227,8 @@ def _at_rest(block: Block, zero: str = "") -> bool:
 def _described(law: Law, idle: Iterable[str]) -> dict[str, Any]:
     """Return the texts of the data sheet from the docstrings of the law and its parts.
 
-    Parameters without effect, `idle`, are omitted, and so is N = 0, where the block, unlike the
-    law, is valid.
+    Limits that concern parameters without effect (`idle`) or N = 0 are omitted; the block, unlike
+    the law, is valid at N = 0.
     """
     found = texts(law)
     limits = dict.fromkeys(limit for text in found for limit in text.limits)
@@ -242,13 +242,13 @@ def _described(law: Law, idle: Iterable[str]) -> dict[str, Any]:
 
 
 def contact_block(law: Population, *, name: str | None = None, h: float | None = None) -> Block:
-    """Return the discrete-time block of one contact of `law` with inputs v, N, r and its force F.
+    """Return the discrete-time block of one contact of `law`; inputs v, N, r, output F.
 
     The step is that of `Population.advance`, so that a loop in C over the contacts of
-    `Population.begin` equals NumPy to rounding. Keep |v| h below `Population.step`.
+    `Population.begin` agrees with NumPy up to rounding. Keep |v| h below `Population.step`.
 
     Args:
-        law: a population; its numbers are constants of the block.
+        law: a population; its parameters are constants of the block.
         name: C identifier; default the name of the population.
         h: step size [s] as a constant; without it h is a parameter, by default 1 ms.
 

@@ -1,4 +1,4 @@
-"""Model as a block: a plant that advances by fixed steps."""
+"""Block of a model or a scene: a plant that advances by fixed steps."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -30,7 +30,7 @@ from symfric.model import Model, Output, Variables, check_model
 
 
 class Machine(Protocol):
-    """Scene: an object whose `model` accepts free parameters."""
+    """Protocol of scenes: objects whose `model` accepts free parameters."""
 
     def model(self, free: Iterable[str] = ()) -> Model:
         """Return the model with the parameters in `free` as symbols."""
@@ -46,16 +46,16 @@ def plant_block(
     free: Sequence[str] | None = None,
     fold: Fold = None,
 ) -> Block:
-    """Return the discrete-time block of a model or a scene; names of the model are kept.
+    """Return the discrete-time block of a model or a scene, with the names of the model.
 
-    A step integrates over h with the inputs held; the outputs are those at its end. Algebraic
-    variables, and time if the equations depend on it, are also states of the block. Initial states
-    are the model's start values, the algebraic ones consistent with the start values of the inputs;
-    they do not follow parameters that are changed at run time.
+    A step integrates over h with the inputs held; the outputs are those at the end of the step.
+    Algebraic variables, and time if the equations depend on it, are also states of the block. The
+    initial states are the start values of the model, with algebraic variables consistent with the
+    start values of the inputs; changing parameters at run time does not change them.
 
-    Fixed steps have no error control and do not detect friction that jams. Rabinowicz's stick-slip
-    over 20 s, largest error relative to the largest position, at a step of 1 ms and 0.1 ms, and
-    operations of a step:
+    Fixed steps have no error control and do not detect friction that jams. The table shows, for
+    Rabinowicz's stick-slip over 20 s, the largest error relative to the largest position at steps
+    of 1 ms and 0.1 ms, and the number of operations of a step:
 
         method            order   BrownMcPhee         LuGre
         "rodas3"          3       5e-7   5e-9   125   4e-6   9e-9    189
@@ -64,20 +64,22 @@ def plant_block(
         "backward_euler"  1       1e-2   1e-3   176   1e-2   1e-3    273
         "exponential"     1       8e-3   8e-4    68   1e-2   1e-3    105
 
-    In double the C is CasADi's bit for bit. In float one step of this scene differs by up to 3e-5
-    of a signal's peak (2e-4 by Rodas5P), more than `verify` allows: the sliding velocity is a
-    difference of larger ones. Use double if the time of break-away matters.
+    In double, the C computes the same bits as CasADi. In float, a step of this scene differs by up
+    to 3e-5 of the peak of a signal (2e-4 with Rodas5P), which is more than `verify` allows, because
+    the sliding velocity is a difference of larger velocities. Use double if the time of break-away
+    matters.
 
-    If h does not resolve the transition (10 ms here, or 1 ms with v_t = 1e-5 m/s) none of them is
-    accurate; backward Euler stays bounded, the others may diverge. With friction on light links h
-    rarely resolves it: a six-joint arm that falls diverges at 1 ms with all others, so backward
-    Euler is the default for mechanisms with friction. Compare with `simulate`. The exponential
-    method is explicit in the coupling of the equations, and for ODEs only.
+    If h does not resolve the transition (10 ms here, or 1 ms with v_t = 1e-5 m/s), no method is
+    accurate; backward Euler stays bounded, the others may diverge. With friction on light links, h
+    rarely resolves it: a falling six-joint arm diverges at 1 ms with all other methods. Therefore
+    backward Euler is the default for mechanisms with friction. Compare with `simulate`. The
+    exponential method is explicit in the coupling of the equations, and for ODEs only.
 
     All parameters of a scene and of its law can be changed at run time, except those whose value
-    selects a cheaper form of the law (`runtime_parameters`). Operations of a step with all of them
-    constants, by default, and with every one variable (instructions on a Cortex-M4F in float, by
-    `symfric.embedded.measure`, for the first two):
+    selects a cheaper form of the law (`runtime_parameters`). The table shows the operations of a
+    step with all parameters constant, with the default, and with all of them variable (for the
+    first two scenes also the instructions on a Cortex-M4F in float, from
+    `symfric.embedded.measure`):
 
         drive, BrownMcPhee            118    126    143     554   548   574
         rabinowicz, LuGre             201    217    243     576   609   912
@@ -85,19 +87,19 @@ def plant_block(
         arm, LuGre                  32133  32314  32485
 
     Args:
-        model: without events; a model, whose parameters in `model.p` stay variable at run time, or
-            a scene.
+        model: a model, whose parameters `model.p` remain variable at run time, or a scene; without
+            events.
         h: step size [s] as a constant; without it h is a parameter, by default 1 ms.
         method: one of `METHODS`, see `simulate` and `flow`; "auto" is backward_euler for mechanisms
             with friction, else rodas3.
         name: C identifier; default the name of the model.
-        free, fold: parameters of a scene that stay variable, and no others, or that become
+        free, fold: the only parameters of a scene that remain variable, or those that become
             constants, as in `law_block`.
 
     Raises:
-        ValueError: unknown method, or one for ODEs only with a DAE; events; a step size <= 0; start
-            values without consistent algebraic ones; outputs that depend on time although the
-            equations do not.
+        ValueError: an unknown method, or a method for ODEs with a DAE; events; a step size <= 0;
+            start values without consistent algebraic variables; outputs that depend on time
+            although the equations do not.
     """
     folded: list[Parameter] = []
     machine = model
@@ -143,7 +145,7 @@ def plant_block(
 
 
 def fixed_method(where: str, model: Model, method: str) -> str:
-    """Return the method of fixed steps; "auto" is the one for the model, see `plant_block`."""
+    """Return the method of fixed steps; "auto" selects one for the model, see `plant_block`."""
     checks.choice(f"{where}: method", method, ["auto", *METHODS])
     if method != "auto":
         return method
@@ -153,7 +155,7 @@ def fixed_method(where: str, model: Model, method: str) -> str:
 def _opened(
     machine: Machine, free: Sequence[str] | None, fold: Fold
 ) -> tuple[Model, list[Parameter]]:
-    """Return the model of a scene with its variable parameters, and the constant ones."""
+    """Return the model of a scene with variable parameters, and the constant parameters."""
     if not (isinstance(machine, Parametric) and hasattr(machine, "model")):
         raise checks.refused("codegen", "a model, or a scene such as Rabinowicz(LuGre())", machine)
     names, problems = variable(machine, free, fold)
@@ -163,13 +165,13 @@ def _opened(
 
 
 def _held(model: Model) -> System:
-    """Return the equations with the inputs as run data."""
+    """Return the equations with held inputs, which are data of the run."""
     u = model.vector("u")
     return system(model, InputData(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("plant",)))
 
 
 def _states(model: Model, whole: System, where: str) -> Variables:
-    """Return all unknowns with consistent start values."""
+    """Return all unknowns as states, with consistent start values."""
     known = {v.name: v for v in (*model.x, *model.z)}
     rates = {f"{v.name}_dot": Variable(f"{v.name}_dot", f"({v.unit})/s") for v in model.x}
     time = {"t": Variable("t", "s", doc="time")}

@@ -1,4 +1,4 @@
-"""Step of the states of a law with velocity and load held, and its form without load."""
+"""Step of the states of a law with velocity and load held, and its case without load."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ from symfric.laws import Law, Sum
 from symfric.laws.base.law import chosen
 
 EXACT, EVENT, SECOND = "exact", "event", "second order"
-"""Types of a step: exponential of an affine rate, exact with corners, linearised rates."""
+"""Types of steps: exponential of affine rates, exact with corners, linearised rates."""
 
 FASTEST = 1.0
-"""Largest J h of a linearised rate: faster growth is no approximation of the solution, and may
+"""Limit of J h of a linearised rate; faster growth does not approximate the solution and may
 overflow.
 """
 
@@ -31,8 +31,8 @@ class Step:
     """States of a law after a step of h [s], columns.
 
     Attributes:
-        end, mean: the states after it, and their mean over it.
-        mean_rate, end_rate: their rates, likewise.
+        end, mean: states at the end of the step, and their means over it.
+        mean_rate, end_rate: mean rates over the step, and rates at its end.
         kinds: types of the step: EXACT, EVENT, SECOND, each at most once.
     """
 
@@ -55,11 +55,11 @@ def advanced(
 ) -> Step:
     """Return the states of a law after a step of `h` [s], their means, and their rates.
 
-    v, N and the further inputs `given` are held. A sum is advanced term by term, by the law's own
-    `held_step` if it has one, else by the function `held_step`.
+    v, N and the further inputs `given` are held. A sum is advanced term by term. A law with a
+    method `held_step` uses it, other laws use the function `held_step`.
 
     Raises:
-        ValueError: modes that follow zero crossings within the step; as `held_step`.
+        ValueError: modes that follow zero crossings within the step; errors of `held_step`.
     """
     if isinstance(law, Sum):
         terms = zip(law.laws, law.terms(z), law.terms(rate), strict=True)
@@ -89,27 +89,28 @@ def advanced(
 def held_step(
     rate: ca.SX, z: ca.SX, h: ca.SX | float, rest: ca.SX, where: str, *, each: bool = False
 ) -> Step:
-    """Return states after a step of h [s], their means over it, and their rates, columns.
+    """Return states after a step of h [s], their means over it, and their rates, as columns.
 
-    States are advanced one by one, those that others need first, with the means of these. The step
-    is exact if the rate is affine in its own state and does not depend on others; otherwise
+    States are advanced one by one; a state follows those that its rate depends on, and uses their
+    means. The step of a state is exact if its rate is affine in it and depends on no other state;
+    otherwise
 
         dz = h phi1(J h) f,   m = h phi2(J h) f,   J = df_i/dz_i
         z+ = z + s dz,   mean z = z + s [(1 - s) dz + s m]
 
     of second order (Rosenbrock-Euler, exponential), with J h limited to `FASTEST`. s = min(1,
     (rest - z)/dz) ends the step at the equilibrium of the state, which the solution cannot pass but
-    the linearised one may. The rate at the end is exp(J h) f, without the difference of large
-    numbers that it would be at z+ in fast sliding; 0 if the state has reached its equilibrium.
+    its linearisation may. The rate at the end is exp(J h) f, because evaluating it at z+ in fast
+    sliding is a difference of large numbers; it is 0 if the state has reached its equilibrium.
 
     Args:
-        rate: of the states `z`.
+        rate: rates of the states `z`.
         rest: equilibrium of each state.
-        each: `rest` is that of each state at the values of the others in `z`.
+        each: True if `rest` is the equilibrium of each state for the others in `z`.
 
     Raises:
-        ValueError: states with circular dependencies, or a rate that depends on others and is not
-            affine in its own state, without known equilibrium (without `each`).
+        ValueError: states with circular dependencies, or a rate that depends on other states and is
+            not affine in its own, if `each` is False.
     """
     count = z.numel()
     means, rates, last = ([z[i] for i in range(count)] for _ in range(3))
@@ -137,15 +138,13 @@ def held_step(
 
 
 def _share(way: ca.SX, gap: ca.SX) -> ca.SX:
-    """Return the fraction of `way` up to the equilibrium at the distance `gap`; 1 if it is
-    beyond.
-    """
+    """Return the fraction of `way` up to the equilibrium at the distance `gap`, at most 1."""
     ratio = gap / ca.if_else(way == 0, 1, way)
     return ca.if_else(ca.logic_and(ratio > 0, ratio < 1), ratio, 1)
 
 
 def _order(pattern: NDArray[np.bool_], where: str) -> list[int]:
-    """Return the states, each after those that its rate depends on."""
+    """Return the indices of the states, each after those that its rate depends on."""
     needs = {i: set(row.nonzero()[0].tolist()) - {i} for i, row in enumerate(pattern)}
     found: list[int] = []
     while len(found) < len(needs):
@@ -166,8 +165,8 @@ def _expected(what: str) -> str:
 def force_of_rate(force: ca.SX, rate: ca.SX, z: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Return the force with symbols r for the rates that occur in it, and r.
 
-    Its mean is then taken at the mean rates and not at the rates of the mean state; these are equal
-    in an affine law but, in float at high velocities, the difference of two large numbers.
+    The mean force then uses the mean rates instead of the rates of the mean state. Both are equal
+    in an affine law, but the latter are differences of large numbers in float at high velocities.
     """
     r = ca.SX.sym("r", rate.numel())
     others = ca.veccat(*(s for s in ca.symvar(ca.vertcat(force, rate)) if not ca.depends_on(z, s)))
@@ -185,7 +184,7 @@ LEAST_LOAD = 1e-9
 
 
 def forces_at(force: ca.SX, own: ca.SX, at: Mapping[str, ca.SX]) -> dict[str, ca.SX]:
-    """Return the force with the values `at`, by name, for the states and rates `own`, a column."""
+    """Return the force, by name, with the column `own` (states and rates) set to values `at`."""
     return {name: ca.substitute(force, own, values) for name, values in at.items()}
 
 
@@ -195,11 +194,11 @@ def with_unloaded_case(
     """Return states and forces of a step with a separate case for a contact without load.
 
     A state whose step depends on the load becomes 0, as in a contact that has just closed; the
-    others (a lag, a temperature) continue. Only viscous friction remains of the force.
+    other states (a lag, a temperature) continue. The force reduces to viscous friction.
 
     Args:
         following: states after the step.
-        force, own, at: as for `forces_at`.
+        force, own, at: arguments of `forces_at`.
         N: normal force.
     """
     least = LEAST_LOAD * N.nominal
@@ -210,10 +209,10 @@ def with_unloaded_case(
     found: dict[str, ca.SX] = {}
     for name, normal in forces_at(force, own, at).items():
         values, left = ca.vertcat(kept, kept) * at[name], ca.SX()
-        for load in (0.0, least):  # not 0 if that gives 0/0: a corner as wide as a part of it
+        for load in (0.0, least):  # not 0 if a width relative to N gives 0/0
             given = ca.densify(ca.vertcat(values, load))
             left = ca.substitute(force, ca.vertcat(own, N.symbol), given)
-            symbols = stacked(ca.symvar(left))  # at numbers that no formula treats specially
+            symbols = stacked(ca.symvar(left))  # at numbers without special cases in formulas
             value = ca.evalf(ca.substitute(left, symbols, 0.7 * ca.SX.ones(symbols.numel())))
             if np.isfinite(float(value)):
                 break
@@ -224,17 +223,17 @@ def with_unloaded_case(
 def needs_unloaded_case(law: Law, own: ca.Function, cases: ca.Function) -> bool:
     """Return True if the formulas of `law` are not finite at N = 0, or give a force at rest there.
 
-    Elements of event forms release at once. A law with a level of its own there, such as by a
+    Elements of event forms release at once. A law with a friction level at N = 0, such as from a
     preload, keeps its formulas.
 
     Args:
-        law: with numbers.
-        own, cases: (v, N, z, further inputs) -> states, outputs, by the law itself and
-            `with_unloaded_case`.
+        law: the law with numbers as parameters.
+        own, cases: functions (v, N, z, further inputs) -> states, outputs; of the law itself, and
+            with the results of `with_unloaded_case`.
     """
     try:
         level = max(abs(float(law.static_level(0.0, side))) for side in (1, -1))
-    except ValueError:  # it is not defined
+    except ValueError:  # the law does not define a level
         level = 0.0
     if level:
         return False

@@ -1,4 +1,4 @@
-"""Inverse dynamics of a mechanism with friction in its joints as a block."""
+"""Blocks of a mechanism: inverse dynamics with joint friction, and gravity compensation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,41 +38,41 @@ def inverse_dynamics_block(
     fold: bool = False,
     h: float | None = None,
 ) -> Block:
-    """Return the block of the forces that a motion needs: tau(q, qd, qdd), with joint friction.
+    """Return the block of the forces that a motion requires, including joint friction.
 
         tau = M(q) qdd + c(q, qd) + g(q) + friction(qd, N(q, qd, qdd), z)
 
-    by the recursion of Newton and Euler. The normal force N of a bearing loaded by reactions is
-    that of this motion, payload and acceleration included; it does not depend on friction, so
-    nothing is solved. Bristles are states of the block and make a step with velocity and normal
+    The block uses the Newton-Euler recursion. The normal force N of a bearing loaded by reactions
+    is that of this motion, including payload and acceleration; it must not depend on friction, so
+    no equation is solved. Bristles are states of the block and make a step with velocity and normal
     force held, see `law_block`; use the velocity and acceleration that are planned for the step.
 
-    Inputs q_1 ... q_n, qd_1 ..., qdd_1 ... in the order of the joints that the header names;
-    outputs tau_1 ... [N m or N], positive along the joint. Parameters and states of the laws, and
-    constant normal forces, have the numbers of their joints, and can be changed at run time. Inputs
-    of the mechanism have their start values, those of motors are zero.
+    Inputs are q_1 ... q_n, qd_1 ..., qdd_1 ... in the order of the joints that the header names;
+    outputs are tau_1 ... [N m or N], positive along the joint. Parameters and states of the laws,
+    and constant normal forces, have the numbers of their joints; the parameters can be changed at
+    run time. Inputs of the mechanism keep their start values; those of motors are zero.
 
-    Couplings of constant ratio, such as the fingers that mimic another one in URDF files, leave the
-    leading joints; tau includes the forces to move the others.
+    Couplings of constant ratio, such as fingers that mimic another one in URDF files, reduce the
+    coordinates to those of the leading joints; tau includes the forces that move the others.
 
     Args:
-        mechanism: or a URDF file, or its text; `read_urdf(file, law=..., bearings=...)` selects its
-            friction.
-        name: C identifier; default that of the mechanism.
-        p: parameters of the mechanism that stay variable, as for `Mechanism.build`.
+        mechanism: a mechanism, a URDF file or its text; `read_urdf(file, law=..., bearings=...)`
+            selects the friction of a URDF file.
+        name: C identifier; default the name of the mechanism.
+        p: parameters of the mechanism that remain variable, as for `Mechanism.build`.
         payload: the frame "body.frame", or the body or link, that carries a load whose mass
             payload_m and centre of mass payload_c are parameters, initially zero.
-        payload_inertia: True if the load has moments of inertia payload_J, too.
-        tunable_gravity: the vector of gravity is a parameter: a robot on a wall, on a vehicle.
-        separate: friction also as outputs friction_1 ... (tau contains it).
-        fold: the parameters of friction become constants.
+        payload_inertia: True if the load also has moments of inertia payload_J.
+        tunable_gravity: True if the gravity vector is a parameter, as for a robot on a vehicle.
+        separate: True if friction, which tau contains, is also output as friction_1 ...
+        fold: True if the parameters of friction become constants.
         h: step size [s] of laws with states as a constant; without it h is a parameter.
 
     Raises:
         ValueError: closed loops, balls or free bodies, prescribed motion; laws without a step of
             their states (Leuven, smooth GMS) or that need the applied force (exact Coulomb,
             Karnopp); friction whose normal force depends on other friction; a payload at an
-            unknown place; as `Mechanism.build`.
+            unknown place; errors of `Mechanism.build`.
     """
     checks.flag(f"{WHERE}: separate", separate)
     checks.flag(f"{WHERE}: fold", fold)
@@ -120,8 +120,8 @@ def gravity_block(
 ) -> Block:
     """Return the block of the forces that hold a mechanism at rest, tau = g(q), without friction.
 
-    Springs are included. Arguments as of `inverse_dynamics_block`; the default name ends in
-    _gravity.
+    Springs are included. The arguments are those of `inverse_dynamics_block`; the default name ends
+    in _gravity.
     """
     machine = _machine(mechanism, p, payload, False, tunable_gravity)
     eq = machine.eq
@@ -142,10 +142,10 @@ class _Machine:
     """Equations of a mechanism in its leading coordinates.
 
     Attributes:
-        joints: the leading coordinates: name, unit.
-        inputs: q, qd, qdd of them.
-        symbols, values: symbols of the coordinates of all joints, and their values.
-        T: rates of all joints are T times the leading ones, shape (n, k).
+        joints: leading coordinates.
+        inputs: q, qd, qdd of the leading coordinates.
+        symbols, values: symbols in the equations, and their values in terms of the inputs.
+        T: matrix of the rates of all coordinates by the leading rates, shape (n, k).
     """
 
     name: str
@@ -159,7 +159,7 @@ class _Machine:
 
     @property
     def identifier(self) -> str:
-        """Name as a C identifier: names in robot files may begin with a digit."""
+        """Name as a C identifier; names in robot files may begin with a digit."""
         return self.name if self.name[:1].isalpha() else f"robot_{self.name.lstrip('_')}"
 
     def along(self, contact: Contact) -> str:
@@ -168,20 +168,20 @@ class _Machine:
         return joint.coordinate(joint.directions[contact.direction])
 
     def label(self, coordinate: str) -> str:
-        """Return the number of a leading coordinate; the name of a following one."""
+        """Return the number of a leading coordinate, or the name of another coordinate."""
         names = [v.name for v in self.joints]
         return str(names.index(coordinate) + 1) if coordinate in names else coordinate
 
     def moved(self, expression: ca.SX) -> ca.SX:
-        """Return an expression of all coordinates in terms of the leading ones."""
+        """Return an expression of all coordinates in terms of the leading coordinates."""
         return ca.substitute([expression], list(self.symbols), list(self.values))[0]
 
     def leading(self, forces: ca.SX) -> ca.SX:
-        """Return forces along all coordinates as forces along the leading ones."""
+        """Return forces along all coordinates as forces along the leading coordinates."""
         return ca.densify(ca.SX(self.T.T) @ self.moved(forces))
 
     def outputs(self, stem: str, column: ca.SX, doc: str) -> dict[str, Output]:
-        """Return one output per joint."""
+        """Return one output for each leading coordinate."""
         units = ("N m" if v.unit == "rad" else "N" for v in self.joints)
         rows = zip(ca.vertsplit(column), units, strict=True)
         return {f"{stem}_{k}": Output(row, unit, doc) for k, (row, unit) in enumerate(rows, 1)}
@@ -268,10 +268,10 @@ def _machine(
 
 
 def _check(eq: Equations, mechanism: Mechanism) -> None:
-    """Check that this recursion supports the mechanism.
+    """Check that the recursion supports the mechanism.
 
     Raises:
-        ValueError: with the names of joints and constraints.
+        ValueError: the mechanism is not supported; the message names the joints.
     """
     where = f"{WHERE} of '{mechanism.name}'"
     if eq.loops:
@@ -302,11 +302,11 @@ def _check(eq: Equations, mechanism: Mechanism) -> None:
 
 
 def _couplings(eq: Equations) -> tuple[ca.DM, ca.DM, list[int]]:
-    """Return T, c and the leading coordinates: all coordinates are T times those, plus c.
+    """Return T, c and the indices of the leading coordinates y; all coordinates are T y + c.
 
     Raises:
-        ValueError: a constraint that is not linear in coordinates, or whose ratio is not a number;
-            constraints that do not determine the other coordinates.
+        ValueError: a constraint that is not linear in the coordinates, or whose ratio is not a
+            number; constraints that do not determine the other coordinates.
     """
     J, at_zero = ca.jacobian(eq.phi, eq.q), ca.substitute(eq.phi, eq.q, ca.SX.zeros(eq.n))
     if not (J.is_constant() and at_zero.is_constant()):

@@ -1,4 +1,4 @@
-"""Joints of a mechanism in a block: friction, a payload, gravity at run time."""
+"""Parts of a block of a mechanism: friction of joints, a payload, variable gravity."""
 
 from copy import copy
 from dataclasses import replace
@@ -22,12 +22,12 @@ class ContactStep(NamedTuple):
     """Friction of one contact over a step.
 
     Attributes:
-        along: the coordinate that it resists.
-        law: the block of its law, whose texts are those of the data sheet.
-        force: friction [N], for a law of the moment [N m].
-        parameters: with the names of the law.
-        following: the states after the step.
-        sliding: the states of long sliding.
+        along: coordinate that the friction resists.
+        law: block of the law, with the texts of the data sheet.
+        force: friction [N]; for a rotary law [N m].
+        parameters: parameters with the names of the law.
+        following: states after the step.
+        sliding: states of long sliding.
     """
 
     along: str
@@ -43,14 +43,14 @@ def contact_step(
 ) -> ContactStep:
     """Return the friction of a contact under the normal force `normal` [N], in a step of `h` [s].
 
-    A constant normal force is a parameter N.
+    A constant normal force becomes a parameter N, unless `fold` is True.
 
     Args:
-        along: the coordinate that it resists.
-        fold: True if all parameters are constants.
+        along: coordinate that the friction resists.
+        fold: True if all parameters become constants.
 
     Raises:
-        ValueError: as `law_block`; a law that needs more than v and N.
+        ValueError: errors of `law_block`; a law with inputs other than v and N.
     """
     law, friction = contact.friction.law, contact.friction
     if law.inputs:
@@ -76,7 +76,7 @@ def contact_step(
 
 
 def _level(friction: JointFriction) -> Variables:
-    """Return the constant normal force of a joint as a parameter, if it has one."""
+    """Return the constant normal force of a joint as a parameter; () if it is not constant."""
     if friction.normal is None or not is_number(friction.normal):
         return ()
     start, turning = float(friction.normal), friction.turning
@@ -86,21 +86,22 @@ def _level(friction: JointFriction) -> Variables:
 
 
 def with_payload(mechanism: Mechanism, place: str, *, inertia: bool) -> tuple[Mechanism, Variables]:
-    """Return a copy whose body at `place` carries a rigid load, and the load's parameters.
+    """Return a copy whose body at `place` carries a rigid load, and the parameters of the load.
 
-    The two form one body of the mass m + m_l, with the centre of mass c + r (c_l - c) and the
+    Body and load form one body of mass m + m_l, with the centre of mass c + r (c_l - c) and the
     inertia J + J_l + r m (|d|^2 - d d'), d = c_l - c, r = m_l / (m + m_l).
 
     Args:
-        place: "body", "body.frame", or the name of a frame or a link that occurs once.
-        inertia: True if the load has moments of inertia; otherwise it is a point.
+        place: "body", "body.frame", or the unique name of a frame or a link.
+        inertia: True if the load has moments of inertia; otherwise it is a point mass.
 
     Returns:
-        The copy; payload_m [kg], payload_c_1 ... 3 [m] in the axes of the frame and, with
-        `inertia`, payload_J_1 ... 6 [kg m^2] about its centre of mass; all of them zero.
+        The copy, and the parameters payload_m [kg], payload_c_1 ... 3 [m] in the axes of the frame
+        and, with `inertia`, payload_J_1 ... 6 [kg m^2] about the centre of mass of the load; the
+        default of each is zero.
 
     Raises:
-        ValueError: an unknown or ambiguous place, the ground.
+        ValueError: an unknown or ambiguous place, or the ground.
     """
     name, frame = _found(mechanism, place)
     m = Variable("payload_m", "kg", lower=0.0, upper=1e6, doc="mass of the payload")
@@ -122,7 +123,7 @@ def with_payload(mechanism: Mechanism, place: str, *, inertia: bool) -> tuple[Me
 
 
 def _found(mechanism: Mechanism, place: str) -> tuple[str, Frame]:
-    """Return the body at a place, and the frame on it."""
+    """Return the name of the body at a place, and the frame on this body."""
     places = dict(mechanism.frames)
     if place in [body.name for body in mechanism.bodies]:
         places, found = {**places, place: Frame()}, [place]
@@ -141,7 +142,7 @@ def _found(mechanism: Mechanism, place: str) -> tuple[str, Frame]:
 
 
 def _together(body: Body, load: Body, frame: Frame) -> Body:
-    """Return a body and its load at a frame, as one body."""
+    """Return a body and its load at a frame as one body."""
     c = ca.SX(frame.p) + ca.SX(frame.R) @ load.c
     inertia = body.J + ca.SX(frame.R) @ load.J @ ca.SX(frame.R).T
     mass = load.mass
@@ -155,8 +156,9 @@ def _together(body: Body, load: Body, frame: Frame) -> Body:
 
 
 def with_gravity(mechanism: Mechanism) -> tuple[Mechanism, Variables]:
-    """Return a copy whose gravity is the parameters g_1, g_2, g_3 [m/s^2] in the axes of the
-    ground.
+    """Return a copy with variable gravity, and its parameters g_1, g_2, g_3 [m/s^2].
+
+    The axes are those of the ground.
     """
     weights = [force for force in mechanism.forces if isinstance(force, Gravity)]
     start = stacked(vector(force.g) for force in weights[:1])

@@ -1,4 +1,4 @@
-"""Texts of a data sheet, from the docstring of a law and the method of its steps."""
+"""Texts of a data sheet, derived from the docstring of a law and the method of its steps."""
 
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
@@ -14,24 +14,24 @@ from symfric.integrator.methods.families import BackwardEuler, Exponential, Rada
 from symfric.integrator.methods.method import Method
 
 SHEET = tomllib.loads(Path(__file__).with_name("sheet.toml").read_text(encoding="utf-8"))
-"""Fixed texts."""
+"""Fixed texts of data sheets."""
 
 TELLING = (
     r"[Nn]ot valid|[Cc]reeps? |[Dd]rifts?\b|Needs |Keep |Never |[Oo]nly if |smooth over|rounded"
 )
-"""Patterns of sentences that users of the law must read."""
+"""Pattern of sentences that users of the law must read."""
 
 LEANING = r"^Without it|^Made for slip|, as there|that form|form = "
-"""Patterns of sentences that depend on the previous one, or describe another form."""
+"""Pattern of sentences that depend on the previous sentence or describe another form."""
 
 
 class LawText(NamedTuple):
     """Texts about a law, without Python terms.
 
     Attributes:
-        title: its name, one line.
+        title: name of the law, one line.
         equations: formulas, line by line.
-        limits: restrictions, a sentence each.
+        limits: sentences about restrictions.
         source: publication.
     """
 
@@ -42,7 +42,7 @@ class LawText(NamedTuple):
 
 
 def texts(law: Parametric) -> tuple[LawText, ...]:
-    """Return the texts of a law and of its parts, each once."""
+    """Return the texts of a law and of its parts, without repetitions."""
 
     def every(part: Parametric) -> Iterator[LawText]:
         yield _text(part)
@@ -56,9 +56,7 @@ def texts(law: Parametric) -> tuple[LawText, ...]:
 
 
 def equations(obj: Parametric) -> str:
-    """Return the formulas of a law or a machine and of its parts, with titles if there are
-    several.
-    """
+    """Return the formulas of a law or machine and its parts; several parts have titles."""
     found = texts(obj)
     if len(found) == 1:
         return found[0].equations
@@ -82,7 +80,7 @@ def _text(law: Parametric) -> LawText:
 
 
 def _formulas(paragraphs: Sequence[str], forms: Iterable[Option]) -> Iterator[str]:
-    """Yield the formulas except those of another form, whose name precedes them."""
+    """Yield the formulas, except those whose introduction names another value of an option."""
     others = "|".join(rf'{o.name} = "(?!{o.value}")' for o in forms) or "(?!)"
     before = ""
     for paragraph in paragraphs:
@@ -94,7 +92,7 @@ def _formulas(paragraphs: Sequence[str], forms: Iterable[Option]) -> Iterator[st
 
 
 def _limits(prose: str) -> Iterator[str]:
-    """Yield the sentences about restrictions of a law and its smoothing widths."""
+    """Yield the sentences about restrictions and smoothing widths of a law."""
     for sentence in split(r"(?<=\.)(?<!al\.)\s+", " ".join(prose.split())):
         for clause in split(r";\s+", sentence.removeprefix("Limits: ").replace("`", "")):
             if search(TELLING, clause) and not search(LEANING, clause):
@@ -104,9 +102,10 @@ def _limits(prose: str) -> Iterator[str]:
 
 
 def of_law(kinds: tuple[str, ...], ends: bool) -> str:
-    """Return the text about the step of the states of a law, by the `kinds` of its `Step`.
+    """Return the text about the step of the states of a law.
 
     Args:
+        kinds: types of the step, see `Step`.
         ends: True if the block also has the force at the end of the step.
     """
     names = ("held", *kinds, "mean", *("end",) * ends)
@@ -114,10 +113,10 @@ def of_law(kinds: tuple[str, ...], ends: bool) -> str:
 
 
 def of_method(method: Method, algebraic: bool) -> str:
-    """Return the text about a method's fixed step of x' = f(x, u), 0 = g(x, z, u).
+    """Return the text about the fixed step of a method for x' = f(x, u), 0 = g(x, z, u).
 
     Args:
-        algebraic: True if there are unknowns z.
+        algebraic: True if there are algebraic unknowns z.
     """
     unknowns = "\n    x stands for states and algebraic unknowns" if algebraic else ""
     return (

@@ -1,6 +1,6 @@
 """Variables of a block: step size, run-time parameters, numbered joints, arrays of elements.
 
-Candidates for arrays are found by names, and confirmed by the graph of the step: only variables
+Names determine the candidates for arrays, and the graph of the step confirms them: only variables
 that a loop reads or writes become an array, and a block without loops is unchanged.
 """
 
@@ -29,8 +29,8 @@ from symfric.laws import Law
 from symfric.model import Variables
 
 Fold = bool | Sequence[str] | None
-"""Parameters that become constants: True for all, names, or None for those that select a cheaper
-form."""
+"""Parameters that become constants: True for all, or their names, or None for those whose values
+select a cheaper form."""
 
 STEP_SIZE = 1e-3
 """Default of the parameter h [s]."""
@@ -40,9 +40,9 @@ class StepSize(NamedTuple):
     """Step size of a block.
 
     Attributes:
-        h: its symbol, or its number [s].
-        parameters: the parameter h, or nothing.
-        constants: likewise of a constant step size.
+        h: symbol or number [s].
+        parameters: the parameter h; empty if h is a constant.
+        constants: the constant h; empty if h is a parameter.
     """
 
     h: ca.SX | float
@@ -51,7 +51,7 @@ class StepSize(NamedTuple):
 
 
 def step_size(where: str, h: float | None) -> StepSize:
-    """Return the step size `h` [s] as a constant; if None, a parameter, by default 1 ms."""
+    """Return the step size `h` [s] as a constant; if None, as a parameter, by default 1 ms."""
     if h is not None:
         h = checks.number(f"{where}: h", h, unit="s", above=0.0)
         return StepSize(h, (), {"h": h})
@@ -62,7 +62,7 @@ def step_size(where: str, h: float | None) -> StepSize:
 def as_constants(
     gone: Iterable[Parameter], more: Mapping[str, float], turning: bool = False
 ) -> dict[str, Any]:
-    """Return the fields `constants` and `about` of a block for parameters that are constants."""
+    """Return the fields `constants` and `about` of a block for the parameters `gone`."""
     listed = [*gone]
     return {
         "constants": {p.name: float(p.value) for p in listed} | dict(more),
@@ -73,13 +73,13 @@ def as_constants(
 def variable(
     obj: Parametric, free: Sequence[str] | None, fold: Fold
 ) -> tuple[tuple[str, ...], list[str]]:
-    """Return the parameters of a law or a machine that stay variable at run time, and problems.
+    """Return the parameters of a law or a machine that remain variable at run time, and problems.
 
     Args:
-        obj: a law, or a machine with one in its field `law`.
-        free: these stay variable and no others; None to use `fold`.
-        fold: True for constants only, names that become constants in addition to those that select
-            a cheaper form (`runtime_parameters`), None for the latter only.
+        obj: a law, or a machine with a law in its field `law`.
+        free: the only parameters that remain variable; None to use `fold`.
+        fold: True for constants only; names of parameters that become constants in addition to
+            those that select a cheaper form (`runtime_parameters`); None for the latter only.
 
     Returns:
         Names in the order of `parameters`, and a sentence for each problem.
@@ -103,9 +103,7 @@ def variable(
 
 
 def _worth_it(obj: Parametric) -> tuple[str, ...]:
-    """Return `runtime_parameters` of a law; of a machine its own parameters and those of its
-    law.
-    """
+    """Return the parameters of `obj`, without those whose value selects a cheaper form."""
     if isinstance(obj, Law):
         return runtime_parameters(obj)
     names, law = tuple(parameters(obj)), getattr(obj, "law", None)
@@ -118,20 +116,20 @@ def _worth_it(obj: Parametric) -> tuple[str, ...]:
 
 
 def runtime_parameters(law: Law) -> tuple[str, ...]:
-    """Return the parameters of a law that belong into the parameter struct.
+    """Return the parameters of a law that are members of the parameter struct.
 
-    These are all except those whose present value selects a cheaper form of the law. This is
-    measured: a parameter is left out if making it a constant saves a transcendental function of
-    inputs or states. So delta = 2 of a Stribeck curve saves a `pow`, mu_v = 0 of Brown-McPhee a
+    These are all parameters except those whose present value selects a cheaper form of the law: a
+    parameter is omitted if making it a constant saves a transcendental function of inputs or
+    states. For example, delta = 2 of a Stribeck curve saves a `pow`, mu_v = 0 of Brown-McPhee a
     `tanh`, E = 0 of the self-tuning law an `atan`, n = 1 of Dahl's law a `pow` (and keeps the law
     affine in its state), v_eps = 0 the `tanh` of a smooth |v|. A factor of 1 or a summand of 0
-    saves none and stays.
+    saves no function, and the parameter remains.
 
     Parameters with the same meaning and value, such as those of the two sides of an asymmetric law,
-    are measured as one.
+    are examined together.
     """
     groups: dict[tuple[str, str, str, float], list[str]] = {}
-    for name, p in parameters(law).items():  # `field` is the name in their own part
+    for name, p in parameters(law).items():  # `field` is the name within the part of the law
         groups.setdefault((p.role, p.unit, p.field, float(p.value)), []).append(name)
     least = _calls(law, [*groups.values()])
     kept: set[str] = set()
@@ -142,7 +140,7 @@ def runtime_parameters(law: Law) -> tuple[str, ...]:
 
 
 def _calls(law: Law, groups: Sequence[Sequence[str]]) -> int:
-    """Return the number of transcendental functions in the law with one symbol per group."""
+    """Return the number of transcendental functions of the law with one symbol per group."""
     v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
     p = ca.SX.sym("p", len(groups))
     symbols = zip(ca.vertsplit(p), groups, strict=True)
@@ -160,7 +158,7 @@ def without_idle(block: Block, free: Sequence[str] | None, where: str) -> Block:
     """Return the block without parameters that have no effect.
 
     Raises:
-        ValueError: one of them was requested in `free`.
+        ValueError: `free` contains a parameter without effect.
     """
     everything = block.everything
     idle = [p.name for p in block.parameters if not ca.depends_on(everything, p.symbol)]
@@ -174,14 +172,14 @@ def without_idle(block: Block, free: Sequence[str] | None, where: str) -> Block:
 
 
 SMALLEST = 1e-6
-"""Lower limit of a parameter that must not be 0, relative to its default."""
+"""Lower bound of a parameter that must not be 0, relative to its default."""
 
 
 def above_zero(block: Block, names: Collection[str]) -> Block:
-    """Return the block whose parameters `names`, valid from 0 on, keep a distance from 0.
+    """Return the block with lower bounds above 0 for the parameters `names`.
 
-    A law treats a width of the number 0 as its original form; the C of a variable width has no such
-    case, and divides by it.
+    A law with a width of 0 (a number) has its original form; the C with a variable width lacks this
+    case and divides by the width.
     """
     changed = tuple(
         replace(p, lower=SMALLEST * float(p.start))
@@ -196,8 +194,8 @@ class Family(NamedTuple):
     """Variables of one group whose names differ in a number that counts from 1.
 
     Attributes:
-        name: of the array: that of the variables without the number.
-        rows: of the variables, in the order of their numbers.
+        name: name of the array: that of the variables without the number.
+        rows: rows of the variables, in the order of their numbers.
     """
 
     name: str
@@ -205,17 +203,16 @@ class Family(NamedTuple):
 
     @property
     def contiguous(self) -> bool:
-        """True if the rows follow each other."""
+        """True if the rows are consecutive."""
         return self.rows == tuple(range(self.rows[0], self.rows[0] + len(self.rows)))
 
 
 def arranged(block: Block) -> Block:
-    """Return the block with identical elements as arrays, and the parameters of an array in
-    sequence.
+    """Return the block with identical elements as arrays; parameters are reordered for them.
 
-    Their names differ in one number (F_1, F_2, ... or k_1_pos, k_2_pos, ...); units and ranges are
-    equal. States keep their order, which an array must match; inputs, which are guarded one by one,
-    have no arrays.
+    The names of elements differ in one number (F_1, F_2, ... or k_1_pos, k_2_pos, ...); units and
+    ranges are equal. States keep their order, which an array must match. Inputs form no arrays,
+    because each is guarded separately.
     """
     found = {
         "state": [f for f in families(block.states) if f.contiguous],
@@ -232,7 +229,10 @@ def arranged(block: Block) -> Block:
 
 
 def families(variables: Variables) -> list[Family]:
-    """Return all families of at least `LEAST`, each variable in the one of nearest rows."""
+    """Return all families of at least `LEAST` variables; each variable is in at most one.
+
+    If a variable belongs to several, the family with the smallest range of rows is chosen.
+    """
     numbered: dict[tuple[int, tuple[str, ...]], dict[int, int]] = {}
     for row, variable in enumerate(variables):
         parts = variable.name.split("_")
@@ -260,7 +260,7 @@ def families(variables: Variables) -> list[Family]:
 
 
 def _with(block: Block, found: Mapping[str, Sequence[Family]]) -> Block:
-    """Return the block with these arrays."""
+    """Return the block with the families `found` as arrays."""
     arrays = [Elements("state", f.name, f.rows[0], len(f.rows)) for f in found["state"]]
     first = {family.rows[0]: family for family in found["param"]}
     members = {row for family in found["param"] for row in family.rows}
@@ -280,16 +280,16 @@ def numbered(groups: Sequence[Variables], labels: Sequence[str]) -> tuple[Variab
     """Return variables of several joints, grouped by name: mu_s_1, mu_s_2, ..., mu_d_1, ...
 
     Args:
-        groups: the variables of each joint.
-        labels: number of each joint, or another name.
+        groups: variables of each joint.
+        labels: number, or another name, of each joint.
 
     Returns:
-        The variables, and the place of each among all of `groups`, one group after the other.
+        The variables, and the index of each in the concatenated `groups`.
     """
     every = [(v, label) for group, label in zip(groups, labels, strict=True) for v in group]
     stems = list(dict.fromkeys(v.name for v, _ in every))
 
-    def rank(i: int) -> tuple[int, bool, int]:  # numbers in their order, then names as given
+    def rank(i: int) -> tuple[int, bool, int]:  # ascending numbers, then names as given
         variable, label = every[i]
         stem, digits = stems.index(variable.name), label.isdecimal()
         return stem, not digits, int(label) if digits else 0
@@ -300,7 +300,7 @@ def numbered(groups: Sequence[Variables], labels: Sequence[str]) -> tuple[Variab
 
 
 def in_arrays(block: Block) -> Block:
-    """Return the block with arrays of neighbours that count from 1 with equal unit and range."""
+    """Return the block with arrays of neighbours numbered from 1 with equal units and ranges."""
     groups: dict[str, list[tuple[str, object]]] = {
         group: [(v.name, (v.unit, v.lower, v.upper)) for v in of]
         for group, of in block.groups.items()
@@ -312,7 +312,7 @@ def in_arrays(block: Block) -> Block:
 
 
 def _runs(group: str, rows: Sequence[tuple[str, object]]) -> Iterator[Elements]:
-    """Yield runs of two or more identical neighbours NAME_1, NAME_2, ..."""
+    """Yield sequences of two or more identical neighbours NAME_1, NAME_2, ..."""
     first = 0
     while first < len(rows):
         (name, kind), size = rows[first], 1
