@@ -65,7 +65,7 @@ def check_file(path: str | Path) -> Path:
     """
     place = checks.path("output", path)
     with _expecting("a file name", path):
-        target = _resolved(place)  # a link stays a link to the new file
+        target = _resolved(place)  # a link is kept and points to the new file
         if target.exists() and not target.is_file():
             kind = "a folder" if target.is_dir() else "a device"
             raise ValueError(f"output '{path}': expected a file name, got {kind}")
@@ -87,7 +87,8 @@ def check_folder(folder: str | Path) -> Path:
     file system, where a mistake in the first name would create a new tree.
 
     Raises:
-        ValueError: the nearest existing path is a file, the root, or not writable.
+        ValueError: the nearest existing path is a file or is not writable, or a missing folder
+            would be directly below the root.
     """
     place = checks.path("output", folder)
     with _expecting("a folder", folder):

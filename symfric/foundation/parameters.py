@@ -88,7 +88,7 @@ T = TypeVar("T")
 
 @dataclass_transform(frozen_default=True, eq_default=False)
 def parametric(cls: type[T]) -> type[T]:
-    """Make a class a frozen dataclass that is compared by identity, as required of `Parametric`."""
+    """Make a subclass of `Parametric` a frozen dataclass that is compared by identity."""
     return dataclass(frozen=True, eq=False)(cls)
 
 

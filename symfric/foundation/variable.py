@@ -7,7 +7,7 @@ from math import inf
 import casadi as ca
 
 from symfric.foundation import checks, units
-from symfric.foundation import identity as identity  # what holds symbols pickles
+from symfric.foundation import identity as identity  # makes objects with symbols picklable
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.shown import figure_of
 from symfric.foundation.symbolic import Symbolic, take_symbols

@@ -41,7 +41,7 @@ class Vector:
     """
 
     __slots__ = ("parts", "turn")
-    __array_ufunc__ = None  # arrays leave arithmetic with vectors to this class
+    __array_ufunc__ = None  # arrays defer to the operators of this class
     __hash__ = None  # pyright: ignore[reportAssignmentType]
 
     def __init__(self, parts: list[Scalar], turn: Scalar) -> None:

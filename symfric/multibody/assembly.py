@@ -234,7 +234,7 @@ def _advice(bristles: Sequence[Slip]) -> str:
 
 
 def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:
-    """Return sliding velocity and friction force; smoothed magnitudes if they are vectors."""
+    """Return the sliding velocity and friction force; smoothed magnitudes if they are vectors."""
     law = slip.contact.law
     if not isinstance(law, SpatialSlip):
         return slip.contact.slip, slip.force

@@ -32,7 +32,7 @@ class Held(NamedTuple):
     """Equations of a constraint, and the loads of its multipliers.
 
     Attributes:
-        phi: SX (m, 1).
+        phi: expressions that must vanish, SX (m, 1).
         labels: names of the multipliers.
         loads: function of the multipliers (m, 1) that returns the loads on the bodies.
         unit: unit of the multipliers.
@@ -151,7 +151,7 @@ class PrescribedMotion(Constraint):
 @final
 @dataclass(frozen=True, eq=False)
 class UserConstraint(Constraint):
-    """Constraint that expressions of positions and time vanish.
+    """Constraint that sets expressions of positions and time to zero.
 
     `expression` takes the kinematics, with `point("body.frame")` for a position (and a velocity,
     which must not be used), `motion["body"]` with R and p, `along(joint, direction)` for a

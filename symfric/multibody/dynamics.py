@@ -162,7 +162,7 @@ def balance(kin: Kinematics, applied: Iterable[Load | Axial]) -> tuple[ca.SX, di
 
 
 def _floats(kin: Kinematics, link: Link) -> bool:
-    """Return True if the link's coordinates are the pose of its centre of mass in the ground."""
+    """Return True if the coordinates of a link are the pose of its centre of mass in the ground."""
     centred = (link.at_body.p - kin.topology.bodies[link.body].c).is_zero()
     return isinstance(link.joint, Floating) and link.base == GROUND and not link.reverse and centred
 

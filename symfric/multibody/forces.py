@@ -149,8 +149,8 @@ class SpringDamper(Force):
 
         l = |p_b - p_a|,   f = stiffness (l - free_length) + damping l' + actuator
 
-    f > 0 pulls the points together. Not defined at l = 0, unless spring and damper reduce to
-    f (p_b - p_a) / l = stiffness (p_b - p_a) because free_length, damping and actuator are zero.
+    f > 0 pulls the points together. The force is not defined at l = 0, unless free_length, damping
+    and actuator are zero, so that f (p_b - p_a) / l = stiffness (p_b - p_a).
     """
 
     a: str
@@ -250,7 +250,7 @@ class UserForce(Force):
 
     @property
     def conservative(self) -> bool:
-        """Always False."""
+        """False, because the expression is arbitrary."""
         return False
 
     def problems(self) -> Iterator[str]:

@@ -220,10 +220,10 @@ class Keywords:
     """Base of dataclasses that list their keywords if an unknown keyword is given."""
 
     def __new__(cls, *_: object, **given: object) -> Self:
-        """Check the keywords.
+        """Create an object after a check of the keywords.
 
         Raises:
-            ValueError: a keyword that is not a field.
+            ValueError: a keyword is not a field.
         """
         kind: Any = cls
         known = [item.name for item in fields(kind) if item.init]

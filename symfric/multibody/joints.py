@@ -180,7 +180,7 @@ class Revolute(Joint):
         return rotation_z(q), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return an angular velocity about z and no velocity."""
+        """Return the subspace of rotations about z."""
         return unit(2), ca.SX(3, 1)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -205,7 +205,7 @@ class Prismatic(Joint):
         return ca.SX.eye(3), ca.vertcat(0, 0, q)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return no angular velocity and a velocity along z."""
+        """Return the subspace of translations along z."""
         return ca.SX(3, 1), unit(2)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -230,7 +230,7 @@ class Cylindrical(Joint):
         return rotation_z(q[1]), ca.vertcat(0, 0, q[0])
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return a translation along z and a rotation about z."""
+        """Return the subspace of translations along z and rotations about z."""
         return ca.horzcat(ca.SX(3, 1), unit(2)), ca.horzcat(unit(2), ca.SX(3, 1))
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -255,7 +255,7 @@ class Spherical(Joint):
         return rotation(q), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return the angular velocity w = 2 G q' and no velocity."""
+        """Return the subspace of all rotations, with the angular velocity 2 G q'."""
         return 2 * euler_g(q), ca.SX(3, 4)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -283,7 +283,7 @@ class Universal(Joint):
         return rotation_x(q[0]) @ rotation_y(q[1]), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return the rotations about x and about the new y."""
+        """Return the subspace of rotations about x and about the new y."""
         axes = ca.horzcat(ca.vertcat(ca.cos(q[1]), 0, ca.sin(q[1])), ca.vertcat(0, 1, 0))
         return axes, ca.SX(3, 2)
 
@@ -322,7 +322,7 @@ class Planar(Joint):
         return rotation_z(q[2]), ca.vertcat(q[0], q[1], 0)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return translations along x and y and a rotation about z."""
+        """Return the subspace of translations along x and y and rotations about z."""
         return ca.horzcat(ca.SX(3, 2), unit(2)), ca.horzcat(ca.SX.eye(3)[:, :2], ca.SX(3, 1))
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -343,7 +343,7 @@ class Fixed(Joint):
         return ca.SX.eye(3), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return matrices without columns."""
+        """Return the empty subspace, matrices without columns."""
         return ca.SX(3, 0), ca.SX(3, 0)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
@@ -365,7 +365,7 @@ class Floating(Joint):
         return rotation(q[3:]), q[:3]
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return the angular velocity w = 2 G q[3:]' and the velocity q[:3]'."""
+        """Return the subspace of all motions, with angular velocity 2 G q[3:]', velocity q[:3]'."""
         turning = ca.horzcat(ca.SX(3, 3), 2 * euler_g(q[3:]))
         return turning, ca.horzcat(ca.SX.eye(3), ca.SX(3, 4))
 

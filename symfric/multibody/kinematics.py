@@ -123,7 +123,7 @@ class Motion(NamedTuple):
         return self.R @ self.v_B
 
     def point(self, offset: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Return position and velocity in the world of a point fixed to the body."""
+        """Return the position and velocity in the world of a point fixed to the body."""
         return self.p + self.R @ offset, self.R @ (self.v_B + ca.cross(self.w_B, offset))
 
 
@@ -164,7 +164,7 @@ class Kinematics:
     turns: dict[str, Turn] | None = None
 
     def point(self, place: str) -> tuple[ca.SX, ca.SX]:
-        """Return position and velocity in the world of the origin of the frame "body.frame"."""
+        """Return the position and velocity of the origin of the frame "body.frame" in the world."""
         body, _, frame = place.partition(".")
         if body not in self.motion or frame not in self.topology.bodies[body].frames:
             raise ValueError(f"kinematics: expected a place 'body.frame', got {place}")
@@ -175,7 +175,7 @@ class Kinematics:
         return frame_at(self.topology.bodies, place)
 
     def relative(self, joint: Joint) -> Relative:
-        """Return pose and motion of the child frame of `joint` in its parent frame."""
+        """Return the pose and motion of the child frame of `joint` relative to its parent frame."""
         P, C = self.frame(joint.parent), self.frame(joint.child)
         parent, child = self.motion[body_of(joint.parent)], self.motion[body_of(joint.child)]
         R_WP = parent.R @ P.R

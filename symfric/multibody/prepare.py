@@ -209,7 +209,7 @@ def _undetermined(
 def _fixed_already(made: Prepared, constraints: Sequence[Constraint], free: Array) -> Iterator[str]:
     """Yield messages about constraints in time with multipliers in the combinations `free`.
 
-    Such a constraint is redundant only at the start, as are two motions of one coordinate.
+    For example, two prescribed motions of one coordinate agree only at the start.
     """
     phi, t = made.eq.phi, made.eq.kin.t
     involved = np.abs(free).max(axis=1) > start.RANK
@@ -338,7 +338,7 @@ def without_friction(made: Prepared, u: Variables) -> tuple[Array, Array, Array]
 def with_cuts(made: Prepared) -> Equations | None:
     """Return the equations with cuts; None if cuts do not save operations.
 
-    They save operations for long open chains.
+    Cuts save operations in long open chains.
     """
     eq, topology = made.eq, made.eq.kin.topology
     loaded = ca.depends_on(stacked(eq.normals), eq.a)

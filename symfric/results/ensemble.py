@@ -84,7 +84,7 @@ class Ensemble(Showing):
         )
 
     def shown(self) -> Shown:
-        """Return members, failures, varied arguments, and the signals at the last time."""
+        """Return the members, failures, varied arguments, and signals at the last time."""
         members, times = self.attempts.size, self.t.shape[-1]
         first, last = np.min(self.t), np.max(self.t)
         span = f"{last:g} s"
@@ -121,7 +121,7 @@ class Ensemble(Showing):
         )
 
     def _ends(self, name: str, read: bool) -> Iterable[str]:
-        """Return least, median and greatest value of a signal at the last time, if it is `read`."""
+        """Return least, median and greatest value at the last time; empty unless `read`."""
         values = np.asarray(self.signals[name][:, -1]) if read else np.zeros(0)
         values = values[np.isfinite(values)]
         if not values.size:

@@ -341,7 +341,7 @@ def plot_over(
 def _series(
     count: int, others: Mapping[str, tuple[str, Array]]
 ) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Return legend entry and members of each series; see `plot_over`."""
+    """Return the legend entry and the members of each series; see `plot_over`."""
     every = [("", np.ones(count, dtype=bool))]
     if len(others) != 1:
         return every

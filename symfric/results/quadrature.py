@@ -1,6 +1,6 @@
 """Extremes and integrals of signals over all accepted steps of a run.
 
-A run may contain rest of years and slip of a second: steps resolve the slip, equally spaced samples
+A run may contain years of rest and a second of slip: steps resolve the slip, equally spaced samples
 do not.
 """
 

@@ -123,7 +123,7 @@ class Trajectory(packed.Portable, Signals):
     keep: "Callable[[Trajectory], Any] | None" = None
 
     def shown(self) -> Shown:
-        """Return laws, status, and the first, last, least and greatest value of every signal.
+        """Return the laws, the status, and first, last and extreme values of every signal.
 
         Extremes are taken over all steps if they are known or cheap to compute, else over `t`.
         """
@@ -169,7 +169,7 @@ class Trajectory(packed.Portable, Signals):
         """Return the energy balance of a mechanism: energy, work by cause, and defect.
 
         Raises:
-            ValueError: the model has no detail "conserved", as models other than mechanisms.
+            ValueError: the model is not a mechanism and has no detail "conserved".
         """
         if "conserved" not in self.details:
             raise ValueError(
