@@ -1,1 +1,1 @@
-"""Base package: numbers, parameters, units, files, solver status, empty figures."""
+"""Base package: argument checks, parameters, units, files, CasADi expressions, empty figures."""

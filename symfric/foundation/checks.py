@@ -1,13 +1,13 @@
 """Argument validation for the public API.
 
-Every check takes `where` first ("simulate: rtol"), returns the value in the required type, and
-raises an error with one sentence:
+The first argument of every check is `where`, the name of the argument in messages, such as
+"simulate: rtol". A check returns the value in the required type or raises an error with one
+sentence:
 
     <where>: expected <what>, got <value>; <hint>
 
-Numbers are the types that NumPy and CasADi users work with: int, float, NumPy scalars of any real
-type, arrays without dimension, constant CasADi scalars. Truth values, texts and complex numbers are
-not accepted.
+Numbers are int, float, NumPy scalars of any real type, 0-d arrays, and constant CasADi scalars.
+Booleans, strings and complex numbers are not accepted.
 """
 
 import operator
@@ -33,20 +33,20 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 
 LONGEST = 60
-"""Longest text of a value shown in an error [characters]."""
+"""Largest length of a value shown in an error [characters]."""
 LONGEST_LINE = 200
-"""Longest name [characters]."""
+"""Largest length of a name [characters]."""
 LISTED = 16
-"""Number of names listed in an error; if there are more, only the closest are offered."""
+"""Largest number of known names listed in an error."""
 
 
 def refused(where: str, what: str, value: object, hint: str = "") -> ValueError:
-    """Return the error with what was expected and what was given."""
+    """Return the error that states the expected and the given value."""
     return ValueError(f"{where}: expected {what}, got {shown(value)}" + (f"; {hint}" * bool(hint)))
 
 
 def shown(value: object) -> str:
-    """Return a short description of `value`, of any type."""
+    """Return a short description of a value of any type."""
     if isinstance(value, type):
         return f"the class {value.__name__}"
     if isinstance(value, np.ndarray) and value.ndim:
@@ -71,9 +71,7 @@ def shown(value: object) -> str:
 
 
 def listed(names: Iterable[str], most: int = 6) -> str:
-    """Join `names` by commas; if there are many, only the first ones and the number of the
-    others.
-    """
+    """Return `names` joined by commas; beyond `most` names, only their number is added."""
     every = list(names)
     if len(every) <= most:
         return ", ".join(every)
@@ -85,7 +83,7 @@ def _cut(text: str) -> str:
 
 
 def as_number(value: object) -> float | None:
-    """Return `value` as a float if it is a number (see above), finite or not; else None."""
+    """Return `value` as a float, finite or not; None if it is not a number."""
     if type(value) is float:  # the usual case: a public function makes a dozen of these checks
         return value
     if isinstance(value, bool | np.bool_):
@@ -115,14 +113,15 @@ def number(
     """Return `value` as a finite float.
 
     Args:
-        where: for the message.
-        unit: likewise.
+        where: name of the argument in the message.
+        value: value to check.
+        unit: unit in the message.
         lower, upper: closed bounds.
         above: open lower bound.
         hint: advice for the message.
 
     Raises:
-        ValueError: not a number, NaN, infinite, or out of bounds.
+        ValueError: `value` is not a number, is not finite, or is out of bounds.
     """
     found = as_number(value)
     good = found is not None and isfinite(found) and lower <= found <= upper
@@ -133,7 +132,7 @@ def number(
 
 
 def _bounded(lower: float, upper: float, above: float | None) -> str:
-    """Describe a number within bounds."""
+    """Return the description of a number within bounds."""
     if above is not None:
         return f"a number > {above:g}" + (f" and <= {upper:g}" if upper < inf else "")
     if lower > -inf and upper < inf:
@@ -144,7 +143,7 @@ def _bounded(lower: float, upper: float, above: float | None) -> str:
 
 
 def parsed(where: str, text: str) -> float:
-    """Return the finite number given by a text from a command line or a file."""
+    """Return the finite number in a string from a command line or a file."""
     try:
         found = None if "_" in text else float(text)
     except ValueError:
@@ -160,7 +159,7 @@ def count(
     """Return `value` as an int; 1e6 is accepted.
 
     Raises:
-        ValueError: not a whole number, or out of bounds.
+        ValueError: `value` is not a whole number or is out of bounds.
     """
     found: int | None = value if type(value) is int and abs(value) < 2**63 else None
     real = as_number(value) if found is None else None
@@ -174,7 +173,10 @@ def count(
 
 
 def expression(where: str, value: object) -> Any:
-    """Return `value`, SX, DM, a finite number or an array of them; of a variable its symbol."""
+    """Return `value`, which must be SX, DM, a finite number or an array of finite numbers.
+
+    A variable is replaced by its symbol.
+    """
     value = plain(value)
     if isinstance(value, ca.SX | ca.DM):
         return value
@@ -197,14 +199,14 @@ def flag(where: str, value: object) -> bool:
 
 
 def text(where: str, value: object, what: str = "a text", hint: str = "") -> str:
-    """Return `value` as a text that is not empty."""
+    """Return `value`, which must be a non-empty string."""
     if isinstance(value, str) and value.strip():
         return str(value)
     raise refused(where, what, value, hint)
 
 
 def identifier(where: str, value: object) -> str:
-    """Return `value` as a C identifier in ASCII letters, digits and underscores."""
+    """Return `value`, which must be a C identifier of ASCII letters, digits and underscores."""
     name = text(where, value, "a C identifier")
     if not (name.isascii() and name.isidentifier()):
         raise refused(where, "a C identifier", value, f"write {as_identifier(name)}")
@@ -212,7 +214,7 @@ def identifier(where: str, value: object) -> str:
 
 
 def as_identifier(name: str) -> str:
-    """Return a C identifier similar to a name: my_x for "my x", phi for its Greek letter."""
+    """Return a C identifier similar to a name, such as my_x for "my x" or phi for "φ"."""
     letters = (unicodedata.name(c, "").partition(" LETTER ")[2].lower() for c in name)
     plain_ones = (
         f"{'_' * (i > 0)}{letter.split()[0]}" if letter and not c.isascii() else c
@@ -223,7 +225,7 @@ def as_identifier(name: str) -> str:
 
 
 def line(where: str, value: object, what: str = "a text") -> str:
-    """Return `value` as one line of printable text, safe in headers, XML and file names."""
+    """Return `value`, which must be one printable line, safe in headers, XML and file names."""
     found = text(where, value, what)
     if not found.isprintable() or len(found) > LONGEST_LINE:
         raise refused(where, f"{what} of one printable line", value)
@@ -231,7 +233,7 @@ def line(where: str, value: object, what: str = "a text") -> str:
 
 
 def choice(where: str, value: object, choices: Collection[str]) -> str:
-    """Return `value` as one of the texts in `choices`; errors offer the nearest one."""
+    """Return `value`, which must be one of `choices`; errors offer the nearest choice."""
     name: Any = value
     check_names(where, [name], choices)
     return name
@@ -240,7 +242,7 @@ def choice(where: str, value: object, choices: Collection[str]) -> str:
 def kind(where: str, value: object, wanted: type[T], such_as: str) -> T:
     """Return `value`, which must be an instance of `wanted`.
 
-    `such_as` is an article, a noun and an example: "a model, such as rabinowicz(LuGre())".
+    `such_as` describes the expected value with an example: "a model, such as rabinowicz(LuGre())".
     """
     if isinstance(value, wanted):
         return value
@@ -251,9 +253,9 @@ def kind(where: str, value: object, wanted: type[T], such_as: str) -> T:
 
 
 def named(where: str, value: object, known: Collection[str] | None = None) -> dict[str, Any]:
-    """Return a mapping of names to values, or None, as a dict; unknown names raise an error.
+    """Return a mapping from names to values as a dict, empty for None.
 
-    A variable stands for its name.
+    Names that are not in `known` raise an error. A variable as a key is replaced by its name.
     """
     if value is None:
         return {}
@@ -272,7 +274,7 @@ def named(where: str, value: object, known: Collection[str] | None = None) -> di
 
 
 def many(where: str, value: object, what: str) -> tuple[Any, ...]:
-    """Return a sequence of `what` as a tuple; a single text is not split into letters."""
+    """Return a sequence of `what` as a tuple; a string is not accepted."""
     if isinstance(value, str | bytes | ca.SX | ca.MX) or not isinstance(value, Iterable):
         name = getattr(value, "name", "")
         hint = f"write ({name},)" if isinstance(name, str) and name.isidentifier() else ""
@@ -283,7 +285,7 @@ def many(where: str, value: object, what: str) -> tuple[Any, ...]:
 def names(
     where: str, value: object, known: Collection[str] | None = None, hint: str = ""
 ) -> tuple[str, ...]:
-    """Return a sequence of texts as a tuple, each known and given once."""
+    """Return a sequence of distinct names as a tuple; unknown names raise an error."""
     if isinstance(value, str):
         raise refused(where, "a sequence of names", value, f"write [{value!r}]")
     given = many(where, value, "names")
@@ -301,12 +303,13 @@ def names(
 def array(
     where: str, value: object, *, ndim: int | None = 1, what: str = "", nan: bool = False
 ) -> Array:
-    """Return `value` as an array of finite floats; `ndim` None allows any number of dimensions.
+    """Return `value` as an array of finite floats with `ndim` dimensions; None allows any number.
 
-    `what` describes the numbers; with `nan` they need not be finite.
+    `what` describes the numbers in messages; if `nan` is True, the numbers need not be finite.
 
     Raises:
-        ValueError: not numbers, NaN, infinite, another number of dimensions.
+        ValueError: `value` does not consist of numbers, is not finite, or has a wrong number of
+            dimensions.
     """
     kinds = {0: "a number", 1: "a sequence of numbers", 2: "a matrix of numbers"}
     what = what or kinds.get(-1 if ndim is None else ndim, "numbers")
@@ -314,7 +317,7 @@ def array(
         value = ca.DM(value).full().squeeze()
     try:
         found = np.asarray(value)
-    except (ValueError, TypeError, RuntimeError):  # ragged; CasADi's own refusals
+    except (ValueError, TypeError, RuntimeError):  # ragged sequences, or errors of CasADi
         raise refused(where, what, value) from None
     if found.dtype.kind not in "iuf" and found.size:
         raise refused(where, what, value)
@@ -329,7 +332,7 @@ def array(
 
 
 def times(where: str, value: object, first: float = -inf, last: float = inf) -> Array:
-    """Return `value` as an array of increasing times [s] in [first, last], at least one."""
+    """Return `value` as a non-empty array of increasing times [s] in [first, last]."""
     bounded = isfinite(first) or isfinite(last)
     what = "increasing times in [{:g}, {:g}] s" if bounded else "increasing times [s]"
     found = array(where, value, what=what.format(first, last))
@@ -344,7 +347,7 @@ def times(where: str, value: object, first: float = -inf, last: float = inf) -> 
 
 
 def path(where: str, value: object) -> Path:
-    """Return `value` as the path of a file or folder; "~" is the user's home."""
+    """Return `value` as the path of a file or folder; "~" is the home directory of the user."""
     name = fspath(value) if isinstance(value, str | PathLike) else None
     if not isinstance(name, str) or not name or "\0" in name:
         raise refused(where, "a path, such as 'run.csv'", value)
@@ -360,9 +363,9 @@ def function(where: str, value: object, what: str) -> Any:
 
 
 def check_names(where: str, given: Iterable[str], known: Collection[str], hint: str = "") -> None:
-    """Raise one error for all names that are not in `known`, offering the closest ones.
+    """Raise one error for all names that are not in `known`; it offers the closest known names.
 
-    `hint` is the advice if none is close.
+    `hint` is the advice if no known name is close.
     """
     listed = list(given)
     if not listed:

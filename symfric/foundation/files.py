@@ -13,12 +13,12 @@ from typing import Any, cast
 from symfric.foundation import checks
 
 FULL = (ENOSPC, EDQUOT, EFBIG, EIO)
-"""Errors of a full disk."""
+"""Error numbers of a full disk."""
 
 
 @contextmanager
 def _expecting(what: str, path: str | Path) -> Generator[None, None, None]:
-    """Turn errors of the operating system into a ValueError that names the output path."""
+    """Convert errors of the operating system to a ValueError that names the output path."""
     try:
         yield
     except (OSError, RuntimeError) as error:  # RuntimeError for circular links in Python 3.12
@@ -29,7 +29,7 @@ def _expecting(what: str, path: str | Path) -> Generator[None, None, None]:
 
 @contextmanager
 def written(path: str | Path) -> Generator[Path, None, None]:
-    """Yield a temporary path in the folder of `path` that is renamed to it if the block succeeds.
+    """Yield a temporary path that is renamed to `path` if the block succeeds.
 
     A missing folder is created (see `check_folder`). After an error or an interrupt the old file,
     if any, is unchanged and the temporary file is removed.
@@ -60,11 +60,12 @@ def check_file(path: str | Path) -> Path:
     """Return the output file of `path`, with links followed.
 
     Raises:
-        ValueError: not a path, a folder, a device, circular links, or see `check_folder`.
+        ValueError: `path` is not a path, is a folder or a device, or has circular links; or its
+            folder is invalid (see `check_folder`).
     """
     place = checks.path("output", path)
     with _expecting("a file name", path):
-        target = _resolved(place)  # a link stays a link to the new file
+        target = _resolved(place)  # a link is kept and points to the new file
         if target.exists() and not target.is_file():
             kind = "a folder" if target.is_dir() else "a device"
             raise ValueError(f"output '{path}': expected a file name, got {kind}")
@@ -73,7 +74,7 @@ def check_file(path: str | Path) -> Path:
 
 
 def _resolved(place: Path) -> Path:
-    """Follow links in `place`; OSError if they are circular, which Python 3.13 does not report."""
+    """Return `place` with links followed; circular links raise an OSError, also in Python 3.13."""
     with suppress(FileNotFoundError, NotADirectoryError):
         place.stat()
     return place.resolve()
@@ -82,11 +83,12 @@ def _resolved(place: Path) -> Path:
 def check_folder(folder: str | Path) -> Path:
     """Return an output folder, which may be missing.
 
-    Missing folders are allowed below an existing one, but not directly below the root of the file
-    system, where a wrong first name would create a new tree.
+    Missing folders are allowed below an existing folder, but not directly below the root of the
+    file system, where a mistake in the first name would create a new tree.
 
     Raises:
-        ValueError: it, or the nearest folder above it, is a file, the root or without permission.
+        ValueError: the nearest existing path is a file or is not writable, or a missing folder
+            would be directly below the root.
     """
     place = checks.path("output", folder)
     with _expecting("a folder", folder):
@@ -109,7 +111,7 @@ def make_folder(folder: str | Path) -> Path:
     """Create an output folder if it is missing; see `check_folder`.
 
     Raises:
-        ValueError: it cannot be created.
+        ValueError: the folder cannot be created.
     """
     place = check_folder(folder)
     with _expecting("a writable place", folder):
@@ -118,16 +120,16 @@ def make_folder(folder: str | Path) -> Path:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write `text` to `path` as UTF-8, atomically."""
+    """Write `text` to `path` atomically, in UTF-8."""
     with written(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def read_json(where: str, path: str | Path, what: str) -> dict[str, Any]:
-    """Read the JSON object in a file.
+    """Return the JSON object in a file; `what` describes the expected content in messages.
 
     Raises:
-        ValueError: no such file, not JSON, or not an object; `what` describes the expected content.
+        ValueError: the file does not exist, or its content is not a JSON object.
     """
     place = checks.path(where, path)
     try:
@@ -143,7 +145,7 @@ def read_json(where: str, path: str | Path, what: str) -> dict[str, Any]:
 
 
 def write_table(path: str | Path, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
-    """Write a CSV file as UTF-8, atomically; numbers keep all their digits."""
+    """Write a CSV file atomically, in UTF-8; numbers keep all digits."""
     with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(header)

@@ -1,4 +1,4 @@
-"""CasADi functions as graphs of operations without duplicates, and groups of coupled rows."""
+"""CasADi Functions as graphs of operations without duplicates, and groups of coupled rows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,7 @@ from symfric.foundation.numeric import LEAVES, applied, walk
 from symfric.foundation.variable import stacked
 
 SELECT = -1
-"""Operation code of an `if_else` node, which CasADi writes as a sum of two halves."""
+"""Operation code of an `if_else` node, which CasADi represents as a sum of two terms."""
 
 
 @dataclass(frozen=True)
@@ -19,10 +19,10 @@ class Node:
     """Operation of a graph.
 
     Attributes:
-        op: CasADi's operation number, or `SELECT`.
-        args: numbers of its argument nodes, all smaller than its own.
-        entry: of an input: (argument, row).
-        value: of a constant.
+        op: operation number of CasADi, or `SELECT`.
+        args: numbers of the argument nodes, which precede this node.
+        entry: (argument, row) of an input.
+        value: value of a constant.
     """
 
     op: int
@@ -33,18 +33,23 @@ class Node:
 
 @dataclass(frozen=True)
 class Graph:
-    """Nodes, arguments before their users, and the node of every row of every result."""
+    """Graph of operations.
+
+    Attributes:
+        nodes: nodes, each after its arguments.
+        results: node number of each row of each result.
+    """
 
     nodes: tuple[Node, ...]
     results: tuple[tuple[int, ...], ...]
 
     @property
     def operations(self) -> int:
-        """Number of operations, without leaves."""
+        """Number of operations, not counting inputs and constants."""
         return sum(node.op not in LEAVES for node in self.nodes)
 
     def depends(self, arguments: Sequence[int]) -> list[bool]:
-        """Return for each node True if it depends on one of the function's `arguments`."""
+        """Return a list that is True for each node that depends on one of the `arguments`."""
         found: list[bool] = []
         for node in self.nodes:
             own = node.op == ca.OP_INPUT and node.entry[0] in arguments
@@ -66,8 +71,9 @@ class _Builder:
         return number
 
     def _if_else(self, a: int, b: int) -> Node | None:
-        """Return the node c ? x : y of (c ? x : 0) + (!c ? y : 0), equal but for the sign of a
-        zero.
+        """Return the node c ? x : y if a + b is (c ? x : 0) + (!c ? y : 0); else None.
+
+        The values are equal except for the sign of zero.
         """
         yes, no = self.nodes[a], self.nodes[b]
         if not yes.op == no.op == ca.OP_IF_ELSE_ZERO:
@@ -78,10 +84,11 @@ class _Builder:
 
 
 def graph(function: ca.Function) -> Graph:
-    """Return the graph of an SX function with dense arguments and results, without unused nodes.
+    """Return the graph of an SX Function with dense arguments and results, without unused nodes.
 
     Raises:
-        ValueError: not an SX function, free symbols, or sparse arguments or results.
+        ValueError: the Function is not an SX Function, has free symbols, or has sparse arguments or
+            results.
     """
     _check(function)
     builder = _Builder()
@@ -112,7 +119,7 @@ def _check(function: ca.Function) -> None:
 
 
 def pruned(nodes: Sequence[Node], results: Sequence[tuple[int, ...]]) -> Graph:
-    """Return the graph of these results without unused nodes."""
+    """Return the graph of the given results without unused nodes."""
     used = {i for row in results for i in row}
     for i in reversed(range(len(nodes))):
         if i in used:
@@ -126,7 +133,7 @@ def pruned(nodes: Sequence[Node], results: Sequence[tuple[int, ...]]) -> Graph:
 
 
 def merged(source: Graph, instead: Mapping[int, int]) -> Graph:
-    """Return the graph with the users of each node in `instead` moved to an earlier node."""
+    """Return the graph with each node in `instead` replaced by the given earlier node."""
     builder = _Builder()
     number: list[int] = []
     for i, node in enumerate(source.nodes):
@@ -141,9 +148,9 @@ def merged(source: Graph, instead: Mapping[int, int]) -> Graph:
 def rebuild(
     source: Graph, arguments: Sequence[ca.SX], replacing: Mapping[int, ca.SX]
 ) -> list[ca.SX]:
-    """Return the results as columns of new expressions in `arguments`, with some nodes replaced.
+    """Return the results as expressions of `arguments`, columns, with some nodes replaced.
 
-    This substitutes a part of an expression that is not a symbol.
+    Unlike `casadi.substitute`, this can replace parts of an expression that are not symbols.
     """
     found: list[ca.SX] = []
     for i, node in enumerate(source.nodes):
@@ -163,10 +170,10 @@ def rebuild(
 
 
 def coupled(pattern: NDArray[np.bool_]) -> list[tuple[list[int], list[int]]]:
-    """Return (columns, rows) of each group of rows that share columns.
+    """Return (columns, rows) of each group of rows that are coupled by common columns.
 
     Args:
-        pattern: mask of the columns that each row depends on, shape (rows, columns).
+        pattern: mask of the columns on which each row depends, shape (rows, columns).
     """
     left, found = set(range(pattern.shape[0])), list[tuple[list[int], list[int]]]()
     while left:

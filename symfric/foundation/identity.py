@@ -1,15 +1,15 @@
 """Persistent identity of symbols in copies, pickles and files.
 
-A CasADi symbol is an atom: two symbols of one name are different, and expressions depend on one of
-them only. CasADi refuses to pickle symbols, since another process does not have them. Here a symbol
-that leaves the process gets a unique name, and each reader of that name gets the same symbol: the
-original one in the process where it was made, a single one in any other process, whatever object it
-came in. A law and a model that were pickled separately therefore still share their parameter, and
-`copy.deepcopy` does not copy symbols.
+Two CasADi symbols with the same name are different, and an expression depends on one of them only.
+CasADi refuses to pickle symbols, because another process does not have them. In symfric, a symbol
+that is pickled or saved gets a unique name, and reading this name always returns the same symbol:
+the original in the process that created it, and one common symbol in any other process. A law and a
+model that were pickled separately therefore still share their parameters, and `copy.deepcopy` does
+not copy symbols.
 
-A name lasts as long as an object with it, or a copy, exists; nothing is kept for ever.
+A unique name is kept as long as an expression with its symbol, or a copy of it, exists.
 
-Importing this module makes `pickle` accept SX and MX, alone or inside other objects.
+Importing this module makes `pickle` accept SX and MX, also inside other objects.
 """
 
 import copyreg
@@ -24,13 +24,13 @@ import casadi as ca
 
 Expression = TypeVar("Expression", ca.SX, ca.MX)
 KEPT = "_symfric_atoms"
-"""Attribute of a CasADi expression that keeps the names of its symbols alive."""
+"""Attribute of a CasADi expression that holds references to the atoms of its symbols."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Atom:
-    """Symbol and its unique name."""
+    """Symbol with its unique name."""
 
     symbol: Any
     name: str
@@ -42,13 +42,13 @@ _by_name: WeakValueDictionary[tuple[type, str], Atom] = WeakValueDictionary()
 
 
 def _node(symbol: Any) -> tuple[type, int]:
-    """Return the address of the symbol, unique as long as an `Atom` holds it."""
+    """Return type and address of a symbol, which are unique while an `Atom` holds the symbol."""
     node = symbol.element_hash() if isinstance(symbol, ca.SX) else hash(symbol)
     return type(symbol), node
 
 
 def _known(symbol: Any, name: str) -> Atom:
-    """Return the atom of a name: the known one, else a new one of `symbol`."""
+    """Return the atom with this name; if there is none, create it for `symbol`."""
     found = _by_name.get((type(symbol), name))
     if found is None or found.symbol.name() != symbol.name():
         found = Atom(type(symbol)(symbol), name)
@@ -57,7 +57,7 @@ def _known(symbol: Any, name: str) -> Atom:
 
 
 def named(expressions: Sequence[Expression]) -> tuple[Atom, ...]:
-    """Return the atoms in some expressions, which keep their names from now on."""
+    """Return the atoms of the symbols in some expressions, and keep them with the expressions."""
     atoms = list[Atom]()
     with _lock:
         flat: list[Any] = [ca.vec(e) for e in expressions if not e.is_constant()]
@@ -69,7 +69,7 @@ def named(expressions: Sequence[Expression]) -> tuple[Atom, ...]:
 
 
 def atoms_of(labels: Sequence[str], names: Sequence[str]) -> list[Atom]:
-    """Return the SX symbols of these unique names in this process, created if missing."""
+    """Return the atoms with these unique names in this process; create missing ones."""
     with _lock:
         return [_known(ca.SX.sym(label), name) for label, name in zip(labels, names, strict=True)]
 
@@ -77,8 +77,12 @@ def atoms_of(labels: Sequence[str], names: Sequence[str]) -> list[Atom]:
 def again(
     expression: Expression, symbols: Sequence[Expression], names: Sequence[str]
 ) -> Expression:
-    """Return an expression that was read with its `symbols`, in those of this process with these
-    names.
+    """Return an expression with `symbols` replaced by the symbols of this process.
+
+    Args:
+        expression: expression that was read.
+        symbols: its symbols, which were read with it.
+        names: unique names of the symbols.
     """
     with _lock:
         atoms = [_known(symbol, name) for symbol, name in zip(symbols, names, strict=True)]
@@ -92,14 +96,14 @@ def again(
 
 
 def keep(expressions: Iterable[Any], atoms: Sequence[Atom]) -> None:
-    """Keep the names of `atoms` as long as one of the expressions exists."""
+    """Keep `atoms` as long as one of the expressions exists."""
     kept = tuple(atoms)
     for expression in expressions:
         vars(expression)[KEPT] = kept
 
 
 def deserialized(text: str, names: Sequence[str] | None) -> Any:
-    """Return the expression or Function that `serialized` wrote; CasADi may execute its content."""
+    """Return the expression or Function that `serialized` wrote; this may execute code."""
     if names is None:
         return ca.Function.deserialize(text)
     reader: Any = ca.StringDeserializer(text)
@@ -108,7 +112,7 @@ def deserialized(text: str, names: Sequence[str] | None) -> Any:
 
 
 def serialized(value: Any) -> tuple[str, tuple[str, ...] | None]:
-    """Return an expression or Function in CasADi's own format, and the names of its symbols."""
+    """Return an expression or Function in the format of CasADi, and the names of its symbols."""
     if isinstance(value, ca.Function):
         return str(value.serialize()), None
     atoms = named([value])
@@ -119,7 +123,7 @@ def serialized(value: Any) -> tuple[str, tuple[str, ...] | None]:
 
 
 def _written(expression: Any) -> Any:
-    """Reduce an expression for `pickle`; inside CasADi's own pickling as CasADi does."""
+    """Reduce an expression for `pickle`; within a pickle context of CasADi, as CasADi does."""
     if getattr(ca.casadi, "_current_pickle_context", lambda: None)():
         return object.__reduce_ex__(expression, 2)
     return deserialized, serialized(expression)

@@ -1,9 +1,9 @@
-"""CasADi expressions as plain lists of instructions, for files that must not run code.
+"""CasADi expressions as lists of instructions, for files that must not run code.
 
-CasADi's own format holds any `Function`, and with it shell commands (`jit`), libraries (`external`)
-and callbacks. A list holds symbols, constants and the scalar operations of `OPERATIONS` only; it is
-checked completely before an expression is built. CasADi simplifies expressions while building them:
-one that was built with simplification on is restored operation by operation.
+The format of CasADi can contain any `Function`, including shell commands (`jit`), libraries
+(`external`) and callbacks. A list of instructions contains only symbols, constants and the scalar
+operations in `OPERATIONS`, and is checked completely before expressions are built. Expressions that
+CasADi built with simplification, its default, are restored with the same operations.
 """
 
 from collections.abc import Sequence
@@ -27,26 +27,26 @@ BINARY = (
     "copysign", "if_else_zero", "fmin", "fmax", "atan2", "hypot", "remainder",
 )  # fmt: skip
 OPERATIONS = (*UNARY, *BINARY)
-"""Operations of a list by their names in CasADi, without "OP_"."""
+"""Allowed operations: names of CasADi without "OP_"."""
 CODES: dict[str, int] = {name: getattr(ca, f"OP_{name.upper()}") for name in OPERATIONS}
 NAMES = {code: name for name, code in CODES.items()}
 MOST_ENTRIES = 10**7
-"""Largest number of entries of one expression, zeros included."""
+"""Largest number of entries of one expression, including zeros."""
 DEEPEST = 8000
-"""Longest path of operations; CasADi may overflow the stack when printing deeper expressions."""
+"""Largest depth of nested operations; CasADi may overflow the stack with deeper expressions."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Instructions:
-    """Expressions with numbered scalars: symbols, constants, then operations.
+    """Expressions as numbered scalars: symbols, then constants, then results of operations.
 
     Attributes:
         labels: name of each symbol.
         names: unique name of each symbol (`symfric.foundation.identity`).
-        constants: values, shape (c,).
-        operations: names of the operations in use.
-        code: one row (operation, first operand, second operand) each, shape (k, 3); a unary
+        constants: values of the constants, shape (c,).
+        operations: names of the operations that occur.
+        code: (operation, first operand, second operand) of each operation, shape (k, 3); a unary
             operation repeats its operand.
         shapes: rows and columns of each expression, shape (e, 2).
         entries: (expression, row, column, number) of each structural nonzero, by expression,
@@ -63,10 +63,10 @@ class Instructions:
 
     @classmethod
     def of(cls, expressions: Sequence[ca.SX]) -> "Instructions":
-        """Return the instructions of some expressions, common parts once.
+        """Return the instructions of some expressions; common subexpressions occur once.
 
         Raises:
-            ValueError: an operation that is not one of `OPERATIONS`, such as a function call.
+            ValueError: an operation is not in `OPERATIONS`, such as a function call.
         """
         atoms = identity.named(expressions)
         columns = [ca.vec(e.nz[:]) for e in expressions if e.nnz()]
@@ -78,7 +78,7 @@ class Instructions:
             op = f.instruction_id(k)
             if op == ca.OP_INPUT:
                 return f.instruction_input(k)[1]
-            if op == ca.OP_CONST:  # -1, -2, ... until their count is known
+            if op == ca.OP_CONST:  # provisional numbers -1, -2, ...
                 constants.append(f.instruction_constant(k))
                 return -len(constants)
             if op not in NAMES:
@@ -112,10 +112,10 @@ class Instructions:
         )
 
     def expressions(self, trusted: bool = False) -> list[ca.SX]:
-        """Return the expressions, in the symbols of this process with these unique names.
+        """Return the expressions, with the symbols of this process that have the unique names.
 
         Raises:
-            ValueError: instructions that `of` does not write, unless they are `trusted`.
+            ValueError: the instructions are invalid; not checked if `trusted`.
         """
         if not trusted:
             self.check()
@@ -136,10 +136,10 @@ class Instructions:
         return found
 
     def check(self) -> None:
-        """Check operations, operands, which must be earlier numbers, and entries.
+        """Check operations, entries, and operands, which must precede their operation.
 
         Raises:
-            ValueError: an invalid one, or a path of more than `DEEPEST` operations.
+            ValueError: something is invalid, or more than `DEEPEST` operations are nested.
         """
         symbols, count = len(self.labels), len(self.labels) + len(self.constants)
         places, shapes = self.entries[:, [0, 2, 1]], self.shapes
@@ -174,7 +174,7 @@ def _within(numbers: NDArray[np.int64], end: NDArray[np.int64] | int) -> bool:
 
 
 def _matrix(rows: int, columns: int, entries: NDArray[np.int64], nodes: Sequence[ca.SX]) -> ca.SX:
-    """Return the matrix with these (row, column, number), column by column."""
+    """Return the matrix with entries (row, column, number), which are sorted by column."""
     nonzeros = ca.vertcat(ca.SX(0, 1), *(nodes[i] for i in entries[:, 2].tolist()))
     pattern = ca.Sparsity.triplet(rows, columns, entries[:, 0].tolist(), entries[:, 1].tolist())
     return ca.SX(pattern, nonzeros)

@@ -1,6 +1,6 @@
-"""Packages that import a module when one of its public names is first used (PEP 562).
+"""Packages that import a module when one of its public names is first used.
 
-`import symfric` then loads no law, no mechanism and no plotting library.
+`import symfric` therefore loads no laws, no mechanisms and no plotting library.
 """
 
 import ast
@@ -11,12 +11,12 @@ from typing import Any
 
 
 class LazyPackage(ModuleType):
-    """A package whose public names are imported on first use."""
+    """Package whose public names are imported on first use."""
 
     _places: dict[str, str]
 
     def __getattr__(self, name: str) -> Any:
-        """Import the public name or the submodule called `name`."""
+        """Import and return the public name or the submodule `name`."""
         found, submodule = None, f"{self.__name__}.{name}"
         if name in self._places:
             found = getattr(import_module(self._places[name]), name)
@@ -43,10 +43,10 @@ class LazyPackage(ModuleType):
 
 
 def load_lazily(package: str) -> None:
-    """Make the names that `package` imports for type checkers public, imported on first use.
+    """Make the names that a package imports for type checkers available on first use.
 
-    The imports in the block `if TYPE_CHECKING:` of its source are the only list of these names;
-    `from module import *` stands for `module.__all__`. The source must be installed.
+    The imports in the block `if TYPE_CHECKING:` of its source are the only list of public names;
+    `from module import *` means `module.__all__`. The source must be installed.
 
     Args:
         package: `__name__` of the package.

@@ -9,9 +9,9 @@ _LOCK = Lock()
 
 
 def remember(known: dict[Hashable, T], key: Hashable, made: T, most: int) -> T:
-    """Store `made` in `known`, unless another thread was first; return the stored object.
+    """Store `made` in `known` unless `key` is present, and return the stored object.
 
-    With more than `most` entries the oldest is dropped.
+    If `known` has `most` entries, the oldest entry is removed.
     """
     with _LOCK:
         if key not in known and len(known) >= most:

@@ -1,8 +1,7 @@
-"""Elementary functions that accept floats, NumPy arrays and CasADi SX, MX and DM; evaluation of
-CasADi functions and walks through their instructions.
+"""Elementary functions of floats, NumPy arrays and CasADi matrices, and evaluation of Functions.
 
-CasADi's own functions turn an array into a DM column, and NumPy's turn a DM into an array; a law
-written with these keeps the type of its arguments.
+CasADi's elementary functions convert an array to a DM column, and those of NumPy convert a DM to an
+array; laws written with the functions of this module keep the type of their arguments.
 """
 
 import ctypes
@@ -20,27 +19,27 @@ from symfric.foundation.symbolic import Symbolic
 from symfric.foundation.vector import Rows, Vector
 
 Scalar = Any
-"""Real number: float, NumPy array (element-wise), SX, MX or DM; a `Vector` where laws accept it."""
+"""Real number: float, NumPy array (element-wise), SX, MX or DM; in isotropic laws also `Vector`."""
 
 _CASADI = (ca.SX, ca.MX, ca.DM, Symbolic)
 
 
 def is_symbolic(value: Scalar) -> bool:
-    """Return True if `value` contains a CasADi symbol, so that numerical checks do not apply."""
+    """Return True if `value` contains a CasADi symbol; numerical checks then do not apply."""
     if isinstance(value, ca.SX):
         return not value.is_constant()
     return isinstance(value, ca.MX | Symbolic)
 
 
 def is_casadi(*values: Scalar) -> bool:
-    """Return True if any of `values` is a CasADi matrix, or stands for one."""
+    """Return True if any of `values` is a CasADi matrix or a `Symbolic` object."""
     return any(isinstance(value, _CASADI) for value in values)
 
 
 def is_number(value: Scalar) -> bool:
-    """Return True for a plain number: int, float, NumPy's scalars and 0-d arrays of them.
+    """Return True if `value` is an int, a float, a real NumPy scalar or a 0-d array.
 
-    An int too large for a float does not count.
+    The result is False for an int that is too large for a float.
     """
     if isinstance(value, np.ndarray):
         return value.ndim == 0 and value.dtype.kind in "iuf"
@@ -50,17 +49,17 @@ def is_number(value: Scalar) -> bool:
 
 
 def equals(value: Scalar, number: float) -> bool:
-    """Return True if `value` is the plain number `number`, so that a special case may be built in.
+    """Return True if `value` is a plain number equal to `number`.
 
-    False for a symbol, whose value is unknown when the expression is built.
+    The result is False for a symbol. Use it to simplify an expression while it is built.
     """
     return is_number(value) and float(value) == number
 
 
 def reciprocal(value: Scalar) -> Scalar:
-    """Return 1 / value, bit for bit, for a value that divides several others.
+    """Return 1 / value, bit for bit, in a form for use in several products.
 
-    CasADi turns a product with 1 / x into a quotient by x, and so one division into many.
+    CasADi rewrites a product with 1 / x as a division by x, which would repeat the division.
     """
     return 2 * (0.5 / value)
 
@@ -113,9 +112,9 @@ def column(*rows: Scalar) -> Scalar:
 
 
 def empty(like: Scalar) -> Scalar:
-    """Return the empty column of a stateless law: DM (0, 1), or an array (0, ...).
+    """Return the empty column of states of a stateless law: DM (0, 1), or an array (0, ...).
 
-    Concatenation of a DM with SX and MX columns leaves no trace, so absent states cost nothing.
+    An empty DM can be concatenated with SX and MX columns and adds no operations.
     """
     if isinstance(like, Vector):
         return Rows()
@@ -131,15 +130,15 @@ def smallest(*values: Scalar) -> Scalar:
 
 
 def total(terms: Iterable[Scalar]) -> Scalar:
-    """Return the sum of `terms`, at least one, in their order."""
+    """Return the sum of one or more `terms`, added in their order."""
     first, *rest = terms
     return sum(rest, start=first)
 
 
 def evaluate(function: ca.Function, *arguments: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the first output of `function`, flat, at contiguous arrays, without conversions.
+    """Return the first output of `function` as a flat array; arguments must be contiguous.
 
-    Five times faster than calling the Function with arrays, which copies each into a matrix.
+    This is five times faster than calling the Function, which copies each array to a matrix.
     """
     return evaluate_all(function, *arguments)[0].ravel(order="F")
 
@@ -147,7 +146,7 @@ def evaluate(function: ca.Function, *arguments: NDArray[np.float64]) -> NDArray[
 def evaluate_all(
     function: ca.Function, *arguments: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
-    """Return all outputs of `function`, which must be dense, as matrices; see `evaluate`."""
+    """Return all outputs of `function` as matrices; outputs must be dense, see `evaluate`."""
     results = [np.zeros(function.size_out(i)[::-1]) for i in range(function.n_out())]
     bound(function, arguments, results)()
     return [result.T for result in results]
@@ -158,7 +157,7 @@ def bound(
     arguments: Sequence[NDArray[np.float64]],
     results: Sequence[NDArray[np.float64]],
 ) -> Callable[[], None]:
-    """Bind `function` to contiguous arrays that CasADi reads and writes without copies."""
+    """Return a call of `function` that reads and writes the given contiguous arrays in place."""
     buffer, call = cast(tuple[Any, Any], function.buffer())
     for place, arrays in ((buffer.set_arg, arguments), (buffer.set_res, results)):
         for i, array in enumerate(arrays):
@@ -172,7 +171,7 @@ def bound(
 
 
 def address(array: NDArray[np.float64]) -> int:
-    """Return the address of the numbers of a contiguous array, for compiled code."""
+    """Return the memory address of the data of a contiguous array, for compiled code."""
     if array.flags.writeable and array.size:  # three times faster than below
         return ctypes.addressof(ctypes.c_char.from_buffer(cast(Any, array)))
     return array.ctypes.data
@@ -184,11 +183,12 @@ Made = TypeVar("Made")
 
 
 def walk(function: ca.Function, made: Callable[[int, list[Made]], Made]) -> list[list[Made]]:
-    """Return the nonzeros of each result of an SX function, from its instructions in order.
+    """Return a value for each nonzero of each result of an SX Function.
 
     Args:
-        function: of SX.
-        made: value of instruction k from those of its operands, none for inputs and constants.
+        function: SX Function, whose instructions are processed in order.
+        made: function that returns the value of instruction k, given the values of its operands;
+            inputs and constants have no operands.
     """
     slots = dict[int, Made]()
     results = [dict[int, Made]() for _ in range(function.n_out())]
@@ -205,5 +205,5 @@ def walk(function: ca.Function, made: Callable[[int, list[Made]], Made]) -> list
 
 
 def applied(operation: int, operands: Sequence[ca.SX]) -> ca.SX:
-    """Apply one CasADi operation."""
+    """Return the expression of one CasADi operation on its operands."""
     return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(operation, *operands)

@@ -1,13 +1,14 @@
-"""Frozen data with expressions as plain arrays, for files and pickles.
+"""Objects with CasADi expressions as plain arrays, for files and pickles.
 
-A pack is an archive of arrays (NPZ): one holds JSON, in which objects are given by class and fields
-and expressions by number; the others are the arrays themselves. Numbers are restored bit for bit.
+A pack is an archive of arrays (NPZ). One array contains JSON, in which objects are represented by
+class and fields, and arrays and expressions by number; the other arrays contain the data. Numbers
+are restored exactly.
 
 A file cannot run code. Expressions are lists of instructions (`symfric.foundation.instructions`),
-arrays are never pickles, and objects are of a fixed list of classes
-(`symfric.foundation.storable`) or of classes that the caller passes; their fields are checked
-against their annotations. A pickle is trusted, like all pickles: it may also hold other classes and
-CasADi's own serialization.
+arrays are never pickles, and objects are instances of the classes in a fixed list
+(`symfric.foundation.storable`) or of classes passed by the caller; their fields are checked against
+the annotations. A pickle is trusted, as all pickles are: it may also contain other classes and
+expressions in the format of CasADi.
 """
 
 import json
@@ -28,14 +29,14 @@ from symfric.foundation import checks, identity, storable
 from symfric.foundation.instructions import Instructions
 
 FUNCTION = tuple[str, list[ca.SX], list[ca.SX], list[str], list[str]]
-"""Name, arguments and results of a Function in a file, and their names."""
+"""Function in a file: its name, arguments, results, and the names of arguments and results."""
 ABOUT, OLD = "about", "expressions"
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Given:
-    """Function without arguments that returns a stored value; a pack may hold it."""
+    """Function without arguments that returns a stored value; packs may contain it."""
 
     value: Any
 
@@ -54,24 +55,25 @@ class Portable:
         return made
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the pack."""
+        """Return the pack for `pickle`."""
         return loads, (dumps(self),)
 
 
 def dump(file: IO[bytes], thing: object, kind: str = "", form: int = 0) -> None:
     """Write the pack of `thing` to an open file.
 
-    An object with `to_pack()` defines its own fields in a pack; one with `packed_as()` is packed as
-    another object, whose `unpacked()` restores it.
+    The method `to_pack()` of a class defines the fields in a pack. An object with `packed_as()` is
+    replaced by the object that this method returns, whose `unpacked()` restores the original.
 
     Args:
-        file: open for writing.
+        file: file that is open for writing.
         thing: object to pack.
         kind: name of the file type.
-        form: number of the format, raised whenever older programs would misread it.
+        form: version of the format; it is increased if older programs would misread the file.
 
     Raises:
-        ValueError: an object that a file cannot hold, such as a function, with its place.
+        ValueError: a file cannot contain some part of the object, such as a function; the message
+            names the part.
     """
     _Writer(trusted=False).pack(file, thing, kind, form)
 
@@ -84,7 +86,7 @@ def dumps(thing: object) -> bytes:
 
 
 def holds(thing: object) -> bool:
-    """Return True if a file can hold `thing`."""
+    """Return True if a file can contain `thing`."""
     try:
         dump(BytesIO(), thing)
     except ValueError:
@@ -99,14 +101,14 @@ def load(
     """Return the object that `dump` wrote.
 
     Args:
-        file: open for reading.
-        kind, form: as given to `dump`; older formats are read, too.
-        own: classes and functions in it that are not symfric's.
-        reader: function to which users pass them, for messages.
+        file: file that is open for reading.
+        kind, form: values passed to `dump`; older formats are also read.
+        own: classes and functions in the file that symfric does not define.
+        reader: public function with the argument `own`, for messages.
 
     Raises:
-        ValueError: not a pack of this kind, a damaged one, one of a newer format, or an unknown
-            class or function.
+        ValueError: the file is not a pack of this kind, is damaged, has a newer format, or contains
+            an unknown class or function.
     """
     try:
         arrays = storable.arrays(file)
@@ -134,15 +136,13 @@ def load(
 
 
 def loads(data: bytes) -> Any:
-    """Return the object that `dumps` wrote in a pickle, with any classes."""
+    """Return the object that `dumps` packed; any classes are accepted."""
     arrays = storable.arrays(BytesIO(data))
     return _Reader(arrays, None).unpack(json.loads(arrays.pop(ABOUT).tobytes()))
 
 
 class UnreadableError(ValueError):
-    """Pack of another version, or with a class that is neither symfric's nor passed by the
-    caller.
-    """
+    """Error for a pack of another version, or with a class that is not known."""
 
 
 def _foreign() -> ValueError:
@@ -151,9 +151,9 @@ def _foreign() -> ValueError:
 
 @final
 class _Writer:
-    """Conversion of objects to JSON; arrays and expressions are collected separately.
+    """Converter of objects to JSON; arrays and expressions are collected separately.
 
-    In a pickle, which is `trusted`, MX expressions and Functions use CasADi's serialization.
+    In a pickle, which is `trusted`, MX expressions and Functions have the format of CasADi.
     """
 
     def __init__(self, trusted: bool) -> None:
@@ -164,7 +164,7 @@ class _Writer:
         self._trusted = trusted
 
     def pack(self, file: IO[bytes], thing: object, kind: str, form: int) -> None:
-        """Write the archive."""
+        """Write the archive of `thing` to `file`."""
         head: dict[str, Any] = {"kind": kind, "format": form, "content": self.write("", thing)}
         try:
             instructions = Instructions.of(self._expressions)
@@ -181,7 +181,7 @@ class _Writer:
         np.savez(file, **{ABOUT: about}, **arrays)  # pyright: ignore[reportArgumentType]
 
     def write(self, where: str, value: Any) -> Any:
-        """Return `value` as JSON; types other than text and number become {kind: content}."""
+        """Return `value` as JSON; types unknown to JSON become {kind: content}."""
         if value is None or isinstance(value, bool | str | int):
             return value
         if isinstance(value, float | np.floating | np.integer | np.bool_):
@@ -211,9 +211,7 @@ class _Writer:
         return self._object(where, value)
 
     def _of_casadi(self, where: str, value: Any) -> Any:
-        """Return a Function as expressions of its arguments; in a pickle use CasADi's
-        serialization.
-        """
+        """Return a Function as expressions of its arguments; in a pickle, in CasADi's format."""
         if self._trusted:
             return {"serialized": identity.serialized(value)}
         if isinstance(value, ca.Function):
@@ -244,7 +242,7 @@ class _Writer:
         return {"array": len(self._arrays) - 1}
 
     def _object(self, where: str, value: Any) -> Any:
-        """Return an object as class and fields; repeated objects as a reference "same"."""
+        """Return an object as class and fields, or as a reference "same" if it is repeated."""
         if id(value) in self._known:
             return {"same": self._known[id(value)]}
         kind = type(value)
@@ -270,8 +268,9 @@ def state_of(thing: Any) -> dict[str, Any]:
 
 @final
 class _Reader:
-    """Construction of objects from JSON; `own` None, for a pickle, allows any classes and
-    functions.
+    """Constructor of objects from JSON.
+
+    `own` is None for a pickle, in which any classes and functions are allowed.
     """
 
     def __init__(
@@ -316,7 +315,7 @@ class _Reader:
         return self._ways[cast(str, way)](content)
 
     def _object(self, kind: type, has: Mapping[str, Any]) -> Any:
-        """Build an object with these fields; for a file its own checks are applied."""
+        """Return an object with the given fields; for a file, the class checks them."""
         made, k = object.__new__(kind), len(self._known)
         self._known.append(None)
         values = {name: self.read(held) for name, held in has.items()}
@@ -330,13 +329,13 @@ class _Reader:
         return made
 
     def _same(self, k: int) -> object:
-        """Return the object of this number, which must be complete."""
+        """Return object number `k`, which must be complete."""
         if self._known[k] is None:
             raise _foreign()
         return self._known[k]
 
     def _class(self, path: str, wanted: type) -> Any:
-        """Return the class of this name, if packs may contain it."""
+        """Return the class with this path, if packs may contain it."""
         path = storable.current(path)
         if self._own is not None and not storable.may_hold(path):
             raise _foreign()
@@ -348,25 +347,25 @@ class _Reader:
         return found
 
     def _of_expressions(self, parts: Any) -> ca.Function:
-        """Return a Function of SX expressions, without CasADi options, which could run code."""
+        """Return a Function of SX expressions, without options of CasADi that could run code."""
         if not storable.fits(tuple(parts), FUNCTION):
             raise _foreign()
         return ca.Function(*parts)
 
     def _serialized(self, content: Any) -> Any:
-        """Return an expression or Function from CasADi's own format, which may run code."""
+        """Return an expression or Function from the format of CasADi, which may run code."""
         if self._own is not None:
             raise _foreign()
         return identity.deserialized(*content)
 
     def _function(self, path: str) -> Any:
-        """Return the function of this name; for a file only one passed by the caller."""
+        """Return the function with this path; for a file, the caller must have passed it."""
         if self._own is not None and path not in self._own:
             raise self._unknown("functions", path)
         return self._named(path, "functions")
 
     def _named(self, path: str, what: str) -> Any:
-        """Return the object of this name, passed by the caller or of a known package."""
+        """Return the object with this path, from the caller or from a known package."""
         module, _, name = path.partition(":")
         if self._own is not None and path in self._own:
             return self._own[path]

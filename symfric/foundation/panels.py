@@ -1,8 +1,8 @@
 """Empty figures and panels with a light grid, atomic saving, and figures for print.
 
-Figures are made without `matplotlib.pyplot`: they are garbage-collected, a notebook shows the one
-that a cell returns, once, and a program without a screen needs no setting. `figure.show()` opens a
-window.
+Figures are created without `matplotlib.pyplot`: they are garbage-collected, a notebook shows a
+figure only where a cell returns it, and programs without a screen need no configuration.
+`figure.show()` opens a window.
 """
 
 from pathlib import Path
@@ -29,20 +29,20 @@ NARROW, WIDE = 5.0, 7.0
 
 @final
 class Picture(Figure):
-    """Figure outside pyplot's registry: a notebook shows it where it is returned."""
+    """Figure that is not registered with pyplot; a notebook shows it where a cell returns it."""
 
     def _repr_png_(self) -> bytes:  # pyright: ignore[reportUnusedFunction]  (notebooks call it)
         """Return the PNG for a notebook."""
         return png(self, dpi=100)
 
     def show(self, warn: bool = True) -> None:
-        """Open it in a window and wait until that is closed, as `matplotlib.pyplot.show` does.
+        """Open a window and wait until it is closed, like `matplotlib.pyplot.show`.
 
         Args:
-            warn: has no effect; Matplotlib's own figures have it.
+            warn: ignored; it exists for compatibility with Matplotlib.
 
         Raises:
-            ValueError: Matplotlib has no windows here, as on a machine without a screen.
+            ValueError: the Matplotlib backend has no windows, as on a machine without a screen.
         """
         import matplotlib.pyplot as plt  # noqa: PLC0415  (only needed for windows)
 
@@ -64,7 +64,7 @@ class Picture(Figure):
 
 
 def blank(width: float = WIDE, height: float = 4.0, *, free: bool = False) -> Figure:
-    """Return an empty figure [inch] that keeps its labels apart, unless `free`."""
+    """Return an empty figure [inch], with constrained layout unless `free`."""
     return Picture(figsize=(width, height), layout=None if free else "constrained")
 
 
@@ -78,9 +78,9 @@ def grid(
     sharey: Shared = False,
     **more: Any,
 ) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure of `width` and `height` [inch] and its panels with a light grid, row by row.
+    """Return a figure of `width` and `height` [inch] and its panels with a light grid, by row.
 
-    Further arguments go to `Figure.subplots`.
+    Further arguments are passed to `Figure.subplots`.
     """
     figure = blank(width, height)
     axes = figure.subplots(rows, columns, sharex=sharex, sharey=sharey, squeeze=False, **more)
@@ -90,15 +90,16 @@ def grid(
 def panels(
     count: int, width: float = WIDE, height: float = 1.9, shared: bool = True
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure and `count` panels in a column with a light grid, abscissa shared by
-    default.
+    """Return a figure and a column of `count` panels with a light grid; `height` is per panel.
+
+    `shared` is True for a common abscissa.
     """
     figure, axes = grid(count, 1, width, 0.7 + height * count, sharex=shared)
     return figure, [axis for (axis,) in axes]
 
 
 def dressed(axis: Axes) -> Axes:
-    """Add a light grid behind the curves and colours for colour-blind readers; return the panel."""
+    """Set a light grid and colours for colour-blind readers, and return the panel."""
     axis.set_prop_cycle(cycler(color=COLOURS))
     axis.set_axisbelow(True)
     axis.grid(alpha=0.3)
@@ -106,7 +107,7 @@ def dressed(axis: Axes) -> Axes:
 
 
 def save(figure: Figure, path: str | Path | None, dpi: float = 150) -> Figure:
-    """Write `figure` to `path`, if given; return it either way."""
+    """Write `figure` to `path` unless it is None, and return the figure."""
     if path is not None:
         known = sorted(figure.canvas.get_supported_filetypes())
         place = checks.path("picture", path)
@@ -121,7 +122,7 @@ MILLIMETRE = 1 / 25.4
 DOTS = 300
 """Resolution of pixel images [dots per inch]."""
 FONTS: dict[Any, Any] = {"pdf.fonttype": 42, "ps.fonttype": 42}
-"""TrueType in PDF and PS: printers of journals refuse the Type 3 that is Matplotlib's default."""
+"""TrueType in PDF and PS; journals reject Type 3 fonts, the default of Matplotlib."""
 
 
 def for_print(
@@ -132,20 +133,20 @@ def for_print(
     height: float | None = None,
     text: float = 8.0,
 ) -> Figure:
-    """Return any figure of symfric in the width of a column, such as that of `run.plot()`.
+    """Resize a figure of symfric, such as `run.plot()`, to the width of a printed column.
 
-    Texts keep their proportions, and legends outside the panels take as many columns as fit. The
-    figure itself is changed.
+    Texts keep their relative sizes, and legends outside the panels have as many columns as fit. The
+    figure is changed in place and returned.
 
     Args:
-        figure: returned by `plot()` of a run, a fit, an optimal motion, a comparison.
-        path: file, its format taken from the ending (.pdf, .svg, .eps, .png).
-        width: [mm]; 85 is a column of most journals, 175 a page.
-        height: [mm]; None keeps the proportions.
-        text: size of the axis labels [pt]; other texts keep their size relative to it.
+        figure: figure returned by `plot()` of a run, a fit, an optimal motion or a comparison.
+        path: output file; its suffix (.pdf, .svg, .eps, .png) selects the format.
+        width: width [mm]; most journals have columns of 85 mm and pages of 175 mm.
+        height: height [mm]; None keeps the proportions.
+        text: font size of the axis labels [pt]; other texts are scaled by the same factor.
 
     Raises:
-        ValueError: not a figure, sizes that are not positive, an unknown ending.
+        ValueError: `figure` is not a figure, a size is not positive, or the suffix is unknown.
     """
     figure = checks.kind("for_print", figure, Figure, "a figure, such as run.plot()")
     width = checks.number("for_print: width", width, unit="mm", above=0.0)
@@ -163,7 +164,7 @@ def for_print(
 
 
 def _write_at(figure: Figure, text: float) -> None:
-    """Scale all texts of the figure so that axis labels have `text` points."""
+    """Scale all texts of the figure so that axis labels have the size `text` [pt]."""
     first = next(iter(figure.axes), None)
     ratio = text / (float(mpl.rcParams["font.size"]) if first is None else _size(first.yaxis.label))
     texts = {id(one): one for one in _texts(figure)}
@@ -173,7 +174,7 @@ def _write_at(figure: Figure, text: float) -> None:
             ticks = [one for one in _texts(axis) if one not in kept]
             for one in ticks:
                 texts.pop(id(one), None)
-            if ticks:  # set on the axis: ticks are recreated
+            if ticks:  # set on the axis, because Matplotlib recreates ticks
                 axis.set_tick_params(which="both", labelsize=_size(ticks[0]) * ratio)
     for one in texts.values():
         one.set_fontsize(_size(one) * ratio)

@@ -1,8 +1,9 @@
-"""Parameters of laws and scenes: value, unit, bounds, default; named sets and their symbols.
+"""Parameters of laws and scenes, with value, unit, bounds and default, and their symbols.
 
-A parametric object is a frozen dataclass whose numbers are declared with `param`. A field holds a
-float (folded into every expression as a constant) or a CasADi symbol (visible to derivatives,
-identification and optimal control). Objects nest: a scene holds a law, a sum holds its terms.
+A parametric object is a frozen dataclass whose numbers are declared with `param`. The value of a
+field is a float, which is a constant in all expressions, or a CasADi symbol, which is available to
+derivatives, identification and optimal control. Objects are nested: a scene contains a law, a sum
+contains its terms.
 """
 
 from collections import Counter
@@ -45,7 +46,7 @@ ROLES = {
     "motion": "what moves the machine: a start value, a given velocity or path",
     "sampling": "of random contacts: how many, and which random numbers",
 }
-"""Roles of parameters, independent of their names; "" if unspecified."""
+"""Roles of parameters and their meaning; the role "" is unspecified."""
 
 
 def param(
@@ -55,17 +56,17 @@ def param(
     """Declare a parameter field of a `Parametric` dataclass.
 
     Args:
-        default: value used if none is given.
-        unit: SI unit as text, "1" for a pure number.
+        default: default value.
+        unit: SI unit, "1" for a pure number.
         doc: short description.
-        role: purpose, one of `ROLES`, by which identification, temperature and the code generator
-            recognise parameters; "" if unspecified.
-        width: of a parameter that smooths a jump, its exponent in the smoothing width: 1 for the
-            width itself, -1 for a steepness; 0 for any other.
-        lower, upper: closed bounds, also the box constraints of identification.
+        role: purpose, one of `ROLES`, by which identification, temperature models and the code
+            generator recognise parameters; "" if unspecified.
+        width: for a parameter that smooths a jump, its exponent in the smoothing width: 1 for the
+            width itself, -1 for a steepness; 0 for other parameters.
+        lower, upper: closed bounds, which are also the bounds in identification.
 
     Raises:
-        ValueError: an unknown role.
+        ValueError: the role is unknown.
     """
     if role and role not in ROLES:
         raise ValueError(f"param: role: expected one of {', '.join(ROLES)}, got {role!r}")
@@ -77,7 +78,7 @@ def param(
 def option(default: str, *, choices: tuple[str, ...], doc: str) -> Any:
     """Declare a field of a `Parametric` dataclass that selects one of several forms.
 
-    A form is chosen when the object is made and leaves no switch in the expressions.
+    The form is selected when the object is created; expressions contain no switch.
     """
     return field(default=default, metadata={"choices": choices, "doc": doc})
 
@@ -87,17 +88,17 @@ T = TypeVar("T")
 
 @dataclass_transform(frozen_default=True, eq_default=False)
 def parametric(cls: type[T]) -> type[T]:
-    """Make a class a frozen dataclass that compares by identity, as every `Parametric` is."""
+    """Make a subclass of `Parametric` a frozen dataclass that is compared by identity."""
     return dataclass(frozen=True, eq=False)(cls)
 
 
 @dataclass(frozen=True, eq=False)
 class Parameter:
-    """Parameter with its metadata, for users.
+    """Parameter of an object, with its value and metadata.
 
     Attributes:
         name: flat name in the whole object, such as "mu_s_pos".
-        field: name in the part that declares it, such as "mu_s".
+        field: name in the part that declares the parameter, such as "mu_s".
         role: purpose, one of `ROLES`, or "".
         width: exponent in the width of a smoothed jump, see `param`.
     """
@@ -116,9 +117,9 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Parametric:
-    """Frozen dataclass with `param` fields, whose numbers are checked on construction.
+    """Frozen dataclass with `param` fields, whose values are checked on construction.
 
-    `eq=False` because comparing fields that hold symbols has no truth value.
+    Objects are compared by identity, because a comparison of symbols has no truth value.
     """
 
     ordered: ClassVar[tuple[tuple[str, str], ...]] = ()
@@ -128,10 +129,10 @@ class Parametric:
     """Pairs of fields (a, b) that must satisfy a < b."""
 
     suffixes: ClassVar[tuple[str, ...]] = ()
-    """Fixed name endings of the children; without them a child is renamed only on a clash."""
+    """Name suffixes of the children; if empty, parameters are renamed only to avoid duplicates."""
 
     def __new__(cls, *_: Any, **given: Any) -> Self:
-        """Create an object; an unknown field raises an error that offers the nearest name."""
+        """Create an object; the error for an unknown field offers the nearest name."""
         if not given.keys() <= cls.__dataclass_fields__.keys():
             check_names(cls.__name__, given, [item.name for item in fields(cls)])
         return super().__new__(cls)
@@ -144,7 +145,7 @@ class Parametric:
             raise ValueError(f"{type(self).__name__}: " + "; ".join(problems))
 
     def _repr_html_(self) -> str:
-        """Return HTML for notebooks: parameters with units, and a figure."""
+        """Return HTML for notebooks with a table of parameters and a figure."""
         rows = [(p.name, figure_of(p.value), p.unit, p.doc) for p in parameters(self).values()]
         rows += [(o.name, o.value, "", o.doc) for o in options(self).values()]
         first = (self.__doc__ or "").partition("\n")[0]
@@ -152,7 +153,7 @@ class Parametric:
         return Shown(type(self).__name__, (first,), table).html(self.thumbnail())
 
     def thumbnail(self) -> "Figure | None":
-        """Return a small figure, if there is one."""
+        """Return a small figure, or None."""
 
 
 P = TypeVar("P", bound=Parametric)
@@ -183,7 +184,7 @@ def _problems(obj: Parametric) -> Iterator[str]:
 
 
 def _numbers(value: Any) -> NDArray[np.float64]:
-    """Return the numbers in a plain number, an array or a constant matrix; else an empty array."""
+    """Return a number, a numeric array or a constant matrix as a flat array; else an empty one."""
     if is_casadi(value):
         return ca.DM(value).full().ravel()
     numeric = isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
@@ -191,7 +192,10 @@ def _numbers(value: Any) -> NDArray[np.float64]:
 
 
 def _out_of_order(a: Scalar, b: Scalar, strictly: bool) -> bool:
-    """Return True if numbers violate a <= b, or a < b; False for arrays of other shapes."""
+    """Return True if numbers violate a <= b, or a < b if `strictly`.
+
+    The result is False for symbols and for arrays of different sizes.
+    """
     if is_symbolic(a) or is_symbolic(b):
         return False
     low, high = _numbers(a), _numbers(b)
@@ -217,7 +221,7 @@ def _children(obj: Parametric) -> list[tuple[str, int | None, Parametric]]:
 
 
 def _names(obj: Parametric) -> dict[str, tuple[int | None, str]]:
-    """Return flat name -> (child number or None, name inside it)."""
+    """Return (child number or None, name in the child) of each parameter by its flat name."""
     own = [item.name for item in fields(obj) if "unit" in item.metadata]
     inner = [list(_names(child)) for _, _, child in _children(obj)]
     if obj.suffixes:
@@ -231,7 +235,7 @@ def _names(obj: Parametric) -> dict[str, tuple[int | None, str]]:
 
 
 def distinct(groups: Sequence[Sequence[str]], taken: Sequence[str] = ()) -> list[list[str]]:
-    """Return the names of several groups made unique: repeated names get their group's number."""
+    """Return the names of several groups; repeated names are made unique by the group number."""
     count = Counter([*taken, *(name for group in groups for name in group)])
     used = set(count)
     renamed: list[list[str]] = []
@@ -249,11 +253,11 @@ def distinct(groups: Sequence[Sequence[str]], taken: Sequence[str] = ()) -> list
 def parameters(obj: Parametric) -> dict[str, Parameter]:
     """Return all parameters of `obj` and of its parts, by flat name.
 
-    Names are the field names. Terms of a sum that share a name get `_1`, `_2`, ...; the two sides
-    of an asymmetric law get `_pos` and `_neg`.
+    Names are the field names. Repeated names in the terms of a sum have the suffixes `_1`, `_2`,
+    ...; the two sides of an asymmetric law have the suffixes `_pos` and `_neg`.
 
     Raises:
-        ValueError: neither a law nor a scene.
+        ValueError: `obj` is neither a law nor a scene.
     """
     _check_parametric("parameters", obj)
     found: dict[str, Parameter] = {}
@@ -270,7 +274,7 @@ def parameters(obj: Parametric) -> dict[str, Parameter]:
 
 @dataclass(frozen=True)
 class Option:
-    """Option with its choices, for users."""
+    """Option of an object, with its value and choices."""
 
     name: str
     value: str
@@ -280,7 +284,7 @@ class Option:
 
 
 def options(obj: Parametric) -> dict[str, Option]:
-    """Return the options of `obj` itself, by name."""
+    """Return the options of `obj` by name, without those of its parts."""
     found: dict[str, Option] = {}
     for item in fields(obj):
         if "choices" in item.metadata:
@@ -293,8 +297,8 @@ def with_values(obj: P, values: Mapping[str, Scalar]) -> P:
     """Return a copy of `obj` with the parameters in `values` replaced, at any level.
 
     Raises:
-        ValueError: a name that `obj` does not have (the closest ones are offered), or a value
-            outside its bounds.
+        ValueError: `obj` has no parameter of a name (the closest names are offered), or a value is
+            out of bounds.
     """
     _check_parametric("with_values", obj)
     names = _names(obj)
@@ -321,16 +325,16 @@ def with_values(obj: P, values: Mapping[str, Scalar]) -> P:
 
 
 def symbolise(obj: P, *names: str) -> tuple[P, tuple[Variable, ...]]:
-    """Return a copy of `obj` with SX symbols for the named parameters, and these symbols.
+    """Return a copy of `obj` with SX symbols for the named parameters, and their variables.
 
-    Every other parameter stays a constant of the expression, so that a term switched off by a float
-    zero leaves no trace.
+    Other parameters remain constants, so that terms with a zero coefficient are omitted from
+    expressions.
 
     Returns:
-        The copy and one `Variable` per name with start value, unit and bounds of the parameter.
+        The copy, and one `Variable` per name with start value, unit and bounds of the parameter.
 
     Raises:
-        ValueError: unknown or repeated name.
+        ValueError: a name is unknown or repeated.
     """
     known = parameters(obj)
     names = checks.names(type(obj).__name__, names, known)

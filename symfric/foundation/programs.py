@@ -1,4 +1,4 @@
-"""Run the C compiler and other programs of this machine, with a time limit.
+"""Execution of the C compiler and other programs, with a time limit.
 
 Compilers, compiled programs, emulators and related tools are run only through this module.
 """
@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import IO, final
 
 PATIENCE = 60.0
-"""Default time limit of a program [s]: it stops hanging programs, but not slow ones under load."""
+"""Default time limit of a program [s], long enough for slow programs on a machine under load."""
 GRACE = 1.0
-"""Time [s] for a program to stop after a request."""
+"""Time [s] between the request to stop a program and its forced end."""
 KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
 
 
 class ProgramError(RuntimeError):
-    """Program that does not start, or exceeds its time limit."""
+    """Error for a program that does not start or exceeds its time limit."""
 
 
 @final
@@ -32,9 +32,9 @@ class Finished:
     """Result of a finished program.
 
     Attributes:
-        status: 0 for success.
-        output: its standard output.
-        messages: its standard error, as text.
+        status: exit status; 0 for success.
+        output: standard output.
+        messages: standard error, decoded.
     """
 
     status: int
@@ -50,16 +50,19 @@ def finished(
     variables: Mapping[str, str] | None = None,
     name: str = "",
 ) -> Finished:
-    """Run a program on the standard input `given` to its end, within `limit` [s].
+    """Run a program to its end and return its result.
 
-    Its language is English. An interrupt stops it, too.
+    The locale of the program is "C". An interrupt also stops the program.
 
     Args:
-        variables: additional variables of its environment.
-        name: in messages; default the command.
+        command: program and arguments.
+        given: standard input.
+        limit: time limit [s].
+        variables: additional environment variables.
+        name: name in messages; the command by default.
 
     Raises:
-        ProgramError: it does not start, or exceeds the limit.
+        ProgramError: the program does not start or exceeds the time limit.
     """
     pipe = subprocess.PIPE
     process = started(command, stdin=pipe, stdout=pipe, stderr=pipe, variables=variables, name=name)
@@ -81,10 +84,10 @@ def started(
     variables: Mapping[str, str] | None = None,
     name: str = "",
 ) -> subprocess.Popen[bytes]:
-    """Start a program in its own session; `end` stops and closes it.
+    """Start a program in a new session; use `end` to stop it and close its streams.
 
     Raises:
-        ProgramError: it cannot be started.
+        ProgramError: the program cannot be started.
     """
     try:
         return subprocess.Popen(
@@ -100,14 +103,14 @@ def started(
 
 
 def called(command: Sequence[str]) -> str:
-    """Return a command without the folder of its program."""
+    """Return a command as one string, without the folder of its program."""
     return shlex.join((Path(command[0]).name, *command[1:]))
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """Stop a running program and its children, also after an interrupt.
+    """Stop a program and its children if they still run, and close its streams.
 
-    SIGTERM comes first, so a compiler can remove its temporary files.
+    SIGTERM is sent first, so that a compiler can remove its temporary files.
     """
     if process.poll() is None:
         _signal(process, signal.SIGTERM)
@@ -121,7 +124,7 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 
 def _signal(process: subprocess.Popen[bytes], number: int) -> None:
-    """Send a signal to the process group of a program, if it still exists."""
+    """Send a signal to the process group of a program, if the group still exists."""
     with suppress(ProcessLookupError, PermissionError):
         if hasattr(os, "killpg"):
             os.killpg(process.pid, number)
@@ -131,13 +134,14 @@ def _signal(process: subprocess.Popen[bytes], number: int) -> None:
 
 NAMES = ("gcc", "clang", "cc")
 PER_BYTE = 1e-4
-"""Additional time limit of a compiler per byte of C [s], besides `PATIENCE`: a hundred times the
-usual, for machines under load.
+"""Time [s] per byte of C that is added to `PATIENCE` for compilers.
+
+It is a hundred times the usual compilation time, for machines under load.
 """
 
 
 class CompileError(ProgramError):
-    """Missing compiler, rejected code, or an unusable result."""
+    """Error for a missing compiler, rejected code, or an unusable result."""
 
 
 @dataclass(frozen=True)
@@ -152,10 +156,11 @@ class Compiler:
     def run(
         self, *arguments: str, code: str = "", variables: Mapping[str, str] | None = None
     ) -> str:
-        """Run it on `code`, its standard input, or on files; return its messages.
+        """Run the compiler on files, or on `code` as standard input, and return its messages.
 
         Raises:
-            CompileError: it cannot be started, rejects the code, or exceeds the time limit.
+            CompileError: the compiler cannot be started, rejects the code, or exceeds the time
+                limit.
         """
         try:
             done = finished(
@@ -172,27 +177,27 @@ class Compiler:
         return done.messages
 
     def warnings(self, *arguments: str) -> list[str]:
-        """Run it on files; return the lines with warnings.
+        """Run the compiler on files and return the lines with warnings.
 
         Raises:
-            CompileError: as `run`.
+            CompileError: see `run`.
         """
         return [line for line in self.run(*arguments).splitlines() if "warning:" in line]
 
 
 def is_clang(compiler: Compiler) -> bool:
-    """Return True for clang, which rejects some options of gcc; `cc` often links to it."""
+    """Return True for clang, also as `cc`; it rejects some options of gcc."""
     names = (path.name for path in (Path(compiler.command[0]), Path(compiler.command[0]).resolve()))
     return sys.platform == "darwin" or any("clang" in name for name in names)
 
 
 def patience(code: str) -> float:
-    """Return the time limit of a compiler for `code` [s]."""
+    """Return the time limit for the compilation of `code` [s]."""
     return PATIENCE + PER_BYTE * len(code)
 
 
 def first_error(text: str) -> str:
-    """Return the head of a compiler's messages, and its first error."""
+    """Return the first line of compiler messages together with the first error."""
     head, _, messages = text.partition("\n")
     lines = messages.strip().splitlines()
     error = next((line for line in lines if "error" in line), "".join(lines[:1]))
@@ -200,13 +205,12 @@ def first_error(text: str) -> str:
 
 
 def find_compiler(name: str | None = None) -> Compiler | None:
-    """Return the compiler `name`, else `$CC`, else the first of gcc, clang and cc; None if not
-    found.
+    """Return the compiler `name`, by default `$CC` or the first of gcc, clang and cc.
 
-    A `$CC` that does not exist gives None, without trying the others.
+    The result is None if no compiler is found. If `$CC` is set, no other compiler is tried.
 
     Raises:
-        ValueError: `name` is given and does not exist.
+        ValueError: `name` is given and not found.
     """
     wanted = os.environ.get("CC") if name is None else name
     for candidate in NAMES if wanted is None or not wanted.strip() else (wanted,):
@@ -222,14 +226,14 @@ def _command(text: str) -> tuple[str, ...] | None:
     """Return `text` as a command with the full path of its program; None if not found."""
     try:
         words = shlex.split(text)
-    except ValueError:  # a quotation mark without its partner
+    except ValueError:  # unbalanced quotation marks
         return None
     path = shutil.which(words[0]) if words else None
     return None if path is None else (str(Path(path)), *words[1:])
 
 
 def missing_compiler() -> str:
-    """Return the reason why `find_compiler` found none, with advice."""
+    """Return the reason why `find_compiler` returned None, with advice."""
     wanted = os.environ.get("CC", "").strip()
     if wanted:
         return f"no C compiler found: $CC is {wanted!r}, which does not exist; fix or unset it"
@@ -237,10 +241,10 @@ def missing_compiler() -> str:
 
 
 def needed_compiler() -> Compiler:
-    """Return the compiler of this machine.
+    """Return the default compiler.
 
     Raises:
-        CompileError: not found.
+        CompileError: no compiler is found.
     """
     compiler = find_compiler()
     if compiler is None:

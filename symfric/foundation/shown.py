@@ -1,6 +1,6 @@
-"""Display of objects: one description, as text of one screen and as HTML of a notebook.
+"""Display of objects: one description as text that fits a screen and as HTML for notebooks.
 
-All user text is escaped; there are no scripts, and images are embedded.
+In HTML, text from users is escaped, images are embedded, and there are no scripts.
 """
 
 from abc import ABC, abstractmethod
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WIDTH, HEIGHT = 100, 25
-"""Columns and lines of a screen."""
+"""Size of a screen in columns and lines."""
 DOTS_PER_INCH = 80
 """Resolution of images in notebooks."""
 BOX = "font-family:sans-serif;font-size:13px;line-height:1.35;max-width:64em"
@@ -30,10 +30,10 @@ HEAD = f"{CELL};border-bottom:1px solid #888;font-weight:600"
 
 
 class Showing(ABC):
-    """Base class of objects with a `repr` of one screen, and HTML in notebooks.
+    """Base class of objects with a `repr` that fits a screen and with HTML for notebooks.
 
     Attributes:
-        hidden: internal names that completion omits.
+        hidden: internal names that `dir` and completion omit.
     """
 
     hidden: ClassVar[frozenset[str]] = frozenset(
@@ -45,10 +45,10 @@ class Showing(ABC):
 
     @abstractmethod
     def shown(self) -> "Shown":
-        """Return the description, without expensive computations."""
+        """Return the description; it must not require expensive computations."""
 
     def thumbnail(self) -> "Figure | None":
-        """Return a small figure for notebooks, if there is one."""
+        """Return a small figure for notebooks, or None."""
         return None
 
     def __repr__(self) -> str:
@@ -61,12 +61,14 @@ class Showing(ABC):
 @final
 @dataclass(frozen=True)
 class Table:
-    """Rows of texts below a header.
+    """Table of strings.
 
     Attributes:
-        header: names of the columns; no header if all are "".
-        numbers: right-aligned columns.
-        rest: line below a shortened table, with "{n}" and "{names}" of the omitted rows.
+        header: names of the columns; if all are "", the table has no header.
+        rows: cells of each row.
+        numbers: indices of right-aligned columns.
+        rest: line below a shortened table; "{n}" is the number and "{names}" the first cells of the
+            omitted rows.
     """
 
     header: tuple[str, ...]
@@ -81,10 +83,10 @@ class Shown:
     """Description of an object.
 
     Attributes:
-        title: its name and type, in a line.
-        lines: sentences below.
-        table: its parts.
-        after: sentences below the table.
+        title: name and type of the object, in one line.
+        lines: lines below the title.
+        table: parts of the object.
+        after: lines below the table.
     """
 
     title: str
@@ -93,13 +95,13 @@ class Shown:
     after: tuple[str, ...] = ()
 
     def text(self) -> str:
-        """Return the description as text within a screen."""
+        """Return the description as text that fits a screen."""
         top = [cut(line) for line in (self.title, *self.lines)]
         bottom = [cut(line) for line in self.after]
         return "\n".join([*top, *_rows(self.table, HEIGHT - len(top) - len(bottom)), *bottom])
 
     def html(self, picture: "Figure | None" = None) -> str:
-        """Return the description as HTML, with the figure at its end."""
+        """Return the description as HTML, followed by the figure if there is one."""
         parts = [f"<div><b>{escape(self.title)}</b></div>"]
         parts += [f"<div>{escape(line)}</div>" for line in self.lines]
         parts += [_html_table(self.table)] if self.table.rows else []
@@ -113,19 +115,19 @@ class Shown:
 
 
 def cut(line: str, width: int = WIDTH) -> str:
-    """Return `line` shortened to `width` letters."""
+    """Return `line` shortened to `width` characters."""
     return line if len(line) <= width else f"{line[: width - 4].rstrip(', ')} ..."
 
 
 def figure_of(value: object) -> str:
-    """Return a number with six digits; "(expression)" for a symbolic one."""
+    """Return a number with six significant digits; "(expression)" if it is symbolic."""
     if is_casadi(value):
         return str(value) if value.is_constant() else "(expression)"  # pyright: ignore
     return f"{value:.6g}" if is_number(value) else str(value)
 
 
 def valued(named: Iterable[tuple[str, Scalar, str]]) -> str:
-    """Return numbers with names and units, such as "m = 0.8 kg, mu_s = 0.2"."""
+    """Return numbers with their names and units, such as "m = 0.8 kg, mu_s = 0.2"."""
     units = ((n, v, "" if u in ("", "1") else f" {u}") for n, v, u in named)
     return ", ".join(f"{n} = {figure_of(v)}{u}" for n, v, u in units)
 
@@ -136,14 +138,14 @@ def counted(n: int, one: str, many: str = "") -> str:
 
 
 def among(names: Iterable[str], most: int = 8) -> str:
-    """Join names by commas; if there are many, the first ones and the number of the others."""
+    """Return names joined by commas; beyond `most` names, only their number is added."""
     every = list(names)
     more = f", ... {len(every) - most} more" if len(every) > most else ""
     return ", ".join(every[:most]) + more
 
 
 def _rows(table: Table, most: int) -> list[str]:
-    """Return aligned lines, at most `most` of them."""
+    """Return the table as at most `most` aligned lines."""
     rows, lines = list(table.rows), [table.header] if any(table.header) else []
     room = most - len(lines)
     shown = rows if len(rows) <= room else rows[: max(0, room - 1)]
@@ -174,7 +176,7 @@ def _html_table(table: Table) -> str:
     head = f"<thead><tr>{cells(table.header, 'th', HEAD)}</tr></thead>" * any(table.header)
     body = "".join(f"<tr>{cells(row, 'td', CELL)}</tr>" for row in table.rows)
     whole = f'<table style="{TABLE}">{head}<tbody>{body}</tbody></table>'
-    return f'<div style="overflow-x:auto">{whole}</div>'  # narrow cells scroll it
+    return f'<div style="overflow-x:auto">{whole}</div>'  # scrolls in narrow notebook cells
 
 
 def png(figure: "Figure", dpi: float = 100) -> bytes:
@@ -185,16 +187,16 @@ def png(figure: "Figure", dpi: float = 100) -> bytes:
 
 
 def data_uri(figure: "Figure", dpi: float = 60) -> str:
-    """Return `figure` as a data URI for the `src` of an HTML image, without file and network."""
+    """Return `figure` as a data URI for the `src` of an HTML image."""
     return "data:image/png;base64," + b64encode(png(figure, dpi)).decode()
 
 
 SHORT = 8
-"""Largest number of values that are written out."""
+"""Largest number of values of an array that are listed."""
 
 
 def brief(self: Any) -> str:
-    """Return class and fields of a dataclass, a line each, within a screen."""
+    """Return the class and the fields of a dataclass, one per line, as text that fits a screen."""
     lines = [f"  {item.name}: {in_a_line(getattr(self, item.name))}" for item in fields(self)]
     if len(lines) > HEIGHT - 2:
         lines = [*lines[: HEIGHT - 2], f"  ... {len(lines) - HEIGHT + 2} more"]
@@ -202,7 +204,7 @@ def brief(self: Any) -> str:
 
 
 def in_a_line(value: Any) -> str:
-    """Return a value in a line."""
+    """Return a description of a value in one line."""
     if isinstance(value, np.ndarray):
         return _array(cast(NDArray[Any], value))
     if is_casadi(value):

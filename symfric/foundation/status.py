@@ -1,4 +1,4 @@
-"""Outcome of a solve: each member's value is the sentence shown to the user."""
+"""Status of a solve, and related errors and warnings."""
 
 from enum import Enum, unique
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 
 @unique
 class Status(Enum):
-    """Result of a simulation, an optimisation or a fit."""
+    """Status of a simulation, an optimisation or a fit; the value is the sentence for users."""
 
     SUCCESS = "The end was reached within the tolerances."
     TERMINATED = "A terminal event ended the simulation."
@@ -72,7 +72,7 @@ class Status(Enum):
 
     @property
     def stopped(self) -> bool:
-        """True if the user or a time limit ended the solve."""
+        """True if the user or the time limit ended the solve."""
         return self in (Status.INTERRUPTED, Status.TIME_LIMIT)
 
     @property
@@ -82,7 +82,7 @@ class Status(Enum):
 
 
 class SolveError(RuntimeError):
-    """Failed solve; `status` gives the reason, `partial` the result so far."""
+    """Error for a failed solve; `status` is the reason and `partial` the result so far."""
 
     def __init__(self, message: str, status: Status, partial: Any = None) -> None:
         super().__init__(message)
@@ -91,8 +91,8 @@ class SolveError(RuntimeError):
 
 
 class OverloadWarning(UserWarning):
-    """Friction above its static level, for example of a bristle that does not relax."""
+    """Warning about friction above its static level, for example of bristles that do not relax."""
 
 
 class EnergyWarning(UserWarning):
-    """Friction that adds energy to the motion, for example of a law with the wrong sign."""
+    """Warning about friction that adds energy to the motion, as a law with a wrong sign does."""

@@ -1,4 +1,4 @@
-"""Contents of untrusted files: arrays, classes that a file may name, and types of their fields."""
+"""Checks of untrusted files: arrays, classes that a file may name, and types of their fields."""
 
 import tomllib
 from collections.abc import Callable, Collection, Mapping
@@ -19,33 +19,32 @@ from numpy.typing import NDArray
 OWN = ("symfric", "ocp", "identification")
 """Packages whose classes are known."""
 ARRAYS = "biufU"
-"""NumPy kinds of numbers and texts that an array may hold; objects, which are pickles, are
-refused."""
+"""NumPy kinds of numbers and strings that arrays may contain; objects would be pickles."""
 OURS = tuple(f"{package}{mark}" for package in OWN for mark in ".:")
 
 
 def path_of(named: Any) -> str:
-    """Return module and name of a class or function."""
+    """Return the path "module:name" of a class or function."""
     return f"{named.__module__}:{named.__qualname__}"
 
 
 @cache
 def names() -> Mapping[str, Any]:
-    """Return "modules", whose classes a file may name, and "moved", their older names."""
+    """Return "modules", whose classes a file may name, and "moved", their names in older files."""
     return tomllib.loads(Path(__file__).with_name("stored_names.toml").read_text("utf-8"))
 
 
 def current(path: str) -> str:
-    """Return the present path of a class or function that a file may name by an older one."""
+    """Return the current path of a class or function, given a current or an older path."""
     place, _, name = path.partition(":")
     return f"{names()['moved'].get(place, place)}:{name}"
 
 
 def found_at(path: str) -> Any:
-    """Return the class or function of this path.
+    """Return the class or function with this path.
 
     Raises:
-        ImportError, AttributeError, ValueError: there is none.
+        ImportError, AttributeError, ValueError: the path does not exist.
     """
     place, _, name = path.partition(":")
     found: Any = import_module(place)
@@ -55,13 +54,13 @@ def found_at(path: str) -> Any:
 
 
 def may_hold(path: str) -> bool:
-    """Return True if a file may name this class: one of "modules", or of another package."""
+    """Return True if a file may name the class: it is in "modules" or in another package."""
     inside = (path.startswith(m if m.endswith(".") else f"{m}:") for m in names()["modules"])
     return not path.startswith(OURS) or any(inside)
 
 
 def checked(kind: type, values: dict[str, Any]) -> dict[str, Any]:
-    """Return the checked fields of a symfric class, with defaults for missing ones."""
+    """Check the fields of a symfric class and return them, with defaults for missing fields."""
     known = {item.name: item for item in fields(kind)}
     for name, value in values.items():
         hint = _hint(kind, known.get(name), name)
@@ -77,7 +76,7 @@ def checked(kind: type, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _hint(kind: type, item: "Field[Any] | None", name: str) -> Any:
-    """Return the type of a field in a file, or of a cached property stored with the fields."""
+    """Return the type in files of a field, or of a cached property stored with the fields."""
     if item is not None:
         return item.metadata.get("packed", hints_of(kind)[name])
     if not isinstance(made := vars(kind).get(name), cached_property):
@@ -95,10 +94,10 @@ def hints_of(kind: Any) -> Mapping[str, Any]:
 
 
 def fits(value: Any, hint: Any) -> bool:
-    """Return True if `value` is of the annotated type, down to the members of containers.
+    """Return True if `value` has the annotated type, including the members of containers.
 
-    A float may be an int, an array must have the annotated number type, and an object for a
-    protocol must have its methods. `Any` and type variables accept everything.
+    For float, an int is accepted. An array must have the annotated number type, and an object must
+    have the methods of an annotated protocol. `Any` and type variables accept every value.
     """
     origin, of = get_origin(hint), get_args(hint)
     kind = origin or hint
@@ -130,7 +129,7 @@ def fits(value: Any, hint: Any) -> bool:
 
 
 def _of_numbers(array: np.ndarray[Any, Any], of: tuple[Any, ...]) -> bool:
-    """Return True if the array holds the annotated kind of numbers."""
+    """Return True if the array has the annotated number type."""
     wanted: Any = (get_args(of[-1]) or of)[-1] if of else np.generic
     return not isinstance(wanted, type) or issubclass(array.dtype.type, wanted)
 
@@ -139,23 +138,24 @@ def agree(what: str, *conditions: bool) -> None:
     """Check that the fields of an object from a file are consistent.
 
     Raises:
-        ValueError: one of the conditions is False.
+        ValueError: a condition is False.
     """
     if not all(conditions):
         raise ValueError(f"{what}: expected consistent fields, got contradictory ones")
 
 
 def arrays(file: IO[bytes]) -> dict[str, NDArray[Any]]:
-    """Read the arrays of an archive that `numpy.savez` wrote, by their names.
+    """Return the arrays of an archive that `numpy.savez` wrote, by name.
 
-    The arrays together take no more memory than the file: compressed members, overlapping members
-    and headers that announce more data than follow are refused.
+    The arrays do not need more memory than the size of the file: compressed members, overlapping
+    members, and headers that announce more data than follow are rejected.
 
     Args:
-        file: open for reading.
+        file: file that is open for reading.
 
     Raises:
-        ValueError: such a member, one that is not an array of numbers or texts, or not an archive.
+        ValueError: the file is not an archive, or a member is rejected or is not an array of
+            numbers or strings.
     """
     try:
         size = file.seek(0, 2)
@@ -171,7 +171,7 @@ def arrays(file: IO[bytes]) -> dict[str, NDArray[Any]]:
 
 
 def _array(content: bytes, most: int) -> NDArray[Any]:
-    """Return the array in a member; `most` bounds its dimensions if it is empty."""
+    """Return the array in a member; no dimension may exceed `most`."""
     stream = BytesIO(content)
     if npy.read_magic(stream) != (1, 0):
         raise ValueError("expected format 1.0 of NumPy's arrays")

@@ -1,11 +1,11 @@
 """Styles of curves: colours for colour-blind readers, and line styles for print in grey.
 
-The colours differ by at least 25 CIELAB units, as seen with normal vision, protanopia, deuteranopia
-and tritanopia, and have a contrast of at least 3 against white paper; a test simulates it. The line
-style changes with the colour, so that curves also differ in grey.
+The colours differ by at least 25 CIELAB units with normal vision, protanopia, deuteranopia and
+tritanopia, and have a contrast of at least 3 to white paper; a test simulates this. The line style
+changes with the colour, so that curves also differ in grey.
 
-This module does not change Matplotlib's settings: `symfric.foundation.panels` sets the colours of
-its axes, and curves that must differ are drawn by `axis.plot(x, y, **line(k))`.
+This module does not change the settings of Matplotlib: `symfric.foundation.panels` sets the colours
+of its axes, and `axis.plot(x, y, **line(k))` draws curves that must be distinguishable.
 """
 
 from typing import Literal, TypedDict
@@ -23,7 +23,7 @@ COLOURS = (
 
 Dash = Literal["-"] | tuple[float, tuple[float, ...]]
 DASHES: tuple[Dash, ...] = ("-", (0, (5, 1.6)), (0, (6, 1.5, 1.2, 1.5)), (0, (1.3, 1.3)))
-"""Solid, dashed, dash-dotted, dotted; lengths in line widths."""
+"""Line styles: solid, dashed, dash-dotted and dotted; lengths are in line widths."""
 
 MARKERS = "osD^vPX"
 """Markers of measured points, in this order."""
@@ -32,11 +32,11 @@ QUIET = "0.6"
 """Colour of data behind a model curve."""
 
 EDGE = "#1f1f1f"
-"""Colour of outlines and of anything that is not a curve."""
+"""Colour of outlines and other elements that are not curves."""
 
 
 class Line(TypedDict):
-    """Keywords of `Axes.plot`."""
+    """Style keywords of `Axes.plot`."""
 
     color: str
     linestyle: Dash
@@ -53,9 +53,9 @@ def dash(k: int) -> Dash:
 
 
 def line(k: int, style: int | None = None) -> Line:
-    """Return colour and line style of curve number `k`, from 0; the first 28 are all different.
+    """Return colour and line style of curve number `k`, from 0; the first 28 are different.
 
-    With `style`, the line style has a number of its own, for example if runs differ by it.
+    `style` is the number of the line style if it is independent of the colour.
     """
     return {"color": colour(k), "linestyle": dash(k if style is None else style)}
 

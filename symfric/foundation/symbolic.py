@@ -1,6 +1,4 @@
-"""Objects that stand for a symbol: CasADi accepts them, and arithmetic with them gives
-expressions.
-"""
+"""Base class of objects that represent a symbol in CasADi functions and in arithmetic."""
 
 import operator
 from collections.abc import Callable, Mapping
@@ -11,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 EXPRESSIONS = (ca.SX, ca.MX, ca.DM, int, float, np.generic, np.ndarray)
-"""Types whose comparison for equality with a symbol is an expression."""
+"""Types whose equality with a symbolic object is an expression."""
 ORDERS = (operator.lt, operator.le, operator.gt, operator.ge)
 
 
@@ -19,7 +17,7 @@ T = TypeVar("T")
 
 
 def plain(value: Any) -> Any:
-    """Return the symbol of a symbolic object, also in a list, tuple or mapping; else the value."""
+    """Return `value` with symbolic objects, also in containers, replaced by their symbols."""
     if isinstance(value, Symbolic):
         return value.symbol
     if isinstance(value, Equality):
@@ -32,13 +30,13 @@ def plain(value: Any) -> Any:
 
 
 def take_symbols(given: object, *names: str) -> None:
-    """Replace symbolic objects in these fields of a frozen dataclass by their symbols."""
+    """Replace symbolic objects in the named fields of a frozen dataclass by their symbols."""
     for name in names:
         object.__setattr__(given, name, plain(getattr(given, name)))
 
 
 def with_symbols(given: T) -> T:
-    """Return a frozen dataclass with symbols for its symbolic objects; itself if it has none."""
+    """Return a frozen dataclass with symbolic objects in its fields replaced by their symbols."""
     known = {item.name: getattr(given, item.name) for item in fields(given)}  # pyright: ignore
     changed = {name: plain(value) for name, value in known.items() if _stands(value)}
     return replace(given, **changed) if changed else given  # pyright: ignore
@@ -51,7 +49,7 @@ def _stands(value: Any) -> bool:
 
 
 def _written(operate: Callable[..., Any], *operands: Any) -> Any:
-    """Return the expression that an operator gives for these operands."""
+    """Return the expression of an operator with the given operands."""
     if any(isinstance(value, ca.MX) for value in operands):
         name = next(value.symbol for value in operands if isinstance(value, Symbolic))
         raise ValueError(
@@ -64,7 +62,7 @@ def _written(operate: Callable[..., Any], *operands: Any) -> Any:
 
 @final
 class Condition(ca.SX):
-    """Comparison with a symbol, which Python's `if`, `and` and `max` cannot evaluate."""
+    """Comparison with a symbol; `if`, `and` and `max` of Python raise an error for it."""
 
     def __bool__(self) -> bool:
         if self.is_constant():
@@ -90,16 +88,16 @@ def _reflected(operate: Callable[..., Any]) -> Callable[["Symbolic", Any], Any]:
 
 
 class Symbolic:
-    """Object with an SX symbol; equations use that symbol.
+    """Object with an SX symbol, which represents the object in equations.
 
         ca.sin(v),  ca.vertcat(s, v),  50 * s - v**2,  np.array([1.0, 2.0]) * v,  v > 0,  v == 0
 
-    are SX. Between two of these objects `==` is True if they are the same, and is an expression
-    only where CasADi uses it, as in `ca.if_else(v == s, ...)`; they can therefore be found in
-    tuples and used as keys.
+    are SX. For two of these objects, `==` is True if they are the same object, and an expression
+    where CasADi uses the result, as in `ca.if_else(v == s, ...)`. The objects can therefore be
+    found in tuples and used as dictionary keys.
 
     Raises:
-        ValueError: an operator with MX on its other side.
+        ValueError: the other operand of an operator is MX.
     """
 
     symbol: ca.SX
@@ -146,7 +144,7 @@ class Symbolic:
 
 @final
 class Equality:
-    """Result of `a == b` or `a != b` of two objects: a bool, and an expression for CasADi."""
+    """Result of `a == b` or `a != b` for symbolic objects: a bool, and an expression in CasADi."""
 
     __slots__ = ("a", "b", "compare")
 

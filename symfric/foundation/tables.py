@@ -1,4 +1,4 @@
-"""Signals in CSV files: a header with column names and units, rows of numbers, results in SI."""
+"""Reader of CSV files with column names and units in the header; results are in SI units."""
 
 import csv
 from collections.abc import Collection, Mapping, Sequence
@@ -12,28 +12,29 @@ from symfric.foundation.units import parsed
 
 Array = NDArray[np.float64]
 Rows = list[tuple[int, list[str]]]
-"""Row number in the file, cells."""
+"""Row number in the file and cells of each row."""
 
 USUAL: Mapping[str, str] = {
     "s": "s, ms, us, µs, min, h, d, a, yr", "m": "m, mm, cm, um, µm", "N": "N, mN, kN",
     "m/s": "m/s, mm/s, um/s, µm/s", "N m": "N m, Nm, mN m, mNm, kN m, kNm",
     "rad": "rad, mrad, deg, °, rev", "rad/s": "rad/s, deg/s, rpm",
 }  # fmt: skip
-"""SI unit -> its usual units, for messages; a column may have any unit of its dimension."""
+"""Usual units by SI unit, for messages; a column may have any unit of the dimension."""
 
 
 def read_columns(file: Path, wanted: Mapping[str, tuple[Collection[str], str]]) -> dict[str, Array]:
     """Return columns of a CSV file in SI units, by key.
 
-    Comma, semicolon or tab separates the cells; numbers may have a decimal comma if commas are not
-    the separator. A column without a unit in the header is in SI units. Other columns are ignored.
+    Cells are separated by commas, semicolons or tabs; numbers may have a decimal comma if the
+    separator is not a comma. Columns without a unit in the header are in SI units. Columns that are
+    not in `wanted` are ignored.
 
     Args:
-        file: to read.
-        wanted: key -> possible names in the header, without or with the unit, and SI unit.
+        file: file to read.
+        wanted: possible names in the header, without or with the unit, and SI unit, by key.
 
     Raises:
-        ValueError: all problems of the header, or of the cells, at once, each with its place.
+        ValueError: all problems of the header, or else of the cells, at once, each with its place.
         OSError: the file cannot be read.
     """
     rows, delimiter = _rows(file)
@@ -67,7 +68,7 @@ def _refuse(name: str, problems: Sequence[str]) -> None:
 
 
 def _rows(file: Path) -> tuple[Rows, str]:
-    """Return non-empty rows with their number in the file, the header first, and the separator."""
+    """Return the non-empty rows, beginning with the header, and the separator."""
     if not file.is_file():
         kind = "a folder" if file.is_dir() else "something else"
         got = kind if file.exists() else "nothing there; check the path"
@@ -94,10 +95,10 @@ def _rows(file: Path) -> tuple[Rows, str]:
 
 
 def _place(header: list[str], key: str, names: Collection[str], unit: str) -> tuple[int, float]:
-    """Return the index of a column and its factor to SI.
+    """Return the index of a column and the factor from its unit to SI.
 
     Raises:
-        ValueError: no such column, several of them, or a unit of another dimension.
+        ValueError: the column is missing, is not unique, or has a unit of another dimension.
     """
     labels = [_label(cell) for cell in header]
     hits = [i for i, (name, _) in enumerate(labels) if name in names or header[i] in names]
@@ -122,13 +123,13 @@ def _place(header: list[str], key: str, names: Collection[str], unit: str) -> tu
 
 
 def _label(cell: str) -> tuple[str, str]:
-    """Return name and unit of a header cell such as `x [mm]`."""
+    """Return the name and the unit in a header cell such as `x [mm]`."""
     match = fullmatch(r"(.*?)\s*\[(.*)\]", cell)
     return (match[1], match[2].strip().replace("μ", "µ")) if match else (cell, "")
 
 
 def _numbers(rows: Rows, index: int, decimal: str) -> tuple[Array, str]:
-    """Return one column as numbers, and a sentence about its first bad cell, if any."""
+    """Return one column as numbers, and a message about its first invalid cell, or ""."""
     values = np.full(len(rows), np.nan)
     for k, (number, row) in enumerate(rows):
         cell = row[index].strip() if index < len(row) else ""

@@ -1,8 +1,9 @@
-"""Units as text: one grammar for their spelling, size in SI, dimension and prefixes.
+"""Units as strings: spelling, size in SI units, dimension and prefixes.
 
-A unit is a product of symbols with prefixes and powers, `N s^2/m`, `kg m^2`, `1/(N m)`, `m s^-2`.
+A unit is a product of symbols with prefixes and powers: `N s^2/m`, `kg m^2`, `1/(N m)`, `m s^-2`.
 Other spellings are accepted: `N*s/m`, `kg·m²`, `m/s/s`, `m/s2`, `N.m`, `Nm`. All factors after a
-slash divide. Newtons stay newtons and radians radians, so that a torque is not an energy.
+slash are in the denominator. Newtons and radians are not replaced by base units, so that torque and
+energy have different units.
 """
 
 import tomllib
@@ -23,18 +24,18 @@ PREFIXED: Mapping[str, tuple[float, str]] = {
     **{symbol: (1.0, symbol) for symbol in _DATA["si"].split()},
     **{symbol: (size, unit) for symbol, (size, unit) in _DATA["prefixed"].items()},
 }
-"""Symbols that take a prefix -> their size in SI units, and that SI unit."""
+"""Symbols that allow prefixes, with their size in an SI unit and this unit."""
 _ALONE: Mapping[str, tuple[float, str]] = {
     **{symbol: (1.0, "1") for symbol in _DATA["counts"].split()},
     **{symbol: (size, si) for si, own in _DATA["alone"].items() for symbol, size in own.items()},
 }
-"""Symbols without prefixes, likewise; units of counts are 1."""
+"""Symbols without prefixes, with their size in an SI unit and this unit; for counts it is 1."""
 SPOKEN: Mapping[str, str] = {"u/min": "rpm", "r/min": "rpm"}
 """Complete units that are not products of symbols."""
 WORDS: Mapping[str, str] = {
     word: unit for unit, words in _DATA["words"].items() for word in words.split()
 }
-"""Common words in lower case, and the unit they mean."""
+"""Units by common words in lower case."""
 
 _SIGNS = (
     ("µ", "u"), ("μ", "u"), ("°C", "degC"), ("°F", "degF"), ("°", "deg"), ("Ω", "Ohm"),
@@ -45,7 +46,7 @@ _POWER = r"\^-?\d+(?:\.\d+)?|\^\(-?\d+(?:[./]\d+)?\)|\^[a-z]\b"
 _doubted: set[str] = set()
 
 _ORDER = ("kg", "N", "J", "V", "A", "K", "W", "", "rad", "m", "s")
-"""Order of symbols in a written product; "" is the place of all others."""
+"""Order of symbols in a product; "" is the position of all other symbols."""
 BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 CELSIUS = "degC"
 """Temperature unit of FMI with an offset: 273.15 K."""
@@ -54,14 +55,14 @@ CELSIUS = "degC"
 @final
 @dataclass(frozen=True)
 class Unit:
-    """Unit: numbers times `factor` are in the SI unit of these `powers` of symbols."""
+    """Unit; numbers times `factor` are in the SI unit that is the product of `powers`."""
 
     factor: float
     powers: tuple[tuple[str, float], ...]
 
     @property
     def si(self) -> str:
-        """SI unit as text."""
+        """SI unit as a string."""
 
         def side(sense: int) -> list[str]:
             found = [(s, sense * power) for s, power in self.powers if sense * power > 0]
@@ -76,7 +77,7 @@ class Unit:
 def checked(where: str, unit: str, stacklevel: int = 4) -> str:
     """Return `unit` in the spelling of `written`.
 
-    An unknown unit warns, once per unit, at the line that is `stacklevel` calls above.
+    An unknown unit causes a warning, once per unit, at the line `stacklevel` calls above.
     """
     text = written(unit)
     if in_si(text) is None and text not in _doubted:
@@ -89,10 +90,10 @@ def checked(where: str, unit: str, stacklevel: int = 4) -> str:
 
 
 def turned(unit: str) -> str:
-    """Return the rotary unit of a translational one: m is rad, N is N m, kg is kg m^2.
+    """Return the rotary unit for a translational one: rad for m, N m for N, kg m^2 for kg.
 
-    A law has the slip in m/s and the force in N; about an axis the same numbers are rad/s and N m.
-    A unit that contains rad or N m already is unchanged.
+    For rotation about an axis, the slip of a law is in rad/s instead of m/s and its force in N m
+    instead of N. A unit that already contains rad or N m is unchanged.
     """
     if search(r"\brad\b|\bN m\b", unit):
         return unit
@@ -103,7 +104,7 @@ def turned(unit: str) -> str:
 
 @cache
 def written(text: str) -> str:
-    """Return a unit in symfric's spelling: spaces between factors, `^` before powers."""
+    """Return a unit in the spelling of symfric: spaces between factors and `^` before powers."""
     text = text.strip()
     for sign, plain in _SIGNS:
         text = text.replace(sign, plain)
@@ -116,7 +117,7 @@ def written(text: str) -> str:
 
 
 def _apart(word: str) -> str:
-    """Return `Nm` as `N m`, `kgm` as `kg m`; symbols are unchanged."""
+    """Return `Nm` as `N m` and `kgm` as `kg m`; known symbols are unchanged."""
     if _symbol(word) is None and (pair := fullmatch(r"([mkMu]?N|kg|V|A|W)([mcu]?m|s|h)(s?)", word)):
         return " ".join(part for part in pair.groups() if part)
     return word
@@ -126,8 +127,8 @@ def _apart(word: str) -> str:
 def parsed(text: str) -> Unit | None:
     """Return the unit of `text`; None if it is not a unit.
 
-    Angles are radians, counts are 1, and degrees Celsius have the size of kelvins. A power given as
-    a letter is NaN.
+    Angles are in radians, counts are 1, and a degree Celsius has the size of a kelvin. A power that
+    is a letter is NaN.
     """
     plain = written(text)
     found, rest = _quotient(SPOKEN.get(plain.lower(), plain))
@@ -146,9 +147,9 @@ def in_si(text: str) -> float | None:
 
 
 def exponents(text: str) -> dict[str, int] | None:
-    """Return exponents of the base units of `text`; None if it is not a product of SI units.
+    """Return the exponents of the base units in `text`; None if it is not a product of SI units.
 
-    A unit of another size, such as mm, has none, nor has a power that is not an integer.
+    The result is also None for units of another size, such as mm, and for non-integer powers.
     """
     unit, found = parsed(text), dict[str, int]()
     if unit is None or unit.factor != 1.0:
@@ -163,7 +164,7 @@ def exponents(text: str) -> dict[str, int] | None:
 
 
 def per_second(unit: str) -> str:
-    """Return the unit of a rate: m becomes m/s, m/s becomes m/s^2."""
+    """Return the unit of a time derivative: m/s for m, m/s^2 for m/s."""
     numerator, slash, denominator = unit.partition("/")
     if not slash:
         return f"{numerator}/s"
@@ -173,11 +174,11 @@ def per_second(unit: str) -> str:
 
 
 _Size = tuple[float, dict[str, float]]
-"""Factor to SI units, and powers of their symbols."""
+"""Factor to SI units and powers of the symbols."""
 
 
 def _quotient(text: str) -> tuple[_Size | None, str]:
-    """Return the size of a product with slashes, and the rest: a closing bracket, or nothing."""
+    """Return the size of a product with slashes, and the remaining text from ")" on."""
     size, powers, sense, text = 1.0, dict[str, float](), 1, text.strip()
     while text and text[0] != ")":
         if text[0] == "/":
@@ -193,7 +194,7 @@ def _quotient(text: str) -> tuple[_Size | None, str]:
 
 
 def _factor(text: str) -> tuple[_Size | None, str]:
-    """Return the size of one factor with its power, and the rest."""
+    """Return the size of one factor with its power, and the remaining text."""
     if text.startswith("("):
         size, text = _quotient(text[1:])
         if size is None or not text.startswith(")"):
@@ -210,7 +211,7 @@ def _factor(text: str) -> tuple[_Size | None, str]:
 
 
 def _raised(size: _Size, power: str) -> _Size | None:
-    """Return a size to a power; a letter as power leaves SI units unchanged."""
+    """Return a size raised to a power; a letter is allowed as the power of SI units only."""
     if power.isalpha():
         return (1.0, dict.fromkeys(size[1], float("nan"))) if size[0] == 1.0 else None
     above, _, below = power.partition("/")
@@ -236,7 +237,7 @@ def _symbol(text: str) -> _Size | None:
 
 
 def nearest(text: str) -> str:
-    """Return the unit probably meant by an invalid text; "" if unknown."""
+    """Return the unit that an invalid string probably means; "" if unknown."""
     meant = sub(r"[A-Za-z]+", lambda word: _meant(word[0]), sub(r"[\[\]]", "", written(text)))
     meant = sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", " ", sub(r"\s+per\s+", "/", meant))
     return written(meant) if in_si(meant) is not None else ""
@@ -251,20 +252,18 @@ def _meant(word: str) -> str:
 SHOWN_WITH = (
     "m", "m/s", "m/s^2", "N", "N m", "N/s", "rad", "rad/s", "rad/s^2", "s", "J", "W", "Pa",
 )  # fmt: skip
-"""Units that `readable` writes with a prefix."""
+"""Units to which `readable` may add a prefix."""
 
 STEPS = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 LEAST, MOST = 0.08, 2e4
-"""Range of largest magnitudes that are written without a prefix."""
+"""Range of the largest magnitude in which `readable` adds no prefix."""
 
 CLOCKS = tuple((_ALONE[unit][0], unit) for unit in ("years", "days", "h"))
-"""Units of long times [s]; used from three of them on, hours from six."""
+"""Sizes [s] and names of units for long times, used from three units on, hours from six."""
 
 
 def clock(times: ArrayLike) -> tuple[float, str]:
-    """Return a factor and a unit in which `times` [s], times the factor, are easily read on an
-    axis.
-    """
+    """Return a factor and a readable unit for an axis of `times` [s] multiplied by the factor."""
     t = np.asarray(times, dtype=float)
     span = float(np.ptp(t[np.isfinite(t)])) if np.isfinite(t).any() else 0.0
     for size, unit in CLOCKS:
@@ -274,10 +273,10 @@ def clock(times: ArrayLike) -> tuple[float, str]:
 
 
 def readable(unit: str, values: Iterable[ArrayLike]) -> tuple[float, str]:
-    """Return a factor and a unit in which `values` in `unit`, times the factor, are easily read.
+    """Return a factor from `unit` to a readable unit for `values`, and this unit.
 
-    The unit is unchanged if the largest magnitude is between 0.08 and 20000 or zero, or if the unit
-    takes no prefix; otherwise the largest magnitude is scaled to between 0.08 and 80.
+    The unit is unchanged if the largest magnitude is zero or between 0.08 and 20000, or if the unit
+    allows no prefix. Otherwise, the largest scaled magnitude is between 0.08 and 80.
     """
     sizes = [np.abs(np.asarray(v, dtype=float)) for v in values]
     top = max((float(np.max(s[np.isfinite(s)], initial=0.0)) for s in sizes), default=0.0)

@@ -1,4 +1,4 @@
-"""Named scalars of a model, and columns of their symbols."""
+"""Named scalars of a model, and functions of their symbols and start values."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from math import inf
 import casadi as ca
 
 from symfric.foundation import checks, units
-from symfric.foundation import identity as identity  # what holds symbols pickles
+from symfric.foundation import identity as identity  # makes objects with symbols picklable
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.shown import figure_of
 from symfric.foundation.symbolic import Symbolic, take_symbols
@@ -15,9 +15,9 @@ from symfric.foundation.symbolic import Symbolic, take_symbols
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Variable(Symbolic):
-    """Named scalar of a model: its symbol, unit, start value, bounds.
+    """Named scalar of a model, with its symbol, unit, start value and bounds.
 
-    It is used in equations like its symbol, see `Symbolic`:
+    Equations may contain the variable instead of its symbol, see `Symbolic`:
 
         s, v = Variable("s", "m"), Variable("v", "m/s", start=0.1)
         Model("spring", x=(s, v), ode=ca.vertcat(v, -50 * s))
@@ -26,17 +26,17 @@ class Variable(Symbolic):
 
     Attributes:
         name: C identifier, such as x or theta_1.
-        unit: as text, SI in laws and mechanisms; an unknown unit warns and suggests a known one.
+        unit: unit, SI in laws and mechanisms; an unknown unit causes a warning with a suggestion.
         symbol: SX symbol, shape (1, 1).
-        start: initial or default value; an expression in other symbols if it depends on them.
-        nominal: typical magnitude; absolute tolerances and scalings are relative to it.
-        lower, upper: bounds for optimisation and identification, and of a given parameter.
+        start: initial or default value; may be an expression of other symbols.
+        nominal: typical magnitude, to which absolute tolerances and scalings are relative.
+        lower, upper: bounds in optimisation and identification, and of values given by users.
         doc: short description.
-        kind: type among the signals of a model, see `symfric.model.kinds`.
+        kind: kind of signal in a model, see `symfric.model.kinds`.
 
     Raises:
-        ValueError: name or unit is not a text, start is not a number or expression, nominal is not
-            above zero, or invalid bounds.
+        ValueError: name or unit is not a string, start is not a number or an expression, nominal is
+            not positive, or the bounds are invalid.
     """
 
     name: str
@@ -73,17 +73,17 @@ class Variable(Symbolic):
         return f"<variable '{self.name}' [{self.unit}], start {figure_of(self.start)}{said}>"
 
     def within(self, where: str, value: object) -> float:
-        """Return `value` as a finite number inside the bounds."""
+        """Return `value`, which must be a finite number within the bounds."""
         return checks.number(where, value, unit=self.unit, lower=self.lower, upper=self.upper)
 
 
 def take_si(where: str, given: object, *names: str) -> None:
-    """Replace variables, which must be in SI units, by symbols in fields of a frozen dataclass.
+    """Replace variables in the named fields of a frozen dataclass by their symbols.
 
-    Laws and mechanisms compute in SI: 50 mm/s would be taken for 50 m/s.
+    The variables must be in SI units, because laws and mechanisms do not convert units.
 
     Raises:
-        ValueError: a variable in another unit.
+        ValueError: a variable has another unit.
     """
     for name in names:
         value = getattr(given, name)
@@ -93,7 +93,7 @@ def take_si(where: str, given: object, *names: str) -> None:
 
 
 def check_si(where: str, value: object) -> None:
-    """Check that a variable with a known unit is in SI units; other values pass."""
+    """Check that `value` is not a variable in a known unit other than an SI unit."""
     size = units.in_si(value.unit) if isinstance(value, Variable) else None
     if isinstance(value, Variable) and size not in (None, 1.0):
         raise ValueError(
@@ -103,34 +103,32 @@ def check_si(where: str, value: object) -> None:
 
 
 def stacked(rows: Iterable[Scalar]) -> ca.SX:
-    """Return `rows` as a column, SX (n, 1), empty without rows."""
+    """Return `rows` as a column SX (n, 1), which may be empty."""
     return ca.vertcat(ca.SX(0, 1), *rows)
 
 
 def symbols_of(variables: Iterable[Variable]) -> ca.SX:
-    """Return their symbols, SX (n, 1)."""
+    """Return the symbols of variables as a column, SX (n, 1)."""
     return stacked(v.symbol for v in variables)
 
 
 def starts_of(variables: Iterable[Variable]) -> ca.SX:
-    """Return their start values, SX (n, 1); expressions if they depend on other symbols."""
+    """Return the start values of variables as a column, SX (n, 1), which may contain symbols."""
     return stacked(v.start for v in variables)
 
 
 def at_start(expression: Scalar, variables: Sequence[Variable]) -> ca.DM:
-    """Return the value of `expression` with `variables`, its only symbols, at their start
-    values.
-    """
+    """Return the value of `expression` at the start values of its symbols, `variables`."""
     starts = ca.SX(starts_of(variables))
     return ca.DM(ca.substitute(ca.SX(expression), symbols_of(variables), starts))
 
 
 def undeclared(expression: Scalar, known: ca.SX) -> list[ca.SX]:
-    """Return the symbols in `expression` that are not among `known`, each once."""
+    """Return the symbols in `expression` that are not in `known`, without duplicates."""
     declared = {symbol.__hash__() for symbol in ca.symvar(known)}
     return [s for s in ca.symvar(ca.SX(expression)) if s.__hash__() not in declared]
 
 
 def strays(expression: Scalar, known: ca.SX) -> list[str]:
-    """Return the names of symbols in `expression` that are not among `known`, each once."""
+    """Return the names of symbols in `expression` that are not in `known`, without duplicates."""
     return list(dict.fromkeys(map(str, undeclared(expression, known))))

@@ -1,15 +1,15 @@
-"""Vectors in the expressions of a scalar law: quantities that change sign have a direction.
+"""Vectors as arguments of scalar laws, for slip in a plane or in space.
 
-A quantity of a law either changes sign when the motion is mirrored (v, deflections, forces) or does
-not (N, ages, levels). In a plane or in space the first are vectors, the second numbers:
+If the motion is mirrored, some quantities of a law change sign (v, deflections, forces), and others
+do not (N, ages, levels). In a plane or in space the former are vectors, the latter are numbers:
 
     number * vector = vector         vector + vector = vector
     vector * vector = number, a.b    vector + number: error, the law has no isotropic form
     odd f(a) = f(|a|) a/|a|          even f(a) = f(|a|)
 
-On collinear vectors this is the arithmetic of their components, and it does not depend on axes: a
-law evaluated with vectors is the scalar law in straight slip of any direction, and rotates with its
-arguments. Only products of three vectors depend on their order.
+For collinear vectors these rules are the arithmetic of components, and they do not depend on the
+axes. A law evaluated with vectors is therefore isotropic and equals the scalar law for straight
+slip in any direction. Only products of three vectors depend on their order.
 """
 
 from collections.abc import Callable
@@ -17,31 +17,31 @@ from typing import Any, final
 
 Scalar = Any
 Vectors = Any
-"""`Vector`, or a number."""
+"""`Vector` or number."""
 
 ODD = frozenset({"sin", "tan", "tanh", "atan", "asin", "asinh", "erf"})
 EVEN = frozenset({"cos"})
 ROUND = 1e-6
-"""Smoothing of the length of a unitless vector; odd functions err by its square."""
+"""Smoothing width of the length of a unitless vector; the error of odd functions is its square."""
 TINY = 1e-30
-"""Smoothing of a length whose kink is intended: keeps derivatives at zero finite."""
+"""Smoothing width of a length that keeps its kink; it makes derivatives at zero finite."""
 
 
 class NotIsotropicError(TypeError):
-    """Expression that treats a vector as a number."""
+    """Error for an expression that treats a vector as a number."""
 
 
 @final
 class Vector:
-    """Vector as the list of its components, each a number of any type.
+    """Vector of numbers of any type.
 
     Attributes:
         parts: components.
-        turn: width over which `along` goes from unloading to loading, passed on to all results.
+        turn: width of the transition of `along` from unloading to loading; results inherit it.
     """
 
     __slots__ = ("parts", "turn")
-    __array_ufunc__ = None  # arrays leave arithmetic with vectors to this class
+    __array_ufunc__ = None  # arrays defer to the operators of this class
     __hash__ = None  # pyright: ignore[reportAssignmentType]
 
     def __init__(self, parts: list[Scalar], turn: Scalar) -> None:
@@ -52,16 +52,20 @@ class Vector:
         return sum(a * b for a, b in zip(self.parts, other.parts, strict=True))
 
     def length(self, width: Scalar) -> Scalar:
-        """Return the smooth length, sqrt(a.a + width^2)."""
+        """Return the smoothed length sqrt(a.a + width^2)."""
         return (self.dot(self) + width * width) ** 0.5
 
     def odd(self, f: Callable[[Scalar], Scalar], width: Scalar) -> "Vector":
-        """Return f(|a|) a/|a| of an odd function, with the length smoothed over `width`."""
+        """Return f(|a|) a/|a| for an odd function f, with the length smoothed over `width`."""
         size = self.length(width)
         return f(size) / size * self
 
     def apply(self, f: Callable[[Scalar], Scalar], name: str) -> Vectors:
-        """Apply the elementary function f; raises NotIsotropicError for one without parity."""
+        """Return the elementary function f of the vector.
+
+        Raises:
+            NotIsotropicError: the function is neither odd nor even.
+        """
         if name in ODD:
             return self.odd(f, ROUND)
         if name in EVEN:
@@ -114,17 +118,17 @@ class Vector:
 
 @final
 class Rows(tuple[Vectors, ...]):
-    """Column with vectors in some rows."""
+    """Column in which some rows are vectors."""
 
     __slots__ = ()
 
     @property
     def shape(self) -> tuple[int]:
-        """Number of rows."""
+        """Shape of the column, (number of rows,)."""
         return (len(self),)
 
 
 def no_vector(what: str, *values: Vectors) -> None:
-    """Raise an error for vectors where a function needs numbers."""
+    """Raise an error if one of `values` is a vector; `what` describes the operation."""
     if any(isinstance(value, Vector) for value in values):
         raise NotIsotropicError(f"{what} what has a direction")

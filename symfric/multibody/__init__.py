@@ -1,5 +1,6 @@
-"""Mechanisms: rigid bodies, joints with friction from reactions, and forces, built into a
-`Model`.
+"""Mechanisms of rigid bodies, joints with friction from reactions, and forces.
+
+`Mechanism.build` assembles them into a `Model`.
 """
 
 from typing import TYPE_CHECKING

@@ -1,35 +1,35 @@
-"""Applied force of a contact: the force it must carry for zero sliding acceleration.
+"""Applied force of a contact: the friction force for which the sliding acceleration is zero.
 
-Laws with true sticking need it. In a mechanism it follows from the constrained equations of motion,
+Laws with true sticking need this force, F_e. It follows from the constrained equations of motion,
 
     F_e = F + ds/dt / W,   W = G P G'     (see below)
 
 for the sliding velocity s and the friction force F: with F_e instead of F, and all other friction
-forces unchanged, s would be constant. It is an algebraic unknown F_e. A sticking contact carries
-it, F = F_e, so the equation is ds/dt = 0 for any W; contacts that stick independently of each other
-share the forces by their equations together.
+forces unchanged, s would be constant. F_e is an algebraic unknown. A sticking contact transmits
+F = F_e, so its equation is ds/dt = 0 for any W. Contacts that stick independently of each other
+have one such equation each; the equations together determine the forces.
 
 In a loop of one degree of freedom all contacts stick together: s_i = g_i(q) omega, with omega the
-speed along the tangent of its constraints. The distribution of the force that holds the loop,
-T = sum g_i F_i, is undetermined. The contacts hold it as long as they can, which is with equal
-fractions of their static levels,
+speed along the tangent of the constraints. The distribution of the force that holds the loop,
+T = sum g_i F_i, is undetermined. The contacts share it in equal fractions of their static levels,
+the distribution that holds the largest force,
 
     F_i = sign(g_i) S_i T / sum |g_k| S_k,   |T| <= sum |g_k| S_k,   S_i = mu_s N_i
 
 A contact whose g_i passes through zero (a slider in its dead centre) reverses and does not stop.
-Laws without modes get g_i in place of sign(g_i), which does not jump there: the contact that moves
-most carries most.
+For laws without modes, g_i replaces sign(g_i), which jumps there: the contact with the largest
+g_i then has the largest share.
 
-A law with modes does not need F_e in sliding; it needs the sign of |F_e| - mu_s N in stick. For it
-W is a constant, that of the start, which costs nothing, and F_e is exact only in stick. Limits: a
-loop of several degrees of freedom allows as many such contacts as are independent; a loop of one
-has no constraint that moves with time.
+A law with modes does not need F_e while it slides; while it sticks, it needs the sign of
+|F_e| - mu_s N. For such a law W is constant, with its value at the start, and F_e is exact only in
+stick. Limits: in a loop of several degrees of freedom the contacts with such laws must be
+independent; a loop of one degree of freedom must not have constraints that depend on time.
 
-Accelerations under forces, and the mobility of a contact:
+Accelerations under the generalised forces `right`, and the mobility of a contact:
 
     M^-1 right,   W_i = G_i P G_i',   P = M^-1 - M^-1 phi_q' (phi_q M^-1 phi_q')^-1 phi_q M^-1
 
-G_i is the row of sliding velocities s_i = G_i q' + ..., W_i the decrease of the sliding
+G_i is the row of sliding velocities s_i = G_i q' + ..., and W_i is the decrease of the sliding
 acceleration per unit friction force with all other forces unchanged.
 """
 
@@ -62,9 +62,9 @@ def free_bodies(eq: Equations) -> bool:
 
 
 def mirrored(M: ca.SX) -> ca.SX:
-    """Return a symmetric matrix from one that is symmetric in value, but not in its zeros.
+    """Return a matrix with symmetric sparsity from one that is symmetric in value only.
 
-    An entry that cancels on one side of the diagonal may be 0 x on the other.
+    An entry that is a structural zero on one side of the diagonal may be 0 x on the other side.
     """
     if M.sparsity().is_symmetric():
         return M
@@ -73,7 +73,7 @@ def mirrored(M: ca.SX) -> ca.SX:
 
 
 def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
-    """Return M^-1 times the columns of `right`, by blocks if bodies float freely."""
+    """Return M^-1 times the columns of `right`; block by block if all bodies float freely."""
     topology = eq.kin.topology
     if not free_bodies(eq):
         D, L, order = ca.ldl(mirrored(eq.mass))
@@ -90,7 +90,7 @@ def solve_mass(eq: Equations, right: ca.SX) -> ca.SX:
 
 
 def mobility(eq: Equations, G: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return W of each row of `G`, and its value without the constraints, shape (k, 1) each."""
+    """Return W of each row of `G`, with and without the constraints, shape (k, 1) each."""
     J, k = eq.Phi_q, G.size1()
     right = ca.densify(ca.vertcat(G, J).T)
     columns = ca.horzsplit(right) if free_bodies(eq) else [right]
@@ -105,9 +105,9 @@ def mobility(eq: Equations, G: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def null_direction(J: ca.SX) -> ca.SX:
-    """Return the unit vector Z with J Z = 0 of a matrix (n - 1, n), from its minors.
+    """Return the unit vector Z with J Z = 0, computed from the minors of J, shape (n - 1, n).
 
-    It is smooth at full rank.
+    Z is a smooth function of J as long as J has full rank.
     """
     n = J.size2()
     minors = [ca.det(ca.densify(J[:, [j for j in range(n) if j != k]])) for k in range(n)]
@@ -119,30 +119,31 @@ Array = NDArray[np.float64]
 IMMOVABLE = 1e-10
 """Fraction of the unconstrained W below which the constraints hold a contact."""
 MINORS = 8
-"""Most coordinates of a loop of one degree of freedom; its tangent is made of their minors."""
+"""Largest number of coordinates of a loop whose tangent is computed from minors."""
 UNLOADED = 1e-12
-"""Force [N] that keeps fractions finite without load; it must be negligible at break-away."""
+"""Force [N] that keeps the shares finite without load; it must be negligible at break-away."""
 CALM = 0.1
-"""Time constant [s] by which stick removes a sliding velocity left by rounding, so that there is no
-drift; for laws with modes F_e matters only in stick.
+"""Time constant [s] with which a sliding velocity left by rounding decays in stick.
+
+It prevents drift. Only laws with modes use it; they evaluate F_e only in stick.
 """
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """Contacts that stick together, and the force that then holds them.
+    """Group of contacts that stick together, and the force that holds them in stick.
 
     Attributes:
-        name: of the contact, or of the loop.
+        name: name of the contact or of the loop.
         members: numbers of the contacts.
-        along: g_i = s_i / omega of each.
-        rate: omega; the sliding velocity of a single contact.
-        change: its rate of change, at least in stick.
+        along: g_i = s_i / omega of each contact.
+        rate: omega; for a single contact its sliding velocity.
+        change: time derivative of `rate`, exact at least in stick.
         force: F_e or T, an algebraic variable.
         inertia: 1 / W of omega.
-        by_modes: True if its laws stick by a mode.
-        direction: of a loop with modes, the sign of omega, 0 in stick.
+        by_modes: True if the laws of the contacts stick by a mode.
+        direction: for a loop with modes the sign of omega, 0 in stick; otherwise empty.
         still: names of the joint rates that are zero in stick.
     """
 
@@ -158,7 +159,7 @@ class Rest:
     still: tuple[str, ...]
 
     def shares(self, levels: Sequence[ca.SX]) -> list[ca.SX]:
-        """Return F_e of each member; `levels` [N] are their static levels."""
+        """Return F_e of each member, given the static levels of the members [N]."""
         if not self.is_loop:
             return [self.force.symbol]
         above = [S + UNLOADED for S in levels]
@@ -168,17 +169,17 @@ class Rest:
         return [w / total * self.force.symbol for w in weights]
 
     def capacity(self, levels: Sequence[ca.SX]) -> ca.SX:
-        """Return the largest force along omega that `levels` hold."""
+        """Return the largest force along omega that the static levels `levels` hold."""
         pairs = zip(self.along, levels, strict=True)
         return sum((smooth.magnitude(g, 0.0) * S for g, S in pairs), start=ca.SX(0))
 
     @property
     def is_loop(self) -> bool:
-        """Return True if its members move together along the tangent of constraints."""
+        """Return True if the members move together along the tangent of constraints."""
         return not self.along[0].is_one()
 
     def needed(self, forces: Sequence[ca.SX]) -> ca.SX:
-        """Return the residual of the applied force, zero at the right one, shape (1, 1)."""
+        """Return the residual of the equation for the applied force, shape (1, 1)."""
         held = sum((g * F for g, F in zip(self.along, forces, strict=True)), start=ca.SX(0))
         change = self.change + self.rate / CALM if self.by_modes else self.change
         return held + self.inertia * change - self.force.symbol
@@ -192,19 +193,20 @@ def forward(x: ca.SX) -> ca.SX:
 def switches_at(
     law: Law | SpatialSlip, v: ca.SX, N: ca.SX, z: ca.SX, F_e: ca.SX
 ) -> tuple[Switch, ...]:
-    """Return the changes of mode of a law that may need F_e."""
+    """Return the changes of mode of a law, with F_e as an argument if the law needs it."""
     return law.switches(v, N, z, **({FORCE: F_e} if law.inputs else {}))
 
 
 def some_switches(law: Law | SpatialSlip) -> tuple[Switch, ...]:
-    """Return the changes of mode of a law, with arbitrary arguments."""
+    """Return the changes of mode of a law, evaluated at arbitrary arguments."""
     one = ca.SX(1.0)
     return switches_at(law, one, one, ca.SX.ones(len(law.states)), one)
 
 
 def capacity_of(law: Law | SpatialSlip, N: ca.SX) -> ca.SX:
-    """Return the static level [N] of a contact in a loop; its normal force for laws without
-    modes.
+    """Return the static level [N] of a contact in a loop.
+
+    For laws without modes it is the normal force.
     """
     if isinstance(law, SpatialSlip) or not some_switches(law):
         return N
@@ -213,11 +215,11 @@ def capacity_of(law: Law | SpatialSlip, N: ca.SX) -> ca.SX:
 
 @final
 class _Maker:
-    """Builder of the groups of contacts that stick together, of a mechanism at its start.
+    """Builder of the groups of contacts that stick together.
 
     Args:
-        where: for messages.
-        made: the equations of motion and their start.
+        where: name of the mechanism in messages.
+        made: equations of motion and start values.
         a0: accelerations without friction at the start.
     """
 
@@ -225,7 +227,7 @@ class _Maker:
         self.where, self.made, self.eq, self.a0 = where, made, made.eq, a0
 
     def numbers(self, expression: ca.SX) -> Array:
-        """Return an expression at the start, without friction."""
+        """Return the value of an expression at the start, without friction."""
         return self.made.numbers(ca.substitute(expression, self.eq.a, ca.SX(self.a0)))[0]
 
     def refuse(self, contacts: Sequence[Contact], expected: str, advice: str) -> ValueError:
@@ -241,7 +243,7 @@ class _Maker:
         self, name: str, members: Sequence[int], along: Sequence[ca.SX], rate: ca.SX,
         change: ca.SX, G: ca.SX, columns: Sequence[int],
     ) -> Rest:  # fmt: skip
-        """Return one group; `G` are the derivatives of its rate by the joint rates."""
+        """Return one group; `G` is the derivative of `rate` with respect to the joint rates."""
         contacts, rates = [self.eq.contacts[i] for i in members], self.made.qd
         W, loose = mobility(self.eq, G)
         here, free = (float(self.numbers(x)[0, 0]) for x in (W, loose))
@@ -298,7 +300,7 @@ class _Maker:
 
 
 def rests(where: str, made: Prepared, a0: Array) -> tuple[Rest, ...]:
-    """Return the contacts whose laws need F_e, in groups that stick together; see `_Maker`.
+    """Return the groups of contacts whose laws need F_e.
 
     Raises:
         ValueError: constraints hold a contact, or the forces of sticking contacts are undetermined.
@@ -331,7 +333,7 @@ def rests(where: str, made: Prepared, a0: Array) -> tuple[Rest, ...]:
 
 
 def applied_forces(groups: Sequence[Rest], levels: Sequence[ca.SX]) -> dict[int, ca.SX]:
-    """Return number of a contact -> its F_e, for the static levels of all contacts [N]."""
+    """Return F_e of each contact by its number, given the static levels of all contacts [N]."""
     found: dict[int, ca.SX] = {}
     for rest in groups:
         shares = rest.shares([levels[i] for i in rest.members])

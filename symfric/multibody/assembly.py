@@ -5,9 +5,9 @@ the inverse has a closed form,
 
     M^-1 = diag(I/m, E' J_W^-1 E / 4 + p p' / weight),
 
-with J_W the inertia in world components; otherwise M is factorised as L D L'. The multipliers of
-loops, the applied forces of laws with true sticking and those normal forces that depend on
-reactions are algebraic variables.
+with J_W the inertia in world components; otherwise M is factorised as L D L'. Algebraic variables
+are the multipliers of constraints, the applied forces of laws with true sticking, and the normal
+forces that depend on reactions.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,15 +33,16 @@ from symfric.multibody.results import Put, constraint_units, results, sketch
 from symfric.multibody.slips import Slip, depends_on_load, events, keeps_deflection, slips
 
 AT_REST = 1e-9
-"""Sliding velocity [m/s] below which a law with modes sticks in figures: its stick is exact up to
-rounding.
+"""Sliding velocity [m/s] below which figures show a law with modes as sticking.
+
+Stick of such laws is exact up to rounding.
 """
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class _Machine:
-    """Parts of a mechanism that do not depend on its friction forces; `index` as in `Holonomic`."""
+    """Data of a mechanism that do not depend on friction forces; `index` as in `Holonomic`."""
 
     name: str
     made: Prepared
@@ -52,7 +53,7 @@ class _Machine:
 
 
 def assemble(name: str, made: Prepared, u: Variables, index: int) -> Model:
-    """Return the model of a mechanism with the inputs `u`; `index` is 0 or 1, see `Holonomic`."""
+    """Return the model of a mechanism with the inputs `u`; `index` is that of `Holonomic`."""
     eq, cut = made.eq, with_cuts(made)
     a0, lam0, N0 = without_friction(made, u)
     groups = rests(f"mechanism '{name}'", made, a0)
@@ -64,7 +65,7 @@ def assemble(name: str, made: Prepared, u: Variables, index: int) -> Model:
     )
     machine = _Machine(name, made, multipliers, u, made.p, index)
     inner = None if cut is None else _inner(cut, eq, contacts)
-    # a ball is not among the contacts of a model: its slip is a vector without two sides
+    # balls are excluded: their slip is a vector
     frictional = tuple(_contact(s) for s in contacts if not isinstance(s.contact.law, SpatialSlip))
     opening = partial(_open, machine, contacts, frictional)
     return _model(machine, contacts, groups, inner, frictional, opening)
@@ -74,7 +75,7 @@ def _model(
     machine: _Machine, contacts: Sequence[Slip], groups: Sequence[Rest], inner: Inner | None,
     frictional: tuple[Contact, ...], opening: Callable[[], Model] | None,
 ) -> Model:  # fmt: skip
-    """Return the model of a machine with the contact forces of `contacts`."""
+    """Return the model of a machine with the given contacts."""
     made, eq, p = machine.made, machine.made.eq, machine.p
     pressed, loops = [s for s in contacts if s.unknown], [v for r in groups for v in r.direction]
     states = [v for s in contacts for v in s.states]
@@ -127,12 +128,12 @@ def _model(
 
 
 def _contact(s: Slip) -> Contact:
-    """Return a contact of the model."""
+    """Return the contact as `Model` describes it."""
     contact = s.contact
     width = Variable(
         f"{contact.pressed}_eps", "N", start=contact.friction.eps, lower=0.0, doc="width of |f|"
     )
-    # the normal force is written in the symbols of the model, or no law needs it
+    # a normal force that contains reactions is no expression of the model's symbols
     known = s.N is not s.normal or depends_on_load(contact.friction.law)
     return Contact(
         contact.name,
@@ -148,7 +149,7 @@ def _contact(s: Slip) -> Contact:
 
 
 def _open(machine: _Machine, contacts: Sequence[Slip], frictional: tuple[Contact, ...]) -> Model:
-    """Return the model with friction forces as inputs; balls keep their laws."""
+    """Return the model with the friction forces as inputs; balls keep their laws."""
     eps: dict[str, Scalar] = {s.contact.pressed: s.contact.friction.eps for s in contacts}
     widths = {v.name: v for c in frictional for v in c.widths.values()}
     eps |= {name: widths[f"{name}_eps"].symbol for name in eps if f"{name}_eps" in widths}
@@ -166,8 +167,9 @@ def _open(machine: _Machine, contacts: Sequence[Slip], frictional: tuple[Contact
 
 
 def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip]) -> Inner | None:
-    """Return balance and normal forces with inner unknowns, eliminated link by link from the
-    tips.
+    """Return the balance and normal forces with inner unknowns, ordered from the tips to the base.
+
+    The unknowns are eliminated link by link in this order.
     """
     cuts, links = cut.kin.cuts, eq.kin.topology.links
     if cuts is None:
@@ -191,11 +193,11 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip]) -> Inner | N
 
 
 def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[str, ...], str]:
-    """Return normal forces that could become negative, their names, and advice if there is no
-    solution.
+    """Return the normal forces that could become negative, their names, and advice.
 
-    These are the unknown ones, and those given by inputs or parameters; a sum of absolute values of
-    reactions that no law needs cannot become negative.
+    These are the normal forces that are unknowns or are given by inputs or parameters. A sum of
+    absolute values of reactions cannot become negative. The advice is shown if there is no
+    solution.
     """
     values, words, bristles = list[ca.SX](), list[str](), list[Slip]()
     for s in contacts:
@@ -211,10 +213,10 @@ def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[s
 
 
 def _advice(bristles: Sequence[Slip]) -> str:
-    """Return advice to replace laws whose bristles keep the deflection of a larger load, once.
+    """Return advice to replace laws whose bristles keep the deflection of a larger load.
 
-    The load of the replacement is the least of those at the start: bristles in all joints are then
-    at least as stiff as before.
+    The reference load N_0 of the replacement is the smallest load at the start, so that the
+    bristles of all joints are at least as stiff as before.
     """
     if not bristles:
         return ""
@@ -232,7 +234,7 @@ def _advice(bristles: Sequence[Slip]) -> str:
 
 
 def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:
-    """Return sliding velocity and friction force; their smooth sizes if they are vectors."""
+    """Return the sliding velocity and friction force; smoothed magnitudes if they are vectors."""
     law = slip.contact.law
     if not isinstance(law, SpatialSlip):
         return slip.contact.slip, slip.force
@@ -243,9 +245,9 @@ def _sizes(slip: Slip) -> tuple[ca.SX, ca.SX]:
 def _outputs(
     eq: Equations, contacts: Sequence[Slip], put: Put, multipliers: list[str]
 ) -> dict[str, Output]:
-    """Return results of the contacts, energies, and the residuals of the constraints.
+    """Return the results of the contacts, energies, and the residuals of the constraints.
 
-    `multipliers` are their units.
+    `multipliers` are the units of the multipliers.
     """
     found: dict[str, Output] = {}
     levels = ("constraint_position", "constraint_velocity", "constraint_acceleration")

@@ -18,7 +18,7 @@ from symfric.multibody.topology import Topology, body_of
 
 
 def texts(part: object) -> Iterator[str]:
-    """Yield messages about names and places of a part that are not texts."""
+    """Yield messages about names and places of a part that are not strings."""
     for item in fields(part):  # type: ignore[arg-type]
         value = getattr(part, item.name)
         if item.type is str and not isinstance(value, str):
@@ -28,7 +28,7 @@ def texts(part: object) -> Iterator[str]:
 def naming(
     bodies: Sequence[Body], joints: Sequence[Joint], parts: Sequence[Part], inputs: Variables
 ) -> Iterator[str]:
-    """Yield messages about repeated or invalid names, and missing places and joints.
+    """Yield messages about repeated or invalid names and about missing places and joints.
 
     `parts` are forces and constraints.
     """
@@ -55,7 +55,7 @@ def naming(
 
 
 def _moving(where: str, pairs: Iterable[tuple[str, str]], joints: Sequence[Joint]) -> Iterator[str]:
-    """Yield messages about missing joints, and directions in which they do not move."""
+    """Yield messages about missing joints and about directions that a joint does not have."""
     known = {joint.name: joint for joint in joints}
     for name, direction in pairs:
         if name not in known:
@@ -133,7 +133,7 @@ def undeclared(where: str, values: Iterable[object], known: ca.SX, expected: str
 
 
 def connected(topology: Topology) -> Iterator[str]:
-    """Yield messages about bodies without a connection, and mechanisms that cannot move."""
+    """Yield messages about unconnected bodies and about a mechanism that cannot move."""
     loose = topology.bodies.keys() - {GROUND, *(link.body for link in topology.links)}
     for name in topology.bodies:
         if name in loose:

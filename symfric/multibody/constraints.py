@@ -2,10 +2,10 @@
 
     phi(q, t) = 0,   phi_q q' + phi_t = 0,   phi_q a + (phi_q q')_q q' + 2 phi_qt q' + phi_tt = 0
 
-A constraint on displacements s_j of joints, phi = f(t) - sum c_j s_j, loads joint j with c_j lam: a
-multiplier is a force or moment, and named accordingly. For a joint that closes a loop, and for all
-joints in absolute coordinates, the pose gives an angle between -pi and pi. Then phi is taken modulo
-its period: full turns are possible, and the nearest of equivalent positions is used.
+A constraint on displacements s_j of joints, phi = f(t) - sum c_j s_j, loads joint j with c_j lam:
+the multiplier is a force or a moment and is named accordingly. The angle of a joint that closes a
+loop, and of every joint in absolute coordinates, is computed from the pose and lies between -pi and
+pi. In this case phi is taken modulo its period, so that full turns are possible.
 """
 
 from abc import abstractmethod
@@ -32,11 +32,11 @@ class Held(NamedTuple):
     """Equations of a constraint, and the loads of its multipliers.
 
     Attributes:
-        phi: SX (m, 1).
-        labels: names of its multipliers.
-        loads: multipliers (m, 1) -> loads on the bodies.
-        unit: of the multipliers, as text.
-        problems: reasons why it is invalid; then it has no rows.
+        phi: expressions that must vanish, SX (m, 1).
+        labels: names of the multipliers.
+        loads: function of the multipliers (m, 1) that returns the loads on the bodies.
+        unit: unit of the multipliers.
+        problems: reasons why the constraint is invalid; phi then has no rows.
     """
 
     phi: ca.SX
@@ -47,12 +47,12 @@ class Held(NamedTuple):
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Units of its multipliers."""
+        """Units of the multipliers."""
         return (self.unit,) * len(self.labels)
 
 
 def impossible(*problems: str) -> Held:
-    """Return no equations, with the problems."""
+    """Return a constraint without equations that reports the problems."""
     return Held(ca.SX(0, 1), (), problems=problems)
 
 
@@ -64,7 +64,7 @@ class Constraint(Part):
 
     @abstractmethod
     def held(self, kin: Kinematics) -> Held:
-        """Return its equations and the loads of its multipliers."""
+        """Return the equations of the constraint and the loads of its multipliers."""
 
 
 Term = tuple[Joint, str, Scalar]
@@ -74,15 +74,15 @@ Term = tuple[Joint, str, Scalar]
 def linear(
     kin: Kinematics, name: str, terms: Sequence[Term], rest: Scalar, period: Scalar | None
 ) -> Held:
-    """Return the constraint rest - sum c_j s_j = 0, modulo `period` if there is one.
+    """Return the constraint rest - sum c_j s_j = 0, modulo `period` unless it is None.
 
-    Its multiplier is the force or moment on the last of the joints.
+    The multiplier is the force or moment on the last of the joints.
     """
     phi = ca.SX(rest)
     for joint, direction, c in terms:
         phi -= c * kin.along(joint, direction)[0]
     if period is not None:
-        # the derivative of floor is zero, so those of phi are unchanged
+        # derivatives of phi are unchanged: the derivative of floor is zero
         phi -= period * ca.floor(phi / period + 0.5)
     last, along, _ = terms[-1]
     what, unit = ("force", "N") if last.linear(along) else ("moment", "N m")
@@ -94,7 +94,7 @@ def linear(
 
 
 def wraps(kin: Kinematics, joint: Joint, direction: str) -> bool:
-    """Return True if the pose gives the displacement, an angle, between -pi and pi only."""
+    """Return True if the displacement is an angle that is known between -pi and pi only."""
     return joint.name not in kin.topology.link_of and not joint.linear(direction)
 
 
@@ -103,16 +103,18 @@ def wraps(kin: Kinematics, joint: Joint, direction: str) -> bool:
 class PrescribedMotion(Constraint):
     """Prescribed motion of a joint: s = motion(t).
 
-    A joint with one direction needs no `direction`; for others the default is "turn".
+    `direction` may be omitted for a joint with one direction; for other joints the default is
+    "turn".
 
     `motion` takes the SX symbol of time and returns a displacement [m] or angle [rad], twice
-    differentiable; it may contain parameters, but no input, whose derivatives are unknown. Its
-    multiplier is the force `<name>_force` [N] or moment `<name>_moment` [N m] that the drive exerts
-    on the joint's child; the drive's power is that times s'.
+    differentiable. It may contain parameters, but no inputs, because their derivatives are unknown.
+    The multiplier is the force `<name>_force` [N] or moment `<name>_moment` [N m] that the drive
+    exerts on the child of the joint; the power of the drive is the multiplier times s'.
 
-    Limits: positions and velocities of the start must be motion(0) and motion'(0); a jump of
-    motion' would be an impact and is not detected. Joints that close loops and absolute coordinates
-    have the angle modulo 2 pi: full turns are possible, motion and motion + 2 pi are the same.
+    Limits: positions and velocities at the start must be motion(0) and motion'(0); a jump of
+    motion' would be an impact and is not detected. For joints that close loops, and in absolute
+    coordinates, the angle is known modulo 2 pi: full turns are possible, but motion and
+    motion + 2 pi are equivalent.
     """
 
     kind: ClassVar[str] = "drive"
@@ -122,7 +124,7 @@ class PrescribedMotion(Constraint):
     direction: str = ""
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """Yield the joint that is driven, and its direction."""
+        """Return the driven joint and the direction of the motion."""
         return ((self.joint, self.direction),)
 
     def problems(self) -> Iterator[str]:
@@ -149,13 +151,13 @@ class PrescribedMotion(Constraint):
 @final
 @dataclass(frozen=True, eq=False)
 class UserConstraint(Constraint):
-    """Expressions of positions and time that vanish.
+    """Constraint that sets expressions of positions and time to zero.
 
     `expression` takes the kinematics, with `point("body.frame")` for a position (and a velocity,
     which must not be used), `motion["body"]` with R and p, `along(joint, direction)` for a
-    displacement, and the time `t`; it returns one expression or a column of them. Their multipliers
-    are `<name>_lambda`, or `_1`, `_2`, ...; bodies are loaded with -phi_p' lam at their origins, so
-    that reactions of joints and their friction are correct.
+    displacement, and the time `t`. It returns one expression or a column of expressions. The
+    multipliers are `<name>_lambda`, or `<name>_lambda_1`, `<name>_lambda_2`, ... The bodies are
+    loaded with -phi_p' lam at their origins, so that joint reactions and friction are correct.
 
     Limits: holonomic constraints only.
     """
@@ -168,7 +170,7 @@ class UserConstraint(Constraint):
             yield f"expression: expected a function of the kinematics, got {self.expression!r}"
 
     def held(self, kin: Kinematics) -> Held:
-        """Return the expressions, and their derivatives by the pose of every body."""
+        """Return the expressions, and the loads from their derivatives by the pose of each body."""
         probe = _probe(kin)
         given: Any = self.expression(probe)
         try:
@@ -211,7 +213,7 @@ class UserConstraint(Constraint):
 
 
 def _probe(kin: Kinematics) -> Kinematics:
-    """Return the same kinematics with the motions of all bodies as symbols."""
+    """Return the kinematics with the motions of all bodies replaced by symbols."""
     motion = {GROUND: kin.motion[GROUND]}
     for name in kin.motion:
         if name != GROUND:
@@ -229,22 +231,23 @@ class Coupling(Constraint):
 
         s_b = ratio s_a + offset
 
-    with displacements [m] or angles [rad] relative to the parents of the joints; a planetary gear
-    is described by gears between joints on its carrier. The multiplier is the force or moment on
-    the child of b; ratio times its opposite acts on the child of a.
+    where s_a and s_b are displacements [m] or angles [rad] relative to the parents of the joints. A
+    planetary gear is described by gears between joints on its carrier. The multiplier is the force
+    or moment on the child of b; minus ratio times the multiplier acts on the child of a.
 
-    Joint coordinates count full turns. A joint that closes a loop, and every joint in absolute
-    coordinates, has its angle modulo 2 pi. The coupling still allows full turns: for any ratio if
-    one of the two angles is known modulo 2 pi, for ratios of integers if both are.
+    Joint coordinates count full turns. The angle of a joint that closes a loop, and of every joint
+    in absolute coordinates, is known modulo 2 pi. The coupling still allows full turns: for any
+    ratio if one of the two angles is known modulo 2 pi, for ratios of integers if both are.
 
-    Limits: the bearings of the joints get forces and moments along the axes only, not the pressure
-    between teeth; use a `UserConstraint` for that. No backlash, no friction of teeth.
+    Limits: the coupling loads the joints with forces and moments along their axes only, not with
+    the pressure between teeth; use a `UserConstraint` for that. There is no backlash and no
+    friction between teeth.
     """
 
     kind: ClassVar[str] = "coupling"
 
     ratio_field: ClassVar[str] = "ratio"
-    """Field that is the ratio, or defines it."""
+    """Name of the field that is or determines the ratio."""
 
     a: str
     b: str
@@ -262,13 +265,11 @@ class Coupling(Constraint):
         return getattr(self, self.ratio_field)
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """Yield both coupled joints with their directions."""
+        """Return both coupled joints with their directions."""
         return self._ends
 
     def problems(self) -> Iterator[str]:
-        """Yield messages about a zero ratio, invalid numbers, or a displacement coupled to
-        itself.
-        """
+        """Yield messages about a zero ratio, invalid numbers, or identical displacements."""
         for name, other in ((self.ratio_field, " other than 0"), ("offset", "")):
             value = getattr(self, name)
             number = is_number(value) and abs(value) < ca.inf and (value != 0 or not other)
@@ -304,8 +305,9 @@ class Coupling(Constraint):
 class Gear(Coupling):
     """Coupling of two angles: angle_b = ratio angle_a + offset.
 
-    `ratio` is -z_a/z_b for external gears with z teeth, +z_a/z_b for a belt or an internal gear, if
-    both axes point the same way. Result: `<name>_moment` [N m] on the child of b.
+    With z the number of teeth and axes in the same direction, `ratio` is -z_a/z_b for external
+    gears and +z_a/z_b for a belt or an internal gear. Result: `<name>_moment` [N m] on the child
+    of b.
     """
 
     a: str
@@ -321,10 +323,10 @@ class Gear(Coupling):
 class Rolling(Coupling):
     """Coupling of an angle and a displacement: s_b = radius angle_a + offset.
 
-    Examples are a pinion on its rack, a wheel that rolls without slipping, a drum with its rope; a
-    negative radius reverses the direction. Result: `<name>_force` [N] on the child of b. For a disc
-    in a plane both are directions of one `Planar` joint, "turn" and "x"; then it is the force that
-    the track must transmit without slipping.
+    Examples are a pinion on its rack, a wheel that rolls without slipping, and a drum with its
+    rope. A negative radius reverses the direction. Result: `<name>_force` [N] on the child of b.
+    For a disc in a plane, angle and displacement are the directions "turn" and "x" of one `Planar`
+    joint; the result is then the force that the track must transmit without slipping.
     """
 
     ratio_field = "radius"
@@ -340,9 +342,9 @@ class Rolling(Coupling):
 @final
 @dataclass(frozen=True, eq=False)
 class Screw(Coupling):
-    """Cylindrical joint with a thread: slide = lead / (2 pi) turn + offset.
+    """Thread of a cylindrical joint: slide = lead / (2 pi) turn + offset.
 
-    Result: `<name>_force` [N] along the axis on its child.
+    Result: `<name>_force` [N] along the axis on the child of the joint.
     """
 
     ratio_field = "lead"

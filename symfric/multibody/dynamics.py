@@ -1,13 +1,13 @@
-"""Equations of motion by Newton and Euler, in one recursion from the tips of the tree inwards.
+"""Newton-Euler equations of motion, in one recursion from the tips of the tree to the base.
 
 With the accelerations a of the coordinates and the multipliers lam of the loops as unknowns,
 
     balance(q, q', a, lam) = M a + Phi_q' lam - Q = 0,   Phi_q a + gamma = 0
 
 where each row of the balance is the wrench that a joint of the tree transmits, projected on its
-motion subspace. The rest of that wrench is the reaction that loads the bearing; for a joint that
-closes a loop it follows from its multipliers. Both are wrenches on the joint's child about the
-origin of the joint's frame there and in the axes of that frame.
+motion subspace. The remaining part of the wrench is the reaction that loads the bearing. The
+reaction of a joint that closes a loop follows from its multipliers. Reactions act on the child of
+the joint, about the origin and in the axes of the joint's frame on the child.
 """
 
 from collections.abc import Iterable, Sequence
@@ -35,7 +35,10 @@ def numbered(name: str, count: int) -> tuple[str, ...]:
 
 
 def twist_jacobian(phi: ca.SX, R: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return C_v, C_w of phi' = C_v v + C_w w for the motion of the pose (R, p), symbols."""
+    """Return C_v, C_w of phi' = C_v v + C_w w, with v = p' and w the angular velocity of R.
+
+    The pose R, p must consist of symbols.
+    """
     w = ca.SX.sym("w", 3)
     turned = ca.jtimes(phi, ca.vec(R), ca.vec(skew(w) @ R))
     return ca.jacobian(phi, p), ca.jacobian(turned, w)
@@ -57,15 +60,15 @@ class Loop(NamedTuple):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of its multipliers."""
+        """Names of the multipliers."""
         return numbered(self.joint.name, self.phi.numel())
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Units of its multipliers.
+        """Units of the multipliers.
 
-        A constraint on places has a force as multiplier, one on directions a moment; that of a rod,
-        on the square of its length, a force over length.
+        The multiplier of a constraint on positions is a force, that of a constraint on directions
+        is a moment, and that of a rod, which constrains its squared length, is a force per length.
         """
         if isinstance(self.joint, Distance):
             return ("N/m",)
@@ -81,7 +84,7 @@ class Loop(NamedTuple):
         return self.relative.R.T @ reaction[0], self.relative.R.T @ reaction[1]
 
     def loads(self, kin: Kinematics, reaction: Wrench) -> tuple[Load, Load]:
-        """Return the loads of the reaction on child and parent."""
+        """Return the loads of the reaction on the child and on the parent."""
         R_WP, at = self.relative.R_WP, self.relative.p_WC
         force, moment = R_WP @ reaction[0], R_WP @ reaction[1]
         child, parent = self.joint.child, self.joint.parent
@@ -102,12 +105,12 @@ def loop_of(kin: Kinematics, joint: Joint) -> Loop:
 
 
 def normalisations(kin: Kinematics) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return norms of the Euler parameters, (p'p - 1)/2 = 0, and their terms in the balance.
+    """Return the norm constraints of Euler parameters, (p'p - 1)/2 = 0, and their balance terms.
 
     Returns:
-        Constraints (k, 1); the directions p in which the mass matrix is singular, as the columns
-        of (n, k); weights (k, 1) that make it regular: adding weight p (p'a + p''p') has no effect
-        if the constraints hold.
+        The constraints (k, 1); the directions p in which the mass matrix is singular, as columns
+        (n, k); and weights (k, 1) that make it regular. The added term weight p (p'a + p''p') is
+        zero if the constraints hold.
     """
     phi, along, weights = ca.SX(0, 1), ca.SX(kin.topology.n, 0), ca.SX(0, 1)
     for link in kin.topology.links:
@@ -124,9 +127,9 @@ def normalisations(kin: Kinematics) -> tuple[ca.SX, ca.SX, ca.SX]:
 
 
 def balance(kin: Kinematics, applied: Iterable[Load | Axial]) -> tuple[ca.SX, dict[str, Wrench]]:
-    """Return the rows of the equations of motion, and the reaction in every joint of the tree.
+    """Return the rows of the equations of motion and the reaction in each joint of the tree.
 
-    The weight of the normalisations is not included. Reactions are the wrenches that constraints
+    The terms of the norm constraints are not included. Reactions are the wrenches that constraints
     transmit, without the axial loads of the joint.
     """
     links = kin.topology.links
@@ -159,7 +162,7 @@ def balance(kin: Kinematics, applied: Iterable[Load | Axial]) -> tuple[ca.SX, di
 
 
 def _floats(kin: Kinematics, link: Link) -> bool:
-    """Return True if the coordinates of a link are those of its centre of mass in the world."""
+    """Return True if the coordinates of a link are the pose of its centre of mass in the ground."""
     centred = (link.at_body.p - kin.topology.bodies[link.body].c).is_zero()
     return isinstance(link.joint, Floating) and link.base == GROUND and not link.reverse and centred
 
@@ -167,8 +170,8 @@ def _floats(kin: Kinematics, link: Link) -> bool:
 def _floating(kin: Kinematics, link: Link, loads: Sequence[Load]) -> ca.SX:
     """Return the balance of a free body that carries no other body.
 
-    Its forces stay in world components: transformed into the body and back, R R' would be
-    multiplied out in every derivative.
+    Forces remain in world components: a transformation to body components and back would leave
+    R R' in every derivative.
     """
     body, motion, rows = kin.topology.bodies[link.body], kin.motion[link.body], link.rows
     force = body.mass * (link.at_base.R @ kin.qdd[rows, 0][:3] + kin.motion[GROUND].dv_B)
@@ -181,8 +184,9 @@ def _floating(kin: Kinematics, link: Link, loads: Sequence[Load]) -> ca.SX:
 
 
 def _inertial(kin: Kinematics, link: Link, loads: Sequence[Load]) -> Wrench:
-    """Return inertial minus applied wrench of a body about its centre of mass, in its
-    components.
+    """Return the inertial minus the applied wrench of a body about its centre of mass.
+
+    Components are those of the body.
     """
     body, motion = kin.topology.bodies[link.body], kin.motion[link.body]
     w, c = motion.w_B, body.c
@@ -197,11 +201,11 @@ def _inertial(kin: Kinematics, link: Link, loads: Sequence[Load]) -> Wrench:
 def _project(
     kin: Kinematics, link: Link, carried: dict[str, Wrench], axial: Sequence[Axial]
 ) -> tuple[ca.SX, Wrench]:
-    """Return the balance of a link's coordinates and the wrench of its joint on the joint's child.
+    """Return the balance of a link's coordinates and the reaction of its joint on the child.
 
-    `carried` holds the wrench that each body needs from its joint, about its centre of mass and in
-    its own components; that of the base A is increased by the wrench of this link. The reaction is
-    in the axes of the joint's frame on the child, about its origin.
+    `carried` contains the wrench that each body requires from its joint, about the centre of mass
+    and in components of that body; the wrench of this link is added to that of its base A. The
+    reaction is in the axes and about the origin of the joint's frame on the child.
     """
     body, q = kin.topology.bodies[link.body], kin.q[link.rows, 0]
     R_PC, p = link.pose(q)

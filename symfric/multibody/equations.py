@@ -1,4 +1,4 @@
-"""Expressions of a mechanism in one choice of coordinates."""
+"""Equations of motion of a mechanism in given coordinates, as CasADi expressions."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -34,19 +34,20 @@ class Equations:
     Attributes:
         forces: applied forces.
         held: constraints other than joints.
-        turns: angles of loops that forces need.
-        norms: number of Euler parameter norms, which are the last constraints.
+        turns: angles of joints in loops that forces depend on.
+        norms: number of norm constraints of Euler parameters; these are the last constraints.
         q, qd, a: coordinates, rates, accelerations, shape (n, 1).
-        lam: multipliers of loops, then further constraints, then Euler parameters, shape (m, 1).
+        lam: multipliers of loops, of other constraints, and of Euler parameters, shape (m, 1).
         F: friction forces of the contacts [N].
-        phi, phi_dot, phi_ddot: constraints on three levels, shape (m, 1).
+        phi, phi_dot, phi_ddot: constraints and their time derivatives, shape (m, 1).
         balance: M a + Phi_q' lam - Q, shape (n, 1), affine in a, lam and F.
-        contacts: of all joints with friction.
+        contacts: contacts of all joints with friction.
         normals: normal force of each contact [N], in terms of q, qd, a, lam.
         kinetic, potential: energies [J].
         power: power of all applied forces, of friction and of drives on the bodies [W].
         reactions: wrench on the child of each joint at its joint point, in the child's joint frame.
-        pressing: the wrenches that load bearings; of joints that only close loops, their own.
+        pressing: wrench that loads each bearing: the reaction; for a joint that only closes loops,
+            the reaction in the parent's joint frame.
     """
 
     kin: Kinematics
@@ -89,7 +90,7 @@ class Equations:
 
     @property
     def phi_t(self) -> ca.SX:
-        """Partial derivative of the constraints by time, shape (m, 1)."""
+        """Partial derivative of the constraints with respect to time, shape (m, 1)."""
         return ca.jacobian(self.phi, self.kin.t)
 
     @property
@@ -99,12 +100,12 @@ class Equations:
 
     @property
     def angles(self) -> ca.SX:
-        """Symbols of the angles of loops, shape (k, 1)."""
+        """Symbols of the angles `turns`, shape (k, 1)."""
         return symbols_of(turn.angle for turn in self.turns)
 
     @property
     def multipliers(self) -> dict[str, str]:
-        """Name -> unit of the multipliers of all constraints, redundant ones included."""
+        """Unit of each multiplier by its name, including those of redundant constraints."""
         found: dict[str, str] = {}
         for part in (*self.loops, *self.held):
             found |= zip(part.labels, part.units, strict=True)
@@ -122,16 +123,16 @@ def equations(
     kept: Sequence[int] | None = None,
     cuts: Cuts | None = None,
 ) -> Equations:
-    """Write the equations of motion of a mechanism.
+    """Return the equations of motion of a mechanism.
 
     Args:
         topology: bodies and joints.
         forces: all applied forces.
-        constraints: other than joints.
+        constraints: constraints other than joints.
         q, qd: symbols of the coordinates and their rates, shape (n, 1).
         t: symbol of time.
         kept: indices of the independent constraints; None keeps all.
-        cuts: introduces symbols for quantities passed between bodies; None writes everything out.
+        cuts: replaces quantities passed between bodies by symbols; None substitutes everything.
     """
     a = ca.SX.sym("a", topology.n)
     gravity = [f for f in forces if isinstance(f, Gravity)]
@@ -196,7 +197,7 @@ def equations(
 
 
 def normals_with(eq: Equations, eps: Mapping[str, Scalar]) -> tuple[ca.SX, ...]:
-    """Return the normal force of each contact, rounded over the widths `eps` by `pressed` name."""
+    """Return the normal force of each contact, smoothed with the widths `eps` by `pressed` name."""
     rounded = (replace(c, friction=replace(c.friction, eps=eps[c.pressed])) for c in eq.contacts)
     return tuple(_normal(eq.kin, contact, eq.pressing) for contact in rounded)
 
@@ -217,7 +218,7 @@ def _contacts(kin: Kinematics) -> Iterator[Contact]:
 
 
 def _rubbing(kin: Kinematics, contact: Contact) -> list[Load | Axial]:
-    """Return the friction on the child of a joint, and on the parent."""
+    """Return the loads of a friction force on the child and the parent of its joint."""
     joint = kin.topology.joints[contact.joint]
     if contact.direction != "ball":
         return [Axial(joint, contact.direction, contact.load)]

@@ -1,8 +1,8 @@
 """Applied forces: gravity, springs, dampers, actuators, user expressions.
 
-A force defines its loads on bodies and its potential energy. The power of a load is force times
-velocity of its point plus moment times angular velocity; for conservative forces power = -dV/dt (a
-test checks it for every force).
+A force defines its loads on bodies and its potential energy V. The power of a load is the force
+times the velocity of its point plus the moment times the angular velocity. For conservative forces,
+power = -dV/dt; a test checks this for every force.
 """
 
 from abc import ABC, abstractmethod
@@ -23,7 +23,7 @@ ZERO = ca.SX(3, 1)
 
 
 class Load(NamedTuple):
-    """Force [N] at a point and a moment [N m] on a body, in world components.
+    """Force [N] at a point of a body and moment [N m] on the body, in world components.
 
     `arm` is the vector from the origin of the body to the point, in body components.
     """
@@ -48,9 +48,9 @@ class Load(NamedTuple):
 
 
 class Axial(NamedTuple):
-    """Force [N] or moment [N m] on the child of a joint in one of its directions.
+    """Force [N] or moment [N m] on the child of a joint in a direction of the joint.
 
-    Its opposite acts on the parent.
+    The opposite force or moment acts on the parent.
     """
 
     joint: Joint
@@ -82,15 +82,15 @@ class Part(Keywords, ABC):
     name: str
 
     def places(self) -> Iterable[str]:
-        """Return the "body.frame" texts it names."""
+        """Return the places, "body" or "body.frame", that the part refers to."""
         return ()
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """Return the joints it names, each with a direction."""
+        """Return the joints that the part refers to, each with a direction."""
         return ()
 
     def problems(self) -> Iterator[str]:
-        """Yield problems of its numbers."""
+        """Yield messages about invalid values."""
         return iter(())
 
 
@@ -110,7 +110,7 @@ class Force(Part):
 
     @property
     def conservative(self) -> bool:
-        """True if its power is exactly the change of its potential energy."""
+        """True if the power is exactly minus the rate of change of the potential energy."""
         return all(equals(getattr(self, name, 0.0), 0.0) for name in ("damping", "actuator"))
 
     @abstractmethod
@@ -118,14 +118,14 @@ class Force(Part):
         """Yield the loads on the bodies."""
 
     def energy(self, kin: Kinematics) -> ca.SX:
-        """Return the potential energy [J]; zero if it has none."""
+        """Return the potential energy [J]; zero by default."""
         return ca.SX(0)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Gravity(Force):
-    """Weight m g of every body at its centre of mass; g [m/s^2] in world components."""
+    """Weight m g of every body at its centre of mass, with g [m/s^2] in world components."""
 
     g: Vector = (0.0, 0.0, -9.81)
 
@@ -149,8 +149,8 @@ class SpringDamper(Force):
 
         l = |p_b - p_a|,   f = stiffness (l - free_length) + damping l' + actuator
 
-    f > 0 pulls the points together. Not defined at l = 0, unless spring and damper reduce to
-    f (p_b - p_a) / l = stiffness (p_b - p_a) because free_length, damping and actuator are zero.
+    f > 0 pulls the points together. The force is not defined at l = 0, unless free_length, damping
+    and actuator are zero, so that f (p_b - p_a) / l = stiffness (p_b - p_a).
     """
 
     a: str
@@ -161,7 +161,7 @@ class SpringDamper(Force):
     actuator: Scalar = 0.0
 
     def places(self) -> Iterable[str]:
-        """Yield the two places between which it acts."""
+        """Return the two places between which the force acts."""
         return (self.a, self.b)
 
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
@@ -190,16 +190,18 @@ class SpringDamper(Force):
 @final
 @dataclass(frozen=True, eq=False)
 class JointSpringDamper(Force):
-    """Spring, damper and actuator in one of the directions of a joint: "slide", "turn", ...
+    """Spring, damper and actuator in a direction of a joint: "slide", "turn", ...
 
-    A joint with one direction needs no `direction`; for others the default is "turn".
+    `direction` may be omitted for a joint with one direction; for other joints the default is
+    "turn".
 
         f = -stiffness (s - rest) - damping s' + actuator
 
-    with s the displacement [m] or angle [rad]; f acts on the child, its opposite on the parent. The
-    angle counts full turns. If the joint closes a loop, the angle is a state of the model with the
-    joint's name. It starts with the turns that the joints of the loop have made, if all axes of the
-    loop are parallel; otherwise nearest to the joint's `start`, as the pose gives it modulo a turn.
+    with s the displacement [m] or angle [rad]; f acts on the child, -f on the parent. The angle
+    counts full turns. If the joint closes a loop, the angle is a state of the model with the name
+    of the joint. If all axes of the loop are parallel, its initial value includes the full turns of
+    the other joints; otherwise it is the value nearest to `start` of the joint, because the pose
+    gives the angle only modulo 2 pi.
     """
 
     joint: str
@@ -210,11 +212,11 @@ class JointSpringDamper(Force):
     actuator: Scalar = 0.0
 
     def joints(self) -> Iterable[tuple[str, str]]:
-        """Yield the joint along whose direction it acts."""
+        """Return the joint and the direction in which the force acts."""
         return ((self.joint, self.direction),)
 
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
-        """Yield one load along the direction of its joint: actuator, spring and damper."""
+        """Yield the sum of spring, damper and actuator as one load of the joint."""
         joint = kin.topology.joints[self.joint]
         direction = joint.way(self.direction)
         f = ca.SX(self.actuator)
@@ -236,11 +238,11 @@ class JointSpringDamper(Force):
 @final
 @dataclass(frozen=True, eq=False)
 class UserForce(Force):
-    """Force [N] and moment [N m] on a place, expressions of the motion of any body.
+    """Force [N] and moment [N m] at a place as expressions of the motion of any bodies.
 
     `expression` takes the kinematics, with `point("body.frame")` for position and velocity,
-    `motion["body"]` with R, p, w, v, `along(joint, direction)` for a displacement or an angle over
-    full turns and its rate, and returns force and moment in world components.
+    `motion["body"]` with R, p, w, v, and `along(joint, direction)` for a displacement or an angle
+    that counts full turns, and its rate. It returns force and moment in world components.
     """
 
     place: str
@@ -248,7 +250,7 @@ class UserForce(Force):
 
     @property
     def conservative(self) -> bool:
-        """Always False."""
+        """False, because the expression is arbitrary."""
         return False
 
     def problems(self) -> Iterator[str]:
@@ -257,7 +259,7 @@ class UserForce(Force):
             yield f"expression: expected a function of the kinematics, got {self.expression!r}"
 
     def places(self) -> Iterable[str]:
-        """Yield the place at which it acts."""
+        """Return the place at which the force acts."""
         return (self.place,)
 
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:

@@ -14,7 +14,7 @@ def functions(
 ) -> dict[str, ca.Function]:
     """Return Functions of coordinates q, rates qd, accelerations a, inputs u and parameters p.
 
-    Functions that depend on time, through prescribed motion or forces, take it as last argument t.
+    Functions that depend on time, through prescribed motion or forces, have a last argument t.
 
     Args:
         mechanism: the mechanism.
@@ -27,16 +27,16 @@ def functions(
             of M a + phi_q' lam.
         constraints: (q, p) -> phi, shape (m, 1), and its Jacobian phi_q.
         inverse_dynamics: (q, qd, a, lam, z, u, p) -> the additional generalised forces required for
-            the accelerations a, friction included; its normal forces follow from a and lam
-            without a loop. z are the internal states of the laws.
+            the accelerations a, including friction, whose normal forces are explicit in a and lam.
+            z are the internal states of the laws.
         energy: (q, qd, p) -> kinetic and potential energy [J].
-        poses: (q, p) -> for every body R_WB (3, 3) and p_WB (3, 1) side by side, (3, 4 bodies).
+        poses: (q, p) -> [R_WB, p_WB] of every body, concatenated to shape (3, 4 bodies).
 
     Raises:
         ValueError: as `Mechanism.build`.
 
-    Limits: q alone does not count the full turns of a joint that closes a loop; springs about its
-    axis are evaluated at the angle nearest to the start.
+    Limits: q does not contain the number of full turns of a joint that closes a loop; springs about
+    the axis of such a joint are evaluated at the equivalent angle that is nearest to the start.
     """
     eq = mechanism.prepare(p, formulation).eq
     where = f"mechanism '{mechanism.name}'"

@@ -1,30 +1,31 @@
 """Base class of joints: pose, motion subspace, constraints, drawing style, and friction.
 
 A joint connects a frame P on its parent body with a frame C on its child body. Its pose (R_PC,
-p_PC) is a function of the joint coordinates q; its motion subspace (H_w, H_v) gives the relative
-angular velocity w_PC_C = H_w q' in components of C, in which Euler parameters have it simplest, and
-the velocity p_PC' = H_v q' in those of P. The constraints are expressions of the pose that vanish
-for every q; they close a loop, in which the joint has no coordinates. The axis of a joint is z of
-both frames.
+p_PC) is a function of the joint coordinates q. Its motion subspace (H_w, H_v) gives the relative
+angular velocity w_PC_C = H_w q' in components of C, which are the simplest for Euler parameters,
+and the velocity p_PC' = H_v q' in components of P. The constraints are expressions of the pose that
+vanish for every q; they replace the coordinates of a joint that closes a loop. The axis of a joint
+is z of both frames.
 
-Friction laws act on bodies only here, with the only minus sign.
+Only this module applies friction laws to bodies, with the minus sign of `Contact.load`.
 
 The reaction of a joint on its child, force F and moment T about the joint point in the axes of the
-child's frame, loads the bearing at two stations a apart on z:
+child's frame, loads the bearing at two stations at distance a on z:
 
     f_x2 = -T_y / a,  f_y2 = T_x / a,  f_x1 = -F_x - f_x2,  f_y1 = -F_y - f_y2
 
     cylindrical: N = |f_1| + |f_2|
     revolute:    N = |f_1| + |f_2| + |F_z|                   (thrust face)
     prismatic:   N = |f_x1 + T_z/b| + |f_y1| + |f_x2| + |f_y2| + |T_z/b|    (guide of width b)
-    universal:   of each of its two axes as a revolute joint; the cross between them is massless
+    universal:   as a revolute joint for each of the two axes; the cross between them is massless
     spherical:   N = |F|
     joints that only close loops: see `symfric.multibody.joints`
 
-Friction opposes sliding with -F(v, N) along z, and with the moment -R F(R w, N) about it. The ball
-of a spherical joint slips with v = R w, a vector in the axes of the socket, the parent's frame: the
-moment is -R F(v, N), with F along v for laws without states and bristles that are vectors, see
-`Isotropic`. Source: Haug, Mech. Based Des. Struct. Mach., 2018, joint friction from multipliers.
+Friction opposes sliding with -F(v, N) along z, and rotation about z with the moment -R F(R w, N).
+The ball of a spherical joint slips with the vector v = R w in the axes of the socket, which is the
+parent's frame. The moment is -R F(v, N); F is parallel to v for laws without states, and the
+bristles of other laws are vectors, see `Isotropic`. Source: Haug, Mech. Based Des. Struct. Mach.,
+2018, joint friction from multipliers.
 """
 
 from abc import ABC, abstractmethod
@@ -46,44 +47,49 @@ from symfric.laws.composed.isotropic import SpatialSlip, anisotropy
 from symfric.model.sketch import Symbol
 
 OFFERED = (FORCE,)
-"""Inputs that a joint gives a law besides v and N, except in a ball."""
+"""Inputs in addition to v and N that a joint other than a ball provides for a law."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class JointFriction:
-    """Friction law in a joint; in a universal joint the same in both of its bearings.
+    """Friction law and bearing geometry of a joint.
 
-    A normal force that falls below zero, through an input, a parameter or a negative preload, is an
-    error at that time, not friction that drives.
+    Both bearings of a universal joint have the same law and geometry.
 
-    Laws with true sticking (`ExactCoulomb`, `Karnopp`, `LeineSwitch`, `Awrejcewicz`) get the
+    If the normal force becomes negative, through an input, a parameter or a negative preload, the
+    simulation stops with an error at that time.
+
+    Laws with true sticking (`ExactCoulomb`, `Karnopp`, `LeineSwitch`, `Awrejcewicz`) obtain the
     applied force F_e from the constraints, see `symfric.multibody.applied`. With modes, a contact
     that stops sticks, and a sticking contact breaks away when |F_e| exceeds the static level. After
     each change of mode the whole mechanism is solved again; contacts that then cannot hold break
-    away at the same instant, and contacts that would slide the wrong way stick again. mu_s > mu_d
-    allows several valid states of stick and slip; the history selects one, and at the start
-    overloaded contacts break away. The contacts of a loop of one degree of freedom stick and break
-    away together, when all of them are at their static levels; smooth laws with mu_s > mu_d break
-    away slightly earlier there, because the contact that moves most passes its peak first, and tend
-    to the same motion for mu_s = mu_d. Limits: not in a ball, nor where a drive prescribes the
-    sliding; in a loop of several degrees of freedom as many as are independent. Forms that jump
-    without modes (`Karnopp`, `LeineSwitch` with form = "original") end a run at the jump. Other
-    terms of a `Sum` must vanish in stick.
+    away at the same instant, and contacts that would slide in the wrong direction stick again. For
+    mu_s > mu_d several states of stick and slip may be valid; the history selects one, and
+    overloaded contacts break away at the start. The contacts of a loop of one degree of freedom
+    stick and break away together, when all of them reach their static levels. Smooth laws with
+    mu_s > mu_d break away slightly earlier there, because the contact with the largest sliding
+    velocity passes its peak first; for mu_s = mu_d they tend to the same motion. Limits: laws with
+    true sticking are not available in a ball, nor where a drive prescribes the sliding; in a loop
+    of several degrees of freedom their contacts must be independent. Forms that jump without modes
+    (`Karnopp`, `LeineSwitch` with form = "original") end a run at the jump. Other terms of a `Sum`
+    must vanish in stick.
 
     Attributes:
-        law: any friction law of v, N and F_e; in a spherical joint an isotropic one of v and N,
+        law: any friction law of v, N and F_e; in a spherical joint an isotropic law of v and N, see
             `SpatialSlip`.
-        radius: of the bearing or ball [m], for friction about an axis or a point.
-        length: distance a of the two bearing stations [m], the first at the origin of the frame,
-            the second along its +z; None: moments do not load the bearing.
-        width: width b of a guide that takes the moment about z [m]; None: it does not load it.
+        radius: radius of the bearing or ball [m], for friction about an axis or a point.
+        length: distance a of the two bearing stations [m]; the first is at the origin of the frame,
+            the second on the positive z axis. With None, moments do not load the bearing.
+        width: width b of a guide that supports the moment about z [m]; with None, this moment does
+            not load the guide.
         preload: normal force in addition to the reactions [N].
-        normal: constant normal force [N] instead of reactions; then no unknown is added.
-        turning: True if the law is one of the joint's rate [rad/s] and its force a moment [N m],
-            with the level `normal` [N m]; without a radius. Robot description files use this form.
-        eps: width of |f|, sqrt(f^2 + eps^2) - eps [N]. Laws that divide by the normal force
-            (bristles) need a preload above zero if the reactions can vanish.
+        normal: constant normal force [N] that replaces the reactions; no unknown is then added.
+        turning: True if the law takes the joint rate [rad/s] and returns a moment [N m]; `normal`
+            is then the level of the moment [N m], and there is no radius. Robot description files
+            use this form.
+        eps: smoothing width of |f|, sqrt(f^2 + eps^2) - eps [N]. Laws that divide by the normal
+            force (bristles) need a preload above zero if the reactions can vanish.
     """
 
     law: Law
@@ -100,7 +106,7 @@ class JointFriction:
         take_si("friction", self, "radius", "length", "width", "preload", "normal", "eps")
 
     def problems(self, rubs: Sequence[str]) -> Iterator[str]:
-        """Yield problems for a joint with friction in the directions `rubs`."""
+        """Yield messages about invalid values for friction in the directions `rubs`."""
         if not rubs:
             yield "expected a joint with friction, such as a hinge, a guide or a ball"
         offered = () if "ball" in rubs else OFFERED
@@ -135,18 +141,18 @@ class JointFriction:
 
     @property
     def arm(self) -> Scalar:
-        """Radius of the bearing [m]; 1 for friction along z only, and for a law of the moment."""
+        """Radius of the bearing [m]; 1 without a radius (sliding only, or `turning`)."""
         return 1.0 if self.radius is None else self.radius
 
     def magnitude(self, *components: ca.SX) -> ca.SX:
-        """Return the smooth length of a force with these components [N]."""
+        """Return the smoothed magnitude of a force with the given components [N]."""
         squares = sum((f * f for f in components), start=self.eps * self.eps)
         return ca.sqrt(squares) - self.eps
 
     def normal_force(self, rubs: Sequence[str], F: ca.SX, T: ca.SX) -> ca.SX:
         """Return the sum of the bearing forces [N] under the reaction F, T.
 
-        Components are those of the child's frame, of a universal joint those of the bearing.
+        Components are those of the child's frame, and for a universal joint those of the bearing.
         """
         if self.normal is not None:
             return ca.SX(self.normal)
@@ -170,16 +176,16 @@ class JointFriction:
 @final
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Friction of a joint in one of its friction directions.
+    """Friction of a joint in one direction.
 
     Attributes:
-        name: of its results.
-        joint: the joint it belongs to.
+        name: prefix of the results of the contact.
+        joint: name of the joint.
         direction: "slide", "turn", "x", "y" or "ball".
         friction: law and geometry.
-        law: the law, for a ball in its form for vectors.
-        pressed: name of its normal force; directions of one bearing share it.
-        slip: sliding velocity [m/s], shape (1, 1), of a ball (3, 1).
+        law: the law; for a ball its vector form.
+        pressed: name of the normal force, which directions of one bearing share.
+        slip: sliding velocity [m/s], shape (1, 1); for a ball (3, 1).
         F: symbols of the friction force [N], of the same shape.
     """
 
@@ -193,12 +199,12 @@ class Contact:
     F: ca.SX
 
     def unit(self, of_sliding: str) -> str:
-        """Return a unit of the law, of sliding or of turning."""
+        """Return a unit of the law; that of rotation if the law is one of moment and rate."""
         return turned(of_sliding) if self.friction.turning else of_sliding
 
     @property
     def load(self) -> ca.SX:
-        """Force [N] along or moment [N m] about its axis on the child; of a ball a vector."""
+        """Force [N] along or moment [N m] about the axis on the child; a vector for a ball."""
         return -self.F if self.direction == "slide" else -self.friction.arm * self.F
 
 
@@ -207,17 +213,17 @@ HINTS = {
     "friction": "friction acts in joints, such as Revolute(..., friction=JointFriction(law))",
     "damping": "damping is a separate part, m.force(JointSpringDamper(...))",
 }
-"""Advice about keywords that other tools have."""
+"""Advice about keywords of other tools."""
 
 
 class Keywords:
-    """Dataclass that lists its keywords if an unknown one is given."""
+    """Base of dataclasses that list their keywords if an unknown keyword is given."""
 
     def __new__(cls, *_: object, **given: object) -> Self:
-        """Check the keywords.
+        """Create an object after a check of the keywords.
 
         Raises:
-            ValueError: a keyword that is not a field.
+            ValueError: a keyword is not a field.
         """
         kind: Any = cls
         known = [item.name for item in fields(kind) if item.init]
@@ -235,7 +241,7 @@ COMPONENTS = (*FORCE_NAMES, "Mx", "My", "Mz")
 
 
 def unit(k: int) -> ca.SX:
-    """Return a motion along or about the axis k, shape (3, 1)."""
+    """Return the unit vector of axis k, shape (3, 1)."""
     return ca.SX.eye(3)[:, k]
 
 
@@ -248,26 +254,26 @@ class Joint(Keywords, ABC):
         parent, child: "body" or "body.frame"; "ground" is the fixed body.
         start: joint coordinates at the start [m, rad]; a number for a single coordinate. Joints
             that close a loop need none.
-        rate: their rates [m/s, rad/s].
+        rate: rates of the joint coordinates at the start [m/s, rad/s].
         friction: law and geometry of the bearing, or None.
     """
 
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = ()
     """Suffix and unit of each joint coordinate."""
     constrains: ClassVar[int] = 0
-    """Number of constraints; the spanning tree keeps the joints with most."""
+    """Number of constraints; the spanning tree prefers joints with more constraints."""
     closes: ClassVar[bool] = False
-    """True if it can only close loops, having no coordinates of its own."""
+    """True if the joint has no coordinates and can only close loops."""
     rubs: ClassVar[tuple[str, ...]] = ()
-    """Directions in which friction acts; "ball" is a ball in its socket."""
+    """Directions in which friction acts; "ball" stands for a ball in its socket."""
     directions: ClassVar[Mapping[str, int]] = {}
-    """Directions of forces and motions: "slide", "turn", ... -> joint coordinate."""
+    """Joint coordinate of each direction of forces and motions: "slide", "turn", ..."""
     quaternion: ClassVar[int | None] = None
     """Index of the first of four Euler parameters among the coordinates."""
     plane: ClassVar[int | None] = None
     """Axis of both frames that is normal to the plane of a planar joint."""
     transmits: ClassVar[tuple[str, ...]] = COMPONENTS
-    """Components of force and moment that it can transmit, in the axes of the child's frame."""
+    """Components of force and moment that the joint can transmit, in axes of the child's frame."""
     symbol: ClassVar[Symbol] = Symbol()
     """Drawing style."""
 
@@ -291,11 +297,11 @@ class Joint(Keywords, ABC):
         """Return expressions of R_PC and p_PC that must vanish, shape (m, 1)."""
 
     def problems(self) -> Iterator[str]:
-        """Yield problems of its own numbers."""
+        """Yield messages about invalid values."""
         return iter(())
 
     def way(self, direction: str) -> str:
-        """Return the given direction; by default the only one, or "turn" if available."""
+        """Return the given direction; if it is empty, the only direction or else "turn"."""
         if direction:
             return direction
         (only,) = self.directions if len(self.directions) == 1 else ("turn",)
@@ -315,27 +321,26 @@ class Joint(Keywords, ABC):
         return unit("xyz".index(direction) if direction in "xyz" else 2)
 
     def bearing(self, direction: str, R: ca.SX) -> ca.SX:
-        """Return the matrix from components in C to those of the bearing, whose axis is the
-        last.
-        """
+        """Return the rotation from components in C to those of the bearing, with its axis last."""
         return ca.SX.eye(3)
 
     def displacement(self, direction: str, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return the coordinate of a direction at a pose; an angle between -pi and pi."""
+        """Return the coordinate of a direction at a pose; angles are between -pi and pi."""
         if self.linear(direction):
             return p["xyz".index(direction) if direction in "xyz" else 2]
         return ca.atan2(R[1, 0], R[0, 0])
 
     def normal_force(self, friction: JointFriction, F: ca.SX, T: ca.SX) -> ca.SX:
-        """Return the normal force [N] of its bearing under the reaction F, T on the child.
+        """Return the normal force [N] of the bearing under the reaction F, T on the child.
 
-        It is in the axes of the child's frame, for a joint that only closes loops in the parent's.
+        F and T are in the axes of the child's frame; for a joint that only closes loops they are in
+        those of the parent's frame.
         """
         return friction.normal_force(self.rubs, F, T)
 
     @property
     def starts(self) -> tuple[Scalar, ...]:
-        """Joint coordinates at the start; zero, or no rotation, by default."""
+        """Joint coordinates at the start; by default zero, and Euler parameters of no rotation."""
         return _several(self.start, len(self.coordinates), self.quaternion)
 
     @property

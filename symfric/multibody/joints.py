@@ -1,4 +1,4 @@
-"""Joints with their pose, motion subspace and constraints; see `symfric.multibody.joint`."""
+"""All joints, each with pose, motion subspace and constraints; see `symfric.multibody.joint`."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from symfric.multibody.spatial import euler_g, rotation, rotation_x, rotation_y,
 
 @dataclass(frozen=True, eq=False)
 class Closing(Joint):
-    """Joint that only closes loops: no coordinates, and no redundant constraints.
+    """Joint that only closes loops; it has no coordinates and no redundant constraints.
 
-    A planar loop closed by a hinge or a guide of 5 constraints has three constraints that the plane
-    implies already; the reactions out of the plane are then undetermined, and friction that depends
-    on them is refused. The planar joints here have only the constraints of a hinge or a guide in
-    the plane, so that every joint of the loop can have friction. The motion does not depend on
-    which of them closes the loop.
+    If a hinge or a guide of 5 constraints closes a planar loop, three of its constraints are
+    redundant: the reactions out of the plane are undetermined, and friction that depends on them is
+    rejected. The planar joints below have only the constraints of a hinge or a guide in the plane,
+    so that every joint of the loop can have friction. The motion does not depend on which joint
+    closes the loop.
 
         joint             constraints                        friction        normal force N
         PlanarRevolute    p_x = p_y = 0; plane x, y          turn about z    |(F_x, F_y)|
@@ -28,9 +28,9 @@ class Closing(Joint):
         PinInSlot         p_x = 0; plane x, z                slide along z   |F_x|
         PointOnLine       p_x = p_y = 0, in space            slide along z   |(F_x, F_y)|
 
-    p is the origin of the child's frame in the parent's. Sliding is measured in the parent's frame,
-    which may move: v = p_z'. F is the reaction in the parent's axes, of the multipliers only.
-    Limits: in a mechanism that is not planar they have only the constraints of the table.
+    p is the origin of the child's frame in the parent's frame. Sliding v = p_z' is relative to the
+    parent's frame, which may move. F is the reaction of the multipliers in the parent's axes.
+    Limits: in a mechanism that is not planar they also have only the constraints of the table.
     """
 
     closes = True
@@ -51,7 +51,7 @@ class Closing(Joint):
 class Distance(Closing):
     """Massless rod with ball joints at both ends: (d'd - length^2) / 2 = 0; 1 constraint.
 
-    Its multiplier [N/m] times the length is the force in the rod, positive under tension.
+    The multiplier [N/m] times the length is the force in the rod, positive under tension.
     """
 
     constrains = 1
@@ -66,17 +66,17 @@ class Distance(Closing):
             yield f"length: expected > 0 m, got {self.length!r}"
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return (p'p - length^2)/2 = 0: the squared distance has a gradient everywhere."""
+        """Return (p'p - length^2)/2 = 0; the squared distance is differentiable everywhere."""
         return (ca.dot(p, p) - self.length * self.length) / 2
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PointOnLine(Closing):
-    """Origin of the child's frame stays on the parent's axis z; 2 constraints.
+    """Joint that keeps the origin of the child's frame on the parent's z axis; 2 constraints.
 
-    An example is a bead on a wire, with friction along the line. The pin that closes a planar loop,
-    with the same constraints, is `PlanarRevolute`, with friction of the rotation.
+    An example is a bead on a wire. Friction acts along the line. `PlanarRevolute` has the same
+    constraints, but friction of rotation; it models the pin that closes a planar loop.
     """
 
     constrains = 2
@@ -86,18 +86,18 @@ class PointOnLine(Closing):
     symbol = Symbol("o", axes=(("a", 2),), anchored=True)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return p_x = p_y = 0: the point is on the z axis of the line."""
+        """Return p_x = p_y = 0: the point is on the line."""
         return ca.vertcat(p[0], p[1])
 
     def normal_force(self, friction: JointFriction, F: ca.SX, T: ca.SX) -> ca.SX:
-        """Return the magnitude of the reaction: the wire is round."""
+        """Return the magnitude of the reaction, as for a round wire."""
         return friction.normal_force(("ball",), F, T)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PlanarRevolute(Closing):
-    """Hinge that closes a planar loop: a pin that turns about z; 2 constraints.
+    """Hinge that closes a planar loop, a pin that turns about z; 2 constraints.
 
     z is normal to the plane.
     """
@@ -110,16 +110,16 @@ class PlanarRevolute(Closing):
     symbol = Symbol("o", axes=(("b", 2),), hinge=True, anchored=True)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return p_x = p_y = 0: one common point in the plane."""
+        """Return p_x = p_y = 0: the frames have a common point in the plane."""
         return ca.vertcat(p[0], p[1])
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PlanarPrismatic(Closing):
-    """Guide that closes a planar loop: slides along z without turning; 2 constraints.
+    """Guide that closes a planar loop, sliding along z without turning; 2 constraints.
 
-    y is normal to the plane. With `JointFriction.length` the moment acts at two stations.
+    y is normal to the plane. With `JointFriction.length` the moment loads two bearing stations.
     """
 
     constrains = 2
@@ -130,9 +130,7 @@ class PlanarPrismatic(Closing):
     symbol = Symbol("s", guide=True)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return the constraints: on one line, and the child's z has no component along the
-        parent's x.
-        """
+        """Return p_x = 0 and R_xz = 0: the child moves on a line and does not turn."""
         return ca.vertcat(p[0], R[0, 2])
 
 
@@ -152,7 +150,7 @@ class PinInSlot(Closing):
     symbol = Symbol("o", slot=True)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return p_x = 0: between the walls of the slot."""
+        """Return p_x = 0: the pin is between the walls of the slot."""
         return ca.SX(p[0])
 
 
@@ -161,14 +159,14 @@ EULER = tuple((f"e{i}", "1") for i in range(4))
 
 
 def _parallel(R: ca.SX) -> ca.SX:
-    """Return 2 equations for parallel axes z of both frames."""
+    """Return the two constraints that keep the z axes of both frames parallel."""
     return ca.vertcat(R[0, 2], R[1, 2])
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Revolute(Joint):
-    """Hinge joint: turns about z; 5 constraints."""
+    """Hinge joint that turns about z; 5 constraints."""
 
     coordinates = (ANGLE,)
     constrains = 5
@@ -178,22 +176,22 @@ class Revolute(Joint):
     symbol = Symbol("o", axes=(("b", 2),), hinge=True, anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
-        """Return a rotation by q about z."""
+        """Return the rotation by q about z."""
         return rotation_z(q), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return the angular velocity along z of the joint, no velocity of its point."""
+        """Return the subspace of rotations about z."""
         return unit(2), ca.SX(3, 1)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return the constraints: one common point, parallel axes."""
+        """Return the constraints of a common point and parallel axes."""
         return ca.vertcat(p, _parallel(R))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Prismatic(Joint):
-    """Sliding joint: slides along z without turning; 5 constraints."""
+    """Sliding joint that slides along z without turning; 5 constraints."""
 
     coordinates = (LENGTH,)
     constrains = 5
@@ -203,22 +201,22 @@ class Prismatic(Joint):
     symbol = Symbol("s", guide=True)
 
     def pose(self, q: ca.SX) -> Pair:
-        """Return a shift by q along z."""
+        """Return the translation by q along z."""
         return ca.SX.eye(3), ca.vertcat(0, 0, q)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return no angular velocity, velocity along z of the joint."""
+        """Return the subspace of translations along z."""
         return ca.SX(3, 1), unit(2)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return the constraints: on one line, parallel axes, no rotation."""
+        """Return the constraints of a common line, parallel axes and no rotation."""
         return ca.vertcat(p[0], p[1], _parallel(R), R[1, 0])
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Cylindrical(Joint):
-    """Cylindrical joint: slides along z and turns about it; 4 constraints."""
+    """Cylindrical joint that slides along z and turns about z; 4 constraints."""
 
     coordinates = (("slide", "m"), ("angle", "rad"))
     constrains = 4
@@ -228,22 +226,22 @@ class Cylindrical(Joint):
     symbol = Symbol("s", axes=(("a", 2),), guide=True)
 
     def pose(self, q: ca.SX) -> Pair:
-        """Return a shift by q[0] along z and a rotation by q[1] about it."""
+        """Return the translation by q[0] along z and the rotation by q[1] about z."""
         return rotation_z(q[1]), ca.vertcat(0, 0, q[0])
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return translation along z, rotation about z."""
+        """Return the subspace of translations along z and rotations about z."""
         return ca.horzcat(ca.SX(3, 1), unit(2)), ca.horzcat(unit(2), ca.SX(3, 1))
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return the constraints: on one line, parallel axes."""
+        """Return the constraints of a common line and parallel axes."""
         return ca.vertcat(p[0], p[1], _parallel(R))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Spherical(Joint):
-    """Ball joint: turns about a point; Euler parameters as coordinates; 3 constraints."""
+    """Ball joint that turns about a point, with Euler parameters as coordinates; 3 constraints."""
 
     coordinates = EULER
     constrains = 3
@@ -253,24 +251,24 @@ class Spherical(Joint):
     symbol = Symbol("o", anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
-        """Return R of the Euler parameters q."""
+        """Return the rotation with the Euler parameters q."""
         return rotation(q), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return w' = 2 G q'."""
+        """Return the subspace of all rotations, with the angular velocity 2 G q'."""
         return 2 * euler_g(q), ca.SX(3, 4)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return the constraints: one common point."""
+        """Return the constraints of a common point."""
         return ca.SX(p)
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Universal(Joint):
-    """Universal joint: turns about x of the parent and y of the child, which stay orthogonal.
+    """Universal joint that turns about the parent's x and the child's y; 4 constraints.
 
-    It has 4 constraints.
+    The two axes remain orthogonal.
     """
 
     coordinates = (("x", "rad"), ("y", "rad"))
@@ -281,30 +279,28 @@ class Universal(Joint):
     symbol = Symbol("o", axes=(("a", 0), ("b", 1)), anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
-        """Return a rotation by q[0] about x, then by q[1] about the new y."""
+        """Return the rotation by q[0] about x and then by q[1] about the new y."""
         return rotation_x(q[0]) @ rotation_y(q[1]), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return rotation about y, and about x before it."""
+        """Return the subspace of rotations about x and about the new y."""
         axes = ca.horzcat(ca.vertcat(ca.cos(q[1]), 0, ca.sin(q[1])), ca.vertcat(0, 1, 0))
         return axes, ca.SX(3, 2)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return the constraints: one common point, orthogonal axes."""
+        """Return the constraints of a common point and orthogonal axes."""
         return ca.vertcat(p, R[0, 1])
 
     def axis(self, direction: str, R: ca.SX) -> ca.SX:
-        """Return the parent's x, the child's y."""
+        """Return the parent's x axis or the child's y axis."""
         return unit(0) if direction == "x" else R[:, 1]
 
     def bearing(self, direction: str, R: ca.SX) -> ca.SX:
-        """Return the bearing on the parent's x or on the child's y, with a massless cross
-        between.
-        """
+        """Return the rotation to the bearing on the parent's x or the child's y, axis last."""
         return R[[1, 2, 0], :] if direction == "x" else ca.SX.eye(3)[[2, 0, 1], :]
 
     def displacement(self, direction: str, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return the angle about the parent's x, or about the child's y."""
+        """Return the angle about the parent's x or about the child's y."""
         if direction == "x":
             return ca.atan2(R[2, 1], R[1, 1])
         return ca.atan2(R[0, 2], R[0, 0])
@@ -313,7 +309,7 @@ class Universal(Joint):
 @final
 @dataclass(frozen=True, eq=False)
 class Planar(Joint):
-    """Planar joint: moves in the plane x, y and turns about z; 3 constraints."""
+    """Planar joint that moves in the plane x, y and turns about z; 3 constraints."""
 
     coordinates = (("x", "m"), ("y", "m"), ("angle", "rad"))
     constrains = 3
@@ -322,15 +318,15 @@ class Planar(Joint):
     symbol = Symbol("D", plate=True)
 
     def pose(self, q: ca.SX) -> Pair:
-        """Return a shift by q[0], q[1] in the plane and a rotation by q[2] about its normal."""
+        """Return the translation by q[0], q[1] in the plane and the rotation by q[2] about z."""
         return rotation_z(q[2]), ca.vertcat(q[0], q[1], 0)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return translation along x and y, rotation about z."""
+        """Return the subspace of translations along x and y and rotations about z."""
         return ca.horzcat(ca.SX(3, 2), unit(2)), ca.horzcat(ca.SX.eye(3)[:, :2], ca.SX(3, 1))
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return the constraints: in one plane, parallel normals."""
+        """Return the constraints of a common plane and parallel normals."""
         return ca.vertcat(p[2], _parallel(R))
 
 
@@ -343,38 +339,38 @@ class Fixed(Joint):
     symbol = Symbol("s", anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:
-        """Return coincident frames: identity and zero."""
+        """Return the identity and zero: the frames coincide."""
         return ca.SX.eye(3), ca.SX(3, 1)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return no columns: nothing moves."""
+        """Return the empty subspace, matrices without columns."""
         return ca.SX(3, 0), ca.SX(3, 0)
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return the constraints: one common point, all axes parallel."""
+        """Return the constraints of a common point and parallel axes."""
         return ca.vertcat(p, _parallel(R), R[1, 0])
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Floating(Joint):
-    """Free joint; Euler parameters for the rotation; no constraint."""
+    """Free joint without constraints, with Euler parameters for the rotation."""
 
     coordinates = (("x", "m"), ("y", "m"), ("z", "m"), *EULER)
     quaternion = 3
     transmits = ()
 
     def pose(self, q: ca.SX) -> Pair:
-        """Return a shift by q[:3], R of the Euler parameters q[3:]."""
+        """Return the rotation with the Euler parameters q[3:] and the translation q[:3]."""
         return rotation(q[3:]), q[:3]
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return v = q[:3]', w' = 2 G q[3:]'."""
+        """Return the subspace of all motions, with angular velocity 2 G q[3:]', velocity q[:3]'."""
         turning = ca.horzcat(ca.SX(3, 3), 2 * euler_g(q[3:]))
         return turning, ca.horzcat(ca.SX.eye(3), ca.SX(3, 4))
 
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
-        """Return no rows: all six directions are free."""
+        """Return a column without rows."""
         return ca.SX(0, 1)
 
 

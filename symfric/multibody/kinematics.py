@@ -1,6 +1,4 @@
-"""Positions, velocities and accelerations of all bodies, in one recursion from the ground
-outwards.
-"""
+"""Positions, velocities and accelerations of all bodies, by recursion from the ground."""
 
 from dataclasses import dataclass
 from math import pi
@@ -19,19 +17,19 @@ from symfric.multibody.topology import Link, Topology, body_of, frame_at
 
 @final
 class Cuts:
-    """Collection of symbols l and their values in the order of the recursions; mutable.
+    """Mutable collection of symbols l and their values in the order of the recursions.
 
-    Written out, the balance of every link depends on the coordinates of all others, and its
-    derivatives fill a matrix. With a symbol for each quantity passed between bodies (orientation,
-    velocities and accelerations outwards, wrench inwards), every equation depends on neighbours
-    only, and elimination link by link, from the tips to the ground, takes a number of operations
-    proportional to the number of links, like the articulated-body algorithm for accelerations, here
-    for all unknowns of an implicit step.
+    If all quantities are substituted, the balance of each link depends on the coordinates of all
+    links, and its Jacobian is dense. With a symbol for each quantity passed between bodies
+    (orientation, velocities and accelerations towards the tips, wrenches towards the ground), each
+    equation depends on neighbouring links only. Elimination link by link, from the tips to the
+    ground, then takes a number of operations proportional to the number of links, as in the
+    articulated-body algorithm, but for all unknowns of an implicit step.
 
     Attributes:
         symbols: l, shape (k, 1).
-        values: of l, each in terms of coordinates and of l before it.
-        links: the link that each of l belongs to.
+        values: value of each entry of l, in terms of coordinates and preceding entries of l.
+        links: number of the link to which each entry of l belongs.
     """
 
     def __init__(self) -> None:
@@ -39,7 +37,7 @@ class Cuts:
         self.links: list[int] = []
 
     def __call__(self, link: int, expression: ca.SX) -> ca.SX:
-        """Return `expression` with a symbol for every entry that is not a number or a symbol."""
+        """Return `expression` with entries other than numbers and symbols replaced by symbols."""
         cut = ca.SX(expression)
         for k in range(cut.nnz()):
             value = ca.SX(cut.nz[k])
@@ -52,7 +50,7 @@ class Cuts:
         return cut
 
     def needed(self, expression: ca.SX) -> list[int]:
-        """Return numbers of those l that `expression` depends on, directly or through others."""
+        """Return the indices of the entries of l on which `expression` depends, also indirectly."""
         found = np.zeros(len(self.links), dtype=bool)
         found[ca.jacobian_sparsity(expression, self.symbols).get_triplet()[1]] = True
         own = ca.jacobian_sparsity(self.values, self.symbols)
@@ -64,16 +62,16 @@ class Cuts:
 
 
 PARALLEL = 1e-9
-"""Differences of the derivatives of a rate between positions that are rounding."""
+"""Largest difference between derivatives of a rate at several positions due to rounding."""
 
 
 class Turn(NamedTuple):
-    """Angle of a joint that closes a loop, over full turns, as a state, and its rate [rad/s].
+    """State that counts full turns of a joint that closes a loop, and its rate [rad/s].
 
-    The pose of two bodies gives the angle between them modulo 2 pi. A force that grows with the
-    angle needs all of it: the angle becomes a state phi of the model, with the relative angular
-    velocity as its rate. It starts at the angle of the pose, with as many turns as the start of the
-    joint has, and as the other joints of its loop have made if all axes are parallel:
+    The pose of two bodies gives the angle between them modulo 2 pi. A force that depends on the
+    number of turns needs the angle as a state phi of the model, whose rate is the relative angular
+    velocity. Its initial value is the angle of the pose plus the full turns of the start of the
+    joint; if all axes are parallel, also those of the other joints of the loop:
 
         phi' = a' q'  with constant a,   so that   phi - phi_0 = a' (q - q_0)
     """
@@ -83,7 +81,7 @@ class Turn(NamedTuple):
 
 
 def constant_slopes(rate: ca.SX, qd: ca.SX) -> ca.SX | None:
-    """Return the derivatives a' of `rate` by the rates `qd`; None if they depend on positions."""
+    """Return the derivative a' of `rate` by `qd`, shape (1, n); None if it is not constant."""
     slopes = ca.densify(ca.jacobian(rate, qd))
     at = ca.symvar(slopes)
     numbers = ca.Function("slopes", [stacked(at)], [slopes])
@@ -101,10 +99,10 @@ class Motion(NamedTuple):
     """Motion of a body B relative to the world W.
 
     Attributes:
-        R, p: pose R_WB, p_WB of its origin.
-        w_B, v_B: angular velocity, velocity of the origin, in components of B.
-        dw_B, dv_B: angular acceleration, acceleration of the origin less that of gravity, in
-            components of B.
+        R, p: orientation R_WB and position p_WB of the origin.
+        w_B, v_B: angular velocity and velocity of the origin, in components of B.
+        dw_B, dv_B: angular acceleration, and acceleration of the origin minus the gravitational
+            acceleration, in components of B.
     """
 
     R: ca.SX
@@ -125,7 +123,7 @@ class Motion(NamedTuple):
         return self.R @ self.v_B
 
     def point(self, offset: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Return position and velocity in the world of a point fixed to the body."""
+        """Return the position and velocity in the world of a point fixed to the body."""
         return self.p + self.R @ offset, self.R @ (self.v_B + ca.cross(self.w_B, offset))
 
 
@@ -134,9 +132,9 @@ class Relative(NamedTuple):
 
     Attributes:
         R, p: pose.
-        w, v: relative angular velocity, velocity of the child frame's origin.
-        R_WP, p_WP: parent frame in the world.
-        p_WC: origin of the child frame in the world.
+        w, v: relative angular velocity, and velocity of the origin of the child frame.
+        R_WP, p_WP: pose of the parent frame in the world.
+        p_WC: position of the origin of the child frame in the world.
     """
 
     R: ca.SX
@@ -166,7 +164,7 @@ class Kinematics:
     turns: dict[str, Turn] | None = None
 
     def point(self, place: str) -> tuple[ca.SX, ca.SX]:
-        """Return position and velocity in the world of the origin of the frame "body.frame"."""
+        """Return the position and velocity of the origin of the frame "body.frame" in the world."""
         body, _, frame = place.partition(".")
         if body not in self.motion or frame not in self.topology.bodies[body].frames:
             raise ValueError(f"kinematics: expected a place 'body.frame', got {place}")
@@ -177,7 +175,7 @@ class Kinematics:
         return frame_at(self.topology.bodies, place)
 
     def relative(self, joint: Joint) -> Relative:
-        """Return pose and motion of the child frame of `joint` in its parent frame."""
+        """Return the pose and motion of the child frame of `joint` relative to its parent frame."""
         P, C = self.frame(joint.parent), self.frame(joint.child)
         parent, child = self.motion[body_of(joint.parent)], self.motion[body_of(joint.child)]
         R_WP = parent.R @ P.R
@@ -208,9 +206,10 @@ class Kinematics:
         return joint.pose(q)[0] @ (joint.subspace(q)[0] @ qd)
 
     def along(self, joint: Joint, direction: str) -> tuple[ca.SX, ca.SX]:
-        """Return displacement or angle of a joint in one of its `directions`, and its rate.
+        """Return the displacement or angle of a joint in one of its `directions`, and its rate.
 
-        For a constraint the angle of a joint that closes a loop lies between -pi and pi.
+        The angle of a joint that closes a loop counts full turns in forces; in constraints it is
+        between -pi and pi.
         """
         link, rate = self.topology.link_of.get(joint.name), self.rate(joint, direction)
         if link is not None:
@@ -224,7 +223,7 @@ class Kinematics:
     def _counted(
         self, turns: dict[str, Turn], joint: Joint, k: int, angle: ca.SX, rate: ca.SX
     ) -> ca.SX:
-        """Return the state, kept in `turns`, that is the `angle` of a pose over full turns."""
+        """Return the state in `turns` that equals `angle` modulo 2 pi; create it if missing."""
         name = joint.coordinate(k)
         if name not in turns:
             near, slopes = ca.SX(joint.starts[k]), constant_slopes(rate, self.qd)
@@ -250,14 +249,14 @@ class Kinematics:
 def kinematics(
     topology: Topology, q: ca.SX, qd: ca.SX, qdd: ca.SX, t: ca.SX, g: ca.SX, cuts: Cuts | None
 ) -> Kinematics:
-    """Return the motions of all bodies, by recursion from the ground outwards.
+    """Return the motions of all bodies, by recursion from the ground to the tips.
 
     Args:
-        topology: tree.
+        topology: bodies and the tree of joints.
         q, qd, qdd: coordinates, rates, accelerations, shape (n, 1).
         t: symbol of time.
-        g: gravity [m/s^2]; the ground is accelerated by -g instead, and all bodies with it.
-        cuts: introduces symbols for quantities passed between bodies.
+        g: gravity [m/s^2]; the ground, and with it every body, is accelerated by -g instead.
+        cuts: replaces quantities passed between bodies by symbols; None substitutes everything.
     """
     motion = {GROUND: Motion(ca.SX.eye(3), ZERO, ZERO, ZERO, ZERO, ca.sparsify(-g))}
     for k, link in enumerate(topology.links):
@@ -267,10 +266,10 @@ def kinematics(
 
 
 def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motion:
-    """Return the motion of the body of `link`, given that of its base A.
+    """Return the motion of the body of `link`, given the motion of its base A.
 
-    P is the joint's frame on the base, C that on the body; all terms are rotated into the body
-    before they are added, so that the contribution of the joint stays simple in its own axes.
+    P and C are the joint's frames on the base and on the body. All terms are rotated into the body
+    before they are added; the contribution of the joint is simplest in its own axes.
     """
     q, qd, qdd = q[link.rows, 0], qd[link.rows, 0], qdd[link.rows, 0]
     R_PC, p = link.pose(q)

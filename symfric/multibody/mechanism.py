@@ -1,4 +1,4 @@
-"""Builder: collects bodies, joints and forces, checks them and writes the model."""
+"""Builder of mechanisms: it collects bodies, joints and forces, checks them and builds a model."""
 
 from collections.abc import Iterable, Sequence
 from copy import copy
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 class Mechanism(packed.Portable, Showing):
-    """Mechanism of bodies, joints, forces and constraints; `build` writes the `Model`.
+    """Mechanism of bodies, joints, forces and constraints; `build` returns the `Model`.
 
     Example:
         m = Mechanism("pendulum")
@@ -50,12 +50,12 @@ class Mechanism(packed.Portable, Showing):
         m.joint(Revolute("hinge", "ground.pivot", "bob.pivot", start=0.3))
         model = m.build()
 
-    Numbers may be variables, which are passed to `build(p=(mass, length))`. Bodies, frames and
+    Numbers may be variables, which are then passed to `build(p=(mass, length))`. Bodies, frames and
     joints may be added in any order; `build` reports all mistakes in one ValueError.
 
     Args:
         name: C identifier.
-        gravity: in world components [m/s^2]; (0, 0, 0) for none.
+        gravity: gravitational acceleration in world components [m/s^2]; (0, 0, 0) for none.
     """
 
     def __init__(self, name: str, gravity: Vector = (0.0, 0.0, -9.81)) -> None:
@@ -74,7 +74,7 @@ class Mechanism(packed.Portable, Showing):
             self.forces.append(Gravity("gravity", gravity))
 
     def shown(self) -> Shown:
-        """Describe the parts added so far as a table; `build` reports its mistakes."""
+        """Return a table of the parts added so far; mistakes are reported by `build` only."""
         bodies = [body for body in self.bodies if body.name != GROUND]
         loops = max(0, len(self.joints) - len(bodies))
         rows = [(b.name, "body", f"{figure_of(b.mass)} kg", "") for b in bodies]
@@ -93,7 +93,7 @@ class Mechanism(packed.Portable, Showing):
         )
 
     def thumbnail(self) -> "Figure | None":
-        """Return a small figure of the machine at its start; None if it cannot be built yet."""
+        """Return a small figure of the mechanism at its start; None if it cannot be built yet."""
         from symfric.results.animation import still  # noqa: PLC0415  (matplotlib is slow to import)
 
         try:
@@ -138,15 +138,15 @@ class Mechanism(packed.Portable, Showing):
             )
 
     def joint(self, joint: Joint) -> None:
-        """Add a joint; `build` reports its mistakes, with its path."""
+        """Add a joint; `build` reports mistakes with the path of the joint."""
         self._take(self.joints, joint, Joint)
 
     def force(self, force: Force) -> None:
-        """Add a force; `build` reports its mistakes, with its path."""
+        """Add a force; `build` reports mistakes with the path of the force."""
         self._take(self.forces, force, Force)
 
     def constraint(self, constraint: Constraint) -> None:
-        """Add a constraint other than a joint: prescribed motion, a coupling, an expression."""
+        """Add a constraint other than a joint: prescribed motion, coupling or expression."""
         self._take(self.constraints, constraint, Constraint)
 
     def _take(self, group: list[Any], part: object, wanted: type) -> None:
@@ -169,16 +169,16 @@ class Mechanism(packed.Portable, Showing):
     def build(
         self, p: Variables = (), formulation: str = "joint", index: int | None = None
     ) -> Model:
-        """Write the model.
+        """Return the model.
 
         Args:
-            p: parameters, whose symbols the numbers of bodies, joints and forces may contain.
-            formulation: "joint" has the coordinates of the joints of a spanning tree and
-                constraints for its loops; "absolute" has position and Euler parameters of every
-                body and constraints for every joint, several times more expensive.
-            index: treatment of the constraints: 0 integrates in their tangent space, 1 in all
-                coordinates with a projection at the end of every step; None takes the faster one,
-                0 for absolute coordinates and 1 for those of joints. Same solution, to the
+            p: parameters whose symbols the numbers of bodies, joints and forces may contain.
+            formulation: "joint" uses the coordinates of the joints of a spanning tree and
+                constraints for loops; "absolute" uses position and Euler parameters of every body
+                and constraints for every joint, and is several times more expensive.
+            index: treatment of the constraints: 0 integrates in their tangent space, 1 integrates
+                all coordinates and projects at the end of every step. None selects the faster one:
+                0 for absolute coordinates, 1 for joint coordinates. Both solutions agree to the
                 tolerance.
 
         Raises:
@@ -190,7 +190,7 @@ class Mechanism(packed.Portable, Showing):
         return assemble(self.name, self.prepare(p, formulation), tuple(self.inputs), chosen)
 
     def prepare(self, p: Variables = (), formulation: str = "joint") -> Prepared:
-        """Return the equations of motion with their variables, checked.
+        """Check the mechanism and return its equations of motion with their variables.
 
         Raises:
             ValueError: all mistakes at once, each with its path.
@@ -219,10 +219,11 @@ class Mechanism(packed.Portable, Showing):
     def _tree(self, p: Variables, closed: bool = True) -> Topology:
         """Return the bodies with their frames and the spanning tree of the joints.
 
-        `closed`: True if the start has to close the loops.
+        `closed`: True if the start values must close the loops.
 
         Raises:
-            ValueError: all mistakes that can be found without equations, and those of the start.
+            ValueError: all mistakes that can be found without equations, and inconsistent start
+                values.
         """
         bodies, problems = self._placed()
         u = tuple(self.inputs)
@@ -258,16 +259,16 @@ class Mechanism(packed.Portable, Showing):
         return [replace(body, frames=placed[body.name]) for body in self.bodies], problems
 
     def assembled(self, p: Variables = ()) -> "Mechanism":
-        """Return a copy whose joints start at the nearest position and velocity that close all
-        loops.
+        """Return a copy that starts at the nearest positions and velocities that close all loops.
 
-        Nonzero rates are kept if the other joints can follow them.
+        Nonzero rates are kept if the rates of the other joints can satisfy the constraints.
 
         Args:
-            p: parameters, at whose start values they close.
+            p: parameters; the loops are closed for their start values.
 
         Raises:
-            ValueError: all mistakes at once, each with its path; there is no position near.
+            ValueError: all mistakes at once, each with its path; or no position near the start
+                closes the loops.
         """
         made = written(self._tree(p, closed=False), self.forces, self.constraints, p)
         self._refuse(made.problems)

@@ -29,28 +29,29 @@ from symfric.multibody.topology import Topology, absolute
 
 Array = NDArray[np.float64]
 LONG, LONG_WITH_FRICTION = 16, 12
-"""Number of links of a chain from which cuts save operations. Friction from reactions makes the
-full derivatives more expensive.
+"""Number of links of a chain from which cuts save operations.
+
+The second number is for friction from reactions, which makes dense derivatives more expensive.
 """
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """Equations with their variables and start values.
+    """Equations of a mechanism with their variables and start values.
 
     Attributes:
         eq: equations without redundant constraints.
         p: parameters.
         q, qd: coordinates and rates with consistent start values.
-        q0, qd0: the same as numbers.
+        q0, qd0: start values of q and qd as numbers.
         labels: names of the multipliers.
-        redundant: names of the constraints that were left out.
+        redundant: names of the multipliers of omitted constraints.
         undetermined: joints whose normal force is undetermined because of redundant constraints.
         open_reactions: joints whose reactions are undetermined.
-        singular: True if constraints that are independent nearby are not at the start.
-        problems: invalid constraints.
-        misfits: violations of constraints at the start, redundant ones included.
+        singular: True if constraints are dependent at the start but independent near it.
+        problems: messages about invalid constraints.
+        misfits: messages about constraints violated at the start, including redundant ones.
     """
 
     eq: Equations
@@ -70,9 +71,9 @@ class Prepared:
     def numbers(
         self, *expressions: ca.SX, others: Callable[[int], Array] = np.zeros
     ) -> list[Array]:
-        """Return expressions of q, qd, p and t at the start, as matrices.
+        """Return the values of expressions of q, qd, p and t at the start, as matrices.
 
-        `others` returns values of all other symbols, given their number.
+        `others` returns the values of all other symbols, given the number of these symbols.
         """
         eq, p = self.eq, symbols_of(self.p)
         known = ca.vertcat(eq.q, eq.qd, p, eq.kin.t)
@@ -84,7 +85,7 @@ class Prepared:
 
     @property
     def position(self) -> start.Position:
-        """Function q -> (phi, phi_q, phi_t) at time 0 and the start values of the parameters."""
+        """Function q -> (phi, phi_q, phi_t) at time 0 with the start values of the parameters."""
         eq = self.eq
         parts = [eq.phi, ca.densify(eq.Phi_q), ca.densify(eq.phi_t)]
         every = ca.Function("at", [eq.q, symbols_of(self.p), eq.kin.t], parts)
@@ -98,7 +99,7 @@ class Prepared:
 
 
 def coordinates(topology: Topology) -> tuple[Variables, Variables]:
-    """Return joint coordinates and their rates as variables of a model."""
+    """Return the joint coordinates and their rates as variables of a model."""
     q: list[Variable] = []
     qd: list[Variable] = []
     for link in topology.links:
@@ -118,7 +119,7 @@ def coordinates(topology: Topology) -> tuple[Variables, Variables]:
 def written(
     topology: Topology, forces: Sequence[Force], constraints: Sequence[Constraint], p: Variables
 ) -> Prepared:
-    """Return the equations of independent constraints."""
+    """Return the equations of motion with independent constraints only."""
     q, qd = coordinates(topology)
     q0, qd0 = (at_start(starts_of(group), p).full().ravel() for group in (q, qd))
     t = ca.SX.sym("t")
@@ -130,7 +131,7 @@ def written(
         return made
     at = made.position
     made = replace(made, misfits=tuple(_misfits(made, at)))
-    # a norm may be implied by closed loops, but its multiplier also carries theirs along p
+    # norms are kept even if loops imply them: their multipliers also contain loop terms along p
     found = start.rank(at, q0, range(eq.m - eq.norms, eq.m))
     if not found.redundant:
         return replace(made, singular=found.singular)
@@ -149,7 +150,7 @@ def written(
 
 
 def _held(eq: Equations, constraints: Sequence[Constraint], p: Variables) -> Iterator[str]:
-    """Yield reasons why constraints are invalid, including dependencies on other symbols."""
+    """Yield reasons why constraints are invalid, including symbols that they must not contain."""
     known = ca.vertcat(eq.q, eq.kin.t, symbols_of(p))
     for constraint, part in zip(constraints, eq.held, strict=True):
         where = f"{constraint.kind} '{constraint.name}'"
@@ -163,7 +164,7 @@ def _held(eq: Equations, constraints: Sequence[Constraint], p: Variables) -> Ite
 
 
 def _misfits(made: Prepared, at: start.Position) -> Iterator[str]:
-    """Yield violations of constraints at the start, with the nearest consistent values."""
+    """Yield messages about constraints violated at the start, with the nearest valid values."""
     phi, J, phi_t = at(made.q0)
     speed = J @ made.qd0 + phi_t
     fast = start.FITS * max(1.0, float(np.abs(made.qd0).max()))
@@ -178,8 +179,9 @@ def _misfits(made: Prepared, at: start.Position) -> Iterator[str]:
 
 
 def _offer(what: str, made: Prepared, off: Array, group: Variables, near: Array | None) -> str:
-    """Return the message about the worst entry of `off`, with consistent values `near` the start
-    of the variables in `group`.
+    """Return the message about the largest entry of `off`.
+
+    The message offers the consistent values `near` for the variables in `group`.
     """
     worst = int(np.abs(off).argmax())
     offer = "no position near it satisfies them"
@@ -195,7 +197,7 @@ def _offer(what: str, made: Prepared, off: Array, group: Variables, near: Array 
 def _undetermined(
     made: Prepared, rows: Iterable[tuple[str, ca.SX]], free: Array
 ) -> tuple[str, ...]:
-    """Return joints whose `rows` change with combinations `free` of the multipliers."""
+    """Return the joints whose `rows` depend on the combinations `free` of the multipliers."""
     pairs = [(name, ca.vec(row)[i]) for name, row in rows for i in range(row.numel())]
     slopes = ca.jacobian(stacked(row for _, row in pairs), made.eq.lam)
     (slopes,) = made.numbers(slopes, others=np.random.default_rng(1).standard_normal)
@@ -205,9 +207,9 @@ def _undetermined(
 
 
 def _fixed_already(made: Prepared, constraints: Sequence[Constraint], free: Array) -> Iterator[str]:
-    """Yield constraints in time whose multipliers take part in the combinations `free`.
+    """Yield messages about constraints in time with multipliers in the combinations `free`.
 
-    Two motions prescribed for one coordinate agree only at the start.
+    For example, two prescribed motions of one coordinate agree only at the start.
     """
     phi, t = made.eq.phi, made.eq.kin.t
     involved = np.abs(free).max(axis=1) > start.RANK
@@ -223,7 +225,7 @@ def _fixed_already(made: Prepared, constraints: Sequence[Constraint], free: Arra
 
 
 def in_absolute_coordinates(tree: Prepared, constraints: Sequence[Constraint]) -> Prepared:
-    """Return the same mechanism in absolute coordinates, from the same start."""
+    """Return the equations of the mechanism in absolute coordinates, with the same start."""
     kin = tree.eq.kin
     starts: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {}
     for name, body in kin.topology.bodies.items():
@@ -286,7 +288,7 @@ def infinite(made: Prepared) -> Iterator[str]:
 
 
 def without_inertia(made: Prepared) -> Iterator[str]:
-    """Yield messages about coordinates without inertia, at the start or near it."""
+    """Yield messages about coordinates without inertia near the start."""
     eq = made.eq
     if not any(eq.kin.topology.bodies[link.body].ideal for link in eq.kin.topology.links):
         return
@@ -302,7 +304,7 @@ def without_inertia(made: Prepared) -> Iterator[str]:
 
 
 def inseparable(made: Prepared) -> Iterator[str]:
-    """Yield messages about bodies that have no equations of their own."""
+    """Yield messages about bodies whose inertia does not allow absolute coordinates."""
     for name, body in made.eq.kin.topology.bodies.items():
         if body.ideal and name != GROUND and any(replace(body, ideal=False).problems(made.p)):
             yield (
@@ -312,7 +314,7 @@ def inseparable(made: Prepared) -> Iterator[str]:
 
 
 def without_friction(made: Prepared, u: Variables) -> tuple[Array, Array, Array]:
-    """Return accelerations, multipliers and normal forces at the start without friction."""
+    """Return the accelerations, multipliers and normal forces at the start without friction."""
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
     turned = ca.densify(starts_of(turn.angle for turn in eq.turns))
@@ -334,8 +336,9 @@ def without_friction(made: Prepared, u: Variables) -> tuple[Array, Array, Array]
 
 
 def with_cuts(made: Prepared) -> Equations | None:
-    """Return the equations of a long open chain with cuts; None if they would not save
-    operations.
+    """Return the equations with cuts; None if cuts do not save operations.
+
+    Cuts save operations in long open chains.
     """
     eq, topology = made.eq, made.eq.kin.topology
     loaded = ca.depends_on(stacked(eq.normals), eq.a)

@@ -1,4 +1,4 @@
-"""Results of a mechanism: its outputs and its sketch."""
+"""Results of a mechanism: additional outputs and the sketch."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -19,17 +19,17 @@ from symfric.multibody.spatial import GROUND
 from symfric.multibody.topology import body_of
 
 Put = Callable[[Sequence[ca.SX]], list[ca.SX]]
-"""Expressions in accelerations and friction forces -> the same in the symbols of the model."""
+"""Function that rewrites expressions of accelerations and forces in the symbols of the model."""
 
 
 def results(eq: Equations, undetermined: Sequence[str], p: ca.SX, put: Put) -> dict[str, Output]:
-    """Return all further results by name.
+    """Return reactions, motions of centres of mass, and powers, by name.
 
     Args:
         eq: equations of the mechanism.
-        undetermined: names of joints whose reactions are not unique; they are left out.
+        undetermined: names of joints whose reactions are not unique and are omitted.
         p: symbols of the parameters.
-        put: converts expressions to the symbols of the model.
+        put: function that rewrites expressions in the symbols of the model.
     """
     found = [
         *_reactions(eq, undetermined),
@@ -46,9 +46,9 @@ def results(eq: Equations, undetermined: Sequence[str], p: ca.SX, put: Put) -> d
 
 
 def _reactions(eq: Equations, undetermined: Sequence[str]) -> Iterator[tuple[str, Output]]:
-    """Yield force [N] and moment [N m] on the child of each joint about its joint point.
+    """Yield the reaction force [N] and moment [N m] on the child of each joint at its joint point.
 
-    They are in the axes of the joint's frame on the child; friction, motors and springs along or
+    Components are those of the joint's frame on the child. Friction, motors and springs along or
     about the axis of the joint are not included.
     """
     for name, joint in eq.kin.topology.joints.items():
@@ -67,7 +67,7 @@ def _reactions(eq: Equations, undetermined: Sequence[str]) -> Iterator[tuple[str
 
 
 def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
-    """Yield positions [m] and velocities [m/s] of all centres of mass in the world."""
+    """Yield the positions [m] and velocities [m/s] of all centres of mass in the world."""
     for name, motion in eq.kin.motion.items():
         if name == GROUND:
             continue
@@ -79,10 +79,11 @@ def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
 
 
 def _work(eq: Equations, still: ca.SX) -> Iterator[tuple[str, Output]]:
-    """Yield powers [W] that change the sum of kinetic energy and of potentials of q alone.
+    """Yield the powers [W] that change the conserved energy, and this energy [J].
 
-    A potential that depends on anything but `still` (for example, a spring attached to an input or
-    to time) does not count as one: the whole power of its force is included.
+    The conserved energy is the kinetic energy plus the potentials that depend on the symbols
+    `still` only. Other potentials, for example that of a spring attached to an input or to time,
+    are excluded: the whole power of such a force is yielded.
     """
     kin, conserved = eq.kin, eq.kinetic
     positions = ca.vertcat(eq.q, eq.angles)
@@ -109,11 +110,11 @@ def _work(eq: Equations, still: ca.SX) -> Iterator[tuple[str, Output]]:
 
 
 CONSTRAINT = {"N": "m", "N m": "rad", "N/m": "m^2"}
-"""Unit of a multiplier -> that of its constraint: their product is an energy."""
+"""Unit of a constraint by the unit of its multiplier; their product is an energy."""
 
 
 def constraint_units(units: list[str]) -> tuple[str, str, str]:
-    """Return units of the norms of the constraints on three levels; "" if they differ."""
+    """Return the units of the norms of phi, phi' and phi''; "" if constraints differ in unit."""
     kinds = {CONSTRAINT.get(unit, "") for unit in units}
     unit = kinds.pop() if len(kinds) == 1 else ""
     return (unit, f"{unit}/s", f"{unit}/s^2") if unit else ("", "", "")
@@ -126,8 +127,8 @@ def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
     """Return the sketch of a mechanism.
 
     Args:
-        eq: its equations.
-        scales: contact -> velocity [m/s] below which it counts as sticking.
+        eq: equations of the mechanism.
+        scales: sliding velocity [m/s] below which a contact is drawn as sticking, by its name.
     """
     kin = eq.kin
     bodies, joints = kin.topology.bodies, kin.topology.joints.values()
@@ -164,7 +165,7 @@ def _mark(
     used: dict[str, int],
     slips: tuple[tuple[str, float], ...] = (),
 ) -> Mark:
-    """Return a mark whose first end is on the ground, if one is and it may be the first."""
+    """Return a mark; if possible, its first end is the end that is on the ground."""
     grounded = GROUND in (body_of(end) for end in ends[: 1 if symbol.slot else 2])
     if grounded and body_of(ends[0]) != GROUND and symbol.turnable:
         ends = ends[1], ends[0]
@@ -172,5 +173,5 @@ def _mark(
 
 
 def _column(motion: Motion, R: ca.SX, offset: ca.SX) -> ca.SX:
-    """Return axes and position of a place on a body, shape (12, 1)."""
+    """Return the axes and the position of a place on a body, shape (12, 1)."""
     return ca.densify(ca.vertcat(ca.vec(motion.R @ R), motion.point(offset)[0]))

@@ -24,13 +24,14 @@ class Slip:
     """Contact with its unknowns in the model.
 
     Attributes:
-        unknown: its normal force as algebraic variable, if it depends on the reactions and the law
-            depends on it.
-        N: normal force as passed to the law.
-        normal: its expression in terms of accelerations and multipliers.
-        states, rate: of the law.
-        force: friction force [N], of a ball a vector.
-        inputs: the applied force by name, for a law that needs it.
+        contact: the contact.
+        unknown: the normal force as an algebraic variable, if it depends on reactions and the law
+            depends on it; otherwise empty.
+        N: normal force that the law is evaluated with.
+        normal: normal force in terms of accelerations and multipliers.
+        states, rate: states of the law and their derivatives.
+        force: friction force [N]; for a ball a vector.
+        inputs: the applied force by name, if the law needs it.
     """
 
     contact: Contact
@@ -44,17 +45,18 @@ class Slip:
 
 
 def depends_on_load(law: Law) -> bool:
-    """Return True if friction force or states of `law` depend on the normal force."""
+    """Return True if the friction force or the rates of `law` depend on the normal force."""
     N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
     v = ca.SX.sym("v")
     return ca.depends_on(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)), N)
 
 
 def keeps_deflection(law: Law) -> bool:
-    """Return True if bristles deflect with the load.
+    """Return True if the deflection of the bristles depends on the load.
 
-    At the deflection of a larger load their damping (`LuGre`) or their rate (`Dahl`) grows without
-    bound as the load falls. `LoadNormalised` takes laws of v and N only.
+    If a deflection of a larger load remains, the damping (`LuGre`) or the rate (`Dahl`) of the
+    bristles grows without bound as the load falls. Laws that need more than v and N return False,
+    because `LoadNormalised` does not accept them.
     """
     N, z, v = ca.SX.sym("N"), ca.SX.sym("z", len(law.states)), ca.SX.sym("v")
     if law.inputs or not law.states or not ca.depends_on(ca.SX(law.steady_state(v, N)), N):
@@ -66,12 +68,12 @@ def keeps_deflection(law: Law) -> bool:
 def slips(
     eq: Equations, normal_at_start: Sequence[float], groups: Sequence[Rest] = ()
 ) -> tuple[Slip, ...]:
-    """Return the friction laws of all contacts.
+    """Return all contacts with their unknowns.
 
     Args:
-        eq: the equations of motion.
-        normal_at_start: normal force of each contact [N].
-        groups: the contacts whose laws need the applied force.
+        eq: equations of motion.
+        normal_at_start: normal force of each contact at the start [N].
+        groups: groups of contacts whose laws need the applied force.
     """
     unknowns, pressing = dict[str, Variable](), list[ca.SX]()
     for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
@@ -91,14 +93,14 @@ def slips(
     slides = [c.slip for c in eq.contacts]
     for rest in groups:
         for i, g in zip(rest.members, rest.along, strict=True) if rest.direction else ():
-            # in a moving loop no velocity that determines a mode at the start is zero
+            # a contact at its dead centre has no velocity that could determine its mode
             slides[i] = forward(g) * smooth.sign(rest.rate, 0.0)
     found: list[Slip] = []
     for i, contact in enumerate(eq.contacts):
         law, N = contact.law, pressing[i]
         states = _states(contact, ca.SX(law.steady_state(slides[i], normal_at_start[i])))
         z, inputs = symbols_of(states), {FORCE: applied[i]} if i in applied else {}
-        # a ball may turn about some axes only; what is put for the symbols of F must be dense
+        # dense, because these expressions replace the symbols of F
         rate, force = (
             ca.densify(ca.SX(of(contact.slip, N, z, **inputs))) for of in (law.rate, law.force)
         )
@@ -109,7 +111,7 @@ def slips(
 
 
 def _states(contact: Contact, begin: ca.SX) -> Variables:
-    """Return states of a law with their names in the model."""
+    """Return the states of a law with their names in the model."""
     return tuple(
         Variable(
             f"{contact.name}_{s.name}",
@@ -124,7 +126,7 @@ def _states(contact: Contact, begin: ca.SX) -> Variables:
 
 
 def events(contacts: Sequence[Slip], groups: Sequence[Rest], rates: Variables) -> tuple[Event, ...]:
-    """Return the mode changes of all laws, with their states under their names in the model."""
+    """Return the mode changes of all laws, with the names of states in the model."""
     in_loops = {i for rest in groups if rest.direction for i in rest.members}
     still = {rest.members[0]: rest.still for rest in groups if not rest.direction}
     names = {v.name for v in rates}
@@ -141,9 +143,10 @@ def events(contacts: Sequence[Slip], groups: Sequence[Rest], rates: Variables) -
 
 
 def _of_contact(slip: Slip, rest: dict[str, float]) -> Iterator[Event]:
-    """Yield mode changes of a single contact, at whose stop the states in `rest` get their values.
+    """Yield the mode changes of a single contact; a stop also sets the states in `rest`.
 
-    A contact that stops first sticks: only the solution of the stick equations shows if it can.
+    A contact that stops always sticks first: only the solution of the stick equations determines
+    whether it breaks away again.
     """
     contact, z = slip.contact, symbols_of(slip.states)
     found = contact.law.switches(contact.slip, slip.N, z, **slip.inputs)
@@ -162,7 +165,7 @@ def _of_contact(slip: Slip, rest: dict[str, float]) -> Iterator[Event]:
 
 
 def _of_loop(rest: Rest, contacts: Sequence[Slip]) -> Iterator[Event]:
-    """Yield end of motion, break-away and dead centres of a loop of one degree of freedom."""
+    """Yield the stop, break-away and dead centres of a loop of one degree of freedom."""
     m, T, omega = rest.direction[0].symbol, rest.force.symbol, rest.rate
     top = rest.capacity([capacity_of(s.contact.law, s.N) for s in contacts])
     modes = [_modes(s) for s in contacts]
@@ -192,7 +195,7 @@ def _of_loop(rest: Rest, contacts: Sequence[Slip]) -> Iterator[Event]:
 
 
 def _modes(slip: Slip) -> list[str]:
-    """Return names of the states of a contact that are its mode."""
+    """Return the names of the states that represent the mode of a contact."""
     z = symbols_of(slip.states)
     found = switches_at(slip.contact.law, slip.contact.slip, slip.N, z, ca.SX(0.0))
     return [f"{slip.contact.name}_{state}" for s in found if s.halts for state in s.reset]

@@ -1,7 +1,7 @@
-"""Rotations, Euler parameters and frames as pure functions of SX, and rigid bodies.
+"""Rotations, Euler parameters, frames and rigid bodies.
 
-Monogram notation: `R_AB` turns components in B into components in A, `p_AB` leads from A to B in
-components of A. Euler parameters p = (e0, e), |p| = 1, of the rotation R = E G':
+Monogram notation: `R_AB` converts components in B to components in A, `p_AB` is the vector from A
+to B in components of A. Euler parameters p = (e0, e), |p| = 1, of the rotation R = E G':
 
     E = [-e, e~ + e0 I],  G = [-e, -e~ + e0 I],  w = 2 E p' (in A),  w' = 2 G p' (in B)
 
@@ -104,12 +104,12 @@ def euler_parameters(R: ca.DM) -> ca.DM:
 @final
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Place on a body: position of its origin [m] and directions of its axes.
+    """Frame fixed to a body.
 
     Attributes:
-        at: position from the origin of the body, in the body's components.
-        z, x: directions; z is the axis of a joint, x is made orthogonal to it, y = z x x. Without
-            x any direction orthogonal to z is taken.
+        at: position of the origin relative to that of the body [m], in the body's components.
+        z, x: directions of the axes. z is the axis of a joint, x is made orthogonal to z, and y is
+            z x x. If x is None, an arbitrary direction orthogonal to z is used.
     """
 
     at: Vector = (0.0, 0.0, 0.0)
@@ -124,7 +124,7 @@ class Frame:
         z = _unit("z", self.z)
         if self.x is None:
             smallest = min(range(3), key=lambda i: abs(float(z[i])))
-            # cyclic: a frame without directions has the axes of the body
+            # the default frame has the axes of the body
             x = ca.DM([float(i == (smallest if abs(float(z[2])) < 1 else 0)) for i in range(3)])
         else:
             x = _unit("x", self.x)
@@ -137,7 +137,7 @@ class Frame:
 
 
 def _unit(name: str, a: Any) -> ca.DM:
-    """Return the direction of length one of three numbers."""
+    """Return the unit vector in the direction of three numbers."""
     numbers = is_vector(a) and not is_symbolic(vector(a))
     length = float(ca.norm_2(ca.DM(vector(a)))) if numbers else 0.0
     if not 0.0 < length < ca.inf:
@@ -149,7 +149,7 @@ Array = NDArray[np.float64]
 GROUND = "ground"
 """Name of the fixed body."""
 TRIANGLE = 1e-9
-"""Relative rounding of principal moments that is not a mistake."""
+"""Relative rounding error that is accepted in principal moments."""
 
 
 @final
@@ -159,14 +159,14 @@ class Body:
 
     Attributes:
         name: C identifier.
-        mass: [kg].
-        inertia: about the centre of mass, in the body's axes [kg m^2]: three principal moments, or
-            six numbers Jxx, Jyy, Jzz, Jxy, Jxz, Jyz.
-        com: centre of mass from the origin of the body [m].
-        frames: places where joints and forces act; "" is the origin.
-        ideal: True to accept mass and inertia unchecked: a massless link between two joints, a
-            point mass, unphysical numbers. The mass matrix of the mechanism must still be positive
-            definite at the start.
+        mass: mass [kg].
+        inertia: inertia about the centre of mass in the body's axes [kg m^2]: three principal
+            moments, or six numbers Jxx, Jyy, Jzz, Jxy, Jxz, Jyz.
+        com: position of the centre of mass relative to the origin of the body [m].
+        frames: frames where joints and forces act, by name; "" is the origin.
+        ideal: True to accept mass and inertia unchecked, for a massless link between two joints, a
+            point mass, or unphysical numbers. The mass matrix of the mechanism must still be
+            positive definite at the start.
     """
 
     name: str
@@ -178,7 +178,7 @@ class Body:
 
     @property
     def J(self) -> ca.SX:
-        """Inertia about the centre of mass, shape (3, 3)."""
+        """Inertia about the centre of mass [kg m^2], shape (3, 3)."""
         J = ca.diag(ca.SX(ca.vertcat(*self.inertia[:3])))
         if len(self.inertia) == 6:
             for (i, j), value in zip(((0, 1), (0, 2), (1, 2)), self.inertia[3:], strict=True):
@@ -187,11 +187,11 @@ class Body:
 
     @property
     def c(self) -> ca.SX:
-        """Centre of mass from the origin of the body [m], shape (3, 1)."""
+        """Position of the centre of mass relative to the origin [m], shape (3, 1)."""
         return vector(self.com)
 
     def problems(self, p: Sequence[Variable]) -> Iterator[str]:
-        """Yield problems of the numbers, with the parameters `p` at their start values."""
+        """Yield messages about invalid numbers, with the parameters `p` at their start values."""
         wrong = list(self._no_numbers())
         if wrong:
             yield from wrong
@@ -209,7 +209,7 @@ class Body:
         yield from (f"{text}{hint}" for text in unphysical(numbers[1:].reshape(3, 3)))
 
     def _no_numbers(self) -> Iterator[str]:
-        """Yield values that are not numbers, or of a wrong count."""
+        """Yield messages about values that are not numbers or whose count is wrong."""
         inertia: Any = self.inertia
         if not is_scalar(self.mass):
             yield f"mass: expected a number [kg], got {shown(self.mass)}"
@@ -229,7 +229,7 @@ def unphysical(J: Array, point: bool = False) -> Iterator[str]:
 
     Args:
         J: shape (3, 3).
-        point: True to allow principal moments of zero: a point, a thin rod.
+        point: True to allow principal moments of zero, as those of a point or a thin rod.
     """
     principal = np.linalg.eigvalsh(J)
     spread = TRIANGLE * abs(principal[2])

@@ -1,4 +1,4 @@
-"""Consistent start values and independent constraints of a mechanism, as numbers."""
+"""Numerical computation of consistent start values and independent constraints."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -8,25 +8,25 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Position = Callable[[Array], tuple[Array, Array, Array]]
-"""q -> (phi, phi_q, phi_t) at time 0, shapes (m,), (m, n), (m,)."""
+"""Function q -> (phi, phi_q, phi_t) at time 0, shapes (m,), (m, n), (m,)."""
 FITS = 1e-8
-"""Largest violation of a constraint at the start [m, m/s]."""
+"""Largest accepted violation of a constraint at the start [m, m/s]."""
 FASTEST = 1e4
-"""Largest ratio of dependent to independent rates; it is exceeded at a dead centre only."""
+"""Largest ratio of dependent to independent rates; larger ratios occur only at a dead centre."""
 RANK = 1e-9
-"""Singular values below this fraction of the largest count as zero."""
+"""Fraction of the largest singular value below which singular values count as zero."""
 SINGULAR = 1e-12
-"""Eigenvalues of a mass matrix of unit diagonal below this count as zero."""
+"""Value below which eigenvalues of a mass matrix with unit diagonal count as zero."""
 
 
 class Rank(NamedTuple):
-    """Constraints that determine the motion.
+    """Independent and redundant constraints.
 
     Attributes:
-        kept: indices of independent constraints.
-        redundant: indices of the others.
-        undetermined: multiplier combinations without effect on the motion, shape (m, k).
-        singular: True if the rank drops at the start position itself.
+        kept: indices of independent constraints, which determine the motion.
+        redundant: indices of all other constraints.
+        undetermined: combinations of multipliers without effect on the motion, shape (m, k).
+        singular: True if the rank at the start is lower than near it.
     """
 
     kept: tuple[int, ...]
@@ -36,11 +36,12 @@ class Rank(NamedTuple):
 
 
 def rank(at: Position, q: Array, first: Sequence[int]) -> Rank:
-    """Return independent constraints near q, by elimination with full pivoting.
+    """Return the independent constraints near q, by Gram-Schmidt with pivoting.
 
     Args:
-        at: q -> (phi, phi_q, phi_t).
-        first: constraints that are kept in any case, independent of each other.
+        at: function q -> (phi, phi_q, phi_t).
+        q: start position, shape (n,).
+        first: indices of constraints that are always kept; they must be independent.
     """
     here = at(q)[1]
     near = here
@@ -62,9 +63,10 @@ def _rank(A: Array) -> int:
 
 
 def _independent(A: Array, r: int, first: Sequence[int]) -> list[int]:
-    """Return indices of r independent rows: `first`, then by Gram-Schmidt the largest remainder.
+    """Return the indices of r independent rows, beginning with `first`, by Gram-Schmidt.
 
-    Of equal rows the first is taken, so that the joints named first are kept completely.
+    The next row is the first whose remainder is more than half the largest, so that the constraints
+    of the joints that were added first are kept.
     """
     left, chosen = A.copy(), list[int]()
     for k in range(r):
@@ -77,9 +79,9 @@ def _independent(A: Array, r: int, first: Sequence[int]) -> list[int]:
 
 
 def weightless(M: Array) -> NDArray[np.bool_]:
-    """Return a mask of coordinates that make the mass matrix M (n, n) not positive definite.
+    """Return a mask of the coordinates in which the mass matrix M (n, n) is not positive definite.
 
-    Each is scaled by its own inertia, so that units and sizes do not matter.
+    M is scaled to unit diagonal, so that the result does not depend on units.
     """
     own = np.diag(M)
     if not (own > 0).all():
@@ -91,8 +93,8 @@ def weightless(M: Array) -> NDArray[np.bool_]:
 def following(J: Array, wanted: Array, phi_t: Array) -> Array:
     """Return rates near `wanted` that satisfy J rates + phi_t = 0.
 
-    Nonzero rates are kept if possible, and the others follow; otherwise the nearest rates are
-    taken.
+    Nonzero rates are kept if changes of the zero rates can satisfy the equations; otherwise the
+    nearest rates in the sense of least squares are returned.
     """
     if not J.size:
         return wanted
@@ -107,9 +109,7 @@ def following(J: Array, wanted: Array, phi_t: Array) -> Array:
 
 
 def project(at: Position, q: Array, iterations: int = 30) -> Array | None:
-    """Return the nearest q that satisfies the constraints, by Gauss-Newton; None if there is
-    none.
-    """
+    """Return q near the given one that satisfies the constraints; None if Gauss-Newton fails."""
     for _ in range(iterations):
         phi, J, _ = at(q)
         if not phi.size or np.abs(phi).max() < 1e-13:

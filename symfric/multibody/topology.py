@@ -14,12 +14,12 @@ from symfric.multibody.spatial import GROUND, Body, Frame, skew
 
 
 def body_of(place: str) -> str:
-    """Return the body in "body.frame"."""
+    """Return the name of the body in "body.frame"."""
     return place.partition(".")[0]
 
 
 def frame_at(bodies: Mapping[str, Body], place: str) -> Frame:
-    """Return the frame "body.frame"; the origin of the body if no frame is named."""
+    """Return the frame "body.frame"; for "body" the frame at the origin of the body."""
     body, _, frame = place.partition(".")
     return bodies[body].frames[frame]
 
@@ -27,14 +27,14 @@ def frame_at(bodies: Mapping[str, Body], place: str) -> Frame:
 @final
 @dataclass(frozen=True, eq=False)
 class Link:
-    """Body with the joint that connects it to a body nearer to the ground.
+    """Body with the joint that connects it to a base nearer to the ground.
 
     Attributes:
-        base, body: names; the body moves relative to the base.
+        base, body: names of the two bodies.
         joint: the joint between them.
-        reverse: True if the joint's child is the base.
-        at_base, at_body: the joint's frames there.
-        first: index of its first coordinate.
+        reverse: True if the base is the child of the joint.
+        at_base, at_body: frames of the joint on the base and on the body.
+        first: index of the first coordinate.
     """
 
     base: str
@@ -52,7 +52,7 @@ class Link:
 
     @property
     def rows(self) -> slice:
-        """Slice of its coordinates."""
+        """Slice of the link's coordinates in q."""
         return slice(self.first, self.first + self.n)
 
     def pose(self, q: ca.SX) -> Pair:
@@ -61,7 +61,7 @@ class Link:
         return (R.T, -R.T @ p) if self.reverse else (R, p)
 
     def subspace(self, q: ca.SX) -> Pair:
-        """Return the motion subspace, as seen from the base."""
+        """Return the subspace (H_w, H_v) of the motion of the body relative to the base."""
         H_w, H_v = self.joint.subspace(q)
         if not self.reverse:
             return H_w, H_v
@@ -75,7 +75,7 @@ class Topology:
     """Bodies and joints by name, and the tree of joints with coordinates.
 
     Attributes:
-        links: from the ground outwards.
+        links: links of the tree, each after the link of its base.
         loops: joints that close loops.
     """
 
@@ -99,15 +99,15 @@ class Topology:
 
     @cached_property
     def link_of(self) -> dict[str, Link]:
-        """Links by the name of their joint."""
+        """Link of each joint of the tree by the name of the joint."""
         return {link.joint.name: link for link in self.links}
 
 
 def spanning_tree(bodies: Mapping[str, Body], joints: Sequence[Joint]) -> Topology:
-    """Connect every body to the ground, by the joints with the most constraints.
+    """Return the tree that connects the bodies to the ground by the joints with most constraints.
 
-    Every joint in the tree removes its constraints from the equations; the others close loops.
-    Bodies that no joint with coordinates connects to the ground are left out.
+    Joints in the tree have coordinates and no constraint equations; all other joints close loops.
+    Bodies that no joint with coordinates connects to the ground are omitted.
     """
     depth = {GROUND: 0}
     links: list[Link] = []
@@ -131,9 +131,10 @@ def spanning_tree(bodies: Mapping[str, Body], joints: Sequence[Joint]) -> Topolo
 def absolute(
     bodies: Mapping[str, Body], joints: Sequence[Joint], starts: Mapping[str, tuple[Any, Any]]
 ) -> Topology:
-    """Return free bodies, with Euler parameters at their centres of mass; all joints close loops.
+    """Return the topology for absolute coordinates, in which all joints close loops.
 
-    `starts` are positions and rates by body.
+    Each body floats, with the frame of its coordinates at the centre of mass. `starts` are the
+    positions and rates of each body.
     """
     links = [
         Link(GROUND, name, Floating(name, GROUND, name, *start), False, Frame(),
@@ -147,7 +148,7 @@ def _topology(
     bodies: Mapping[str, Body], joints: Sequence[Joint], links: Sequence[Link],
     loops: Sequence[Joint],
 ) -> Topology:  # fmt: skip
-    """Return the topology with the coordinates of its links numbered."""
+    """Return a topology whose links are numbered by their first coordinates."""
     first = accumulate((link.n for link in links), initial=0)
     numbered = tuple(replace(link, first=k) for link, k in zip(links, first, strict=False))
     return Topology(bodies, {joint.name: joint for joint in joints}, numbered, tuple(loops))

@@ -1,4 +1,4 @@
-"""URDF import of mechanisms."""
+"""Import of mechanisms from URDF files."""
 
 import re
 import warnings
@@ -27,7 +27,7 @@ KINDS: dict[str, type[Joint]] = {
     **{kind.__name__.lower(): kind for kind in (Revolute, Prismatic, Planar, Floating)},
 }
 FLOATING = "floating_base"
-"""Joint of a root link that moves freely."""
+"""Name of the joint of a root link that moves freely."""
 
 
 def read_urdf(
@@ -41,31 +41,31 @@ def read_urdf(
     gravity: Vector = (0.0, 0.0, -9.81),
     strict: bool = False,
 ) -> Mechanism:
-    """Return the mechanism of a URDF file: a chain or tree of links.
+    """Return the mechanism of a URDF file, a chain or tree of links.
 
-    Joints keep their names, q = 0 is the file's zero. Links connected by fixed joints become one
-    body with the name of the innermost link; every link is a frame of its body, "body.link".
-    Massless links between joints make these the axes of one joint; joints that move no mass at all
-    are fixed at zero. Every joint that turns about or slides along its axis gets an input
-    `tau_<joint>` [N m, N], unless it mimics another one: then a `Gear` makes it follow.
+    Joints keep their names and zero positions. Links connected by fixed joints become one body with
+    the name of the innermost link; every link is a frame of its body, "body.link". Joints connected
+    by massless links act as the axes of one joint; joints that move no mass are fixed at zero.
+    Every joint that turns about or slides along its axis has an input `tau_<joint>` [N m, N]. If it
+    mimics another joint, it has no input, and a `Gear` couples the two joints.
 
     `<dynamics damping="d" friction="f">` becomes the friction d w + f tanh(w / v_eps) for a joint
-    rate w: `Viscous` with sigma_2 = d, and `Coulomb` with mu_d = 1 under the normal force f. That
+    rate w: `Viscous` with sigma_2 = d, and `Coulomb` with mu_d = 1 under the normal force f. This
     friction is independent of the reactions and adds no unknown; for a joint that turns, read N m
     and rad/s. Use `bearings` for friction caused by reactions.
 
     Args:
-        source: path of the file, or its text.
-        law: instead of Coulomb; its normal force is f, so with mu_d = 1 it slides at the file's
-            level (`relative` scales a law in this way).
-        laws: joint name -> law, instead of `law`.
-        level: f of the joints whose tag has none [N m, N].
-        bearings: joint name -> friction, instead of that in the file.
+        source: path of the file, or its content.
+        law: law that replaces Coulomb; its normal force is f, so with mu_d = 1 it slides at the
+            level of the file (`relative` scales a law in this way).
+        laws: laws by joint name; they take precedence over `law`.
+        level: f of the joints whose tag does not define it [N m, N].
+        bearings: friction by joint name; it replaces the friction of the file.
         floating: True if the root link moves freely (joint `floating_base`); otherwise it is the
-            ground, whatever its mass. A massless root always is.
-        gravity: [m/s^2] in the axes of the root link.
-        strict: raise errors instead of warnings: inertias that no rigid body has, joints that move
-            no mass, joints that mimic one the file does not have.
+            ground, regardless of its mass. A massless root is always the ground.
+        gravity: gravitational acceleration [m/s^2] in the axes of the root link.
+        strict: True to raise errors instead of warnings about inertias that no rigid body has,
+            joints that move no mass, and joints that mimic a joint missing from the file.
 
     Raises:
         ValueError: all mistakes of the file at once, each with its path; no moving part has a
@@ -74,12 +74,12 @@ def read_urdf(
 
     Warns:
         UserWarning: once, about implausible values that are accepted (see `strict`), about all
-            parts that are left out (tags such as `<limit>`: nothing stops a joint there, `parse`
-            returns the numbers; not about visual, collision and material) and about names that are
-            changed because they are not C identifiers.
+            omitted parts other than visual, collision and material, and about names that are
+            changed because they are not C identifiers. The omitted parts include `<limit>`: joints
+            do not stop at their limits, but `parse` returns them.
 
-    Limits: an unphysical inertia can make the motion gain energy; `build` refuses it if the mass
-    matrix at the start is not positive definite.
+    Limits: an unphysical inertia can increase the energy of the motion; `build` rejects it if the
+    mass matrix at the start is not positive definite.
     """
     if law is not None:
         check_law("urdf: law", law)
@@ -133,7 +133,7 @@ def read_urdf(
 def tag_friction(
     joint: UrdfJoint, law: Law | None = None, level: Scalar = 0.0
 ) -> JointFriction | None:
-    """Return the friction of `<dynamics damping friction>`, see `read_urdf`; None without it."""
+    """Return the friction of the tag `<dynamics>`, see `read_urdf`; None if there is none."""
     laws: list[Law] = []
     normal = joint.friction or level
     if not equals(normal, 0.0):
@@ -147,9 +147,9 @@ def tag_friction(
 
 
 def relative(law: Law) -> Law:
-    """Return `law` with its coefficients divided by the largest, so that it breaks away at N.
+    """Return `law` with its coefficients divided by the largest one, so that it breaks away at N.
 
-    Coefficients are the levels of unit 1; a law without any is unchanged.
+    Coefficients are parameters with role "level" and unit 1; a law without them is unchanged.
     """
     known = {n: p for n, p in parameters(law).items() if p.role == "level" and p.unit == "1"}
     numbers = {name: float(p.value) for name, p in known.items() if is_number(p.value)}
@@ -158,19 +158,19 @@ def relative(law: Law) -> Law:
 
 
 class Carried(NamedTuple):
-    """Pose of a link in the link whose body it is part of."""
+    """Pose of a link in its body, in the frame of the link that names the body."""
 
     body: str
     R: Array
     p: Array
 
     def beyond(self, joint: UrdfJoint) -> "Carried":
-        """Return the pose of the child of `joint`, at zero."""
+        """Return the pose of the child of `joint` at the zero position."""
         return Carried(self.body, self.R @ joint.R, self.p + self.R @ joint.p)
 
 
 def carried(urdf: Urdf) -> dict[str, Carried]:
-    """Return the place of every link: a body of its own, or fixed to another one."""
+    """Return the body of each link and its pose there; fixed joints merge links into one body."""
     found = {urdf.root: Carried(urdf.root, np.eye(3), np.zeros(3))}
     for joint in urdf.outwards():
         own = Carried(joint.child, np.eye(3), np.zeros(3))
@@ -179,7 +179,7 @@ def carried(urdf: Urdf) -> dict[str, Carried]:
 
 
 def merged(urdf: Urdf, places: Mapping[str, Carried], body: str) -> Inertial:
-    """Return mass, centre of mass and inertia about it of all links of a body."""
+    """Return the mass, centre of mass and inertia of a body, the sum over its links."""
     parts = [
         (at, part)
         for link, at in places.items()
@@ -196,10 +196,10 @@ def merged(urdf: Urdf, places: Mapping[str, Carried], body: str) -> Inertial:
 
 
 def holding(urdf: Urdf) -> tuple[Urdf, tuple[str, ...]]:
-    """Return the robot with joints fixed that move only massless links, and their names.
+    """Fix the joints that move only massless links; return the robot and the names of the joints.
 
-    Such joints have no inertia and no effect. A massless link that carries a heavy one, however far
-    out, is different: its joints are the axes of one joint.
+    Such joints have no inertia and no effect. Joints that move a link with mass, even through
+    several massless links, are not fixed.
     """
     heavy = {link for link, weight in urdf.links.items() if weight is not None}
     for joint in reversed(tuple(urdf.outwards())):
@@ -213,7 +213,7 @@ def holding(urdf: Urdf) -> tuple[Urdf, tuple[str, ...]]:
 
 
 class _Names(NamedTuple):
-    """Names in the mechanism, of bodies by link and of joints; changed names; problems."""
+    """Names in the mechanism by names of links and joints in the file; changed names; problems."""
 
     links: dict[str, str]
     joints: dict[str, str]
@@ -222,7 +222,7 @@ class _Names(NamedTuple):
 
 
 def _massless(moved: Iterable[UrdfJoint], held: Collection[str], refused: bool) -> Iterator[str]:
-    """Yield joints that move no mass, if that is refused, and those that mimic them."""
+    """Yield messages about joints that move no mass, if refused, and joints that mimic them."""
     for name in held if refused else ():
         yield (
             f"joint '{name}': expected links with a mass > 0 kg that it moves, got none; give one "
@@ -237,13 +237,13 @@ def _massless(moved: Iterable[UrdfJoint], held: Collection[str], refused: bool) 
 
 
 def _identifier(text: str) -> str:
-    """Return `text` with underscores in place of characters that C identifiers do not allow."""
+    """Return `text` with underscores for characters that are invalid in a C identifier."""
     text = re.sub(r"\W", "_", text, flags=re.ASCII)
     return f"_{text}" if text[:1].isdigit() else text
 
 
 def _names(urdf: Urdf, grounded: bool) -> _Names:
-    """Return unique C identifiers; joints keep their names first, because results contain them."""
+    """Return unique C identifiers; joints take precedence, because results contain their names."""
     names = _Names({urdf.root: GROUND} if grounded else {}, {}, {}, [])
     taken = {GROUND: "the ground", "gravity": "the weight", FLOATING: "the root's joint"}
     groups = (
@@ -271,7 +271,7 @@ def _names(urdf: Urdf, grounded: bool) -> _Names:
 def _add_bodies(
     m: Mechanism, places: Mapping[str, Carried], weights: Mapping[str, Inertial], names: _Names
 ) -> None:
-    """Add the bodies, with every link as a frame."""
+    """Add the bodies, and every link as a frame of its body."""
     for link, weight in weights.items():
         if names.links[link] != GROUND:
             six = weight.J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
@@ -290,9 +290,9 @@ def _hang(
     friction: JointFriction | None,
     start: float,
 ) -> Iterator[str]:
-    """Add a joint with its frames and its input; yield the parts that are left out."""
+    """Add a joint with its frames and its input, and yield the omitted parts."""
     name, at = names.joints[joint.name], places[joint.parent].beyond(joint)
-    # a dot separates joints and links of one name
+    # joints and links may have the same name; the dots keep their frames distinct
     ends = f"{names.links[at.body]}.{name}.parent", f"{names.links[joint.child]}.{name}.child"
     z, x = joint.axis, np.eye(3)[int(np.argmin(np.abs(joint.axis)))]
     if joint.kind == "floating":
@@ -310,7 +310,7 @@ def _hang(
 
 
 def _couple(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names) -> None:
-    """Add gears that make joints follow those they mimic."""
+    """Add gears that couple joints to the joints that they mimic."""
     directions = {joint.name: joint.way("") for joint in m.joints}
     for joint in moved:
         if joint.mimic is not None:

@@ -1,4 +1,4 @@
-"""URDF file as data: links and joints, with mistakes, doubts and omitted parts."""
+"""Reader of URDF files: links and joints as data, with mistakes, doubts and omitted parts."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -18,14 +18,14 @@ from symfric.multibody.spatial import unphysical
 Array = NDArray[np.float64]
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 SINGLE = KINDS[:3]
-"""Joints of one coordinate."""
+"""Kinds of joints with one coordinate."""
 LIMITS = ("lower", "upper", "effort", "velocity")
 POINT = 1e-15
-"""Inertia over mass [m^2] that is rounding: a radius of gyration of 30 nm."""
+"""Inertia per mass [m^2] below which an inertia is zero: a radius of gyration of 30 nm."""
 APPEARANCE = {"visual", "collision", "material"}
-"""Tags that a mechanism does not need."""
+"""Tags that are ignored without a note."""
 SNAP = 1e-15
-"""Limit below which entries of rotation matrices are 0: a quarter turn must not leave 6e-17."""
+"""Magnitude below which entries of rotation matrices are set to zero, as after a quarter turn."""
 
 
 class Inertial(NamedTuple):
@@ -37,7 +37,7 @@ class Inertial(NamedTuple):
 
 
 class Mimic(NamedTuple):
-    """Joint that follows another one: q = multiplier q_joint + offset."""
+    """Coupling to another joint: q = multiplier q_joint + offset."""
 
     joint: str
     multiplier: float
@@ -47,16 +47,17 @@ class Mimic(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class UrdfJoint:
-    """Joint tag.
+    """Joint of a URDF file.
 
     Attributes:
         kind: one of `KINDS`.
-        parent, child: links.
-        R, p: pose of the child link in the parent link while the joint is at zero.
+        parent, child: names of the links.
+        R, p: pose of the child link in the parent link at the zero position of the joint.
         axis: unit vector in the axes of the child link.
-        damping: [N s/m] or [N m s/rad].
-        friction: [N] or [N m].
+        damping: viscous damping [N s/m] or [N m s/rad].
+        friction: friction level [N] or [N m].
         limits: lower and upper [m, rad], effort [N, N m], velocity [m/s, rad/s], where given.
+        mimic: coupling to another joint, or None.
     """
 
     name: str
@@ -78,11 +79,11 @@ class Urdf:
     """Robot of a URDF file.
 
     Attributes:
-        name: of the robot.
-        links: mass and inertia of each link; None for a massless one.
-        joints: every link but the root is the child of one.
-        left_out: tags with unsupported content, each with its places.
-        doubts: implausible values that are accepted, each with its path.
+        name: name of the robot.
+        links: mass and inertia of each link; None for a massless link.
+        joints: joints; every link except the root is the child of one joint.
+        left_out: omitted tags, each with its places.
+        doubts: accepted implausible values, each with its path.
     """
 
     name: str
@@ -93,19 +94,19 @@ class Urdf:
 
     @property
     def root(self) -> str:
-        """Link that is not a child of another one."""
+        """Name of the link that is not a child of any joint."""
         children = {joint.child for joint in self.joints}
         return next(link for link in self.links if link not in children)
 
     def zero(self, joint: UrdfJoint) -> float:
-        """Return the position of a joint while all independent joints are at zero [m, rad]."""
+        """Return the position of a joint [m, rad] if all independent joints are at zero."""
         if joint.mimic is None:
             return 0.0
         leader = next(other for other in self.joints if other.name == joint.mimic.joint)
         return joint.mimic.multiplier * self.zero(leader) + joint.mimic.offset
 
     def outwards(self) -> Iterator[UrdfJoint]:
-        """Yield the joints, each after the one that carries its parent."""
+        """Yield the joints from the root to the tips."""
         below: dict[str, list[UrdfJoint]] = {}
         for joint in self.joints:
             below.setdefault(joint.parent, []).append(joint)
@@ -119,9 +120,9 @@ class Urdf:
 @final
 @dataclass(frozen=True, eq=False)
 class Notes:
-    """Notes on a file: problems, implausible values, and omitted tags -> their places.
+    """Notes on a file: problems, doubts (implausible values), and places of omitted tags.
 
-    A strict reader treats doubts as problems.
+    If `strict`, doubts are problems.
     """
 
     strict: bool = False
@@ -142,14 +143,15 @@ class Notes:
         (self.problems if self.strict else self.doubts).append(text)
 
     def left(self, tag: str, where: str) -> None:
-        """Note a tag that is left out, once for every place."""
+        """Note an omitted tag, once for every place."""
         places = self.left_out.setdefault(tag, [])
         if where not in places:
             places.append(where)
 
     def numbers(self, where: str, tag: ET.Element | None, key: str, default: str) -> Array:
-        """Return the numbers in an attribute, as many as in `default`, the value of a missing
-        one.
+        """Return the numbers in an attribute, or in `default` if the attribute is missing.
+
+        The attribute must contain as many numbers as `default`.
         """
         text = default if tag is None else tag.get(key, default)
         n = len(default.split())
@@ -168,7 +170,7 @@ class Notes:
         return float(self.numbers(where, tag, key, default)[0])
 
     def pose(self, where: str, tag: ET.Element) -> tuple[Array, Array]:
-        """Return rotation and position in the tag <origin> of `tag`."""
+        """Return the rotation and position in the tag <origin> of `tag`."""
         origin, at = tag.find("origin"), f"{where} > origin"
         turn = rotation(*self.numbers(at, origin, "rpy", "0 0 0"))
         return turn, self.numbers(at, origin, "xyz", "0 0 0")
@@ -189,14 +191,14 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
     """Read a URDF file.
 
     Args:
-        source: path of a file, or its text (which begins with "<").
-        strict: refuse unphysical inertias (a negative principal moment, one larger than the sum of
-            the others, an inertia without a mass) and joints that mimic one the file does not have;
-            otherwise the former are accepted, the latter move on their own.
+        source: path of a file, or its content (which begins with "<").
+        strict: True to reject unphysical inertias (a negative principal moment, a principal moment
+            larger than the sum of the other two, an inertia without a mass) and joints that mimic a
+            missing joint; otherwise such inertias are accepted, and such joints are independent.
 
     Raises:
-        ValueError: not XML, not a tree of links, or invalid numbers, all problems at once, each
-            with its path ("urdf 'arm' > joint 'elbow' > axis").
+        ValueError: the file is not XML, does not describe a tree of links, or has invalid numbers;
+            all problems at once, each with its path ("urdf 'arm' > joint 'elbow' > axis").
         OSError: the file cannot be read.
     """
     is_text = isinstance(source, str) and source.lstrip().startswith("<")
@@ -229,7 +231,7 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
 
 
 def _tags(content: bytes, encoding: str | None) -> ET.Element:
-    """Return the outermost tag; prefixes need not be declared, because many files do not."""
+    """Return the outermost tag; undeclared prefixes are accepted, because many files have them."""
     builder, parser = ET.TreeBuilder(), expat.ParserCreate(encoding)
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
@@ -281,7 +283,7 @@ def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
             notes.left(f"dynamics {key}", where)
     if limit is not None and kind != "fixed":
         notes.left("limit", where)
-    # attributes of absent properties have no meaning, and exporters write zeros there
+    # exporters write zero axes for joints without an axis
     along = None if kind in ("fixed", "floating") else tag.find("axis")
     mimic = tag.find("mimic")
     if kind == "fixed" and mimic is not None:
@@ -360,7 +362,7 @@ def _tree_problems(links: Iterable[str], joints: Sequence[UrdfJoint]) -> Iterato
 
 
 def _known_leader(joint: UrdfJoint, joints: Sequence[UrdfJoint], notes: Notes) -> UrdfJoint:
-    """Return the joint; it moves on its own if the file lacks the joint that it mimics."""
+    """Return the joint, without its coupling if the file lacks the joint that it mimics."""
     if joint.mimic is None or any(joint.mimic.joint == other.name for other in joints):
         return joint
     leader = joint.mimic.joint or "one without a name"
@@ -369,7 +371,7 @@ def _known_leader(joint: UrdfJoint, joints: Sequence[UrdfJoint], notes: Notes) -
 
 
 def _mimic_problems(joints: Sequence[UrdfJoint]) -> Iterator[str]:
-    """Yield followers whose chain of leaders does not end in a joint that turns or slides."""
+    """Yield messages about couplings that do not end in an independent joint of one coordinate."""
     along = {joint.name: joint for joint in joints if joint.kind in SINGLE}
     for joint in joints:
         leader, steps = joint, 0

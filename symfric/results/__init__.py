@@ -1,1 +1,1 @@
-"""Results of simulations: signals over time that draw, film, balance and save themselves."""
+"""Results of simulations: signals over time, with plots, animations, energy balance and files."""

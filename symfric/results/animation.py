@@ -1,4 +1,4 @@
-"""Animations of mechanisms."""
+"""Animations and still figures of mechanisms."""
 
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -27,18 +27,18 @@ Array = NDArray[np.float64]
 ENDINGS = (".gif", ".html", ".mp4")
 Flags = NDArray[np.bool_]
 BRIEF, LONG, SHOWN = 2.0, 12.0, 6.0
-"""Motions between BRIEF and LONG [s] are shown in real time, others in SHOWN."""
+"""Motions between BRIEF and LONG [s] are shown in real time, other motions in SHOWN [s]."""
 SIZE, SMALL = 6.4, 3.2
-"""Larger sides of the panels of animations and of small figures [inch]."""
+"""Larger side of the panel of an animation and of a small figure [inch]."""
 PATH = 1001
-"""Number of points of the path of a centre of mass."""
+"""Number of points in the path of a centre of mass."""
 STICKS, SLIDES = colour(1), "white"
-"""Fill of joints with friction: filled if they stick, hollow if they slide."""
+"""Fill colours of joints with friction: filled if they stick, hollow if they slide."""
 GROUND = "#8c6d46"
 PASSES = 3
-"""Number of drawings after which a layout with axes of one scale has settled."""
+"""Number of drawing passes after which a layout with equal axis scales is stationary."""
 FLATTEST = 0.4
-"""Least ratio of the sides of a picture in a plane."""
+"""Smallest ratio of the sides of a planar picture."""
 
 
 def animate(
@@ -52,7 +52,8 @@ def animate(
     """Write an animation of `trajectory`; see `Trajectory.animate`.
 
     Raises:
-        ValueError: a model without bodies, another ending, no ffmpeg, numbers not above zero.
+        ValueError: the model has no bodies, the file suffix is not supported, ffmpeg is missing, or
+            a number is not positive.
     """
     check_format(path)
     for name, value in (("fps", fps), ("speed", speed)):
@@ -80,7 +81,7 @@ def animate(
             with movie.saving(figure, str(temporary), dpi=100):
                 for _ in frames():
                     movie.grab_frame()
-        else:  # `saving` would put a film together even after an interrupt
+        else:  # `saving` would write the film even after an interrupt
             film = PillowWriter(fps)  # type: ignore[arg-type]
             film.setup(figure, str(temporary), dpi=100)
             for _ in frames():
@@ -89,10 +90,10 @@ def animate(
 
 
 def check_format(path: str | Path) -> None:
-    """Check that there is a writer for the ending of a path.
+    """Check that the format given by the suffix of a path can be written.
 
     Raises:
-        ValueError: another ending than .gif, .html and .mp4, or .mp4 without ffmpeg.
+        ValueError: the suffix is not .gif, .html or .mp4, or it is .mp4 and ffmpeg is missing.
     """
     ending = checks.path("animation", path).suffix.lower()
     if ending not in ENDINGS:
@@ -117,10 +118,10 @@ def frame_times(begin: float, end: float, fps: float, speed: float | None) -> tu
 def picture(
     trajectory: Signals, times: Array, speed: float = 1.0
 ) -> tuple[Figure, Callable[[int], None]]:
-    """Return a figure of a mechanism, and a function that shows its pose at times[k].
+    """Return a figure of a mechanism, and a function of k that draws the pose at times[k].
 
     Raises:
-        ValueError: a model without bodies.
+        ValueError: the model has no bodies.
     """
     model = trajectory.model
     if model.sketch is None:
@@ -153,7 +154,7 @@ def picture(
 
 
 def still(sketch: Sketch, places: Array) -> Figure:
-    """Return a small figure of a machine with these places, shape (12, k)."""
+    """Return a small figure of a sketch, given its places, shape (12, k)."""
     columns = places.T[:, :, None]
     centres = columns[[part.centre for part in sketch.parts], 9:]
     figure, drawn = _drawn(sketch, columns, centres, {}, SMALL)
@@ -165,13 +166,13 @@ def still(sketch: Sketch, places: Array) -> Figure:
 def _drawn(
     sketch: Sketch, columns: Array, paths: Array, sticks: Mapping[str, Flags], size: float = SIZE
 ) -> tuple[Figure, list[Callable[[int], None]]]:
-    """Return a figure, and functions that show each of its strokes in picture k.
+    """Return a figure, and a function of k for each stroke that draws it as in picture k.
 
     Args:
         sketch: places, parts and marks.
         columns: axes and positions of the places in each picture, shape (places, 12, pictures).
         paths: centres of the parts, shape (parts, 3, times).
-        sticks: joint -> True if its contacts stick, per picture.
+        sticks: flags by joint, True in pictures where its contacts stick.
         size: larger side of the panel [inch].
     """
     poses = Poses(columns[:, :9].reshape(-1, 3, 3, columns.shape[2]), columns[:, 9:], paths)
@@ -181,7 +182,7 @@ def _drawn(
 
 
 def _sticks(trajectory: Signals, sketch: Sketch, times: Array) -> dict[str, Flags]:
-    """Return joint -> True if all its contacts are slower than the scale of their law."""
+    """Return flags by joint, True at times when all its contacts are slower than their limit."""
     marks = [mark for mark in sketch.marks if mark.slips]
     if not marks:
         return {}
@@ -195,7 +196,7 @@ def _sticks(trajectory: Signals, sketch: Sketch, times: Array) -> dict[str, Flag
 
 
 def _legend(figure: Figure) -> None:
-    """Add the legend of the fill of joints."""
+    """Add a legend for the fill colours of joints."""
     entries = [
         Line2D([], [], linestyle="", marker="o", color=EDGE, markerfacecolor=fill, label=label)
         for fill, label in ((SLIDES, "slides"), (STICKS, "sticks"))
@@ -208,7 +209,7 @@ def _legend(figure: Figure) -> None:
 
 
 def _flat(view: View, size: float) -> tuple[Figure, Array]:
-    """Return axes that show a plane along its normal, and the projection on them."""
+    """Return a figure that shows a plane along its normal, and the projection to its axes."""
     axes = np.stack([view.right, view.up])
     low, high = axes @ view.low, axes @ view.high
     low, high = np.minimum(low, high), np.maximum(low, high)
@@ -227,7 +228,7 @@ def _flat(view: View, size: float) -> tuple[Figure, Array]:
 
 
 def _spatial(view: View, size: float) -> tuple[Figure, Array]:
-    """Return axes with three directions of one scale, and the projection on them."""
+    """Return a figure with three axes of equal scale, and the projection to its axes."""
     figure = blank(1.125 * size, size, free=True)
     ax: Any = figure.add_subplot(projection="3d", proj_type="ortho")
     extent = view.high - view.low
@@ -245,7 +246,7 @@ def _spatial(view: View, size: float) -> tuple[Figure, Array]:
 
 
 def _added(figure: Figure, axes: Array, stroke: Stroke) -> Callable[[int], None]:
-    """Add a stroke to the figure; return the function that shows it in picture k."""
+    """Add a stroke to the figure, and return a function of k that draws it as in picture k."""
     points = np.einsum("ac,nck->kan", axes, stroke.points)
     canvas: Any = figure.axes[0]
     (line,) = canvas.plot(*([] for _ in axes), **_style(stroke))
@@ -260,7 +261,7 @@ def _added(figure: Figure, axes: Array, stroke: Stroke) -> Callable[[int], None]
 
 
 def _direction(axis: Array) -> str:
-    """Return the name of a direction: x, or its components."""
+    """Return the name of a direction, such as x or -y, or else its components."""
     k = int(np.argmax(np.abs(axis)))
     if abs(abs(axis[k]) - 1) < 1e-9:
         return "xyz"[k] if axis[k] > 0 else f"-{'xyz'[k]}"
@@ -268,7 +269,7 @@ def _direction(axis: Array) -> str:
 
 
 def _style(stroke: Stroke) -> dict[str, Any]:
-    """Return the look of a stroke."""
+    """Return the style keywords of a stroke."""
     shade = colour(stroke.body) if stroke.body >= 0 else EDGE
     styles: dict[str, dict[str, Any]] = {
         "path": {"color": shade, "linewidth": 0.8, "alpha": 0.35},

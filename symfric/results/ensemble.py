@@ -1,4 +1,4 @@
-"""Result of many runs: signals of all members, their varied inputs, and how each ended."""
+"""Result of many runs: signals of all members, varied arguments, and the end of each run."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 PLACES = ("end", "least", "greatest")
 MOST = 5_000_000
-"""Largest number of values that `shown` reads; of a memory-mapped file the last column needs every
-page."""
+"""Largest number of values that `shown` reads; all count in a memory-mapped file, because the last
+column is on all pages."""
 
 
 @final
@@ -31,29 +31,29 @@ page."""
 class Ensemble(Showing):
     """Results of many runs.
 
-    `study["x"]` is a signal of all members, `study.varied["mu_s"]` the value of each, and
-    `study.extremes["v"]` its range.
+    `study["x"]` is a signal of all members, `study.varied["mu_s"]` a parameter of all members, and
+    `study.extremes["v"]` the range of a signal.
 
     Attributes:
         scene: name of the model.
-        t: times [s], shape (k,); (members, 1) if each member has its own end and no
-            other times were requested.
-        signals: name -> values, shape (members, k); NaN after a member ended, failed or met a
+        t: times [s], shape (k,); or the ends of the members, shape (members, 1), if they differ and
+            no other times were requested.
+        signals: values by name, shape (members, k); NaN after a member ended, failed or met a
             terminal event, and for members that were not started. Memory-mapped if the results
             were written to a folder.
-        units: name -> unit of every signal; `unit(name)` also knows those of varied quantities.
-        attempts: attempts of each member, shape (members,).
-        reached: time [s] each member reached, shape (members,): that of a terminal event or of
-            its failure, else its end; NaN for members that were not started.
-        failed: number of a failed member -> sentence.
-        status: SUCCESS, or INTERRUPTED with the members that were finished.
+        units: unit of every signal by name; `unit(name)` also accepts varied quantities.
+        attempts: number of attempts of each member, shape (members,).
+        reached: time [s] that each member reached, shape (members,): that of a terminal event or of
+            a failure, else the end; NaN for members that were not started.
+        failed: message of each failed member by its number.
+        status: SUCCESS; or INTERRUPTED, with results of the finished members only.
         varied: arguments that differ between members, shape (members,): parameters by name, start
             values as "x0.v", inputs as "u.force", ends as "t_end". Samples of inputs are not kept.
-        fixed: arguments that all members share, likewise.
-        given_units: name -> unit of `varied` and `fixed`.
-        reach: state -> its least and greatest value over the start and the ends of all accepted
+        fixed: arguments that are equal for all members, with names as in `varied`.
+        given_units: units of `varied` and `fixed` by name.
+        reach: smallest and largest value of each state over the start and the ends of all accepted
             steps, shape (2, members); NaN for members that were not started.
-        doubtful: number of a member that ended well -> sentence about a doubt.
+        doubtful: message about a doubt for members that ended without failure, by number.
     """
 
     scene: str
@@ -71,7 +71,7 @@ class Ensemble(Showing):
     doubtful: dict[int, str] = field(default_factory=dict[int, str])
 
     def check_fields(self) -> None:
-        """Check that all arrays have the same members; for files."""
+        """Check the shapes of all arrays and the names; used when a file is read."""
         n, k = self.attempts.size, self.t.shape[-1]
         agree(
             "Ensemble",
@@ -84,7 +84,7 @@ class Ensemble(Showing):
         )
 
     def shown(self) -> Shown:
-        """Describe members, failures, varied numbers, and the signals at the last time."""
+        """Return the members, failures, varied arguments, and signals at the last time."""
         members, times = self.attempts.size, self.t.shape[-1]
         first, last = np.min(self.t), np.max(self.t)
         span = f"{last:g} s"
@@ -121,7 +121,7 @@ class Ensemble(Showing):
         )
 
     def _ends(self, name: str, read: bool) -> Iterable[str]:
-        """Return least, median and greatest value of a signal at the last time, if it is `read`."""
+        """Return least, median and greatest value at the last time; empty unless `read`."""
         values = np.asarray(self.signals[name][:, -1]) if read else np.zeros(0)
         values = values[np.isfinite(values)]
         if not values.size:
@@ -129,7 +129,7 @@ class Ensemble(Showing):
         return (f"{x:.6g}" for x in (values.min(), np.median(values), values.max()))
 
     def thumbnail(self) -> "Figure | None":
-        """Return a small plot of the first signal; None if only ends are known."""
+        """Return a small plot of the first signal; None if there is only one time per member."""
         from symfric.results.pictures import thumbnail_of_many  # noqa: PLC0415  (matplotlib is slow to import)
 
         if self.t.ndim > 1 or self.t.size < 2:
@@ -161,16 +161,16 @@ class Ensemble(Showing):
 
     @property
     def ends(self) -> dict[str, Array]:
-        """Name -> value at the last time, shape (members,)."""
+        """Values at the last time by name, shape (members,)."""
         return {name: np.array(values[:, -1]) for name, values in self.signals.items()}
 
     @cached_property
     def extremes(self) -> dict[str, tuple[Array, Array]]:
-        """Name -> least and greatest value of each member, shape (members,) both.
+        """Smallest and largest value of each member by name, each of shape (members,).
 
-        Those of states are over all accepted steps and over `t`. Those of other signals are over
-        `t` only, which may miss short events: request more times by `t_eval`, or simulate such a
-        member alone. NaN for members without a value.
+        For states, they are taken over all accepted steps and `t`. For other signals, they are
+        taken over `t` only and may miss short events; request more times by `t_eval`, or simulate
+        such a member alone. Members without a value have NaN.
         """
         found: dict[str, tuple[Array, Array]] = {}
         for name, values in self.signals.items():
@@ -182,18 +182,20 @@ class Ensemble(Showing):
     def plot(
         self, *names: str, over: str = "", at: float | str = "end", path: str | Path | None = None
     ) -> "Figure":
-        """Plot median and bands of 50 and 90 % of the members over time; of ends plot histograms.
+        """Plot the median and the bands of 50 and 90 % of the members over time.
+
+        If there is only one time per member, plot histograms.
 
         Args:
             names: signals; by default the first six.
-            over: varied quantity on the abscissa, a point for each member, as in
+            over: varied quantity on the abscissa, with a point for each member, as in
                 `study.plot("v", over="mu_s", at="greatest")`.
-            at: with `over`, time [s], rounded to the nearest of the result; or "end", "least",
-                "greatest" (see `extremes`).
-            path: image file, its format taken from the ending.
+            at: with `over`, a time [s], rounded to the nearest time of the result; or "end",
+                "least" or "greatest" (see `extremes`).
+            path: image file; its suffix selects the format.
 
         Raises:
-            ValueError: unknown names.
+            ValueError: a name is unknown.
         """
         from symfric.results import pictures  # noqa: PLC0415  (matplotlib is slow to import)
 
@@ -212,7 +214,7 @@ class Ensemble(Showing):
     def _at(
         self, where: str, names: Sequence[str], at: float | str
     ) -> tuple[str, dict[str, Array]]:
-        """Return `at` in words, and name -> values there, shape (members,)."""
+        """Return `at` in words, and the values by name, shape (members,)."""
         if isinstance(at, str):
             checks.choice(where, at, PLACES)
             if at == "end":
@@ -228,10 +230,10 @@ class Ensemble(Showing):
         return f"at t = {self.t[k]:.4g} s", {name: self.signals[name][:, k] for name in names}
 
     def save(self, path: str | Path) -> None:
-        """Write everything to one file, which `symfric.load_ensemble` reads to the bit.
+        """Write the ensemble to one file, from which `symfric.load_ensemble` restores it exactly.
 
-        Of an interrupted ensemble it holds the finished members. For results that exceed the memory
-        use the folder of `simulate_many(..., out=)`.
+        The file of an interrupted ensemble contains the finished members. For results that exceed
+        the memory, use `simulate_many(..., out=)` to write them to a folder.
 
         Raises:
             ValueError: the file cannot be written.
@@ -239,11 +241,13 @@ class Ensemble(Showing):
         ENSEMBLE.save(path, self)
 
     def to_csv(self, path: str | Path, *names: str) -> None:
-        """Write a row for each member and time: member, t, varied quantities, signals, with units.
+        """Write a CSV file with a row for each member and time.
+
+        The columns are member, t, varied quantities and signals, with units in the header.
 
         Args:
-            path: file.
-            names: signals; all if none is given.
+            path: CSV file.
+            names: signals; by default all.
         """
         columns = self._columns(names)
         header = ["member", *(f"{name} [{unit}]" for name, unit in self._units(columns).items())]
@@ -252,15 +256,16 @@ class Ensemble(Showing):
         write_table(path, header, rows)
 
     def to_dataframe(self, *names: str) -> Any:
-        """Return a pandas table with a row for each member and time, and columns of what varies.
+        """Return a pandas DataFrame with a row for each member and time.
 
-        If only ends are known, it has a row for each member. Its `attrs` contain the units.
+        The columns are varied quantities and signals; the attribute `attrs` contains the units. If
+        there is only one time per member, there is one row for each member.
 
         Args:
-            names: signals; all if none is given.
+            names: signals; by default all.
 
         Raises:
-            ImportError: no pandas.
+            ImportError: pandas is not installed.
         """
         pandas = module("to_dataframe", "pandas")
         columns = self._columns(names)
@@ -276,10 +281,10 @@ class Ensemble(Showing):
         return frame
 
     def to_xarray(self, *names: str) -> Any:
-        """Return an xarray data set over member and t, with varied quantities as coordinates.
+        """Return an xarray Dataset over member and t, with varied quantities as coordinates.
 
         Raises:
-            ImportError: no xarray.
+            ImportError: xarray is not installed.
         """
         xarray = module("to_xarray", "xarray")
         over_t, unit = self.t.ndim == 1, {"units": "s"}
@@ -311,7 +316,7 @@ class Ensemble(Showing):
 
     @property
     def _about(self) -> dict[str, Any]:
-        """Scene, status, and numbers that all members share."""
+        """Scene, status and fixed arguments."""
         return {"scene": self.scene, "status": self.status.name, **self.fixed}
 
 
@@ -319,10 +324,10 @@ ENSEMBLE = Format("symfric ensemble", 2, "load_ensemble", "a saved ensemble", En
 
 
 def load_ensemble(path: str | Path) -> Ensemble:
-    """Return the ensemble that `study.save(path)` wrote, to the bit.
+    """Return the ensemble that `study.save(path)` wrote, restored exactly.
 
     Raises:
-        ValueError: no such file, one that something else wrote, a damaged one, or one of a newer
-            version.
+        ValueError: the file does not exist, is not a saved ensemble, is damaged, or was written by
+            a newer version.
     """
     return ENSEMBLE.load(path)

@@ -1,4 +1,4 @@
-"""Kinds of the signals of a run, which group them in tables and plots."""
+"""Kinds of signals, and groups of signals for tables and plots."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ def is_mechanism(model: Model) -> bool:
 
 
 def norms(model: Model) -> tuple[str, ...]:
-    """Return the names of the norms of constraints; none without closed loops."""
+    """Return the names of the norms of constraints; empty without closed loops."""
     return tuple(name for name, kind in kinds(model).items() if kind == CONSTRAINTS)
 
 
 def kinds(model: Model) -> dict[str, str]:
-    """Return name -> kind of the signals that have one; inputs always do.
+    """Return the kinds of signals by name; signals without a kind are omitted.
 
-    Multipliers and sliding velocities have none.
+    Inputs always have a kind; multipliers and sliding velocities have none.
     """
     found = {v.name: v.kind for v in (*model.x, *model.z)}
     found |= {v.name: v.kind or INPUT for v in model.u}
@@ -35,13 +35,13 @@ def kinds(model: Model) -> dict[str, str]:
 @final
 @dataclass(frozen=True)
 class Group:
-    """Signals that share a panel.
+    """Group of signals in one panel.
 
     Attributes:
-        title: common name; empty for a single signal, which is labelled by its own name.
+        title: common name; empty for a single signal, which is labelled by its name.
         unit: common unit.
-        names: signal -> name in the panel.
-        norms: True for norms of constraints, which are dots on a logarithmic axis.
+        names: label of each signal in the panel.
+        norms: True for norms of constraints, which are drawn as dots on a logarithmic axis.
     """
 
     title: str
@@ -51,15 +51,14 @@ class Group:
 
 
 def main(model: Model, units: dict[str, str]) -> list[Group]:
-    """Return the main signals of a run: positions, friction, and energy or, without a balance,
-    power.
+    """Return the main signals of a run: positions, friction, and energy or else power.
 
-    If no state is a position, as in a clutch, speeds take their place. Empty for a model with
-    neither positions nor friction.
+    If no state is a position, as in a clutch, speeds replace positions. The result is empty for a
+    model with neither positions nor friction.
 
     Args:
         model: model of the signals.
-        units: name -> unit of the signals that may be shown.
+        units: units by name of the signals that may be shown.
     """
     kind, own = kinds(model), {v.name for c in model.contacts for v in c.states}
     rubs = {"friction" if c.bare else f"{c.name}_friction" for c in model.contacts}
@@ -81,7 +80,7 @@ def main(model: Model, units: dict[str, str]) -> list[Group]:
 
 
 def every(model: Model, units: dict[str, str], apart: int) -> list[Group]:
-    """Return groups of all signals: one each for at most `apart` of them, else by kind and unit."""
+    """Return groups of all signals: single signals if at most `apart`, else by kind and unit."""
     kind = kinds(model)
     norm = {n: n for n in units if kind.get(n) == CONSTRAINTS}
     rest = [n for n in units if n not in norm]
@@ -91,7 +90,7 @@ def every(model: Model, units: dict[str, str], apart: int) -> list[Group]:
     titled: dict[str, list[str]] = {}
     for n in rest:
         title = kind.get(n, "")
-        if title or not is_mechanism(model):  # those are multipliers and sliding velocities
+        if title or not is_mechanism(model):  # omits multipliers and sliding velocities
             of_power = (title, units[n]) == (FRICTION, POWER)
             titled.setdefault(f"power of {title}" if of_power else title, []).append(n)
     groups = [group for title, names in titled.items() for group in by_unit(title, names, units)]
@@ -99,7 +98,10 @@ def every(model: Model, units: dict[str, str], apart: int) -> list[Group]:
 
 
 def by_unit(title: str, names: Iterable[str], units: dict[str, str]) -> list[Group]:
-    """Return the names with a unit in groups of one unit; a common ending of a group is removed."""
+    """Return the names grouped by unit; names without a unit are omitted.
+
+    Labels are names without a common last word, see `shortened`.
+    """
     found: dict[str, list[str]] = {}
     for name in names:
         if name in units:
@@ -111,7 +113,7 @@ def by_unit(title: str, names: Iterable[str], units: dict[str, str]) -> list[Gro
 
 
 def shortened(names: list[str]) -> list[str]:
-    """Return `names` without a shared last word, such as "_friction", cut to 28 letters each."""
+    """Return names of at most 28 characters without a common last word such as "_friction"."""
     ending = f"_{names[0].rpartition('_')[2]}"
     if len(names) > 1 and all(n.endswith(ending) and n != ending for n in names):
         names = [n.removesuffix(ending) for n in names]
@@ -119,11 +121,11 @@ def shortened(names: list[str]) -> list[str]:
 
 
 def friction_laws(model: Model) -> str:
-    """Return the laws of the contacts, each once: "LuGre, Coulomb"; "" without contacts."""
+    """Return the names of the laws of all contacts, such as "LuGre, Coulomb"; "" if none."""
     return ", ".join(dict.fromkeys(_called(contact.law) for contact in model.contacts))
 
 
 def _called(law: Any) -> str:
-    """Return the class of a law, of a sum those of its terms."""
+    """Return the name of a law; for a sum, the names of its terms joined by "+"."""
     terms = getattr(law, "laws", ())
     return "+".join(map(_called, terms)) if terms else type(law).__name__

@@ -1,4 +1,4 @@
-"""Plots of simulations, with units."""
+"""Plots of simulations and of ensembles, with units."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,13 +21,13 @@ from symfric.results.signals import Signals
 
 Array = NDArray[np.float64]
 APART = 8
-"""Largest number of signals that have a panel each if all are shown."""
+"""Largest number of signals for which each signal has a panel if all are shown."""
 BLACK = COLOURS.index(EDGE)
 FLAT = 1e-6
-"""Change, relative to the magnitude, below which a signal counts as constant on an axis."""
+"""Change relative to the magnitude below which a signal is plotted as a constant."""
 
 PANELS, POINTS = 3, 1500
-"""Numbers of signals and of times in the small figure."""
+"""Largest number of signals and approximate number of intervals in the small figure."""
 
 
 def plot_trajectories(
@@ -37,19 +37,19 @@ def plot_trajectories(
     panels: str = "main",
     log: Sequence[str] = (),
 ) -> Figure:
-    """Plot signals of one or several simulations over time, those of a kind in one panel.
+    """Plot signals of one or several simulations over time, with signals of one kind in one panel.
 
     Long times are in hours, days or years.
 
     Args:
-        trajectories: legend entry -> trajectory.
-        names: signals or details, a panel each.
+        trajectories: trajectories by legend entry.
+        names: signals or details, each in its own panel.
         path: image file.
-        panels: signals if `names` is empty: "main" for positions, friction and energy (or power,
-            if the model has no energy balance); "all" for every signal that all trajectories
-            share, grouped by kind and unit if there are many. A model with neither positions nor
-            friction shows all.
-        log: signals or details with a logarithmic axis; values that are not positive are left out.
+        panels: signals to plot if `names` is empty: "main" for positions, friction and energy (or
+            power, if the model has no energy balance); "all" for every signal that all trajectories
+            have, grouped by kind and unit if there are many. For a model with neither positions nor
+            friction, "main" also selects all signals.
+        log: signals or details with a logarithmic axis; nonpositive values are omitted.
     """
     checks.choice("plot: panels", panels, ("main", "all"))
     log = (log,) if isinstance(log, str) else tuple(log)
@@ -98,9 +98,9 @@ def _finished(
 
 
 def split(groups: Sequence[Group]) -> list[Group]:
-    """Return the groups for a comparison of simulations: a panel per signal if there are few.
+    """Return the groups for a comparison of simulations.
 
-    Of the energies only the sum is shown.
+    If there are few signals, each has its own panel, and only the total energy is shown.
     """
     single = [
         Group("", group.unit, {name: name}, group.norms)
@@ -113,7 +113,7 @@ def split(groups: Sequence[Group]) -> list[Group]:
 def _check_log(
     log: Sequence[str], groups: Sequence[Group], trajectories: Mapping[str, Signals]
 ) -> None:
-    """Check that signals with a logarithmic axis are shown and positive at some time."""
+    """Check that signals with a logarithmic axis are plotted and positive at some time."""
     checks.check_names("plot: log", log, [name for group in groups for name in group.names])
     for name in log:
         top = max(float(run.at_looks(name).max()) for run in trajectories.values())
@@ -131,9 +131,9 @@ def _panel(
     by_t: float,
     log: bool,
 ) -> None:
-    """Plot the signals of a group: a colour each, a line style for each simulation.
+    """Plot the signals of a group, with a colour per signal and a line style per simulation.
 
-    If every panel has one signal only, the simulations also differ in colour.
+    If `alone`, every panel has only one signal, and simulations also differ in colour.
     """
     several, runs = len(group.names) > 1, len(trajectories) > 1
     values = {
@@ -165,7 +165,7 @@ def _panel(
 
 
 def level(axis: Axes, values: Sequence[Array]) -> None:
-    """Write ticks without offset; centre a constant on the axis instead of magnifying rounding."""
+    """Set ticks without offset; centre a constant signal, so that rounding is not magnified."""
     axis.ticklabel_format(axis="y", useOffset=False)
     low = min((float(np.nanmin(v, initial=np.inf)) for v in values), default=0.0)
     high = max((float(np.nanmax(v, initial=-np.inf)) for v in values), default=0.0)
@@ -208,7 +208,7 @@ def _few(run: Signals) -> list[str]:
 
 
 def _thinned(t: Array, values: Array) -> tuple[Array, Array]:
-    """Return few points that include the extremes of every interval."""
+    """Return fewer points; they include the extremes of each interval."""
     size = -(-t.size // POINTS)
     if size < 3:
         return t, values
@@ -220,17 +220,17 @@ def _thinned(t: Array, values: Array) -> tuple[Array, Array]:
 
 
 SHOWN, LINES, TIMES, SMALL = 6, 6, 500, 200
-"""Largest numbers of signals shown by default, of members drawn individually, of times, and of
-members in the small plot."""
+"""Largest numbers of signals by default, of individually drawn members, of times, and of members in
+the small plot."""
 BANDS = ((5.0, 95.0, 0.15, "90 %"), (25.0, 75.0, 0.3, "50 %"))
-"""Percentiles, opacity and legend of each band."""
+"""Percentiles, opacity and legend entry of each band."""
 SERIES, JOINED = 6, 200
-"""Largest numbers of values of a second parameter that give a series each, and of members that a
-line joins."""
+"""Largest number of values of a second parameter for which each value has a series, and largest
+number of members joined by a line."""
 DECADES = 100.0
-"""Ratio of the greatest to the least value from which an axis is logarithmic."""
+"""Ratio of the largest to the smallest value from which an axis is logarithmic."""
 Varied = tuple[str, str, Array]
-"""Name, unit and values of the members, shape (members,)."""
+"""Name, unit and values of a varied quantity, shape (members,)."""
 
 
 def plot_many(
@@ -243,19 +243,19 @@ def plot_many(
 ) -> Figure:
     """Plot the median and the bands of 50 and 90 % of the members over time, a panel per signal.
 
-    Up to six members are drawn individually. If only the ends are known, they are shown as
-    histograms. NaN of members that have ended or failed is left out.
+    Up to six members are drawn individually. If there is only one time per member, histograms are
+    plotted. NaN of members that have ended or failed is omitted.
 
     Args:
         scene: title.
-        t: times [s], shape (k,), or (members, 1) if each member has its own end.
-        signals: name -> values, shape (members, k).
-        units: name -> unit.
-        names: signals to show; the first six if none is given.
+        t: times [s], shape (k,); or ends of the members, shape (members, 1).
+        signals: values by name, shape (members, k).
+        units: units by name.
+        names: signals to plot; by default the first six.
         path: image file.
 
     Raises:
-        ValueError: unknown names.
+        ValueError: a name is unknown.
     """
     checks.check_names(f"ensemble of '{scene}'", names, signals)
     shown = list(names) or list(signals)[:SHOWN]
@@ -284,7 +284,7 @@ def plot_many(
 
 
 def _bands(axis: Axes, t: Array, values: Array) -> None:
-    """Plot a few members individually, else median and bands."""
+    """Plot the members individually if they are few, else median and bands."""
     if values.shape[0] <= LINES:
         for k, row in enumerate(values):
             axis.plot(t, row, linewidth=1.2, label=f"member {k}", **line(k))
@@ -306,16 +306,16 @@ def plot_over(
     others: Mapping[str, tuple[str, Array]],
     path: str | Path | None = None,
 ) -> Figure:
-    """Plot signals over a varied quantity, a panel each.
+    """Plot signals over a varied quantity, each in its own panel.
 
-    If another quantity was varied and has few values, there is a series for each of them. The title
-    counts members without a value, which failed or ended before.
+    If one other quantity was varied and has few values, each of these values has its own series.
+    The title states the number of members without a value, which failed or ended before.
 
     Args:
-        scene, said: title, and the time of the values in words.
-        signals: name -> unit and values of the members, shape (members,).
-        over: the varied quantity.
-        others: name -> unit and values of other varied quantities.
+        scene, said: title, and a description of the time of the values.
+        signals: unit and values of each signal by name, shape (members,).
+        over: varied quantity on the abscissa.
+        others: unit and values of other varied quantities by name.
         path: image file.
     """
     name_x, unit, x = over
@@ -341,7 +341,7 @@ def plot_over(
 def _series(
     count: int, others: Mapping[str, tuple[str, Array]]
 ) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Return legend entry and members of each series: one for each value of the other quantity."""
+    """Return the legend entry and the members of each series; see `plot_over`."""
     every = [("", np.ones(count, dtype=bool))]
     if len(others) != 1:
         return every
@@ -354,7 +354,7 @@ def _series(
 
 
 def _draw(axis: Axes, x: Array, y: Array, k: int, label: str) -> None:
-    """Plot points, joined by a line if they are few and their abscissas differ."""
+    """Plot points, which a line joins if they are few and have different abscissas."""
     order = np.argsort(x, kind="stable")
     x, y = x[order], y[order]
     if x.size <= JOINED and np.unique(x).size == x.size and x.size > 1:

@@ -1,7 +1,7 @@
 """Extremes and integrals of signals over all accepted steps of a run.
 
-A run may rest for years and slip for a second: steps resolve the slip, equally spaced samples do
-not.
+A run may contain years of rest and a second of slip: steps resolve the slip, equally spaced samples
+do not.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Evaluate = Callable[[Array], Mapping[str, Array]]
 Of = Callable[[ca.SX, Array], Array]
-"""Values of an expression at times."""
+"""Function that returns the values of an expression at times."""
 ROUNDS, PARTS = 2, 16
-"""Numbers of refinements of the neighbourhood of an extreme, and of its parts."""
+"""Number of refinements around an extreme, and number of parts in each refinement."""
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
-"""Gauss quadrature on (-1, 1): exact up to degree 9, higher than that of any dense output."""
+"""Gauss quadrature on (-1, 1), exact up to degree 9, which exceeds that of all dense outputs."""
 EXACT, HALVINGS = 1e-12, 24
-"""Relative difference of two halves from the whole at which a step is halved, and largest number of
-halvings."""
+"""Relative difference between the integral of a step and those of its halves above which the step
+is halved, and largest number of halvings."""
 
 
 def looks(t: Array, steps: Array, jumps: Array) -> Array:
-    """Return times that resolve a run: `t`, ends and middles of `steps`, just before `jumps`."""
+    """Return times that resolve a run: `t`, ends and middles of `steps`, and before `jumps`."""
     middles = (steps[:-1] + steps[1:]) / 2
     before = np.nextafter(jumps, -np.inf)
     every = np.sort(np.concatenate([t, steps, middles, before]))
@@ -33,9 +33,9 @@ def looks(t: Array, steps: Array, jumps: Array) -> Array:
 
 
 def extremes(times: Array, values: Mapping[str, Array], evaluate: Evaluate) -> dict[str, Array]:
-    """Return name -> least and greatest value, shape (2,), refined between the `times`.
+    """Return the smallest and largest value of each signal by name, shape (2,).
 
-    Both are NaN if the signal is NaN at any time.
+    The search is refined between the `times`. Both values are NaN if a signal is NaN at any time.
     """
     names = list(values)
     best = np.array([[v.min(), v.max()] for v in values.values()])
@@ -56,9 +56,10 @@ def extremes(times: Array, values: Mapping[str, Array], evaluate: Evaluate) -> d
 
 
 def integrals(ends: Array, of: Of, expression: ca.SX, times: Array) -> Array:
-    """Return integrals of the rows of a column from the start to `times`, shape (rows, times).
+    """Return the integrals of the rows of a column from the start to `times`, shape (rows, times).
 
-    Steps between `ends` end at jumps of inputs and at events, so the integrand is smooth in each.
+    `ends` are the ends of steps. The integrand is smooth in each step, because steps end at events
+    and at jumps of inputs.
     """
     k = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, ends.size - 2)
     whole = _pieces(of, expression, ends[:-1], ends[1:])
@@ -69,7 +70,7 @@ def integrals(ends: Array, of: Of, expression: ca.SX, times: Array) -> Array:
 def integral_between(ends: Array, of: Of, expression: ca.SX, a: float, b: float) -> float:
     """Return the integral of one expression from time a to b.
 
-    A step between `ends` is halved until its halves agree with the whole.
+    Steps between `ends` are halved until the integrals of the halves agree with the whole.
     """
     cuts = np.unique(np.concatenate([[a], ends[(ends > a) & (ends < b)], [b]]))
     left, right, done = cuts[:-1], cuts[1:], 0.0
@@ -85,7 +86,7 @@ def integral_between(ends: Array, of: Of, expression: ca.SX, a: float, b: float)
 
 
 def _pieces(of: Of, expression: ca.SX, a: Array, b: Array) -> Array:
-    """Return integrals over intervals from a to b, each within a step, shape (rows, intervals)."""
+    """Return the integrals from a to b, each within one step, shape (rows, intervals)."""
     half = (b - a)[:, None] / 2
     at = (a + b)[:, None] / 2 + half * NODES
     if not at.size:

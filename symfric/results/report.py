@@ -1,5 +1,7 @@
-"""Self-contained HTML page of simulations: numbers, laws with equations, parameters and limits, and
-the command that repeats them.
+"""Self-contained HTML page about simulations.
+
+It contains signals, laws with equations and limits, parameters, and the command that repeats the
+simulations.
 """
 
 from collections import Counter
@@ -24,7 +26,7 @@ from symfric.results.kinds import is_mechanism, norms
 from symfric.results.trajectory import Trajectory
 
 LINES = 4
-"""Largest number of runs in one chart of friction."""
+"""Largest number of runs in one chart of friction over sliding velocity."""
 
 
 def report(
@@ -34,19 +36,20 @@ def report(
     settings: Mapping[str, Mapping[str, Parameter]] | None = None,
     command: str = "",
 ) -> str:
-    """Return one HTML page of one or several simulations of a machine.
+    """Return an HTML page about one or several simulations of a machine.
 
     Args:
-        runs: a trajectory, or name, such as that of the law -> trajectory.
+        runs: a trajectory, or trajectories by name, such as the name of the law.
         path: HTML file to write.
-        settings: name -> all parameters of the machine, which are constants of the model.
+        settings: all parameters of the machine by name of the run; models contain only their
+            values.
         command: command line that repeats the runs.
 
     Returns:
-        The page as text.
+        The content of the page.
 
     Raises:
-        ValueError: no run, or a value that is not a run.
+        ValueError: there is no run, or a value is not a run.
     """
     if isinstance(runs, Trajectory):
         runs = {runs.scene: runs}
@@ -77,7 +80,7 @@ def report(
 
 
 def _verdict(runs: Mapping[str, Trajectory]) -> str:
-    """Return the block that says how the runs ended."""
+    """Return the block with the status of the runs."""
     ended = all(run.status.ok for run in runs.values())
     good = ended and not any(run.doubts for run in runs.values())
     messages = [f"{name}: {run.message}" for name, run in runs.items()]
@@ -95,7 +98,7 @@ def _picture(runs: Mapping[str, Trajectory]) -> str:
 
 
 def _signals(runs: Mapping[str, Trajectory]) -> Iterator[str]:
-    """Yield a table of ranges and a line of events for each run."""
+    """Yield a table of ranges and a paragraph about events for each run."""
     for name, run in runs.items():
         rows = [
             (signal, *map(_number, (run.final[signal], *run.extremes[signal])), run.units[signal])
@@ -111,7 +114,7 @@ def _signals(runs: Mapping[str, Trajectory]) -> Iterator[str]:
 
 
 def _friction(runs: Mapping[str, Trajectory]) -> Iterator[str]:
-    """Yield friction over the sliding velocity in the colours of the picture, by contact."""
+    """Yield charts of friction over sliding velocity for each contact, in the colours of `plot`."""
     first = next(iter(runs.values()))
     for contact in first.model.contacts:
         name = "friction" if contact.bare else f"{contact.name}_friction"
@@ -133,7 +136,7 @@ def _friction(runs: Mapping[str, Trajectory]) -> Iterator[str]:
 
 
 def _books(runs: Mapping[str, Trajectory]) -> Iterator[str]:
-    """Yield the table of errors, constraints, energy and cost."""
+    """Yield the table of errors, constraints, energy and cost, with an explanation."""
     rows = [(name, *_accuracy(run)) for name, run in runs.items()]
     header = ("run", "measured error", "energy unexplained", "constraints", "steps", "rejected")
     yield html.table("Error and cost", (*header, "method", "run [ms]"), rows, (1, 2, 3, 4, 5, 7))
@@ -158,7 +161,7 @@ def _accuracy(run: Trajectory) -> tuple[str, ...]:
 
 
 def _laws(runs: Mapping[str, Trajectory]) -> Iterator[str]:
-    """Yield equation, limits and parameters of each law, once per set of parameters."""
+    """Yield equation, limits and parameters of each law with different parameters."""
     laws: dict[str, Any] = {}
     for run in runs.values():
         for contact in run.model.contacts:
@@ -177,7 +180,7 @@ def _laws(runs: Mapping[str, Trajectory]) -> Iterator[str]:
 
 
 def _settings(settings: Mapping[str, Mapping[str, Parameter]]) -> Iterator[str]:
-    """Yield the table of all parameters, with a column for each machine."""
+    """Yield the table of all parameters, with a column for each run."""
     names = dict.fromkeys(name for known in settings.values() for name in known)
     rows: list[Sequence[str]] = []
     for name in names:
@@ -190,7 +193,7 @@ def _settings(settings: Mapping[str, Mapping[str, Parameter]]) -> Iterator[str]:
 
 
 def _made(command: str) -> Iterator[str]:
-    """Yield the command and the versions."""
+    """Yield the command and a table of versions."""
     yield html.code(command)
     rows = [(name, version(name)) for name in ("symfric", "casadi", "numpy")]
     rows += [("Python", python_version()), ("platform", platform())]
@@ -198,5 +201,5 @@ def _made(command: str) -> Iterator[str]:
 
 
 def _number(value: Any) -> str:
-    """Return a number with six digits, an expression unchanged."""
+    """Return a number with six significant digits; other values as `str`."""
     return f"{value:.6g}" if isinstance(value, int | float | np.floating) else str(value)

@@ -1,4 +1,4 @@
-"""Signals of a simulation at any time, their extremes, integrals and derivatives."""
+"""Signals of a simulation at any time, with extremes, integrals and derivatives."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Signals(Showing):
-    """Named signals of a simulated model over time; see `Trajectory` for its fields."""
+    """Named signals of a simulated model over time; `Trajectory` documents the fields."""
 
     hidden = Showing.hidden | {
         "count", "delays", "ends", "evaluate", "express", "pull_back", "states",
@@ -51,31 +51,32 @@ class Signals(Showing):
 
     @property
     def doubts(self) -> str:
-        """Errors that the tolerances do not bound, in sentences; "" if none are known."""
+        """Message about errors that the tolerances do not bound; "" if none are known."""
         return self.message.removeprefix(self.status.value).strip() if self.status.ok else ""
 
     @cached_property
     def statistics(self) -> Statistics:
-        """Numbers of steps and evaluations, and times."""
+        """Numbers of steps and evaluations, and wall times."""
         return self.count()
 
     @cached_property
     def step_times(self) -> Array:
-        """Ends of the accepted steps [s], shape (steps + 1,); `at(step_times)` has the signals.
+        """Start and ends of the accepted steps [s], shape (steps + 1,).
 
-        A run whose steps would take too much memory does not keep them; it is repeated when they,
-        or values between the times `t`, are used.
+        `at(step_times)` returns the signals there. If the steps would need too much memory, they
+        are not kept, and the simulation is repeated when they, or values between the times `t`, are
+        used.
         """
         return self.ends()
 
     @cached_property
     def signals(self) -> dict[str, Array]:
-        """Name -> values at `t`, shape (n,): states, algebraic variables, inputs, outputs."""
+        """Values at `t` by name, shape (n,): states, algebraic variables, inputs, outputs."""
         return self.evaluate(self.t)
 
     @cached_property
     def looks(self) -> Array:
-        """Times [s] that show every accepted step, however short, and `t`, shape (k,)."""
+        """Times [s] for plots, shape (k,), which resolve every accepted step and include `t`."""
         jumps = np.array([time for time, _ in self.happened], dtype=float)
         return looks(self.t, self.step_times, jumps)
 
@@ -92,7 +93,7 @@ class Signals(Showing):
 
     @cached_property
     def extremes(self) -> dict[str, tuple[float, float]]:
-        """Name -> least and greatest value of a signal over all accepted steps."""
+        """Smallest and largest value of each signal by name, over all accepted steps."""
         found = extremes(self.looks, self._looked, self.evaluate)
         return {name: (float(low), float(high)) for name, (low, high) in found.items()}
 
@@ -111,13 +112,13 @@ class Signals(Showing):
 
     @cached_property
     def _further(self) -> dict[str, Array]:
-        """All details at `t`; one alone would cost almost as much."""
+        """All details at `t`, evaluated together because one alone would cost almost as much."""
         column = ca.vertcat(*(o.expression for o in self.model.further.values()), 0)
         return dict(zip(self.model.further, self.of(column), strict=False))
 
     @cached_property
     def details(self) -> dict[str, str]:
-        """Name -> unit of the further results of the model, such as reactions."""
+        """Units of the results that are computed on request, such as reactions, by name."""
         return {name: output.unit for name, output in self.model.further.items()}
 
     def unit(self, name: str) -> str:
@@ -128,24 +129,24 @@ class Signals(Showing):
         """Check that all names are signals or details.
 
         Raises:
-            ValueError: unknown names, with the nearest known one.
+            ValueError: a name is unknown; the message offers the nearest one.
         """
         names = [checks.text(self._where, name, "the name of a signal") for name in names]
         known = self.units if all(n in self.units for n in names) else self.units | self.details
         checks.check_names(self._where, names, known)
 
     def of(self, expression: Scalar, times: ArrayLike | None = None) -> Array:
-        """Return an expression in the symbols t, x, z, u, p of the model as numbers.
+        """Return the values of an expression in the symbols t, x, z, u, p of the model.
 
         Args:
-            expression: SX of one element, or a column (rows, 1).
-            times: [s], shape (n,); default `t`.
+            expression: scalar SX, or a column (rows, 1).
+            times: times [s], shape (n,); by default `t`.
 
         Returns:
-            Shape (n,), or (rows, n) for a column.
+            Values of shape (n,), or (rows, n) for a column.
 
         Raises:
-            ValueError: a symbol that the model does not have, a time outside the span.
+            ValueError: the expression contains other symbols, or a time is outside the span.
         """
         column, model = ca.SX(checks.expression(f"{self._where}: of", expression)), self.model
         known = ca.vertcat(model.t, *(model.vector(letter) for letter in "xzup"))
@@ -158,10 +159,10 @@ class Signals(Showing):
         return values[0] if column.is_scalar() else values
 
     def at(self, times: ArrayLike) -> dict[str, Array]:
-        """Return all signals at `times` [s] inside the simulated span, by dense output.
+        """Return all signals at `times` [s] in the simulated span, by dense output.
 
         Raises:
-            ValueError: a time outside the span.
+            ValueError: a time is outside the span.
         """
         return self.evaluate(self._inside(times))
 
@@ -186,15 +187,15 @@ class Signals(Showing):
     def integral(self, name: str, times: ArrayLike | None = None) -> Array:
         """Return the integral of a signal or detail over time from the start.
 
-        It is found by Gauss quadrature over the dense output of every accepted step:
-        `trajectory.integral("friction_power")` is a work [J].
+        It is computed by Gauss quadrature over the dense output of every accepted step. For
+        example, `trajectory.integral("friction_power")` is the work of friction [J].
 
         Args:
-            name: of a signal or detail.
-            times: upper limits [s], shape (n,); default `t`.
+            name: name of a signal or detail.
+            times: upper limits [s], shape (n,); by default `t`.
 
         Raises:
-            ValueError: unknown name, a time outside the span.
+            ValueError: the name is unknown, or a time is outside the span.
         """
         self.check([name])
         at = self.t if times is None else self._inside(times)
@@ -204,15 +205,15 @@ class Signals(Showing):
         """Return the integral of a force times a rate over time, such as the work of friction [J].
 
         Steps of the dense output are halved until the quadrature is exact up to rounding. A sum
-        over the samples at `t` misses what happens between them.
+        over the samples at `t` would miss events between them.
 
         Args:
-            force: a signal or detail.
-            rate: another one, such as a velocity.
-            between: first and last time [s]; default the whole span.
+            force: name of a signal or detail.
+            rate: name of a signal or detail, such as a velocity.
+            between: first and last time [s]; by default the whole span.
 
         Raises:
-            ValueError: unknown names, times outside the span or not in order.
+            ValueError: a name is unknown, or times are outside the span or not in order.
         """
         self.check([force, rate])
         product = self.model.expression(force) * self.model.expression(rate)
@@ -221,17 +222,17 @@ class Signals(Showing):
     def area(self, y: str, x: str, between: tuple[float, float] | None = None) -> float:
         """Return the integral of y dx along the run: the area below a curve, or in a closed loop.
 
-        A loop that is run clockwise in the plane of x and y is positive. The method is that of
-        `work`; jumps of x by the reset of an event are left out.
+        The area of a loop is positive if it is traversed clockwise in the x-y plane. The method is
+        the same as in `work`; jumps of x by the reset of an event are not included.
 
         Args:
-            y: a signal or detail.
-            x: a signal or detail that depends on the states and time only, of a model with explicit
-                equations.
-            between: first and last time [s]; default the whole span.
+            y: name of a signal or detail.
+            x: name of a signal or detail that depends on states and time only; the model must have
+                explicit equations.
+            between: first and last time [s]; by default the whole span.
 
         Raises:
-            ValueError: unknown names, an x whose rate the equations do not give, times outside the
+            ValueError: a name is unknown, the rate of x is not explicit, or times are outside the
                 span or not in order.
         """
         self.check([y, x])
@@ -256,13 +257,15 @@ class Signals(Showing):
 
     @cached_property
     def sensitivities(self) -> dict[str, dict[str, Array]]:
-        """Derivatives at `t`: name as given to `simulate` -> signal -> values, shape (n,).
+        """Derivatives of the signals at `t`, shape (n,), by requested name and by signal.
 
-        They jump at an event that moves with the name; at its time they are those after it.
+        Names are those passed to `simulate`. Derivatives jump at an event whose time depends on the
+        name; at the time of the event, the values after it are returned.
 
         Raises:
-            ValueError: none were requested, or an event has none: its expression only touches
-                zero, or it coincides with a jump of an input or with an event whose order matters.
+            ValueError: no derivatives were requested, or an event is not differentiable: its
+                expression touches zero without crossing, or it coincides with a jump of an input or
+                with another event and their order matters.
         """
         if self.differentiate is None:
             raise self._without_derivatives
@@ -270,9 +273,10 @@ class Signals(Showing):
 
     @cached_property
     def event_sensitivities(self) -> dict[str, Array]:
-        """Derivatives of the times of `happened`: name -> [s per unit], shape (events,).
+        """Derivatives of the event times in `happened` by requested name, shape (events,).
 
-        That of a terminal event is the derivative of the end time. Raises as `sensitivities` does.
+        The unit is s per unit of the name. For a terminal event, it is the derivative of the end
+        time. The errors are those of `sensitivities`.
         """
         if self.delays is None:
             raise self._without_derivatives
@@ -281,18 +285,19 @@ class Signals(Showing):
     def gradient(self, weights: Mapping[str, ArrayLike]) -> dict[str, float]:
         """Return the derivatives of the sum over signals s and times t_i of weights[s][i] s(t_i).
 
-        One sweep backwards over the steps computes all of them, at a cost that does not depend on
-        the number of names given to `simulate`. For a cost J of the signals at `t`, the weights are
-        dJ/ds(t_i).
+        One backward sweep over the steps computes all derivatives, at a cost that does not depend
+        on the number of names passed to `simulate`. For a cost J of the signals at `t`, the weights
+        are dJ/ds(t_i).
 
         Args:
-            weights: signal -> a number for every time of `t`, or one for all.
+            weights: weights by signal: a number for each time in `t`, or one number for all times.
 
         Returns:
-            Name as given to `simulate` -> derivative.
+            Derivatives by the names passed to `simulate`.
 
         Raises:
-            ValueError: no sensitivities were requested, an unknown signal, another length.
+            ValueError: no sensitivities were requested, a signal is unknown, or the number of
+                weights is wrong.
         """
         if self.pull_back is None:
             raise self._without_derivatives

@@ -1,7 +1,7 @@
-"""Files of runs, ensembles, fits and optimal motions, and packages for tables.
+"""Files of runs, ensembles, fits and optimal motions, and statistics of simulations.
 
-Files are written atomically and restored bit for bit. `symfric.foundation.packed` converts objects
-to arrays.
+Files are written atomically, and objects are restored exactly. `symfric.foundation.packed` converts
+objects to arrays.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -19,13 +19,14 @@ T = TypeVar("T")
 @final
 @dataclass(frozen=True)
 class Format(Generic[T]):
-    """Kind of file.
+    """Format of a file.
 
     Attributes:
         kind: name of the file type in the file.
-        number: raised whenever older programs would misread it; older formats are read.
-        reader: function that reads it, for messages: "load_run".
-        what: content in words: "a saved run".
+        number: version; it is increased if older programs would misread the file. Older versions
+            can be read.
+        reader: name of the function that reads the file, such as "load_run", for messages.
+        what: description of the content, such as "a saved run".
         content: class of the content.
     """
 
@@ -39,22 +40,21 @@ class Format(Generic[T]):
         """Write `thing` to a file.
 
         Raises:
-            ValueError: the file cannot be written, or `thing` contains an object that a file cannot
-                hold.
+            ValueError: the file cannot be written, or a file cannot contain some part of `thing`.
         """
         with written(checks.path("output", path)) as temporary, temporary.open("wb") as file:
             packed.dump(file, thing, self.kind, self.number)
 
     def load(self, path: str | PathLike[str], own: Iterable[type | Callable[..., Any]] = ()) -> T:
-        """Return the object that `save` wrote; reading runs no code from the file.
+        """Return the object that `save` wrote; no code in the file is executed.
 
         Args:
-            path: the file.
-            own: the user's classes and functions in it.
+            path: file to read.
+            own: classes and functions of the user that the file contains.
 
         Raises:
-            ValueError: no such file, another or a damaged one, one of a newer version, or unknown
-                classes.
+            ValueError: the file does not exist, has another format, is damaged, was written by a
+                newer version, or contains unknown classes.
         """
         place, where = checks.path(self.reader, path), f"{self.reader} '{path}'"
         try:
@@ -70,10 +70,10 @@ class Format(Generic[T]):
 
 
 def module(where: str, name: str) -> Any:
-    """Import an optional package.
+    """Import and return an optional package.
 
     Raises:
-        ImportError: it is not installed.
+        ImportError: the package is not installed.
     """
     try:
         return import_module(name)
@@ -86,21 +86,21 @@ def module(where: str, name: str) -> Any:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Cost of a simulation.
+    """Statistics of a simulation: cost and measured errors.
 
     Attributes:
         backend: "vm" or "compiled".
         method: integration method.
-        steps, rejections: accepted and rejected steps.
-        evaluations, jacobians, factorisations: calls of the right-hand side, of its Jacobian, and
-            LU factorisations.
-        events: events that happened.
+        steps, rejections: numbers of accepted and rejected steps.
+        evaluations, jacobians, factorisations: numbers of evaluations of the right-hand side and of
+            its Jacobian, and of LU factorisations.
+        events: number of events.
         smallest_step: smallest accepted step [s].
-        build_time, compile_time, run_time: wall time [s] for making the integrator (0 if it is
-            reused), compiling it, and running it.
-        error: measured error relative to each state's magnitude, the largest; NaN if not requested.
-        sensitivity_errors: measured error of derivatives by each requested name, relative
-            to the largest value of each state's derivative, the largest; NaN if there is none.
+        build_time, compile_time, run_time: wall times [s] to build the integrator (0 if it is
+            reused), to compile it, and to run it.
+        error: largest measured error of a state relative to its magnitude; NaN if not requested.
+        sensitivity_errors: largest measured error of the derivatives by each requested name,
+            relative to the largest value of the derivative of the same state; NaN if there is none.
     """
 
     backend: str
@@ -119,5 +119,5 @@ class Statistics:
     sensitivity_errors: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the fields by name; errors that were not measured are left out."""
+        """Return the fields by name; errors that were not measured are omitted."""
         return {k: v for k, v in asdict(self).items() if v == v and v != {}}

@@ -11,22 +11,22 @@ from symfric.model.sketch import Mark, Part, Sketch
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 FLAT = 1e-6
-"""Fraction of the motion in a plane below which motion out of it counts as zero."""
+"""Fraction of the motion in a plane below which motion out of the plane counts as zero."""
 SYMBOL = 0.02
-"""Half the size of a joint's symbol, as a fraction of the whole machine."""
+"""Half the size of the symbol of a joint as a fraction of the size of the machine."""
 ELEVATION, AZIMUTH = 22.0, -58.0
-"""Direction of view of a spatial motion [degree]."""
+"""Direction from which spatial motion is viewed [degree]."""
 UPRIGHT = 0.99
-"""Component of the view along z beyond which z is not upward in the picture."""
+"""Component of the viewing direction along z above which y is upward in the picture."""
 
 
 class Poses(NamedTuple):
-    """Places of a sketch over the pictures.
+    """Poses of the places of a sketch in all pictures.
 
     Attributes:
-        axes: shape (places, axis, component, pictures).
-        at: positions [m], shape (places, component, pictures).
-        paths: of the centres of the parts [m], shape (parts, component, times).
+        axes: axes of the places, shape (places, axis, component, pictures).
+        at: positions of the places [m], shape (places, component, pictures).
+        paths: paths of the centres of the parts [m], shape (parts, component, times).
     """
 
     axes: Array
@@ -35,15 +35,15 @@ class Poses(NamedTuple):
 
 
 class Stroke(NamedTuple):
-    """Line or markers.
+    """Line or markers in all pictures.
 
     Attributes:
         role: body, arm (to the end of a spring), path, block, axis, guide, rod, spring, damper,
-            ground (a guide fixed to it), anchor, centre, or joint.
-        points: corners of the line, NaN where it is broken, shape (n, 3, pictures).
-        body: number of the body, which selects the colour; -1 if it is not part of a body.
-        marker: shape of a joint's marker.
-        sticks: True if the joint's contacts stick, per picture; None without friction.
+            ground (a guide fixed to the ground), anchor, centre, or joint.
+        points: points of the line, shape (n, 3, pictures); NaN interrupts the line.
+        body: number of the body, which selects the colour; -1 if the stroke belongs to no body.
+        marker: marker of a joint.
+        sticks: flags of a joint, True in pictures where its contacts stick; None without friction.
     """
 
     role: str
@@ -54,13 +54,13 @@ class Stroke(NamedTuple):
 
 
 class View(NamedTuple):
-    """Direction from which a motion is seen.
+    """View of a motion.
 
     Attributes:
-        low, high: corners of the box in the picture [m], shape (3,).
-        eye: direction towards the eye.
+        low, high: corners of the visible box [m], shape (3,).
+        eye: unit vector towards the viewer.
         planar: True if the motion is in a plane with the normal `eye`.
-        size: half the size of a joint's symbol [m].
+        size: half the size of the symbol of a joint [m].
     """
 
     low: Array
@@ -71,14 +71,14 @@ class View(NamedTuple):
 
     @property
     def up(self) -> Array:
-        """Upward direction in the picture: z, or y if the view is along z."""
+        """Upward direction in the picture, near z, or near y if the view is along z."""
         upwards = np.eye(3)[1 if abs(self.eye[2]) > UPRIGHT else 2]
         up = upwards - (upwards @ self.eye) * self.eye
         return np.asarray(up / np.linalg.norm(up))
 
     @property
     def right(self) -> Array:
-        """Direction to the right in the picture."""
+        """Rightward direction in the picture."""
         return np.cross(self.up, self.eye)
 
 
@@ -95,15 +95,15 @@ def look(sketch: Sketch, poses: Poses) -> View:
 
 
 def _points(places: Array) -> Array:
-    """Return all places at all times as columns, shape (3, n)."""
+    """Return the positions of all places at all times as columns, shape (3, n)."""
     return places.transpose(1, 0, 2).reshape(3, -1)
 
 
 def _normal(sketch: Sketch, poses: Poses) -> Array | None:
-    """Return the normal of the plane in which everything moves, towards the eye; None in space.
+    """Return the normal of the plane of motion, towards the viewer; None if motion is spatial.
 
-    Motion along a line, or rest, is seen along the hinges; without hinges, along the normal of the
-    plane through all places, or from the side if these also lie on a line.
+    For motion along a line, or rest, the normal is the axis of the hinges. Without hinges, it is
+    the normal of the plane through all places, or orthogonal to their line if they are collinear.
     """
     moved = _points(poses.at - poses.at[:, :, :1])
     hinges = [poses.axes[mark.b, 2] for mark in sketch.marks if mark.symbol.hinge]
@@ -127,7 +127,7 @@ def _normal(sketch: Sketch, poses: Poses) -> Array | None:
 
 
 def _aside(line: Array) -> Array:
-    """Return the horizontal direction across a line; y for one along x or z."""
+    """Return a direction orthogonal to a line: -y for a line along x or z, x for one along y."""
     level = np.array([0.0, -1.0, 0.0]) if abs(line[1]) < UPRIGHT else np.array([1.0, 0.0, 0.0])
     across = level - (level @ line) * line
     return np.asarray(across / np.linalg.norm(across))
@@ -136,12 +136,12 @@ def _aside(line: Array) -> Array:
 def strokes(
     sketch: Sketch, poses: Poses, view: View, sticks: Mapping[str, Flags]
 ) -> Iterator[Stroke]:
-    """Yield everything that is drawn, from back to front.
+    """Yield all strokes of a sketch from back to front.
 
     Args:
-        sketch, poses: parts and their places.
-        view: direction from which it is seen.
-        sticks: joint -> True if its contacts stick, per picture.
+        sketch, poses: sketch, and poses of its places.
+        view: view of the motion.
+        sticks: flags by joint, True in pictures where its contacts stick.
     """
     moving = [
         (part, path) for part, path in zip(sketch.parts, poses.paths, strict=True) if not part.fixed
@@ -160,7 +160,7 @@ def strokes(
 
 
 def _body(sketch: Sketch, part: Part, k: int, poses: Poses, view: View) -> Iterator[Stroke]:
-    """Yield lines from the centre of mass to the places of a body; a block if they coincide."""
+    """Yield lines from the centre of mass to the places of a body, or a block if they coincide."""
     centre = poses.at[part.centre]
     for role, places in (("arm", part.ends), ("body", part.corners)):
         arms = [poses.at[c] for c in places]
@@ -174,7 +174,7 @@ def _body(sketch: Sketch, part: Part, k: int, poses: Poses, view: View) -> Itera
 
 
 def _behind(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
-    """Yield guides, slots, rods, springs, and anchors on the ground."""
+    """Yield the guide, slot, rod, spring or damper of a mark, and its anchor on the ground."""
     a, b, z = poses.at[mark.a], poses.at[mark.b], poses.axes[mark.a, 2]
     if mark.symbol.guide or mark.symbol.slot:
         along = np.sum(z * (b - a), axis=0)
@@ -190,7 +190,7 @@ def _behind(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
 
 
 def _symbol(mark: Mark, poses: Poses, view: View) -> Iterator[Stroke]:
-    """Yield blocks, axes and plates of joints."""
+    """Yield the block, axes and plate of a joint."""
     a, b, size = poses.axes[mark.a], poses.at[mark.b], view.size
     if mark.symbol.guide:
         yield Stroke("block", _block(poses.axes[mark.b], b, size))
@@ -214,7 +214,7 @@ def _block(axes: Array, at: Array, size: float) -> Array:
 
 
 def _zigzag(a: Array, b: Array, view: View) -> Array:
-    """Return a spring of 8 coils between two points, turned towards the eye."""
+    """Return the points of a spring of 8 coils between two points, facing the viewer."""
     d = b - a
     side = np.cross(d.T, view.eye)
     length = np.linalg.norm(side, axis=1, keepdims=True)

@@ -31,22 +31,22 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class EnergyBalance(Showing):
-    """Energy of a mechanism and the work that changed it, over the times of a trajectory.
+    """Energy of a mechanism and work on its bodies, over the times of a trajectory.
 
         defect(t) = E(t) - E(0) - W(t),   W the sum of all work
 
-    W is the integral of the powers over the dense output, which error control does not use, so
-    that the defect measures the error of the simulation. It has the order of the method, 5
-    (rodas5p, radau5), 4 (rodas4p) or 3 (rodas3), and is up to a hundred times larger inside the
-    steps than at their ends. Energy removed by the reset of an event belongs to the defect.
+    W is the integral of the powers over the dense output. Error control does not use W; the defect
+    therefore measures the error of the simulation. It has the order of the method, 5 (rodas5p,
+    radau5), 4 (rodas4p) or 3 (rodas3), and is up to a hundred times larger inside the steps than at
+    their ends. It includes the energy removed by the reset of an event.
 
     Attributes:
         t: times [s], shape (n,).
         energy: kinetic and potential energy [J], without potentials that depend on time or inputs.
-        work: name -> work done on the bodies [J]: by friction (negative), by each force that is
-            not conservative, by prescribed motions.
-        defect: difference [J].
-        scale: the largest kinetic energy, change of potential energy, or work [J].
+        work: work on the bodies [J] by name: of friction (negative), of each force that is not
+            conservative, and of prescribed motions.
+        defect: E(t) - E(0) - W(t) [J].
+        scale: largest kinetic energy, change of potential energy, or work [J].
     """
 
     t: Array
@@ -56,7 +56,7 @@ class EnergyBalance(Showing):
     scale: float
 
     def shown(self) -> Shown:
-        """Describe the energy at the start and at the end, the work in between, and the defect."""
+        """Return the energy at the start and at the end, the work, and the largest defect."""
         rows = [("energy at the start", f"{self.energy[0]:.6g}")]
         rows += [(f"work of {name}", f"{work[-1]:.6g}") for name, work in self.work.items()]
         rows += [("energy at the end", f"{self.energy[-1]:.6g}")]
@@ -67,13 +67,13 @@ class EnergyBalance(Showing):
 
     @property
     def relative(self) -> float:
-        """Largest defect over `scale`; 0 if nothing moved up to rounding."""
+        """Largest defect divided by `scale`; 0 if `scale` is at the level of rounding errors."""
         largest = float(np.abs(self.defect).max(initial=0.0))
         moved = self.scale > 1e-16 * float(np.abs(self.energy).max(initial=0.0))
         return largest / self.scale if moved else 0.0
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the numbers at the end [J], and the largest defect."""
+        """Return the energies at start and end, the work, and the largest defect [J]."""
         return {
             "start": float(self.energy[0]),
             "end": float(self.energy[-1]),
@@ -84,34 +84,37 @@ class EnergyBalance(Showing):
 
 
 CHEAP = 200_000
-"""Steps times signals up to which extremes over all steps are always computed: about 20 ms."""
+"""Number of steps times signals up to which `shown` computes extremes over all steps (20 ms)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(packed.Portable, Signals):
     """Named signals of a simulated model.
 
-    `trajectory["v"]` is a signal at the times `trajectory.t`; `trajectory.at(times)` evaluates
-    all signals anywhere in the span by the dense output of the method. Signals are evaluated when
-    they are first used. Further results are named in `details`: `trajectory["hinge_Fx"]` is a
-    reaction, and plots and CSV files accept such names, too.
+    `trajectory["v"]` is a signal at the times `trajectory.t`; `trajectory.at(times)` evaluates all
+    signals at any time in the span, by the dense output of the method. Signals are evaluated when
+    they are first used. `details` lists additional results, such as the reaction
+    `trajectory["hinge_Fx"]`; plots and CSV files also accept their names.
 
     Attributes:
         scene: name of the model.
         t: times of the result [s], shape (n,).
-        units: name -> unit of every signal.
-        status: how it ended; `message` explains it in a sentence.
+        units: unit of every signal by name.
+        status: status at the end of the simulation.
+        message: explanation of the status.
         count: function that returns `statistics`.
-        span: first time and the last one reached [s].
+        span: first time and last reached time [s].
         ends: function that returns `step_times`.
         states: function of times that returns the states; cheaper than all signals.
         evaluate: function of times that returns all signals.
-        express: function that returns an expression of the model at times, shape (rows, n).
+        express: function of an expression of the model and times that returns its values, shape
+            (rows, n).
         model: the model that was simulated.
         happened: (time [s], name) of every event.
         differentiate: function of times that returns derivatives of all signals, if requested.
-        delays: function that returns derivatives of the times of `happened`, likewise.
-        pull_back: gradient of a weighted sum of signals at `t`, likewise.
+        delays: function that returns derivatives of the event times in `happened`, if requested.
+        pull_back: function that returns the gradient of a weighted sum of signals at `t`, if
+            requested.
         keep: function that returns the run as data for files and pickles.
     """
 
@@ -120,9 +123,9 @@ class Trajectory(packed.Portable, Signals):
     keep: "Callable[[Trajectory], Any] | None" = None
 
     def shown(self) -> Shown:
-        """Return laws, the end of the run, and the start, end and extremes of every signal.
+        """Return the laws, the status, and first, last and extreme values of every signal.
 
-        Extremes are those over all steps if these are known or cheap, else those at `t`.
+        Extremes are taken over all steps if they are known or cheap to compute, else over `t`.
         """
         counts, (first, last) = self.statistics, self.span
         known = "extremes" in self.__dict__ or counts.steps * len(self.units) <= CHEAP
@@ -147,7 +150,7 @@ class Trajectory(packed.Portable, Signals):
         return Shown(title, tuple(lines), table, tuple(after))
 
     def _rows(self, known: bool) -> Iterator[tuple[str, ...]]:
-        """Yield the rows of the table; `known`: True for extremes over all steps."""
+        """Yield the rows of the table, with extremes over all steps if `known`, else over `t`."""
         if not self.t.size:
             yield from ((name, unit, "", "", "", "") for name, unit in self.units.items())
             return
@@ -163,10 +166,10 @@ class Trajectory(packed.Portable, Signals):
         return thumbnail(self)
 
     def energy_balance(self) -> EnergyBalance:
-        """Return the balance of a mechanism's energy: work by cause, and the defect.
+        """Return the energy balance of a mechanism: energy, work by cause, and defect.
 
         Raises:
-            ValueError: a model without the detail "conserved" and powers of the kind `WORK`.
+            ValueError: the model is not a mechanism and has no detail "conserved".
         """
         if "conserved" not in self.details:
             raise ValueError(
@@ -196,17 +199,17 @@ class Trajectory(packed.Portable, Signals):
         panels: str = "main",
         log: Sequence[str] = (),
     ) -> "Figure":
-        """Plot signals over time with units; save the figure to `path` if given.
+        """Plot signals over time with units, and save the figure to `path` if it is given.
 
-        A notebook shows the figure that a cell returns; elsewhere `.show()` opens a window.
+        A notebook shows the figure that a cell returns; elsewhere, `.show()` opens a window.
 
         Args:
-            names: signals or details, a panel each.
-            path: image file, its format taken from the ending.
+            names: signals or details, each in its own panel.
+            path: image file; its suffix selects the format.
             label: legend entry of this trajectory.
-            panels: without names, "main" for positions, friction and energy or power, "all" for
-                every signal, grouped by kind if there are many.
-            log: signals on logarithmic axes, as `plot("v", "x", log=["v"])`.
+            panels: signals to plot if no names are given: "main" for positions, friction and energy
+                or power, "all" for every signal, grouped by kind if there are many.
+            log: signals on logarithmic axes, as in `plot("v", "x", log=["v"])`.
         """
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow to import)
 
@@ -220,37 +223,37 @@ class Trajectory(packed.Portable, Signals):
         speed: float | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> None:
-        """Write an animation of a machine: GIF, HTML with embedded pictures, or MP4.
+        """Write an animation of a machine as GIF, HTML with embedded pictures, or MP4.
 
-        Planar machines are seen along the normal of their plane. A joint with friction is filled
-        while all its contacts move slower than the velocity scale of their law, and hollow while
-        one slides.
+        Planar machines are viewed along the normal of their plane. A joint with friction is drawn
+        filled while all its contacts are slower than the velocity scale of their law, and hollow
+        while a contact slides.
 
         Args:
-            path: file ending in .gif, .html or .mp4 (needs the program ffmpeg).
+            path: file with the suffix .gif, .html or .mp4 (requires the program ffmpeg).
             fps: pictures per second.
-            speed: of the motion relative to real time; by default 1 for runs of 2 to 12 s;
-                other runs are shown in 6 s.
-            progress: called with the fraction done.
+            speed: speed relative to real time; by default 1 for runs of 2 to 12 s, while other runs
+                are shown in 6 s.
+            progress: function that is called with the completed fraction.
 
         Raises:
-            ValueError: a model without bodies, another ending, no ffmpeg, numbers not above zero.
+            ValueError: the model has no bodies, the suffix is not supported, ffmpeg is missing, or
+                a number is not positive.
         """
         from symfric.results.animation import animate  # noqa: PLC0415  (matplotlib is slow to import)
 
         animate(self, path, fps=fps, speed=speed, progress=progress)
 
     def save(self, path: str | Path) -> None:
-        """Write the whole run to one file, which `symfric.load_run` reads to the bit.
+        """Write the run to one file, from which `symfric.load_run` restores it exactly.
 
-        It holds the model, the signals at `t` and all accepted steps; a long run is repeated to
-        find its steps. A loaded run has all features of this one: times in between, extremes,
-        further results, plots, animations, energy, requested derivatives, another simulation of its
-        `model`. Inputs given by functions are stored as expressions.
+        The file contains the model, the signals at `t` and all accepted steps; a long run is
+        repeated to compute its steps. A loaded run supports all methods of this class, including
+        values between the times, animations and requested derivatives, and its `model` can be
+        simulated again. Inputs given by functions are stored as expressions.
 
         Raises:
-            ValueError: the file cannot be written, or the model contains an object that a file
-                cannot hold.
+            ValueError: the file cannot be written, or a file cannot contain some part of the model.
         """
         self.packed_as().save(path)
 
@@ -264,20 +267,20 @@ class Trajectory(packed.Portable, Signals):
         """Write signals as columns with units in the header, such as `v [m/s]`.
 
         Args:
-            path: file.
-            names: signals or details; all signals if none is given.
+            path: CSV file.
+            names: signals or details; by default all signals.
         """
         columns = self._columns(names)
         header = ["t [s]", *(f"{name} [{self.unit(name)}]" for name in columns)]
         write_table(path, header, np.column_stack([self.t, *columns.values()]).tolist())
 
     def to_dataframe(self, *names: str) -> Any:
-        """Return signals or details, by default all signals, as a pandas table over t.
+        """Return signals or details, by default all signals, as a pandas DataFrame over t.
 
-        Its `attrs` contain the units.
+        The attribute `attrs` contains the units.
 
         Raises:
-            ImportError: no pandas.
+            ImportError: pandas is not installed.
         """
         pandas = module("to_dataframe", "pandas")
         columns = self._columns(names)
@@ -287,10 +290,10 @@ class Trajectory(packed.Portable, Signals):
         return frame
 
     def to_xarray(self, *names: str) -> Any:
-        """Return the same as an xarray data set, with units as attributes.
+        """Return signals or details, by default all signals, as an xarray Dataset with units.
 
         Raises:
-            ImportError: no xarray.
+            ImportError: xarray is not installed.
         """
         xarray = module("to_xarray", "xarray")
         columns = self._columns(names)
@@ -308,7 +311,7 @@ class Trajectory(packed.Portable, Signals):
         return {"scene": self.scene, "status": self.status.name, "message": self.message}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return scene, status, statistics, units, times and signals as plain data."""
+        """Return scene, status, statistics, units, times and signals as built-in types."""
         return {
             "scene": self.scene,
             "status": self.status.name,
@@ -320,5 +323,5 @@ class Trajectory(packed.Portable, Signals):
         }
 
     def to_json(self, path: str | Path) -> None:
-        """Write `to_dict` as JSON."""
+        """Write the result of `to_dict` as JSON."""
         write_text(path, json.dumps(self.to_dict()))
