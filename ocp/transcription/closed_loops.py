@@ -6,9 +6,9 @@ removes the remaining violation; its multipliers mu, nu are additional unknowns:
     q_(k+1) = q_end + phi_q' mu,   phi(q_(k+1), t) = 0
     v_(k+1) = v_end + phi_q' nu,   phi_q v_(k+1) + phi_t = 0
 
-phi_q is evaluated at q_end, which makes a node an explicit function of the interval before.
-Coordinates may be named wherever values are given, also dependent ones: those that follow from the
-others are released, so that no condition is stated twice.
+phi_q is evaluated at q_end, so each node is an explicit function of the preceding interval.
+The user may prescribe dependent coordinates, too. Those that follow from the others are released,
+so that no condition is redundant.
 
 Source: Gear, Leimkuhler and Gupta, J. Comput. Appl. Math. 12/13, 1985, 77-90 (constraints on two
 levels); Ascher and Petzold, SIAM J. Numer. Anal. 28, 1991, 1097-1120 (projected collocation).
@@ -57,14 +57,14 @@ class Loops:
         self.open = bool(unknown) and bool(ca.depends_on(phi, ca.vertcat(*unknown)))
 
     def at(self, q: Array, t: float) -> tuple[Array, Array, Array]:
-        """Return phi (m,), phi_q (m, n) and phi_t (m,), scaled, at the time `t` of the phase [s]."""
+        """Return phi (m,), phi_q (m, n) and phi_t (m,), scaled, `t` [s] after the start."""
         values = self._function(q, self.begin + t, self.span.p)
         phi, slope, rate = (np.array(part) for part in values)
         slope = slope * self.nominal / self.sizes[:, None]
         return phi.ravel() / self.sizes, slope, rate.ravel() / self.sizes
 
     def closed(self, q: Array, held: Sequence[int], t: float) -> tuple[Array, float]:
-        """Return coordinates that satisfy the constraints with those `held` as in q, and a residual.
+        """Return coordinates on the constraints with those `held` as in q, and the residual.
 
         Gauss-Newton steps of least norm are combined with continuation from the start of the model.
         The residual is the largest remaining one of the constraints.
@@ -93,7 +93,7 @@ class Loops:
     def _towards(
         self, start: Array, q: Array, held: Sequence[int], t: float, pace: tuple[int, int]
     ) -> Array:
-        """Return coordinates moved from `start` to the `held` values of q, and others by least norm."""
+        """Return `start` with the `held` values of q, and other coordinates on the constraints."""
         free = np.setdiff1d(np.arange(self.n), held)
         now, begin = start.copy(), start[list(held)]
         for s in np.linspace(0.0, 1.0, pace[0] + 1)[1:]:

@@ -246,7 +246,7 @@ class Transcription:
         return self.skeleton.layout
 
     def pack(self, points: Points) -> Array:
-        """Return the vector w of `points`; shared unknowns have the values of the first scenario."""
+        """Return the vector w of `points`; shared unknowns take values of the first scenario."""
         w = np.zeros(self.layout.size)
         for span, own in zip(points.spans[::-1], self.layout.spans[::-1], strict=True):
             w[own.nodes], w[own.inner] = span.nodes, span.inner
