@@ -1,26 +1,25 @@
-"""Multi-phase problem of a mode sequence: one phase of mode models for each arc.
+"""Multi-phase problem of a mode sequence, with one phase of mode models for each arc.
 
-The user's conditions hold by name in all arcs of their phases. In addition, the following
-conditions make the arcs a motion with exact Coulomb friction and stiction, for each contact:
+The user's conditions apply by name to all arcs of a phase. The following conditions on each contact
+ensure that the arcs are a motion with exact Coulomb friction and stiction:
 
-* it slips in the direction of its mode: slip >= 0 or <= 0;
-* in stick the reaction is within the static level in both directions: |F| <= F_s;
-* at a change of mode slip = 0: at the end of slipping, and at the start of the next mode;
-* at the end of stick, or at a reversal, it breaks away: the force that would hold it at rest under
-  the control *after* that instant reaches the static level in that direction. It may exceed it,
-  since controls jump, so this is an inequality: an equality would exclude such motions; without
-  the condition a body could leave rest although friction can hold it, with a lower, wrong cost;
-
-* a contact that sticks when the control changes is caught: slightly earlier, the previous control
-  would reverse it. It would then slip back for a moment, and stop only if the force under the next
-  control is below the sliding force, not just below the static level;
-
-* a contact that sticks is stopped by a share of the sliding force: if slip only touches zero, or
-  a larger force would be needed after a jump of the control, the smallest deviation would let it
+* In slip the sliding velocity has the sign of the mode: slip >= 0 or <= 0.
+* In stick the reaction is within the static level in both directions: |F| <= F_s.
+* At a change of mode slip = 0, at the end of slipping and at the start of the next mode.
+* At the end of stick, or at a reversal, the contact breaks away: the force that would hold it under
+  the control *after* this time reaches the static level. The force may exceed the level, because
+  controls jump, so the condition is an inequality. Without it a body could start to move although
+  friction can hold it, at a lower, wrong cost.
+* A contact that stops when the control changes must be caught. If it stops slightly earlier, the
+  previous control may reverse it; it then slips back for a moment and stops only if the force under
+  the next control is below the sliding force, not just below the static level.
+* A contact that stops must be decelerated by a share of the sliding force. If slip only touches
+  zero, or a larger force is necessary after a jump of the control, a small deviation would let it
   continue to slip.
 
-Dependent conditions are stated once, since solvers need independent ones: in stick slip stays zero
-by itself, so no condition is imposed on it at the end of stick.
+Solvers need independent conditions, so dependent ones are omitted: slip remains zero in stick, and
+no condition is imposed on it at the end of stick.
+
 Source: Brogliato, Nonsmooth Mechanics, 3rd ed., 2016, ch. 5; Betts, Practical Methods for Optimal
 Control, 2nd ed., 2010, 2.8 and 3.7 (phases, linkage conditions).
 """

@@ -61,15 +61,17 @@ class Width:
 
 
 def smooth_model(model: Model) -> Model:
-    """Return `model` with the widths of all contacts as parameters, see `widths`.
+    """Return `model` with smooth laws and with the widths of all contacts as parameters.
 
-    Laws that neither smooth nor are smooth (with modes, with states, without regularisation) are
-    replaced by one with the same sliding force and static level. With s = tanh 4x, x = v / width,
+    Laws with modes or states, and laws with a jump that is not smoothed, are replaced by a law with
+    the same sliding force and static level. With s = tanh 4x, x = v / width,
 
         F = (1 + s)/2 sliding(|v|, +1) + (1 - s)/2 sliding(-|v|, -1) + excess x / (x^2/4 + 3/4)^2
 
     where the excess is the static level minus the sliding force at v = 0.
-    Raises ValueError for laws without a force on each side of v = 0.
+
+    Raises:
+        ValueError: a law has no force on each side of v = 0.
     """
     return _smoothed(model)[0]
 

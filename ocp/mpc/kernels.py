@@ -187,7 +187,7 @@ def _function(name: str, arguments: Sequence[ca.SX], results: Sequence[ca.SX]) -
 
 
 def _slopes(moved: ca.SX, x: ca.SX, u: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return the derivative of the state as a matrix of symbols, and its entries after a substep."""
+    """Return the derivative of F as a matrix of symbols, and its entries after a substep."""
     nx, nu = x.numel(), u.numel()
     by_x, by_u = ca.jacobian(moved, x), ca.jacobian(moved, u)
     before = ca.Sparsity(nx, nx + nu)

@@ -34,9 +34,10 @@ Elimination of t, s and y from Newton's method leaves a weight w and a slope e f
 with f = 0 for a hard row, which enter the recursion over the intervals. Mehrotra's predictor and
 corrector use the same matrices. If the minimum without rows satisfies all rows, it is the solution.
 
-C names begin with the name of the controller. `NAME_t` contains plan and work space; `NAME_param_t`,
-with `NAME_default`, model parameters, bounds, tolerance and iterations; `NAME_in_t` measurements
-and references; `NAME_out_t` controls and results. The functions are `NAME_init` and `NAME_step`.
+C names begin with the name of the controller. `NAME_t` contains plan and work space; `NAME_param_t`
+(defaults `NAME_default`) model parameters, bounds, tolerance and iterations; `NAME_in_t`
+measurements and references; `NAME_out_t` controls and results. `NAME_init` and `NAME_step` are the
+functions.
 
 Sources: Nocedal and Wright, Numerical Optimization, 2nd ed., (18.36) (weight of the merit);
     Mehrotra, On the implementation of a primal-dual interior point method, SIAM J. Optim. 2(4),
@@ -63,7 +64,7 @@ The file cycle.c contains the loops of all controllers, with NAME for the name o
 macros for sizes and functions for kernels. Loops are bounded, and memory is a struct of the caller.
 """
 PLAIN = 2
-"""Number of iterations without curvature of the equations, which is useful only near the optimum."""
+"""Number of iterations without curvature of the equations, which helps only near the optimum."""
 ARMIJO = 1e-4
 ROUNDING = 1e-12
 """Relative increase of the merit by rounding errors that a step may have."""
