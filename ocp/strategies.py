@@ -38,7 +38,7 @@ SHARED_PASSES, SHARED_ITERATIONS = 4, 150
 """Limits if scenarios share inputs. Their contacts reverse at many times, and each finer mesh takes
 many iterations at these kinks for a thousandth of the cost."""
 EXACT_RTOL = 1e-7
-"""Relative tolerance of the motion with exact friction: a hundredth of the required accuracy."""
+"""Relative tolerance of the simulation with exact friction, 1 % of the required accuracy."""
 SHARPEST = 1e-4
 """Smallest smoothing width, in multiples of the speeds, of a direct solve."""
 MISSED = (Status.TERMINAL_MISS, Status.BOUND_MISS)
@@ -69,7 +69,7 @@ class Direct:
 
     @property
     def ipopt(self) -> Ipopt:
-        """The solver if it is Ipopt, else Ipopt without options."""
+        """The solver if it is Ipopt, otherwise Ipopt without options."""
         return self.solver if isinstance(self.solver, Ipopt) else Ipopt()
 
     def solved(
@@ -122,7 +122,7 @@ class Verifier:
     def checked(self, solution: Solution) -> Solution:
         """Return `solution` with its verification.
 
-        The law states of a motion by modes are unknown: their simulated values are not compared,
+        The law states of a motion by modes are unknown, so their simulated values are not compared,
         and local errors are not evaluated.
         """
         if not self.active or solution.status.stopped:
@@ -246,7 +246,7 @@ class ModeSearch:
         settings = direct.ipopt, self.verifier.tolerance, direct.clock, direct.progress
         try:
             own = OriginalLaw(direct.problem, scheme, *settings).solved(exact)
-        except FAILURES as error:  # mechanisms, algebraic variables
+        except FAILURES as error:  # shooting does not support all models
             return with_sentence(exact, f"With the law itself: {_reason(error)}.")
         own = _after(exact, own)
         if own.verified:

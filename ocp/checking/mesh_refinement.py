@@ -36,8 +36,8 @@ MOST_PARTS = 16.0
 STEEPEST = 2.0
 """Approximate largest ratio of the lengths of neighbouring intervals."""
 SAME_NUMBER = 0.4
-"""Share of the number of intervals below which a pass reduces the number. Above it the number is
-kept, so that the program need not be rebuilt."""
+"""Share of the number of intervals. If a pass requires fewer intervals than this share, the number
+is reduced; otherwise it is kept, so that the program need not be rebuilt."""
 LATER = 1e-2
 """Initial barrier parameter of Ipopt for later passes, which start near a solution."""
 CAP = 150

@@ -169,12 +169,11 @@ def verify(solution: Solution, tolerance: float = TOLERANCE, rtol: float = RTOL)
     """Simulate the user's model under the control of `solution`, and check all conditions.
 
     The simulation runs from the start through all phases, joined by their links. Inputs are
-    constant on each interval; for an input with bounded rate, the rate is. The function checks:
-
-    - the conditions at the start, via points and the end, joints and periodicity,
-    - bounds and path conditions at all steps of the simulation, not only at points of the mesh,
-    - states at the end of each phase against their optimised values,
-    - the cost by quadrature over the simulated motion, and the local error of each interval.
+    constant on each interval; for an input with bounded rate, its rate is constant. The function
+    checks the conditions at the start, via points and the end, joints and periodicity; bounds and
+    path conditions at all steps of the simulation, not only at points of the mesh; states at the
+    end of each phase against their optimised values; the cost by quadrature over the simulated
+    motion; and the local error of each interval.
 
     The simulation of an unstable motion fails over times much longer than the inverse of the growth
     rate, because rounding errors grow until they dominate. If the local errors are small but the

@@ -33,7 +33,7 @@ from symfric.model import Model
 T = TypeVar("T")
 
 Duration = tuple[Sequence[int], float | Free]
-"""Indices of phases, and the sum of their durations [s]."""
+"""(indices of phases, sum of their durations [s])."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class Statement:
 
     @property
     def chain(self) -> tuple[Phase, ...]:
-        """The phases in order."""
+        """Phases in the order of time."""
         return (self.phases,) if isinstance(self.phases, Phase) else self.phases.phases
 
 

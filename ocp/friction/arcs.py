@@ -64,7 +64,7 @@ PULLED = "_pull"
 CAUGHT = "_catch"
 STOPPED = "_stop"
 LEFT = "rest_left"
-"""State of an arc at whose end a contact breaks away: its remaining time [s]."""
+"""Name of the state with the remaining time [s] of an arc at whose end a contact breaks away."""
 
 Ranges = dict[str, Range]
 Sides = Mapping[str, int]
@@ -196,7 +196,7 @@ class ArcPhase:
 
     @cached_property
     def inputs(self) -> ca.SX:
-        """Inputs that may jump: those without a bounded rate."""
+        """Inputs that may jump, which have no bounded rate."""
         limited = {*self.rules.problem.rates, *self.base.rates}
         return stacked(v.symbol for v in self.base.model.u if v.name not in limited)
 

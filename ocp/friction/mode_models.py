@@ -224,7 +224,7 @@ def slip_change(model: Model, contact: Contact) -> ca.SX:
 
 
 def nominal_load(model: Model, contact: Contact) -> float:
-    """Return the typical holding force [N] of a contact: its static level at the start."""
+    """Return the typical holding force [N] of a contact, its static level at the start."""
     symbols = ca.vertcat(model.vector("x"), model.vector("z"), model.vector("u"), model.t)
     level = ca.SX(contact.static_level())
     starts = [v.start for group in (model.x, model.z, model.u) for v in group]

@@ -211,7 +211,7 @@ def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
     )
     c, size = L[:nx], nx * (nx + 1) // 2
     P, q, w, e = (ca.SX.sym(n, k) for n, k in (("P", size), ("q", nx), ("w", rows), ("e", rows)))
-    # one step of the recursion
+    # one step of the Riccati recursion, backwards
     whole = symmetric(P, nx) + H_late + D_late.T @ ca.diag(w) @ D_late
     curved = H + symmetric(pack.part("E", L), nx + nu)
     Q = curved + D.T @ ca.diag(w) @ D + F.T @ whole @ F
@@ -227,7 +227,7 @@ def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
     slope = q + g_late + D_late.T @ e + P_whole @ c
     both = g + D.T @ e + F.T @ slope
     k = -solved(kept.part("L", G) + ca.SX.eye(nu), kept.part("1/D", G), both[nx:])
-    # forwards
+    # forward pass
     d, feed = ca.SX.sym("d", nx), ca.SX.sym("k", nu)
     du = K @ d + feed
     now = ca.vertcat(d, du)

@@ -309,7 +309,7 @@ def _known(
     levels: list[Known] = []
     for level, what in enumerate(("coordinates", "rates")):
         if all(linked.get(i, False) for i in range((level + 1) * n)):
-            levels.append(Known({}, imposed=False))  # rates of the same coordinates
+            levels.append(Known({}, imposed=False))  # implied by links of all states
             continue
         inside, offset = range(level * n, (level + 1) * n), level * n
         plain = [i - offset for i in inside if linked.get(i) is True or i in default]

@@ -78,7 +78,7 @@ class Engine:
         if self._prospect.pays(self.expected):
             try:
                 return self.compiled
-            except CompileError:  # the solve does not require a compiler
+            except CompileError:  # compiled code is optional
                 self._prospect.hopeless = True
         return self.block
 

@@ -94,10 +94,11 @@ class Radau(_Collocation):
 @final
 @dataclass(frozen=True)
 class Legendre(_Collocation):
-    """Gauss-Legendre collocation with `degree` points: order 2 d at the nodes, conserves energy.
+    """Gauss-Legendre collocation with `degree` points: order 2 d at the nodes, energy conservation.
 
-    Limits: A-stable, not L-stable: stiff components oscillate from interval to interval. The end of
-    an interval is not a collocation point: algebraic variables there are extrapolated.
+    Limits: the method is A-stable but not L-stable, so stiff components oscillate between
+    intervals. Algebraic variables at the end of an interval, which is no collocation point, are
+    extrapolated.
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5.
 
     Raises:
@@ -218,7 +219,7 @@ def _mesh(span: Span, intervals: ArrayLike) -> Array:
 
 
 def _bounds_intervals(mesh: Array) -> bool:
-    """Return True for at least two increasing fractions from 0 to 1."""
+    """Return True if `mesh` consists of at least two increasing fractions from 0 to 1."""
     return mesh.size > 1 and mesh[0] == 0.0 and mesh[-1] == 1.0 and bool((np.diff(mesh) > 0).all())
 
 

@@ -342,7 +342,7 @@ class Transcription:
 
     @cached_property
     def unknowns(self) -> list[Place]:
-        """Names and places of all unknowns of the program; shared ones belong to the first span."""
+        """Names and places of all unknowns; shared unknowns belong to the first span."""
         scale = self.program.scale.tolist()
         places = [Place(LARGEST, 0, np.nan)] * self.layout.size
         for number, (span, own) in reversed(
