@@ -1,7 +1,7 @@
-"""Optimal control that lands where it says: phases, contact modes, verification, receding horizons.
+"""Optimal control with friction: phases, contact modes, verification, predictive controllers.
 
-`solve(Problem(Phase(model, T=1.0, end=...), cost))` is the whole of it; see `solve` for what is
-done about friction.
+A complete call is `solve(Problem(Phase(model, T=1.0, end=...), cost))`. The documentation of
+`solve` describes how friction is treated.
 """
 
 from typing import TYPE_CHECKING

@@ -1,15 +1,15 @@
-"""Solution with the user's law and its states, from a motion with static friction.
+"""Solution with the user's law and its states, started from a motion with static friction.
 
-LuGre's bristles give way before they slip, so that a control that is exact for Coulomb friction
-with stiction misses with them. Collocation does not follow them: their time constants run from
-microseconds in sliding to milliseconds at rest. Shooting by exponential steps does.
+The bristles of a LuGre law deflect before they slip, so a control that is exact for Coulomb
+friction with stiction misses the end with the law itself. Collocation does not resolve their time
+constants, from microseconds in sliding to milliseconds at rest; shooting by exponential steps does.
 
-1. The control nearest to the given one with which the law itself meets all conditions
-   (`project_control`).
-2. The problem itself from there, for a few iterations: the kink of the law at reversals makes
-   Newton's method cycle, and the best feasible iterate is taken.
-3. The nearest control again, on intervals that are cut where steps err, until the simulation
-   agrees; and the problem itself once more if it was solved before.
+1. Find the control nearest to the given one with which the motion with the law itself satisfies
+   all conditions (`project_control`).
+2. Solve the problem from there for a few iterations. The kink of the law at reversals can make
+   Newton's method cycle; the best feasible iterate is kept.
+3. Find the nearest control again, on intervals that are divided where steps are inaccurate, until
+   the simulation agrees. Solve the problem once more if step 2 solved it.
 """
 
 from collections.abc import Sequence
@@ -41,7 +41,7 @@ STEPS = 20
 PASSES = 6
 """Largest number of meshes."""
 MOST_PARTS = 8
-"""Largest number of parts into which one interval is cut at once."""
+"""Largest number of parts into which one pass divides an interval."""
 GOAL = 0.3
 """Largest local error of an interval, as a share of the tolerance."""
 CLOSE: dict[str, Option] = {"tol": 1e-6, "mu_init": 1e-4, "max_iter": 100}
@@ -54,15 +54,15 @@ KEPT = 1e-6
 @final
 @dataclass(frozen=True, eq=False)
 class OriginalLaw:
-    """Data shared by the solves.
+    """Solver of a problem with laws with states, and its settings.
 
     Attributes:
-        problem: the user's, whose laws have states.
-        scheme: shooting that follows them.
-        solver: with the user's options, which take precedence.
-        tolerance: of the verification.
+        problem: the user's problem, whose laws have states.
+        scheme: shooting scheme that resolves these states.
+        solver: solver with the user's options, which take precedence.
+        tolerance: tolerance of the verification.
         clock: time limit.
-        progress: called after each iteration.
+        progress: function called after each iteration.
     """
 
     problem: Problem
@@ -73,13 +73,13 @@ class OriginalLaw:
     progress: Report | None = None
 
     def solved(self, static: Solution) -> Solution:
-        """Return the motion with the law itself near `static`, verified.
+        """Return the verified motion with the law itself near `static`.
 
-        Its message describes the method; its status is ACCEPTABLE if it meets all conditions but
-        the optimality conditions do not hold.
+        Its message describes the method. Its status is ACCEPTABLE if the motion satisfies all
+        conditions but not the optimality conditions.
 
         Raises:
-            ValueError: a model that `scheme` does not support.
+            ValueError: `scheme` does not support a model.
         """
         made = discretise(self.problem, self.scheme)
         near = self._near(made, static, 1)
@@ -107,7 +107,7 @@ class OriginalLaw:
         )
 
     def _near(self, made: Discretisation, guess: Solution, passes: int) -> Solution:
-        """Return a motion by the control nearest to that of `guess`; of several passes verified."""
+        """Return the motion by the control nearest to that of `guess`; verified if passes > 1."""
         meshes: Sequence[Array] = guess.meshes
         goal, past, phases = GOAL * self.tolerance, None, len(self.problem.chain)
         for number in range(1, passes + 1):
@@ -136,9 +136,9 @@ class OriginalLaw:
         return verified(guess, self.tolerance)
 
     def _cheaper(self, made: Discretisation, near: Solution) -> Solution:
-        """Return the solution of the problem from `near`: solved, stopped, or as ACCEPTABLE.
+        """Solve the problem from `near`.
 
-        The latter is the best feasible iterate.
+        If it is neither solved nor stopped, return the best feasible iterate as ACCEPTABLE.
         """
         on = made.on(near.meshes)
         prepared = self._solver(COST).prepared(on.program)
@@ -158,7 +158,7 @@ class OriginalLaw:
 def project_control(transcription: Transcription, w: ArrayLike) -> Program:
     """Return the program of `transcription` with the distance from the controls in `w` as its cost.
 
-    Free durations and chosen parameters count like inputs; everything is scaled.
+    Free durations and chosen parameters count as inputs. All variables are scaled.
     """
     program, layout = transcription.program, transcription.layout
     weights = np.zeros(layout.size)

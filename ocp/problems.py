@@ -1,7 +1,7 @@
-"""Ready problems, each with its known optimum and the source of that.
+"""Predefined problems, each with its best known optimum and the source of this value.
 
-In problems with friction, bodies stick and reverse on the way; they minimise the integral of the
-squared input. Their `v_t` is the width of the law [m/s or rad/s]: at 1e-6 it is sharp, and the
+In problems with friction, bodies stick and reverse during the motion, and the cost is the integral
+of the squared input. Their `v_t` is the smoothing width of the law [m/s or rad/s]; at 1e-6 the
 optimum is that of Coulomb's law with stiction. Problems of other authors, which have no friction,
 use the data of their sources, so that optima can be compared digit by digit.
 """
@@ -28,7 +28,7 @@ from symfric.scenes.blocks import drive
 @final
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """A problem that `symfric ocp NAME` solves and `symfric bench ocp` measures.
+    """Predefined problem that `symfric ocp NAME` solves and `symfric bench ocp` measures.
 
     Attributes:
         make: function that returns the problem; its keyword arguments are numbers such as v_t.
@@ -80,7 +80,7 @@ FORCE = integral(lambda s: s.force**2)
 
 
 def guide(v_t: float) -> BrownMcPhee:
-    """Friction of the linear guides: 4 N sliding, 6 N at rest, 0.5 N s/m, for N = 1 N."""
+    """Return the friction of the linear guides: 4 N sliding, 6 N static, 0.5 N s/m, N = 1 N."""
     return BrownMcPhee(mu_s=6.0, mu_d=4.0, mu_v=0.5, v_t=v_t, N_t=1e-3)
 
 
@@ -88,7 +88,7 @@ def guide(v_t: float) -> BrownMcPhee:
 def out_and_back(v_t: float = V_T) -> Problem:
     """1 m out and back in 2 s on a guide with stiction.
 
-    The mass of 1 kg passes x = 1 m after 1 s and is back at rest after another.
+    The mass of 1 kg passes x = 1 m after 1 s and is back at rest after 2 s.
     """
     stage = drive(guide(v_t), m=1.0, N=1.0)
     out = Phase(stage, T=1.0, start={"x": 0.0, "v": 0.0}, end={"x": 1.0}, name="out")
@@ -149,9 +149,9 @@ def cart_pendulum(v_t: float = V_T) -> Problem:
 
 
 def _coupled(name: str, v_t: float, share: float) -> Model:
-    """A motor of 0.5 kg moves a load of 1 kg on a guide through a spring of 200 N/m.
+    """Return a motor of 0.5 kg that moves a load of 1 kg on a guide by a spring of 200 N/m.
 
-    `share` is the friction under the motor, in multiples of that under the load.
+    `share` is the ratio of the friction of the motor to that of the load.
     """
     x_motor, x = (Variable(n, "m", nominal=0.1) for n in ("x_motor", "x"))
     v_motor, v = (Variable(n, "m/s", nominal=0.1) for n in ("v_motor", "v"))
@@ -186,7 +186,7 @@ def _there_and_back(model: Model) -> Problem:
 
 @frictional(28.480, 3e-2, BEST)
 def load_through_spring(v_t: float = V_T) -> Problem:
-    """A load on a guide, there and back through a spring."""
+    """A load on a guide, moved there and back by a spring."""
     return _there_and_back(_coupled("load_through_spring", v_t, 0.0))
 
 
@@ -194,7 +194,7 @@ def load_through_spring(v_t: float = V_T) -> Problem:
 def two_blocks(v_t: float = V_T) -> Problem:
     """Two coupled blocks with a contact each.
 
-    As `load_through_spring`, with friction under the motor, too.
+    The problem is `load_through_spring` with friction of the motor in addition.
     """
     return _there_and_back(_coupled("two_blocks", v_t, 0.5))
 
@@ -205,8 +205,8 @@ def parcel_on_tray(v_t: float = V_T) -> Problem:
 
         m (v' - x w^2) = -m g sin(a) - F,   m (x w' + 2 v w) = N - m g cos(a),   J w' = M - x N
 
-    with position x along the tray from its pivot, tilt a and w = a'; the normal force follows the
-    motion. The solver was not tuned on this problem.
+    with position x along the tray from its pivot, tilt a and w = a'. The normal force N depends on
+    the motion. The solver was not tuned on this problem.
     """
     m, J = 1.0, 0.5
     x = Variable("x", "m", start=0.3, nominal=0.3)
@@ -256,7 +256,7 @@ def bryson_denham(wall: float = 1.0 / 9.0) -> Problem:
     x' = v,  v' = a,  x <= wall,  (x, v) from (0, 1) to (0, -1) in 1 s; J = integral of a^2 / 2
 
     Args:
-        wall: its position [m]; for wall <= 1/6 the cart slows down along it, J = 4 / (9 wall).
+        wall: position of the wall [m]; for wall <= 1/6 the bound on x is active, J = 4 / (9 wall).
     """
     x, v = Variable("x", "m", nominal=wall), Variable("v", "m/s", start=1.0)
     a = Variable("a", "m/s^2", nominal=10.0)
@@ -305,7 +305,7 @@ def goddard() -> Problem:
 def hang_glider() -> Problem:
     """A hang glider flies as far as it can through a thermal.
 
-    The lift coefficient is the input. The glider descends from 1000 m to 900 m, and is in steady
+    The lift coefficient is the input. The glider descends from 1000 m to 900 m and is in a steady
     glide at both ends.
     """
     x, y = Variable("x", "m", nominal=1000.0), Variable("y", "m", start=1000.0, nominal=1000.0)
@@ -342,7 +342,7 @@ def alp_rider() -> Problem:
     |y|^2 >= 3 p(t, 3, 12) + 3 p(t, 6, 10) + 3 p(t, 10, 6) + 8 p(t, 15, 4) + 0.01,
     p(t, a, b) = exp(-b (t - a)^2);  J = integral of 100 |y|^2 + 0.01 |u|^2 over 20 s
 
-    Errors of a simulation grow by e^40 over the ride, so no held control lands it.
+    Errors of a simulation grow by e^40 over 20 s, so an open-loop simulation misses the end.
     """
     starts = (2.0, 1.0, 2.0, 1.0)
     y = [Variable(f"y{i + 1}", "1", start=start) for i, start in enumerate(starts)]

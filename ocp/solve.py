@@ -1,4 +1,4 @@
-"""Solve an optimal control problem, directly or by homotopy in the width of friction; verify it."""
+"""Public entry point of optimal control: `solve` checks its arguments and selects the strategy."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ocp.strategies import Friction
 
 OVER = "obj_scaling_factor"
-"""Option of Ipopt: what it multiplies the cost by."""
+"""Option of Ipopt for the factor by which it multiplies the cost."""
 
 
 def solve(
@@ -44,59 +44,60 @@ def solve(
     max_time: float | None = None,
     throw: bool = True,
 ) -> Solution:
-    """Solve `problem`, and simulate its models under the control that was found.
+    """Solve `problem` and verify the solution by a simulation of its models.
 
-    "Solved" only says that a discretised problem is. What the models do under the control, at the
-    ends, on the way and between the nodes, says the verification, which decides: a solution that
-    misses is none.
+    The solver satisfies a discretised problem. The verification simulates the models under the
+    control that was found and checks the conditions at the ends, at the nodes and between them. A
+    solution that violates them counts as a failure.
 
-    Where a contact holds at rest, one direct solve of the problem ends in the next of many
-    local optima and misses. `friction` says what is done:
+    If a contact sticks during the motion, one direct solve usually ends in a nearby local optimum
+    that the simulation does not confirm. `friction` selects the treatment:
 
-        "auto"     "modes" where the layer of the law is narrower than a hundredth of the speeds;
-                   else "sharpen" down to the law itself. Without contacts that hold, "smooth".
-        "modes"    layers from wide to narrow, then the modes of each contact, slip and stick, with
-                   the instants between them (`ocp.friction.mode_optimisation`): for exact Coulomb
-                   friction with stiction, whatever smooths it. `solution.modes` lists them. A law
-                   with states (LuGre, GMS) is replaced by its steady sliding and its static level,
-                   and the result verified with the law itself. If it misses, `Shooting` with
-                   exponential steps goes on from there with the law itself where it can; the
-                   message says so. `scheme=Shooting(...)` with "auto" always does.
-        "sharpen"  layers from wide to narrow, down to those of the law, or as far as it gets.
-        "smooth"   the models as they are, states of laws included.
+        "auto"     "modes" if the layer of the law is narrower than a hundredth of the speeds,
+                   otherwise "sharpen" down to the law itself; "smooth" without contacts that stick.
+        "modes"    decrease the widths of the layers, then optimise the modes (slip and stick) of
+                   each contact and the times between them (`ocp.friction.mode_optimisation`). The
+                   result holds for exact Coulomb friction with stiction. `solution.modes` lists
+                   the modes. A law with states (LuGre, GMS) is replaced by its steady sliding and
+                   its static level, and the result is verified with the law itself. If it misses,
+                   `Shooting` with exponential steps continues with the law itself if it supports
+                   the model, and the message says so; `scheme=Shooting(...)` with "auto" always
+                   takes this step.
+        "sharpen"  decrease the widths of the layers to those of the law, or as far as possible.
+        "smooth"   solve with the models unchanged, including the states of laws.
 
-    Where modes are not found, the motion with the narrowest layers that were reached is verified
-    and returned; its message says how wide they are and what was not done.
+    If no modes are found, the motion with the narrowest layers reached is verified and returned.
+    Its message gives the widths and the steps that failed.
 
     Args:
-        problem: what to solve.
-        scheme: `Radau(3)` if none; or `Legendre(d)`, `Shooting(method, steps)`.
-        intervals: their number for each phase, fractions of T, or a list of these; 50 if none.
-            Where layers narrow, as many even ones in all; 60 if none. Refinement changes them.
-        solver: `Ipopt()` if none; or `Fatrop()`, `Sqp()`.
-        guess: values by name (see `ocp.solving.starts`), a solution, or one that was saved. With
-            friction, further starts are made around it.
+        problem: the problem to solve.
+        scheme: `Radau(3)` by default; `Legendre(d)` or `Shooting(method, steps)`.
+        intervals: number of intervals of each phase, fractions of T, or a list of these; 50 by
+            default. While layers narrow, total number of equal intervals, 60 by default.
+        solver: `Ipopt()` by default; `Fatrop()` or `Sqp()`.
+        guess: values by name (see `ocp.solving.starts`), a solution, or a saved solution. With
+            friction, further starts are generated around it.
         friction: see above.
-        tolerance: of the verification, relative to the largest magnitude of each state.
-        refine: make the mesh finer where intervals err or where it costs to hold the inputs over
-            them; with False it stays, where no friction is sharpened.
+        tolerance: tolerance of the verification, relative to the largest magnitude of each state.
+        refine: refine the mesh where local errors are large or where constant inputs increase the
+            cost. False keeps the mesh, unless friction is sharpened.
         verify: simulate the models under the control.
-        starts: with friction, number of coarse solves of which the best goes on.
-        resting_margin: share of its static level that a contact at rest keeps from it, where modes
-            are found: a smooth law creeps just below that level. The search begins with 0.01 and
-            ends with this, if the motion is still right then; where a rest is at that margin the
-            message says what it costs.
-        progress: called with a `Progress` after each iteration. Ctrl-C, or an exception raised
-            here, stops the solver.
-        max_time: wall time [s] for all; what was found by then is returned.
-        throw: raise `SolveError` on failure; with False the solution is returned as it is.
+        starts: with friction, number of coarse solves; the best one is continued.
+        resting_margin: margin between the friction of a contact at rest and its static level, as a
+            share of this level, for motions by modes: a smooth law creeps just below the level. The
+            search starts at 0.01 and ends at this value if the motion still passes verification. If
+            the margin is active, the message gives its cost.
+        progress: function called with a `Progress` after each iteration. Ctrl-C, or an exception
+            raised in the function, stops the solver.
+        max_time: wall time [s] of all solves; the best solution found by then is returned.
+        throw: raise `SolveError` on failure; False returns the solution with its status.
 
     Raises:
         ValueError: bad input.
-        SolveError: not solved, stopped, or not verified; its `partial` is the best solution there
-            is, with its statistics and verification.
+        SolveError: not solved, stopped, or not verified; `partial` is the best solution found,
+            with its statistics and verification.
 
-    Limits: a local optimum. With friction it is the best of a few starts.
+    Limits: the solution is a local optimum; with friction, the best of a few starts.
     """
     from ocp.checking.mesh_refinement import Goals  # noqa: PLC0415  (slow to load)
     from ocp.strategies import (  # noqa: PLC0415  (slow to load)
@@ -125,7 +126,7 @@ def solve(
     if not isinstance(solver, Ipopt | Fatrop | Sqp):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise checks.refused("solve: solver", "a solver, such as Ipopt()", solver)
     if intervals is not None:
-        make_meshes(problem, intervals)  # refuses what is no mesh, whatever the way
+        make_meshes(problem, intervals)  # raises ValueError for invalid meshes of any strategy
     posed = sized(problem)
     if posed is not problem and isinstance(solver, Ipopt) and OVER not in solver.options:
         solver = solver.with_options(**{OVER: 1.0 / cost_size(posed)})

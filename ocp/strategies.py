@@ -1,4 +1,4 @@
-"""Strategies of `solve`: directly, by homotopy, by modes, and the fallbacks if one fails."""
+"""Strategies of `solve`: direct, by homotopy, by modes, and the order in which they are tried."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -31,32 +31,32 @@ Array = NDArray[np.float64]
 Friction = Literal["auto", "smooth", "sharpen", "modes"]
 INTERVALS = 50
 EARLY = 0.04
-"""Smoothing width, in multiples of the speeds, from which on modes may be deduced."""
+"""Largest smoothing width, in multiples of the speeds, from which modes are deduced."""
 CLOSE_PASSES, CLOSE_INTERVALS, CLOSE_ITERATIONS = 4, 400, 60
-"""Limits of a solve from a motion by modes: a solution is near, or not found."""
+"""Limits of a solve that starts from a motion by modes, near which a solution is expected."""
 SHARED_PASSES, SHARED_ITERATIONS = 4, 150
-"""Limits if scenarios share inputs: their contacts reverse at many instants, and each finer mesh is
-a search among kinks for a thousandth of the cost."""
+"""Limits if scenarios share inputs. Their contacts reverse at many times, and each finer mesh takes
+many iterations at these kinks for a thousandth of the cost."""
 EXACT_RTOL = 1e-7
-"""Relative tolerance of the motion with exact friction: a hundredth of the required accuracy."""
+"""Relative tolerance of the simulation with exact friction, 1 % of the required accuracy."""
 SHARPEST = 1e-4
-"""Smoothing width, in multiples of the speeds, that is too narrow for a direct solve."""
+"""Smallest smoothing width, in multiples of the speeds, of a direct solve."""
 MISSED = (Status.TERMINAL_MISS, Status.BOUND_MISS)
 FOUND = (*MISSED, Status.UNSTABLE)
-"""Status of a motion that was found and violates its conditions."""
+"""Statuses of a motion that was found but violates its conditions."""
 FAILURES = (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError)
-"""Exceptions of a strategy that fails: another one is used then."""
+"""Exceptions after which the next strategy is tried."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Direct:
-    """Direct solves of a problem, on meshes that follow from its errors.
+    """Direct solves of a problem, on meshes refined by its local errors.
 
     Attributes:
         problem, scheme, solver, intervals, progress: as in `ocp.solve`.
-        goals: when a mesh is fine enough; one pass does not refine.
-        clock: runs for all solves.
+        goals: goals of mesh refinement; with one pass the mesh is not refined.
+        clock: time limit shared by all solves.
     """
 
     problem: Problem
@@ -69,13 +69,13 @@ class Direct:
 
     @property
     def ipopt(self) -> Ipopt:
-        """The solver if it is Ipopt, else Ipopt without options."""
+        """The solver if it is Ipopt, otherwise Ipopt without options."""
         return self.solver if isinstance(self.solver, Ipopt) else Ipopt()
 
     def solved(
         self, guess: Start, meshes: Sequence[Array] | None = None, *, close: bool = False
     ) -> Solution:
-        """Solve the problem from `guess`; with `close` a solver that diverges is stopped early."""
+        """Solve the problem from `guess`; `close` limits passes, intervals and iterations."""
         goals, solver, most = self.goals, self.solver, 0
         if meshes is None:
             wanted = INTERVALS if self.intervals is None else self.intervals
@@ -105,7 +105,7 @@ class Direct:
 
 
 class Judged(NamedTuple):
-    """A motion by modes, and whether it is right with the user's laws and with exact friction."""
+    """A motion by modes, and True if it is valid with the user's laws and with exact friction."""
 
     solution: Solution
     right: bool
@@ -114,7 +114,7 @@ class Judged(NamedTuple):
 @final
 @dataclass(frozen=True)
 class Verifier:
-    """Verification within a tolerance; none if not `active`."""
+    """Verification within a tolerance, skipped if `active` is False."""
 
     tolerance: float
     active: bool
@@ -122,7 +122,7 @@ class Verifier:
     def checked(self, solution: Solution) -> Solution:
         """Return `solution` with its verification.
 
-        The law states of a motion by modes are unknown: their simulated values are not compared,
+        The law states of a motion by modes are unknown, so their simulated values are not compared,
         and local errors are not evaluated.
         """
         if not self.active or solution.status.stopped:
@@ -144,7 +144,7 @@ class Verifier:
         return replace(solution, verification=found, message=text)
 
     def judged(self, solution: Solution) -> Judged:
-        """Return a verified motion by modes after a simulation with exact friction."""
+        """Return a motion by modes with the verdict of a simulation with exact friction."""
         if not self.active or not (solution.ok or solution.status in MISSED):
             return Judged(solution, solution.ok)
         try:
@@ -166,12 +166,12 @@ class Verifier:
 @final
 @dataclass(frozen=True, eq=False)
 class ModeSearch:
-    """The search for an exact motion near a sharpened one.
+    """Search for a motion with exact friction near one with sharpened friction.
 
     Attributes:
-        direct: solves of the problem itself.
-        verifier: of the motions.
-        margin: share of its static level that a contact at rest keeps from it.
+        direct: direct solves of the problem.
+        verifier: verification of the motions.
+        margin: margin of a contact at rest, as a share of its static level.
     """
 
     direct: Direct
@@ -214,7 +214,7 @@ class ModeSearch:
         motions: Iterator[tuple[Solution, float]],
         sharp: Solution,
     ) -> Judged:
-        """Return the right motion whose rests come closest to their levels."""
+        """Return the valid motion with the smallest margin of contacts at rest."""
         kept, slope, best, last = margin, nan, first, first.solution
         for exact, less in motions:
             last = _after(sharp, exact)
@@ -237,16 +237,16 @@ class ModeSearch:
         return Judged(with_sentence(found, text), right=True)
 
     def by_original_law(self, exact: Solution) -> Solution:
-        """Return a motion with the law and its states, by shooting from one that misses with it.
+        """Return a motion with the law and its states, found by shooting from `exact`.
 
-        If that fails, return `exact` with the reason.
+        If shooting fails, return `exact` with the reason in its message.
         """
         direct, scheme = self.direct, self.direct.scheme
         scheme = scheme if isinstance(scheme, Shooting) else Shooting("exponential", STEPS)
         settings = direct.ipopt, self.verifier.tolerance, direct.clock, direct.progress
         try:
             own = OriginalLaw(direct.problem, scheme, *settings).solved(exact)
-        except FAILURES as error:  # mechanisms, algebraic variables
+        except FAILURES as error:  # shooting does not support all models
             return with_sentence(exact, f"With the law itself: {_reason(error)}.")
         own = _after(exact, own)
         if own.verified:
@@ -258,7 +258,7 @@ class ModeSearch:
 
 
 def solved(search: ModeSearch, friction: Friction, guess: Start, starts: int) -> Solution:
-    """Return the solution by the strategy that the problem of `search.direct` requires."""
+    """Solve the problem of `search.direct` by the strategy that it requires."""
     direct, check = search.direct, search.verifier.checked
     problem, shooting = direct.problem, isinstance(direct.scheme, Shooting)
     holding = any(sticking(phase.model) for phase in problem.chain)
@@ -279,7 +279,7 @@ def solved(search: ModeSearch, friction: Friction, guess: Start, starts: int) ->
 
 
 def _by_shooting(search: ModeSearch, guess: Start, starts: int) -> Solution:
-    """Return the motion of laws with states by shooting, from the motion with static friction."""
+    """Solve with laws with states by shooting, started from the motion with static friction."""
     collocation = replace(search.direct, scheme=Radau())
     unverified = replace(search.verifier, active=False)
     static = _by_homotopy(
@@ -292,9 +292,9 @@ def _by_shooting(search: ModeSearch, guess: Start, starts: int) -> Solution:
 
 
 def _by_homotopy(search: ModeSearch, friction: Friction, guess: Start, starts: int) -> Solution:
-    """Return the first right motion on the path of decreasing widths.
+    """Return the first valid motion on the path of decreasing widths.
 
-    Else the best one, with a message about what failed.
+    If there is none, return the best motion, with a message about the steps that failed.
     """
     problem, check = search.direct.problem, search.verifier.checked
     reason = _refused(problem) if friction != "sharpen" else "not requested"
@@ -343,13 +343,13 @@ def _by_homotopy(search: ModeSearch, friction: Friction, guess: Start, starts: i
 
 
 def law_states(problem: Problem) -> set[str]:
-    """Return the states of laws, which a motion by modes does not have."""
+    """Return the names of the states of laws, which a motion by modes does not contain."""
     contacts = [c for phase in problem.chain for c in phase.model.contacts]
     return {v.name for c in contacts for v in c.states}
 
 
 def _without_law_states(solution: Solution, found: Verification) -> Verification:
-    """Return a verification of a motion by modes without law states and local errors."""
+    """Return `found` without checks of law states and local errors."""
     hidden = law_states(solution.problem)
     if not hidden:
         return found
@@ -363,7 +363,7 @@ def _events(problem: Problem) -> list[str]:
 
 
 def _refused(problem: Problem) -> str:
-    """Return the reason why modes cannot be sought, usually ""."""
+    """Return the reason why a search for modes is impossible, or "" if it is possible."""
     try:
         return refusal(problem)
     except FAILURES as error:
@@ -371,7 +371,7 @@ def _refused(problem: Problem) -> str:
 
 
 def _reason(error: Exception) -> str:
-    """Return the failure as a clause; the type is added if it is not written for users."""
+    """Return the message of `error` as a clause, with its type if it is an internal error."""
     first = (str(error).strip().splitlines() or [""])[0].rstrip(".")
     if isinstance(error, ValueError | SolveError):
         return first
@@ -379,5 +379,5 @@ def _reason(error: Exception) -> str:
 
 
 def _after(first: Solution, later: Solution) -> Solution:
-    """Return `later` with the effort of both."""
+    """Return `later` with the statistics of both solves."""
     return replace(later, statistics=first.statistics.then(later.statistics))

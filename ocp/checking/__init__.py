@@ -1,1 +1,1 @@
-"""Verification of an optimised control by re-simulation, and mesh refinement."""
+"""Verification of an optimised control by re-simulation, error estimates and mesh refinement."""

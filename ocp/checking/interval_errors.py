@@ -1,4 +1,4 @@
-"""Errors of each interval: its local error, and the cost of holding the inputs over it."""
+"""Errors of each interval: local error, and loss of cost by inputs that are constant on it."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -21,12 +21,12 @@ RTOL = 1e-6
 
 
 def local_errors(arcs: Sequence[Arc], rtol: float = RTOL) -> tuple[Array, ...]:
-    """Return the local error of each interval, for each arc of shape (N,).
+    """Return the local error of each interval, shape (N,), for each arc.
 
         e_k = max_i |flow(x_k, u_k)_i - x_(k+1),i| / size_i
 
-    The model starts at each node; all intervals are simulated as one ensemble: 25 ms for 100 of
-    them. An interval over which the model cannot be simulated has the error inf.
+    The model is simulated over each interval from its first node. All intervals are one ensemble,
+    which takes 25 ms for 100 intervals. If the simulation of an interval fails, its error is inf.
 
     Args:
         arcs: optimised arcs.
@@ -47,9 +47,10 @@ def cut_meshes(
     order: int,
     most: int,
 ) -> list[Array] | None:
-    """Return `meshes` with inaccurate intervals divided; None if no error exceeds `allowed`.
+    """Return `meshes` with inaccurate intervals divided, or None if no error exceeds `allowed`.
 
-    Such intervals get (error / allowed)^(1/order) parts, 2 to `most`. Scenarios share their meshes.
+    An interval is divided into (error / allowed)^(1/order) parts, at least 2 and at most `most`.
+    All scenarios have the same meshes.
     """
     if max((float(e.max()) for e in errors), default=0.0) <= allowed:
         return None
@@ -68,7 +69,7 @@ def cut_meshes(
 
 
 def _ends(arc: Arc, rtol: float) -> Array:
-    """Return the states at the end of each interval, simulated from its first node, (nx, N)."""
+    """Return the states at the end of each interval, simulated from its start, (nx, N)."""
     model, N = arc.span.model, arc.intervals
     local = _local(model)
     p: dict[str, Any] = {name: np.full(N, x) for name, x in arc.parameters().items()}
@@ -90,10 +91,10 @@ def _ends(arc: Arc, rtol: float) -> Array:
 
 
 def _local(model: Model) -> Model:
-    """Return `model` with time relative to the start of each member, if its equations need time.
+    """Return `model` with time since the node of each member, if its equations contain time.
 
-    For a mechanism only the explicit equations are used: its constraints are not enforced over an
-    interval, whose drift is below all relevant errors.
+    For a mechanism only the explicit equations are used. Its constraints are not enforced, because
+    their drift over one interval is negligible.
     """
     kept = model.memory.get("ocp local")
     if kept is None:
@@ -111,28 +112,28 @@ def _local(model: Model) -> Model:
 
 
 def zoh_losses(transcription: Transcription, iterate: Iterate) -> tuple[Array, ...]:
-    """Estimate the reduction of J with inputs free to vary in each interval, (N,) for each phase.
+    """Estimate the reduction of J by inputs that vary within each interval, (N,) for each phase.
 
-    With costates lam the minimum principle requires of the input at every time what a held input
-    satisfies only on average. The loss is, to second order in the length h,
+    The minimum principle with costates lam holds at every time for a free input, but only on
+    average for an input that is constant on intervals. To second order in the length h the loss is
 
         E_k = sum_j w_j (H(u_k) - min_u H(u)),   H(u) = H + H_u (u - u_k) + H_uu (u - u_k)^2 / 2
 
-    over the collocation points, with H_u and H_uu from the multipliers of the equations at each of
-    them. The input stays in its bounds and between its values in the neighbouring intervals; on a
-    singular arc (H_u = H_uu = 0) and at a switch (H_uu = 0) this limits it. For a smooth input
-    E_k = H_uu (u' h)^2 h / 24; at a switch it also falls as h^2, in one interval.
+    over the collocation points, with H_u and H_uu from the multipliers of the equations at each
+    point. The input is limited to its bounds and to the range of its values in the neighbouring
+    intervals, which matters on a singular arc (H_u = H_uu = 0) and at a switch (H_uu = 0). For a
+    smooth input E_k = H_uu (u' h)^2 h / 24; at a switch, E_k of one interval falls as h^2.
 
     Args:
         transcription: the solved transcription.
         iterate: unknowns and multipliers of the rows at a solution.
 
     Returns:
-        For each phase, in units of J; zeros without collocation points (shooting) or without
-        inputs. Inputs shared by scenarios are counted with the first scenario.
+        Losses of each phase in units of J; zeros without collocation points (shooting) or without
+        inputs. Losses of inputs that scenarios share are assigned to the first scenario.
 
-    Limits: the estimate assumes multipliers of a solution; for inputs in active path conditions it
-    is too large by a factor of up to 4.
+    Limits: the estimate requires the multipliers of a solution. For inputs in active path
+    conditions it is too large by a factor of up to 4.
     """
     losses: list[Array] = []
     spans = transcription.layout.spans
@@ -140,7 +141,7 @@ def zoh_losses(transcription: Transcription, iterate: Iterate) -> tuple[Array, .
     for number, own in enumerate(spans):
         loss = np.zeros(own.intervals)
         for columns in own.u:
-            sharing = [  # (span, input) with the same unknowns
+            sharing = [  # (span, input) pairs with the same unknowns
                 (k, i)
                 for k, other in enumerate(spans)
                 for i, row in enumerate(other.u)
@@ -154,7 +155,7 @@ def zoh_losses(transcription: Transcription, iterate: Iterate) -> tuple[Array, .
 
 
 def _drop(H_u: Array, H_uu: Array, low: Array, high: Array) -> Array:
-    """Return the decrease of H from its value at 0 in [low, high], summed over the points, (N,)."""
+    """Return the largest decrease of H by a change in [low, high], summed over points, (N,)."""
     low, high = low[:, None], high[:, None]
     downhill = np.where(H_u > 0, low, high)
     curved = H_uu > 0
@@ -167,7 +168,7 @@ def _drop(H_u: Array, H_uu: Array, low: Array, high: Array) -> Array:
 def _reach(
     transcription: Transcription, w: Array, columns: NDArray[np.int64]
 ) -> tuple[Array, Array]:
-    """Return the permitted range of an input around its value in each interval, scaled."""
+    """Return the scaled permitted range of changes of an input in each interval."""
     u, program = w[columns], transcription.program
     lower, upper = program.lower_w[columns], program.upper_w[columns]
     if u.size < 2:
@@ -218,7 +219,7 @@ def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tupl
 def _entries(
     entries: Entries, varying: Array, columns: NDArray[np.int64]
 ) -> Iterator[tuple[int, int, Array]]:
-    """Yield (row, index into the columns, values at all places) of the entries in some columns."""
+    """Yield (row, index into `columns`, values at all places) of each entry in `columns`."""
     values = np.empty((entries.rows.size, varying.shape[1]))
     values[entries.varying] = varying
     values[entries.still] = entries.constant[:, None]
@@ -227,7 +228,7 @@ def _entries(
 
 
 def _weight(transcription: Transcription, lam_g: Array, number: int) -> float:
-    """Return the weight of a phase's cost in J: of the mean, or the multiplier of the largest."""
+    """Return the weight of the cost of a phase in J; for "worst", the multiplier of its bound."""
     problem, phases = transcription.problem, len(transcription.problem.chain)
     if problem.kind == "worst":
         return float(lam_g[transcription.skeleton.largest[number // phases]])

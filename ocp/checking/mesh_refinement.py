@@ -1,6 +1,6 @@
 """Mesh refinement: repeated solves on meshes derived from error estimates.
 
-A mesh is refined where necessary, and stays as coarse as possible elsewhere.
+Meshes are refined only where the estimates require it.
 """
 
 from collections.abc import Iterable, Sequence
@@ -28,24 +28,24 @@ from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
 GROWTH = 3.0
-"""Largest growth of a mesh at once: errors are estimates."""
+"""Largest growth of the number of intervals in one pass, as errors are only estimates."""
 LEAST_PARTS = 0.5
-"""Fewest parts of an interval: at most two intervals of the same density are merged at once."""
+"""Smallest number of parts of an interval; 0.5 merges at most two intervals in one pass."""
 MOST_PARTS = 16.0
-"""Most parts into which an interval is divided at once."""
+"""Largest number of parts into which one pass divides an interval."""
 STEEPEST = 2.0
 """Approximate largest ratio of the lengths of neighbouring intervals."""
 SAME_NUMBER = 0.4
-"""A mesh that needs no more intervals keeps its number down to this share, which avoids rebuilding
-everything that depends on the number."""
+"""Share of the number of intervals. If a pass requires fewer intervals than this share, the number
+is reduced; otherwise it is kept, so that the program need not be rebuilt."""
 LATER = 1e-2
-"""Initial barrier parameter of Ipopt for all passes but the first, which start near a solution."""
+"""Initial barrier parameter of Ipopt for later passes, which start near a solution."""
 CAP = 150
-"""Largest number of iterations on a mesh that only shows where to refine."""
+"""Largest number of iterations on a mesh whose solution only determines the next mesh."""
 FULL = 0.9
-"""Share of the largest mesh above which a mesh counts as full."""
+"""Share of the largest number of intervals above which a mesh counts as full."""
 LEAST_TRUST = 0.2
-"""Least trust in loss estimates, which active path conditions make too large."""
+"""Smallest trust in loss estimates, which are too large for active path conditions."""
 
 
 class MeshErrors(NamedTuple):
@@ -53,8 +53,8 @@ class MeshErrors(NamedTuple):
 
     Attributes:
         local: relative local error of each interval, shape (N,).
-        losses: cost lost in each of them by holding the inputs (see `zoh_losses`).
-        outside: mask of intervals that violate a bound between the nodes; None for none.
+        losses: loss of cost in each interval by constant inputs (see `zoh_losses`), shape (N,).
+        outside: mask of intervals that violate a bound between nodes, or None if there are none.
     """
 
     local: Array
@@ -73,25 +73,26 @@ def refined(
     most: int = 1000,
     for_loss: float = inf,
 ) -> tuple[Array, ...]:
-    """Return new meshes with local errors below `local` and a lost cost below `loss`.
+    """Return new meshes with local errors below `local` and a total loss below `loss`.
 
-    Interval k needs n_k parts. A local error e falls as n^-(p+1) with the order p for a smooth
-    motion, which is assumed only for longer intervals; where the error is too large the order is
-    halved. Losses E_k fall as n^-2, so their sum is `loss` with the fewest intervals for
+    Interval k is divided into n_k parts. The local error of a smooth motion falls as n^-(p+1) with
+    the order p. This is assumed where intervals are merged; where the error is too large, half this
+    exponent is used. Losses E_k fall as n^-2, so the sum `loss` is reached with the fewest
+    intervals for
 
         n_k = E_k^(1/3) sqrt(sum E^(1/3) / loss)
 
-    The larger of both, at least two parts where a bound is violated between nodes, is distributed
-    evenly: nodes move, and their number is kept if possible.
+    The larger n_k applies, and at least two parts where a bound is violated between nodes. New
+    nodes are placed at equal amounts of n, and their number is kept if possible.
 
     Args:
         meshes: fractions that bound the intervals of each phase.
-        errors: their errors.
-        keep: fractions of each phase that stay nodes.
-        local, loss: tolerances; `loss` for all phases together, in units of J.
-        order: of the scheme.
-        most: largest number of intervals of all phases together.
-        for_loss: largest number of intervals for losses alone.
+        errors: errors of the intervals of each phase.
+        keep: fractions of each phase that remain nodes.
+        local, loss: tolerances; `loss` is the total of all phases in units of J.
+        order: order of the scheme.
+        most: largest total number of intervals.
+        for_loss: largest total number of intervals for the sake of losses.
     """
     roots = [np.cbrt(e.losses) for e in errors]
     total = sum(float(root.sum()) for root in roots)
@@ -114,7 +115,7 @@ def refined(
 
 
 def _graded(parts: Array, lengths: Array) -> Array:
-    """Return more parts next to short intervals, so that lengths change gradually."""
+    """Return `parts` with larger numbers near short intervals, so that lengths change gradually."""
     density = parts / lengths
     for k in range(1, density.size):
         density[k] = max(density[k], density[k - 1] / STEEPEST)
@@ -132,7 +133,7 @@ def _spread(mesh: Array, parts: Array, keep: Sequence[float]) -> Array:
         scale = old / max(float(wanted.sum()), 1e-9)
     counts = [max(1, ceil(scale * n - 1e-9)) for n in wanted]
     while scale > 1.0 and sum(counts) > old and max(counts) > 1:
-        counts[int(np.argmax(counts))] -= 1  # rounded up more than once
+        counts[int(np.argmax(counts))] -= 1  # rounding up may exceed the old number
     pieces = [
         np.interp(np.linspace(low, high, n, endpoint=False), done, mesh)
         for low, high, n in zip(at[:-1], at[1:], counts, strict=True)
@@ -149,13 +150,13 @@ class Goals:
 
     Attributes:
         local: largest relative local error of an interval.
-        loss: cost lost by holding the inputs, relative to |J|.
+        loss: loss of cost by constant inputs, relative to |J|.
         outside: violation of a bound between nodes, relative to its magnitude.
         passes: largest number of solves.
-        most: largest number of intervals, of all phases together.
-        nonzeros: of Jacobian and Hessian of the program, up to which a mesh is refined for the
-            sake of the cost alone: 1000 intervals of a small model, 70 of an arm with six joints.
-        patient: whether a mesh is also refined if the solver reached its iteration limit.
+        most: largest total number of intervals.
+        nonzeros: number of nonzeros of the Jacobian and the Hessian up to which a mesh is refined
+            only to reduce the loss: 1000 intervals of a small model, 70 of an arm with six joints.
+        patient: True to refine a mesh also if the solver reached its iteration limit.
     """
 
     local: float
@@ -168,10 +169,10 @@ class Goals:
 
     @staticmethod
     def of(tolerance: float) -> "Goals":
-        """Return the goals for a verification within `tolerance`: four digits of J at 1e-3.
+        """Return the goals for a verification within `tolerance`; 1e-3 gives four digits of J.
 
-        Local errors accumulate over the motion, by experience to at most ten times the largest. An
-        inaccurate cost is not a miss, but it is the quantity to be minimised.
+        Local errors accumulate over the motion, usually to at most ten times the largest one. The
+        verification does not require an accurate cost, but the cost is to be minimised.
         """
         return Goals(0.1 * tolerance, 0.02 * tolerance, 0.2 * tolerance)
 
@@ -187,27 +188,27 @@ def refined_solve(
     goals: Goals | None = None,
     clock: Clock | None = None,
 ) -> Solution:
-    """Solve repeatedly, each time on meshes derived from the remaining errors.
+    """Solve `problem` repeatedly, each time on meshes derived from the remaining errors.
 
-    A mesh is fine enough when the local error of every interval, the cost lost by holding the
-    inputs and the violations between nodes reach the `goals`. Nodes move to where they are needed;
-    as long as their number stays the same, nothing is rebuilt.
+    A mesh is fine enough if the local error of each interval, the loss by constant inputs and the
+    violations between nodes reach the `goals`. A mesh with the same number of intervals uses the
+    same program.
 
     Args:
         problem: the problem to solve.
-        meshes: initial meshes, `make_meshes(problem, 50)`.
-        scheme: `Radau(3)` if none.
-        solver: `Ipopt()` if none.
+        meshes: initial meshes, such as `make_meshes(problem, 50)`.
+        scheme: `Radau(3)` by default.
+        solver: `Ipopt()` by default.
         guess: see `ocp.solving.starts`.
-        progress: called with a `Progress` after each iteration.
-        goals: default: for a verification within 1e-3.
+        progress: function called with a `Progress` after each iteration.
+        goals: criteria for a fine mesh, by default for a verification within 1e-3.
         clock: time limit.
 
     Returns:
-        The last solution that the solver reports as solved, with the statistics of all passes; the
-        first one if that already fails, and with status INTERRUPTED or TIME_LIMIT the previous
-        one. A mesh that did not become fine enough is not a failure: the verification evaluates
-        the result.
+        The last successful solution with the statistics of all passes, or the first solution if it
+        failed. If a later pass was stopped, the solution has the status INTERRUPTED or TIME_LIMIT.
+        A mesh that did not become fine enough is not a failure, as the verification evaluates the
+        result.
     """
     begin = perf_counter()
     goals, clock = goals or Goals.of(TOLERANCE), clock or Clock()
@@ -218,7 +219,7 @@ def refined_solve(
         began = begin if number == 1 else perf_counter()
         transcription = made.on(meshes)
         key = (transcription.skeleton, number == 1, capped)
-        if key not in ready:  # on as many intervals the program is the same
+        if key not in ready:  # meshes with equal numbers of intervals have the same program
             later = _later(problem, solver, number, capped)
             ready[key] = later.prepared(transcription.program)
         start, warm = start_of(transcription, guess)
@@ -258,7 +259,7 @@ def _later(problem: Problem, solver: Solver, number: int, capped: bool) -> Solve
     if number == 1 or not isinstance(solver, Ipopt):
         return solver
     later: dict[str, float] = {"max_iter": CAP} if capped else {}
-    if problem.kind != "worst":  # its multipliers must converge
+    if problem.kind != "worst":  # a small barrier prevents convergence of its multipliers
         later["mu_init"] = LATER
     return solver.with_options(**(later | dict(solver.options)))
 
@@ -266,14 +267,15 @@ def _later(problem: Problem, solver: Solver, number: int, capped: bool) -> Solve
 @final
 @dataclass(frozen=True)
 class Excess:
-    """Distance of a mesh from its goals.
+    """Errors of a mesh in comparison with its goals.
 
     Attributes:
         local: largest local error in multiples of its goal.
-        lost: estimated cost lost by holding the inputs; `allowed` is its goal.
+        lost: estimated loss of cost by constant inputs.
         cost: J.
-        trust: share of an estimated loss that refinement actually gains.
-        stuck: whether the last refinement gained little.
+        allowed: goal of the loss.
+        trust: ratio of the actual gain by refinement to the estimated loss.
+        stuck: True if the last refinement gained little.
     """
 
     local: float = np.inf
@@ -285,7 +287,7 @@ class Excess:
 
     @property
     def loss(self) -> float:
-        """Likely cost of holding the inputs."""
+        """Estimated loss of cost by constant inputs, corrected by `trust`."""
         return self.trust * self.lost
 
     @property
@@ -294,7 +296,7 @@ class Excess:
         return max(self.local, self.loss / self.allowed if self.allowed > 0 else 0.0)
 
     def then(self, local: float, lost: float, cost: float, allowed: float) -> "Excess":
-        """Return the excess after another pass; its gain determines the trust in the estimates."""
+        """Return the excess after another pass, with the trust updated by the gain of this pass."""
         trust = self.trust
         if max(self.local, local) <= 1.0 and np.isfinite(self.lost) and self.lost > 2 * lost:
             gained = (self.cost - cost) / (self.lost - lost)
@@ -306,7 +308,7 @@ class Excess:
 def finer_meshes(
     made: Discretisation, solution: Solution, goals: Goals, before: Excess
 ) -> tuple[tuple[Array, ...], Excess]:
-    """Return refined meshes, empty if the goals are reached, and the excess over the goals."""
+    """Return refined meshes, or () if the goals are reached, and the excess over the goals."""
     problem, phases = made.problem, len(made.problem.chain)
     arcs = arcs_of(problem, solution.meshes, solution.points)
     local = local_errors(arcs, min(1e-6, 0.1 * goals.local))
@@ -347,7 +349,7 @@ def finer_meshes(
 def _outside(arcs: Sequence[Arc], goals: Goals) -> list[NDArray[np.bool_]]:
     """Return masks of the intervals that violate a bound between their nodes.
 
-    The runs start at optimised nodes and stay near the optimised motion.
+    The simulations restart at optimised nodes, so they remain near the optimised motion.
     """
     masks = [np.zeros(arc.intervals, dtype=bool) for arc in arcs]
     for run in restarted(arcs, 10 * goals.local)[0]:

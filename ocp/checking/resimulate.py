@@ -1,6 +1,6 @@
 """Re-simulation of the models under an optimised control, from start to end.
 
-An `Arc` is the optimised motion of one phase as numbers for a simulation.
+An `Arc` contains the data of one optimised phase that the simulation requires.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +22,7 @@ from symfric.results.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 REST = 1e-3
-"""Motion of a state below this multiple of its nominal value is treated as zero."""
+"""Magnitude of a state, in multiples of its nominal value, that counts as zero."""
 RTOL = 1e-9
 """Relative tolerance of the re-simulation."""
 GAUSS_POINTS, GAUSS_WEIGHTS = legendre.leggauss(4)
@@ -31,16 +31,16 @@ GAUSS_POINTS, GAUSS_WEIGHTS = legendre.leggauss(4)
 @final
 @dataclass(frozen=True, eq=False)
 class Arc:
-    """The optimised motion of one phase.
+    """Optimised motion of one phase.
 
     Attributes:
         number: index of the phase in its problem.
-        span: its conditions.
-        begin: its start since that of the problem [s].
+        span: model and conditions of the phase.
+        begin: start time of the phase since the start of the problem [s].
         T: duration [s].
         mesh: fractions of T that bound the intervals, shape (N + 1,).
-        nodes: states there, shape (nx, N + 1).
-        u: inputs, held on each interval, shape (nu, N).
+        nodes: states at the nodes of the mesh, shape (nx, N + 1).
+        u: inputs, constant on each interval, shape (nu, N).
         p: parameters of the model, with chosen values, shape (n_p,).
     """
 
@@ -67,17 +67,17 @@ class Arc:
 
     @cached_property
     def sizes(self) -> Array:
-        """Largest magnitude of each state in the arc, at least `REST` nominal, shape (nx,)."""
+        """Largest magnitude of each state in the arc, at least `REST` nominal values, (nx,)."""
         largest = np.abs(self.nodes).max(axis=1, initial=0.0)
         return np.maximum(largest, REST * self.span.model.nominal("x"))
 
     def state(self, node: int) -> dict[str, float]:
-        """Return states at a node by name."""
+        """Return the states at a node by name."""
         values = self.nodes[:, node].tolist()
         return {v.name: x for v, x in zip(self.span.model.x, values, strict=True)}
 
     def parameters(self) -> dict[str, float]:
-        """Return parameters by name, clipped to their bounds against rounding errors."""
+        """Return the parameters by name, clipped to their bounds because of rounding errors."""
         pairs = zip(self.span.model.p, self.p, strict=True)
         return {v.name: clipped(float(x), (v.lower, v.upper)) for v, x in pairs}
 
@@ -98,12 +98,12 @@ def arcs_of(problem: Problem, meshes: Sequence[Array], points: Points) -> tuple[
 @final
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The simulated motion of an arc, or of a part of it.
+    """Simulated motion of an arc, or of a part of an arc.
 
     Attributes:
         arc: the optimised arc.
-        trajectory: motion of the model; the simulation may have failed before the end.
-        end: end of the part in use [s].
+        trajectory: motion of the model; the simulation may have failed before `end`.
+        end: end of the part that is used [s].
     """
 
     arc: Arc
@@ -112,34 +112,34 @@ class Run:
 
     @property
     def begin(self) -> float:
-        """First time [s]."""
+        """Start time of the simulation [s]."""
         return self.trajectory.span[0]
 
     @property
     def ok(self) -> bool:
-        """True if it reached its end."""
+        """True if the simulation reached `end`."""
         return self.trajectory.status.ok and self.trajectory.span[1] >= self.end
 
     @property
     def at_start(self) -> bool:
-        """True if it begins at the start of its arc."""
+        """True if the run begins at the start of its arc."""
         return self.begin == self.arc.times[0]
 
     @property
     def at_end(self) -> bool:
-        """True if it ends at the end of its arc."""
+        """True if the run ends at the end of its arc."""
         return self.end == self.arc.times[-1]
 
     @property
     def looks(self) -> Array:
-        """Times for evaluation [s]: every step, and both sides of every node."""
+        """Times at which conditions are evaluated [s]: all steps, and both sides of each node."""
         inside = self.arc.times[(self.arc.times > self.begin) & (self.arc.times <= self.end)]
         every = np.concatenate([self.trajectory.looks, np.nextafter(inside, -np.inf), inside])
         last = min(self.end, self.trajectory.span[1])
         return np.unique(every[(every >= self.begin) & (every <= last)])
 
     def of(self, column: ca.SX, times: Array | float) -> Array:
-        """Return values of a column of expressions in the symbols of the model, shape (rows, n)."""
+        """Return values of a column of expressions in symbols of the model, shape (rows, n)."""
         at, rows = np.atleast_1d(times), column.numel()
         if not rows:
             return np.zeros((0, at.size))
@@ -152,7 +152,7 @@ class Run:
         return [np.array([time]), *values, self.arc.p]
 
     def integral(self, expression: ca.SX) -> float:
-        """Integrate an expression over the run, by Gauss quadrature over every accepted step."""
+        """Return the integral of an expression over the run, by Gauss quadrature over each step."""
         if ca.SX(expression).is_zero():
             return 0.0
         steps = self.trajectory.step_times
@@ -168,13 +168,14 @@ def resimulated(
     rtol: float = RTOL,
     follow: Callable[[Arc, Mapping[str, float]], Run | None] | None = None,
 ) -> tuple[Run, ...]:
-    """Simulate the models under the optimised controls, held on each interval.
+    """Simulate the models under the optimised controls, which are constant on each interval.
 
-    A phase starts at the simulated end of the previous one, according to its links; states without
-    a link start at their optimised values. After a run that fails the rest of its scenario is
-    left out, because it has no start.
+    A phase starts at the simulated end of the previous one, according to its links. States without
+    a link start at their optimised values. If a run fails, the later phases of its scenario are
+    omitted, because they have no start.
 
-    `follow` makes the run of an arc from its start, or None; by default with the user's model.
+    `follow` returns the run of an arc from given start values, or None if it fails. By default it
+    simulates the user's model.
     """
     runs: list[Run] = []
     for arc in arcs:
@@ -191,7 +192,7 @@ def resimulated(
 
 
 def run_from(arc: Arc, node: int, start: Mapping[str, float], rtol: float = RTOL) -> Run:
-    """Simulate from a node to the end of the arc."""
+    """Simulate the model from a node to the end of the arc."""
     times, model = arc.times[node:], arc.span.model
     trajectory = simulate(
         model,

@@ -1,6 +1,6 @@
 """Verification of the user's model under the optimised control.
 
-Conditions are evaluated on simulated runs: at nodes, and everywhere between.
+All conditions are evaluated on simulated runs, at the nodes of the mesh and between them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,18 +25,18 @@ from symfric.foundation.variable import stacked
 
 Array = NDArray[np.float64]
 CLOSER, PARTS = 2, 16
-"""Refinements of the worst time, and parts of its neighbourhood in each."""
+"""Number of refinements of the worst time, and of parts of its neighbourhood in each."""
 TOLERANCE = 1e-3
-"""Default of the largest permitted relative miss."""
+"""Default value of the largest permitted relative miss."""
 SMALL = 0.1
-"""Local errors below this many tolerances indicate error growth if the end is missed."""
+"""Local error, in tolerances, below which a missed end indicates error growth."""
 MOST_RESTARTS = 60
 
 
 def _miss(
     what: str, name: str, time: float, value: float, box: Box, size: float, unit: str = ""
 ) -> Miss:
-    """Return a condition with the nearest value in its range."""
+    """Return a condition whose `wanted` value is the nearest one in its range."""
     wanted = min(max(value, box[0]), box[1]) if value == value else box[0]
     return Miss(what, name, float(time), float(value), float(wanted), float(size), unit)
 
@@ -44,7 +44,7 @@ def _miss(
 def _at_nodes(run: Run) -> Iterator[Miss]:
     """Yield the misses of states and rows at the start, the via points and the end of a phase.
 
-    Inputs and algebraic variables in rows are those of the interval before.
+    Inputs and algebraic variables in rows are those of the preceding interval.
     """
     arc, span = run.arc, run.arc.span
     for fraction, boxes in span.nodes.items():
@@ -65,7 +65,7 @@ def _at_nodes(run: Run) -> Iterator[Miss]:
 
 
 def _against_optimised(run: Run) -> Iterator[Miss]:
-    """Yield the misses of states at the end against their optimised values, if not prescribed."""
+    """Yield the differences of states that are not prescribed from their optimised end values."""
     arc, model = run.arc, run.arc.span.model
     node = int(np.argmin(np.abs(arc.times - run.end)))
     prescribed = arc.span.nodes[1.0] if run.at_end else {}
@@ -76,7 +76,7 @@ def _against_optimised(run: Run) -> Iterator[Miss]:
 
 
 class _Kept(NamedTuple):
-    """A condition over a whole phase."""
+    """Condition that holds over a whole phase."""
 
     kind: str
     name: str
@@ -85,18 +85,18 @@ class _Kept(NamedTuple):
     unit: str = ""
 
     def outside(self, values: Array) -> Array:
-        """Return the distance of values from the range; negative inside; inf for NaN."""
+        """Return the distance of values from the range: negative inside, inf for NaN."""
         outside = np.maximum(values - self.box[1], self.box[0] - values)
         return np.where(np.isnan(outside), np.inf, outside)
 
     def magnitude(self, values: Array) -> float:
-        """Return the magnitude of the condition, from its bounds and values."""
+        """Return the largest magnitude of the bounds and of `values`."""
         bounds = [abs(b) for b in self.box if isfinite(b)]
         return max([*bounds, float(np.abs(values).max(initial=0.0))])
 
 
 def _kept(arc: Arc) -> list[_Kept]:
-    """Return bounds of states and algebraic variables, and path conditions."""
+    """Return the bounds of states and algebraic variables, and the path conditions."""
     span = arc.span
     known = [v for v in (*span.model.x, *span.model.z) if span.boxes[v.name] != FREE]
     bounds = [_Kept("bound", v.name, v.symbol, span.boxes[v.name], v.unit) for v in known]
@@ -105,7 +105,7 @@ def _kept(arc: Arc) -> list[_Kept]:
 
 
 def _between_nodes(runs: Sequence[Run]) -> Iterator[Miss]:
-    """Yield the worst violations of bounds and path conditions by the runs of one arc."""
+    """Yield the worst violation of each bound and path condition in the runs of one arc."""
     for kept in _kept(runs[0].arc):
         size, worst = kept.magnitude(np.zeros(0)), (-np.inf, 0.0, 0.0)
         for run in runs:
@@ -117,7 +117,7 @@ def _between_nodes(runs: Sequence[Run]) -> Iterator[Miss]:
 
 
 def _worst(run: Run, kept: _Kept, looks: Array, values: Array) -> tuple[float, float, float]:
-    """Return the worst violation of a range, its time and value, refined between the `looks`."""
+    """Return the worst violation of a range, its time and its value, refined between `looks`."""
     outside = kept.outside(values)
     j = int(np.argmax(outside))
     best = (float(outside[j]), float(looks[j]), float(values[j]))
@@ -133,7 +133,7 @@ def _worst(run: Run, kept: _Kept, looks: Array, values: Array) -> tuple[float, f
 
 
 def left_between(run: Run, tolerance: float) -> NDArray[np.bool_]:
-    """Return a mask of intervals with a bound or path violation above `tolerance`, (N,)."""
+    """Return a mask (N,) of intervals that violate a bound or path condition by > `tolerance`."""
     mask = np.zeros(run.arc.intervals, dtype=bool)
     looks = run.looks
     interval = np.searchsorted(run.arc.times, looks, side="right") - 1
@@ -145,7 +145,7 @@ def left_between(run: Run, tolerance: float) -> NDArray[np.bool_]:
 
 
 def _joined(before: Run, after: Run) -> Iterator[Miss]:
-    """Yield the misses of conditions between the end of a phase and the start of the next one."""
+    """Yield the misses of joins between the end of a phase and the start of the next one."""
     for join in after.arc.span.joins:
         value = float(
             ca.DM(join.function(*before.signals(before.end), *after.signals(after.begin)))
@@ -156,7 +156,7 @@ def _joined(before: Run, after: Run) -> Iterator[Miss]:
 
 
 def _periodic(problem: Problem, first: Run, last: Run) -> Iterator[Miss]:
-    """Yield the misses of periodic states."""
+    """Yield the differences of periodic states between the end and the start."""
     model = first.arc.span.model
     for v, size in zip(model.x, first.arc.sizes, strict=True):
         if v.name in problem.periodic:
@@ -168,26 +168,27 @@ def _periodic(problem: Problem, first: Run, last: Run) -> Iterator[Miss]:
 def verify(solution: Solution, tolerance: float = TOLERANCE, rtol: float = RTOL) -> Verification:
     """Simulate the user's model under the control of `solution`, and check all conditions.
 
-    One run from the start through all phases, joined by their links, with the inputs held on each
-    interval (for an input with bounded rate, the rate is held). Checked are the start, via points
-    and the end, joints and periodicity, bounds and path conditions over all steps of the simulation
-    and not only at points of the mesh, states at the end of each phase against their optimised
-    values, the cost by quadrature of the simulated motion, and the local error of each interval.
+    The simulation runs from the start through all phases, joined by their links. Inputs are
+    constant on each interval; for an input with bounded rate, its rate is constant. The function
+    checks the conditions at the start, via points and the end, joints and periodicity; bounds and
+    path conditions at all steps of the simulation, not only at points of the mesh; states at the
+    end of each phase against their optimised values; the cost by quadrature over the simulated
+    motion; and the local error of each interval.
 
-    An unstable motion cannot be simulated from its start over many times the inverse of its growth
-    rate, in any arithmetic: errors of 1e-16 grow until they dominate. If the single intervals are
-    accurate but the end is missed, the simulation is restarted at the nodes where it has departed,
-    and its result is added as `restarted`; but the control alone does not meet the conditions, so
-    the solution is not verified.
+    The simulation of an unstable motion fails over times much longer than the inverse of the growth
+    rate, because rounding errors grow until they dominate. If the local errors are small but the
+    end is missed, the simulation is repeated with restarts at the nodes where it has departed; the
+    result is `restarted`. The solution is not verified in this case, because the control alone does
+    not satisfy the conditions.
 
     Args:
-        solution: of any solver.
-        tolerance: relative to the largest magnitude of a state in its phase (at least a thousandth
-            of its nominal value), or of the bounds and values of a condition.
-        rtol: of the simulation.
+        solution: solution by any method.
+        tolerance: largest miss, relative to the largest magnitude of a state in its phase (at least
+            a thousandth of its nominal value), or of the bounds and values of a condition.
+        rtol: relative tolerance of the simulation.
 
     Raises:
-        ValueError: not a solution, or a tolerance that is not above zero.
+        ValueError: not a solution, or a tolerance that is not positive.
     """
     checks.kind("verify", solution, Solution, "a solution, such as solve(...)")
     tolerance = checks.number("verify: tolerance", tolerance, above=0.0)
@@ -196,7 +197,7 @@ def verify(solution: Solution, tolerance: float = TOLERANCE, rtol: float = RTOL)
 
 
 def verified(solution: Solution, tolerance: float = TOLERANCE) -> Solution:
-    """Return `solution` with its verification, whose status replaces a success if it fails."""
+    """Return `solution` with its verification, and with its status if the verification fails."""
     verification = verify(solution, tolerance)
     checked = replace(solution, verification=verification)
     if verification.ok or not solution.status.ok:
@@ -212,7 +213,7 @@ def verified_arcs(
     tolerance: float = TOLERANCE,
     rtol: float = RTOL,
 ) -> Verification:
-    """Verify arcs that were optimised at `cost`."""
+    """Verify optimised arcs whose optimised cost is `cost`; see `verify`."""
     errors = local_errors(arcs, min(1e-6, 1e-2 * tolerance))
     found = _judged(problem, arcs, resimulated(arcs, rtol), errors, cost, tolerance, rtol)
     local = max((float(e.max()) for e in errors), default=0.0)
@@ -235,7 +236,7 @@ def _judged(
     tolerance: float,
     rtol: float,
 ) -> Verification:
-    """Return the verification from runs of the arcs, in the order of time."""
+    """Return the verification of the arcs by `runs`, which are in the order of time."""
     bad = next((run.trajectory for run in runs if not run.ok), None)
     checked, value = [*misses_of(problem, runs)], float("nan")
     for arc, error in zip(arcs, errors, strict=True):
@@ -253,7 +254,7 @@ def _judged(
 
 
 def misses_of(problem: Problem, runs: Sequence[Run], *, optimised: bool = True) -> Iterator[Miss]:
-    """Yield the misses of all conditions; with `optimised` also of the optimised ends."""
+    """Yield the misses of all conditions, and of optimised end values if `optimised`."""
     for _, of_arc in groupby(runs, lambda run: run.arc.number):
         yield from _between_nodes(list(of_arc))
     for run in runs:
@@ -271,7 +272,7 @@ def misses_of(problem: Problem, runs: Sequence[Run], *, optimised: bool = True) 
 
 
 def cost_of(problem: Problem, runs: Sequence[Run]) -> float:
-    """Return J of the simulated motion: the mean, the sum or the largest of its scenarios."""
+    """Return J of the simulated motion: sum, or mean or largest value of the scenarios."""
     shares: dict[int, float] = {}
     for run in runs:
         span = run.arc.span
@@ -288,10 +289,10 @@ def cost_of(problem: Problem, runs: Sequence[Run]) -> float:
 def restarted(
     arcs: Sequence[Arc], tolerance: float, rtol: float = RTOL
 ) -> tuple[tuple[Run, ...], tuple[float, ...]]:
-    """Simulate with restarts at the optimised nodes wherever the motion has departed.
+    """Simulate with restarts at optimised nodes where the motion departs from the optimised one.
 
     Returns:
-        The runs and the times of restarts; both empty if not even single intervals agree.
+        The runs and the times of restarts; both are empty if single intervals do not agree.
     """
     runs: list[Run] = []
     restarts: list[float] = []
@@ -310,7 +311,7 @@ def restarted(
 
 
 def _departs(run: Run, node: int, tolerance: float) -> int:
-    """Return the last node up to which the run is near all optimised ones."""
+    """Return the last node up to which the run is near the optimised states."""
     arc = run.arc
     times = arc.times[node:][arc.times[node:] <= run.trajectory.span[1]]
     x = run.of(arc.span.model.vector("x"), times)

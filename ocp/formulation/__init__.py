@@ -1,1 +1,1 @@
-"""Problems as users write them: phases, conditions, costs, and their resolved form."""
+"""Optimal control problems: phases, conditions and costs, their checks and resolved form."""

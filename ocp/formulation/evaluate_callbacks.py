@@ -1,4 +1,4 @@
-"""Evaluation of the callbacks of a problem at symbols: costs, conditions, links, joins."""
+"""Evaluation of the user's functions with symbols: costs, conditions, links and joins."""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
@@ -23,9 +23,9 @@ from symfric.model import Model
 
 
 class Evaluated(NamedTuple):
-    """Results of the functions of one phase; see `Span`.
+    """Expressions returned by the functions of one phase; see `Span` for the fields.
 
-    `details` are the names of results of a mechanism in costs and path conditions.
+    `details` are names of results of a mechanism that costs and path conditions contain.
     """
 
     running: ca.SX
@@ -40,7 +40,7 @@ class Evaluated(NamedTuple):
 def evaluated(
     problem: Statement, settings: Sequence[Setting], problems: list[str]
 ) -> tuple[Evaluated, ...]:
-    """Return the results of the functions of each phase; messages are appended to `problems`."""
+    """Return the expressions of each phase, and append messages about errors to `problems`."""
     results: list[Evaluated] = []
     before: Model | None = None
     for setting in settings:
@@ -61,7 +61,7 @@ def evaluated(
 
 @contextmanager
 def collected(problems: list[str], where: str) -> Generator[None]:
-    """Append an error of the block to `problems` and continue after the block."""
+    """Append a `ValueError` of the block to `problems` and continue after the block."""
     try:
         yield
     except ValueError as error:
@@ -98,7 +98,7 @@ def _check_known(expression: ca.SX, model: Model) -> None:
 def _path(
     problem: Statement, setting: Setting, signals: Signals, problems: list[str]
 ) -> Iterator[Row]:
-    """Yield path conditions of the problem, if the names exist, and of the phase."""
+    """Yield path conditions of the phase, and those of the problem whose names it has."""
     model = setting.model
     changing = ca.vertcat(*arguments(model))
     for group, everywhere in ((problem.path, True), (setting.phase.path, False)):
@@ -118,7 +118,7 @@ def _path(
 
 
 def _check_possible(expression: ca.SX, low: float, high: float, changing: ca.SX) -> None:
-    """Raise ValueError for a condition that is impossible, or constant."""
+    """Raise ValueError if a condition is impossible or constant."""
     if low > high:
         raise ValueError(f"expected a condition that can be met, got {low:g} to {high:g}")
     if not ca.depends_on(expression, changing):
@@ -132,7 +132,7 @@ def _label(what: str, number: int, condition: Callable[..., object]) -> str:
 
 
 def _missing(condition: Callable[..., object], settings: Sequence[Setting]) -> str:
-    """Return a message about names of a condition of the problem that no phase has."""
+    """Return a message if each phase lacks a name that a condition of the problem contains."""
     errors: list[MissingError] = []
     for setting in settings:
         try:

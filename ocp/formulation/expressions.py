@@ -1,4 +1,4 @@
-"""Functions of the signals of a model: their expressions, comparisons, and costs made of them."""
+"""Functions of the signals of a model: their expressions, comparisons and costs."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -23,15 +23,15 @@ Comparison = tuple[ca.SX, float, float]
 
 @final
 class MissingError(ValueError):
-    """A name that a model does not have."""
+    """Error for a name that a model does not have."""
 
 
 @final
 class Signals:
-    """The signals of a model by name: `s.force`, or `s["force"]`.
+    """Signals of a model by name: `s.force` or `s["force"]`.
 
-    Time `t` since the start of the problem [s], states, algebraic variables, inputs, parameters,
-    outputs, and the details of a mechanism, which are written out on demand.
+    These are the time `t` since the start of the problem [s], states, algebraic variables, inputs,
+    parameters, outputs, and the details of a mechanism, which are written out on demand.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class Signals:
         symbols: Mapping[str, ca.SX] | None = None,
         convert: Callable[[ca.SX], ca.SX] | None = None,
     ) -> None:
-        """Use `symbols` instead of those of the model; `convert` writes expressions in them."""
+        """Create signals; `convert` expresses details in `symbols` if given (name -> symbol)."""
         self._model = model
         self._symbols = known_symbols(model) if symbols is None else symbols
         self._convert = convert
@@ -64,7 +64,7 @@ class Signals:
         return self[name]
 
     def __call__(self) -> tuple[str, ...]:
-        """Return the names of the details in use."""
+        """Return the names of the details that were accessed."""
         return tuple(self._details)
 
 
@@ -74,14 +74,14 @@ def arguments(model: Model) -> list[ca.SX]:
 
 
 def known_symbols(model: Model) -> dict[str, ca.SX]:
-    """Return name -> expression of all signals and parameters except the details."""
+    """Return name -> expression of all signals and parameters, without the details."""
     groups = (model.x, model.z, model.u, model.p)
     known = {"t": model.t} | {v.name: v.symbol for group in groups for v in group}
     return known | {name: ca.SX(o.expression) for name, o in model.outputs.items()}
 
 
 def fresh_symbols(model: Model, mark: str) -> tuple[list[ca.SX], Signals]:
-    """Return new symbols [t, x, z, u, p] and the signals in them; two phases may share a model."""
+    """Return new symbols [t, x, z, u, p] and signals in them, as two phases may share a model."""
     old = arguments(model)
     new = [ca.SX.sym(f"{mark}_{letter}", s.numel()) for letter, s in zip("txzup", old, strict=True)]
     known = known_symbols(model)
@@ -94,7 +94,7 @@ def fresh_symbols(model: Model, mark: str) -> tuple[list[ca.SX], Signals]:
 
 
 def called(function: Callable[..., Any], *signals: Any, what: str) -> Any:
-    """Call `function`; errors of CasADi and Python become a `ValueError`."""
+    """Call `function` and convert errors of CasADi and Python to a `ValueError`."""
     try:
         return function(*signals)
     except (TypeError, ArithmeticError, AttributeError, RuntimeError) as error:
@@ -108,10 +108,10 @@ def called(function: Callable[..., Any], *signals: Any, what: str) -> Any:
 
 
 def value_of(function: Callable[..., Any], *signals: Any) -> ca.SX:
-    """Return the one expression that `function` makes of the signals, SX (1, 1).
+    """Return the expression that `function` returns for the signals, SX (1, 1).
 
     Raises:
-        ValueError: no expression, several, or one with a constant that is not finite.
+        ValueError: the result is not one expression, or contains a constant that is not finite.
     """
     result = called(function, *signals, what=EXPRESSION)
     hint = ""
@@ -139,13 +139,13 @@ def constants(expression: ca.SX) -> Iterator[float]:
 
 
 def comparisons(function: Callable[..., Any], *signals: Any) -> list[Comparison]:
-    """Return the rows of the comparison `a <= b`, `a >= b` or `a == b` of SX that `function` makes.
+    """Return the rows of the comparison `a <= b`, `a >= b` or `a == b` that `function` returns.
 
-    Columns are compared row by row, `ca.logic_and(a, b)` of comparisons requires both, and
-    `abs(a) <= number` is a range without a kink.
+    Columns are compared row by row. `ca.logic_and(a, b)` of comparisons requires both of them.
+    `abs(a) <= number` becomes a range of `a`, which has no kink.
 
     Raises:
-        ValueError: no comparison, or one that is always true or false.
+        ValueError: the result is not a comparison, or is always true or always false.
     """
     result = called(function, *signals, what=COMPARISON)
     if isinstance(result, bool):
@@ -177,7 +177,7 @@ def _rows(condition: ca.SX) -> Iterator[Comparison]:
 
 
 def _sorted(left: ca.SX, right: ca.SX, *, equal: bool) -> Comparison:
-    """Return left <= right, or ==, with numbers moved to the bounds."""
+    """Return the row of left <= right, or left == right, with numbers moved to the bounds."""
     for number in constants(ca.vertcat(left, right)):
         if not isfinite(number):
             raise ValueError(f"expected finite numbers, got {number}; {MATH}")
@@ -203,16 +203,16 @@ Terms = tuple[tuple[float, Expression], ...]
 class Cost:
     """Bolza cost J = integral of (L + sum_i w_i r_i^2) dt + E at the end.
 
-    Costs are added and multiplied by weights: `integral(lambda s: s.force**2) + 0.1 * TIME`; a
-    negative weight maximises: `-at_end(lambda s: s.height)`. Signals are bound by name, so one
-    cost serves every model that has them.
+    Costs can be added and multiplied by weights: `integral(lambda s: s.force**2) + 0.1 * TIME`. A
+    negative weight maximises: `-at_end(lambda s: s.height)`. Signals are identified by name, so a
+    cost can be used with every model that has them.
 
     Attributes:
         running: the terms of L as (weight, expression).
         end: the terms of E as (weight, expression).
-        squares: (w_i, r_i) of `track` and `effort`, kept apart for Gauss-Newton methods.
-        references: names that `track` follows.
-        largest: whether the largest cost of all scenarios counts instead of the mean; see `worst`.
+        squares: (w_i, r_i) of `track` and `effort`, stored separately for Gauss-Newton methods.
+        references: names of the references of `track`.
+        largest: True for the largest cost of all scenarios instead of the mean; see `worst`.
     """
 
     running: Terms = ()
@@ -264,10 +264,10 @@ class Cost:
         return self * (1.0 / weight)
 
     def expressions(self, signals: Signals) -> tuple[ca.SX, ca.SX]:
-        """Return integrand, squares included, and end value, (1, 1) each.
+        """Return the integrand, including squares, and the end value, SX (1, 1) each.
 
         Raises:
-            ValueError: a name the model does not have, or an expression that is not scalar.
+            ValueError: the model lacks a name, or an expression is not scalar.
         """
         running, end = (
             sum((weight * value_of(term, signals) for weight, term in terms), ca.SX(0))
@@ -278,7 +278,7 @@ class Cost:
         return running, end
 
     def residuals(self, signals: Signals) -> tuple[tuple[float, ca.SX], ...]:
-        """Return (weight, residual) of the squares."""
+        """Return (weight, residual) of each squared term."""
         return tuple((weight, value_of(term, signals)) for weight, term in self.squares)
 
 
@@ -287,28 +287,28 @@ def _checked(where: str, expression: Expression) -> Expression:
 
 
 def integral(expression: Expression) -> Cost:
-    """Cost: the integral over the motion, such as `integral(lambda s: s.force**2)`."""
+    """Return the integral over the motion as a cost, such as `integral(lambda s: s.force**2)`."""
     return Cost(running=((1.0, _checked("integral", expression)),))
 
 
 def at_end(expression: Expression) -> Cost:
-    """Cost: the value at the end, where `s.t` is the time since the start of the problem."""
+    """Return the value at the end as a cost; `s.t` is the time since the start of the problem."""
     return Cost(end=((1.0, _checked("at_end", expression)),))
 
 
 TIME = at_end(lambda s: s.t)
-"""The duration [s] as a cost: the sum over all phases."""
+"""Cost equal to the total duration [s] of all phases."""
 
 
 def track(name: str, reference: float | str | Expression, weight: float) -> Cost:
-    """Cost: the integral of weight (signal - reference)^2.
+    """Return the integral of weight (signal - reference)^2 as a cost.
 
     Args:
-        name: the signal that follows the reference.
+        name: name of the signal that follows the reference.
         reference: a number; a function of the signals, such as `lambda s: 0.1 * ca.sin(s.t)`; or
-            the name of a parameter or signal. A name that no model has becomes a parameter of the
-            problem, whose value is given in `p`: the goal of a controller.
-        weight: above zero.
+            the name of a parameter or signal. A name that the model does not have becomes a
+            parameter of the problem with its value in `p`, such as the goal of a controller.
+        weight: positive weight.
     """
     name = checks.text("track", name, "the name of a signal")
     weight = checks.number("track: weight", weight, above=0.0)
@@ -323,11 +323,11 @@ def track(name: str, reference: float | str | Expression, weight: float) -> Cost
 
 
 def effort(name: str, weight: float = 1.0) -> Cost:
-    """Cost: the integral of weight signal^2."""
+    """Return the integral of weight signal^2 as a cost."""
     return track(name, 0.0, weight)
 
 
 def worst(cost: Cost) -> Cost:
-    """Cost: the largest `cost` of all scenarios, instead of their mean."""
+    """Return `cost` with the largest value of all scenarios as total, instead of their mean."""
     such = "a cost made of integral(...), at_end(...) and TIME"
     return replace(checks.kind("worst", cost, Cost, such), largest=True)

@@ -1,6 +1,6 @@
-"""Ranges and phases of a problem, as given by the user and resolved to spans.
+"""Ranges and phases of a problem as given by the user, and their resolved form, the spans.
 
-Transcription, verification and friction use the spans.
+Transcription, verification and friction modules use only the spans.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -25,7 +25,7 @@ Range = float | tuple[float | None, float | None]
 Box = tuple[float, float]
 
 FREE: Box = (-inf, inf)
-"""No condition: `start={"x": FREE}` lets the optimiser choose the start inside the bounds."""
+"""Range without bounds: `start={"x": FREE}` lets the optimiser choose the start."""
 
 RANGE = "a finite number or (lower, upper) with lower <= upper and None for no bound"
 
@@ -33,7 +33,7 @@ RANGE = "a finite number or (lower, upper) with lower <= upper and None for no b
 @final
 @dataclass(frozen=True)
 class Free:
-    """A duration [s] that the optimiser chooses between `lower` > 0 and `upper`.
+    """Duration [s] that the optimiser chooses between `lower` > 0 and `upper`.
 
     `guess` is its initial value, by default the geometric mean of the bounds.
 
@@ -65,17 +65,17 @@ class Free:
 
 
 def initial(T: float | Free) -> float:
-    """Return a duration [s], the initial one if it is free."""
+    """Return a duration [s]; if it is free, its initial value."""
     return T.start if isinstance(T, Free) else float(T)
 
 
 def limits(T: float | Free) -> Box:
-    """Return the least and the largest duration [s]."""
+    """Return the smallest and the largest duration [s]."""
     return (T.lower, T.upper) if isinstance(T, Free) else (float(T), float(T))
 
 
 def clipped(value: float, box: Box) -> float:
-    """Return the number of a range that is nearest to `value`."""
+    """Return the number in `box` that is nearest to `value`."""
     return min(max(value, box[0]), box[1])
 
 
@@ -98,7 +98,7 @@ def fixed(box: Box) -> bool:
 
 
 def size_of(box: Box, default: float = 1.0) -> float:
-    """Return the larger magnitude of the bounds that are finite and not zero."""
+    """Return the larger magnitude of the finite nonzero bounds, or `default` if there is none."""
     return max((abs(b) for b in box if b and isfinite(b)), default=default)
 
 
@@ -116,53 +116,53 @@ Ranges = Mapping[str, Range]
 """Name -> prescribed value, or (lower, upper)."""
 
 Start = Callable[[Signals], Scalar] | str | None
-"""Start of a state that continues another phase: an expression in the signals at its end, the
-name of one of them, or None for no condition."""
+"""Start of a state of a phase that follows another one: an expression in the signals at the end of
+the previous phase, the name of one of these signals, or None for no condition."""
 
 PathCondition = Callable[[Signals], object]
 """A function that returns a comparison, such as `lambda s: s.tip_z <= 0.9`."""
 
 JoinCondition = Callable[[Signals, Signals], object]
-"""A comparison of the signals before and after: `lambda before, after: after.x >= before.x`."""
+"""A function that returns a comparison, such as `lambda before, after: after.x >= before.x`."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Phase:
-    """A part of the motion with one model and one set of conditions.
+    """Part of the motion with one model and one set of conditions.
 
         x' = ode(t, x, z, u, p),  0 = alg(t, x, z, u, p),  0 <= t - t_start <= T
 
-    Conditions are given by name: a number prescribes a value, a pair (lower, upper) a range in
-    which None is no bound. Fields of a phase take precedence over those of the `Problem`.
+    Conditions are given by name. A number prescribes a value; a pair (lower, upper) prescribes a
+    range, with None for no bound. Fields of a phase take precedence over those of the `Problem`.
 
     Attributes:
         model: an explicit model, `ode` with or without `alg`.
         T: duration [s], or `Free(lower, upper)` to let the optimiser choose.
-        start: states, inputs and outputs at the start; those of an input hold on the first
-            interval. States of the first phase that are not named have the start of the model.
-            `FREE` leaves one open.
-        end: the same at the end; states that are not named end anywhere.
-        via: {0.5: {"x": 1.0}}: states and outputs at a fraction of T between 0 and 1.
-        bounds: states, algebraic variables, inputs and outputs over the whole phase, in place of
-            the bounds of the model.
-        rates: bounds of the rates of inputs [unit/s]. Such an input becomes a state that is
-            continuous, with the constant rate `<input>_rate` on each interval; its start is free
-            unless `start` names it, and links and ends name it like any state.
-        path: lambdas over the signals that return `a <= b`, `a >= b` or `a == b`.
-        cost: of this phase alone, with `at_end` at its own end.
-        link: state -> its start: `lambda before: -0.5 * before.v` from the signals at the end of
-            the previous phase, the name of one of them, or None for no condition. States of the
-            same name are continuous unless named here; others start anywhere in their bounds.
-        joins: lambdas `(before, after)` over the signals at the end of the previous phase and at
+        start: conditions on states, inputs and outputs at the start; those on an input apply to the
+            first interval. States of the first phase that are not named have the start of the
+            model; `FREE` releases a state.
+        end: conditions at the end; states that are not named are free there.
+        via: conditions on states and outputs at fractions of T, such as {0.5: {"x": 1.0}}.
+        bounds: bounds of states, algebraic variables, inputs and outputs over the whole phase,
+            which replace the bounds of the model.
+        rates: bounds of the rates of inputs [unit/s]. Such an input becomes a continuous state
+            with the constant rate `<input>_rate` on each interval. Its start is free unless `start`
+            names it; links and ends can name it.
+        path: functions of the signals that return `a <= b`, `a >= b` or `a == b`.
+        cost: cost of this phase only; `at_end` refers to the end of this phase.
+        link: state -> its start: a function such as `lambda before: -0.5 * before.v` of the signals
+            at the end of the previous phase, the name of one of them, or None for no condition.
+            By default states of the same name are continuous and others start free.
+        joins: functions `(before, after)` of the signals at the end of the previous phase and at
             the start of this one that return a comparison.
         p: values of parameters of the model.
-        name: for messages and figures.
+        name: name for messages and figures.
 
     `Problem` reports errors of its phases.
 
-    Limits: bounds on states and outputs, and `path`, hold at the collocation points, not between
-    them; `verify` checks them there.
+    Limits: bounds on states and outputs, and `path`, are imposed at the collocation points;
+    `verify` checks them between these points.
     """
 
     model: Model
@@ -190,7 +190,7 @@ class Phase:
 @final
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Consecutive phases: `out >> back`."""
+    """Sequence of consecutive phases, written `out >> back`."""
 
     phases: tuple[Phase, ...]
 
@@ -210,10 +210,10 @@ class Chain:
 @final
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A condition lower <= expression <= upper.
+    """Condition lower <= expression <= upper.
 
     Attributes:
-        name: its subject, such as "the bound on tip_x", for messages.
+        name: subject for messages, such as "the bound on tip_x".
         expression: SX (1, 1) in the symbols of the model of its span.
     """
 
@@ -224,14 +224,14 @@ class Row:
 
     @property
     def nominal(self) -> float:
-        """Typical magnitude: that of its bounds, 1 if they are zero or infinite."""
+        """Typical magnitude: that of the bounds, or 1 if they are zero or infinite."""
         return size_of((self.lower, self.upper))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Link:
-    """Start of a state: an expression in t, x, z, u, p of the model of the previous span."""
+    """Start of a state as an expression in t, x, z, u, p of the model of the previous span."""
 
     state: str
     expression: ca.SX
@@ -240,10 +240,10 @@ class Link:
 @final
 @dataclass(frozen=True, eq=False)
 class Join:
-    """A condition between the end of the previous span and the start of this one.
+    """Condition between the end of the previous span and the start of this one.
 
     Attributes:
-        name: its subject.
+        name: subject for messages.
         function: (t, x, z, u, p at the end of the previous span, t, x, z, u, p at the start of
             this one) -> one value, between `lower` and `upper`.
     """
@@ -255,34 +255,34 @@ class Join:
 
     @property
     def nominal(self) -> float:
-        """Typical magnitude, as that of a `Row`."""
+        """Typical magnitude; see `Row`."""
         return size_of((self.lower, self.upper))
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Span:
-    """One phase of a problem in one scenario, in the symbols of `model`: t, x, z, u, p.
+    """Phase of a problem in one scenario, expressed in the symbols t, x, z, u, p of `model`.
 
     `model.t` is the time since the start of the problem, over all phases.
 
     Attributes:
-        name: of the phase, for messages.
-        scenario, phase: their indices; 0 if there is only one.
-        model: after `rates`, and with the references of costs as parameters.
+        name: name of the phase for messages.
+        scenario, phase: index of the scenario and of the phase.
+        model: model with `rates` applied and with the references of costs as parameters.
         T: duration [s], or `Free`.
-        p: numbers of all parameters of the model; of chosen ones their initial values.
+        p: values of all parameters of the model; initial values for chosen parameters.
         chosen: names of the parameters that the optimiser chooses.
         boxes: bounds of states, algebraic variables and inputs over the whole span.
-        nodes: fraction of T -> state -> range there, within the bounds; 0, 1 and all `via`.
+        nodes: fraction of T (0, 1 and all `via`) -> state -> range there, within the bounds.
         inputs_at: 0 or 1 -> input -> range on the first or last interval, within the bounds.
-        rows_at: fraction of T -> further conditions there; 0, 1 and all `via`. Algebraic variables
-            and inputs in them are those of the interval before, at 0 of the first one.
+        rows_at: fraction of T (0, 1 and all `via`) -> further conditions there. They use algebraic
+            variables and inputs of the preceding interval; at 0, of the first interval.
         path: conditions at every collocation point.
-        running, end: integrand, and value at the end, of the share of the cost, SX (1, 1).
+        running, end: integrand and end value of the contribution to the cost, SX (1, 1).
         squares: least-squares form of the squared terms in `running`, as (weight, residual).
-        links: starts of states that continue the previous span; none in the first span.
-        joins: conditions to the previous span; none in the first span.
+        links: starts of states that follow from the previous span; empty for the first span.
+        joins: conditions between the previous span and this one; empty for the first span.
     """
 
     name: str
@@ -305,10 +305,10 @@ class Span:
 
     @property
     def symbols(self) -> list[ca.SX]:
-        """[t, x, z, u, p] of the model: arguments of Functions made of the expressions."""
+        """Symbols [t, x, z, u, p] of the model: arguments of Functions of the expressions."""
         return arguments(self.model)
 
     def same_state(self, expression: ca.SX) -> str:
-        """Return the name of the state that `expression` is, or ""."""
+        """Return the name of the state that `expression` equals, or "" if there is none."""
         same = (v.name for v in self.model.x if ca.is_equal(expression, v.symbol))
         return next(same, "")

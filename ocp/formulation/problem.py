@@ -1,9 +1,9 @@
 """Optimal control problems, nominal values from their ends and bounds, and their form in files.
 
-Solvers work with unknowns and costs divided by their typical magnitudes. A variable without a given
-`nominal` has the value 1: if that is far from the prescribed values it is derived from these, and
-so is a nominal value far above them. States have the magnitude of their ends, via points and
-bounds; other variables follow from the equations,
+Solvers use unknowns and costs divided by their nominal values. The default nominal value of a
+variable is 1. A default far below or far above the prescribed values, or a given nominal value far
+above them, is replaced by their magnitude: ends, via points and bounds for states. The magnitudes
+of other variables follow from the equations,
 
     |x_i| / T ~ |d x_i' / d x_j| |x_j|     |x_i| / T ~ |d x_i' / d u_j| |u_j|
 """
@@ -29,32 +29,35 @@ from symfric.model import Model, check_model
 FAR = 100.0
 """Factor between a size and a nominal value above which the nominal value is replaced."""
 DEFAULT = 1.0
-"""The nominal value of a variable for which none was given."""
+"""Nominal value of a variable for which none is given."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Problem(Statement):
-    """Minimise a cost over the motion of one or several phases.
+    """Optimal control problem: minimise a cost over the motion of one or several phases.
 
         min J   subject to   x' = ode(t, x, z, u, p),  0 = alg(t, x, z, u, p)   in every phase,
                              ends, bounds, path conditions, links between phases
 
-    `bounds`, `rates`, `path` and `p` hold in every phase that has the names; fields of a phase take
-    precedence. Everything is bound to names, so one problem serves several models.
+    `bounds`, `rates`, `path` and `p` apply to every phase whose model has the names; fields of a
+    phase take precedence. Fields refer to variables by name, so they apply to different models.
 
     Attributes:
         phases: a `Phase`, or several: `out >> back`.
-        cost: a sum of `integral(...)` over all phases, `at_end(...)` of the last one, `TIME`,
-            `track(...)` and `effort(...)`; with scenarios their mean, or `worst(...)`.
+        cost: a sum of `integral(...)` over all phases, `at_end(...)` of the last phase, `TIME`,
+            `track(...)` and `effort(...)`. With scenarios, the mean of their costs is minimised,
+            or the largest one with `worst(...)`.
         bounds, rates, path, p: as in `Phase`.
-        choose: parameter -> (lower, upper) or (lower, upper, guess): chosen with the motion, equal
-            in all phases and scenarios.
-        periodic: states that end the last phase as they start the first; their start is free
-            unless `start` names it.
-        scenarios: name -> values of parameters; the motion is computed for each of them.
-        shared: inputs that are equal in all scenarios; by default all. Free durations are, too.
-        durations: ((0, 1), 2.0): the sum of the durations of these phases is 2 s; or a `Free`.
+        choose: parameter -> (lower, upper) or (lower, upper, guess): parameters optimised with the
+            motion; their values are equal in all phases and scenarios.
+        periodic: states whose value at the end of the last phase equals that at the start of the
+            first one; the start is free unless `start` names it.
+        scenarios: name -> values of parameters; the motion is computed for each scenario.
+        shared: inputs that are equal in all scenarios, by default all inputs. Free durations are
+            always equal.
+        durations: pairs such as ((0, 1), 2.0): the sum of the durations of phases 0 and 1 is 2 s.
+            The second item may be a `Free`.
 
     Raises:
         ValueError: all problems at once.
@@ -65,12 +68,12 @@ class Problem(Statement):
 
     @cached_property
     def spans(self) -> tuple[Span, ...]:
-        """The resolved phases, for one scenario after the other."""
+        """Resolved phases, in the order of scenarios and of phases within each scenario."""
         return resolved(self)
 
     @property
     def scenario_names(self) -> tuple[str, ...]:
-        """Names of the scenarios; empty if there is only one motion."""
+        """Names of the scenarios; empty for a problem without scenarios."""
         return tuple(self.scenarios)
 
     @cached_property
@@ -80,7 +83,7 @@ class Problem(Statement):
 
     @property
     def kind(self) -> Literal["sum", "mean", "worst"]:
-        """Sum of the costs of the spans, or mean or worst of these sums over scenarios."""
+        """Kind of total cost: sum over phases, or mean or worst of the sums of all scenarios."""
         if len(self.scenarios) < 2:
             return "sum"
         return "worst" if self.cost is not None and self.cost.largest else "mean"
@@ -89,7 +92,7 @@ class Problem(Statement):
     def shared_inputs(self) -> tuple[str, ...]:
         """Inputs of the models of the spans that are equal in all scenarios.
 
-        For an input with bounded rate, its rate and its state; see `shared_starts`.
+        An input with bounded rate is represented by its rate; see `shared_starts` for its start.
         """
         inputs = dict.fromkeys(v.name for span in self.spans for v in span.model.u)
         if self.shared is None:
@@ -99,7 +102,7 @@ class Problem(Statement):
 
     @cached_property
     def shared_starts(self) -> tuple[tuple[int, str], ...]:
-        """(phase, state): inputs with bounded rate whose free start is equal in all scenarios."""
+        """(phase, state) of inputs with bounded rate whose free start all scenarios share."""
         starts: list[tuple[int, str]] = []
         for span in self.spans[: len(self.chain)]:
             linked = {link.state for link in span.links}
@@ -111,13 +114,13 @@ class Problem(Statement):
     def to_mpc(self, step: float = 0.01, **options: Any) -> Any:
         """Return a model predictive controller that solves this problem every `step` seconds.
 
-        See `controller_of` in `ocp.mpc` for the options, and `Controller` for what it does.
+        See `controller_of` in `ocp.mpc` for the options, and `Controller` for the method.
         """
         return import_module("ocp.mpc.controller").controller_of(self, step, **options)
 
 
 def sized(problem: Problem) -> Problem:
-    """Return `problem` with nominal values from its conditions; unchanged if 1 is near enough."""
+    """Return `problem` with nominal values from its conditions, unchanged if none is far off."""
     sizes: dict[str, float] = {}
     for phase in problem.chain:
         for ranges in (phase.start, phase.end, *phase.via.values(), phase.bounds, problem.bounds):
@@ -135,7 +138,7 @@ def sized(problem: Problem) -> Problem:
 
 
 def cost_size(problem: Problem) -> float:
-    """Return the cost of a motion in which everything has its nominal value."""
+    """Return the magnitude of the cost at nominal states and inputs; 1 if it is not positive."""
     total = 0.0
     for span in problem.spans:
         model, T = span.model, initial(span.T)
@@ -147,13 +150,13 @@ def cost_size(problem: Problem) -> float:
 
 
 def _far(v: Variable, sizes: Mapping[str, float]) -> bool:
-    """Return True if a nominal value is far above the size, or was not given and is far below."""
+    """Return True if a nominal value is far above the size, or a default is far below it."""
     times = sizes.get(v.name, v.nominal) / v.nominal
     return times * FAR <= 1.0 or (v.nominal == DEFAULT and times >= FAR)
 
 
 def _sizes_by_equations(model: Model, T: float, known: Mapping[str, float]) -> dict[str, float]:
-    """Return `known` sizes, and those of states and inputs that follow from the equations."""
+    """Return `known` sizes and the sizes of states and inputs that follow from the equations."""
     symbols = arguments(model)
     ode = ca.SX(0, 1) if model.ode is None else model.ode
     slope = ca.densify(ca.jacobian(ode, ca.vertcat(symbols[1], symbols[3])))
@@ -185,7 +188,7 @@ def _with_nominals(model: Model, sizes: Mapping[str, float]) -> Model:
 @final
 @dataclass(frozen=True, eq=False)
 class PosedPhase:
-    """A phase: name, model given by the user, and duration [s]."""
+    """Phase of a problem from a file: its name, the user's model and its duration [s]."""
 
     name: str
     model: Model
@@ -195,14 +198,14 @@ class PosedPhase:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Posed:
-    """A problem of a file: enough to verify and plot a solution, and to start others from it.
+    """Problem from a file, which suffices to verify and plot its solution or to use it as guess.
 
-    Costs, conditions and links are expressions in `spans`; the user's functions are not kept, so it
-    cannot be solved again: write the problem, and give the solution as `guess`.
+    Costs, conditions and links are expressions in `spans`. The user's functions are not stored, so
+    the problem cannot be solved again: write it again, and pass the solution as `guess`.
 
     Attributes:
-        name, spans, chain, chosen, kind, scenario_names, shared_inputs: as those of a `Problem`.
-        periodic, choose: names.
+        name, spans, chain, chosen, kind, scenario_names, shared_inputs: as in `Problem`.
+        periodic, choose: names of periodic states and of chosen parameters.
         durations: indices of the phases with a condition on the sum of their durations.
     """
 
@@ -230,7 +233,7 @@ class Posed:
 
 
 def posed(problem: Problem | Posed) -> Posed:
-    """Return the part of a problem that a file keeps."""
+    """Return the part of a problem that a file stores."""
     if isinstance(problem, Posed):
         return problem
     return Posed(
@@ -257,10 +260,10 @@ def rest_to_rest(
     velocity: str = "v",
     force: str = "force",
 ) -> Problem:
-    """Move a mass over `distance` [m] from rest to rest, with |force| <= `limit` [N].
+    """Return the problem of moving a mass by `distance` [m] from rest to rest.
 
-    With a given duration `T` [s] the move of least effort, min int force^2 dt; with
-    `T=Free(lower, upper)` the fastest one, min T.
+    The force is bounded by |force| <= `limit` [N]. The cost is int force^2 dt for a given duration
+    `T` [s], and the duration for `T=Free(lower, upper)`.
 
     Raises:
         ValueError: errors of `Problem`, such as a model without these signals.

@@ -1,7 +1,7 @@
-"""Resolution of a problem into spans: numbers, start values, and contradictions.
+"""Resolution of a problem into spans: values of parameters, start values, and contradictions.
 
-The first phase starts at given values, those of the model, or equations for them; mechanisms with
-loops at coordinates and rates that close these.
+The first phase starts at values of the user or the model, or at equations for them. Mechanisms with
+loops start at coordinates and rates that satisfy their constraints.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -33,11 +33,11 @@ CLOSED = 1e-11
 
 
 def resolved(problem: Statement) -> tuple[Span, ...]:
-    """Return the spans of `problem`, for one scenario after the other.
+    """Return the spans of `problem`, in the order of scenarios.
 
     Raises:
-        ValueError: all problems at once: wrong types; else unknown names, invalid ranges and
-            functions; else values that contradict each other.
+        ValueError: wrong types; if there are none, unknown names, invalid ranges and functions;
+            if there are none, contradictory values. All problems of a stage are reported at once.
     """
     _refuse(problem, [*type_problems(problem)])
     problems, settings = [*input_problems(problem)], settings_of(problem)
@@ -82,7 +82,7 @@ def _box_of(setting: Setting, name: str) -> Box:
 
 
 def _span(setting: Setting, result: Evaluated, chosen: Sequence[Choice]) -> Span:
-    """Return a span without the numbers of its parameters."""
+    """Return a span with zeros as values of its parameters."""
     phase = setting.phase
     given = {0.0: phase.start, **{float(s): phase.via[s] for s in phase.via}, 1.0: phase.end}
     given = dict(sorted(given.items()))
@@ -122,7 +122,7 @@ def _span(setting: Setting, result: Evaluated, chosen: Sequence[Choice]) -> Span
 
 
 def _rows_at(model: Model, fraction: float, given: Mapping[str, Any]) -> tuple[Row, ...]:
-    """Return conditions on signals other than states and inputs."""
+    """Return the conditions at a fraction of T on signals other than states and inputs."""
     own = {v.name for group in (model.x, model.u) for v in group}
     place = {0.0: "at the start", 1.0: "at the end"}.get(fraction, f"at {fraction:g} T")
     return tuple(
@@ -133,7 +133,7 @@ def _rows_at(model: Model, fraction: float, given: Mapping[str, Any]) -> tuple[R
 
 
 def _at_numbers(problem: Statement, setting: Setting, span: Span, p: Mapping[str, float]) -> Span:
-    """Return `span` with the numbers of its parameters, and the start values they determine."""
+    """Return `span` with the values of its parameters and the start values that follow."""
     p = {v.name: p[v.name] for v in span.model.p if v.name in p}
     span = replace(span, p=span.model.values("p", p))
     if setting.number > 0:
@@ -147,7 +147,7 @@ def _at_numbers(problem: Statement, setting: Setting, span: Span, p: Mapping[str
 
 
 def _unreachable(spans: Sequence[Span], settings: Sequence[Setting]) -> Iterator[str]:
-    """Yield messages about empty ranges, and continuous states that cannot be."""
+    """Yield messages about empty ranges and about states that cannot be continuous."""
     for span in spans:
         for fraction, boxes in (*span.nodes.items(), *span.inputs_at.items()):
             where = {0.0: "start", 1.0: "end"}.get(fraction, f"via {fraction:g}")
@@ -177,7 +177,7 @@ def _text(box: Box) -> str:
 
 
 def _constant_cost(spans: Sequence[Span]) -> Iterator[str]:
-    """Yield a message about a constant cost."""
+    """Yield a message if the cost is constant."""
     costs, free = ca.SX(0, 1), False
     for span in spans:
         own = ca.vertcat(span.running, span.end)
@@ -197,9 +197,9 @@ def _start_of(
 ) -> tuple[dict[str, Box], tuple[Row, ...]]:
     """Return the range of every state at 0, and equations of starts that depend on unknowns.
 
-    A state that is not named has the start of the model: a number, or, if that depends on chosen
-    parameters, an expression in these. Periodic states and inputs with bounded rate start anywhere.
-    In a mechanism with loops, coordinates and rates that are not named follow from those that are.
+    A state that `start` does not name has the start of the model: a number, or an expression in
+    chosen parameters. The start of periodic states and of inputs with bounded rate is free. In a
+    mechanism with loops, coordinates and rates that are not named follow from the named ones.
 
     Raises:
         ValueError: a start value that is not finite, or that depends on states in a range.
@@ -241,7 +241,7 @@ def _start_of(
 
 
 def _dependent_starts(span: Span, named: Collection[str]) -> dict[str, ca.SX]:
-    """Return state -> start that depends on chosen parameters, also through other states."""
+    """Return state -> start for starts that depend on chosen parameters, directly or indirectly."""
     unknown = {v.name: v.symbol for v in span.model.p if v.name in span.chosen}
     starts: dict[str, ca.SX] = {}
     while unknown:
@@ -266,10 +266,10 @@ def has_loops(model: Model) -> bool:
 def _open_in_loops(
     model: Model, open_states: Collection[str], values: Mapping[str, float]
 ) -> tuple[str, ...]:
-    """Return coordinates and rates without a start value, if some of them start in a range.
+    """Return coordinates and rates that lose their start values because some start in a range.
 
     The constraints, which hold at every node, determine them. If only coordinates start in a range
-    and all rates are zero, the rates stay zero.
+    and all rates are zero, the rates remain zero.
     """
     mechanics = model.holonomic
     n = 0 if mechanics is None else mechanics.n
@@ -284,10 +284,10 @@ def _open_in_loops(
 def _closed(span: Span, values: Mapping[str, float], named: Collection[str]) -> dict[str, float]:
     """Return `values` of the states with loops closed by the smallest change of unnamed states.
 
-    Positions first, then rates, by Newton's method with least norm.
+    Newton's method with steps of least norm changes first positions, then rates.
 
     Raises:
-        ValueError: the named states do not permit closed loops.
+        ValueError: the loops cannot be closed with the named states.
     """
     model = span.model
     mechanics = model.holonomic

@@ -1,7 +1,7 @@
 """Fields of a problem, and the model, bounds and costs of each phase derived from them.
 
-Changes of models are pure, Model -> Model, with the same symbols and names: a cost, a bound or an
-output written for one model holds for the other.
+Functions that change a model return a new one with the same symbols and names, so costs, bounds and
+outputs written for the original model remain valid.
 """
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
@@ -33,7 +33,7 @@ from symfric.model import Model
 T = TypeVar("T")
 
 Duration = tuple[Sequence[int], float | Free]
-"""Indices of phases, and the sum of their durations [s]."""
+"""(indices of phases, sum of their durations [s])."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,19 +55,19 @@ class Statement:
 
     @property
     def name(self) -> str:
-        """Name in messages: the names of its models."""
+        """Name in messages: the names of the models of its phases."""
         if not isinstance(self.phases, Phase | Chain):  # pyright: ignore[reportUnnecessaryIsInstance]
             return "?"
         return " >> ".join(dict.fromkeys(phase.model.name for phase in self.chain))
 
     @property
     def chain(self) -> tuple[Phase, ...]:
-        """The phases in order."""
+        """Phases in the order of time."""
         return (self.phases,) if isinstance(self.phases, Phase) else self.phases.phases
 
 
 def labelled_phases(problem: Statement) -> Iterator[tuple[str, Phase]]:
-    """Yield phases with their prefix in messages: "phase 2 'back': ", "" for a single one."""
+    """Yield phases with their prefix in messages, "phase 2 'back': "; "" for a single phase."""
     phases = problem.chain
     for number, phase in enumerate(phases):
         name = f" '{phase.name}'" if isinstance(phase.name, str) and phase.name else ""  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -80,14 +80,14 @@ def costs_of(problem: Statement, phase: Phase) -> tuple[Cost, ...]:
 
 
 class Setting(NamedTuple):
-    """One phase with the fields that it inherits from the problem.
+    """Phase with the fields that it inherits from the problem.
 
     Attributes:
         number: index of the phase.
         where: prefix of messages, "phase 2 'back': ".
-        model: after `rates`, and with the references of costs as parameters.
-        bounds, p: by name, for names that the model has.
-        costs: of the problem and of the phase.
+        model: model with `rates` applied and with the references of costs as parameters.
+        bounds, p: bounds and parameters of the problem and the phase whose names the model has.
+        costs: costs of the problem and of the phase.
     """
 
     number: int
@@ -124,16 +124,16 @@ def only(values: Mapping[str, T], names: Iterable[str]) -> dict[str, T]:
 
 
 def references_of(model: Model, costs: Iterable[Cost]) -> tuple[str, ...]:
-    """Return references of `costs` that `model` does not have: they become parameters."""
+    """Return references of `costs` that `model` lacks and that become parameters."""
     wanted = dict.fromkeys(name for cost in costs for name in cost.references)
     known = {*model.signals, *(v.name for v in model.p), "t"}
     return tuple(name for name in wanted if name not in known and name not in model.further)
 
 
 def names_of(model: Model, wanted: Iterable[str] = ()) -> list[str]:
-    """Return the signals of `model`; with details only if some of the `wanted` are not among them.
+    """Return the names of the signals of `model`, and of its details if `wanted` requires them.
 
-    Writing out the details takes time.
+    The details are included only on demand because writing them out takes time.
     """
     known = list(model.signals)
     return [*known, *model.further] if set(wanted) - set(known) else known
@@ -142,10 +142,10 @@ def names_of(model: Model, wanted: Iterable[str] = ()) -> list[str]:
 @final
 @dataclass(frozen=True)
 class Choice:
-    """A parameter that the optimiser chooses.
+    """Parameter that the optimiser chooses.
 
     Attributes:
-        lower, upper: its bounds, within those of the parameter itself.
+        lower, upper: bounds, within those of the parameter of the model.
         guess: initial value for the solver.
     """
 
@@ -157,7 +157,7 @@ class Choice:
 
     @property
     def nominal(self) -> float:
-        """Typical magnitude: of the guess, else of the larger bound, else 1."""
+        """Typical magnitude: that of the guess, otherwise of the larger bound, otherwise 1."""
         return abs(self.guess) or size_of((self.lower, self.upper))
 
 
@@ -178,7 +178,7 @@ def chosen_of(problem: Statement, settings: Sequence[Setting]) -> tuple[Choice, 
 
 
 def _nearby(box: tuple[float, float], value: float) -> float:
-    """Return `value` if it is in the range, else the middle of the range."""
+    """Return `value` if it is in `box`, otherwise the middle or the finite bound of `box`."""
     low, high = box
     if low <= value <= high:
         return value
@@ -195,7 +195,7 @@ def rate_name(name: str) -> str:
 
 
 def rebuilt(model: Model, again: Callable[[Model], Model] | None = None, **changes: Any) -> Model:
-    """Return `model` with other fields; `again` makes the same changes in its open form."""
+    """Return `model` with changed fields; `again` applies the same change to its open form."""
     if model.contacts and again is not None:
         changes["opening"] = partial(_opened, model, again)
     if model.holonomic is not None:
@@ -208,7 +208,7 @@ def _opened(model: Model, again: Callable[[Model], Model]) -> Model:
 
 
 def _remembered(model: Model, what: str, key: Hashable, make: Callable[[], Model]) -> Model:
-    """Return the same object for the same change of the same model."""
+    """Return the model of `make`, cached in `model` by `what` and `key`."""
     kept = model.memory.setdefault(f"ocp {what}", {})
     if key not in kept:
         kept[key] = make()
@@ -216,12 +216,12 @@ def _remembered(model: Model, what: str, key: Hashable, make: Callable[[], Model
 
 
 def with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
-    """Return `model` with inputs as states, whose rates are inputs instead.
+    """Return `model` with some inputs as states and the rates of these as inputs.
 
         u' = u_rate
 
-    A rate that is constant on an interval makes the input continuous and linear there. Its state
-    follows those of the model; in a mechanism its rate is appended to `holonomic.rates`.
+    A rate that is constant on an interval makes the input continuous and linear there. The new
+    states follow those of the model; in a mechanism their rates are appended to `holonomic.rates`.
 
     Args:
         model: the model.
@@ -249,9 +249,10 @@ def with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
 
 
 def further_states(model: Model, states: Sequence[Variable], rates: ca.SX) -> dict[str, Any]:
-    """Return changed fields of `model` for further `states`, after its own, that change at `rates`.
+    """Return changed fields of `model` with `states` of derivatives `rates` appended to its states.
 
-    In a mechanism they belong to `holonomic.rates`; no other equation depends on them.
+    In a mechanism the rates are appended to `holonomic.rates`. No other equation depends on the
+    new states.
     """
     x, mechanics = (*model.x, *states), model.holonomic
     if mechanics is None:
@@ -265,7 +266,7 @@ def further_states(model: Model, states: Sequence[Variable], rates: ca.SX) -> di
 
 
 def with_parameters(model: Model, units: Mapping[str, str]) -> Model:
-    """Return `model` with further parameters (name -> unit) that its equations do not contain."""
+    """Return `model` with additional parameters (name -> unit) that its equations do not use."""
     if not units:
         return model
 

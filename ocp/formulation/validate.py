@@ -1,6 +1,6 @@
-"""Checks of a problem: types, then names, ranges and durations; likely mistakes of units.
+"""Checks of a problem: types, names, ranges and durations, and likely mistakes of units.
 
-`type_problems` comes first: the other checks require the right types.
+`type_problems` must be called first, because the other checks require the right types.
 """
 
 from collections import Counter
@@ -33,7 +33,7 @@ SUMS = "sums of durations, such as ((0, 1), 2.0): the first two phases take 2 s"
 
 
 def message(check: Callable[..., Any], *arguments: Any, **named: Any) -> str:
-    """Return the message of a check that fails, else ""."""
+    """Return the message of a check that fails, or "" if it passes."""
     try:
         check(*arguments, **named)
     except ValueError as error:
@@ -169,7 +169,7 @@ def _phase(problem: Statement, number: int, phase: Phase) -> Iterator[str]:
 
 
 def _event_problem(model: Model) -> str:
-    """Return a message about events, except those of laws with known modes of slip and stick."""
+    """Return a message about events that are not of laws with known modes of slip and stick."""
     if not model.events:
         return ""
     for contact in model.contacts:
@@ -187,7 +187,7 @@ def _event_problem(model: Model) -> str:
 
 
 def duration_problem(T: object) -> str:
-    """Return a message about an invalid duration, else ""."""
+    """Return a message if a duration is invalid, or "" if it is valid."""
     number = checks.as_number(T)
     if isinstance(T, Free) or (number is not None and 0 < number < inf):
         return ""
@@ -214,12 +214,12 @@ def _rate_problems(rates: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _freed(names: Iterable[str]) -> str:
-    """Return the hint how to make parameters of numbers of a law or a scene."""
+    """Return a hint on turning numbers of a law or a scene into parameters."""
     return f"free it where the model is made: drive(law, free={list(names)!r})"
 
 
 def _no_signal(model: Model, names: Iterable[str], inputs: Collection[str]) -> str:
-    """Return the hint for names that are not signals."""
+    """Return a hint for names that are not signals."""
     if {"t", "T"} & set(names):
         return "durations are T of the phases, and durations=... of the problem"
     if set(inputs) & set(names):
@@ -248,7 +248,7 @@ def _parameters(problem: Statement) -> list[str]:
 
 
 def _for_all_phases(problem: Statement) -> Iterator[str]:
-    """Yield messages about fields for all phases, whose names must exist in some phase."""
+    """Yield messages about fields of the problem whose names must exist in some phase."""
     models = [phase.model for phase in problem.chain]
     inputs = list(dict.fromkeys(v.name for model in models for v in model.u))
     signals = list(dict.fromkeys(n for m in models for n in names_of(m, problem.bounds)))
@@ -336,8 +336,8 @@ def _cost_problems(problem: Statement) -> Iterator[str]:
 def doubts(problem: Statement) -> str:
     """Return sentences about values far from the nominal ones, which indicate mistakes of units.
 
-    A prescribed value of `FAR` times the `nominal` of its variable, and an input limited to a
-    `FAR`th of its nominal value or less.
+    These are prescribed values of at least `FAR` times the `nominal` of their variable, and bounds
+    of inputs of at most 1 / `FAR` times the `nominal`.
     """
     return " ".join(dict.fromkeys(_doubtful(problem)))
 

@@ -1,1 +1,1 @@
-"""Optimal control with friction: homotopy, contact modes, verification by event simulation."""
+"""Optimal control with friction: homotopy, contact modes, verification with exact friction."""

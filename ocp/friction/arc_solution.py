@@ -1,4 +1,4 @@
-"""Solution of a mode sequence: durations, motion, and the solution of the user's problem."""
+"""Solution of a mode sequence, and its conversion to a solution of the user's problem."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,60 +30,60 @@ from symfric.foundation.variable import stacked
 
 Array = NDArray[np.float64]
 LEAST = 3
-"""Fewest intervals of an arc."""
+"""Smallest number of intervals of an arc."""
 NEAR = 1.5
-"""Distance of a stick interval from its static level that counts as close, in margins."""
+"""Distance of stiction from its static level, in margins, below which it counts as close."""
 CLOSE: dict[str, Option] = {"constr_mult_init_max": 1e8}
-"""Options for a start near the solution: estimated multipliers are kept even if they are large.
-Ipopt sets those above 1e3 to zero, and then diverges from the solution on another mesh:
-cart-pendulum, twice as many intervals, 9 iterations instead of more than 100."""
+"""Options for a start near the solution, which keep large estimated multipliers. By default Ipopt
+sets multipliers above 1e3 to zero and may diverge: after a refinement of the cart-pendulum to twice
+as many intervals, it takes 9 iterations with these options and more than 100 without."""
 FINER: dict[str, Option] = CLOSE | {"perturb_always_cd": "yes", "mumps_permuting_scaling": 0}
-"""The same for a finer mesh. Where stiction is at its level, the rows of short intervals are nearly
-dependent. Unless Ipopt always regularises them, and MUMPS orders the matrix without permuting it
-first, pivots are delayed until fronts are dense: for arms with 700 intervals, 30 to 150 s for one
-factorisation instead of 0.1 s."""
+"""Options for a finer mesh. If stiction is at its level, the rows of short intervals are nearly
+dependent. Unless Ipopt always regularises them and MUMPS does not permute the matrix before it
+orders it, pivots are delayed until fronts are dense: for robot arms with 700 intervals, one
+factorisation takes 30 to 150 s instead of 0.1 s."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class SolvedSequence(Solved):
-    """A mode sequence with its optimised durations."""
+    """Mode sequence with its optimised durations and motion."""
 
     legs: Legs
     discretisation: Discretisation
 
     @cached_property
     def known(self) -> Known:
-        """Motion, as a starting point."""
+        """Motion as a starting point of further solves."""
         t, points = self.transcription, self.points
         (motion,) = motions_of(t.problem, t.meshes, t.scheme.coefficients(), points)
         return Known.of(t.problem, motion, points.chosen)
 
     @cached_property
     def losses(self) -> tuple[Array, ...]:
-        """Cost of holding the inputs in each interval."""
+        """Loss of cost by constant inputs in each interval, (N,) for each arc."""
         return zoh_losses(self.transcription, self.outcome.iterate)
 
     @property
     def loss(self) -> float:
-        """Cost of holding the inputs over all intervals."""
+        """Total loss of cost by constant inputs."""
         return sum(float(loss.sum()) for loss in self.losses)
 
     @property
     def ideal_cost(self) -> float:
-        """Cost J without the cost of holding the inputs: compares sequences on different meshes."""
+        """Cost J minus the loss by constant inputs, for comparisons between different meshes."""
         return self.outcome.cost - self.loss
 
     @cached_property
     def overloaded(self) -> list[NDArray[np.bool_]]:
-        """Intervals at whose start, before their first point, stiction exceeds its static level."""
+        """Masks of intervals at whose start stiction exceeds its static level."""
         return [
             np.any(_at_starts(span, points, _margins(span)) < 0.0, axis=0)
             for span, points in self._arcs()
         ]
 
     def pressed(self, margin: float) -> bool:
-        """Return True if stiction, or its start or end, is as close to its level as permitted."""
+        """Return True if stiction, or a start or end of stick, is near the limit of the margin."""
         for span, points in self._arcs():
             kept = _at_starts(span, points, _margins(span))
             changes = [
@@ -102,17 +102,17 @@ class SolvedSequence(Solved):
 
     @property
     def intervals(self) -> int:
-        """Number of intervals."""
+        """Total number of intervals."""
         return sum(mesh.size - 1 for mesh in self.transcription.meshes)
 
 
 def _margins(span: Span) -> list[ca.SX]:
-    """Return the friction margins at starts of intervals."""
+    """Return the expressions of the friction margins at starts of intervals."""
     return [ca.SX(o.expression) for name, o in span.model.outputs.items() if FIRST in name]
 
 
 def _at_starts(span: Span, points: SpanPoints, expressions: Sequence[ca.SX]) -> Array:
-    """Return values of expressions at the starts of all intervals of a phase, (rows, N)."""
+    """Return the values of expressions at the starts of all intervals of a phase, (rows, N)."""
     n = points.u.shape[1]
     rows = ca.Function("rows", span.symbols, [stacked(expressions)]).map(n)
     z, p = points.z[:, :: points.z.shape[1] // n], np.tile(span.p[:, None], (1, n))
@@ -122,12 +122,12 @@ def _at_starts(span: Span, points: SpanPoints, expressions: Sequence[ca.SX]) -> 
 @final
 @dataclass(frozen=True, eq=False)
 class ModeSolver:
-    """Settings common to all sequences of one problem.
+    """Solver of mode sequences of one problem.
 
     Attributes:
-        rules: of the arcs.
+        rules: rules by which arcs become phases.
         solver, scheme, progress: as in `optimise_modes`.
-        kick: least length of the interval in which a contact breaks away or is stopped [s].
+        kick: smallest length of the interval in which a contact breaks away or is stopped [s].
         clock: time limit.
     """
 
@@ -142,10 +142,10 @@ class ModeSolver:
         """Optimise the durations and the motion of a sequence.
 
         Args:
-            legs: the sequence, with the times in `known`.
+            legs: the sequence, with its times in `known`.
             known: initial motion.
-            intervals: approximate number of intervals, of equal length.
-            barrier: parameter of the interior-point method at the start: small near a solution.
+            intervals: approximate number of intervals, which have similar lengths.
+            barrier: initial barrier parameter of the interior-point method, small near a solution.
         """
         whole = sum(leg.duration for leg in legs)
         parts = [max(LEAST, round(intervals * arc.duration / whole)) for arc in flat(legs)]
@@ -153,11 +153,11 @@ class ModeSolver:
         return self.on(legs, self._discretised(legs), meshes, known, barrier, CLOSE)
 
     def _discretised(self, legs: Legs) -> Discretisation:
-        """Return the problem of a sequence, discretised except for its meshes.
+        """Return the discretised problem of a sequence, independent of meshes.
 
-        If the stiction force is at its level, held inputs make it a sawtooth, whose peaks are at
-        the starts of intervals, between collocation points: margins that depend on inputs are
-        conditions there.
+        With constant inputs, a stiction force near its level is a sawtooth with peaks at the starts
+        of intervals, where there are no collocation points. Therefore margins that depend on inputs
+        are conditions at these starts.
         """
         problem = in_arcs(self.rules, legs)
         peaks: dict[int, list[Row]] = {}
@@ -168,7 +168,7 @@ class ModeSolver:
         return discretise(problem, self.scheme, peaks)
 
     def again(self, solved: SolvedSequence) -> SolvedSequence:
-        """Solve again with this margin, from a motion with another one, on its meshes."""
+        """Solve a sequence again with the margin of `rules`, from its motion and on its meshes."""
         made = self._discretised(solved.legs)
         return self.on(solved.legs, made, solved.transcription.meshes, solved.known, 1e-4)
 
@@ -181,7 +181,7 @@ class ModeSolver:
         barrier: float,
         options: Mapping[str, Option] = FINER,
     ) -> SolvedSequence:
-        """Solve a sequence on given meshes."""
+        """Solve a discretised sequence on given meshes from the motion `known`."""
         spans, arcs = discretisation.problem.spans, flat(legs)
         meshes = [
             _with_kick(mesh, self.kick / arc.duration) if breaks_away(span) else mesh
@@ -199,8 +199,8 @@ class ModeSolver:
 def _with_kick(mesh: Array, kick: float) -> Array:
     """Return `mesh` with a first interval of at least `kick`, if enough intervals remain.
 
-    A control may break a contact away by a pulse and then stay below its static level. The cost
-    decreases with the length of the pulse without limit: its length has to be given.
+    A control may break a contact away by a pulse and then remain below its static level. A shorter
+    pulse always costs less, so its length has to be limited.
     """
     kept = mesh[(mesh == 0.0) | (mesh >= kick)]
     return kept if kept.size > LEAST else mesh
@@ -209,9 +209,9 @@ def _with_kick(mesh: Array, kick: float) -> Array:
 def reassemble(
     problem: Problem, solved: SolvedSequence, statistics: Sequence[SolverStatistics]
 ) -> Solution:
-    """Reassemble the arcs of `solved` into a solution of `problem`.
+    """Return a solution of `problem` from the arcs of `solved`.
 
-    Law states that mode models do not have are set to zero.
+    Law states, which mode models do not contain, are set to zero.
     """
     t, outcome = solved.transcription, solved.outcome
     arcs = list(zip(t.problem.spans, solved.points.spans, t.meshes, strict=True))
@@ -225,7 +225,7 @@ def reassemble(
         meshes.append(_mesh(problem, number, legs, [(p.T, mesh) for _, p, mesh in own]))
     points = Points(tuple(spans), solved.points.chosen)
     (motion,) = motions_of(problem, meshes, t.scheme.coefficients(), points)
-    detailed = solved.known.motion  # in which stiction is a reaction
+    detailed = solved.known.motion  # contains stiction as reactions
     if motion.t.size == detailed.t.size:
         signals = {n: detailed.signals.get(n, row) for n, row in motion.signals.items()}
         motion = replace(motion, signals=signals)
@@ -240,7 +240,7 @@ def reassemble(
         scheme=t.scheme,
         meshes=tuple(meshes),
         points=points,
-        iterate=Iterate.cold(np.zeros(0), 0),  # its program differs from that of the problem
+        iterate=Iterate.cold(np.zeros(0), 0),  # multipliers do not apply to the user's problem
         modes={
             contact: tuple(Mode(KINDS[run.mode], run.begin, run.end) for run in runs)
             for contact, runs in tracks_of(solved.legs).items()
@@ -250,7 +250,7 @@ def reassemble(
 
 
 def _span_points(span: Span, arcs: Sequence[tuple[Span, SpanPoints, Array]]) -> SpanPoints:
-    """Return the points of one phase, for its own model; zero for absent variables."""
+    """Return the points of one phase of the user's problem, with zeros for absent variables."""
 
     def joined(letter: str, name: str) -> Array:
         parts: list[Array] = []
@@ -269,7 +269,7 @@ def _span_points(span: Span, arcs: Sequence[tuple[Span, SpanPoints, Array]]) -> 
 def _mesh(
     problem: Problem, number: int, legs: Sequence[Leg], arcs: Sequence[tuple[float, Array]]
 ) -> Array:
-    """Return the mesh of a phase as fractions of its duration, with exact via points."""
+    """Return the mesh of a phase as fractions of its duration, with its via points as nodes."""
     fractions = [0.0, *sorted(problem.chain[number].via), 1.0]
     parts = [np.zeros(1)]
     first = 0

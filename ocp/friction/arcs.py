@@ -1,26 +1,25 @@
-"""Multi-phase problem of a mode sequence: one phase of mode models for each arc.
+"""Multi-phase problem of a mode sequence, with one phase of mode models for each arc.
 
-The user's conditions hold by name in all arcs of their phases. In addition, the following
-conditions make the arcs a motion with exact Coulomb friction and stiction, for each contact:
+The user's conditions apply by name to all arcs of a phase. The following conditions on each contact
+ensure that the arcs are a motion with exact Coulomb friction and stiction:
 
-* it slips in the direction of its mode: slip >= 0 or <= 0;
-* in stick the reaction is within the static level in both directions: |F| <= F_s;
-* at a change of mode slip = 0: at the end of slipping, and at the start of the next mode;
-* at the end of stick, or at a reversal, it breaks away: the force that would hold it at rest under
-  the control *after* that instant reaches the static level in that direction. It may exceed it,
-  since controls jump, so this is an inequality: an equality would exclude such motions; without
-  the condition a body could leave rest although friction can hold it, with a lower, wrong cost;
-
-* a contact that sticks when the control changes is caught: slightly earlier, the previous control
-  would reverse it. It would then slip back for a moment, and stop only if the force under the next
-  control is below the sliding force, not just below the static level;
-
-* a contact that sticks is stopped by a share of the sliding force: if slip only touches zero, or
-  a larger force would be needed after a jump of the control, the smallest deviation would let it
+* In slip the sliding velocity has the sign of the mode: slip >= 0 or <= 0.
+* In stick the reaction is within the static level in both directions: |F| <= F_s.
+* At a change of mode slip = 0, at the end of slipping and at the start of the next mode.
+* At the end of stick, or at a reversal, the contact breaks away: the force that would hold it under
+  the control *after* this time reaches the static level. The force may exceed the level, because
+  controls jump, so the condition is an inequality. Without it a body could start to move although
+  friction can hold it, at a lower, wrong cost.
+* A contact that stops when the control changes must be caught. If it stops slightly earlier, the
+  previous control may reverse it; it then slips back for a moment and stops only if the force under
+  the next control is below the sliding force, not just below the static level.
+* A contact that stops must be decelerated by a share of the sliding force. If slip only touches
+  zero, or a larger force is necessary after a jump of the control, a small deviation would let it
   continue to slip.
 
-Dependent conditions are stated once, since solvers need independent ones: in stick slip stays zero
-by itself, so no condition is imposed on it at the end of stick.
+Solvers need independent conditions, so dependent ones are omitted: slip remains zero in stick, and
+no condition is imposed on it at the end of stick.
+
 Source: Brogliato, Nonsmooth Mechanics, 3rd ed., 2016, ch. 5; Betts, Practical Methods for Optimal
 Control, 2nd ed., 2010, 2.8 and 3.7 (phases, linkage conditions).
 """
@@ -44,28 +43,28 @@ from symfric.foundation.variable import stacked
 from symfric.model import Contact, Model, Output
 
 MARGIN = 1e-2
-"""Initial friction margin: share of the static level that stiction keeps from it, and by which a
-jumping control exceeds it at break-away. Near its peak a smooth law creeps below it and stays for
-long above it, and where the force follows its limit, held controls make a sawtooth of it. If the
-contact breaks away by a force that cannot jump, the margin is reduced to zero at the end."""
+"""Initial friction margin: distance of stiction below the static level, and of a jumping control
+above it at break-away, as a share of the level. A smooth law creeps just below its peak, and with
+constant inputs a force at its limit is a sawtooth. If a contact breaks away by a force that cannot
+jump, the margin decreases to zero at the end of the arc."""
 FADE = 1e-3
-"""Duration of that reduction, as a share of the whole duration."""
+"""Duration of this decrease, relative to the total duration."""
 LEVEL = -1e-6
-"""Friction margin in that direction: at its end stiction is at its level, which the break-away
-condition already states, and two conditions would be dependent."""
+"""Friction margin in the direction of such a break-away. It is slightly negative, because the
+break-away condition at the end of stick would otherwise be a dependent condition."""
 SIGN = 1e-7
-"""Sliding velocity by which one that is not a state may have the wrong sign: at the ends of
-slipping, where it is zero, two conditions would be dependent."""
+"""Magnitude up to which a sliding velocity that is not a state may have the wrong sign. With zero,
+the condition at an end of slipping would be dependent."""
 CATCH = 5.0
-"""Margins of the sliding force that catch a contact which has slipped back for an instant, or that
-stop one: with none the stop is only grazed, and the smallest deviation lets the contact slip on."""
+"""Distance below the sliding force, in margins, of the force at which a contact is caught or
+stopped. With zero, a small deviation could let the contact continue to slip."""
 
 FIRST = "_first_"
 PULLED = "_pull"
 CAUGHT = "_catch"
 STOPPED = "_stop"
 LEFT = "rest_left"
-"""State of an arc at whose end a contact breaks away: its remaining time [s]."""
+"""Name of the state with the remaining time [s] of an arc at whose end a contact breaks away."""
 
 Ranges = dict[str, Range]
 Sides = Mapping[str, int]
@@ -73,14 +72,14 @@ Sides = Mapping[str, int]
 
 
 class Rules(NamedTuple):
-    """Settings common to all sequences of one problem.
+    """Settings common to all mode sequences of one problem.
 
     Attributes:
         problem: the user's problem.
         sizes: contact -> typical static level [N], which scales conditions on forces.
         at_rest: contacts that stick at the start.
-        shortest: least duration of an arc [s].
-        margin: friction margin: share of the static level that stiction keeps from it.
+        shortest: smallest duration of an arc [s].
+        margin: friction margin as a share of the static level.
     """
 
     problem: Problem
@@ -112,7 +111,7 @@ def in_arcs(rules: Rules, legs: Legs) -> Problem:
 
 
 def _durations(problem: Problem, legs: Legs) -> tuple[Duration, ...]:
-    """Return the sums of durations: of mode intervals, and as given by the user."""
+    """Return the sums of durations of legs, and those given by the user."""
     first = 0
     sums: list[Duration] = []
     of_phase: dict[int, list[int]] = {}
@@ -134,11 +133,11 @@ def _durations(problem: Problem, legs: Legs) -> tuple[Duration, ...]:
 
 
 def arcs_among(rules: Rules, legs: Legs) -> tuple["ArcPhase", ...]:
-    """Return all arcs among their neighbours."""
+    """Return all arcs with their neighbours."""
     pairs = [(leg, arc) for leg in legs for arc in leg.arcs]
     none: Sides = {}
 
-    def continued(i: int) -> bool:  # states are continuous from arc i - 1 to arc i
+    def continued(i: int) -> bool:  # True if states are continuous from arc i - 1 to arc i
         same = pairs[i - 1][0].phase == pairs[i][0].phase
         return same or not rules.problem.chain[pairs[i][0].phase].link
 
@@ -168,15 +167,16 @@ def arcs_among(rules: Rules, legs: Legs) -> tuple["ArcPhase", ...]:
 @final
 @dataclass(frozen=True, eq=False)
 class ArcPhase:
-    """An arc among its neighbours.
+    """Arc with its neighbours, from which its phase is derived.
 
     Attributes:
-        rules: of the problem.
+        rules: settings of the problem.
         number: index of the arc.
-        leg: its mode interval.
-        opens, closes: whether it is the first or last one of the user's phase.
-        before, after: modes of the neighbours if states are continuous; else empty.
-        leaves: sticking contact -> direction of its next slip, 0 if it keeps sticking.
+        arc: the arc.
+        leg: leg that contains the arc.
+        opens, closes: True for the first and for the last arc of the user's phase.
+        before, after: modes of the neighbours if states are continuous, otherwise empty.
+        leaves: sticking contact -> direction of its next slip; 0 if it does not slip again.
     """
 
     rules: Rules
@@ -196,7 +196,7 @@ class ArcPhase:
 
     @cached_property
     def inputs(self) -> ca.SX:
-        """Inputs that may jump: those without a bounded rate."""
+        """Inputs that may jump, which have no bounded rate."""
         limited = {*self.rules.problem.rates, *self.base.rates}
         return stacked(v.symbol for v in self.base.model.u if v.name not in limited)
 
@@ -207,18 +207,18 @@ class ArcPhase:
 
     @cached_property
     def released(self) -> list[str]:
-        """Contacts that start to slip at the start of this arc, or reverse there."""
+        """Contacts that start to slip, or reverse, at the start of this arc."""
         first = dict.fromkeys(self.rules.at_rest, 0) if not self.number else {}
         was = {**first, **self.before}
         return [n for n, mode in self.arc.modes.items() if mode and was.get(n, mode) != mode]
 
     @cached_property
     def tight(self) -> Sides:
-        """Sticking contacts that break away by a force that cannot jump -> direction."""
+        """Sticking contact that breaks away by a force that cannot jump -> direction."""
         return {n: side for n, side in self.leaves.items() if side and not self.jumps(n, side)}
 
     def in_modes(self, fade: float) -> Phase:
-        """Return the phase of this arc: the user's conditions, and those of its modes.
+        """Return the phase of this arc with the user's conditions and those of its modes.
 
         The margin of a contact that breaks away decreases to zero within the time `fade` [s].
         """
@@ -257,7 +257,7 @@ class ArcPhase:
                 for side, row in SIDES.items():
                     least = LEVEL if side == self.tight.get(name) else margin
                     bounds[f"{name}_{row}"] = (least, None)
-                    # also between the start and the first point
+                    # the start precedes the first collocation point
                     start[f"{name}{FIRST}{row}"] = (least, None)
                 start |= {f"{name}{CAUGHT}": (0.0, None)} if name in caught else {}
                 start |= {f"{name}{STOPPED}": (0.0, None)} if name in stopped else {}
@@ -280,7 +280,7 @@ class ArcPhase:
         )
 
     def _direction(self, name: str, mode: int, found: tuple[str, int] | None) -> Ranges:
-        """Return the direction of slip as a bound over the whole arc."""
+        """Return the bound over the whole arc that fixes the direction of slip."""
         if found is None:
             return {f"{name}_slip": (-SIGN, None) if mode > 0 else (None, SIGN)}
         state, factor = found
@@ -290,7 +290,7 @@ class ArcPhase:
     def _pull(self, name: str) -> Range:
         """Return the range of the excess of the holding force over the static level at break-away.
 
-        A force that cannot jump was below it until then: it reaches the level exactly.
+        A force that cannot jump is below the level before, so it equals the level at break-away.
         """
         modes = self.arc.modes
         if self.jumps(name, modes[name]):
@@ -299,7 +299,7 @@ class ArcPhase:
         return 0.0 if alone and self.before.get(name) == 0 else (0.0, None)
 
     def _duration(self) -> float | Free:
-        """Return a free duration of the arc, or that of the phase if the arc is the whole phase."""
+        """Return a free duration, or the duration of the phase if it has no other arc."""
         T, shortest = self.base.T, self.rules.shortest
         if self.opens and self.closes:
             return T
@@ -313,9 +313,9 @@ def breaks_away(span: Span) -> bool:
 
 
 def carrier(model: Model, contact: Contact) -> tuple[str, int] | None:
-    """Return the state proportional to the slip of `contact`, and the sign of the factor.
+    """Return the state to which the slip of `contact` is proportional, and the sign of the factor.
 
-    None if the slip is not a multiple of one state.
+    Return None if the slip is not a multiple of one state.
     """
     x = model.vector("x")
     slope = ca.SX(ca.jacobian(contact.slip, x))
@@ -337,27 +337,28 @@ def arc_model(
     sizes: Mapping[str, float],
     margin: tuple[float, float],
 ) -> Model:
-    """Return the mode model of `modes` with the quantities of an arc's conditions as outputs.
+    """Return the mode model of `modes` with the quantities in the conditions of an arc as outputs.
 
     Args:
         model: the user's model.
-        modes: of all contacts that can stick.
+        modes: contact -> mode, for all contacts that can stick.
         released: contacts that break away at the start of the arc.
-        leaving: contacts that break away at its end by a force that cannot jump -> direction.
-        caught: contacts that stop at its start under a control that may jump -> direction of the
+        leaving: contact that breaks away at the end by a force that cannot jump -> direction.
+        caught: contact that stops at the start under a control that may jump -> direction of its
             previous slip.
-        stopped: the same for all contacts that stop.
+        stopped: contact that stops at the start under any control -> direction of its previous
+            slip.
         sizes: contact -> typical static level [N].
-        margin: friction margin in stick as a share of the level, and the time before the end of
-            the arc in which it decreases to zero if the contact breaks away [s].
+        margin: friction margin in stick as a share of the level, and the time before break-away in
+            which it decreases to zero [s].
 
     Returns:
-        A model with "<contact>_slip"; as shares of the level "<contact>_up" and "<contact>_down",
-        the friction margins in both directions, minus margin times tanh (remaining time / that
-        time)^2 before break-away; "<contact>_first_up" and "<contact>_first_down", the same for
-        states and inputs at the start of an interval; "<contact>_pull", the excess of released
-        contacts; "<contact>_catch", the margin to the force of sliding back of caught contacts,
-        and "<contact>_stop" to that of sliding on of stopped contacts.
+        A model with the output "<contact>_slip" and the following outputs as shares of the level:
+        "<contact>_up" and "<contact>_down", the friction margins in both directions, minus
+        margin tanh (remaining time / given time)^2 before break-away; "<contact>_first_up" and
+        "<contact>_first_down", the margins at the start of an interval; "<contact>_pull", the
+        excess of released contacts; "<contact>_catch", the margin of caught contacts to the sliding
+        force backwards; "<contact>_stop", the margin of stopped contacts to the sliding force.
     """
     kept: dict[Any, Model] = model.memory.setdefault("ocp arcs", {})
     groups = (modes, leaving, caught, stopped, sizes)

@@ -1,16 +1,17 @@
-"""Stick and slip of contacts at an instant: set-valued Coulomb friction, decided by trial.
+"""Stick and slip of contacts at one time: modes of set-valued Coulomb friction, found by trial.
 
-A contact that stops, or sticks already, sticks if it can. The equations are solved with the modes
-of all contacts, and
+A contact without velocity sticks if it can. The equations are solved with trial modes of all
+contacts, which are changed until they are consistent:
 
-    sticking contacts   must have a reaction within the static levels of both directions; else they
-                        slip in the overloaded direction
-    contacts that start to slip must accelerate in that direction: d slip/dt >= 0; else they stick
+    The reaction of a sticking contact must be within the static levels of both directions;
+    otherwise the contact slips in the overloaded direction.
+    A contact that starts to slip must accelerate in this direction, d slip/dt >= 0; otherwise it
+    sticks.
 
-until all modes are consistent. One contact changes at a time, the most overloaded first, and each
-change solves everything again, since normal forces and other reactions change with it. If modes
-repeat, all modes of the contacts without velocity are tried; a single consistent combination is
-accepted. If there is none, or more than one, the modes are undetermined (`SolveError`).
+One contact changes at a time, the most overloaded first. The equations are solved again after each
+change, because normal forces and other reactions change with it. If modes repeat, all combinations
+for the contacts without velocity are tried. A single consistent combination is accepted. If there
+is none, or more than one, the modes are undetermined (`SolveError`).
 """
 
 from collections.abc import Mapping
@@ -40,25 +41,25 @@ from symfric.model import Event, Model
 Array = NDArray[np.float64]
 Modes = dict[str, int]
 OVERLOAD = 1e-9
-"""Excess of a reaction over the static level at break-away, over the level at the start."""
+"""Excess of a reaction over its static level at break-away, relative to the level at the start."""
 STILL = 1e-11
-"""Relative sliding velocity treated as zero, over the nominal values of its states."""
+"""Sliding velocity that counts as zero, relative to the nominal values of its states."""
 TURNING = 1e-8
-"""Sliding acceleration, over the largest one, that is rounding error."""
+"""Sliding acceleration, relative to the largest one, that counts as rounding error."""
 LIFTED = 1e-9
-"""Share of the friction force by which a normal force may be negative."""
+"""Magnitude up to which a normal force may be negative, relative to the friction force."""
 MANY = 8
 """Largest number of contacts without velocity whose modes are tried in all combinations."""
 NEWTON_STEPS, NEWTON_TOLERANCE = 60, 1e-11
 
 
 class Instant(NamedTuple):
-    """State of a model for which its modes are decided.
+    """State of a model at one time, for which modes are decided.
 
     Attributes:
         t: time [s].
-        x, u: numbers in the order of the mode models.
-        guess: algebraic unknowns and friction forces "<contact>_F" by name.
+        x, u: states and inputs in the order of the mode models.
+        guess: initial values of algebraic unknowns and friction forces "<contact>_F" by name.
     """
 
     t: float
@@ -68,12 +69,13 @@ class Instant(NamedTuple):
 
 
 class InModes(NamedTuple):
-    """A model with one mode for each contact, and its functions.
+    """Model with one mode for each contact, and its functions.
 
     Attributes:
-        model: with events at which a slipping contact stops or a sticking one is overloaded.
-        unknowns: (t, x, z, u, p) -> residual of the algebraic equations, and its slopes by z.
-        look: (t, x, z, u, p) -> for each contact: margin above, margin below, d slip/dt, F, N.
+        model: mode model with events at which a slipping contact stops or a sticking contact is
+            overloaded.
+        unknowns: (t, x, z, u, p) -> residual of the algebraic equations, and its Jacobian by z.
+        look: (t, x, z, u, p) -> row of each contact: upper margin, lower margin, d slip/dt, F, N.
     """
 
     model: Model
@@ -83,15 +85,15 @@ class InModes(NamedTuple):
 
 @final
 class Machine:
-    """A model with contact modes; one `InModes` for each combination of modes, cached.
+    """Model with contact modes, which caches an `InModes` for each combination of modes.
 
     Attributes:
         model: the user's model.
-        p: values of its parameters.
-        contacts: those that can stick.
-        sizes: typical holding forces of the contacts [N].
-        together: contacts that stick together with each one.
-        still: sliding velocity of each contact [m/s] treated as zero.
+        p: values of the parameters.
+        contacts: contacts that can stick.
+        sizes: contact -> typical holding force [N].
+        together: contact -> contacts that stick together with it, including the contact.
+        still: sliding velocity of each contact [m/s] that counts as zero.
     """
 
     def __init__(self, model: Model, p: Array) -> None:
@@ -109,7 +111,7 @@ class Machine:
             names = tuple(c.name for c in loop.members)
             self.together |= dict.fromkeys(names, names)
         for c in self.contacts:
-            slip_change(model, c)  # raises for slips that depend on an input
+            slip_change(model, c)  # raises ValueError for slips that depend on an input
         slips = stacked(c.slip for c in self.contacts)
         slopes = ca.densify(ca.jacobian(slips, bare.vector("x")))
         symbols = [bare.t, bare.vector("x"), model.vector("p")]
@@ -119,17 +121,17 @@ class Machine:
         self.still = np.array([STILL * max(nominal[row], default=1.0) for row in touched])
 
     def within(self, modes: Modes) -> InModes:
-        """Return the model with these modes."""
+        """Return the model with `modes`."""
         key = tuple(modes[c.name] for c in self.contacts)
         if key not in self._made:
             self._made[key] = self._make(modes)
         return self._made[key]
 
     def _make(self, modes: Modes) -> InModes:
-        """Return the model in modes, with the integrals of the friction margins as states.
+        """Return the model with `modes`, with the integrals of the friction margins as states.
 
-        Nothing depends on them. They make error control resolve a short overload of sticking
-        contacts, during which nothing moves.
+        No equation depends on these states. They let error control resolve a short overload of
+        sticking contacts, during which no other state changes.
         """
         model = mode_model(self.model, modes)
         symbols = arguments(model)
@@ -164,7 +166,7 @@ class Machine:
         )
 
     def slips(self, t: float, x: Array) -> tuple[Array, Array]:
-        """Return sliding velocities, shape (n,), and their derivatives by the states, (n, nx)."""
+        """Return the sliding velocities, shape (n,), and their derivatives by states, (n, nx)."""
         values, slopes = self._slips(t, x, self.p)
         return values.full()[:, 0], slopes.full()
 
@@ -180,10 +182,10 @@ class Machine:
         return x - np.linalg.lstsq(slopes[held], values[held], rcond=None)[0]
 
     def solved(self, modes: Modes, at: Instant) -> tuple[dict[str, float], Array]:
-        """Return the algebraic unknowns with these modes by name, and the rows of `InModes.look`.
+        """Return the algebraic unknowns with `modes` by name, and the rows of `InModes.look`.
 
         Raises:
-            SolveError: Newton's method fails.
+            SolveError: Newton's method does not converge.
         """
         made = self.within(modes)
         variables = made.model.z
@@ -216,21 +218,21 @@ class Machine:
         return float(at_start(ca.substitute(ca.SX(v.start), model.vector("p"), ca.DM(self.p)), ()))
 
     def undecided(self, t: float, why: str) -> SolveError:
-        """Return the SolveError for undetermined contact modes."""
+        """Return a `SolveError` for undetermined contact modes with the reason `why`."""
         return SolveError(
             f"model '{self.model.name}' at t = {t:.9g} s: no unique stick/slip mode: {why}",
             Status.SOLVER_FAILED,
         )
 
     def decided(self, at: Instant, modes: Modes) -> tuple[Modes, dict[str, float]]:
-        """Return the modes after this instant, with the unknowns and forces "<contact>_F".
+        """Return the modes just after a time, with the unknowns and forces "<contact>_F".
 
         Args:
-            at: the instant; its states determine the contacts without velocity.
-            modes: modes before it; 0 for contacts that stopped.
+            at: state at this time, which determines the contacts without velocity.
+            modes: modes just before this time; 0 for contacts that have stopped.
 
         Raises:
-            SolveError: no unique consistent modes.
+            SolveError: there are no unique consistent modes.
         """
         slips = zip(self.contacts, self.slips(at.t, at.x)[0], self.still, strict=True)
         free = [c.name for c, v, still in slips if abs(v) <= still]
@@ -251,12 +253,15 @@ class Machine:
         return {f"{c.name}_F": float(row[3]) for c, row in pairs}
 
     def _lifted(self, look: Array) -> str:
-        """Return the first contact with a negative normal force, or ""."""
+        """Return the name of the first contact with a negative normal force, or ""."""
         pairs = zip(self.contacts, look, strict=True)
         return next((c.name for c, row in pairs if row[4] < -LIFTED * abs(row[3])), "")
 
     def _objection(self, modes: Modes, free: list[str], look: Array) -> Modes | None:
-        """Return corrected modes of the worst inconsistent contact and those that stick with it."""
+        """Return corrected modes of the most inconsistent contact, or None if all are consistent.
+
+        Contacts that stick together with this contact change with it.
+        """
         largest = max(1e-300, float(np.abs(look[:, 2]).max(initial=0.0)))
         forces = self._forces(look)
         found: list[tuple[float, str, Modes]] = []
@@ -276,7 +281,7 @@ class Machine:
         return max(found, key=lambda one: one[:2])[2] if found else None
 
     def _tried(self, at: Instant, modes: Modes, free: list[str]) -> tuple[Modes, dict[str, float]]:
-        """Try all combinations of modes of the contacts without velocity."""
+        """Return the only consistent combination of modes of the contacts without velocity."""
         if len(free) > MANY or any(len(self.together[name]) > 1 for name in free):
             raise self.undecided(at.t, f"{len(free)} contacts without velocity have cyclic modes")
         fits: list[tuple[Modes, dict[str, float]]] = []
@@ -296,5 +301,5 @@ class Machine:
 
 
 def shown(modes: Modes) -> str:
-    """Return modes as text."""
+    """Return modes as text for messages."""
     return ", ".join(f"{name} {KINDS[mode]}" for name, mode in modes.items())

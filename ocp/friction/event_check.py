@@ -1,23 +1,23 @@
-"""Event simulation with exact Coulomb friction and stiction: verification of smoothed solutions.
+"""Event simulation with exact Coulomb friction and stiction, to verify smoothed solutions.
 
     slip    F = law.sliding(v, N, side)     until v = 0
     stick   F with dv/dt = 0                until it reaches the static level of a side
 
 The motion consists of pieces that end at changes of mode and at jumps of inputs. Each piece is a
-run of the model in its modes (`mode_models`), smooth throughout, with its own tolerance; between
-pieces `decided` (`contact_modes`) determines which contacts stick. It has no smoothing width and no
-penalty: it is the limit of smooth laws.
+smooth run of the model in its modes (`mode_models`). Between pieces `decided` (`contact_modes`)
+determines which contacts stick. The method has no smoothing width and no penalty; it simulates the
+limit of smooth laws.
 
-`simulate` with `ExactCoulomb` supports explicit models and mechanisms alike (the tests compare
-both). This engine remains for cases that `ExactCoulomb` does not cover: any law by its sliding
-force and static level, without rebuilding the model; normal forces that are algebraic unknowns of
-the friction itself, where `symfric.model.forces` refuses the applied force; the most overloaded
-contact first, after which all modes are decided again; and an error if no motion, or more than one,
+`simulate` with `ExactCoulomb` supports the same explicit models and mechanisms (tests compare
+both). This module covers cases that `ExactCoulomb` does not: any law, by its sliding force and
+static level, without rebuilding the model; normal forces that are algebraic unknowns of the
+friction, for which `symfric.model.forces` refuses the applied force; release of the most overloaded
+contact first, after which all modes are decided again; and an error if no motion or more than one
 is consistent.
 
-Limits: it raises `SolveError` for several consistent motions, none (jamming), or reactions without
-a solution; contacts of a loop with several degrees of freedom included. Contacts in balls keep
-their laws.
+Limits: the simulation raises `SolveError` for several consistent motions, for none (jamming), and
+for reactions without a solution, which includes contacts of a loop with several degrees of freedom.
+Contacts in ball joints keep their laws.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ MOST = 10_000
 PILED = 40
 """Largest number of consecutive mode changes without time between them."""
 CREEP = 1e4
-"""Sliding velocity over the zero threshold above which a loop moves although one contact stops."""
+"""Sliding velocity, in zero thresholds, above which a loop moves although one contact stops."""
 APART = 1e-6
-"""Relative difference of an unknown above which two solvers found different solutions."""
+"""Relative difference of an unknown above which two solvers have found different solutions."""
 TOLERANCE = 1e-4
 RTOL = 1e-9
 
@@ -72,21 +72,21 @@ def set_valued(
     """Simulate `model` with the sliding forces and static levels of its laws, without smoothing.
 
     Args:
-        model: with contacts, whose laws define `sliding` and `static_level`.
-        t_end, t_start: time interval [s].
-        x0: start values of states by name; without those of laws.
-        u: inputs as for `simulate`; `Hold` and `Linear` end a piece at every sample.
+        model: model with contacts whose laws define `sliding` and `static_level`.
+        t_end, t_start: end and start time [s].
+        x0: start values of states by name, except law states.
+        u: inputs as for `simulate`; at each sample of `Hold` and `Linear` a piece ends.
         p: values of the parameters.
-        modes: contact -> 1, 0 or -1 before the start, for contacts that do not move; the default
-            is stick.
+        modes: contact -> 1, 0 or -1 before the start, for contacts without velocity; 0 by default.
         rtol: relative tolerance of the pieces.
-        t_eval: times of the result [s]; default `samples` equal intervals.
-        throw: raise on failure; False: return the motion up to the failure.
+        t_eval: times of the result [s]; `samples` equally spaced times by default.
+        samples: number of times of the result without `t_eval`.
+        throw: raise `SolveError` on failure; False returns the motion up to the failure.
 
     Raises:
-        ValueError: bad input, a law without these functions, events of the model itself.
-        SolveError: no unique consistent modes, or a failure of the integrator; `partial` has the
-            motion found.
+        ValueError: bad input, a law without these functions, or events of the model.
+        SolveError: no unique consistent modes, or a failure of the integrator; `partial` is the
+            motion up to the failure.
     """
     check_model("set_valued", model)
     begin = checks.number("set_valued: t_start", t_start)
@@ -121,7 +121,7 @@ class _State(NamedTuple):
 
 @final
 class _Run:
-    """Simulation in pieces."""
+    """Simulation of a motion piece by piece."""
 
     def __init__(self, machine: Machine, inputs: Inputs, p: dict[str, float], rtol: float) -> None:
         self.machine, self.inputs, self.p, self.rtol = machine, inputs, p, rtol
@@ -129,7 +129,7 @@ class _Run:
         self.pieces: list[Piece] = []
 
     def start(self, t: float, x0: dict[str, float], modes: dict[str, int]) -> _State:
-        """Return the state at the start; contacts without velocity stick by default."""
+        """Return the state at the start, in which contacts without velocity stick by default."""
         machine, model = self.machine, self.machine.model
         names = [c.name for c in machine.contacts]
         checks.check_names("set_valued: modes", modes, names)
@@ -157,7 +157,7 @@ class _Run:
         raise SolveError(f"more than {MOST} changes of mode", Status.EVENT_STORM)
 
     def piece(self, state: _State, end: float) -> _State:
-        """Decide the modes, simulate to the next change, and update modes of stopped contacts."""
+        """Decide the modes, simulate to the next change, and return the state after it."""
         t, machine = state.t, self.machine
         at = Instant(t, state.x, self.inputs.at(t), state.guess)
         modes, guess = machine.decided(at, state.modes)
@@ -177,7 +177,7 @@ class _Run:
         return _State(reached, machine.at_rest(reached, x, modes), modes, guess)
 
     def _stopped(self, modes: Modes, slips: Array) -> Modes:
-        """Return modes of stopped contacts: stick, or reversal at a dead centre of their loop."""
+        """Return the modes of stopped contacts: stick, or reversal at a dead centre of a loop."""
         machine, found = self.machine, Modes()
         pairs = list(zip(machine.contacts, slips, machine.still, strict=True))
         moving = {c.name for c, v, still in pairs if abs(v) > CREEP * still}
@@ -209,7 +209,7 @@ class _Run:
         return np.array([float(states[name][-1]) for name in self.names])
 
     def _unknowns(self, run: Trajectory, model: Model, t: float) -> dict[str, float]:
-        """Return the algebraic unknowns of a run by name."""
+        """Return the algebraic unknowns of a run at a time by name."""
         if not model.z:
             return {}
         values = run.express(symbols_of(model.z), np.array([t]))[:, 0].tolist()
@@ -221,12 +221,12 @@ def verify_exactly(
 ) -> Verification:
     """Verify `solution` with exact friction in place of its laws.
 
-    Checks start, via points, end, joints, periodicity, bounds, path conditions and cost. An
-    expression that contains a law itself, such as an output "friction", is evaluated with that law.
-    `Verification.trajectories` are the exact motions; `motions` returns their modes.
+    The function checks start, via points, end, joints, periodicity, bounds, path conditions and
+    cost. An expression that contains a law, such as an output "friction", is evaluated with this
+    law. `Verification.trajectories` are the exact motions; `motions` returns their modes.
 
     Args:
-        solution: of a problem whose models have contacts.
+        solution: solution of a problem whose models have contacts.
         tolerance: largest relative deviation.
         rtol: relative tolerance of the simulation.
 
@@ -250,17 +250,17 @@ def verify_exactly(
 
 
 def motions(solution: Solution, rtol: float = RTOL) -> tuple[SetValued, ...]:
-    """Return the exact motion of each phase, with its contact modes, as far as it can be simulated.
+    """Return the exact motion of each phase with its contact modes, up to a failure.
 
     Raises:
-        ValueError: as `verify_exactly`.
+        ValueError: see `verify_exactly`.
     """
     arcs = arcs_of(solution.problem, solution.meshes, solution.points)
     return tuple(_followed(arcs, rtol)[1])
 
 
 def _followed(arcs: Sequence[Arc], rtol: float) -> tuple[tuple[Run, ...], list[SetValued], str]:
-    """Return runs of the arcs with exact friction, their motions, and a failure message or ""."""
+    """Return runs of the arcs with exact friction, their motions, and the failure message or ""."""
     found, failures = list[SetValued](), list[str]()
 
     def follow(arc: Arc, start: Mapping[str, float]) -> Run | None:

@@ -1,4 +1,4 @@
-"""A piecewise motion with constant contact modes and continuous inputs in each piece."""
+"""Motions in pieces with constant contact modes and continuous inputs, and their inputs."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -21,12 +21,12 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 Given = float | Hold | Linear | Callable[[ca.SX], Any]
 LATER = 1e-13
-"""Relative time difference that separates before from after an instant."""
+"""Relative time difference by which times just after a jump are found."""
 
 
 @final
 class Inputs:
-    """Inputs between their jumps, and their values at an instant."""
+    """Inputs of a simulation, continuous between their jumps."""
 
     def __init__(self, model: Model, given: dict[str, Given], end: float) -> None:
         self.model = model
@@ -55,7 +55,7 @@ class Inputs:
         return {n: self._at(n, t) if isinstance(v, Hold) else v for n, v in self.given.items()}
 
     def at(self, t: float) -> Array:
-        """Return values just after the instant `t`, in the order of the model."""
+        """Return the values just after the time `t`, in the order of the model."""
         return self.model.values("u", {name: self._at(name, t) for name in self.given})
 
     def _at(self, name: str, t: float) -> float:
@@ -72,7 +72,7 @@ class Inputs:
 
 
 class Piece(NamedTuple):
-    """A run in which no contact changes its mode and no input jumps."""
+    """Run in which no contact changes its mode and no input jumps."""
 
     run: Trajectory
     modes: Modes
@@ -83,17 +83,18 @@ class Piece(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class SetValued:
-    """A motion with exact Coulomb friction, as far as it was simulated.
+    """Motion with exact Coulomb friction, up to its end or a failure.
 
     `motion["v"]` is a signal at the times `motion.t`; `motion.at(times)` returns all signals at any
-    times: those of the model except law states, and "<contact>_F", the friction force. See
-    `trajectory` for plots, files and expressions.
+    times. Signals are those of the model except law states, and the friction forces "<contact>_F".
+    See `trajectory` for plots, files and expressions.
 
     Attributes:
         model: the user's model.
         t: times of the result [s].
-        pieces: runs between changes of mode and of inputs.
-        status, message: of the end.
+        pieces: runs between changes of mode and jumps of inputs.
+        status, message: status of the simulation and its description.
+        contacts: names of the contacts.
     """
 
     model: Model
@@ -105,12 +106,12 @@ class SetValued:
 
     @property
     def span(self) -> tuple[float, float]:
-        """First time and the last one reached [s]."""
+        """First time and last time reached [s]."""
         return self.pieces[0].begin, self.pieces[-1].end
 
     @cached_property
     def modes(self) -> dict[str, tuple[Mode, ...]]:
-        """Contact -> its modes over time."""
+        """Contact -> its modes in the order of time."""
         modes: dict[str, tuple[Mode, ...]] = {}
         for name in self.contacts:
             merged: list[Mode] = []
@@ -124,14 +125,14 @@ class SetValued:
 
     @cached_property
     def last(self) -> Modes:
-        """Modes at the end, to continue the run."""
+        """Modes in the last piece, with which a simulation can continue."""
         return dict(self.pieces[-1].modes)
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """The motion as a trajectory of the user's model, with "<contact>_F" as additional signals.
+        """Trajectory of the user's model, with "<contact>_F" as additional signals.
 
-        Expressions with law states, or with algebraic unknowns of other laws, are NaN.
+        Expressions that contain law states or algebraic unknowns of other laws are NaN.
         """
         of_laws = {v.name for c in self.model.contacts for v in c.states}
         known = set.intersection(*(set(p.run.units) for p in self.pieces)) - of_laws
@@ -164,7 +165,7 @@ class SetValued:
         return replace(every[0], **total, events=len(self.pieces) - 1, smallest_step=least)
 
     def _pieces_at(self, at: Array) -> Iterator[tuple[Piece, NDArray[np.bool_], Array]]:
-        """Yield each piece with its times; at a change of mode the later piece."""
+        """Yield (piece, mask, times in the piece); a change of mode belongs to the later piece."""
         edges = np.array([p.begin for p in self.pieces[1:]])
         which = np.searchsorted(edges, at, side="right")
         for k in np.unique(which):
@@ -210,7 +211,7 @@ class SetValued:
         return self.t if name == "t" else self.trajectory[name]
 
     def at(self, times: ArrayLike) -> dict[str, Array]:
-        """Return all signals at `times` [s]; at a change of mode those after it."""
+        """Return all signals at `times` [s]; at a change of mode, the values after it."""
         return self.trajectory.at(times)
 
     def final(self) -> dict[str, float]:

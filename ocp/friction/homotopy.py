@@ -1,21 +1,20 @@
-"""Homotopy in the smoothing width: from wide friction layers to sharp friction, step by step.
+"""Homotopy in the smoothing width, from wide friction layers to sharp friction.
 
-A sharp law has many local optima and no usable derivatives at reversals. A law that is smoothed
-over a third of the largest sliding velocity has few, and an optimal motion for it leads to a good
-one for the sharp law. Therefore:
+With a sharp law there are many local optima and no usable derivatives at reversals. With a law that
+is smoothed over a third of the largest sliding velocity there are few local optima, and an optimal
+motion leads to a good one for the sharp law.
 
-1. Coarse solves with wide layers, from several starts; the best one continues. The order of the
-   costs of local optima there agrees with the order at the end, and such a solve takes a tenth of
-   a second.
-2. The layers become narrower by an adaptive factor, while the mesh is refined where an interval has
-   large errors. A step is rejected and shortened if it does not converge or if it jumps to a worse
-   motion: the Lagrangian with the multipliers of the previous step,
+1. Coarse solves with wide layers start from several points, and the best one continues. The order
+   of the costs of local optima is the same as for sharp friction. A coarse solve takes 0.1 s.
+2. The widths decrease by an adaptive factor, and the mesh is refined where intervals have large
+   errors. A step is rejected and shortened if it does not converge or if it jumps to a worse
+   motion. The Lagrangian with the multipliers of the previous step,
 
        J(widths + step) ~ L(w, lam, widths + step),
 
-   predicts the cost and takes one evaluation. A jump to a better motion is accepted.
+   predicts the cost by one evaluation. A jump to a better motion is accepted.
 
-Widths and mesh fractions are parameters of the nonlinear program: a step rebuilds nothing unless
+Widths and mesh fractions are parameters of the nonlinear program, so the program is rebuilt only if
 the number of intervals changes.
 """
 
@@ -47,50 +46,56 @@ from ocp.transcription.unknowns import Points
 
 Array = NDArray[np.float64]
 FINALISTS = 3
-"""Number of coarse solutions that are solved again on the finer mesh to find the best one."""
+"""Number of coarse solutions that are solved again on the finer mesh."""
 ALIKE = 1e-3
-"""Smallest relative difference of J between different motions."""
+"""Relative difference of J below which motions count as equal."""
 FIRST = 0.3
 """Smoothing width of the first solves, in multiples of the largest sliding velocity."""
 LAST = 1e-2
-"""Smoothing width at which the modes of a motion can be deduced from it."""
+"""Smoothing width, in multiples of the speeds, at which modes can be deduced from a motion."""
 FACTOR = 10**0.25
-"""Largest factor between successive widths."""
+"""Largest ratio of successive widths."""
 LEAST_FACTOR = 1.03
-"""Smallest factor; the homotopy stops below it."""
+"""Ratio of successive widths below which the homotopy stops."""
 QUICK = 15
-"""Iterations up to which the next step may be longer."""
+"""Number of iterations up to which the next step may be longer."""
 ABOVE = 0.01
 """Relative excess of J over the prediction at which a step is rejected."""
 COARSE = 30
-"""Intervals of the whole motion in the first solves; `FINE` afterwards."""
+"""Total number of intervals in the first solves; `FINE` in later ones."""
 FINE = 60
 MOST = 300
 """Largest number of intervals during the homotopy."""
 MOST_PARTS = 4
-"""Largest number of parts into which one interval is divided at once."""
+"""Largest number of parts into which one pass divides an interval."""
 TOLERANCE = 1e-3
-"""Local error of an interval, relative to the size of the states, that needs no refinement."""
+"""Permitted local error of an interval, relative to the magnitude of the states."""
 PASSES = 4
 """Largest number of meshes at one width."""
 SPREAD = 0.5
 """Spread of additional starts around the given one; see `starts_around`."""
 FURTHER = 2
-"""Repetitions with new starts around straight lines if none has led to a solution."""
+"""Number of repetitions with new starts around straight lines if no start leads to a solution."""
 SAME = 3.0
 """Largest ratio between the speeds of the first motion and those assumed for the widths."""
 EARLY: dict[str, Option] = {"tol": 1e-4, "max_iter": 100}
 LATER: dict[str, Option] = {"tol": 1e-5, "max_iter": 60, "mu_init": 1e-3}
 ONTO = LATER | {"max_iter": 150}
 BOUNDING: dict[str, Option] = {"max_iter": 80}
-"""Options for worst-case costs: with a small initial barrier parameter the multipliers of the
-bounds on the costs start wrong, and so does the curvature."""
+"""Options for worst-case costs. With a small initial barrier parameter the initial multipliers of
+the bounds on the costs would be wrong, and with them the curvature."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Step(Solved):
-    """A solve with the smoothing width `level`, at the `values` of all parameters."""
+    """Solve with the smoothing width `level` and the `values` of all parameters.
+
+    Attributes:
+        accepted: False if the solve jumped to a worse motion.
+        error: largest local error of an interval.
+        errors: local errors of each interval, (N,) for each phase.
+    """
 
     values: Array
     level: float
@@ -100,7 +105,7 @@ class Step(Solved):
 
     @property
     def good(self) -> bool:
-        """True if the homotopy can continue from here."""
+        """True if the homotopy can continue from this step."""
         return self.accepted and self.ok
 
     @property
@@ -109,7 +114,7 @@ class Step(Solved):
         return self.outcome.status.stopped
 
     def better_than(self, other: "Step") -> bool:
-        """Return True if solved and the other is not, at a lower cost, or with less violation."""
+        """Return True if only this step is solved, or if it has a lower cost or violation."""
         if self.ok != other.ok:
             return self.ok
         if self.ok:
@@ -118,7 +123,7 @@ class Step(Solved):
 
 
 def least(steps: Sequence[Step]) -> Step:
-    """Return the best of several steps, or the one that was stopped."""
+    """Return the best of several steps, or the step that was stopped."""
     best = steps[0]
     for step in steps[1:]:
         best = step if step.ended or (not best.ended and step.better_than(best)) else best
@@ -126,7 +131,7 @@ def least(steps: Sequence[Step]) -> Step:
 
 
 def finalists(steps: Sequence[Step]) -> list[Step]:
-    """Return the best few steps with different motions; equal costs count as the same motion."""
+    """Return the best steps with different costs, which indicate different motions."""
     kept: list[Step] = []
     for step in sorted(steps, key=lambda one: (not one.good, one.outcome.cost)):
         costs = [one.outcome.cost for one in kept]
@@ -137,13 +142,13 @@ def finalists(steps: Sequence[Step]) -> list[Step]:
 
 
 class Sharp(NamedTuple):
-    """A solution with smooth friction, at one level of the homotopy.
+    """Solution with smooth friction at one level of the homotopy.
 
     Attributes:
-        solution: of the problem with smooth models, its widths among the values of `p`.
+        solution: solution of the problem with smooth models, whose `p` contains the widths.
         level: smoothing width, in multiples of the largest sliding velocity of each contact.
-        scales: of each contact.
-        steady: True if no step before it was rejected.
+        scales: scales of the widths of each contact.
+        steady: True if the step to this solution was not rejected before.
         error: largest local error of an interval.
     """
 
@@ -166,20 +171,20 @@ def sharpened(
     clock: Clock | None = None,
     progress: Report | None = None,
 ) -> Iterator[Sharp]:
-    """Yield solutions with decreasing smoothing widths; each item triggers a solve.
+    """Yield solutions with decreasing smoothing widths, one solve at a time.
 
-    The first has the width `FIRST`, the last one `last`, or the narrowest one reached: if the
-    solver fails or is stopped, the status of the solution reports it.
+    The first solution has the width `FIRST`, and the last one has the width `last` or the smallest
+    width reached. If the solver fails or is stopped, the status of the last solution reports it.
 
     Args:
         problem: the user's problem, with contacts.
         scheme, solver: as in `solve`; the user's options of Ipopt take precedence.
         guess: initial guess; additional starts are generated around it.
-        intervals: of the whole motion, before refinement.
-        starts: coarse solves from different starts, the best of which goes on.
-        last: final smoothing width.
+        intervals: total number of intervals before refinement.
+        starts: number of coarse solves from different starts; the best one is continued.
+        last: final smoothing width, in multiples of the speeds.
         clock: time limit.
-        progress: called after each iteration.
+        progress: function called with a `Progress` after each iteration.
     """
     path = _Path(problem, scheme, solver, clock or Clock(), progress)
     step = path.first(guess, starts, intervals)
@@ -205,7 +210,7 @@ def sharpened(
 
 @final
 class _Path:
-    """State common to all steps."""
+    """Problem with smooth models, scales and prepared solvers, shared by all steps."""
 
     def __init__(
         self, user: Problem, scheme: Scheme, solver: Solver, clock: Clock, progress: Report | None
@@ -260,7 +265,7 @@ class _Path:
     def each(
         self, mesh: Transcription, tries: Sequence[Points], options: Mapping[str, Option] = EARLY
     ) -> list[Step]:
-        """Solve with the widest layers from several starts, until one is stopped."""
+        """Solve with the widest layers from each start, until a solve is stopped."""
         steps: list[Step] = []
         for number, points in enumerate(tries, 1):
             steps.append(self.solve(mesh, points, FIRST, options, f"start {number}"))
@@ -269,10 +274,10 @@ class _Path:
         return steps
 
     def narrower(self, before: Step, level: float) -> Step:
-        """Solve with another width, on a mesh that is fine enough for it.
+        """Solve with the smaller width `level`, and refine the mesh for it.
 
-        The largest cost that belongs to the motion before is its Lagrangian at that width, plus a
-        share of J and of the predicted decrease.
+        A step is not accepted if its cost exceeds the Lagrangian of the previous motion at this
+        width plus a share of J and of the predicted decrease.
         """
         program, iterate = before.transcription.program, before.outcome.iterate
         values = before.transcription.values(widths_at(self.user, self.scales, level))
@@ -289,7 +294,7 @@ class _Path:
         return self.refined(step, limit)
 
     def refined(self, step: Step, limit: float) -> Step:
-        """Refine the mesh of `step` until its errors are small enough or a limit is reached."""
+        """Return `step` on a mesh refined until errors are permitted or a limit is reached."""
         step = self.with_errors(step)
         for _ in range(PASSES - 1):
             meshes, phases = step.transcription.meshes, len(self.problem.chain)
@@ -334,7 +339,7 @@ class _Path:
         return Step(transcription, outcome, values, level)
 
     def moved(self, step: Step, into: Transcription) -> Points:
-        """Interpolate the motion of a step to other meshes."""
+        """Return the motion of a step interpolated to the meshes of `into`."""
         meshes, points = step.transcription.meshes, step.points
         spans = span_motions(self.problem, self.scheme, meshes, points)
         return resample(into, spans, points.chosen)
@@ -351,7 +356,7 @@ class _Path:
         return replace(step, error=worst, errors=errors)
 
     def sharp(self, step: Step, steady: bool) -> Sharp:
-        """Return a step as a solution of the problem with these widths."""
+        """Return a step as a solution of the problem with its widths."""
         widths = widths_at(self.user, self.scales, step.level)
         problem = replace(self.problem, p=dict(self.problem.p) | widths)
         statistics = reduce(SolverStatistics.then, self.solves)

@@ -1,30 +1,30 @@
 """Models with fixed contact modes, and the force that would hold a slipping contact.
 
-    slip, +-1   F = law.sliding(v, N, side)              its force on that side of v = 0
+    slip, +-1   F = law.sliding(v, N, side)              force on that side of v = 0
     stick, 0    F with dv/dt = 0, an algebraic unknown   while -level(-1) <= F <= level(+1)
 
-They have the names of the user's model, so that its costs, bounds and outputs apply to them; only
-law states are absent. Mechanisms keep their implicit equations, with `F` and `0 = dv/dt` in the
-accelerations among them, and normal forces that follow from reactions.
+Mode models have the names of the user's model except law states, so its costs, bounds and outputs
+apply to them. The implicit equations of mechanisms are kept; `F` is added to their unknowns and
+`0 = dv/dt` to their equations. Normal forces may depend on reactions.
 
-Contacts of a loop of one degree of freedom stick together. The slips are s_i = g_i(q) omega, with
-omega the speed along the tangent of the constraints. The equations do not determine how the
-contacts share the force T = sum g_i F_i that holds the loop. They hold it as long as possible,
-which requires shares proportional to their static levels,
+Contacts of a loop of one degree of freedom stick together. Their slips are s_i = g_i(q) omega, with
+the speed omega along the tangent of the constraints. The equations do not determine how the
+contacts share the force T = sum g_i F_i that holds the loop. The loop is held as long as possible
+if the shares are proportional to the static levels,
 
     F_i = sign(g_i) S_i T / sum |g_k| S_k,   S_i the static level
 
-as in `symfric.multibody.applied`. All of them reach their levels at the same instant.
+as in `symfric.multibody.applied`. All contacts then reach their levels at the same time.
 
-A sticking contact keeps sticking while the force needed is below its static level. Break-away
-depends on the control *after* that instant, which may differ from the one before, and is evaluated
-in the slip mode, where nothing holds the contact (`holding`): the force is part of the algebraic
-unknowns of the model in which it sticks,
+A contact sticks while the required force is below its static level. Break-away depends on the
+control *after* this time, which may differ from the control before. It is therefore evaluated in
+the slip mode (`holding`). The force is one of the algebraic unknowns of the model in which the
+contact sticks,
 
     0 = alg(x, z, u),    with 0 = d slip / dt among its rows and the force among z,
 
-found by Newton's method from the values of the slip mode: in one step if the equations are affine
-in z, as without normal forces that follow from reactions.
+and is found by Newton's method from the values of the slip mode. One step suffices if the equations
+are affine in z, as without normal forces that depend on reactions.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,43 +45,44 @@ from symfric.model import Contact, Model, Output
 from symfric.multibody.applied import MINORS, forward, null_direction
 
 RANK = 1e-11
-"""Singular values below this share of the scaled equations count as zero."""
+"""Relative size below which singular values of the scaled equations count as zero."""
 UNLOADED = 1e-9
-"""Static level [N] at the start below which a contact is unloaded."""
+"""Static level [N] at the start below which a contact counts as unloaded."""
 KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
 """Name of each mode."""
 SIDES = {1: "up", -1: "down"}
-"""Suffixes of the outputs "<contact>_grip_<side>": friction margin of a sticking contact."""
+"""Side -> suffix of the output "<contact>_grip_<side>", the friction margin of a contact."""
 NEWTON_STEPS = 2
-"""Newton steps; a normal force is a smoothed absolute value of reactions, affine except near 0."""
+"""Number of Newton steps. A normal force by reactions is a smoothed absolute value, which is affine
+except near 0."""
 
 
 class Loop(NamedTuple):
-    """Contacts that stick together.
+    """Contacts of a loop, which stick together.
 
     Attributes:
         members: the contacts, two or more.
-        along: g_i of each, in the coordinates.
+        along: g_i of each contact, as a function of the coordinates.
     """
 
     members: tuple[Contact, ...]
     along: tuple[ca.SX, ...]
 
     def shares(self, force: ca.SX) -> list[ca.SX]:
-        """Return F_i [N] of each member for a holding force T."""
+        """Return F_i [N] of each member for the holding `force` T."""
         levels = [(c.static_level(1) + c.static_level(-1)) / 2 for c in self.members]
         weights = [forward(g) * S for g, S in zip(self.along, levels, strict=True)]
         total = self.projected(weights)
         return [w / total * force for w in weights]
 
     def projected(self, values: Sequence[ca.SX]) -> ca.SX:
-        """Return the sum of g_i times the members' `values`."""
+        """Return the sum of g_i times the `values` of the members."""
         pairs = zip(self.along, values, strict=True)
         return sum((g * value for g, value in pairs), start=ca.SX(0))
 
 
 def loops_of(model: Model) -> tuple[Loop, ...]:
-    """Return the loops of a mechanism in which several contacts stick together."""
+    """Return the loops of a mechanism that contain several contacts."""
     mechanics = model.holonomic
     if mechanics is None or not mechanics.phi.numel() or ca.depends_on(mechanics.phi, model.t):
         return ()
@@ -107,16 +108,16 @@ def loops_of(model: Model) -> tuple[Loop, ...]:
 def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
     """Return `model` with a mode for each contact: slip forward 1, slip backward -1, stick 0.
 
-    In stick the friction force is the algebraic unknown "<contact>_reaction", and the outputs
+    In stick the friction force is the algebraic unknown "<contact>_reaction". The outputs
     "<contact>_grip_up" and "<contact>_grip_down" are its margins to the static level in both
-    directions, both positive while the contact holds. A contact without slip keeps it zero; a
-    nonzero slip at the start of stick is kept. Contacts without a static level may be omitted.
-    Contacts of a loop of one degree of freedom stick together (see above); their reactions are
-    outputs. The same modes of the same model return the same object.
+    directions, which are positive while the contact sticks. The slip remains constant in stick, so
+    it should be zero at the start. Contacts without a static level may be omitted. Contacts of a
+    loop of one degree of freedom stick together (see above); their reactions are outputs. Results
+    are cached in the model.
 
     Raises:
-        ValueError: names that are not contacts, contacts without a mode, invalid modes, and
-            sticking contacts whose forces the equations do not determine.
+        ValueError: unknown contacts, contacts without a mode, invalid modes, or sticking contacts
+            whose forces the equations do not determine.
     """
     where = f"model '{model.name}': modes"
     names = [c.name for c in model.contacts]
@@ -136,7 +137,7 @@ def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
 
 
 def restless(model: Model) -> str:
-    """Return the reason why contacts of `model` cannot stick individually, or ""."""
+    """Return the reason why contacts of `model` cannot stick individually, or "" if they can."""
     if loops := loops_of(model):
         names = ", ".join(c.name for c in loops[0].members)
         return (
@@ -187,7 +188,7 @@ def _in_modes(model: Model, modes: Mapping[str, int]) -> Model:
 
 
 def _sticking_loops(model: Model, modes: Mapping[str, int]) -> list[Loop]:
-    """Return the loops whose contacts stick, all of them."""
+    """Return the loops whose contacts stick; raise ValueError if only some of them stick."""
     loops: list[Loop] = []
     for loop in loops_of(model):
         resting = [c.name for c in loop.members if not modes[c.name]]
@@ -202,9 +203,9 @@ def _sticking_loops(model: Model, modes: Mapping[str, int]) -> list[Loop]:
 
 
 def slip_change(model: Model, contact: Contact) -> ca.SX:
-    """Return the rate of change of a sliding velocity [m/s^2], in the forces of `model.open`.
+    """Return the rate of change of a sliding velocity [m/s^2], with the forces of `model.open`.
 
-    For a mechanism it is a function of the accelerations `holonomic.a`.
+    For a mechanism it depends on the accelerations `holonomic.a`.
 
     Raises:
         ValueError: the sliding velocity depends on an input or an algebraic variable.
@@ -223,7 +224,7 @@ def slip_change(model: Model, contact: Contact) -> ca.SX:
 
 
 def nominal_load(model: Model, contact: Contact) -> float:
-    """Return the typical holding force [N] of a contact: its static level at the start."""
+    """Return the typical holding force [N] of a contact, its static level at the start."""
     symbols = ca.vertcat(model.vector("x"), model.vector("z"), model.vector("u"), model.t)
     level = ca.SX(contact.static_level())
     starts = [v.start for group in (model.x, model.z, model.u) for v in group]
@@ -234,9 +235,9 @@ def nominal_load(model: Model, contact: Contact) -> float:
 
 
 def _refuse_shared(model: Model, made: Model, held: Sequence[Contact]) -> None:
-    """Raise ValueError if the equations do not determine the stiction forces, near the start.
+    """Raise ValueError if the equations do not determine the stiction forces near the start.
 
-    Loops may have fewer degrees of freedom than contacts, and a drive may prescribe a slip.
+    A loop may have fewer degrees of freedom than contacts, and a drive may prescribe a slip.
     """
     slope = ca.densify(ca.jacobian(made.alg, made.vector("z")))
     slopes = ca.Function("slopes", arguments(made), [slope])
@@ -261,18 +262,18 @@ def _refuse_shared(model: Model, made: Model, held: Sequence[Contact]) -> None:
 
 
 def holding(model: Model, modes: Mapping[str, int], contact: str) -> tuple[ca.SX, dict[int, ca.SX]]:
-    """Return the force [N] that holds `contact`, or would, and its margins to the static level.
+    """Return the force [N] that holds or would hold `contact`, and its margins to the static level.
 
     Args:
         model: the model with contacts.
-        modes: +1, 0 or -1 of each contact; `contact` may slip or stick.
+        modes: contact -> 1, 0 or -1; `contact` may slip or stick.
         contact: name of the contact.
 
     Returns:
-        The force, and side -> margin in that direction, negative if friction cannot hold; SX (1, 1)
-        in the symbols of the mode model of `modes`. They do not depend on algebraic variables if
-        the equations are affine in these: at the start of an interval they follow from states and
-        inputs there.
+        The force, and side -> margin in this direction, which is negative if friction cannot hold
+        the contact; SX (1, 1) in the symbols of the mode model of `modes`. If the equations are
+        affine in the algebraic variables, force and margins do not depend on these, so they follow
+        from states and inputs at the start of an interval.
     """
     moving, held = mode_model(model, modes), mode_model(model, {**modes, contact: 0})
     symbols = arguments(held)
@@ -280,7 +281,7 @@ def holding(model: Model, modes: Mapping[str, int], contact: str) -> tuple[ca.SX
     names = [f"{contact}_reaction", *(f"{contact}_grip_{side}" for side in SIDES.values())]
     outputs = ca.Function("outputs", symbols, [held.expression(name) for name in names])
     t, x, _, u, p = arguments(moving)
-    known = {v.name: v.symbol for v in moving.z}  # each mode model has its own reactions
+    known = {v.name: v.symbol for v in moving.z}
     z = ca.vertcat(*(known.get(v.name, ca.SX(0)) for v in held.z))
     for _ in range(NEWTON_STEPS):
         z = step(t, x, z, u, p)

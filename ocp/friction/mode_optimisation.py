@@ -1,19 +1,19 @@
-"""Optimisation of contact modes, their order and their instants from a sharpened motion.
+"""Optimisation of contact modes, their order and their switching times from a sharpened motion.
 
-Smooth friction with a width of a hundredth of the speed shows which contacts slip and when. With
-the mode sequence deduced from it, friction is a known force while a contact slips and a reaction
-while it sticks. The problem of these arcs is smooth, and the switching instants are unknowns, so a
-solver finds them with full precision, on few intervals:
+Smooth friction with a width of a hundredth of the speed shows which contacts slip and when. In the
+mode sequence deduced from this motion, friction is a known force while a contact slips and a
+reaction while it sticks. The problem of these arcs is smooth and the switching times are unknowns,
+so a solver finds them with full precision on few intervals:
 
-1. deduce the sequence; insert stick at every reversal and at the ends (`ocp.friction.sequence`);
-2. solve the problem of mode models with free durations (`ocp.friction.arcs`);
-3. remove arcs that have shrunk to zero, repair the sequence where the motion is at the bounds of
-   its modes (`ocp.friction.sequence`), and solve again from there;
-4. refine the intervals until holding the controls on each of them costs almost nothing.
+1. Deduce the sequence, and insert stick at each reversal and at the ends (`ocp.friction.sequence`).
+2. Solve the problem of mode models with free durations (`ocp.friction.arcs`).
+3. Remove arcs whose duration is almost zero, change the sequence where the motion is at the bounds
+   of its modes (`ocp.friction.sequence`), and solve again from there.
+4. Refine the intervals until the loss of cost by constant inputs is negligible.
 
 The result holds for exact Coulomb friction with stiction, the limit of smooth laws.
 Source: Betts, Practical Methods for Optimal Control, 2nd ed., 2010, 3.7 (phases); Bryson and Ho,
-Applied Optimal Control, 1975, 3.7 (conditions at instants that are free).
+Applied Optimal Control, 1975, 3.7 (conditions at free times).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -42,46 +42,46 @@ from ocp.transcription.schemes import Radau, Scheme
 
 Array = NDArray[np.float64]
 TOUCH = 1e-5
-"""Share of the largest sliding velocity of a contact below which it touches zero: the distance that
-an interior-point method leaves to an active bound."""
+"""Share of the largest sliding velocity of a contact below which its slip touches zero. It exceeds
+the distance of an interior-point method to an active bound."""
 CREEP = (3.0, 1.0, 10.0)
-"""Multiples of the width below which a contact counts as sticking: the first that leads to a
-solution. A smooth law is back at its dynamic level at a few widths."""
+"""Multiples of the width below which a contact counts as sticking; the first one that leads to a
+solution is used. A smooth law is at its dynamic level at a few widths."""
 SHORTEST = 5e-5
-"""Least duration of an arc, as a share of the whole; necessary arcs are longer."""
+"""Smallest duration of an arc, relative to the total duration; necessary arcs are longer."""
 AGAIN = 0.1
-"""Initial barrier parameter after a change of the sequence: smaller ones may diverge."""
+"""Initial barrier parameter after a change of the sequence; smaller values may diverge."""
 KICK = 2e-3
-"""Least length of an interval in which a contact breaks away, over the whole duration."""
+"""Smallest length of an interval in which a contact breaks away, relative to the total duration."""
 GONE = 4.0
-"""Duration below which arcs are removed, in least durations."""
+"""Duration below which arcs are removed, in multiples of the smallest duration."""
 ROUNDS = 4
 """Largest number of changes of the sequence."""
 NEW_ARC = 5e-3
-"""Initial duration of an inserted arc, over the whole duration."""
+"""Initial duration of an inserted arc, relative to the total duration."""
 WORTH = 1e-4
-"""Relative cost by which another sequence must be better: more than the error of the estimated cost
-of holding the inputs on few intervals."""
+"""Relative reduction of the cost from which another sequence is preferred. It exceeds the error of
+the estimated loss by constant inputs on few intervals."""
 FINE = 3e-4
-"""Tolerable cost of holding the inputs over the intervals, over the cost."""
+"""Permitted loss of cost by constant inputs, relative to the cost."""
 ZERO = 1e-8
-"""Smallest significant difference of costs."""
+"""Smallest significant difference between costs."""
 LOCAL = 1e-7
-"""Largest local error of an interval, relative."""
+"""Largest relative local error of an interval."""
 HALVED = 4.0
-"""Multiple of the largest local error assigned to an interval to halve it, for order 5."""
+"""Error, in multiples of the largest local error, by which refinement halves an interval."""
 MOST_ITERATIONS, PATIENT = 100, 400
-"""Iterations of one solve: a sequence that needs more is usually wrong. If no sequence leads to a
-solution the first solves are repeated with more: an arm whose joints stop needs 350."""
+"""Limits of the iterations of one solve. A sequence that takes more is usually wrong. If no
+sequence leads to a solution, the second limit applies: an arm whose joints stop takes 350."""
 CLOSER = 5.0
-"""Divisor of the margin for a motion that only shows the cost of a margin."""
+"""Divisor of the margin for a motion that is computed only to find the cost of a margin."""
 LEAST_INTERVALS = 40
 MOST = 800
 Keep = Callable[[SolvedSequence], SolvedSequence]
 
 
 def rests_inside(solved: SolvedSequence) -> Legs | None:
-    """Return the sequence with stick where slipping contacts touch zero; None if none does."""
+    """Return the sequence with stick where slips touch zero, or None if none does."""
     arcs, legs, shift = flat(solved.legs), solved.legs, 0
     times, slips = list[Array](), list[dict[str, Array]]()
     for number, (span, arc) in enumerate(
@@ -98,7 +98,7 @@ def rests_inside(solved: SolvedSequence) -> Legs | None:
             largest[contact] = max(largest.get(contact, 0.0), float(np.abs(values).max()))
     for number, (arc, t, own) in enumerate(zip(arcs, times, slips, strict=True)):
         for contact, mode in arc.modes.items():
-            # the interval in which the slip is almost zero, away from the ends of the arc
+            # points inside the arc at which the slip is almost zero
             near = np.flatnonzero(np.abs(own[contact][1:-1]) < TOUCH * largest[contact]) + 1
             if mode and near.size:
                 before, window = len(flat(legs)), (float(t[near[0] - 1]), float(t[near[-1] + 1]))
@@ -109,7 +109,7 @@ def rests_inside(solved: SolvedSequence) -> Legs | None:
 
 
 class _StoppedError(Exception):
-    """Raised after the user or the time limit has stopped a solve."""
+    """Exception after a solve that the user or the time limit has stopped."""
 
 
 def optimise_modes(
@@ -123,33 +123,33 @@ def optimise_modes(
     margin: float = MARGIN,
     clock: Clock | None = None,
 ) -> Iterator[tuple[Solution, float]]:
-    """Yield exact motions near a sharpened one, for `problem`, with their friction margins.
+    """Yield motions with exact friction near a sharpened one, with their friction margins.
 
-    In the first motion stiction keeps the margin `MARGIN` or `margin`, the larger one. If that
-    costs anything, further motions follow from there: with `margin`, and with a value between both;
-    if `margin` is `MARGIN` or more, with less, to show its cost.
+    The margin of the first motion is the larger one of `MARGIN` and `margin`. If the margin is
+    active, two motions with smaller margins follow: with `margin`, and with a value between both.
+    If `margin` is `MARGIN` or more, still smaller margins serve to find its cost.
 
     Args:
-        smooth: solution of `problem` with smooth friction, of widths of about a hundredth of the
+        smooth: solution of `problem` with smooth friction, with widths of about a hundredth of the
             speeds; it need not be verified.
         problem: the user's problem.
         widths: contact -> sliding velocity [m/s] over which its friction is smoothed in `smooth`.
         solver, scheme, progress: as in `ocp.solve`.
-        margin: friction margin: share of the static level that stiction keeps from it.
+        margin: margin between stiction and its static level, as a share of this level.
         clock: time limit.
 
     Yields:
-        A solution with `modes`, valid for exact Coulomb friction with stiction; not verified. Its
-        status is not ok if no sequence led to a solution; if the search was stopped before any
-        did, it has no `modes`.
+        A solution with `modes` for exact Coulomb friction with stiction, without verification, and
+        its margin. The status is not ok if no sequence led to a solution. The solution has no
+        `modes` if the search was stopped before.
 
     Raises:
-        ValueError: an unsuitable problem, see `refusal`.
+        ValueError: an unsuitable problem; see `refusal`.
 
-    Limits: the sequence is that of the sharpened motion except for stick intervals, superfluous
-    arcs and active bounds: a qualitatively different motion is not found. Contacts with dependent
-    slips in stick (a loop of one degree of freedom) have no unique reactions and are refused by the
-    mode model.
+    Limits: the sequence differs from that of the sharpened motion only by stick intervals,
+    superfluous arcs and active bounds; a qualitatively different motion is not found. Contacts with
+    dependent slips (a loop of one degree of freedom) have no unique reactions in stick and are
+    refused.
     """
     if reason := refusal(problem):
         raise ValueError(f"optimise_modes: {reason}")
@@ -183,7 +183,7 @@ def optimise_modes(
             patient = replace(modes_solver, solver=solver.with_options(max_iter=limit))
             found = keep(patient.solve(legs, known, N, 1e-2))
             if found.ok:
-                best = found  # also if the following steps are stopped
+                best = found  # kept if the following steps are stopped
                 best = settled(modes_solver, best, keep)
                 best = better(modes_solver, best, NEW_ARC * whole, keep)
                 best = _fine(modes_solver, best, keep)
@@ -204,7 +204,7 @@ def optimise_modes(
 def _solution(
     problem: Problem, best: SolvedSequence | None, tried: Sequence[SolvedSequence]
 ) -> Solution:
-    """Return the best sequence, or the first, with the effort of all and the reason it ended."""
+    """Return the best or the first sequence, with total statistics and the reason for a stop."""
     found = reassemble(problem, best or tried[0], [s.outcome.statistics for s in tried])
     last = tried[-1].outcome
     if not last.status.stopped:
@@ -216,7 +216,7 @@ def _solution(
 
 
 def refusal(problem: Problem) -> str:
-    """Return the reason why modes of a problem cannot be optimised, or ""."""
+    """Return the reason why modes of a problem cannot be optimised, or "" if they can."""
     if not any(phase.model.contacts for phase in problem.chain):
         return "expected a model with contacts, got none"
     if problem.scenarios:
@@ -236,7 +236,7 @@ def _attempts(
 ) -> Iterator[tuple[int, Legs]]:
     """Yield iteration limits and possible sequences, the most likely one first.
 
-    All sequences with one limit, then with the next.
+    All sequences with the first limit precede those with the second one.
     """
     sequences: dict[str, Legs] = {}
     for rests, factor in product((True, False), CREEP):
@@ -249,7 +249,7 @@ def _attempts(
 
 
 def settled(modes_solver: ModeSolver, solved: SolvedSequence, keep: Keep) -> SolvedSequence:
-    """Remove superfluous arcs, and insert stick where slipping contacts touch zero."""
+    """Return the solution without superfluous arcs and with stick where slips touch zero."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
         legs = pruned(solved.legs, GONE * modes_solver.rules.shortest)
@@ -268,7 +268,7 @@ def settled(modes_solver: ModeSolver, solved: SolvedSequence, keep: Keep) -> Sol
 def better(
     modes_solver: ModeSolver, solved: SolvedSequence, width: float, keep: Keep
 ) -> SolvedSequence:
-    """Return the best of the sequence and its neighbours."""
+    """Return the best one of the solved sequence and its neighbours."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
         for legs in neighbours(solved.legs, width):
@@ -289,11 +289,11 @@ def better(
 
 
 def _fine(modes_solver: ModeSolver, solved: SolvedSequence, keep: Keep) -> SolvedSequence:
-    """Refine the intervals until holding the inputs costs almost nothing.
+    """Refine the intervals until the loss by constant inputs is negligible.
 
-    That cost is estimated, reliably if two meshes agree on the cost without it. Until they do, all
-    intervals are halved. If stiction follows its level the estimate is too large, and the gain of
-    the last mesh decides.
+    The estimate of this loss is reliable if two meshes agree on the cost without the loss. Until
+    they agree, all intervals are halved. If stiction follows its level, the estimate is too large,
+    and the gain by the last refinement is the criterion.
     """
     before = inf, inf
     for _ in range(ROUNDS):
@@ -316,7 +316,7 @@ def _fine(modes_solver: ModeSolver, solved: SolvedSequence, keep: Keep) -> Solve
         )
         parts = solved.legs, solved.discretisation, meshes
         finer = keep(modes_solver.on(*parts, solved.known, 1e-4))
-        if not finer.ok:  # a flat minimum: a long distance to the solution
+        if not finer.ok:  # in a flat minimum the solution may be far from the start
             finer = keep(modes_solver.on(*parts, finer.known, 1e-2))
         if not finer.ok:
             break

@@ -1,9 +1,9 @@
 """Mode sequences: slip directions and stick of contacts over time.
 
-A contact slips forwards (+1), sticks (0) or slips backwards (-1). A `Run` is the time it spends in
-one of these modes, a `Track` its runs in order. For several contacts, a motion is a sequence of
-`Arc`s between the instants at which any of them changes; instants set by the user, ends of phases
-and via points, bound the `Leg`s, inside which durations are free.
+A contact slips forwards (+1), sticks (0) or slips backwards (-1). A `Run` is an interval with one
+mode of a contact, and a `Track` consists of its runs in order. An `Arc` is an interval with
+constant modes of all contacts. Ends of phases and via points, whose times are given by the user,
+divide the motion into `Leg`s of arcs with free durations.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 SAME_INSTANT = 1e-9
-"""Share of the whole duration below which two instants coincide."""
+"""Time difference, relative to the duration, below which two times coincide."""
 
 
 class Run(NamedTuple):
-    """A contact in one mode from `begin` to `end` [s]: +1 and -1 slip, 0 stick."""
+    """Interval from `begin` to `end` [s] with one mode of a contact: +1 and -1 slip, 0 stick."""
 
     mode: int
     begin: float
@@ -27,18 +27,18 @@ class Run(NamedTuple):
 
 
 class Track(NamedTuple):
-    """Runs of one contact, without gaps; the contact may exist for a part of the motion."""
+    """Consecutive runs of one contact, which may exist only in a part of the motion."""
 
     contact: str
     runs: tuple[Run, ...]
 
     def at(self, t: float) -> int | None:
-        """Return the mode at a time; None if the contact does not exist then."""
+        """Return the mode at a time, or None if the contact does not exist at this time."""
         return next((run.mode for run in self.runs if run.begin <= t <= run.end), None)
 
 
 class Arc(NamedTuple):
-    """Interval [s] with constant modes of all contacts; modes by the name of the contact."""
+    """Interval from `begin` to `end` [s] with constant modes of all contacts, by name."""
 
     modes: Mapping[str, int]
     begin: float
@@ -51,12 +51,12 @@ class Arc(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """Arcs between two instants set by the user.
+    """Arcs between two ends or via points of a phase.
 
     Attributes:
         phase: index of the user's phase.
-        part: number of its via points before.
-        arcs: in order; their durations add up to the duration of the leg.
+        part: number of via points of the phase before the leg.
+        arcs: consecutive arcs, whose durations add up to the duration of the leg.
     """
 
     phase: int
@@ -65,26 +65,26 @@ class Leg(NamedTuple):
 
     @property
     def duration(self) -> float:
-        """Sum of the durations [s]."""
+        """Sum of the durations of the arcs [s]."""
         return self.arcs[-1].end - self.arcs[0].begin
 
     def replaced(self, begin: int, end: int, *arcs: Arc) -> "Leg":
-        """Return the leg with other arcs instead of those from `begin` to before `end`."""
+        """Return the leg with `arcs` in place of its arcs with indices `begin` to `end` - 1."""
         return self._replace(arcs=(*self.arcs[:begin], *arcs, *self.arcs[end:]))
 
 
 Legs = tuple[Leg, ...]
-"""A whole sequence."""
+"""Mode sequence of a motion."""
 
 
 def read(contact: str, t: Array, slip: Array, creep: float, shortest: float) -> Track:
     """Deduce the track of one contact from its sliding velocities.
 
     Args:
-        contact: its name.
-        t, slip: times [s], and sliding velocities there, shape (n,).
-        creep: slower than this it sticks: a smooth law creeps under load.
-        shortest: runs shorter than this [s] are merged with their neighbours.
+        contact: name of the contact.
+        t, slip: times [s] and sliding velocities [m/s], shape (n,).
+        creep: sliding velocity [m/s] below which the contact sticks; smooth laws creep under load.
+        shortest: duration [s] below which runs are merged with their neighbours.
     """
     modes = np.where(np.abs(slip) < creep, 0, np.sign(slip)).astype(int)
     first = np.flatnonzero(np.append(True, np.diff(modes) != 0))
@@ -103,17 +103,17 @@ def with_rests(
     width: float,
     ends: tuple[bool, bool] = (True, True),
 ) -> Track:
-    """Return `track` with stick of about `width` [s] at every reversal, and optionally at its ends.
+    """Return `track` with stick of about `width` [s] at each reversal, and optionally at its ends.
 
-    Unnecessary stick intervals shrink when the durations are optimised, and are removed; missing
-    ones cannot appear.
+    Unnecessary stick intervals shrink when durations are optimised, and are then removed. Missing
+    stick intervals cannot appear.
 
     Args:
         track: runs of one contact.
-        can_rest: whether some control can hold the contact at a time: stick that nothing can hold
-            would make the program infeasible.
-        width: of the stick intervals [s].
-        ends: whether the contact sticks at the start and at the end.
+        can_rest: function that returns True if some control can hold the contact at a time. Other
+            stick would make the program infeasible.
+        width: duration of the stick intervals [s].
+        ends: True if the contact sticks at the start, and at the end.
     """
     runs: list[Run] = []
     for run in track.runs:
@@ -135,7 +135,7 @@ def with_rests(
 
 
 def cut(tracks: Sequence[Track], leg: tuple[int, int], begin: float, end: float) -> Leg:
-    """Return the leg (phase, part) from `begin` to `end`, cut at every change of mode."""
+    """Return the leg (phase, part) from `begin` to `end`, divided at each change of mode."""
     inside = {run.end for track in tracks for run in track.runs if begin < run.end < end}
     near = SAME_INSTANT * (end - begin)
     times = [t for t in sorted(inside) if t - begin > near and end - t > near]
@@ -147,7 +147,7 @@ def cut(tracks: Sequence[Track], leg: tuple[int, int], begin: float, end: float)
 
 
 def placed(legs: Legs, durations: Sequence[float]) -> Legs:
-    """Return `legs` with other durations of their arcs, in sequence from the same start."""
+    """Return `legs` with other `durations` of their arcs and the same start."""
     times = iter(durations)
     t = legs[0].arcs[0].begin
     moved: list[Leg] = []
@@ -161,9 +161,9 @@ def placed(legs: Legs, durations: Sequence[float]) -> Legs:
 
 
 def pruned(legs: Legs, shortest: float) -> Legs:
-    """Return `legs` without arcs up to `shortest` [s] long.
+    """Return `legs` without arcs of at most `shortest` [s].
 
-    Equal neighbours are merged; the longest arc of a leg always stays.
+    Neighbours with equal modes are merged. The longest arc of a leg is always kept.
     """
     return tuple(_without(leg, shortest) for leg in legs)
 
@@ -198,7 +198,7 @@ def inserted(legs: Legs, number: int, contact: str, mode: int, begin: float, end
 
 
 def tracks_of(legs: Legs) -> dict[str, tuple[Run, ...]]:
-    """Return contact -> its runs, over all legs."""
+    """Return contact -> its runs over all legs."""
     runs: dict[str, list[Run]] = {}
     for arc in flat(legs):
         for contact, mode in arc.modes.items():
@@ -207,7 +207,7 @@ def tracks_of(legs: Legs) -> dict[str, tuple[Run, ...]]:
 
 
 def shown(legs: Legs) -> str:
-    """Return the sequence as text, such as "0+0- | -0": legs separated, contacts in brackets."""
+    """Return the sequence as text: "0+0- | -0" with "|" between legs, "(+0)" for two contacts."""
 
     def sign(modes: Mapping[str, int]) -> str:
         signs = "".join("-0+"[mode + 1] for mode in modes.values())
@@ -217,7 +217,7 @@ def shown(legs: Legs) -> str:
 
 
 def _merged(runs: Sequence[Run]) -> list[Run]:
-    """Return runs with equal neighbours merged."""
+    """Return `runs` with neighbours of equal mode merged."""
     merged: list[Run] = []
     for run in runs:
         if merged and merged[-1].mode == run.mode:
@@ -230,8 +230,8 @@ def _merged(runs: Sequence[Run]) -> list[Run]:
 def neighbours(legs: Legs, width: float) -> Iterator[Legs]:
     """Yield sequences with an additional arc of about `width` [s] where changes of mode coincide.
 
-    At the end of a leg the modes of the next one start earlier, or its own last modes end later,
-    for each contact; inside a leg simultaneous changes of contacts become consecutive.
+    At the end of a leg, one contact changes its mode before or after the end. Inside a leg, one of
+    several simultaneous changes occurs before the others.
     """
     for k, (leg, then) in enumerate(pairwise(legs)):
         last, first = leg.arcs[-1], then.arcs[0]
@@ -257,5 +257,5 @@ def neighbours(legs: Legs, width: float) -> Iterator[Legs]:
 
 
 def _changes(before: Arc, after: Arc) -> list[str]:
-    """Return contacts of both arcs whose modes differ."""
+    """Return the contacts whose modes differ between two arcs."""
     return [n for n, mode in before.modes.items() if n in after.modes and after.modes[n] != mode]

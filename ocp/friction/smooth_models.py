@@ -1,4 +1,4 @@
-"""Models with smooth friction, and their smoothing widths in multiples of the speeds."""
+"""Models with smooth friction, and their smoothing widths relative to sliding velocities."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,23 +22,23 @@ from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Monitor
 
 WIDTH = 1e-3
-"""Default width [m/s] of a substitute for a law without a velocity scale."""
+"""Default smoothing width [m/s] of a substitute for a law without a velocity scale."""
 Array = NDArray[np.float64]
 LEAST = 0.1
-"""Least ratio of a contact's scale to the previous one, for contacts that barely move."""
+"""Smallest ratio of the scale of a contact to its previous scale, for contacts that barely move."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Width:
-    """A parameter of a smooth model that sets the smoothing width around v = 0.
+    """Parameter of a smooth model that determines the smoothing width around v = 0.
 
     Attributes:
         contact: name of the contact.
-        parameter: its name in `Model.p`, "<contact>_<width>".
-        number: its value in the user's model.
-        exponent: of the width in it: 1 for a width, -1 for a steepness.
-        layer: smoothing width [m/s] at `number`; None for one of a load, as `JointFriction.eps`.
+        parameter: name of the parameter in `Model.p`, "<contact>_<width>".
+        number: value of the parameter in the user's model.
+        exponent: exponent of the width in the parameter: 1 for a width, -1 for a steepness.
+        layer: smoothing width [m/s] at `number`; None for a width of loads, as `JointFriction.eps`.
         least: smoothing width [m/s] of the user's law; 0 for a substitute.
     """
 
@@ -50,10 +50,10 @@ class Width:
     least: float = 0.0
 
     def at(self, layer: float) -> float:
-        """Return its value for a smoothing width [m/s].
+        """Return the value of the parameter for a smoothing width `layer` [m/s].
 
         Raises:
-            ValueError: it is not a width of velocities.
+            ValueError: the parameter is not a width of velocities.
         """
         if self.layer is None:
             raise checks.refused(self.parameter, "a width of velocities", "one of a load [N]")
@@ -61,15 +61,17 @@ class Width:
 
 
 def smooth_model(model: Model) -> Model:
-    """Return `model` with the widths of all contacts as parameters, see `widths`.
+    """Return `model` with smooth laws and with the widths of all contacts as parameters.
 
-    Laws that neither smooth nor are smooth (with modes, with states, without regularisation) are
-    replaced by one with the same sliding force and static level. With s = tanh 4x, x = v / width,
+    Laws with modes or states, and laws with a jump that is not smoothed, are replaced by a law with
+    the same sliding force and static level. With s = tanh 4x, x = v / width,
 
         F = (1 + s)/2 sliding(|v|, +1) + (1 - s)/2 sliding(-|v|, -1) + excess x / (x^2/4 + 3/4)^2
 
     where the excess is the static level minus the sliding force at v = 0.
-    Raises ValueError for laws without a force on each side of v = 0.
+
+    Raises:
+        ValueError: a law has no force on each side of v = 0.
     """
     return _smoothed(model)[0]
 
@@ -135,7 +137,7 @@ def _smooth_force(model: Model, contact: Contact) -> tuple[ca.SX, list[Variable]
 
 
 def _substitute(contact: Contact, width: ca.SX) -> ca.SX:
-    """Return the smooth force [N] of a law that is replaced."""
+    """Return the smooth force [N] that replaces the law of `contact`; see `smooth_model`."""
     v, N, law, given = contact.slip, contact.N, _law(contact), contact.further
     x, speed = v / width, smooth.magnitude(v, width)
     s, bump = tanh(4 * x), x / (0.25 * (x * x) + 0.75) ** 2
@@ -156,7 +158,7 @@ def _law(contact: Contact) -> Law:
 
 
 def _jumps(model: Model, contact: Contact) -> bool:
-    """Return True if friction is nonzero at rest, at the start values of the parameters.
+    """Return True if friction at rest is nonzero for the start values of the parameters.
 
     It is zero for viscous friction and for an unloaded contact.
     """
@@ -168,12 +170,12 @@ def _jumps(model: Model, contact: Contact) -> bool:
 
 
 def sticking(model: Model) -> tuple[Contact, ...]:
-    """Return the contacts that can stick: friction that is zero at v = 0 has no modes."""
+    """Return the contacts that can stick, whose friction is nonzero at v = 0."""
     return tuple(contact for contact in model.contacts if _jumps(model, contact))
 
 
 class Scale(NamedTuple):
-    """Scales of the widths of one contact.
+    """Scales of the smoothing widths of one contact.
 
     Attributes:
         speed: largest sliding velocity of the motion [m/s or rad/s].
@@ -185,11 +187,11 @@ class Scale(NamedTuple):
 
 
 Scales = Mapping[str, Scale]
-"""Contact -> its scale."""
+"""Contact -> its scales."""
 
 
 def smoothed(problem: Problem) -> Problem:
-    """Return `problem` with smooth friction everywhere, its widths as parameters."""
+    """Return `problem` with smooth models, whose widths are parameters."""
     made = {id(phase.model): smooth_model(phase.model) for phase in problem.chain}
     phases = tuple(replace(phase, model=made[id(phase.model)]) for phase in problem.chain)
     return replace(problem, phases=Chain(phases))
@@ -198,11 +200,11 @@ def smoothed(problem: Problem) -> Problem:
 def scales_of(problem: Problem, smooth: Problem, points: Points, before: Scales) -> Scales:
     """Return the scales of the motion `points`, at least `LEAST` times the previous ones.
 
-    A normal force that depends on the friction force of another contact is omitted.
+    Normal forces that depend on the friction force of another contact are omitted.
 
     Args:
         problem: the user's problem.
-        smooth: the problem of `points`, with smooth models.
+        smooth: the problem with smooth models to which `points` belong.
         points: the motion.
         before: previous scales; empty if there are none.
     """
@@ -222,16 +224,16 @@ def scales_of(problem: Problem, smooth: Problem, points: Points, before: Scales)
 
 
 def same_size(a: Scales, b: Scales, factor: float) -> bool:
-    """Return True if no speed differs by more than `factor`."""
+    """Return True if the speeds of each contact differ by at most a factor `factor`."""
     speeds = [(a[name].speed, b[name].speed) for name in a]
     return all(max(pair) <= factor * min(pair) for pair in speeds)
 
 
 def guessed(problem: Problem, scales: Sequence[Scales]) -> Scales:
-    """Return the expected scales of a motion from those of several starts.
+    """Return the expected scales of a motion from the scales of several starts.
 
-    The speed is the largest median speed of all contacts that slide, or that turn: a body at rest
-    in straight lines from end to end will move, and too wide layers do no harm.
+    The speed is the largest median speed of all sliding contacts, or of all turning ones. A body at
+    rest in the initial guess may move in the solution, and too wide layers are harmless.
     """
     turning = {c.name: c.turning for phase in problem.chain for c in phase.model.contacts}
     speeds = {name: float(np.median([s[name].speed for s in scales])) for name in turning}
@@ -250,7 +252,7 @@ def _all_widths(problem: Problem) -> Iterator[Width]:
 
 
 def widths_at(problem: Problem, scales: Scales, level: float) -> dict[str, float]:
-    """Return values of the widths of the smooth models: `level` times the scales.
+    """Return parameter -> value for widths of `level` times the scales.
 
     The widths of the user's laws are lower bounds.
     """
@@ -272,9 +274,9 @@ def speeds_at(problem: Problem, scales: Scales, level: float) -> dict[str, float
 
 
 def own_level(problem: Problem, scales: Scales) -> float:
-    """Return the smoothing width of the user's laws, in multiples of the speeds.
+    """Return the smallest smoothing width of the user's laws, in multiples of the speeds.
 
-    The narrowest counts; 0 for laws without smoothing.
+    It is 0 if no law is smoothed.
     """
     found = [
         w.least / scales[w.contact].speed

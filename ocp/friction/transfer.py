@@ -1,4 +1,4 @@
-"""Transfer of motions to arcs by name and time, and the mode sequence of a motion."""
+"""Transfer of motions to arcs by name and time, and deduction of mode sequences from motions."""
 
 from collections.abc import Mapping, Sequence
 from math import isfinite
@@ -23,18 +23,18 @@ from symfric.model import Model
 
 Array = NDArray[np.float64]
 SHORT_RUN = 5e-3
-"""Share of the whole duration below which a run is merged with its neighbours."""
+"""Duration, relative to the total one, below which a run is merged with its neighbours."""
 NEW_REST = 2.5e-3
-"""Initial duration of an inserted stick interval, over the whole duration."""
+"""Initial duration of an inserted stick interval, relative to the total duration."""
 
 
 class Known(NamedTuple):
-    """A known motion over its whole time.
+    """Known motion with its parameters.
 
     Attributes:
-        motion: signals at times, and inputs held from times on.
-        p: values of parameters, by name.
-        chosen: of those that were chosen.
+        motion: signals over time, and inputs that are constant on intervals.
+        p: values of all parameters by name.
+        chosen: values of the chosen parameters by name.
     """
 
     motion: Motion
@@ -50,7 +50,7 @@ class Known(NamedTuple):
         return Known(motion, p | dict(chosen), chosen)
 
     def signal(self, name: str, t: Array) -> Array:
-        """Return values at times by linear interpolation; zero if unknown."""
+        """Return the values of a signal at times by linear interpolation; zeros if unknown."""
         values = self.motion.signals.get(name, np.zeros(0))
         known = np.isfinite(values)
         if not known.any():
@@ -60,14 +60,14 @@ class Known(NamedTuple):
     def held(self, name: str, t: Array) -> Array:
         """Return the values of an input at times."""
         values = self.motion.controls.get(name)
-        if values is None:  # there a state: an input with bounded rate
+        if values is None:  # an input with bounded rate is a state
             return self.signal(name, t)
         at = np.searchsorted(self.motion.t_control, t, side="right") - 1
         found = values[np.maximum(at, 0)]
         return np.where(np.isfinite(found), found, 0.0)
 
     def along(self, model: Model, expression: ca.SX, t: Array) -> Array:
-        """Return values of an expression in the symbols of `model`, shape (n, times)."""
+        """Return the values of an expression in the symbols of `model`, shape (n, times)."""
         groups = [
             np.array([take(v.name, t) for v in group]).reshape(-1, t.size)
             for group, take in (
@@ -82,9 +82,9 @@ class Known(NamedTuple):
 
 
 def points_in(into: Transcription, arcs: Sequence[Arc], known: Known) -> Points:
-    """Return the initial guess: phase k of `into` takes the known motion during arc k.
+    """Return initial points in which phase k of `into` follows the known motion during arc k.
 
-    Algebraic variables satisfy the equations after one step of Newton's method.
+    Algebraic variables are improved by one step of Newton's method.
     """
     spans: list[SpanPoints] = []
     for number, (span, arc) in enumerate(zip(into.problem.spans, arcs, strict=True)):
@@ -113,8 +113,8 @@ class Reading(NamedTuple):
     """Settings for deducing modes from a motion.
 
     Attributes:
-        creep: contact -> sliding velocity below which it sticks.
-        rests: whether stick is inserted at reversals and at the ends.
+        creep: contact -> sliding velocity [m/s] below which it sticks.
+        rests: True to insert stick at reversals and at the ends.
     """
 
     creep: Mapping[str, float]
@@ -122,12 +122,12 @@ class Reading(NamedTuple):
 
 
 def sequence_of(problem: Problem, known: Known, reading: Reading) -> Legs:
-    """Return the legs of `problem` with the arcs of a motion.
+    """Return the mode sequence of a motion of `problem`.
 
     Args:
-        problem: the user's problem, one scenario.
-        known: its sharpened motion.
-        reading: thresholds of stick.
+        problem: the user's problem without scenarios.
+        known: sharpened motion of the problem.
+        reading: settings for deducing modes.
     """
     tracks = [_track(problem, known, reading, *stay) for stay in _stays(problem)]
     if reading.rests:
@@ -142,7 +142,7 @@ def sequence_of(problem: Problem, known: Known, reading: Reading) -> Legs:
 
 
 def sizes_of(problem: Problem, known: Known) -> dict[str, float]:
-    """Return the typical static level of each contact [N]: its mean over the motion."""
+    """Return the typical static level of each contact [N], the mean over the motion."""
     sizes: dict[str, float] = {}
     for phase in problem.chain:
         contacts = sticking(phase.model)
@@ -156,21 +156,21 @@ def sizes_of(problem: Problem, known: Known) -> dict[str, float]:
 
 
 def starts_at_rest(problem: Problem, known: Known, creep: Mapping[str, float]) -> tuple[str, ...]:
-    """Return contacts without slip at the start."""
+    """Return the names of contacts without slip at the start."""
     t = known.motion.t[:1]
     names = (c.name for c in sticking(problem.chain[0].model))
     return tuple(n for n in names if abs(_slip(problem, known, 0, n, t)[0]) < 1e-3 * creep[n])
 
 
 def _slip(problem: Problem, known: Known, number: int, name: str, t: Array) -> Array:
-    """Return sliding velocities of a contact at times in one phase."""
+    """Return the sliding velocities of a contact at times in one phase."""
     model = problem.chain[number].model
     contact = next(c for c in model.contacts if c.name == name)
     return known.along(model, contact.slip, t)[0]
 
 
 def _stays(problem: Problem) -> list[tuple[int, int, str]]:
-    """Return (first phase, last phase, contact) of each uninterrupted contact."""
+    """Return (first phase, last phase, contact) for each contact over consecutive phases."""
     stays: list[tuple[int, int, str]] = []
     for number, phase in enumerate(problem.chain):
         for contact in sticking(phase.model):
@@ -199,7 +199,7 @@ def _track(
 def _with_rests(
     problem: Problem, known: Known, reading: Reading, track: Track, tracks: Sequence[Track]
 ) -> Track:
-    """Return `track` with stick where inputs can hold the contact."""
+    """Return `track` with inserted stick where inputs can hold the contact."""
     name, phases = track.contact, known.motion.phases
 
     def phase_at(t: float) -> int:
@@ -221,7 +221,7 @@ def _holdable(
 ) -> bool:
     """Return True if inputs within their bounds can hold a contact at a time.
 
-    The force needed is affine in the inputs of most models; for others this is its tangent.
+    The required force is affine in the inputs of most models, and is linearised for others.
     """
     model, span, at = problem.chain[number].model, problem.spans[number], np.array([t])
     modes = {c.name: 0 for c in sticking(model)}

@@ -1,4 +1,4 @@
-"""Model predictive control: quadratic programs on implicit steps, C code, and closed loops."""
+"""Model predictive control: controllers derived from problems, their C code, and closed loops."""
 
 from typing import TYPE_CHECKING
 

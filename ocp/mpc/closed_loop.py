@@ -1,9 +1,9 @@
-"""A controller on a simulated plant, and an independent check of its plans.
+"""Simulation of a controller on a plant, and an independent check of its plans.
 
-The check evaluates the conditions of optimality by derivatives of CasADi: it shares only the
-expressions of the horizon with the solver. The program over all states and inputs is formulated as
-a whole, differentiated as one expression, and the multipliers of the equations are those that make
-the gradient in the states zero (a linear system).
+The check evaluates the optimality conditions by derivatives of CasADi and shares only the
+expressions of the horizon with the solver. The program over all states and inputs is differentiated
+as one expression. The multipliers of the equations follow from a linear system, in which the
+gradient in the states is zero.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ Reference = float | Callable[[Array], ArrayLike]
 FROM_ACTIONS = (
     "residual", "seconds", "cpu", "iterations", "program_iterations", "violation",
 )  # fmt: skip
-"""Attributes of each action that a loop stores."""
+"""Attributes of each action that a run stores."""
 SLACK = 1e-3
-"""Relative difference between a residual and its check that is rounding error."""
+"""Relative difference between a residual and its check that counts as rounding error."""
 
 
 @final
 class Optimality:
-    """Independent residuals of plans of a design."""
+    """Independent computation of residuals of plans of a controller."""
 
     def __init__(self, design: Design) -> None:
         h = design.horizon
@@ -76,7 +76,7 @@ class Optimality:
         self._whole = ca.Function("whole", [X, U, R, t, p, b, m], results)
 
     def residual(self, plan: Plan, data: CycleData) -> float:
-        """Return the residual as defined in `ocp.mpc.source`."""
+        """Return the residual of a plan as defined in `ocp.mpc.source`."""
         h, prices = self._design.horizon, self._design.prices
         gradient, slopes, c, v = evaluate_all(
             self._whole, plan.X, plan.U, data.R, data.t, data.p, data.b, plan.z
@@ -98,24 +98,25 @@ class Optimality:
 @final
 @dataclass(frozen=True, eq=False)
 class ClosedLoopRun:
-    """A plant under a controller; arrays have an entry for each of the n cycles.
+    """Run of a plant with a controller; arrays have an entry for each of the n cycles.
 
     Attributes:
-        plant, controller: names.
-        t: times of the cycles [s]; the last signals are at `t_end`.
-        t_end: [s].
-        signals: of the plant at the cycles and at the end, shape (n + 1,).
-        units: of signals and controls.
-        controls: input -> value held over the interval after each cycle.
+        plant, controller: names of plant and controller.
+        t: times of the cycles [s].
+        t_end: end time [s].
+        signals: signals of the plant at each cycle and at `t_end`, shape (n + 1,).
+        units: units of signals and controls.
+        controls: input -> value over the interval after each cycle.
         references: name -> value at each cycle.
-        residual: of each cycle, as the controller reports it.
-        checked: the same by the independent check (`Optimality`); NaN without it.
+        residual: residual reported by the controller.
+        checked: residual by the independent check (`Optimality`); NaN without check.
         seconds, cpu: wall time and processor time of each cycle [s]; the wall time includes other
             programs on a busy machine.
-        iterations, program_iterations: quadratic programs, and of the interior point.
+        iterations, program_iterations: numbers of quadratic programs and of interior-point
+            iterations.
         violation: largest violation of a soft bound in the plan, in units of its signal.
-        status: of each cycle, numbers of `CycleStatus`.
-        tolerance: of the residual.
+        status: status of each cycle as a number of `CycleStatus`.
+        tolerance: tolerance of the residual.
     """
 
     plant: str
@@ -144,17 +145,17 @@ class ClosedLoopRun:
 
     @property
     def median(self) -> float:
-        """Median of the cycle times [s]."""
+        """Median wall time of a cycle [s]."""
         return float(np.median(self.seconds))
 
     @property
     def worst(self) -> float:
-        """Longest of the cycle times [s]."""
+        """Longest wall time of a cycle [s]."""
         return float(self.seconds.max())
 
     @property
     def worst_cpu(self) -> float:
-        """Longest cycle of the processor [s]."""
+        """Longest processor time of a cycle [s]."""
         return float(self.cpu.max())
 
     @property
@@ -164,7 +165,7 @@ class ClosedLoopRun:
 
     @property
     def unreported(self) -> int:
-        """Number of cycles reported as converged that were not, by their residual or the check.
+        """Number of cycles reported as converged whose residual or check exceeds the tolerance.
 
         It should be zero.
         """
@@ -174,7 +175,7 @@ class ClosedLoopRun:
         return int(np.count_nonzero(reported & wrong))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table as plain data."""
+        """Return the numbers of `table` as plain data."""
         finite = self.residual[np.isfinite(self.residual)]
         return {
             "controller": self.controller,
@@ -205,7 +206,7 @@ class ClosedLoopRun:
         )
 
     def to_csv(self, path: str | Path) -> None:
-        """Write a row per cycle: time, signals, controls, references, residual and status."""
+        """Write one row per cycle with time, signals, controls, references, residual and status."""
         columns: dict[str, Array] = {"t [s]": self.t}
         signals = {name: values[:-1] for name, values in self.signals.items()}
         for name, values in (signals | dict(self.controls)).items():
@@ -216,7 +217,7 @@ class ClosedLoopRun:
         write_table(path, columns, np.column_stack(list(columns.values())).tolist())
 
     def plot(self, *names: str, path: str | Path | None = None) -> Figure:
-        """Plot signals, controls and cycle times over time, a panel each; shaded: not converged.
+        """Plot signals, controls and cycle times over time, one panel each; see `plot_loops`.
 
         Args:
             names: signals and controls to show, by default all.
@@ -228,13 +229,13 @@ class ClosedLoopRun:
 def plot_loops(
     loops: Mapping[str, ClosedLoopRun], names: Sequence[str] = (), path: str | Path | None = None
 ) -> Figure:
-    """Plot signals and controls of closed loops over time, a panel each, and their cycle times.
+    """Plot signals and controls of closed loops over time, one panel each, and cycle times.
 
-    Shaded cycles did not converge, by their own status.
+    Shaded cycles did not converge according to their status.
 
     Args:
-        loops: legend entry -> loop.
-        names: signals and controls to show; by default all that the loops share.
+        loops: legend entry -> run.
+        names: signals and controls to show, by default all that the runs have in common.
         path: image file.
     """
     first = next(iter(loops.values()))

@@ -30,7 +30,7 @@ ALLOWED = frozenset(TRANSCENDENTAL.values()) | {
     "sqrt", "fabs", "fmin", "fmax", "floor", "ceil", "copysign", "sincos", "memcpy", "memmove",
     "memset", "_GLOBAL_OFFSET_TABLE_",
 }  # fmt: skip
-"""Symbols that the object file may need: math.h, and copies inserted by the compiler."""
+"""Symbols that the object file may need: functions of math.h and those inserted by compilers."""
 
 TINY = float(np.finfo(float).tiny)
 
@@ -41,12 +41,12 @@ class ControllerCheck:
     """Result of checking generated C.
 
     Attributes:
-        status: "verified", or the reason.
+        status: "verified", or the reason why the check failed.
         cycles: number of checked cycles.
-        warnings: of the compiler.
-        foreign: symbols that the object file needs besides math.h; None without `nm`.
-        difference: largest relative difference of a control from its plan, and of a residual, as
-            far as above the tolerance, from the independent check; rounding is allowed.
+        warnings: warnings of the compiler.
+        foreign: symbols other than those of math.h that the object file needs; None without `nm`.
+        difference: largest relative difference of a control from its plan, and of a residual from
+            the independent check, relative to the larger of the residual and the tolerance.
         bytes: size of the struct with plan and work space.
     """
 
@@ -59,7 +59,7 @@ class ControllerCheck:
 
     @property
     def ok(self) -> bool:
-        """True if there are no warnings, no foreign symbols, and plans as optimal as reported."""
+        """True if there are no warnings and foreign symbols, and residuals are as reported."""
         return self.status == "verified"
 
 
@@ -70,8 +70,8 @@ class GeneratedController:
 
     Attributes:
         folder: folder of the files.
-        files: header and source.
-        design: of the controller.
+        files: paths of header and source.
+        design: definition of the controller.
     """
 
     folder: Path
@@ -81,9 +81,9 @@ class GeneratedController:
     def verify(self, cycles: int = 100) -> ControllerCheck:
         """Compile the files and check their results independently; see `ControllerCheck`.
 
-        The loop is closed through the controller's own model, with noise, references that jump,
-        distant states, and non-finite measurements. The independent residual is that of
-        `Controller.simulate`: derivatives by CasADi of the whole program.
+        The plant is the model of the controller, with noise, references that jump, distant states,
+        and measurements that are not finite. The independent residual is that of
+        `Controller.simulate`, by derivatives of the whole program with CasADi.
         """
         compiler, design = find_compiler(), self.design
         if compiler is None:
@@ -107,7 +107,7 @@ class GeneratedController:
 
 
 def _difference(session: Session, cycles: int) -> float:
-    """Return the largest relative difference over a demanding loop."""
+    """Return the largest relative difference over the loop of `GeneratedController.verify`."""
     design = session.design
     h, settings, own = design.horizon, design.settings, list(design.measured)
     random, check, nominal = np.random.default_rng(0), Optimality(design), h.model.nominal("x")[own]
@@ -136,19 +136,19 @@ def _difference(session: Session, cycles: int) -> float:
 
 
 OWN = ("residual", "violation", "iterations", "program_iterations", "status", "converged")
-"""Members of the output struct in C, besides the controls."""
+"""Members of the output struct in C other than controls."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Controller:
-    """A model predictive controller; created by `controller_of` or `problem.to_mpc`.
+    """Model predictive controller, created by `controller_of` or `problem.to_mpc`.
 
-    Every `step` seconds the states are measured, the problem is solved over the next T seconds
-    from there, and the inputs of the first interval are applied.
+    Every `step` seconds the states are measured, the problem is solved from these states over the
+    next T seconds, and the inputs of the first interval are applied.
 
     Attributes:
-        design: its horizon and settings.
+        design: horizon and settings of the controller.
     """
 
     design: Design
@@ -174,19 +174,19 @@ class Controller:
 
     @property
     def references(self) -> tuple[str, ...]:
-        """Names of its references."""
+        """Names of the references."""
         return self.design.horizon.references
 
     @property
     def bounds(self) -> dict[str, float]:
-        """Names of all bounds in C, and their values."""
+        """Name in C -> value of each bound."""
         return dict(zip(self.design.bound_names, self.design.bounds.tolist(), strict=True))
 
     def start(self, backend: str = "auto") -> Session:
         """Return a running controller, without a plan.
 
         Args:
-            backend: "auto" or "compiled", with the same meaning: the C of `to_c` on this machine.
+            backend: "auto" or "compiled", which both compile the C of `to_c` for this machine.
 
         Raises:
             CompileError: there is no compiler (install gcc or clang, or set $CC), or it failed.
@@ -215,25 +215,24 @@ class Controller:
     ) -> ClosedLoopRun:
         """Simulate the controller on a plant, whose equations may differ from its model.
 
-        The plant has the controlled inputs and the measured signals by the same names; its other
-        inputs keep the values of the model.
+        The plant must have the controlled inputs and the measured signals by the same names. Its
+        other inputs keep the values of the plant model.
 
         Args:
-            plant: the model of the plant, with events or without.
-            t_end: [s], rounded to whole cycles.
-            references: name -> number, or function of times [s], which the controller knows ahead.
-            x0, plant_p: start values and parameters of the plant, by name.
-            p: parameters of the controller's model, by name.
-            noise: standard deviation of measured states, by name.
-            seed: of the noise.
-            check: whether an independent residual is computed for each cycle, which takes some
-                milliseconds each.
-            backend: as in `start`.
+            plant: model of the plant, which may have events.
+            t_end: end time [s], rounded to whole cycles.
+            references: name -> number or function of times [s]; the controller knows future values.
+            x0, plant_p: start values and parameters of the plant by name.
+            p: parameters of the model of the controller by name.
+            noise: standard deviations of measured states by name.
+            seed: seed of the noise.
+            check: compute an independent residual for each cycle, which takes some milliseconds.
+            backend: see `start`.
 
         Raises:
-            ValueError: unknown names, bad numbers.
+            ValueError: unknown names or bad numbers.
             SolveError: the plant could not be simulated to the end.
-            CompileError: as `start`.
+            CompileError: see `start`.
         """
         return run_closed_loop(
             self.start(backend), plant, t_end, references or {},
@@ -243,12 +242,12 @@ class Controller:
     def to_c(self, folder: str | Path) -> GeneratedController:
         """Write the controller as C99: `NAME.h` and `NAME.c`.
 
-        The C allocates nothing, needs only math.h, and has no data but constants: memory is in the
-        caller's struct. Every loop is bounded, so the time of a cycle is bounded. Each cycle
-        reports the residual of its output. `start` runs the same C.
+        The C code allocates no memory, needs only math.h, and has only constant data; its memory is
+        a struct of the caller. All loops are bounded, so the time of a cycle is bounded. Each cycle
+        reports the residual of its output. `start` runs the same code.
 
         Raises:
-            ValueError: no folder, or an operation that C99 lacks.
+            ValueError: the folder is invalid, or an operation does not exist in C99.
         """
         design, place = self.design, checks.path("to_c: folder", folder)
         files = place / f"{design.name}.h", place / f"{design.name}.c"
@@ -273,36 +272,38 @@ def controller_of(
 
         min  sum_k h [sum_i w_i r_i^2 + L] + E(x_N)   s.t.  x_(k+1) = F(x_k, u_k),  bounds
 
-    by sequential quadratic programs (`ocp.mpc.source`) from the shifted plan of the previous cycle,
-    over N = T / step intervals with inputs held. Costs are `track`, `effort`, and convex quadratic
-    `integral` and `at_end`; a name such as "goal" in `track("x", "goal", 900.0)` is a reference of
-    the controller, with its default in the `p` of the problem. The start of the phase is not
-    used: the state is measured. Bounds on inputs are hard; those on states and outputs, path
-    conditions and the end of the phase are soft, with an exact penalty.
+    The controller solves sequential quadratic programs (`ocp.mpc.source`), starting from the
+    shifted plan of the previous cycle, over N = T / step intervals with constant inputs. Costs are
+    `track`, `effort`, and convex quadratic `integral` and `at_end`. A name such as "goal" in
+    `track("x", "goal", 900.0)` is a reference of the controller, with its default in the `p` of the
+    problem. The start of the phase is not used, because the state is measured. Bounds on inputs are
+    hard. Bounds on states and outputs, path conditions and the end of the phase are soft, with an
+    exact penalty.
 
     Args:
         problem: the problem to minimise.
         step: time between cycles [s].
-        method, steps: of `flow`, for an interval. The steps should resolve the transition velocity
-            of friction: if v changes by much more than v_t in a step, iterations converge slowly or
-            not at all, as the residual shows. With bristles "backward_euler".
-        measured: names of measured states, by default all; the others, such as bristles, are taken
-            from the plan. Inputs with a rate (`rates`) are never measured.
+        method, steps: method and number of steps of `flow` for an interval. The steps should
+            resolve the transition velocity of friction: if v changes by much more than v_t in a
+            step, iterations converge slowly or not at all, as the residual shows. Use
+            "backward_euler" for laws with bristles.
+        measured: names of measured states, by default all. Other states, such as bristles, are
+            taken from the plan. Inputs with bounded rate (`rates`) are never measured.
         tolerance: residual (see `ocp.mpc.source`) at which a plan is optimal.
         iterations: largest number of quadratic programs in a cycle; 1 is the real-time iteration.
         penalty: penalty of violating a soft bound by its unit, per largest curvature of the cost.
-        name: C identifier; by default the name of the model with "_mpc".
+        name: C identifier, by default the name of the model with "_mpc".
 
     Raises:
-        ValueError: unsupported features: several phases, scenarios, chosen parameters, a
-            free duration, via points, algebraic variables, events, time in the equations, a cost
-            without curvature; names that are not C identifiers.
+        ValueError: several phases, scenarios, chosen parameters, a free duration, via points,
+            algebraic variables, events, time in the equations, a cost without curvature, or names
+            that are not C identifiers.
 
-    Limits: inputs are constant over an interval; unmeasured states are not estimated, only
-    predicted; far from the optimum iterations may run out, as the status reports. Very sharp
-    friction hides the way out of stick: a plan that sticks is optimal to first order, and is the
-    converged result. Use a v_t of about a hundredth of the velocities in the controller (on a drive
-    that moves at 1 m/s, 1e-2 m/s leaves stick and 1e-3 m/s does not); the friction of the plant may
+    Limits: inputs are constant over an interval. States that are not measured are predicted, not
+    estimated. Far from the optimum the limit of iterations may be reached, as the status reports.
+    With very sharp friction a plan that sticks is optimal to first order, and the iterations
+    converge to it. Use a v_t of about a hundredth of the velocities in the controller: a drive that
+    moves at 1 m/s leaves stick with 1e-2 m/s, but not with 1e-3 m/s. The friction of the plant may
     be arbitrarily sharp.
     """
     h = Horizon(problem, step, method=method, steps=steps)
@@ -312,7 +313,7 @@ def controller_of(
     )
     own, span = problem.chain[0].model, problem.spans[0]
     states, inputs = [v.name for v in h.model.x], [v.name for v in h.model.u]
-    measurable = [name for name in states if name not in {v.name for v in own.u}]  # nothing rated
+    measurable = [name for name in states if name not in {v.name for v in own.u}]
     if measured is not None:
         measurable = checks.names("to_mpc: measured", measured, measurable)
     bounds = {limit.name: i for i, limit in enumerate(h.limits)}
@@ -345,7 +346,7 @@ def controller_of(
 
 
 def _check_names(where: str, design: Design) -> None:
-    """Raise ValueError unless names are C identifiers, unique in their structs."""
+    """Raise ValueError unless all names are C identifiers and unique in their structs."""
     h = design.horizon
     structs = (
         [*h.parameters, *design.bound_names, "tolerance", "iterations"],

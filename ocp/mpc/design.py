@@ -1,4 +1,4 @@
-"""Definition of a controller: its horizon, settings, measurements and controls."""
+"""Definition of a controller (horizon, settings, measurements, controls), and data of a cycle."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class CycleStatus(IntEnum):
-    """End of a cycle; the numbers are those of the C."""
+    """Status of a cycle, with the numbers of the C code."""
 
     CONVERGED = 0
     NOT_CONVERGED = 1
@@ -27,7 +27,7 @@ class CycleStatus(IntEnum):
 
     @property
     def sentence(self) -> str:
-        """Meaning of the status, and what to try."""
+        """Meaning of the status, with a remedy."""
         return {
             0: "converged",
             1: "not converged: the residual is above the tolerance after the last iteration; allow "
@@ -46,7 +46,7 @@ class Settings:
     Attributes:
         tolerance: residual at which a plan is optimal.
         iterations: largest number of quadratic programs; 1 is the real-time iteration.
-        program: largest number of interior-point iterations in each.
+        program: largest number of interior-point iterations in a quadratic program.
         halvings: largest number of step halvings.
     """
 
@@ -57,7 +57,7 @@ class Settings:
 
 
 class Plan(NamedTuple):
-    """States (N+1, nx), inputs (N, nu), and multipliers of all rows."""
+    """Planned states (N+1, nx), inputs (N, nu), and multipliers of all rows."""
 
     X: Array
     U: Array
@@ -65,12 +65,13 @@ class Plan(NamedTuple):
 
 
 class CycleData(NamedTuple):
-    """Data of the whole horizon in one cycle.
+    """Data of one cycle over the whole horizon.
 
     Attributes:
-        R: references, shape (N+1, number of them).
+        R: references, shape (N+1, number of references).
         t: times [s], shape (N+1,).
-        p, b: parameters, and bounds of the rows of an interval and of the end.
+        p: parameters.
+        b: bounds of the rows of an interval and of the end.
     """
 
     R: Array
@@ -80,7 +81,7 @@ class CycleData(NamedTuple):
 
 
 class Prices(NamedTuple):
-    """Numbers rho and sigma of rows, zero in hard ones, and a mask of soft ones."""
+    """Penalties rho and sigma of rows, which are zero for hard rows, and a mask of soft rows."""
 
     rho: Array
     sigma: Array
@@ -90,12 +91,13 @@ class Prices(NamedTuple):
 @final
 @dataclass(frozen=True)
 class Control:
-    """Output of a controller: an input, or the mean over the interval of one with a rate.
+    """Output of a controller: an input, or the mean over an interval of an input with bounded rate.
 
     Attributes:
-        name, unit: of the input.
+        name, unit: name and unit of the input.
         place: index of the input, or of the state if `rated`.
-        lower, upper: indices of its bounds in the horizon; None if there is none.
+        rated: True if the input has a bounded rate and is a state of the horizon.
+        lower, upper: indices of the bounds in the horizon; None without bound.
     """
 
     name: str
@@ -106,7 +108,7 @@ class Control:
     upper: int | None
 
     def of(self, X: Array, U: Array, b: Array) -> float:
-        """Return its value in a plan, within its bounds."""
+        """Return the value of the output in a plan, clipped to its bounds."""
         value = 0.5 * (X[0, self.place] + X[1, self.place]) if self.rated else U[0, self.place]
         if self.lower is not None and value < b[self.lower]:
             value = b[self.lower]
@@ -118,14 +120,14 @@ class Control:
 @final
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A controller, without its internal state.
+    """Definition of a controller, without its state.
 
     Attributes:
         name: C identifier.
-        horizon: the minimised problem.
-        settings: limits of the work.
-        measured: indices of the measured states; the others are taken from the plan.
-        controls: its outputs.
+        horizon: problem over the horizon.
+        settings: limits of the work in a cycle.
+        measured: indices of the measured states; other states are taken from the plan.
+        controls: outputs of the controller.
         x0, u0: states and inputs of the first plan.
         p0, r0: default parameters and references.
         penalty: penalty of violating a soft bound by its unit, per largest curvature of the cost.
@@ -175,14 +177,14 @@ class Design:
 
     @cached_property
     def row_prices(self) -> Prices:
-        """Prices of the rows of one interval and of the end."""
+        """Penalties of the rows of one interval and of the end."""
         soft = np.array([limit.soft for limit in self.horizon.all_limits], dtype=bool)
         price = np.where(soft, self.penalty * self.horizon.weight, 0.0)
         return Prices(price, price, soft)
 
     @cached_property
     def prices(self) -> Prices:
-        """Prices of the rows of all intervals and of the end."""
+        """Penalties of the rows of all intervals and of the end."""
         h, one = self.horizon, self.row_prices
         rows = np.arange(one.soft.size)
         rows = np.append(np.tile(rows[: len(h.limits)], h.count), rows[len(h.limits) :])

@@ -1,11 +1,11 @@
-"""The horizon of a controller: one interval as expressions, from a problem of one phase.
+"""Horizon of a controller: expressions of one interval, derived from a problem of one phase.
 
     x_(k+1) = F(x_k, u_k),   cost = sum_k h [sum_i w_i r_i^2 + L] + E(x_N),   v >= 0
 
-Terms with inputs are evaluated at (x_k, u_k), terms of states alone at x_(k+1), because the
-measured state cannot be changed. Each bound is a row v >= 0 in units of its signal. Bounds on
-inputs alone are hard. All others are soft, with the penalty rho s + sigma s^2 / 2 on a violation s,
-which is exact if rho is larger than the multiplier: every quadratic program has a solution.
+Terms with inputs are evaluated at (x_k, u_k), and terms without inputs at x_(k+1), because the
+measured state cannot be changed. Each bound is a row v >= 0 in units of its signal. Bounds that
+depend only on inputs are hard. Other bounds are soft, so that each quadratic program has a
+solution; the penalty rho s + sigma s^2 / 2 of a violation s is exact if rho exceeds the multiplier.
 """
 
 from collections.abc import Iterable
@@ -28,17 +28,19 @@ Terms = Iterable[tuple[float, ca.SX]]
 
 MOST_STEPS = 10_000
 FLAT = 1e-6
-"""Curvature added for an input without one in the cost, relative to the largest one."""
+"""Curvature, relative to the largest one, that is added for an input without curvature."""
 
 
 class Limit(NamedTuple):
-    """A bound as a row v = sign (e - bound) / unit >= 0.
+    """Bound as a row v = sign (e - bound) / unit >= 0.
 
     Attributes:
-        name: its subject, after "lower" or "upper".
-        expression: e, in the symbols of the horizon.
-        bound: default of its value, which is a parameter at run time.
-        soft: True if it may be violated at a price.
+        name: "lower" or "upper", and the subject of the bound.
+        expression: e in the symbols of the horizon.
+        sign: 1 for a lower bound, -1 for an upper one.
+        bound: default value of the bound, which is a parameter at run time.
+        unit: typical magnitude by which the row is divided.
+        soft: True if a violation is only penalised.
     """
 
     name: str
@@ -59,24 +61,24 @@ class Costs(NamedTuple):
 
 @final
 class Horizon:
-    """One interval and the end of the horizon, in separate symbols.
+    """One interval and the end of the horizon, in symbols of their own.
 
     Attributes:
-        model: of the controller.
+        model: model of the controller.
         step, count: length h [s] and number N of the intervals.
         references: names of the parameters that may vary from interval to interval.
-        parameters: names of the others.
-        x, u, after: states at the beginning, inputs, states at the end of an interval.
+        parameters: names of the other parameters.
+        x, u, after: states at the beginning, inputs, and states at the end of an interval.
         t, r, r_after, p: time at the beginning, references at beginning and end, parameters.
-        advance: one of the `substeps` of F, (x, u, r, p) -> x.
-        early, late: cost in (x, u), and in `after`.
-        end: cost of the end of the horizon in `x`.
-        limits: rows of an interval; rows of states alone are in `after`.
-        end_limits: rows of the end of the horizon, in `x`.
+        advance: function (x, u, r, p) -> x of one of the `substeps` of F.
+        early, late: cost as a function of (x, u), and of `after`.
+        end: cost at the end of the horizon as a function of `x`.
+        limits: rows of an interval; rows without inputs are functions of `after`.
+        end_limits: rows of the end of the horizon as functions of `x`.
         b: bounds of `limits` and `end_limits`.
         v, v_end: values of these rows.
-        curvature: smallest own curvature of the cost in an input, per nominal^2: the unit of
-            residuals.
+        curvature: smallest own curvature of the cost in an input, per nominal^2, which is the unit
+            of residuals.
         weight: largest own curvature of an interval, per nominal^2.
     """
 
@@ -84,9 +86,9 @@ class Horizon:
         """Derive the horizon from a problem of one phase with a fixed duration.
 
         Args:
-            problem: with a duration that is an integer multiple of `step`.
-            step: [s].
-            method, steps: of `flow`, for one interval.
+            problem: problem whose duration is an integer multiple of `step`.
+            step: length of an interval [s].
+            method, steps: method and number of steps of `flow` for one interval.
 
         Raises:
             ValueError: all unsupported features.
@@ -141,17 +143,17 @@ class Horizon:
         return *self.limits, *self.end_limits
 
     def _all_parameters(self, r: ca.SX) -> ca.SX:
-        """Return all parameters of the model in its order."""
+        """Return all parameters in the order of the model, with references from `r`."""
         values = {name: r[i] for i, name in enumerate(self.references)}
         values |= {name: self.p[i] for i, name in enumerate(self.parameters)}
         return stacked(values[v.name] for v in self.model.p)
 
     def _early(self, expression: ca.SX) -> ca.SX:
-        """Evaluate at the beginning, with the inputs of the interval."""
+        """Return an expression at the beginning of the interval, with its inputs."""
         return self._at(expression, self.t, self.x, self.u, self._all_parameters(self.r))
 
     def _late(self, expression: ca.SX) -> ca.SX:
-        """Evaluate at the end of the interval; for expressions without inputs."""
+        """Return an expression without inputs at the end of the interval."""
         t, p = self.t + self.step, self._all_parameters(self.r_after)
         return self._at(expression, t, self.after, self.u, p)
 
@@ -162,7 +164,7 @@ class Horizon:
     def _advance(self, method: str, h: float) -> ca.Function:
         """Return (x, u, r, p) -> x after a step of h [s] of `flow`, as an SX Function.
 
-        Accelerations of a mechanism are explicit, not unknowns that need a start.
+        Accelerations of a mechanism are explicit, because unknowns would need a start.
 
         Raises:
             ValueError: see `flow`.
@@ -175,7 +177,7 @@ class Horizon:
         return ca.Function("advance", [self.x, self.u, self.r, self.p], [after], {"cse": True})
 
     def _curvatures(self) -> tuple[float, float]:
-        """Return the smallest own curvature in an input, and the largest of all, per nominal^2."""
+        """Return the smallest own curvature in an input and the largest one, per nominal^2."""
         model, nx, nu = self.model, len(self.model.x), len(self.model.u)
         nominal = np.concatenate([model.nominal(letter) for letter in "xuxx"])
         diagonal = ca.vertcat(*(ca.diag(c.hessian) for c in (self.early, self.late, self.end)))
@@ -191,7 +193,7 @@ class Horizon:
         return max(float(scaled[nx : nx + nu].min()), FLAT * largest), largest
 
     def _limits(self, span: Span, at_end: bool) -> tuple[Limit, ...]:
-        """Return the bounds over an interval, hard for inputs alone, or those at the end, soft."""
+        """Return the bounds over an interval, or at the end; only bounds on inputs are hard."""
         model, limits = span.model, list[Limit]()
         boxes = span.nodes.get(1.0, {}) if at_end else span.boxes
         rows: list[tuple[Row, float]] = []
@@ -216,9 +218,9 @@ class Horizon:
 
 
 def _costs(where: str, v: ca.SX, squares: Terms, others: Terms) -> Costs:
-    """Return the sum of w r^2 and of w e in v, where every e is a convex quadratic.
+    """Return the sum of w r^2 and of w e as a function of v, with convex quadratic e.
 
-    The Hessian lacks the curvature of r.
+    The Hessian does not contain the curvature of r.
 
     Raises:
         ValueError: the Hessian of an e is not constant or has a negative eigenvalue.

@@ -1,13 +1,13 @@
 """Computations of one interval of the horizon, as SX Functions of columns.
 
-The quadratic program of an iteration, with d the change of the states and c = F(x, u) - after:
+The quadratic program of an iteration, with the change d of the states and c = F(x, u) - after, is
 
     min  sum_k g_k'(d_k, du_k) + 1/2 (d_k, du_k)'H_k(d_k, du_k) + the same of d_(k+1)
     s.t. d_(k+1) = A_k d_k + B_k du_k + c_k,   d_0 = 0,   v + D (d_k, du_k, d_(k+1)) >= 0
 
-is solved by a Riccati recursion, to which an interior-point method adds weights w and slopes e of
-the rows, H + D'w D and g + D'e. The loops over the intervals in C (`ocp.mpc.source`) call these
-functions. Constants in A, B, H and D are folded into the code.
+It is solved by a Riccati recursion, in which an interior-point method adds weights w and slopes e
+of the rows, H + D'w D and g + D'e. The loops over the intervals in C (`ocp.mpc.source`) call these
+functions. Constants in A, B, H and D are part of the code.
 
 Source: Rao, Wright and Rawlings, Application of interior-point methods to model predictive control,
     JOTA 99(3), 1998.
@@ -32,7 +32,7 @@ class Packed:
         self._parts: dict[str, tuple[ca.SX, list[int]]] = {}
 
     def add(self, name: str, matrix: ca.SX, *, all_of_it: bool = False) -> None:
-        """Append a matrix: its structural entries, without constants unless `all_of_it`."""
+        """Append the varying entries of a matrix, or all entries if `all_of_it`."""
         matrix = ca.densify(ca.SX(matrix)) if all_of_it else ca.sparsify(ca.SX(matrix))
         places: list[int] = []
         entries: list[Any] = matrix.nonzeros()
@@ -43,7 +43,7 @@ class Packed:
         self._parts[name] = matrix, places
 
     def part(self, name: str, column: ca.SX) -> ca.SX:
-        """Return the matrix `name` with entries from `column`."""
+        """Return the matrix `name` with its varying entries from `column`."""
         matrix, places = self._parts[name]
         pairs = zip(matrix.nonzeros(), places, strict=True)
         values = [entry if place < 0 else column[place] for entry, place in pairs]
@@ -53,19 +53,23 @@ class Packed:
 @final
 @dataclass(frozen=True, eq=False)
 class Kernels:
-    """Functions of an interval and of the end, which are None without cost and conditions there.
+    """Functions of an interval and of the end of the horizon.
+
+    The functions of the end are None if there is no cost and no condition at the end.
 
     Attributes:
         advance: (x, u, r, p) -> x after a substep.
-        tangent: (x, S, u, r, p) -> (x, S) after a substep; S holds the structural entries of the
-            derivative with respect to (x, u) at the beginning of the interval.
-        bend: (lam, E, x, S, u, r, p) -> (lam, E) before a substep: multipliers of its end become
-            those of its beginning, and the curvature of lam' x after it joins E.
+        tangent: (x, S, u, r, p) -> (x, S) after a substep; S is the column of structural entries of
+            the derivative with respect to (x, u) at the beginning of the interval.
+        bend: (lam, E, x, S, u, r, p) -> (lam, E) before a substep: lam changes from multipliers of
+            its end to those of its beginning, and the curvature of lam' x after it is added to E.
         linear: (x, u, after, r, r_after, p, t, b, to, S) -> L = (c, v, all varying entries of the
             program), where to = F(x, u).
-        value: the same arguments but S -> (c, v, cost).
-        matrix: (P, L, w) -> (P, G): one step of the Riccati recursion; G is data for the others.
-        vector: (q, L, G, e) -> (q, k): the linear part of the cost-to-go and of the control.
+        value: (x, u, after, r, r_after, p, t, b, to) -> (c, v, cost).
+        matrix: (P, L, w) -> (P, G): one step of the Riccati recursion; `vector` and `forward`
+            use G.
+        vector: (q, L, G, e) -> (q, k): linear part of the cost-to-go, and constant part of the
+            control.
         forward: (d, L, G, k) -> (d, M = (du, change of v, slope and curvature of the cost)).
         adjoint: (lam, L, m) -> (lam, S = (gradient in u, multipliers of the equations)), with
             multipliers m of the rows.
@@ -94,7 +98,7 @@ class Kernels:
 
     @property
     def all(self) -> list[ca.Function]:
-        """List of the existing Functions."""
+        """All Functions that are not None."""
         return [f for f in vars(self).values() if isinstance(f, ca.Function)]
 
 
@@ -105,7 +109,7 @@ def upper(matrix: ca.SX) -> ca.SX:
 
 
 def symmetric(column: ca.SX, n: int) -> ca.SX:
-    """Return the symmetric (n, n) matrix of an upper triangle."""
+    """Return the symmetric (n, n) matrix of an upper triangle stored by `upper`."""
     found = ca.SX(ca.Sparsity.dense(n, n))
     for j in range(n):
         for i in range(j + 1):
@@ -114,7 +118,7 @@ def symmetric(column: ca.SX, n: int) -> ca.SX:
 
 
 def factored(matrix: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return L and 1/D of L D L' = matrix without pivoting, for a positive definite matrix."""
+    """Return L and 1/D of a positive definite matrix L D L', without pivoting."""
     n = matrix.shape[0]
     lower, inverse = ca.SX.eye(n), ca.SX(n, 1)
     for j in range(n):
@@ -207,7 +211,7 @@ def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
     )
     c, size = L[:nx], nx * (nx + 1) // 2
     P, q, w, e = (ca.SX.sym(n, k) for n, k in (("P", size), ("q", nx), ("w", rows), ("e", rows)))
-    # one step of the recursion
+    # one step of the Riccati recursion, backwards
     whole = symmetric(P, nx) + H_late + D_late.T @ ca.diag(w) @ D_late
     curved = H + symmetric(pack.part("E", L), nx + nu)
     Q = curved + D.T @ ca.diag(w) @ D + F.T @ whole @ F
@@ -223,7 +227,7 @@ def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
     slope = q + g_late + D_late.T @ e + P_whole @ c
     both = g + D.T @ e + F.T @ slope
     k = -solved(kept.part("L", G) + ca.SX.eye(nu), kept.part("1/D", G), both[nx:])
-    # forwards
+    # forward pass
     d, feed = ca.SX.sym("d", nx), ca.SX.sym("k", nu)
     du = K @ d + feed
     now = ca.vertcat(d, du)
@@ -244,7 +248,7 @@ def _recursion(pack: Packed, nx: int, nu: int, rows: int) -> list[ca.Function]:
 
 
 def _end(h: Horizon) -> list[ca.Function]:
-    """Return the Functions of the end of the horizon; none without cost and conditions there."""
+    """Return the Functions of the end of the horizon; [] without cost and conditions there."""
     rows = len(h.end_limits)
     if not rows and not ca.depends_on(h.end.value, h.x):
         return []

@@ -1,4 +1,4 @@
-"""A running controller: cycles of its compiled C."""
+"""Running controllers, which call the compiled C code in each cycle."""
 
 from __future__ import annotations
 
@@ -22,26 +22,25 @@ Array = NDArray[np.float64]
 
 BACKENDS = ("auto", "compiled")
 SCALAR = (*FLAGS, "-fno-tree-vectorize")
-"""Compiler flags. Between calls of libm, whose tanh uses SSE, a few AVX vector instructions would
+"""Compiler flags. A few AVX vector instructions between calls of libm, whose tanh uses SSE, would
 make a cycle seven times longer (measured: 1.1 -> 7.9 ms)."""
 
 WRAPPER = Path(__file__).with_name("wrapper.c").read_text(encoding="utf-8")
-"""C between ctypes and a controller, called NAME in it."""
+"""C code between ctypes and a controller with the name NAME."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Action:
-    """Action of a controller in one cycle.
+    """Result of a controller in one cycle.
 
     Attributes:
         controls: input -> value over the next interval.
-        residual: of the conditions of optimality for the plan of these controls, see
-            `ocp.mpc.source`.
+        residual: residual of the optimality conditions of the plan; see `ocp.mpc.source`.
         violation: largest violation of a soft bound, in units of its signal.
-        iterations: quadratic programs.
-        program_iterations: of the interior point, over all of them.
-        status: of the cycle.
+        iterations: number of quadratic programs.
+        program_iterations: total number of interior-point iterations.
+        status: status of the cycle.
         seconds, cpu: wall time and processor time [s].
     """
 
@@ -62,10 +61,10 @@ class Action:
 
 @final
 class Session:
-    """A controller with its current plan; created by `Controller.start`."""
+    """Running controller with its current plan, created by `Controller.start`."""
 
     def __init__(self, design: Design, head: str = "", body: str = "") -> None:
-        """Compile the C of `design`, generated here or given as header and source.
+        """Compile the C code of `design`, or that of the header `head` and the source `body`.
 
         Raises:
             CompileError: there is no compiler, or it failed.
@@ -104,19 +103,19 @@ class Session:
     ) -> Action:
         """Compute the controls until the next cycle.
 
-        Non-finite measurements are not an error here: the plan of the previous cycle continues,
-        and the status reports it, as in C.
+        Measurements that are not finite raise no exception: as in C, the plan of the previous cycle
+        continues, and the status reports it.
 
         Args:
-            x: measured states by name or in their order.
+            x: measured states, by name or in the order of the controller.
             references: name -> value, or values now and after each interval, shape (N+1,).
-            t: time now [s], for costs and bounds that depend on it.
+            t: current time [s], for costs and bounds that depend on time.
             p: parameters of the model by name.
-            bounds: other bounds by their names in C, such as "force_upper".
-            tolerance, iterations: instead of those of the controller.
+            bounds: changed bounds by their names in C, such as "force_upper".
+            tolerance, iterations: replace those of the controller.
 
         Raises:
-            ValueError: unknown names, wrong shapes.
+            ValueError: unknown names or wrong shapes.
         """
         settings = self.design.settings
         if iterations is not None:
@@ -147,12 +146,12 @@ class Session:
         )  # fmt: skip
 
     def forget(self) -> None:
-        """Restart from a plan that stays at the start of the model."""
+        """Discard the plan, and restart from a plan at the start values of the model."""
         self._library.sf_init(ctypes.c_void_p(address(self._self)))
 
     @property
     def plan(self) -> Plan:
-        """Planned states (N+1, nx), inputs (N, nu) and multipliers; the first row is now."""
+        """Current plan, whose first row is the current time."""
         parts = sizes(self.design)
         X, U = np.zeros((parts["N"] + 1, parts["NX"])), np.zeros((parts["N"], parts["NU"]))
         z = np.zeros(parts["ALL"])

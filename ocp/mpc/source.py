@@ -1,42 +1,43 @@
 """Header and source of a controller in C99, the only implementation of the solver.
 
-Sequential quadratic programs over the horizon, with the residual of optimality:
+Each cycle solves sequential quadratic programs over the horizon:
 
-    1. linearise at the plan (X, U); residual <= tolerance: done
-    2. change and multipliers by the quadratic program
-    3. a step of 1, 1/2, 1/4, ... of it by the merit  cost + prices + nu |defects|_1
+    1. linearise at the plan (X, U), and stop if residual <= tolerance
+    2. find the change of the plan and the multipliers by the quadratic program
+    3. take 1, 1/2, 1/4, ... of this change by the merit  cost + penalties + nu |defects|_1
 
-The Hessian is Gauss-Newton in the first two iterations of a cycle. Near stick, friction has more
-curvature than the cost, and these converge slowly; from the third iteration on the curvature of the
-equations, weighted with their multipliers, is added wherever the Riccati recursion then finds no
-negative pivot.
+The Hessian is the Gauss-Newton one in the first two iterations of a cycle. Near stick, friction has
+more curvature than the cost, and these iterations converge slowly. From the third iteration on, the
+curvature of the equations, weighted with their multipliers, is added if the pivots of the Riccati
+recursion remain positive.
 
-The residual is that of the Karush-Kuhn-Tucker conditions at the returned plan, with the multipliers
-of the equations that make the gradients in the states zero: the largest of
+The residual is that of the Karush-Kuhn-Tucker conditions at the returned plan, with multipliers of
+the equations for which the gradients in the states are zero. It is the largest of
 
- * gradients in the inputs, per nominal and own curvature of the cost in an input: an input would
-   move by no more than that share of its nominal;
- * defects of the equations per nominal of the state;
- * violations of rows in units of their signals; products of rows and multipliers, by the larger
-   of multiplier and that curvature. A soft row may be violated instead if its multiplier is the
-   price: then their difference, relative to the price, times the violation.
+ * gradients in the inputs, divided by nominal value and own curvature of the cost in an input,
+   which bound the remaining change of an input relative to its nominal value;
+ * defects of the equations, divided by the nominal value of the state;
+ * violations of rows in units of their signals, and products of rows and multipliers, divided by
+   the larger of multiplier and this curvature. For a violated soft row the alternative is the
+   difference of multiplier and penalty, relative to the penalty, times the violation.
 
-The quadratic program is solved by a primal-dual interior point. A hard row keeps v >= 0; a soft one
-may be violated by s >= 0 at the price rho s + sigma s^2 / 2:
+The quadratic program is solved by a primal-dual interior-point method. Hard rows have v >= 0. Soft
+rows may be violated by s >= 0 with the penalty rho s + sigma s^2 / 2:
 
     v - t + s = 0,   t z = mu,   s y = mu,   z + y = rho + sigma s
 
-Newton's method with t, s and y eliminated leaves a weight w and a slope e for each row,
+Elimination of t, s and y from Newton's method leaves a weight w and a slope e for each row,
 
     z_new = z + w (o - D d),   w = 1 / (t / z + f),   e = -(z + w o),
     o = mu / z - v - s + f a,   a = rho + sigma s - z - mu / s,   f = 1 / (sigma + y / s)
 
-with f = 0 in a hard row, for the recursion over the intervals. Mehrotra's predictor and corrector
-share its matrices. A program whose free minimum satisfies all rows needs none of this.
+with f = 0 for a hard row, which enter the recursion over the intervals. Mehrotra's predictor and
+corrector use the same matrices. If the minimum without rows satisfies all rows, it is the solution.
 
-Names begin with that of the controller: `NAME_t` holds plan and work space, `NAME_param_t` model
-parameters, bounds, tolerance and iterations, with `NAME_default`; `NAME_in_t` measurements and
-references; `NAME_out_t` controls and results of the cycle; `NAME_init`, `NAME_step`.
+C names begin with the name of the controller. `NAME_t` contains plan and work space; `NAME_param_t`
+(defaults `NAME_default`) model parameters, bounds, tolerance and iterations; `NAME_in_t`
+measurements and references; `NAME_out_t` controls and results. `NAME_init` and `NAME_step` are the
+functions.
 
 Sources: Nocedal and Wright, Numerical Optimization, 2nd ed., (18.36) (weight of the merit);
     Mehrotra, On the implementation of a primal-dual interior point method, SIAM J. Optim. 2(4),
@@ -57,22 +58,22 @@ from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph
 
 FOLDER = Path(__file__).parent
-"""Folder of the fixed text.
+"""Folder of the templates in C.
 
-The loops in cycle.c are one text for all controllers, called NAME in it: sizes are macros, kernels
-are functions. Every loop is bounded, nothing is allocated, all memory is in the caller's struct.
+The file cycle.c contains the loops of all controllers, with NAME for the name of the controller,
+macros for sizes and functions for kernels. Loops are bounded, and memory is a struct of the caller.
 """
 PLAIN = 2
-"""Iterations without curvature of the equations, which has no meaning yet far from the optimum."""
+"""Number of iterations without curvature of the equations, which helps only near the optimum."""
 ARMIJO = 1e-4
 ROUNDING = 1e-12
-"""Relative rounding error of the merit that a step may lose."""
+"""Relative increase of the merit by rounding errors that a step may have."""
 BACK = 0.995
-"""Share of the step to the boundary."""
+"""Step of the interior-point method, as a share of the step to the boundary."""
 CLOSE = 1e-7
-"""mu, in units of the curvature, at which a program is solved."""
+"""Value of mu, in units of the curvature, at which a quadratic program is solved."""
 AWAY = 0.1
-"""Least distance from the bounds at which the interior point starts, in units of the signals."""
+"""Smallest initial distance of the interior-point method from bounds, in units of the signals."""
 
 
 def header(design: Design) -> str:
@@ -120,7 +121,7 @@ def source(design: Design) -> str:
     """Return the text of the source file.
 
     Raises:
-        ValueError: an operation without counterpart in C99.
+        ValueError: an operation does not exist in C99.
     """
     h, kernels, calls = design.horizon, list[str](), Counter[str]()
     for kernel in design.kernels.all:
@@ -170,7 +171,7 @@ def _banner(file: str) -> str:
 
 
 def sizes(design: Design) -> dict[str, int]:
-    """Return macro -> number, for the loops."""
+    """Return macro -> number for the loops in C."""
     h, k = design.horizon, design.kernels
     end = k.end_linear
     return {
@@ -215,7 +216,7 @@ def _members(rows: Iterable[tuple[str, str]]) -> str:
 
 
 def _arrays(shapes: dict[str, tuple[int, ...]]) -> str:
-    """Return members name -> shape; no size is zero in C."""
+    """Return the declarations of members name -> shape; sizes of zero become one."""
     lines = (name + "".join(f"[{max(n, 1)}]" for n in shape) for name, shape in shapes.items())
     return "".join(f"    double {line};\n" for line in lines)
 
@@ -266,7 +267,7 @@ def _tables(design: Design) -> str:
 
 
 def _kernel(function: ca.Function) -> tuple[str, Counter[str]]:
-    """Return a static C function (arguments, results), and the functions it calls."""
+    """Return a static C function with columns as arguments, and the functions that it calls."""
     whole = graph(function)
     count, results = function.n_in(), function.n_out()
     names = [[f"a{i}_{j}" for j in range(function.size1_in(i))] for i in range(count)]

@@ -1,1 +1,1 @@
-"""Solvers, single solves on meshes, starting points, and solutions by name."""
+"""Solvers, single solves on given meshes, initial guesses, and solutions with named signals."""

@@ -1,4 +1,4 @@
-"""Ipopt, fatrop and SQP with exact derivatives, and the meaning of their return codes."""
+"""Solvers Ipopt, fatrop and SQP with exact derivatives, and the status of their return codes."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -22,9 +22,9 @@ MULTIPLIERS = ["x", "p", "lam_f", "lam_g"]
 
 
 def symmetric(triangle: ca.MX) -> ca.MX:
-    """Return the symmetric matrix of an upper triangle, by a gather of its nonzeros.
+    """Return the symmetric matrix of an upper triangle.
 
-    No arithmetic: every nonzero of the result is one of the triangle.
+    Each nonzero of the result is a nonzero of the triangle, so no arithmetic is necessary.
     """
     sparsity = triangle.sparsity()
     numbered = ca.DM(sparsity, np.arange(1.0, sparsity.nnz() + 1))
@@ -56,7 +56,7 @@ def lagrangian(program: Program) -> ca.Function:
 def gradients(program: Program) -> ca.Function:
     """Return (x, p, lam_f, lam_g) -> f, g, gradients of lam_f f + lam_g' g in x and in p.
 
-    The gradient in p is zero: it is not used, but CasADi requires it.
+    The gradient in p is zero, because CasADi requires it but does not use it.
     """
     x, p, lam_f, lam_g = _symbols(program)
     f, slope = program.gradient(x, p)
@@ -80,17 +80,17 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FLOOR = 1e-8
-"""Smallest eigenvalue of a block, over its largest."""
+"""Smallest eigenvalue of a convexified block, relative to its largest eigenvalue."""
 
 
 class _Size(NamedTuple):
-    """All blocks of the same size n, with the sources and targets of their entries.
+    """Blocks of the same size n, with the sources and targets of their entries.
 
     Attributes:
-        share: factor of each entry, shape (blocks, n, n); entries common to several blocks are
-            split between them.
-        source: index of the triangle's nonzero of each entry, the number of nonzeros for none.
-        target: index of the result's nonzero of each entry.
+        share: factor of each entry, shape (blocks, n, n), which divides entries that are common to
+            several blocks between them.
+        source: index of each entry in the nonzeros of the triangle; their number for zero entries.
+        target: index of each entry in the nonzeros of the result.
     """
 
     share: Array
@@ -100,7 +100,10 @@ class _Size(NamedTuple):
 
 @final
 class Convexified(Shaped):
-    """(x, p, lam_f, lam_g) -> the whole Hessian of the Lagrangian, made positive semidefinite."""
+    """Function (x, p, lam_f, lam_g) -> positive semidefinite Hessian of the Lagrangian.
+
+    Negative eigenvalues of the blocks of the exact Hessian are replaced by small positive ones.
+    """
 
     def __init__(self, program: Program) -> None:
         self._hessian = program.hessian
@@ -119,7 +122,7 @@ class Convexified(Shaped):
 
 
 def _clipped(blocks: Array) -> Array:
-    """Return V max(L, 0) V' of each symmetric block (k, n, n)."""
+    """Return V max(L, FLOOR max L) V' of each symmetric block V L V', shape (k, n, n)."""
     if not np.isfinite(blocks).all():
         return blocks
     values, vectors = np.linalg.eigh(blocks)
@@ -128,7 +131,7 @@ def _clipped(blocks: Array) -> Array:
 
 
 def _plan(triangle: ca.Sparsity, hubs: NDArray[np.bool_]) -> tuple[list[_Size], ca.Sparsity]:
-    """Return the blocks of a symmetric matrix from its upper triangle, and their pattern."""
+    """Return the blocks of a symmetric matrix by size, and the sparsity of their sum."""
     n = triangle.size1()
     rows, columns = (np.array(part, np.int64) for part in triangle.get_triplet())
     pairs = zip(rows.tolist(), columns.tolist(), strict=True)
@@ -136,7 +139,7 @@ def _plan(triangle: ca.Sparsity, hubs: NDArray[np.bool_]) -> tuple[list[_Size], 
     border = np.flatnonzero(hubs)
     groups = _groups(rows, columns, hubs, n) or [np.zeros(0, np.int64)]
     blocks = [np.concatenate([group, border]).tolist() for group in groups]
-    entries = {(i, j) for block in blocks for i in block for j in block}  # of all blocks
+    entries = {(i, j) for block in blocks for i in block for j in block}
     ordered = sorted(entries, key=lambda e: (e[1], e[0]))
     pattern = ca.Sparsity.triplet(n, n, [e[0] for e in ordered], [e[1] for e in ordered])
     place = {entry: k for k, entry in enumerate(ordered)}
@@ -154,7 +157,7 @@ def _plan(triangle: ca.Sparsity, hubs: NDArray[np.bool_]) -> tuple[list[_Size], 
 
 
 def _groups(rows: Indices, columns: Indices, hubs: NDArray[np.bool_], n: int) -> list[Indices]:
-    """Return groups of coupled unknowns, without hubs and unknowns without an entry."""
+    """Return the groups of coupled unknowns, without hubs and unknowns that have no entry."""
     inside = ~hubs[rows] & ~hubs[columns]
     graph = ca.Sparsity.triplet(n, n, rows[inside].tolist(), columns[inside].tolist())
     _, order, offsets = (graph + graph.T + ca.Sparsity.diag(n)).scc()
@@ -194,7 +197,7 @@ ANSWERS: dict[str, dict[str, Status]] = {
         "User_Requested_Stop": Status.INTERRUPTED,
     },
 }
-"""Solver -> its return code -> status; every other code is SOLVER_FAILED."""
+"""Solver -> return code -> status; other return codes have the status SOLVER_FAILED."""
 
 QUIET: dict[str, Option] = {"print_level": 0, "sb": "yes"}
 WARM: dict[str, Option] = {
@@ -216,12 +219,12 @@ SQP: dict[str, Option] = {
 QP: dict[str, dict[str, Option]] = {
     "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
 }
-"""QP solver -> options that keep it quiet."""
+"""QP solver -> options that suppress its output."""
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class _Method(ABC):
-    """A solver with options by name."""
+    """Solver with options by name."""
 
     options: Mapping[str, Option]
     max_time: float | None
@@ -252,13 +255,13 @@ class _Method(ABC):
 
     @abstractmethod
     def _build(self, program: Program, warm: bool) -> Built:
-        """Return CasADi's solver; `warm` for a start with multipliers."""
+        """Return the CasADi solver; `warm` is True for a start with multipliers."""
 
     def _made(self, program: Program, **common: Any) -> Any:
         return made(type(self).__name__, self.plugin, program, self.options, common)
 
     def _read(self, stats: Mapping[str, Any]) -> tuple[str, Status]:
-        """Return the solver's return code and its status."""
+        """Return the return code of the solver and its status."""
         answer = str(stats["return_status"])
         return answer, ANSWERS[type(self).__name__].get(answer, Status.SOLVER_FAILED)
 
@@ -266,12 +269,12 @@ class _Method(ABC):
 @final
 @dataclass(frozen=True, eq=False, init=False)
 class Ipopt(_Method):
-    """Ipopt, an interior-point method, with options by name: `Ipopt(max_iter=500, print_level=5)`.
+    """Interior-point solver Ipopt with options by name: `Ipopt(max_iter=500, print_level=5)`.
 
     True and False are passed as "yes" and "no".
 
     Attributes:
-        options: see Ipopt's documentation.
+        options: options of Ipopt; see its documentation.
         max_time: wall time [s] after which a solve ends with its best iterate, or None.
 
     Source: Waechter and Biegler, Mathematical Programming 106(1), 2006, 25-57.
@@ -294,27 +297,27 @@ class Ipopt(_Method):
 @final
 @dataclass(frozen=True, eq=False, init=False)
 class Fatrop(_Method):
-    """Fatrop with options by name: `Fatrop(max_iter=500, mu_init=0.1)`.
+    """Interior-point solver fatrop with options by name: `Fatrop(max_iter=500, mu_init=0.1)`.
 
-    An interior-point method that factorises stage by stage. It requires stages: unknowns that
-    couple only neighbouring intervals. A free duration, a parameter chosen with the trajectory,
-    scenarios and conditions between the two ends couple all of them; such a program is refused
-    with the reason, and Ipopt solves it.
+    Fatrop factorises the program stage by stage, so unknowns may couple only neighbouring
+    intervals. A free duration, a parameter chosen with the trajectory, scenarios and conditions
+    between the two ends couple all intervals. Programs that contain them raise a `ValueError` with
+    the reason; use `Ipopt`.
 
     Attributes:
-        options: see fatrop's documentation.
+        options: options of fatrop; see its documentation.
         max_time: wall time [s] after which a solve ends with its best iterate, or None.
 
-    Limits: multipliers of a start are not used, and best iterates of stopped solves have none.
-    CasADi 3.8 needs a time proportional to N^2 to pass the stages: 0.5 s at N = 200, 16 s at
-    N = 1000. Non-numeric values are refused here, as fatrop ignores them.
+    Limits: multipliers of a start are not used, and the best iterates of stopped solves have zero
+    multipliers. CasADi 3.8 needs a time proportional to N^2 to set up the stages: 0.5 s at N = 200,
+    16 s at N = 1000. Options must be numbers, because fatrop ignores other values silently.
     Source: Vanroye et al., FATROP, IROS 2023.
     """
 
     plugin = "fatrop"
 
     def __init__(self, *, max_time: float | None = None, **options: Option) -> None:
-        for name, value in options.items():  # fatrop itself ignores them silently
+        for name, value in options.items():
             checks.number(f"Fatrop: option {name}", float(value) if value in (0, 1) else value)
         super().__init__(max_time=max_time, **options)
 
@@ -322,8 +325,8 @@ class Fatrop(_Method):
         """Return the solver prepared for `program`.
 
         Raises:
-            ValueError: a program without stages, or an unknown option (the
-                latter at the first run).
+            ValueError: the program has no stages, or an option is unknown (raised at the first
+                run).
         """
         stages, reason = program.structure()
         if stages is None:
@@ -356,19 +359,19 @@ class Fatrop(_Method):
 @final
 @dataclass(frozen=True, eq=False, init=False)
 class Sqp(_Method):
-    """`sqpmethod` with options by name: `Sqp(max_iter=500, qpsol="qrqp")`.
+    """Sequential quadratic programming with options by name: `Sqp(max_iter=500, qpsol="qrqp")`.
 
-    Sequential quadratic programming. Its quadratic programs are solved by the interior-point method
-    `piqp` unless `qpsol` names another. Its Hessian is the exact one without negative eigenvalues
-    (`ocp.solving.methods`).
+    The solver is `sqpmethod` of CasADi. Its quadratic programs are solved by the interior-point
+    method `piqp`, or by the solver that `qpsol` names. Its Hessian is the exact one with negative
+    eigenvalues removed (`ocp.solving.methods`).
 
     Attributes:
-        options: see CasADi's documentation of sqpmethod.
+        options: options of sqpmethod; see the documentation of CasADi.
         max_time: wall time [s] after which a solve ends with its best iterate, or None.
 
     Limits: convergence is linear where the exact Hessian is indefinite, and the method does not
-    recover from contradictory linearised constraints. Suited to starts near a solution; on moves
-    against friction Ipopt takes fewer iterations.
+    recover from contradictory linearised constraints. It is suited to starts near a solution. For
+    motions with friction Ipopt takes fewer iterations.
     """
 
     plugin = "sqpmethod"

@@ -1,4 +1,4 @@
-"""Motions of one scenario by name: signals over time, and their values at any time."""
+"""Motions as named signals over time, and their values at any time."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -18,18 +18,18 @@ from symfric.foundation.storable import agree
 Array = NDArray[np.float64]
 
 SAME = 1e-6
-"""Multiples of the nominal value by which a state may differ at a continuous joint."""
+"""Difference, in multiples of the nominal value, up to which a state is continuous at a joint."""
 
 
 @final
 @dataclass(frozen=True)
 class Stretch:
-    """Begin and duration of a phase.
+    """Name, start time and duration of a phase.
 
     Attributes:
-        name: of the phase.
-        begin: its start [s].
-        T: its duration [s].
+        name: name of the phase.
+        begin: start time [s].
+        T: duration [s].
     """
 
     name: str
@@ -38,7 +38,7 @@ class Stretch:
 
     @property
     def end(self) -> float:
-        """Time at its end [s]."""
+        """End time [s]."""
         return self.begin + self.T
 
 
@@ -50,17 +50,17 @@ class Motion:
     `motion["v"]` is a signal at the times `motion.t`.
 
     Attributes:
-        name: of the scenario, empty if there is only one motion.
+        name: name of the scenario; empty for a problem without scenarios.
         t: times [s], shape (n,): nodes of the mesh and collocation points. If a state jumps
             from one phase to the next, the time of the joint appears twice.
-        signals: name -> values, shape (n,): states, algebraic variables, inputs, outputs; NaN in
-            phases that do not have them. An input is the value from this time on.
+        signals: name -> values, shape (n,): states, algebraic variables, inputs and outputs; NaN in
+            phases whose model does not have them. Inputs are constant from each time to the next.
         units: name -> unit.
         nodes: mask of times that are nodes of the mesh.
         t_control: start of each interval [s], shape (N,).
-        controls: input -> value held from there to the next one, shape (N,).
-        phases: begin and duration of each.
-        spans: their indices among the phases of the problem, over all scenarios.
+        controls: input -> value on each interval, shape (N,).
+        phases: name, start time and duration of each phase.
+        spans: indices of the phases among `problem.spans`.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Motion:
     spans: tuple[int, ...]
 
     def check_fields(self) -> None:
-        """Raise an error for signals that do not match the times; for files."""
+        """Raise an error if a file contains signals that do not match the times."""
         agree(
             "Motion",
             self.t.ndim == self.t_control.ndim == 1,
@@ -90,7 +90,7 @@ class Motion:
 
     @property
     def T(self) -> float:
-        """Duration of all phases [s]."""
+        """Total duration of all phases [s]."""
         return self.phases[-1].end - self.phases[0].begin
 
     def __getitem__(self, name: str) -> Array:
@@ -117,8 +117,8 @@ def motions_of(
 
     Args:
         problem: the problem.
-        meshes: of its spans.
-        scheme: the collocation points.
+        meshes: mesh of each span.
+        scheme: coefficients of the scheme.
         points: values of all unknowns.
     """
     phases = len(problem.chain)
@@ -177,7 +177,7 @@ def _motion(
 
 
 def _jumps(before: Span, old: SpanPoints, after: Span, new: SpanPoints) -> bool:
-    """Return True if a state jumps at the joint, or is not in both phases."""
+    """Return True if a state jumps at the joint of two phases, or if their states differ."""
     if [v.name for v in before.model.x] != [v.name for v in after.model.x]:
         return True
     gap = np.abs(new.nodes[:, 0] - old.nodes[:, -1])
@@ -192,7 +192,7 @@ def _piece(
     chosen: Mapping[str, float],
     begin: float,
 ) -> _Piece:
-    """Return signals at the nodes and collocation points of one phase."""
+    """Return the signals of one phase at its nodes and collocation points."""
     model, N, d = span.model, mesh.size - 1, scheme.degree
     inside = scheme.nodes[1:-1] if d and scheme.meets_end else scheme.nodes[1:]
     shown = inside.size
@@ -200,12 +200,12 @@ def _piece(
     at = begin + points.T * np.append(fractions.ravel(), 1.0)
 
     def joined(nodes: Array, inner: Array) -> Array:
-        """Return columns in the order of time."""
+        """Return the columns of nodes and inner points in the order of time."""
         blocks = inner.reshape(nodes.shape[0], N, d)[:, :, :shown]
         held = np.concatenate([nodes[:, :-1, None], blocks], axis=2)
         return np.column_stack([held.reshape(nodes.shape[0], N * (shown + 1)), nodes[:, -1]])
 
-    # algebraic variables at nodes: those at the end of the previous interval; unknown for shooting
+    # z at a node is the value at the end of the previous interval; shooting does not provide it
     z = np.full((points.z.shape[0], N + 1), np.nan)
     if d:
         blocks = points.z.reshape(points.z.shape[0], N, d)
@@ -226,12 +226,12 @@ def _piece(
 
 
 class SpanMotion(NamedTuple):
-    """The motion of a phase, whose signals are known at any time.
+    """Motion of a phase, with signals at any time.
 
     Attributes:
         span: the phase.
         mesh: fractions of T that bound the intervals, shape (N + 1,).
-        nodes: collocation points of an interval, start included, shape (d + 1,).
+        nodes: start and collocation points of the interval [0, 1], shape (d + 1,).
         points: values of the unknowns.
     """
 
@@ -241,10 +241,10 @@ class SpanMotion(NamedTuple):
     points: SpanPoints
 
     def at(self, name: str, fractions: Array) -> Array | None:
-        """Return a signal at fractions of T; None without a signal of this name.
+        """Return a signal at fractions of T, or None if the phase does not have it.
 
-        A state is the polynomial of its interval, an algebraic variable is interpolated between
-        the collocation points, an input is held.
+        States are evaluated by the polynomial of the interval. Algebraic variables are interpolated
+        linearly between collocation points. Inputs are constant on each interval.
         """
         x, z, u = ([v.name for v in getattr(self.span.model, letter)] for letter in "xzu")
         interval = np.searchsorted(self.mesh, fractions, side="right") - 1
@@ -259,7 +259,7 @@ class SpanMotion(NamedTuple):
     def _state(self, i: int, fractions: Array, k: NDArray[np.intp]) -> Array:
         nodes = self.points.nodes[i]
         s = (fractions - self.mesh[k]) / np.diff(self.mesh)[k]
-        if self.nodes.size == 1:  # shooting: values inside an interval are unknown
+        if self.nodes.size == 1:  # shooting provides no values inside an interval
             return (1 - s) * nodes[k] + s * nodes[k + 1]
         weights = np.ones((self.nodes.size, s.size))
         for i_node, node in enumerate(self.nodes):
@@ -281,7 +281,7 @@ def span_motions(
 
 
 def along(spans: Sequence[SpanMotion], name: str, fractions: Array) -> Array | None:
-    """Return a signal at fractions of the total duration of phases; None if one lacks it."""
+    """Return a signal at fractions of the total duration, or None if a phase does not have it."""
     ends = np.cumsum([span.points.T for span in spans])
     times = fractions * ends[-1]
     which = np.minimum(np.searchsorted(ends, times, side="right"), len(spans) - 1)
@@ -297,7 +297,7 @@ def along(spans: Sequence[SpanMotion], name: str, fractions: Array) -> Array | N
 
 
 def structure_of(problem: Problem | Posed, scheme: Scheme) -> str:
-    """Return a text that is equal for programs with equal unknowns and rows on equal meshes."""
+    """Return a text that identifies the unknowns and rows of a program on a given mesh."""
     spans = [
         [
             span.scenario,

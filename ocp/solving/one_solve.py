@@ -1,7 +1,6 @@
-"""A single solve: random starts near a given one, and the result as a solution.
+"""Single solve: random starts near a given one, and conversion of the result to a solution.
 
-Nothing is refined, sharpened or verified here; `ocp.solve` does that with this module. Random
-starts keep the ends of the given one, and vary the path between them.
+This module does not refine meshes, sharpen friction or verify; `ocp.solve` does so.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -35,24 +34,25 @@ WAVES = 4
 HALF_WAVES = np.arange(1, 4)
 """Numbers of half waves over the whole motion in a deviation."""
 STILL = 0.3
-"""Deviation, over the nominal value, of a state that is constant in the given start and has no
-other state of its unit to define its size."""
+"""Deviation, relative to the nominal value, of a state that is constant in the given start if all
+states of its unit are constant."""
 NARROW = 0.02
-"""Smoothing width, over the largest sliding velocity, that Newton steps may jump over."""
+"""Smoothing width, relative to the largest sliding velocity, below which Newton's method may step
+over the layer."""
 NAMED = 3
 """Largest number of contacts in a message."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """A solve and its result."""
+    """Transcription of a problem, and the result of a solver."""
 
     transcription: Transcription
     outcome: Outcome
 
     @cached_property
     def points(self) -> Points:
-        """The motion."""
+        """Unknowns of the motion in SI units."""
         return self.transcription.unpack(self.outcome.iterate.w)
 
     @property
@@ -62,7 +62,7 @@ class Solved:
 
     @property
     def solution(self) -> Solution:
-        """The result as a solution."""
+        """Result as a `Solution`, without verification."""
         made, outcome, points = self.transcription, self.outcome, self.points
         stuck = outcome.status in (Status.MAX_ITERATIONS, Status.NO_STEP) or outcome.cycles
         kinks = narrow_widths(made, points) if stuck and not outcome.status.ok else ""
@@ -83,24 +83,24 @@ class Solved:
 
 
 def perturbed(into: Transcription, points: Points, scale: float, seed: int) -> Points:
-    """Return `points` with a random smooth deviation, the same one on every mesh.
+    """Return `points` with a random smooth deviation that does not depend on the mesh.
 
-    Each signal is moved by a sum of half waves whose standard deviation is `scale` times its
-    magnitude: half the width of its bounds if these are finite, else its largest value or its
-    nominal one. Free durations and chosen parameters are multiplied by exp(scale r / 2), r normal.
-    Prescribed values stay: solvers project them onto their bounds.
+    A sum of half waves is added to each signal. Its standard deviation is `scale` times the
+    magnitude of the signal: half the width of its bounds if these are finite, otherwise the larger
+    of its largest and its nominal value. Free durations and chosen parameters are multiplied by
+    exp(scale r / 2), r normal. Solvers project prescribed values onto their bounds.
 
     Args:
         into: transcription of the points.
-        points: initial points, `initial_points(into)`.
-        scale: 0.1 is a small deviation, 1 fills the bounds.
-        seed: of NumPy's default generator.
+        points: initial points, such as `initial_points(into)`.
+        scale: size of the deviation; 0.1 is small, 1 spans the bounds.
+        seed: seed of NumPy's default generator.
     """
     checks.number("perturbed: scale", scale, lower=0.0)
     random = np.random.default_rng(seed)
 
     def waves(group: Sequence[Variable], rows: Array, span: Span) -> Callable[[Array], Array]:
-        """Return random sums of half waves over [0, 1], a row for each variable."""
+        """Return random sums of half waves over [0, 1], one row for each variable."""
         sizes = [scale * _magnitude(span.boxes[v.name], v.nominal, row)
                  for v, row in zip(group, rows, strict=True)]  # fmt: skip
         a = [random.standard_normal((2, WAVES)) * size / np.sqrt(WAVES) for size in sizes]
@@ -135,7 +135,7 @@ def perturbed(into: Transcription, points: Points, scale: float, seed: int) -> P
 
 
 def _magnitude(box: Box, nominal: float, row: Array) -> float:
-    """Return the magnitude of a signal."""
+    """Return the magnitude of a signal; see `perturbed`."""
     low, high = box
     if isfinite(low) and isfinite(high):
         return 0.5 * (high - low)
@@ -145,17 +145,18 @@ def _magnitude(box: Box, nominal: float, row: Array) -> float:
 def starts_around(
     into: Transcription, begin: Points, seeds: Iterable[int], spread: float
 ) -> tuple[Points, ...]:
-    """Return `begin` for the seed 0, and a random smooth deviation from it for any other.
+    """Return `begin` for the seed 0, and `begin` with a random smooth deviation for other seeds.
 
-    A state deviates by half waves over the whole motion, `spread` times its range in
-    `begin`, less in short waves; the rate of another state (x' = v) by the rate of that deviation,
-    so that both are consistent. Inputs deviate by `spread` times a quarter of their range.
+    The deviation of a state is a sum of half waves over the whole motion, with amplitudes of
+    `spread` times its range in `begin`, smaller in short waves. The deviation of a rate of another
+    state (x' = v) is the rate of that deviation. Amplitudes of inputs are `spread` times a quarter
+    of the range of their bounds, or times their nominal value.
 
     Args:
         into: transcription of the points.
         begin: the first start.
-        seeds: of NumPy's default generator.
-        spread: of the deviations; 0.5 leads to most local optima of a swing-up.
+        seeds: seeds of NumPy's default generator.
+        spread: relative size of the deviations; 0.5 finds most local optima of a swing-up.
     """
     return tuple(_around(into, begin, spread, seed) if seed else begin for seed in seeds)
 
@@ -195,9 +196,9 @@ def _around(into: Transcription, begin: Points, spread: float, seed: int) -> Poi
 
 
 def _ranges(into: Transcription, begin: Points) -> dict[str, float]:
-    """Return state -> its range in `begin`, over all phases.
+    """Return state -> range of its values in `begin`, over all phases.
 
-    A constant state takes the largest range of its unit.
+    A constant state has the largest range of the states of its unit.
     """
     states: dict[str, Variable] = {}
     values: dict[str, list[float]] = {}
@@ -216,10 +217,10 @@ def _ranges(into: Transcription, begin: Points) -> dict[str, float]:
 
 
 def narrow_widths(transcription: Transcription, points: Points) -> str:
-    """Return a message on contacts with narrow smoothing widths, or "".
+    """Return a message about contacts with narrow smoothing widths, or "" if there are none.
 
-    It names contacts that stick or reverse, or whose widths smooth another quantity than their
-    sliding velocity.
+    It names contacts that stick or reverse, and contacts whose widths smooth a quantity other than
+    the sliding velocity.
     """
     messages: dict[str, str] = {}
     for span, at in zip(transcription.problem.spans, points.spans, strict=True):
@@ -234,15 +235,15 @@ def narrow_widths(transcription: Transcription, points: Points) -> str:
 
 
 def _narrow(contact: Contact, span: Span, at: SpanPoints) -> Iterator[str]:
-    """Yield the widths of a contact that are small against its motion, each with its value."""
+    """Yield the widths of a contact that are small relative to its motion, with their values."""
 
-    def number(value: Any) -> float:  # of a parameter of a law, which may be one of the model
+    def number(value: Any) -> float:  # parameters of a law may be parameters of the model
         return float(ca.Function("number", [span.model.vector("p")], [ca.SX(value)])(span.p))
 
     slip = along_points(span, at, contact.slip)[0]
     fastest = float(np.abs(slip).max(initial=0.0))
     turns = slip.size > 0 and bool(slip.min() <= 0.0 <= slip.max())
-    law: Any = contact.law  # which is Parametric
+    law: Any = contact.law  # type Parametric
     known = parameters(law)
     for name, exponent in law.widths.items():
         value = number(known[name].value)
@@ -254,7 +255,7 @@ def _narrow(contact: Contact, span: Span, at: SpanPoints) -> Iterator[str]:
 
 
 def along_points(span: Span, at: SpanPoints, column: ca.SX) -> Array:
-    """Return values at the collocation points, or at the nodes without any, (rows, points)."""
+    """Return `column` at the collocation points, or at nodes if there are none, (rows, points)."""
     inner = at.inner.shape[1]
     x, n = (at.inner, inner) if inner else (at.nodes[:, :-1], at.u.shape[1])
     u = np.repeat(at.u, n // at.u.shape[1], axis=1)

@@ -1,4 +1,4 @@
-"""Figures of optimal motions: optimised points against the simulated model."""
+"""Figures of optimal motions: optimised points and simulated motion."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SHADES = {"slip+": colour(6), "stick": "0.45", "slip-": colour(1)}
-"""Type of mode -> colour of its background."""
+"""Kind of mode -> background colour."""
 WANTED = "0.35"
-"""Colour of bounds, and of values to meet."""
+"""Colour of bounds and prescribed values."""
 
 Modes = Sequence[tuple[str, float, float]]
 """(kind, begin [s], end [s]) of the modes of a contact."""
@@ -35,13 +35,13 @@ CIRCLES = 60
 @final
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A motion in a plot.
+    """Motion in a plot.
 
     Attributes:
         label: legend entry.
         motion: the optimised motion.
-        runs: its re-simulated phases; empty if not verified.
-        ending: text of durations, cost and status.
+        runs: re-simulated phases of the motion; empty if it was not verified.
+        ending: text with duration, cost and status.
     """
 
     label: str
@@ -57,10 +57,10 @@ def plot_motions(
     modes: Mapping[str, Modes] = MappingProxyType({}),
     path: str | Path | None = None,
 ) -> Figure:
-    """Plot signals of motions over time, a panel each; see `ocp.plot_solutions`.
+    """Plot signals of motions over time, one panel each; see `ocp.plot_solutions`.
 
     Args:
-        drawn: the motions; all have the phases and units of the first one.
+        drawn: the motions; the phases and units of the first one are shown.
         names: signals to show.
         spans: phases of the first motion, whose bounds, ends and via points are drawn.
         modes: contact -> its modes.
@@ -85,7 +85,7 @@ def plot_motions(
 
 
 def _explain(axis: "Axes", drawn: Sequence[Drawn], modes: Mapping[str, Modes]) -> None:
-    """Add the title or legend: labels, and the status of the motions."""
+    """Add the title or legend with the labels and the status of the motions."""
     entries = [f"{one.label}: {one.ending}" for one in drawn]
     handles: list[Artist] = []
     if len(entries) > 1:
@@ -124,7 +124,7 @@ def _signal(axis: "Axes", one: Drawn, name: str, look: Line) -> None:
 
 
 def _wanted(axis: "Axes", phase: Stretch, span: Span, name: str) -> None:
-    """Draw bounds over a phase, and prescribed values and ranges."""
+    """Draw the bounds, prescribed values and ranges of a signal in a phase."""
     rows = {row.name: (row.lower, row.upper) for row in span.path}
     for bound in span.boxes.get(name) or rows.get(f"the bound on {name}") or ():
         if isfinite(bound):

@@ -1,4 +1,4 @@
-"""A solver prepared for a nonlinear program, for any start and any parameters."""
+"""Solver prepared for a nonlinear program with any start and any parameters, and time limits."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -36,9 +36,9 @@ from symfric.foundation.status import Status
 Array = NDArray[np.float64]
 Option = str | float | int
 LEAST = 1e-3
-"""Least time limit of a solver [s]; it then stops at once."""
+"""Smallest time limit of a solver [s], with which it stops at once."""
 OVERDETERMINED = "Not_Enough_Degrees_Of_Freedom"
-"""Ipopt's answer to a program with more equations than unknowns."""
+"""Return code of Ipopt for a program with more equations than unknowns."""
 HINTS: dict[str, str] = {
     OVERDETERMINED: (
         "There are more equations than unknowns; use fewer end and via conditions, or more "
@@ -46,7 +46,7 @@ HINTS: dict[str, str] = {
     ),
     "Insufficient_Memory": "The memory is exhausted; use fewer intervals.",
 }
-"""Return code -> message, if the status alone is not specific."""
+"""Return code -> message, for codes that are more specific than the status."""
 TRIED = (
     "It happened at a point tried by the solver, not at an iterate; bound the states to where "
     "the equations are defined."
@@ -61,10 +61,10 @@ LEAN: dict[str, Any] = {
 
 
 class Built(NamedTuple):
-    """A CasADi solver and the hook that monitors it.
+    """CasADi solver and the hook that monitors it.
 
     Attributes:
-        kept: callbacks that CasADi uses but does not keep alive.
+        kept: callbacks that CasADi uses without holding a reference.
     """
 
     function: ca.Function
@@ -82,7 +82,7 @@ def made(
     """Return the CasADi solver of `program`; the user's `options` override `common`.
 
     Raises:
-        ValueError: options that the solver refuses, with its name and message.
+        ValueError: the solver refuses options.
     """
     prefix = "" if plugin == "sqpmethod" else f"{plugin}."
     own = {f"{prefix}{name}": value for name, value in options.items()}
@@ -95,13 +95,13 @@ def made(
 
 
 def _reason_of(error: Exception) -> str:
-    """Return the last line of an error of CasADi, without the place in its source."""
+    """Return the last line of an error of CasADi without its source location."""
     lines = [line for line in str(error).strip().splitlines() if line.strip()]
     return re.sub(r"^\S*:\d+: ", "", lines[-1]).strip()
 
 
 def refused_options(solver: str, options: Mapping[str, Option], reason: str) -> ValueError:
-    """Return the error for refused options, restricted to those in the reason if possible."""
+    """Return an error for refused options, which names only those in `reason` if possible."""
     named = {name: value for name, value in options.items() if name in reason} or dict(options)
     return ValueError(f"{solver}: expected options of {solver}, got {named!r}; {reason}")
 
@@ -109,17 +109,17 @@ def refused_options(solver: str, options: Mapping[str, Option], reason: str) -> 
 @final
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A solver and a program; made by `solver.prepared(program)`. One run at a time.
+    """Solver prepared for a program by `solver.prepared(program)`, for one run at a time.
 
     Attributes:
         program: the program.
-        solver: the name of the solver, for messages.
-        options: those of the user.
-        build: function that makes the CasADi solver and its hook; its argument is True if the
+        solver: name of the solver for messages.
+        options: the user's options.
+        build: function that creates the CasADi solver and its hook; its argument is True if the
             start has multipliers.
-        read: (statistics of CasADi) -> the solver's return code and its status.
+        read: function from the statistics of CasADi to the return code and the status.
         max_time: wall time [s] after which a run is stopped.
-        told_time: the limit in messages, if `max_time` is the rest of it.
+        told_time: total time limit [s] for messages if `max_time` is the remaining time.
     """
 
     program: Program
@@ -140,17 +140,17 @@ class Prepared:
         at: At = as_fraction,
         begin: float | None = None,
     ) -> Outcome:
-        """Solve from `start`; a failure is an outcome, not an exception.
+        """Solve from `start` and return the outcome; a failed solve raises no exception.
 
         Args:
-            start: unknowns and multipliers; the latter are used if `warm`.
-            values: numbers of the parameters of the program, `program.values` if none.
-            progress: called with a `Progress` after each iteration. Ctrl-C stops the solver after
-                the iteration, and so does an exception here; either way the outcome, with status
-                INTERRUPTED, holds the best iterate, and `cause` the exception.
-            warm: start near a solution, with the multipliers.
-            at: (w, place) -> text for the time of a place, for the message.
-            begin: value of `perf_counter` at which building the program began; now if none.
+            start: unknowns and multipliers; the latter are used only if `warm`.
+            values: values of the parameters of the program, by default `program.values`.
+            progress: function called with a `Progress` after each iteration. Ctrl-C, or an
+                exception in the function, stops the solver after the iteration. The outcome then
+                has the status INTERRUPTED, the best iterate, and the exception as `cause`.
+            warm: True to start near a solution with its multipliers.
+            at: function (w, place) -> text for the time of a place, for the message.
+            begin: value of `perf_counter` when building the program began, by default now.
 
         Raises:
             ValueError: unknown options, or a start that is not finite.
@@ -163,7 +163,7 @@ class Prepared:
         result, answer, status = None, OVERDETERMINED, Status.INFEASIBLE
         fixed = (program.lower_g == program.upper_g).sum()
         fixed += (program.lower_w == program.upper_w).sum()
-        overdetermined = fixed > w.size  # no solver accepts it
+        overdetermined = fixed > w.size  # refused by all solvers
         if not overdetermined and warm not in self._built:
             self._built[warm] = self.build(warm)
         built = perf_counter()
@@ -205,7 +205,7 @@ class Prepared:
         try:
             with interrupts(watch):
                 result = solver.function(**arguments)
-        except RuntimeError as error:  # some solvers check options and structure only now
+        except RuntimeError as error:  # some solvers check options and structure only here
             reason = _reason_of(error)
             if "option" in reason.lower():
                 raise refused_options(self.solver, self.options, reason) from None
@@ -230,7 +230,7 @@ class Prepared:
         w: Array,
         values: Array,
     ) -> Seen:
-        """Return the solution, or else the best known point."""
+        """Return the solution, or the best known point of a failed solve."""
         program = self.program
         if status.ok and result is not None:
             names = ("x", "f", "g", "lam_x", "lam_g")
@@ -238,7 +238,7 @@ class Prepared:
             return Seen(x, float(f[0]), g, lam_x, lam_g, worst_of(program, x, g))
         if watch.best is not None:
             return watch.best
-        # No iterate is known, and after some errors the result is zero: use the start.
+        # No iterate is known, and the result is zero after some errors, so use the start.
         f, g = program.gradient(w, values)[0], program.jacobian(w, values)[0].full().ravel()
         lam_w, lam_g = np.zeros(w.size), np.zeros(g.size)
         return Seen(w, float(f), g, lam_w, lam_g, worst_of(program, w, g))
@@ -246,7 +246,7 @@ class Prepared:
     def _sentence(
         self, watch: Watch, point: Seen, status: Status, answer: str, values: Array, at: At
     ) -> str:
-        """Return the message on the end of a solve, the worst row at `point`, and what to try."""
+        """Return a message with the reason for the end, the worst row at `point`, and a remedy."""
         if status.ok:
             return status.value
         count, limit = watch.iterations, self.told_time or self.max_time
@@ -278,7 +278,7 @@ class Prepared:
 @final
 @dataclass(frozen=True)
 class Clock:
-    """Timer of a total time limit, started when created.
+    """Total time limit of several solves, which starts at construction.
 
     Attributes:
         allowed: total wall time [s], or None for no limit.
@@ -310,17 +310,17 @@ class Clock:
         warm: bool = False,
         begin: float | None = None,
     ) -> Outcome:
-        """Solve within the remaining time, and report progress as that of a `stage`."""
+        """Run `prepared` within the remaining time, and report progress under the name `stage`."""
         left = self.left
         if left is not None and (prepared.max_time is None or prepared.max_time > left):
             prepared = replace(prepared, max_time=left, told_time=self.allowed)
         report = in_stage(progress, stage)
-        values = transcription.program.values if values is None else values  # of this mesh
+        values = transcription.program.values if values is None else values
         return prepared.run(start, values, report, warm, transcription.when, begin)
 
 
 def _finite(start: Iterate, program: Program) -> Array:
-    """Return the initial unknowns, which must be finite."""
+    """Return the initial unknowns; raise ValueError if they are not finite."""
     if not np.isfinite(start.w).all():
         place = program.unknowns[int(np.argmin(np.isfinite(start.w)))]
         raise ValueError(

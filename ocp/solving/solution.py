@@ -1,4 +1,4 @@
-"""Result of an optimal control problem: named signals with plots, tables and files."""
+"""Result of an optimal control problem: named signals, with plots, tables and files."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 AT_BOUND = 1e-5
-"""Relative distance from a bound within which a duration counts as at it."""
+"""Relative distance from a bound within which a duration counts as equal to it."""
 
 
 @final
 @dataclass(frozen=True)
 class Mode:
-    """A time interval with a constant contact mode.
+    """Time interval with a constant contact mode.
 
     Attributes:
         kind: "slip+", "slip-" or "stick".
-        begin, end: its limits [s].
+        begin, end: limits of the interval [s].
     """
 
     kind: str
@@ -52,23 +52,23 @@ class Mode:
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(packed.Portable):
-    """Optimal motion, and its verification under the control.
+    """Optimal motion, and the verification of its control.
 
-    `solution["v"]` is a signal at the times `solution.t`, nodes of the mesh and collocation points,
-    joined over the phases. With scenarios it belongs to the first one;
-    `solution.scenarios["oiled"]["v"]` belongs to another.
+    `solution["v"]` is a signal at the times `solution.t`, which are the nodes of the mesh and the
+    collocation points of all phases. With scenarios it belongs to the first one;
+    `solution.scenarios["oiled"]["v"]` belongs to the scenario "oiled".
 
     Attributes:
-        problem: the solved problem; for a stored solution its resolved form, `Posed`.
-        status: of the solution; `message` describes it.
+        problem: the solved problem; its resolved form, `Posed`, if the solution was loaded.
+        status: status of the solution, which `message` describes.
         cost: J.
         motions: motion of each scenario.
         chosen: values of the chosen parameters.
-        statistics: size, iterations, times, of all solves together.
+        statistics: size, and iterations and times of all solves.
         scheme, meshes, points, iterate: data for a warm start.
         modes: contact -> its modes in order; empty if friction was not solved by modes.
-        verification: result of the re-simulation, or None without it.
-        cause: the exception in `progress` that stopped the solver, if any.
+        verification: result of the re-simulation; None without verification.
+        cause: exception in `progress` that stopped the solver, if any.
     """
 
     problem: Problem = field(metadata={"packed": Posed})
@@ -95,12 +95,12 @@ class Solution(packed.Portable):
         )
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
-        """Return text and figure for a notebook."""
+        """Return text and figure as HTML for a notebook."""
         title = f"Solution of '{self.problem.name}': {self.status.name}"
         return Shown(title, tuple(str(self).splitlines())).html(self.plot())
 
     def __str__(self) -> str:
-        """Return the result in a few lines."""
+        """Return a summary of a few lines."""
         phases = ", ".join(f"{phase.name} {phase.T:.4g} s" for phase in self.phases)
         several = f" ({phases})" if len(self.phases) > 1 else ""
         lines = [self.message, f"J = {self.cost:.6g}, T = {self.T:.6g} s{several}"]
@@ -127,17 +127,17 @@ class Solution(packed.Portable):
 
     @property
     def ok(self) -> bool:
-        """True if it is usable."""
+        """True if the status is that of a usable solution."""
         return self.status.ok
 
     @property
     def verified(self) -> bool:
-        """True if the model under this control meets all conditions within the tolerance."""
+        """True if the re-simulated motion satisfies all conditions within the tolerance."""
         return self.verification is not None and self.verification.ok
 
     @property
     def miss(self) -> float:
-        """Largest relative miss of the verification; NaN without one."""
+        """Largest relative miss of the verification; NaN without verification."""
         return float("nan") if self.verification is None else self.verification.largest
 
     @property
@@ -147,12 +147,12 @@ class Solution(packed.Portable):
 
     @property
     def scenarios(self) -> dict[str, Motion]:
-        """The motions by the names of their scenarios; empty if there is only one."""
+        """Scenario -> motion; empty for a problem without scenarios."""
         return {motion.name: motion for motion in self.motions if motion.name}
 
     @property
     def T(self) -> float:
-        """Duration of all phases [s]."""
+        """Total duration of all phases [s]."""
         return self.motions[0].T
 
     @property
@@ -177,36 +177,36 @@ class Solution(packed.Portable):
 
     @property
     def controls(self) -> dict[str, Array]:
-        """Input -> value held over each interval, shape (N,)."""
+        """Input -> value on each interval, shape (N,)."""
         return self.motions[0].controls
 
     @property
     def phases(self) -> tuple[Stretch, ...]:
-        """Begin and duration of each phase."""
+        """Name, start time and duration of each phase."""
         return self.motions[0].phases
 
     @property
     def iterations(self) -> int:
-        """Iterations of the solver, of all solves together."""
+        """Total number of iterations of all solves."""
         return self.statistics.iterations
 
     @property
     def states(self) -> dict[str, Array]:
-        """The states among the signals."""
+        """State -> values, shape (n,)."""
         names = [v.name for i in self.motions[0].spans for v in self.problem.spans[i].model.x]
         return {name: self.signals[name] for name in dict.fromkeys(names)}
 
     @property
     def inputs(self) -> dict[str, Array]:
-        """The inputs among the signals."""
+        """Input -> values, shape (n,)."""
         return {name: self.signals[name] for name in self.controls}
 
     def save(self, path: str | Path) -> None:
-        """Write everything to one file, which `ocp.load` reads exactly.
+        """Write the solution to a file, which `ocp.load` reads without loss.
 
-        A loaded solution has its signals, modes and re-simulated motions; it can be plotted,
-        written, verified again, and used as `guess` on any mesh or model. Functions such as
-        costs are stored as the expressions they returned.
+        A loaded solution has signals, modes and re-simulated motions. It can be plotted, written,
+        verified again, and used as `guess` on any mesh or model. Functions such as costs are stored
+        as the expressions that they returned.
 
         Raises:
             ValueError: the file cannot be written.
@@ -214,14 +214,14 @@ class Solution(packed.Portable):
         SOLUTION.save(path, self)
 
     def to_pack(self) -> dict[str, Any]:
-        """Return the fields, with the resolved problem."""
+        """Return the fields for a file, with the problem in its resolved form."""
         return packed.state_of(self) | {"problem": posed(self.problem), "cause": None}
 
     def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
-        """Plot one panel per signal over time: optimised points and the re-simulated line.
+        """Plot signals over time, one panel each: optimised points and the re-simulated motion.
 
         Args:
-            names: signals to show; all of them if none is given.
+            names: signals to show, by default all.
             path: image file; its extension selects the format.
         """
         return plot_solutions({self.problem.name: self}, names, path)
@@ -229,8 +229,8 @@ class Solution(packed.Portable):
     def to_csv(self, path: str | Path) -> None:
         """Write all signals as columns with units in the header, such as `v [m/s]`.
 
-        The inputs hold from each row to the next, so `Hold(t, force)` restores the control.
-        With scenarios the first column is their name.
+        Inputs are constant from each row to the next, so `Hold(t, force)` restores the control.
+        With scenarios the first column is the name of the scenario.
         """
         several = len(self.motions) > 1
         header = ["t [s]", *(f"{name} [{self.units[name]}]" for name in self.signals)]
@@ -242,12 +242,12 @@ class Solution(packed.Portable):
         write_table(path, [*(["scenario"] * several), *header], rows)
 
     def to_dataframe(self) -> Any:
-        """Return the signals as a pandas table over t, with scenarios over scenario and t.
+        """Return the signals as a pandas table with index t, or scenario and t with scenarios.
 
-        Its `attrs` hold the units; an input is the value from each time on.
+        Its `attrs` contain the units. Inputs are constant from each row to the next.
 
         Raises:
-            ImportError: no pandas.
+            ImportError: pandas is not installed.
         """
         pandas = module("to_dataframe", "pandas")
         parts = {m.name: pandas.DataFrame({"t": m.t, **m.signals}) for m in self.motions}
@@ -258,7 +258,7 @@ class Solution(packed.Portable):
         return frame
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain data, with None for non-finite numbers."""
+        """Return the solution as plain data, with None for numbers that are not finite."""
         return {
             "scene": self.problem.name,
             "status": self.status.name,
@@ -286,12 +286,12 @@ class Solution(packed.Portable):
         }
 
     def to_json(self, path: str | Path) -> None:
-        """Write `to_dict` as JSON."""
+        """Write the data of `to_dict` as JSON."""
         write_text(path, json.dumps(self.to_dict(), allow_nan=False))
 
 
 def with_sentence(solution: Solution, sentence: str) -> Solution:
-    """Return `solution` with a further sentence in its message."""
+    """Return `solution` with `sentence` appended to its message."""
     return replace(solution, message=f"{solution.message} {sentence}".rstrip())
 
 
@@ -300,20 +300,20 @@ def plot_solutions(
     names: Sequence[str] = (),
     path: str | Path | None = None,
 ) -> "Figure":
-    """Plot signals of one or several optimal motions over time, a panel each.
+    """Plot signals of one or several optimal motions over time, one panel each.
 
-    Circles are the optimised nodes of the mesh, lines the simulated motion under the same
-    control (the optimised one without a simulation), steps the inputs. Thin vertical lines
-    separate phases. For a single solution, bounds are dashed, values and ranges to meet are crosses
-    and bars, and the modes of its contacts are shaded, a band for each contact.
+    Circles are optimised nodes of the mesh. Lines are the simulated motion under the same control,
+    or the optimised motion without a simulation. Inputs are steps. Thin vertical lines separate
+    phases. For a single solution, bounds are dashed lines, prescribed values and ranges are crosses
+    and bars, and shaded bands show the modes of each contact.
 
     Args:
         solutions: legend entry -> solution; each scenario is a separate motion.
-        names: signals to show; by default those common to all solutions.
+        names: signals to show, by default all signals common to the solutions.
         path: image file; its extension selects the format.
 
     Raises:
-        ValueError: no solution, an unknown signal, or an unsupported extension of the file.
+        ValueError: no solution, an unknown signal, or an unsupported file extension.
     """
     from ocp.solving.picture import Drawn, plot_motions  # noqa: PLC0415  (matplotlib is slow)
 
@@ -340,13 +340,14 @@ SOLUTION = Format("symfric ocp solution", 3, "ocp.load", "a saved solution", Sol
 
 
 def load(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Solution:
-    """Read the solution that `solution.save(path)` wrote: `solve(problem, guess=load(path))`.
+    """Read a solution written by `solution.save(path)`, as in `solve(problem, guess=load(path))`.
 
     Args:
         path: the file.
-        own: user-defined classes in it, such as a law.
+        own: user-defined classes in the file, such as a law.
 
     Raises:
-        ValueError: no such file, a foreign, damaged or newer one, or unknown classes.
+        ValueError: the file does not exist, is foreign, damaged or of a newer format, or contains
+            unknown classes.
     """
     return SOLUTION.load(path, own)

@@ -1,4 +1,4 @@
-"""Starts of the optimiser: straight lines between prescribed values, guesses, or a solution."""
+"""Initial guesses of the optimiser from prescribed values, the user's guess or a solution."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -22,23 +22,23 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 
 Guess = float | ArrayLike | Callable[[Array], ArrayLike]
-"""A constant, samples at equal distances from 0 to the end, or a function of the times [s]."""
+"""A constant, equally spaced samples from 0 to the end, or a function of the times [s]."""
 
 Start = Mapping[str, Guess] | Solution | Points | None
-"""Guesses by name, a solution of this or of a similar problem, points, or nothing."""
+"""Guesses by name, a solution of this or a similar problem, points, or None."""
 
 STARTS = 6
-"""Number of coarse solves of a problem with friction, of which the best continues."""
+"""Number of coarse solves of a problem with friction; the best one is continued."""
 
 
 def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
-    """Return the first iterate, and whether it has multipliers.
+    """Return the first iterate, and True if it has multipliers.
 
-    It has them if `guess` is a solution of a program with the same unknowns and rows on the same
-    meshes; from other solutions the motion is transferred by name.
+    It has multipliers if `guess` is a solution of a program with the same unknowns and rows on the
+    same meshes. The motion of any other solution is transferred by name.
 
     Raises:
-        ValueError: invalid guesses, see `initial_points`.
+        ValueError: invalid guesses; see `initial_points`.
     """
     rows = into.program.g.numel()
     if isinstance(guess, Points):
@@ -61,7 +61,7 @@ def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
 
 
 def _check_shapes(into: Transcription, points: Points) -> None:
-    """Raise ValueError for points of other meshes or models."""
+    """Raise ValueError if the shapes of `points` do not match the meshes and models."""
 
     def shapes(of: Points) -> list[tuple[tuple[int, ...], ...]]:
         return [tuple(a.shape for a in (s.nodes, s.inner, s.z, s.u)) for s in of.spans]
@@ -77,17 +77,17 @@ def _check_shapes(into: Transcription, points: Points) -> None:
 
 
 def initial_points(into: Transcription, given: Mapping[str, Guess] | None = None) -> Points:
-    """Return initial points: `given` values by name, straight lines and mid values for the rest.
+    """Return initial points from `given` values by name, and default values for other signals.
 
-    States follow straight lines through the middles of their conditions at the start, at via points
+    States are piecewise linear through the middles of their conditions at the start, at via points
     and at the end, over all phases in which they are continuous. A state that is the rate of
-    another one (x' = v) takes the slope of that one: with v = 0, where a friction law is steepest,
-    Ipopt needs ten times the iterations or fails. States with a condition only through an output
-    stay constant. Algebraic variables keep their start value; inputs are zero, or in the middle of
-    their bounds if zero is outside.
+    another state (x' = v) is the slope of this state: with v = 0, where a friction law is steepest,
+    Ipopt needs ten times the iterations or fails. States that are conditioned only by an output are
+    constant. Algebraic variables have their start value. Inputs are zero, or the middle of their
+    bounds if zero is outside.
 
     Raises:
-        ValueError: unknown name, or values that are not finite or not one per time.
+        ValueError: a name is unknown, or values are not finite or not one per time.
     """
     problem = into.problem
     models = [span.model for span in problem.spans]
@@ -110,8 +110,8 @@ def resample(
 ) -> Points:
     """Return the motion of a solution on other meshes, phases or models with equal names.
 
-    With the same number of phases, each phase is transferred to its counterpart; otherwise the
-    whole motion is stretched over the whole duration.
+    If the number of phases is equal, each phase is transferred separately. Otherwise the total
+    motion is stretched to the total duration.
     """
     problem, durations = into.problem, _durations(into.problem)
     old: dict[int, list[SpanMotion]] = {}
@@ -138,11 +138,11 @@ def resample(
 
 
 Value = Callable[[int, str, Array], Array | None]
-"""(index of the phase, name, fractions of T) -> initial values of the signal, if known."""
+"""(index of the phase, name, fractions of T) -> initial values of the signal, None if unknown."""
 
 
 def points_from(into: Transcription, durations: Sequence[float], value: Value) -> Points:
-    """Return points of all phases from known values; straight lines elsewhere."""
+    """Return points of all phases from known values, with default values of other signals."""
     problem, phases = into.problem, len(into.problem.chain)
     points: list[SpanPoints] = []
     lines = _Lines((), ())
@@ -179,10 +179,10 @@ def points_from(into: Transcription, durations: Sequence[float], value: Value) -
 
 
 class _Lines:
-    """Straight lines through the prescribed states of one scenario.
+    """Piecewise linear motion through the prescribed states of one scenario.
 
     Attributes:
-        ends: states at the end of each phase so far, from which states may jump.
+        ends: states at the end of each phase so far, which determine states that jump.
     """
 
     def __init__(self, spans: Sequence[Span], durations: Sequence[float]) -> None:
@@ -191,7 +191,7 @@ class _Lines:
         self.ends: dict[int, dict[str, float]] = {}
 
     def of(self, phase: int, name: str, fractions: Array) -> Array:
-        """Return a state at fractions of a phase."""
+        """Return the values of a state at fractions of T of a phase."""
         first, last = phase, phase
         while self._continues(first, name):
             first -= 1
@@ -220,7 +220,7 @@ class _Lines:
         return link is not None and self._spans[phase - 1].same_state(link.expression) == name
 
     def _landing(self, phase: int, link: Link) -> float:
-        """Return the start of a state that jumps."""
+        """Return the value of a state after its jump at the start of a phase."""
         span = self._spans[phase - 1]
         function = ca.Function("landing", span.symbols, [link.expression])
         x = [self.ends[phase - 1][v.name] for v in span.model.x]
@@ -230,14 +230,14 @@ class _Lines:
 
 
 def _prescribed(span: Span, name: str, fraction: float) -> bool:
-    """Return True if a state has a condition there other than its general bounds."""
+    """Return True if a state has a condition at `fraction` in addition to its bounds."""
     box = span.nodes[fraction][name]
     finite = isfinite(box[0]) or isfinite(box[1])
     return finite and (box != span.boxes[name] or (span.phase == 0 and fraction == 0.0))
 
 
 def _durations(problem: Problem) -> list[float]:
-    """Return initial durations [s], scaled to a prescribed sum."""
+    """Return the initial durations [s], scaled to prescribed sums."""
     spans = problem.spans
     durations = [initial(span.T) for span in spans]
     for phases, total in problem.durations:
@@ -252,7 +252,7 @@ def _durations(problem: Problem) -> list[float]:
 
 
 def _begin(problem: Problem, durations: Sequence[float], number: int) -> float:
-    """Return the start of a phase [s]."""
+    """Return the start time of a phase [s]."""
     first = number - number % len(problem.chain)
     return float(sum(durations[first:number]))
 
@@ -276,7 +276,7 @@ def _evaluate(name: str, guess: Guess, times: Array, T: float) -> Array:
 
 
 def rates_of(model: Model) -> dict[str, str]:
-    """Return state -> the state whose time derivative it is."""
+    """Return state -> other state, for each state that is the time derivative of another one."""
     ode = model.function("ode")(model.t, *(model.vector(letter) for letter in "xzup"))
     return {
         other.name: v.name
@@ -287,7 +287,7 @@ def rates_of(model: Model) -> dict[str, str]:
 
 
 def _middle(box: Box) -> float:
-    """Return the middle of a range, or its finite end."""
+    """Return the middle of a range, or its finite bound."""
     low, high = box
     if isfinite(low) and isfinite(high):
         return (low + high) / 2
@@ -295,5 +295,5 @@ def _middle(box: Box) -> float:
 
 
 def _rest(box: Box) -> float:
-    """Return zero, or the middle of a range that does not contain it."""
+    """Return zero, or the middle of `box` if it does not contain zero."""
     return 0.0 if box[0] <= 0.0 <= box[1] else _middle(box)

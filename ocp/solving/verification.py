@@ -1,4 +1,4 @@
-"""Result of a re-simulation: the deviation from each condition, and when."""
+"""Result of a re-simulation: value and time of each condition, and its deviation."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -18,18 +18,18 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True)
 class Miss:
-    """A condition, and its value in the re-simulated motion.
+    """Condition and its value in the re-simulated motion.
 
     Attributes:
-        what: "start", "end", "via", "joint", "period": a value to meet; "bound" or "path": a range,
-            at its worst violation; "motion": a state at the end of a phase
-            against its optimised value; "cost"; "local error": of the worst interval.
-        name: of the signal, or of the condition.
+        what: kind of condition: "start", "end", "via", "joint" or "period" for a prescribed value,
+            "bound" or "path" for a range at its worst violation, "motion" for the optimised value
+            of a state at the end of a phase, "cost", or "local error" of the worst interval.
+        name: name of the signal or of the condition.
         time: time [s].
-        value: its value there.
-        wanted: the nearest admissible value.
+        value: value in the simulation.
+        wanted: nearest admissible value.
         size: reference magnitude of the difference.
-        unit: of the values.
+        unit: unit of the values.
     """
 
     what: str
@@ -42,18 +42,18 @@ class Miss:
 
     @property
     def miss(self) -> float:
-        """Difference of `value` and `wanted`."""
+        """Difference between `value` and `wanted`."""
         return self.value - self.wanted
 
     @property
     def relative(self) -> float:
-        """Difference in multiples of `size`; inf for NaN."""
+        """Magnitude of the difference in multiples of `size`; inf for NaN."""
         found = abs(self.miss) / self.size if self.size > 0 else abs(self.miss)
         return found if isfinite(found) else float("inf")
 
     @property
     def sentence(self) -> str:
-        """Message: what is missed, when and by how much."""
+        """Message with the condition, the time and the difference."""
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
         if self.what == "local error":
             return f"the interval at {self.time:.4g} s has a local error of {self.relative:.2g}"
@@ -70,20 +70,20 @@ class Miss:
 @final
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """Comparison of a solution with a tight simulation of the user's model under its control.
+    """Comparison of a solution with an accurate simulation of the user's model under its control.
 
     Attributes:
         tolerance: largest permitted relative miss.
-        rtol: of the simulation.
+        rtol: relative tolerance of the simulation.
         checked: all checked conditions, the worst first.
-        local_errors: of each interval, for each phase of shape (N,).
-        trajectories: the simulated motion of each phase, in order.
+        local_errors: error of each interval, shape (N,), for each phase.
+        trajectories: simulated motion of each phase, in order.
         cost: J of the simulated motion; NaN if it did not reach its end.
         failed: message of a simulation that did not reach its end; empty if all did.
-        failure: its status.
-        restarted: for a motion with error growth that makes a simulation from the start
-            meaningless: the same from node to node in `restarts`.
-        restarts: times of restarts at the nodes of the solution [s].
+        failure: status of this simulation.
+        restarted: verification by simulations between the nodes in `restarts`, for a motion whose
+            error growth makes a simulation from the start meaningless; otherwise None.
+        restarts: times of restarts at nodes of the solution [s].
         growth: growth factor of local errors up to the end; NaN if not evaluated.
     """
 
@@ -102,39 +102,39 @@ class Verification:
     __repr__ = brief
 
     def check_fields(self) -> None:
-        """Raise an error for local errors without one number per interval; for files."""
+        """Raise an error if a file contains local errors that are not one number per interval."""
         agree("Verification", all(errors.ndim == 1 for errors in self.local_errors))
 
     @property
     def misses(self) -> tuple[Miss, ...]:
-        """Conditions that miss by more than the tolerance, the worst first."""
+        """Conditions with a relative miss above the tolerance, the worst first."""
         return tuple(miss for miss in self.checked if not miss.relative <= self.tolerance)
 
     @property
     def ok(self) -> bool:
-        """True if the model under this control meets all conditions."""
+        """True if the simulated motion satisfies all conditions."""
         return not self.failed and not self.misses
 
     @property
     def worst(self) -> Miss | None:
-        """The largest miss; None without conditions."""
+        """Condition with the largest miss; None without conditions."""
         return self.checked[0] if self.checked else None
 
     @property
     def largest(self) -> float:
-        """The largest relative miss; inf if the simulation did not reach its end."""
+        """Largest relative miss; inf if the simulation did not reach its end."""
         if self.failed:
             return float("inf")
         return self.checked[0].relative if self.checked else 0.0
 
     @property
     def unstable(self) -> bool:
-        """True if it fails only because of error growth; all is met from node to node."""
+        """True if the verification fails only because of error growth; see `restarted`."""
         return not self.ok and self.restarted is not None and self.restarted.ok
 
     @property
     def status(self) -> Status:
-        """Status of a solution that the solver reports as solved."""
+        """Status that a solved problem has after this verification."""
         if self.ok:
             return Status.SUCCESS
         if self.unstable:
@@ -146,7 +146,7 @@ class Verification:
 
     @property
     def sentence(self) -> str:
-        """Message: what is missed, when, by how much, and what to try; empty if nothing is."""
+        """Message with the largest misses or the failure; empty if all conditions are satisfied."""
         if self.ok:
             return ""
         if self.failed:
@@ -181,7 +181,7 @@ class Verification:
         return "\n".join([text, *([self.sentence] if self.sentence else []), self.table])
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain data, with None for non-finite numbers."""
+        """Return the verification as plain data, with None for numbers that are not finite."""
         return {
             "ok": self.ok,
             "tolerance": self.tolerance,

@@ -1,4 +1,4 @@
-"""Monitoring of a running solver: its best iterate, reasons to stop, and what went wrong."""
+"""Monitoring of a running solver: its best iterate, reasons to stop, and causes of failure."""
 
 import signal
 import threading
@@ -20,15 +20,15 @@ Array = NDArray[np.float64]
 FEASIBLE = 1e-6
 """Largest scaled violation of an iterate that counts as feasible."""
 WINDOW = 30
-"""Number of iterations in which a converging Newton method makes visible progress."""
+"""Number of iterations within which Newton's method, if it converges, improves the iterate."""
 FAR = 1e10
-"""Scaled unknowns above this count as diverging."""
+"""Magnitude of scaled unknowns above which they count as diverging."""
 RESTING = 1e-6
-"""Steps of scaled unknowns below this count as zero."""
+"""Size of steps of scaled unknowns below which they count as zero."""
 
 
 class Seen(NamedTuple):
-    """An iterate of the solver; multipliers are zero if it does not report them."""
+    """Iterate of the solver; multipliers that the solver does not report are zero."""
 
     w: Array
     f: float
@@ -39,11 +39,11 @@ class Seen(NamedTuple):
 
     @property
     def finite(self) -> bool:
-        """True if cost and rows are numbers."""
+        """True if the cost and all rows are finite."""
         return bool(np.isfinite(self.f) and np.isfinite(self.violation))
 
     def better_than(self, other: "Seen | None") -> bool:
-        """Return True if better: feasible with the lower cost, or less violated."""
+        """Return True if both are feasible and the cost is lower, or the violation is smaller."""
         if other is None or not (self.finite and other.finite):
             return other is None or self.finite
         if max(self.violation, other.violation) <= FEASIBLE:
@@ -53,14 +53,14 @@ class Seen(NamedTuple):
 
 @final
 class Watch:
-    """A monitored run of a solver.
+    """Record of a run of a solver, which can stop the run.
 
     Attributes:
-        best, last: iterates; None before the first one.
+        best, last: best and last iterate; None before the first one.
         trace: cost, violation and largest step of each iterate.
-        counted: iterations counted by the solver, after its return.
-        halt: status of a stop, if any.
-        error: an exception in `progress`.
+        counted: number of iterations reported by the solver after its return.
+        halt: status if the run was stopped.
+        error: exception in `progress`, if any.
     """
 
     def __init__(self, program: Program, progress: Report | None, max_time: float | None) -> None:
@@ -75,12 +75,12 @@ class Watch:
 
     @property
     def iterations(self) -> int:
-        """Observed iterations without the start; a restoration reports its first point twice."""
+        """Number of iterations; the smaller count, as restorations report their start twice."""
         seen = max(0, len(self.trace) - 1)
         return seen if self.counted is None else min(seen, self.counted)
 
     def see(self, w: Array, f: float, g: Array, lam_w: Array, lam_g: Array) -> bool:
-        """Record an iterate; return True to stop the solver."""
+        """Record an iterate, and return True if the solver has to stop."""
         violation = worst_of(self._program, w, g)
         step = np.inf if self.last is None else float(np.abs(w - self.last.w).max(initial=0.0))
         self.last = Seen(w, f, g, lam_w, lam_g, violation)
@@ -96,17 +96,17 @@ class Watch:
                 self._progress(Progress(self.iterations, f, violation))
             except KeyboardInterrupt:
                 self.halt = Status.INTERRUPTED
-            # An exception cannot cross C++: it is stored here and raised again afterwards.
+            # Exceptions cannot pass through C++, so it is stored and raised again later.
             except BaseException as error:  # noqa: BLE001
                 self.error, self.halt = error, Status.INTERRUPTED
         return self.halt is not None
 
     @property
     def cycles(self) -> bool:
-        """True if neither cost nor violation improved in the last iterations, while w moved.
+        """True if w moved in the last iterations without improvement of cost or violation.
 
-        A Newton method behaves like this at a kink that is smoothed over less than one step: it
-        jumps from one side to the other.
+        This occurs at a kink that is smoothed over less than one step of Newton's method: iterates
+        alternate between the two sides.
         """
         if len(self.trace) <= 2 * WINDOW:
             return False
@@ -123,7 +123,7 @@ class Watch:
 
 
 class Shaped(ca.Callback):
-    """A function of CasADi that calls Python, with arguments and one result of given shapes."""
+    """CasADi function evaluated in Python, with arguments and one result of given shapes."""
 
     def __init__(
         self, name: str, inputs: Mapping[str, ca.Sparsity], output: str, shape: ca.Sparsity
@@ -155,7 +155,7 @@ class Shaped(ca.Callback):
 
 @final
 class IterationHook(Shaped):
-    """Callback of a solver (Ipopt, SQP) that reports every iterate to the current `watch`."""
+    """Iteration callback of Ipopt and SQP that reports each iterate to the current `watch`."""
 
     def __init__(self, program: Program) -> None:
         n, m, k = program.w.numel(), program.g.numel(), program.p.numel()
@@ -176,9 +176,9 @@ class IterationHook(Shaped):
 
 @final
 class GradientHook(Shaped):
-    """Gradient of the cost, used to monitor a solver without callback (fatrop).
+    """Gradient of the cost that monitors a solver without iteration callback (fatrop).
 
-    It is evaluated once per iteration, at the new iterate. To stop the solver, it returns NaN.
+    The solver evaluates it once per iteration, at the new iterate. NaN as result stops the solver.
     """
 
     def __init__(self, program: Program) -> None:
@@ -203,7 +203,7 @@ Hook = IterationHook | GradientHook
 
 @contextmanager
 def interrupts(watch: Watch) -> Generator[None, None, None]:
-    """Turn the first Ctrl-C into a stop after the current iteration; the second ends as usual."""
+    """Stop the solver after its iteration on the first Ctrl-C; restore the handler for others."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -222,11 +222,11 @@ def interrupts(watch: Watch) -> Generator[None, None, None]:
 
 
 At = Callable[[Array, Place], str]
-"""(w, place) -> text for its time."""
+"""(w, place) -> text for the time of the place."""
 
 
 def worst(program: Program, point: Seen, at: At) -> str:
-    """Return a message on the most violated row or bound, or that there is none."""
+    """Return a message about the most violated row or bound, or about the cost if feasible."""
     far = point.violation
     if far <= FEASIBLE:
         return f"The best iterate satisfies all constraints, at a cost of {point.f:.6g}."
@@ -242,7 +242,7 @@ def worst(program: Program, point: Seen, at: At) -> str:
 
 
 def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
-    """Return a message on a NaN or infinite equation or derivative at `w`; "" if none."""
+    """Return a message about an equation or derivative that is not finite at `w`, or ""."""
     cost, slope = program.gradient(w, values)
     g, jacobian = program.jacobian(w, values)
     bad = ~np.isfinite(g.full().ravel())
@@ -265,6 +265,6 @@ def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
 
 
 def as_fraction(w: Array, place: Place) -> str:
-    """Return the time of a place as a fraction, without known durations."""
+    """Return the time of a place as a fraction of the duration, which need not be known."""
     del w
     return f"at {place.fraction:.4g} of the duration"

@@ -1,1 +1,1 @@
-"""Transcription of a problem to a nonlinear program made of blocks, and back to names."""
+"""Transcription of a problem to a nonlinear program, and of its solution to named values."""

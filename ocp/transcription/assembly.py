@@ -1,8 +1,8 @@
-"""Assembly of pieces: functions of a program with exact sparse derivatives.
+"""Assembly of pieces into the functions of a program with exact sparse derivatives.
 
-Values of all blocks at all places are columns of mapped Functions. One constant sparse matrix each,
-computed here with NumPy, distributes them to the rows, the gradient, the Jacobian and the Hessian:
-nothing is differentiated again, and the graph does not grow with the mesh.
+Mapped Functions return the values of each block at all places as columns. Constant sparse matrices,
+computed with NumPy, distribute these values to the rows, the gradient, the Jacobian and the
+Hessian. No further differentiation is necessary, and the graph does not grow with the mesh.
 """
 
 from collections.abc import Sequence
@@ -16,12 +16,12 @@ import numpy as np
 from ocp.transcription.blocks import Array, Block, Entries, Indices, Piece, Selection
 
 Slot = tuple[float, int]
-"""Target of the shares of one cost: weight in the objective, and -1; or, if a row bounds the cost
-instead, 0 and the index of the piece with that row."""
+"""Target of the shares of one cost: its weight in the objective and -1, or, if a row bounds the
+cost, 0 and the index of the piece with this row."""
 
 
 class Assembled(NamedTuple):
-    """Functions of a program (see `Program`), and row indices of each piece, (m, places)."""
+    """Functions of a program (see `Program`), and `at`: row indices of each piece, (m, places)."""
 
     f: ca.MX
     g: ca.MX
@@ -32,7 +32,7 @@ class Assembled(NamedTuple):
 
 
 def row_numbers(pieces: Sequence[Piece]) -> tuple[Indices, ...]:
-    """Return the row indices of all pieces by their `order`, each of shape (m, places)."""
+    """Return the row indices of each piece, shape (m, places), sorted by `order`."""
     keys = np.concatenate([np.zeros(0, np.int64), *(np.repeat(p.order, p.m) for p in pieces)])
     numbers = np.empty(keys.size, np.int64)
     numbers[np.argsort(keys, kind="stable")] = np.arange(keys.size)
@@ -43,10 +43,10 @@ def row_numbers(pieces: Sequence[Piece]) -> tuple[Indices, ...]:
 def assemble(
     w: ca.MX, p: ca.MX, pieces: Sequence[Piece], slots: Sequence[Slot], c: Array
 ) -> Assembled:
-    """Assemble pieces.
+    """Assemble the functions of a program from its pieces.
 
     Args:
-        w, p: unknowns and parameters of the program; `theta` of the pieces is written in p.
+        w, p: unknowns and parameters of the program; `theta` of each piece depends on p.
         pieces: rows and costs.
         slots: targets of the shares of each cost.
         c: linear part of the objective, shape (n,).
@@ -107,10 +107,10 @@ def _joined(triplets: Sequence[Triplets]) -> Triplets:
 @final
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A piece with a block, at its rows (m, places).
+    """Piece with a block, and the indices of its rows (m, places).
 
-    Its share of the cost is added to the objective with `weight`, and to row `bounded` of the
-    program unless that is -1.
+    The share of the cost is added to the objective with the factor `weight`, and to row `bounded`
+    of the program unless `bounded` is -1.
     """
 
     piece: Piece
@@ -123,7 +123,7 @@ class _Part:
 
     @cached_property
     def arguments(self) -> list[ca.MX]:
-        """Return the local unknowns and parameters at all places."""
+        """Local unknowns and parameters at all places."""
         places, theta = self.piece.places, self.piece.theta
         if theta.shape[1] != places:
             theta = ca.repmat(theta, 1, places)
@@ -131,7 +131,7 @@ class _Part:
 
     @property
     def local(self) -> ca.MX:
-        """Return the local unknowns at all places, MX (n, places)."""
+        """Local unknowns at all places, MX (n, places)."""
         s, places = self.selection, self.piece.places
         if s.plain:
             return ca.reshape(self.w[s.columns.ravel().tolist()], self.block.n, places)
@@ -145,19 +145,19 @@ class _Part:
         return function.map(self.piece.places).call([*self.arguments, *more])
 
     def rows_alone(self) -> ca.MX:
-        """Return the rows at all places, and the cost that is bounded by a row, MX (k, 1)."""
+        """Return the rows at all places and the cost that a row bounds, MX (k, 1)."""
         found = ca.vec(self.mapped(self.block.rows)[0])
         return ca.vertcat(found, self.bounded_cost())
 
     def bounded_cost(self) -> ca.MX:
-        """Return the share of a cost that a row bounds; without rows if none does."""
+        """Return the share of the cost that a row bounds, MX (1, 1), or (0, 1) if there is none."""
         if self.bounded < 0 or self.block.share is None:
             return ca.MX(0, 1)
         return ca.sum2(self.mapped(self.block.share)[0])
 
     @property
     def numbers(self) -> Indices:
-        """Row indices of `rows_alone` in the program."""
+        """Indices in the program of the rows of `rows_alone`."""
         cost = self.bounded >= 0 and self.block.share is not None
         return np.append(self.rows.ravel(order="F"), np.full(int(cost), self.bounded))
 
@@ -171,7 +171,7 @@ class _Part:
                 matrix.add(self.block.of_slopes, rows, self.selection, slopes, weight)
 
     def add_jacobian(self, jacobian: "_Sum") -> ca.MX:
-        """Add the derivative of the rows; return their values as `rows_alone`."""
+        """Add the derivative of the rows, and return the values of `rows_alone`."""
         rows, entries = self.mapped(self.block.jacobian)
         jacobian.add(self.block.of_jacobian, self.rows, self.selection, entries)
         return ca.vertcat(ca.vec(rows), self.bounded_cost())
@@ -188,7 +188,7 @@ class _Part:
 def _rows(
     parts: Sequence[_Part], values: Sequence[ca.MX], constant: Triplets, w: ca.MX, m: int
 ) -> ca.MX:
-    """Return g = A w + the values of the blocks."""
+    """Return g = A w plus the values of the blocks."""
     A = _constant(constant, (m, w.numel()))
     g = ca.densify(ca.mtimes(A, w))
     if not values:
@@ -204,7 +204,7 @@ def _rows(
 @final
 @dataclass(eq=False)
 class _Sum:
-    """A sparse matrix whose entries are constants plus weighted sums of values of blocks."""
+    """Sparse matrix whose entries are constants plus weighted sums of values of blocks."""
 
     shape: tuple[int, int]
     varying: list[Triplets] = field(default_factory=list[Triplets])
@@ -226,20 +226,20 @@ class _Sum:
         values: ca.MX,
         weight: float = 1,
     ) -> None:
-        """Add a derivative by v: `rows` (m, places) of the matrix, `values` (nv, places)."""
+        """Add a derivative by v with `values` (nv, places) to `rows` (m, places) of the matrix."""
         source, columns, weights = _terms(selection, entries.columns)
         at = rows[entries.rows[source]].T
         self._put(entries, source, at, columns, weight * weights, values)
 
     def symmetric(self, entries: Entries, selection: Selection, values: ca.MX) -> None:
-        """Add the upper triangle of S' H S; `entries` are those of the upper triangle of H."""
+        """Add the upper triangle of S' H S; `entries` belong to the upper triangle of H."""
         first, left, by_left = _terms(selection, entries.rows)
         second, right, by_right = _terms(selection, entries.columns)
         a, b = _pairs(first, second, entries.rows.size)
         source, left, right = first[a], left[:, a], right[:, b]
         weights = by_left[:, a] * by_right[:, b]
         off = (entries.rows != entries.columns)[source]
-        # An off-diagonal entry of H represents two, which coincide if its unknowns share one.
+        # An off-diagonal entry of H stands for two, which coincide on the diagonal of S' H S.
         weights = weights * np.where(off & (left == right), 2.0, 1.0)
         weights = weights * (off | (left <= right))
         upper = np.minimum(left, right), np.maximum(left, right)
@@ -254,7 +254,7 @@ class _Sum:
         weights: Array,
         values: ca.MX,
     ) -> None:
-        """Store entry `source` of the block, by terms (places, terms)."""
+        """Store the terms (places, terms) of the entries `source` (terms,) of a block."""
         places, nv = weights.shape[0], entries.varying.size
         position = np.full(entries.rows.size, -1)
         position[entries.varying] = np.arange(nv)
@@ -288,16 +288,16 @@ class _Sum:
 
 
 def _gathered(values: ca.MX, sums: Triplets, start: Array) -> ca.MX:
-    """Return entries start[i] plus sums of weighted `values`, as a column.
+    """Return the entries start[i] plus weighted sums of `values` as a column.
 
-    Most entries are one value or a constant: they are selected, and only the others are summed.
+    Most entries are a single value or a constant and are selected; only the others are summed.
     """
     to, sources, weights = sums
     terms = np.bincount(to, minlength=start.size)
     plain = (terms == 1) & (start == 0.0)
     plain[to[weights != 1.0]] = False
     constants, which = np.unique(start, return_inverse=True)
-    index = np.asarray(which, dtype=np.int64).ravel()  # index of entries without values
+    index = np.asarray(which, dtype=np.int64).ravel()
     one = plain[to]
     index[to[one]] = constants.size + sources[one]
     added = np.flatnonzero((terms > 0) & ~plain)
@@ -314,7 +314,7 @@ def _gathered(values: ca.MX, sums: Triplets, start: Array) -> ca.MX:
 
 
 def _terms(selection: Selection, unknowns: Indices) -> tuple[Indices, Indices, Array]:
-    """Return the entry of each term of the local `unknowns`, its columns and weights."""
+    """Return the entry, columns and weights of each term of the local `unknowns`."""
     first = np.searchsorted(selection.local, unknowns, side="left")
     count = np.searchsorted(selection.local, unknowns, side="right") - first
     entry = np.repeat(np.arange(unknowns.size), count)
@@ -324,7 +324,7 @@ def _terms(selection: Selection, unknowns: Indices) -> tuple[Indices, Indices, A
 
 
 def _pairs(first: Indices, second: Indices, entries: int) -> tuple[Indices, Indices]:
-    """Return pairs of all terms of `first` and `second` that belong to the same entry."""
+    """Return all pairs of terms of `first` and `second` that belong to the same entry."""
     counts = np.bincount(second, minlength=entries)
     starts = np.cumsum(counts) - counts
     a = np.repeat(np.arange(first.size), counts[first])
@@ -333,7 +333,7 @@ def _pairs(first: Indices, second: Indices, entries: int) -> tuple[Indices, Indi
 
 
 def _constant(triplets: Triplets, shape: tuple[int, int]) -> ca.DM:
-    """Return a sparse matrix; duplicate entries are summed."""
+    """Return the sparse matrix of `triplets`, with duplicate entries summed."""
     rows, columns, values = triplets
     keys, number = np.unique(columns * shape[0] + rows, return_inverse=True)
     pattern = _sparsity(keys % shape[0], keys // shape[0], shape)
@@ -341,6 +341,6 @@ def _constant(triplets: Triplets, shape: tuple[int, int]) -> ca.DM:
 
 
 def _sparsity(rows: Indices, columns: Indices, shape: tuple[int, int]) -> ca.Sparsity:
-    """Return the pattern of entries in column-major order."""
+    """Return the sparsity of entries in column-major order."""
     starts = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=shape[1]))])
     return ca.Sparsity(*shape, starts.tolist(), rows.tolist())

@@ -1,9 +1,9 @@
-"""A partially separable program: a few functions of few unknowns, at many places.
+"""Partially separable program: a few functions of few unknowns, evaluated at many places.
 
     f(w) = c'w + sum_i q(S_i w, theta_i),    g(w) = A w + rows r(S_i w, theta_i)
 
-A `Block` is r and q with exact derivatives, built once and mapped over its places i; the S_i are
-constant and sparse, so the derivatives of the program are sums of the block's at constant places:
+A `Block` is r and q with exact derivatives, built once and mapped over its places i. The S_i are
+constant and sparse, so the derivatives of the program are sums of derivatives of blocks:
 
     dg/dw = A + sum_i P_i' (dr/dv) S_i,    H = sum_i S_i' (d^2 (sigma q + lam'r) / dv^2) S_i
 
@@ -24,7 +24,7 @@ from ocp.formulation.phase import Join, Row
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Symbols = Any
-"""SX or MX columns, all of one type; CasADi's stubs have no common type."""
+"""SX or MX columns of one type, for which CasADi's stubs have no common type."""
 
 OPTIONS = {"cse": True}
 
@@ -35,9 +35,9 @@ class Entries:
     """Entries of a derivative, divided into varying and constant ones.
 
     Attributes:
-        rows, columns: of all structural nonzeros, columnwise, shape (nnz,).
-        varying: indices of those that the function returns, increasing, shape (nv,).
-        constant: values of the others, shape (nnz - nv,).
+        rows, columns: indices of all structural nonzeros in column-major order, shape (nnz,).
+        varying: increasing indices of the entries that the function returns, shape (nv,).
+        constant: values of the constant entries, shape (nnz - nv,).
     """
 
     rows: Indices
@@ -54,13 +54,13 @@ class Entries:
 @final
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Rows r (m, 1) and a share q of the cost, functions of (v, theta), with derivatives.
+    """Rows r (m, 1) and a share q of the cost as functions of (v, theta), with derivatives.
 
     Attributes:
         n, m: numbers of local unknowns v and of rows.
         rows: (v, theta) -> r.
         share: (v, theta) -> q; None if there is none.
-        slopes: (v, theta) -> dq/dv, its varying nonzeros.
+        slopes: (v, theta) -> varying nonzeros of dq/dv.
         jacobian: (v, theta) -> r, varying nonzeros of dr/dv.
         hessian: (v, theta, sigma, lam) -> varying nonzeros of the upper triangle of
             d^2 (sigma q + lam'r) / dv^2.
@@ -80,7 +80,7 @@ class Block:
 
 
 def block(name: str, v: Symbols, theta: Symbols, r: Symbols, q: Symbols | None = None) -> Block:
-    """Differentiate rows `r` and a share `q` of the cost by the symbols `v`."""
+    """Return the block of rows `r` and a share `q` of the cost, differentiated by `v`."""
     kind = type(v)
     r = ca.densify(r)
     sigma, lam = kind.sym("sigma"), kind.sym("lam", r.numel())
@@ -108,7 +108,7 @@ def block(name: str, v: Symbols, theta: Symbols, r: Symbols, q: Symbols | None =
 
 
 def _entries(matrix: Symbols) -> tuple[Entries, Symbols]:
-    """Return the places of the nonzeros of a matrix, and the varying ones as a column."""
+    """Return the entries of a matrix, and its varying nonzeros as a column."""
     rows, columns = (np.array(part, dtype=np.int64) for part in matrix.sparsity().get_triplet())
     if isinstance(matrix, ca.MX):
         return Entries(rows, columns, np.arange(rows.size), np.zeros(0)), matrix.nz[:]
@@ -125,12 +125,12 @@ def _entries(matrix: Symbols) -> tuple[Entries, Symbols]:
 @final
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """Local unknowns v = S_i w at `places` places, by terms of the same shape everywhere.
+    """Local unknowns v = S_i w as sums of the same number of terms at each place.
 
     Attributes:
-        local: local unknown of each term, shape (terms,), increasing.
-        columns: the unknown of w in each term, shape (places, terms).
-        weights: its factor, shape (places, terms).
+        local: index of the local unknown of each term, increasing, shape (terms,).
+        columns: index in w of the unknown of each term, shape (places, terms).
+        weights: factor of each term, shape (places, terms).
     """
 
     local: Indices
@@ -139,18 +139,19 @@ class Selection:
 
     @cached_property
     def plain(self) -> bool:
-        """True if each local unknown is one of w."""
+        """True if each local unknown equals one unknown of w."""
         return bool(
             np.array_equal(self.local, np.arange(self.local.size)) and (self.weights == 1.0).all()
         )
 
 
 def select(parts: Sequence[Indices | tuple[Indices, Array]], places: int) -> Selection:
-    """Return a selection from consecutive parts.
+    """Return a selection of the local unknowns of consecutive parts.
 
     Args:
-        parts: (k, places) columns of k local unknowns; or columns and weights, both
+        parts: columns (k, places) of k local unknowns, or columns and weights, both
             (k, terms, places), of k sums.
+        places: number of places.
     """
     local, columns = [np.zeros(0, np.int64)], [np.zeros((0, places), np.int64)]
     weights, count = [np.zeros((0, places))], 0
@@ -165,7 +166,7 @@ def select(parts: Sequence[Indices | tuple[Indices, Array]], places: int) -> Sel
 
 
 class Linear(NamedTuple):
-    """Constant entries of the rows of a `Piece`: row `rows` of place `places` at `columns`."""
+    """Constant entries of the rows of a `Piece`, by place, row of the place, and column."""
 
     places: Indices
     rows: Indices
@@ -174,7 +175,7 @@ class Linear(NamedTuple):
 
     @staticmethod
     def of(rows: Indices, columns: Indices, weights: Array) -> "Linear":
-        """Return equal rows (terms,) at every place, with columns and weights (terms, places)."""
+        """Return entries in the same rows (terms,) of each place; others are (terms, places)."""
         terms, places = columns.shape
         at = np.tile(np.arange(places), terms)
         return Linear(at, np.repeat(rows, places), columns.ravel(), weights.ravel())
@@ -186,7 +187,7 @@ class Rows:
     """Names, sizes and ranges of m rows.
 
     Attributes:
-        names: of each row, for messages.
+        names: name of each row for messages.
         scale: SI value of a row divided by its value in the program, shape (m,).
         lower, upper: bounds in SI units, shape (m,).
     """
@@ -204,7 +205,7 @@ class Rows:
 
     @staticmethod
     def zero(names: Sequence[str], scale: Array) -> "Rows":
-        """Return the rows of equations, which are zero."""
+        """Return the rows of equations, with zero as both bounds."""
         zeros = np.zeros(len(names))
         return Rows(tuple(names), scale, zeros, zeros)
 
@@ -219,17 +220,16 @@ class Piece:
     """Rows and costs of one type at many places.
 
     Attributes:
-        rows: of each place.
-        order: position of the rows of each place among all rows: lower numbers first, shape
-            (places,); see `order_of`.
+        rows: rows of each place.
+        order: sort key of the rows of each place among all rows, shape (places,); see `order_of`.
         span: index of the phase.
-        interval, offset: the place is at the fraction `offset` of an interval of the mesh, both of
-            shape (places,).
+        interval, offset: index of an interval of the mesh, and fraction of this interval, of each
+            place, shape (places,).
         block: nonlinear part; None for linear rows.
-        selection: its local unknowns.
-        theta: its parameters, MX (k, places) or (k, 1).
+        selection: local unknowns of the block.
+        theta: parameters of the block, MX (k, places) or (k, 1).
         linear: linear part of the rows.
-        slot: index of the cost of the shares.
+        slot: index of the cost to which the shares of the block are added.
     """
 
     rows: Rows
@@ -260,7 +260,7 @@ class Piece:
 
 
 def linear_piece(rows: Rows, columns: Indices, weights: Array, span: int, order: Indices) -> Piece:
-    """Return single rows: row i is the sum of weights[i, j] w[columns[i, j]]."""
+    """Return linear rows at one place: row i is the sum of weights[i, j] w[columns[i, j]]."""
     numbers = np.repeat(np.arange(len(rows.names)), columns.shape[1])
     kept = weights.ravel() != 0.0
     return Piece(
@@ -274,9 +274,9 @@ def linear_piece(rows: Rows, columns: Indices, weights: Array, span: int, order:
 
 
 LAST = 63
-"""Last number inside a stage; 0 is the gap to the next one."""
+"""Last number inside an interval; 0 is the gap to the next interval."""
 
 
 def order_of(span: int, interval: Indices | int, inside: Indices | int) -> Indices:
-    """Return the order of rows by phase, interval and number inside the interval, up to `LAST`."""
+    """Return the sort key of rows by phase, interval and number inside it, up to `LAST`."""
     return (np.int64(span) << 40) + (np.asarray(interval, np.int64) << 6) + inside

@@ -1,14 +1,14 @@
 """Mechanisms with constraints phi(q, t) = 0, which hold exactly at every node, without drift.
 
-Collocation keeps phi'' = 0 at its points; the remaining violation is removed at the end of each
-interval by the smallest correction, with multipliers mu, nu as additional unknowns:
+Collocation imposes phi'' = 0 at its points. At the end of each interval the smallest correction
+removes the remaining violation; its multipliers mu, nu are additional unknowns:
 
     q_(k+1) = q_end + phi_q' mu,   phi(q_(k+1), t) = 0
     v_(k+1) = v_end + phi_q' nu,   phi_q v_(k+1) + phi_t = 0
 
-phi_q is evaluated at q_end, which makes a node an explicit function of the interval before.
-Coordinates may be named wherever values are given, also dependent ones: those that follow from the
-others are released, so that no condition is stated twice.
+phi_q is evaluated at q_end, so each node is an explicit function of the preceding interval.
+The user may prescribe dependent coordinates, too. Those that follow from the others are released,
+so that no condition is redundant.
 
 Source: Gear, Leimkuhler and Gupta, J. Comput. Appl. Math. 12/13, 1985, 77-90 (constraints on two
 levels); Ascher and Petzold, SIAM J. Numer. Anal. 28, 1991, 1097-1120 (projected collocation).
@@ -28,19 +28,19 @@ from symfric.foundation.checks import listed
 from symfric.model.holonomic import Holonomic
 
 RANK = 1e-8
-"""Relative singular values below this count as zero."""
+"""Relative size below which a singular value counts as zero."""
 STEPS, ITERATIONS = 20, 30
-"""Continuation steps from the start of a model to named coordinates, and iterations at each."""
+"""Continuation steps from the start of a model to named coordinates, and iterations of each."""
 FINE, NEAR = 4, 5
 """Continuation steps and iterations from one point of a motion to the next."""
 
 
 @final
 class Loops:
-    """Numeric constraints of a phase, scaled by nominal coordinates."""
+    """Numerical constraints of a phase, scaled by nominal coordinates."""
 
     def __init__(self, span: Span, mechanics: Holonomic, begin: float, free: bool) -> None:
-        """Set up a phase that starts at the time `begin` [s]; `free`: its begin or end is free."""
+        """Create constraints from the time `begin` [s]; `free` if start or end time are free."""
         self.span, self.n, self.begin = span, mechanics.n, begin
         p = {v.name: float(x) for v, x in zip(span.model.p, span.p, strict=True)}
         self.start = span.model.initial_state(None, p)[: self.n]
@@ -57,26 +57,26 @@ class Loops:
         self.open = bool(unknown) and bool(ca.depends_on(phi, ca.vertcat(*unknown)))
 
     def at(self, q: Array, t: float) -> tuple[Array, Array, Array]:
-        """Return phi (m,), its scaled Jacobian (m, n), and phi_t (m,), in time of the phase."""
+        """Return phi (m,), phi_q (m, n) and phi_t (m,), scaled, `t` [s] after the start."""
         values = self._function(q, self.begin + t, self.span.p)
         phi, slope, rate = (np.array(part) for part in values)
         slope = slope * self.nominal / self.sizes[:, None]
         return phi.ravel() / self.sizes, slope, rate.ravel() / self.sizes
 
     def closed(self, q: Array, held: Sequence[int], t: float) -> tuple[Array, float]:
-        """Return coordinates that satisfy the constraints best with those `held` as in q.
+        """Return coordinates on the constraints with those `held` as in q, and the residual.
 
-        Gauss-Newton with continuation from the start of the model, the shortest change in each
-        step. Also returns the remaining residual of the constraints.
+        Gauss-Newton steps of least norm are combined with continuation from the start of the model.
+        The residual is the largest remaining one of the constraints.
         """
         now = self._towards(self.start, q, held, t, (STEPS, ITERATIONS))
         return now, float(np.abs(self.at(now, t)[0]).max())
 
     def follow(self, x: Array, times: Array, lead: Sequence[int]) -> Array:
-        """Move coordinates and rates x (2 n, points) onto the constraints, one point after another.
+        """Return coordinates and rates x (2 n, points) moved onto the constraints, point by point.
 
-        As many of the coordinates `lead` as the constraints leave free keep their values, in their
-        order.
+        As many of the coordinates `lead` as the constraints leave free keep their values; earlier
+        ones have priority.
         """
         n, moved, now = self.n, x.copy(), self.start
         for k, t in enumerate(times.tolist()):
@@ -93,7 +93,7 @@ class Loops:
     def _towards(
         self, start: Array, q: Array, held: Sequence[int], t: float, pace: tuple[int, int]
     ) -> Array:
-        """Move from `start` to the `held` values of q, the others by the shortest change."""
+        """Return `start` with the `held` values of q, and other coordinates on the constraints."""
         free = np.setdiff1d(np.arange(self.n), held)
         now, begin = start.copy(), start[list(held)]
         for s in np.linspace(0.0, 1.0, pace[0] + 1)[1:]:
@@ -113,9 +113,10 @@ class Loops:
 def dependent(
     A: Array, given: Sequence[int], plain: Sequence[int], strict: Sequence[int]
 ) -> list[int] | None:
-    """Return columns of A to release so that the others can satisfy all its rows.
+    """Return the fewest columns of A to release so that all rows can be satisfied.
 
-    As few as possible: `plain` ones before those `given`; None if they are not sufficient.
+    Columns `plain` are released before those `given`, and columns `strict` never. Return None if
+    these columns are not sufficient.
     """
     u, s, _ = np.linalg.svd(A, full_matrices=False)
     rank, size = int((s > RANK * s[0]).sum()), float(s[0])
@@ -140,11 +141,11 @@ def dependent(
 
 
 CLOSED = 1e-7
-"""Largest residual of constraints with which named coordinates count as consistent, scaled by
-nominal coordinates; user-specified numbers have six digits or more."""
+"""Largest residual of the constraints for consistent coordinates, scaled by nominal coordinates.
+Numbers given by users have six digits or more."""
 BRANCH = 0.1
-"""Largest error of dependent named coordinates during the solve, over nominal ones: beyond that the
-loops might close in another configuration."""
+"""Largest change of dependent named coordinates during the solve, relative to nominal ones. Beyond
+it the loops might close in another configuration."""
 
 
 class Known(NamedTuple):
@@ -153,7 +154,7 @@ class Known(NamedTuple):
     Attributes:
         released: prescribed states that follow from others -> the range that replaces their
             value.
-        imposed: whether the constraints are rows there; False if they follow from links.
+        imposed: True if the constraints are rows there, False if they follow from links.
     """
 
     released: Mapping[int, Box]
@@ -166,11 +167,11 @@ class Closing:
     """Constraints of a phase.
 
     Attributes:
-        local: its unknowns.
-        loops: numbers of the constraints.
-        correction: rows of the gaps with the multipliers, for all states.
+        local: unknowns of the phase.
+        loops: numerical constraints.
+        correction: terms of the multipliers in the rows of the gaps, for all states.
         levels: phi and its rate, scaled.
-        known: fraction of T -> prescribed q and v there.
+        known: fraction of T -> prescribed coordinates and rates there.
     """
 
     local: Local
@@ -186,13 +187,13 @@ class Closing:
 
     @property
     def released(self) -> dict[float, dict[int, Box]]:
-        """Fraction of T -> states whose values are not conditions there -> their range."""
+        """Fraction of T -> released states there -> the range that replaces their value."""
         return {at: {**q.released, **v.released} for at, (q, v) in self.known.items()}
 
     def consistent(self, points: SpanPoints, nodes: Array, inner: Array) -> SpanPoints:
         """Return `points` moved onto the constraints, at fractions of T of nodes and inner points.
 
-        Coordinates with values at ends and via points lead, the others follow continuously.
+        Coordinates prescribed at ends and via points keep their values if the constraints permit.
         """
         span, n = self.local.span, self.loops.n
         held: dict[int, None] = {}
@@ -206,7 +207,7 @@ class Closing:
         return replace(points, nodes=x[:, : nodes.size], inner=x[:, nodes.size :])
 
     def corrected(self, gap: Piece, grid: Grid) -> Piece:
-        """Return the piece of the gaps with corrections of all intervals."""
+        """Return the piece of the gaps with the corrections of all intervals."""
         own, d = grid.layout.spans[self.local.number], grid.scheme.degree
         columns = own.ends(grid.scheme), own.z[:, d - 1 :: d], own.u
         return self.local.piece(
@@ -215,9 +216,9 @@ class Closing:
         )  # fmt: skip
 
     def pieces(self, grid: Grid) -> Iterator[Piece]:
-        """Yield constraints at the nodes, on both levels; for shooting only at the first one.
+        """Yield the constraints on both levels at all nodes; for shooting only at the first one.
 
-        The steps of an integrator end on the constraints.
+        The steps of an integrator satisfy the constraints at the other nodes.
         """
         number = self.local.number
         own, nodes = grid.layout.spans[number], grid.nodes[number]
@@ -238,17 +239,17 @@ class Closing:
 def closing(
     local: Local, before: Span | None, periodic: Sequence[str], named: Collection[str]
 ) -> Closing | None:
-    """Return the constraints of a phase; None if there are none.
+    """Return the constraints of a phase, or None if it has none.
 
     Args:
-        local: its unknowns.
-        before: the phase before it in the same scenario.
-        periodic: periodic states of the problem, if this is its first phase.
+        local: unknowns of the phase.
+        before: previous phase in the same scenario; None for the first one.
+        periodic: periodic states of the problem if this is the first phase.
         named: states with a start given by the user; others are released if constraints require it.
 
     Raises:
-        ValueError: named coordinates that do not satisfy the constraints, or links that
-            prescribe more than the constraints leave free.
+        ValueError: named coordinates do not satisfy the constraints, or links prescribe more
+            states than the constraints leave free.
     """
     span, mechanics = local.span, local.span.model.holonomic
     if mechanics is None or not mechanics.phi.numel():
@@ -289,7 +290,7 @@ def _known(
     periodic: Sequence[str],
     named: Collection[str],
 ) -> tuple[Known, Known]:
-    """Return prescribed coordinates and rates at a node, and those that follow from the others."""
+    """Return the prescribed coordinates and the prescribed rates at the fraction `at` of T."""
     n, names = loops.n, [v.name for v in span.model.x]
     boxes = [span.nodes[at][name] for name in names]
     held = [i for i in range(2 * n) if fixed(boxes[i])]
@@ -308,7 +309,7 @@ def _known(
     levels: list[Known] = []
     for level, what in enumerate(("coordinates", "rates")):
         if all(linked.get(i, False) for i in range((level + 1) * n)):
-            levels.append(Known({}, imposed=False))  # rates of the same coordinates
+            levels.append(Known({}, imposed=False))  # implied by links of all states
             continue
         inside, offset = range(level * n, (level + 1) * n), level * n
         plain = [i - offset for i in inside if linked.get(i) is True or i in default]
@@ -337,7 +338,7 @@ def _known(
 def _linked(
     span: Span, before: Span | None, periodic: Sequence[str], names: Sequence[str]
 ) -> dict[int, bool]:
-    """Return index of a linked state -> True if linked to a state, False to an expression."""
+    """Return index of a linked state -> True for a link to the same state, False otherwise."""
     if before is None:
         return {names.index(name): True for name in periodic}
     return {
@@ -349,7 +350,7 @@ def _linked(
 def _rate_error(
     span: Span, loops: Loops, rows: tuple[Array, Array], held: Sequence[int], target: Array
 ) -> float:
-    """Return the error of inconsistent rates at known coordinates; 0 if they are consistent."""
+    """Return the residual of inconsistent rates at known coordinates; 0 if they are consistent."""
     (A, A_t), n = rows, loops.n
     known = [i for i in held if i >= n]
     free_q = [i for i in range(n) if i not in held]

@@ -1,15 +1,15 @@
-"""Equations at a collocation point, and the coupling of the points of an interval.
+"""Equations at a collocation point, and coupling of the points of an interval.
 
 For an explicit model with states x the rows are
 
     0 = h f(t, x, z, u, p) - x'(s_j),   0 = alg(t, x, z, u, p),   path conditions
 
-For a mechanism they are implicit: its accelerations are slopes a = v'(s_j) / h of the polynomial,
-so no mass matrix is inverted, in the equations or in their derivatives:
+For a mechanism the rows are implicit. Its accelerations are slopes a = v'(s_j) / h of the
+polynomial, so neither the equations nor their derivatives invert a mass matrix:
 
     0 = h v - q'(s_j),   0 = h (M(q) a + phi_q' lam - Q),   0 = phi_q a + ...,   0 = h y' - y'(s_j)
 
-All rows are divided by nominal values; slopes of the polynomials are linear in the unknowns.
+All rows are divided by nominal values. Slopes of the polynomials are linear in the unknowns.
 """
 
 from collections.abc import Callable
@@ -31,18 +31,18 @@ from symfric.integrator.compiled.compiler import library
 PER_INSTRUCTION = 3e-9
 """Time of the virtual machine per instruction [s]."""
 ITERATIONS = 30
-"""Least number of solver iterations, each with one call of every function."""
+"""Smallest number of iterations of a solve, each with one call of every function."""
 FUNCTIONS = ("rows", "share", "slopes", "jacobian", "hessian")
 
 
 @final
 @dataclass(eq=False)
 class Engine:
-    """The fastest available Functions of a block, with a cache of compiled ones.
+    """Block whose Functions are compiled when this saves time.
 
     Attributes:
-        block: the original block, of SX.
-        expected: predicted time [s] that compiled code would have saved so far.
+        block: the original block of SX Functions.
+        expected: predicted time [s] of the evaluations so far, which compiled code would reduce.
     """
 
     block: Block
@@ -51,7 +51,7 @@ class Engine:
     def __post_init__(self) -> None:
         functions = {name: getattr(self.block, name) for name in FUNCTIONS}
         self._functions = {name: f for name, f in functions.items() if f is not None}
-        self._instructions = 0  # calls of other functions do not fit in one C file
+        self._instructions = 0  # blocks that call other functions are not compiled
         if self.block.rows.is_a("SXFunction"):
             self._instructions = sum(f.n_instructions() for f in self._functions.values())
         names = tuple(f.name() for f in self._functions.values())
@@ -65,39 +65,39 @@ class Engine:
 
     @cached_property
     def compiled(self) -> Block:
-        """The block of compiled functions."""
+        """Block with compiled Functions."""
         path = str(library(self._prospect.written(), *self._prospect.names))
         functions = {name: ca.external(f.name(), path) for name, f in self._functions.items()}
         return replace(self.block, **functions)
 
     def at(self, places: int) -> Block:
-        """Return the block, compiled if worthwhile, for a number of places per solver iteration."""
+        """Return the block for a number of places per iteration, compiled if this saves time."""
         if "compiled" in self.__dict__:
             return self.compiled
         self.expected += ITERATIONS * places * self._instructions * PER_INSTRUCTION
         if self._prospect.pays(self.expected):
             try:
                 return self.compiled
-            except CompileError:  # solve without a compiler if it is broken
+            except CompileError:  # compiled code is optional
                 self._prospect.hopeless = True
         return self.block
 
 
 LEAST, MOST = 1e-6, 1e6
-"""Limits of scales of rows without nominal value, which follow from their derivatives."""
+"""Limits of the scales of rows without nominal value, which are derived from derivatives."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PointEquations:
-    """The equations of one collocation point of a phase.
+    """Equations of one collocation point of a phase.
 
     Attributes:
-        local: its unknowns, followed in v by the slopes of the velocities of a mechanism.
+        local: unknowns of the point, which the slopes of the velocities of a mechanism follow in v.
         engine: rows and share of the cost.
-        rows: names, sizes and ranges; path conditions are the last ones.
-        sloped: for each state the row from which its slope is subtracted; -1 if the slope is a
-            local unknown.
+        rows: names, sizes and ranges of the rows; the path conditions come last.
+        sloped: for each state, index of the row from which its slope is subtracted; -1 if the slope
+            is a local unknown.
     """
 
     local: Local
@@ -120,7 +120,7 @@ def point_equations(local: Local) -> PointEquations:
     algebraic = implicit[n:, :]
     sizes = np.concatenate([*(model.nominal(letter) for letter in "xzu"), nominal[n : 2 * n]])
     slope = ca.jacobian(algebraic, ca.vertcat(*span.symbols[1:4], a))
-    J = ca.fabs(slope) @ ca.diag(ca.DM(sizes))  # changes of rows for nominal changes of unknowns
+    J = ca.fabs(slope) @ ca.diag(ca.DM(sizes))  # change of rows by nominal changes of unknowns
     largest = stacked(ca.mmax(J[i, :]) if J[i, :].nnz() else 1.0 for i in range(len(model.z)))
     scale = np.concatenate([nominal[:n], mass, nominal[2 * n :], at_start(largest)])
     path = stacked(row.expression for row in span.path)
@@ -142,9 +142,9 @@ def point_equations(local: Local) -> PointEquations:
 
 
 def _at_start(span: Span, a: ca.SX) -> Callable[[ca.SX], Array]:
-    """Return a function: expression -> absolute values at the start of the model.
+    """Return a function from an expression to its absolute values at the start of the model.
 
-    Accelerations `a` are zero; the values are safe to divide by.
+    Accelerations `a` are zero. The values are finite and between `LEAST` and `MOST`.
     """
     model = span.model
     z, u = (np.array([float(v.start) for v in group]) for group in (model.z, model.u))
@@ -159,7 +159,7 @@ def _at_start(span: Span, a: ca.SX) -> Callable[[ca.SX], Array]:
 
 
 def piece_of_points(equations: PointEquations, grid: Grid) -> Piece:
-    """Return the equations at all collocation points of a phase."""
+    """Return the piece of the equations at all collocation points of a phase."""
     local, scheme = equations.local, grid.scheme
     span, d = grid.layout.spans[local.number], scheme.degree
     N = span.intervals

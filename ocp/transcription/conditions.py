@@ -1,6 +1,6 @@
 """Conditions at single nodes and between phases: ends, via points, links, joins, end costs.
 
-Each condition is differentiated once; a `Maker` then writes it at its places on a grid.
+Each condition is differentiated once. A `Maker` then returns it as a `Piece` of a program.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -28,11 +28,11 @@ from ocp.transcription.unknowns import Columns, Grid, Layout, Local, time_scale
 from symfric.foundation.variable import stacked
 
 Maker = Callable[[Grid], Piece | None]
-"""Function that writes a condition on a grid; None if it has no place there."""
+"""Function that returns the piece of a condition on a grid, or None if the grid has no place."""
 
 
 def at_nodes(local: Local) -> Iterator[Maker]:
-    """Yield conditions at the ends and at via points of a phase, and its cost at the end."""
+    """Yield the conditions of a phase at its ends and via points, and its cost at the end."""
     span = local.span
     for fraction, rows in span.rows_at.items():
         for inside in (False, True):
@@ -51,7 +51,7 @@ def _at_node(
 ) -> Piece:
     """Return rows, or a share of the cost, at one node of a phase.
 
-    With inputs or algebraic variables they belong to an interval.
+    Rows with inputs or algebraic variables (`inside`) belong to the interval before the node.
     """
     node = grid.nodes[local.number][fraction]
     interval, columns = _columns_at(local, grid, node, inside)
@@ -63,10 +63,11 @@ def _at_node(
 def _columns_at(
     local: Local, grid: Grid, node: int, inside: bool
 ) -> tuple[int, tuple[Columns, Columns, Indices]]:
-    """Return the interval, and columns of x, z and u, at a node of the mesh.
+    """Return the interval and the columns of x, z and u at a node of the mesh.
 
-    Algebraic variables and inputs belong to the interval before; at node 0 to the first
-    collocation point. With `inside` states belong to that interval, not to the copy at the node.
+    Algebraic variables and inputs are those of the interval before the node; at node 0, those of
+    the first collocation point. With `inside`, states are those at the end of this interval, not
+    the copy at the node.
     """
     span, scheme = grid.layout.spans[local.number], grid.scheme
     interval, d = max(node - 1, 0), scheme.degree
@@ -80,17 +81,17 @@ def _columns_at(
 
 
 def _sum(columns: Indices, weights: Array) -> Columns:
-    """Return sums of `columns` (k, terms) with the same weights, at one place."""
+    """Return weighted sums of `columns` (k, terms) at one place; zero weights are omitted."""
     kept = np.flatnonzero(weights)
     factors = np.broadcast_to(weights[kept], (columns.shape[0], kept.size))
     return columns[:, kept, None], factors[:, :, None]
 
 
 def at_starts(local: Local, rows: Sequence[Row]) -> Maker:
-    """Return conditions at the starts of all intervals of a phase but the first one.
+    """Return conditions at the starts of all intervals of a phase except the first one.
 
-    Inputs are held: expressions with them jump there, before the first collocation point. The first
-    interval is covered by the conditions at the start of the phase.
+    Inputs are constant on intervals, so expressions with inputs jump there. Conditions at the start
+    of the phase cover the first interval.
     """
     made = _node_block(local, stacked(row.expression / row.nominal for row in rows))
 
@@ -107,7 +108,7 @@ def at_starts(local: Local, rows: Sequence[Row]) -> Maker:
 
 
 def _knows_inside(span: Span, expression: ca.SX) -> bool:
-    """Return True if an expression contains algebraic variables or inputs."""
+    """Return True if `expression` contains algebraic variables or inputs."""
     inside = ca.vertcat(span.model.vector("z"), span.model.vector("u"))
     return bool(inside.numel()) and bool(ca.depends_on(expression, inside))
 
@@ -119,7 +120,7 @@ def _node_block(local: Local, rows: ca.SX, share: ca.SX | None = None) -> Block:
 
 
 def between(before: Local, after: Local) -> Iterator[Maker]:
-    """Yield links that are expressions, and joins, of a phase to the previous one."""
+    """Yield links by expressions, and joins, between a phase and the previous one."""
     span = after.span
     v, theta = ca.vertcat(before.v, after.v), ca.vertcat(before.theta, after.theta)
     links = [link for link in span.links if not before.span.same_state(link.expression)]
@@ -162,7 +163,7 @@ def _between(
 
 
 def plain_links(number: int, before: Span, span: Span, grid: Grid) -> list[Piece]:
-    """Return the continuity of states from phase `number - 1`, `before`, to phase `number`.
+    """Return rows for the continuity of states from phase `number - 1`, `before`, to `number`.
 
     States whose start follows from other states have no such row.
     """
@@ -182,7 +183,7 @@ def plain_links(number: int, before: Span, span: Span, grid: Grid) -> list[Piece
 
 
 def whole(problem: Problem, grid: Grid) -> Iterator[Piece]:
-    """Yield periodicity, shared starts and sums of durations."""
+    """Yield the rows of periodicity, of shared starts, and of sums of durations."""
     spans, phases, layout = problem.spans, len(problem.chain), grid.layout
     end = order_of(len(spans), 0, 0)
     for first in range(0, len(spans), phases):
@@ -213,7 +214,7 @@ def _equal_states(
     names: Sequence[str],
     order: Indices,
 ) -> Piece:
-    """Return rows for equal states `names` at (phase, node) a and b."""
+    """Return rows that equate the states `names` at the places (phase, node) a and b."""
     columns: list[Indices] = []
     sizes: list[Array] = []
     for span, node in (a, b):

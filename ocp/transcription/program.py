@@ -1,4 +1,4 @@
-"""The nonlinear program for a solver, and the result of the solver."""
+"""Nonlinear program for a solver, its bounds and stages, and the result of the solver."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,9 +20,9 @@ class Place(NamedTuple):
     """Name and place of a row or an unknown of the program.
 
     Attributes:
-        name: "the equation of v", "force".
+        name: name such as "the equation of v" or "force".
         span: index of the phase.
-        fraction: position in the phase, between 0 and 1; nan for the whole phase.
+        fraction: position in the phase, between 0 and 1; NaN for the whole phase.
         scale: SI value divided by the value in the program.
     """
 
@@ -33,11 +33,12 @@ class Place(NamedTuple):
 
 
 class Stages(NamedTuple):
-    """Stages of the program for structured solvers: x_k with u_k, rows of its gap first.
+    """Stages of the program for structured solvers: x_k and u_k, with the rows of the gap first.
 
     Attributes:
-        nx, nu: states and other unknowns of each stage, in the order of w; the last nu is 0.
-        ng: rows of each stage except its gap x_(k+1) = F(x_k, u_k), in the order of g.
+        nx, nu: numbers of states and of other unknowns of each stage, in the order of w; the last
+            nu is 0.
+        ng: numbers of rows of each stage without its gap x_(k+1) = F(x_k, u_k), in the order of g.
         equality: mask of the rows of g that are equations, shape (m,).
     """
 
@@ -50,13 +51,13 @@ class Stages(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class Program:
-    """A nonlinear program with exact sparse derivatives; all values are scaled.
+    """Nonlinear program with exact sparse derivatives; all values are scaled.
 
         min f(w, p)   subject to   lower_w <= w <= upper_w,   lower_g <= g(w, p) <= upper_g
 
     Attributes:
-        w, p: MX unknowns and parameters.
-        f, g: MX cost and rows.
+        w, p: unknowns and parameters, MX.
+        f, g: cost and rows, MX.
         gradient: (x, p) -> (f, grad_f_x).
         jacobian: (x, p) -> (g, jac_g_x).
         hessian: (x, p, lam_f, lam_g) -> triu_hess_gamma_x_x.
@@ -104,10 +105,10 @@ class Program:
 
 
 def bounds_of(problem: Problem, grid: Grid) -> tuple[Array, Array]:
-    """Return lower and upper bounds of w, scaled.
+    """Return the scaled lower and upper bounds of w.
 
-    If the last collocation point is the end of its interval, only the copy at the node is bounded:
-    bounds on both would be dependent.
+    If the last collocation point is the end of its interval, only the copy at the node is bounded,
+    because bounds on both would be dependent.
     """
     layout, scale = grid.layout, scale_of(problem, grid.layout)
     d = grid.scheme.degree
@@ -147,10 +148,10 @@ def stages_of(
     made: Assembled,
     equality: Array,
 ) -> tuple[Stages | None, str]:
-    """Return the stages, or None and the coupling that prevents them.
+    """Return the stages and "", or None and the coupling that prevents them.
 
     Args:
-        problem, layout, pieces, made: of the program.
+        problem, layout, pieces, made: problem, layout, pieces and functions of the program.
         equality: mask of the rows that are equations, shape (m,).
     """
     if len(problem.scenarios) > 1:
@@ -191,7 +192,7 @@ def stages_of(
 def _owners(
     layout: Layout, pieces: Sequence[Piece], made: Assembled
 ) -> tuple[Indices, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
-    """Return the stage of each row, and whether it closes the gap to the next one."""
+    """Return the stage of each row, and a mask of rows of the gap to the next stage."""
     begins = np.cumsum([0, *(span.intervals + 1 for span in layout.spans)])
     m = made.g.numel()
     owner, gap = np.zeros(m, np.int64), np.zeros(m, dtype=bool)
@@ -211,9 +212,9 @@ class Progress:
 
     Attributes:
         iteration: number of iterations in this solve.
-        cost: J at this iterate.
+        cost: J of the iterate.
         violation: largest violation of an equation, a constraint or a bound, scaled.
-        stage: name of one of several solves, such as "widths 0.1"; empty for a single one.
+        stage: name of one of several solves, such as "widths 0.1"; empty for a single solve.
     """
 
     iteration: int
@@ -226,7 +227,7 @@ Report = Callable[[Progress], object]
 
 
 def in_stage(progress: Report | None, stage: str) -> Report | None:
-    """Return `progress` with the name of one of several solves."""
+    """Return `progress` with the name of a solve added to its argument."""
     if progress is None:
         return None
     return lambda now: progress(replace(now, stage=stage))
@@ -235,7 +236,7 @@ def in_stage(progress: Report | None, stage: str) -> Report | None:
 @final
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """Unknowns and multipliers, scaled: the data for a restart."""
+    """Scaled unknowns and multipliers, from which a solver can restart."""
 
     w: Array
     lam_w: Array
@@ -243,19 +244,20 @@ class Iterate:
 
     @staticmethod
     def cold(w: Array, rows: int) -> "Iterate":
-        """Return `w` with zero multipliers for it and for a number of rows."""
+        """Return an iterate with zero multipliers for `w` and for a number of rows."""
         return Iterate(w, np.zeros(w.size), np.zeros(rows))
 
 
 @final
 @dataclass(frozen=True)
 class SolverStatistics:
-    """Effort of one optimisation, or of several in a row.
+    """Size and effort of one solve, or total effort of several solves.
 
     Attributes:
-        unknowns, constraints: size of the nonlinear program, the last one of several.
-        jacobian_nonzeros, hessian_nonzeros: of the constraints; of the Lagrangian (one triangle).
-        iterations: of the solver, all solves together.
+        unknowns, constraints: size of the nonlinear program of the last solve.
+        jacobian_nonzeros, hessian_nonzeros: numbers of nonzeros of the Jacobian of the constraints
+            and of one triangle of the Hessian of the Lagrangian.
+        iterations: number of iterations of the solver in all solves.
         solves: number of solves.
         build_time, solve_time: wall time [s] for building the program and its derivatives, and for
             solving it.
@@ -273,7 +275,7 @@ class SolverStatistics:
     solves: int = 1
 
     def then(self, later: "SolverStatistics") -> "SolverStatistics":
-        """Return the total: the sizes of the later one, counts and times of both."""
+        """Return the sizes of `later`, with the sums of counts and times of both."""
         summed = ("iterations", "solves", "build_time", "solve_time", "verify_time")
         return replace(
             later, **{name: getattr(self, name) + getattr(later, name) for name in summed}
@@ -283,17 +285,17 @@ class SolverStatistics:
 @final
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """Result of a solver, also of a failed solve.
+    """Result of a solver, which may have failed.
 
     Attributes:
-        iterate: the solution, or the best iterate: among feasible ones the one of least cost, else
-            of least violation.
-        cost: J there.
-        violation: largest violation of a row or a bound there, scaled.
-        status: of the end; `sentence` describes it with the worst row and a remedy.
-        cycles: whether the last iterations were cyclic.
-        statistics: size, iterations, times.
-        cause: the exception in `progress` that stopped it, if any.
+        iterate: the solution, or the best iterate: the feasible one of least cost, or the one of
+            least violation if none is feasible.
+        cost: J of the iterate.
+        violation: largest violation of a row or a bound, scaled.
+        status: status of the solve; `sentence` describes it with the worst row and a remedy.
+        cycles: True if the last iterations were cyclic.
+        statistics: size, iterations and times.
+        cause: exception in `progress` that stopped the solver, if any.
     """
 
     iterate: Iterate
@@ -307,7 +309,7 @@ class Outcome:
 
 
 def outside(values: Array, lower: Array, upper: Array) -> Array:
-    """Return the distance of each value from its bounds; infinity for a non-finite one."""
+    """Return the distance of each value from its bounds; infinity if it is not finite."""
     far = np.maximum(0.0, np.maximum(lower - values, values - upper))
     return np.where(np.isfinite(values), far, np.inf)
 

@@ -1,4 +1,4 @@
-"""Discretisation of a motion: Radau and Gauss-Legendre collocation, shooting, and meshes."""
+"""Discretisation schemes (Radau and Gauss-Legendre collocation, shooting) and their meshes."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ MAX_DEGREE = 9
 
 
 class Coefficients(NamedTuple):
-    """Collocation on one interval [0, 1].
+    """Coefficients of collocation on one interval [0, 1].
 
-    A state is the polynomial through s_0 = 0 < s_1 < ... < s_d <= 1,
+    A state is the polynomial through its values at s_0 = 0 < s_1 < ... < s_d <= 1,
 
         x(s) = sum_r l_r(s) x_r,    x'(s_j) = sum_r slopes[r, j-1] x_r = h f(x_j),  j = 1 ... d,
 
@@ -30,7 +30,7 @@ class Coefficients(NamedTuple):
     Attributes:
         nodes: s_0 ... s_d, shape (d + 1,).
         slopes: l_r'(s_j), shape (d + 1, d).
-        weights: shape (d,).
+        weights: quadrature weights, shape (d,).
         ends: l_r(1), shape (d + 1,).
         inner_ends: values at 1 of the polynomials through s_1 ... s_d, which define the algebraic
             variables, shape (d,).
@@ -94,10 +94,11 @@ class Radau(_Collocation):
 @final
 @dataclass(frozen=True)
 class Legendre(_Collocation):
-    """Gauss-Legendre collocation with `degree` points: order 2 d at the nodes, conserves energy.
+    """Gauss-Legendre collocation with `degree` points: order 2 d at the nodes, energy conservation.
 
-    Limits: A-stable, not L-stable: stiff components oscillate from interval to interval. The end of
-    an interval is not a collocation point: algebraic variables there are extrapolated.
+    Limits: the method is A-stable but not L-stable, so stiff components oscillate between
+    intervals. Algebraic variables at the end of an interval, which is no collocation point, are
+    extrapolated.
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5.
 
     Raises:
@@ -113,14 +114,14 @@ class Legendre(_Collocation):
 class Shooting:
     """Multiple shooting: each interval is `steps` equal steps of a method of `symfric.flow`.
 
-    "exponential" passes through stiff bristles, where collocation points do not converge.
+    The method "exponential" also resolves stiff bristles, for which collocation does not converge.
 
     Limits: bounds and path conditions hold only at the nodes of the mesh, and cannot include
-    algebraic variables, which are internal to the steps. Second derivatives of steps that solve
-    equations are expensive: for an arm with six joints fifty times those of collocation.
+    algebraic variables, which are internal to the steps. Second derivatives of implicit steps are
+    expensive: for an arm with six joints, fifty times as expensive as those of collocation.
 
     Raises:
-        ValueError: unknown method, fewer than one step.
+        ValueError: unknown method, or fewer than one step.
     """
 
     method: str = "rodas5p"
@@ -175,7 +176,7 @@ def _at_end(nodes: Array) -> Array:
 
 SAME_NODE = 1e-9
 MOST_INTERVALS = 10**6
-"""Largest number of intervals; larger programs exceed any memory."""
+"""Largest number of intervals; larger programs exceed the memory of a computer."""
 
 WHAT = "their number or increasing fractions of T from 0 to 1"
 
@@ -218,22 +219,22 @@ def _mesh(span: Span, intervals: ArrayLike) -> Array:
 
 
 def _bounds_intervals(mesh: Array) -> bool:
-    """Return True for at least two increasing fractions from 0 to 1."""
+    """Return True if `mesh` consists of at least two increasing fractions from 0 to 1."""
     return mesh.size > 1 and mesh[0] == 0.0 and mesh[-1] == 1.0 and bool((np.diff(mesh) > 0).all())
 
 
 def _counts(intervals: Sequence[object], phases: int) -> bool:
-    """Return True for numbers of intervals, one for each phase, instead of fractions."""
+    """Return True if `intervals` are numbers of intervals, one for each phase, not fractions."""
     return len(intervals) == phases and all(
         (number := checks.as_number(value)) is not None and number >= 1 for value in intervals
     )
 
 
 def nodes_of(span: Span, mesh: Array) -> dict[float, int]:
-    """Return the index of the node at each fraction with conditions of the phase.
+    """Return the index of the node at each fraction of T with conditions.
 
     Raises:
-        ValueError: there is no such node.
+        ValueError: the mesh has no node at such a fraction.
     """
     nodes: dict[float, int] = {}
     for fraction in span.nodes:
@@ -248,11 +249,11 @@ def nodes_of(span: Span, mesh: Array) -> dict[float, int]:
 
 
 def check_meshes(problem: Problem, meshes: Sequence[Array]) -> tuple[Array, ...]:
-    """Return a mesh for each phase of each scenario; one for each phase serves all scenarios.
+    """Return a mesh for each phase of each scenario; `meshes` may hold those of one scenario.
 
     Raises:
-        ValueError: a wrong number of meshes, no increasing fractions from 0 to 1, or different
-            ones for phases that share inputs.
+        ValueError: the number of meshes is wrong, a mesh does not consist of increasing fractions
+            from 0 to 1, or meshes of phases that share inputs differ.
     """
     spans, phases = problem.spans, len(problem.chain)
     given = [np.asarray(mesh, dtype=float).ravel() for mesh in meshes]

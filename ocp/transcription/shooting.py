@@ -2,8 +2,8 @@
 
     x_(k+1) = F(x_k, u_k, p, t_k, h),   share of the cost = c(h),   c' = L(t, x, z, u, p),  c(0) = 0
 
-F is `symfric.flow` of the model with its cost as an additional state, so the derivatives are exact
-for the discrete map. Bounds and path conditions hold at the nodes.
+F is `symfric.flow` of the model with its cost as an additional state. The derivatives are those of
+the discrete map. Bounds and path conditions are imposed at the nodes.
 """
 
 from collections.abc import Iterator
@@ -24,19 +24,20 @@ from symfric.foundation.variable import stacked
 from symfric.model import Model
 
 LARGEST = 20_000
-"""Largest number of operations of an interval that is expanded to one expression; for longer ones
-the steps stay function calls, which are slower but differentiate quickly."""
+"""Largest number of operations of an interval that is expanded to one expression. In longer ones
+the steps remain function calls, which are slower but take less time to differentiate."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """The equations of one interval of a phase.
+    """Equations of one interval of a phase.
 
     Attributes:
-        local: its unknowns; x and u are those at its start.
+        local: unknowns of the interval; x and u are the values at its start.
         block: rows and share of the cost.
-        paths: conditions at a node without inputs, and with inputs of the next interval.
+        paths: (whether they contain inputs, rows, block) of path conditions at a node; inputs are
+            those of the next interval.
     """
 
     local: Local
@@ -48,8 +49,8 @@ def shot(local: Local, scheme: Shooting) -> Shot:
     """Formulate the equations of an interval of a phase.
 
     Raises:
-        ValueError: conditions or costs at nodes that contain algebraic variables, a bound on one,
-            a mechanism with prescribed motion in time.
+        ValueError: conditions or costs at nodes contain algebraic variables, an algebraic variable
+            has a bound, or the equations of a mechanism contain the time.
     """
     span = local.span
     _check(span)
@@ -68,7 +69,7 @@ def shot(local: Local, scheme: Shooting) -> Shot:
 
 
 def _interval_block(interval: ca.Function) -> Block:
-    """Return the block as expanded expressions if not too long, else as calls of steps."""
+    """Return the block as an expanded expression, or with calls of steps if it is too long."""
     flat = interval.expand()
     function, kind = (flat, ca.SX) if flat.n_instructions() <= LARGEST else (interval, ca.MX)
     symbols: list[Any] = [kind.sym(n, interval.size1_in(i)) for i, n in enumerate(("v", "theta"))]
@@ -76,7 +77,7 @@ def _interval_block(interval: ca.Function) -> Block:
 
 
 def with_cost(span: Span) -> tuple[Model, int]:
-    """Return the model with its start time as a parameter, and its cost, if any, as a state."""
+    """Return the model with start time as parameter and cost as state, and the number of costs."""
     model = span.model
     start = Variable("shooting_start", "s")
     shifted = model.t + start.symbol
@@ -91,7 +92,7 @@ def with_cost(span: Span) -> tuple[Model, int]:
 
 
 def _check(span: Span) -> None:
-    """Raise ValueError for conditions that shooting does not support."""
+    """Raise ValueError if `span` has conditions that shooting does not support."""
     model, mechanics = span.model, span.model.holonomic
     conditions = [*span.path, *(row for rows in span.rows_at.values() for row in rows)]
     named = [(row.name, row.expression) for row in conditions] + [("the end cost", span.end)]
@@ -117,7 +118,7 @@ def _check(span: Span) -> None:
 
 
 def _paths(local: Local) -> Iterator[tuple[bool, Rows, Block]]:
-    """Yield path conditions without inputs, then those with inputs."""
+    """Yield the path conditions without inputs, then those with inputs; see `Shot`."""
     span, u = local.span, local.span.model.vector("u")
     knows = [bool(u.numel()) and bool(ca.depends_on(row.expression, u)) for row in span.path]
     for inputs in (False, True):
@@ -130,7 +131,7 @@ def _paths(local: Local) -> Iterator[tuple[bool, Rows, Block]]:
 
 
 def pieces_of_intervals(made: Shot, gap: Piece, grid: Grid) -> Iterator[Piece]:
-    """Yield the flow over all intervals, whose linear part is in `gap`, and the path conditions."""
+    """Yield the flow over all intervals, with its linear part from `gap`, and path conditions."""
     local, number = made.local, made.local.number
     own = grid.layout.spans[number]
     N = own.intervals

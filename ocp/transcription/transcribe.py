@@ -2,9 +2,9 @@
 
     w = [x_0, (u_1, (x, z)_11 ... (x, z)_1d), x_1, ..., x_N, T] for each phase, chosen p
 
-with a copy of the state at every node. Only one point of each phase and the conditions at single
-nodes are differentiated, once, by `discretise`. `Discretisation.on` puts them on meshes, whose
-fractions, like all parameters, are parameters of the program.
+with a copy of the state at every node. `discretise` differentiates the equations of one point of
+each phase and the conditions at single nodes once. `Discretisation.on` assembles them on meshes,
+whose fractions are parameters of the program, as are the parameters of the models.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -56,13 +56,13 @@ Key = tuple[tuple[int, ...], ...]
 @final
 @dataclass(frozen=True, eq=False)
 class Discretisation:
-    """A problem with differentiated equations, to be put on meshes.
+    """Problem with differentiated equations, independent of a mesh.
 
     Attributes:
         problem, scheme: the problem and its scheme.
-        spans: for each phase the equations at its collocation points, or of its intervals.
-        closing: for each phase the constraints of its mechanism; None if it has none.
-        conditions: at single nodes, at starts of intervals, and between phases.
+        spans: for each phase, the equations at its collocation points or of its intervals.
+        closing: for each phase, the constraints of its mechanism; None if it has none.
+        conditions: conditions at single nodes, at starts of intervals, and between phases.
     """
 
     problem: Problem
@@ -73,10 +73,10 @@ class Discretisation:
     _made: dict[Key, Any] = field(default_factory=dict[Key, Any])
 
     def on(self, meshes: Sequence[Array]) -> "Transcription":
-        """Return the program on `meshes`, one for each phase (see `make_meshes`).
+        """Return the transcription on `meshes`, one for each phase (see `make_meshes`).
 
-        Meshes with the same numbers of intervals and the same nodes with conditions change only
-        values: the symbols and Functions of their programs are the same objects.
+        Programs on meshes with the same numbers of intervals and the same nodes with conditions
+        differ only in values and share their symbols and Functions.
 
         Raises:
             ValueError: invalid meshes.
@@ -96,7 +96,7 @@ class Discretisation:
     def _skeleton(
         self, intervals: Sequence[int], nodes: Sequence[Mapping[float, int]]
     ) -> "Skeleton":
-        """Assemble the program for numbers of intervals."""
+        """Assemble the program for given numbers of intervals and indices of nodes."""
         problem, scheme = self.problem, self.scheme.coefficients()
         extra = [2 * part.m if part and scheme.degree else 0 for part in self.closing]
         layout = lay_out(problem, scheme.degree, intervals, extra)
@@ -152,9 +152,9 @@ def discretise(
 
     Args:
         problem: the problem.
-        scheme: scheme; collocation if there are `starts`.
-        starts: index of a phase -> conditions at the start of each interval but the
-            first one, with the inputs that begin there.
+        scheme: the scheme, which must be collocation if there are `starts`.
+        starts: index of a phase -> conditions at the start of each interval except the first
+            one, with the inputs of this interval.
     """
     choices = {choice.name: choice.nominal for choice in problem.chosen}
     made: dict[tuple[object, ...], PointEquations | Shot] = {}
@@ -165,7 +165,7 @@ def discretise(
     for number, span in enumerate(problem.spans):
         earlier = tuple((i, problem.spans[i]) for i in range(number - span.phase, number))
         local = Local(number, span, earlier, choices, not isinstance(scheme, Shooting))
-        # scenarios differ in numbers only, which are parameters of the equations
+        # scenarios differ only in values of parameters
         key = (span.phase, id(span.model), id(span.running), id(span.path))
         if key not in made:
             shooting = isinstance(scheme, Shooting)
@@ -183,14 +183,14 @@ def discretise(
 @final
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """The part common to programs on meshes with the same numbers of intervals.
+    """Common part of programs on meshes with the same numbers of intervals.
 
     Attributes:
         problem: the problem.
         layout: places of the unknowns in w.
-        program: without values of parameters and names of rows and unknowns.
+        program: program without values of parameters and names of rows and unknowns.
         pieces, assembled: rows and costs, and their places in the program.
-        closing: for each phase the constraints of its mechanism; None if it has none.
+        closing: for each phase, the constraints of its mechanism; None if it has none.
     """
 
     problem: Problem
@@ -202,13 +202,13 @@ class Skeleton:
 
     @cached_property
     def structure(self) -> tuple[Stages | None, str]:
-        """Stages, or None and the reason."""
+        """Stages of the program, or None and the reason why it has none."""
         equality = self.program.lower_g == self.program.upper_g
         return stages_of(self.problem, self.layout, self.pieces, self.assembled, equality)
 
     @cached_property
     def largest(self) -> list[int]:
-        """Rows that bound the costs of the scenarios, if the largest counts."""
+        """Indices of the rows that bound the costs of scenarios by the largest one, if any."""
         pairs = zip(self.pieces, self.assembled.at, strict=True)
         return [int(at[0, 0]) for piece, at in pairs if piece.names == (LARGEST,)]
 
@@ -216,13 +216,13 @@ class Skeleton:
 @final
 @dataclass(frozen=True, eq=False)
 class Transcription:
-    """A problem on meshes: the nonlinear program, and its conversion to named values.
+    """Nonlinear program of a problem on meshes, and its conversion to named values.
 
     Attributes:
         problem, scheme: the problem and its scheme.
         meshes: for each phase, fractions of T that bound the intervals.
-        skeleton: common part of meshes with the same numbers of intervals.
-        program: for a solver.
+        skeleton: common part of programs with the same numbers of intervals.
+        program: program for a solver.
     """
 
     problem: Problem
@@ -232,7 +232,7 @@ class Transcription:
 
     @cached_property
     def program(self) -> Program:
-        """The program for a solver."""
+        """Program for a solver, with the values of its parameters."""
         return replace(
             self.skeleton.program,
             values=self.values(),
@@ -246,7 +246,7 @@ class Transcription:
         return self.skeleton.layout
 
     def pack(self, points: Points) -> Array:
-        """Return the vector w of `points`; shared values are those of the first phase."""
+        """Return the vector w of `points`; shared unknowns take values of the first scenario."""
         w = np.zeros(self.layout.size)
         for span, own in zip(points.spans[::-1], self.layout.spans[::-1], strict=True):
             w[own.nodes], w[own.inner] = span.nodes, span.inner
@@ -275,7 +275,7 @@ class Transcription:
         return Points(spans, dict(zip(names, values[self.layout.chosen].tolist(), strict=True)))
 
     def consistent(self, points: Points) -> Points:
-        """Return `points` with mechanisms moved onto their constraints."""
+        """Return `points` with coordinates and rates of mechanisms moved onto their constraints."""
         spans = [
             span if loops is None else loops.consistent(span, mesh, self.inner_fractions(number))
             for number, (span, mesh, loops) in enumerate(
@@ -311,11 +311,11 @@ class Transcription:
         return np.unique(np.concatenate([self.meshes[span], self.inner_fractions(span)]))
 
     def values(self, p: Mapping[str, float] | None = None) -> Array:
-        """Return the values [p, T, mesh] of each phase: those of the parameters of the program.
+        """Return the values of the parameters of the program, [p, T, mesh] of each phase.
 
         Args:
-            p: parameters of the models by name, in all phases that have them, instead of those of
-                the problem, also in scenarios.
+            p: values of parameters of the models by name, which replace those of the problem in
+                all phases and scenarios.
 
         Raises:
             ValueError: an unknown name.
@@ -342,7 +342,7 @@ class Transcription:
 
     @cached_property
     def unknowns(self) -> list[Place]:
-        """Names and places of all unknowns of the program; shared ones belong to the first span."""
+        """Names and places of all unknowns; shared unknowns belong to the first span."""
         scale = self.program.scale.tolist()
         places = [Place(LARGEST, 0, np.nan)] * self.layout.size
         for number, (span, own) in reversed(

@@ -1,4 +1,4 @@
-"""Unknowns of a motion: values, their places in the program, and symbols at one place."""
+"""Unknowns of a motion: their values, places in the program, and symbols at one place."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ class SpanPoints:
         T: duration [s], free or fixed.
         nodes: states at the nodes of the mesh, shape (nx, N + 1).
         inner: states at the collocation points, shape (nx, N d).
-        z: algebraic variables there, shape (nz, N d).
+        z: algebraic variables at the collocation points, shape (nz, N d).
         u: inputs, constant on each interval, shape (nu, N).
     """
 
@@ -41,7 +41,7 @@ class Points:
     """Values of all unknowns.
 
     Attributes:
-        spans: one for each phase and scenario of the problem.
+        spans: values of each phase of each scenario.
         chosen: values of the parameters chosen with the motion.
     """
 
@@ -50,12 +50,12 @@ class Points:
 
 
 class SpanLayout(NamedTuple):
-    """Places of the unknowns of one phase in w; shared ones belong to another phase.
+    """Indices in w of the unknowns of one phase; shared unknowns belong to another phase.
 
     Attributes:
-        T: of the duration; -1 if it is fixed.
-        nodes, inner, z, u: as in `SpanPoints`.
-        extra: additional unknowns of each interval, shape (k, N).
+        T: index of the duration; -1 if it is fixed.
+        nodes, inner, z, u: indices in the shapes of `SpanPoints`.
+        extra: indices of additional unknowns of each interval, shape (k, N).
     """
 
     T: int
@@ -77,13 +77,13 @@ class SpanLayout(NamedTuple):
 
     @property
     def carrying(self) -> Indices:
-        """Columns of the states that define the polynomial of each interval, (nx, d + 1, N)."""
+        """Indices of the states that define the polynomial of each interval, (nx, d + 1, N)."""
         inner = self.inner.reshape(self.inner.shape[0], self.intervals, self.degree)
         return np.concatenate([self.nodes[:, :-1, None], inner], axis=2).transpose(0, 2, 1)
 
     def ends(self, scheme: Coefficients) -> tuple[Indices, Array]:
-        """Return columns and weights (nx, terms, N) of the states at the ends of all intervals."""
-        kept = np.flatnonzero(scheme.ends)  # the others are zero
+        """Return indices and weights (nx, terms, N) of the states at the ends of all intervals."""
+        kept = np.flatnonzero(scheme.ends)
         columns = self.carrying[:, kept]
         return columns, np.broadcast_to(scheme.ends[kept, None], columns.shape)
 
@@ -95,9 +95,9 @@ class Layout(NamedTuple):
             chosen parameters, largest cost
 
     Attributes:
-        spans: one for each phase and scenario.
-        chosen: of chosen parameters.
-        largest: bound of all costs if the largest counts; else -1.
+        spans: indices of the unknowns of each phase of each scenario.
+        chosen: indices of the chosen parameters.
+        largest: index of the bound of all costs if the largest cost is minimised, otherwise -1.
         size: number of unknowns.
     """
 
@@ -110,12 +110,12 @@ class Layout(NamedTuple):
 def lay_out(
     problem: Problem, degree: int, intervals: Sequence[int], extra: Sequence[int]
 ) -> Layout:
-    """Return places of all unknowns in one vector, by phase and interval.
+    """Return the indices of all unknowns in one vector, ordered by phase and interval.
 
     Args:
         problem: the problem.
         degree: number of collocation points of an interval.
-        intervals: their number in each phase.
+        intervals: number of intervals of each phase.
         extra: number of additional unknowns of an interval of each phase.
     """
     spans: list[SpanLayout] = []
@@ -169,9 +169,9 @@ class Data(NamedTuple):
     """Parameters of the program that belong to one phase, MX.
 
     Attributes:
-        p: of the model, (n_p, 1).
-        T: duration, if it is fixed [s].
-        before: fixed time before it [s].
+        p: parameters of the model, (n_p, 1).
+        T: duration [s] if it is fixed.
+        before: total fixed duration of the previous phases [s].
         mesh: fractions of T that bound the intervals, (N + 1, 1).
     """
 
@@ -181,9 +181,9 @@ class Data(NamedTuple):
     mesh: ca.MX
 
     def theta(self, interval: Indices, offset: Array, weights: Array | None = None) -> ca.MX:
-        """Return theta of `Local` at the fractions `offset` of an `interval`, (k, places).
+        """Return theta of `Local` at the fractions `offset` of each `interval`, (k, places).
 
-        `weights` belong to a quadrature on an interval of length 1; zeros by default.
+        `weights` are quadrature weights for an interval of length 1, by default zeros.
         """
         places = interval.size
         weights = np.zeros(places) if weights is None else weights
@@ -200,8 +200,8 @@ class Grid(NamedTuple):
         layout: places of the unknowns.
         scheme: coefficients on an interval.
         data: parameters of each phase.
-        nodes: for each phase, index of the node at each fraction of T with conditions.
-        released: for each phase, fraction of T -> states that follow from others -> their range.
+        nodes: for each phase, fraction of T with conditions -> index of its node.
+        released: for each phase, fraction of T -> state that follows from others -> its range.
     """
 
     layout: Layout
@@ -212,7 +212,7 @@ class Grid(NamedTuple):
 
 
 def data_of(problem: Problem, p: ca.MX, intervals: Sequence[int]) -> list[Data]:
-    """Return the parts of p = [p, T, mesh] of each phase that belong to it."""
+    """Return the parameters of each phase, which are parts of p = [p, T, mesh] of each phase."""
     data: list[Data] = []
     first, before = 0, ca.MX(0)
     for number, (span, N) in enumerate(zip(problem.spans, intervals, strict=True)):
@@ -225,7 +225,7 @@ def data_of(problem: Problem, p: ca.MX, intervals: Sequence[int]) -> list[Data]:
 
 
 Columns = Indices | tuple[Indices, Array]
-"""(k, places) columns, or columns and weights (k, terms, places); see `blocks.select`."""
+"""Columns (k, places), or columns and weights (k, terms, places); see `blocks.select`."""
 
 
 @final
@@ -234,15 +234,15 @@ class Local:
     """Local unknowns v and parameters theta of a phase at one time, as SX symbols.
 
         v = (x, z, u, T if free, free time before, chosen p),  scaled except the time before
-        theta = (p, T, fixed time before, length h of the interval and the place as fractions of T,
+        theta = (p, T, fixed time before, length h of the interval and place as fractions of T,
                  quadrature weight)
 
     Attributes:
         number: index of the phase.
         span: the phase.
-        before: indices and phases of the same scenario before it.
-        choices: names of all chosen parameters of the problem, and their magnitudes.
-        inner: whether there are collocation points, and algebraic variables with them.
+        before: indices and spans of the previous phases of the same scenario.
+        choices: name -> magnitude of all chosen parameters of the problem.
+        inner: True if the scheme has collocation points, and thus algebraic variables.
     """
 
     number: int
@@ -253,7 +253,7 @@ class Local:
 
     @cached_property
     def free_before(self) -> list[tuple[int, Span]]:
-        """Phases before it with a free duration."""
+        """Previous phases with a free duration."""
         return [(i, span) for i, span in self.before if isinstance(span.T, Free)]
 
     @property
@@ -263,7 +263,7 @@ class Local:
 
     @cached_property
     def symbols(self) -> dict[str, ca.SX]:
-        """x, z, u, the rest of v, and theta."""
+        """Symbols by name: x, z, u, the rest of v ("rest"), and theta."""
         model = self.span.model
         rest = self.free + bool(self.free_before) + len(self.span.chosen)
         sizes = {"x": len(model.x), "z": len(model.z) if self.inner else 0, "u": len(model.u)}
@@ -297,7 +297,7 @@ class Local:
 
     @cached_property
     def values(self) -> list[ca.SX]:
-        """[t, x, z, u, p] in SI units: arguments of Functions of the model."""
+        """Arguments [t, x, z, u, p] of Functions of the model, in SI units."""
         model, chosen, symbols = self.span.model, self.span.chosen, self.symbols
         rest, theta = symbols["rest"], symbols["theta"]
         t = theta[-4] + theta[-2] * self.T
@@ -314,7 +314,7 @@ class Local:
         return [t, x, z, u, p]
 
     def columns(self, layout: Layout, x: Columns, z: Columns, u: Indices) -> list[Columns]:
-        """Return parts of `blocks.select` for v, with given columns of x, z and u."""
+        """Return the parts of v for `blocks.select`, with given columns of x, z and u."""
         places = u.shape[1]
         parts: list[Columns] = [x, z, u] if self.inner else [x, u]
         if self.free:
@@ -351,15 +351,15 @@ class Local:
         """Return the piece of a block of these local unknowns.
 
         Args:
-            grid: of the program.
-            rows: names, sizes and ranges of its rows.
+            grid: common data of the program.
+            rows: names, sizes and ranges of the rows of the block.
             made: the block.
-            columns: of x, z and u at all places.
+            columns: columns of x, z and u at all places.
             at: interval and offset of each place.
-            order: of the rows.
-            extra: columns of further local unknowns of the block, after v.
-            weights: of a quadrature on an interval of length 1, at each place.
-            linear: part of the rows.
+            order: order of the rows; see `blocks.order_of`.
+            extra: columns of further local unknowns of the block, which follow v.
+            weights: quadrature weights of the places for an interval of length 1.
+            linear: linear part of the rows.
         """
         interval, offset = at
         parts = [*self.columns(grid.layout, *columns), *extra]
