@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import wraps
+from inspect import cleandoc
 from math import inf, isfinite
 from re import DOTALL, search
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -70,9 +71,9 @@ class Facts:
     checked: str = ""
 
     def __set_name__(self, law: type, _: str) -> None:
+        text = cleandoc(law.__doc__ or "")
         for name in ("source", "checked"):
-            section = rf"\n {{4}}{name.title()}: (.+?)(?=\n\s*\n|\n {{4}}[A-Z]\w+:|\s*\Z)"
-            found = search(section, law.__doc__ or "", DOTALL)
+            found = search(rf"\n{name.title()}: (.+?)(?=\n\s*\n|\n[A-Z]\w+:|\Z)", text, DOTALL)
             if found and not getattr(self, name):
                 object.__setattr__(self, name, " ".join(found[1].split()).removesuffix("."))
 
