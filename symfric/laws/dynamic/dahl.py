@@ -19,11 +19,11 @@ class Dahl(Law):
 
     `z` is the mean bristle deflection [m].
     Limits: steady state mu_d N sign(v); rate-independent; drifts under vibration; n = 1 has the
-    virgin curve F = mu_d N (1 - exp(-sigma_0 x / (mu_d N))). |v| and sign(v) are smooth over v_eps;
-    choose v_eps ten times below the slowest motion of interest. v_eps = 0 is the original, with a
+    virgin curve F = mu_d N (1 - exp(-sigma_0 x / (mu_d N))). |v| and sign(v) are smooth over v_eps.
+    Keep v_eps ten times below the slowest motion of interest. v_eps = 0 is the original, with a
     kink at v = 0. For n < 1 the force reaches its level within a finite distance, with a corner
-    that rho_eps rounds over the fraction rho_eps^(1-n) of the level of z. Keep this fraction ten
-    times above rtol. Otherwise the element is so stiff in the corner that a step can skip a
+    that rho_eps smooths over the fraction rho_eps^(1-n) of the level of z. This fraction should be
+    ten times above rtol. Otherwise the element is so stiff in the corner that a step can skip a
     reversal of slip without an error estimate (n = 0.1, default rho_eps, rtol 1e-3). Not valid for
     N = 0.
     Source: Dahl, Aerospace Corp. TOR-0158(3107-18)-1, 1968; exponent: Dahl, AIAA J. 14, 1976.
@@ -165,7 +165,7 @@ class BoucWen(Law):
     Limits: steady state mu_d N (A / (beta + gamma))^(1/n) sign(v); rate-independent. n = 1,
     beta = 1, gamma = 0 is `Dahl`. Dissipative for -beta < gamma <= beta. One element has no
     non-local memory and drifts under vibration with an offset. sign(v) and sign(z) are smooth over
-    v_eps and z_eps; choose v_eps ten times below the slowest motion. Not valid for N = 0.
+    v_eps and z_eps. Keep v_eps ten times below the slowest motion. Not valid for N = 0.
     Source: Bouc 1967; Wen, J. Eng. Mech. Div. ASCE 102(2), 1976, 249-263.
     Checked: diegoandresalvarez/BWBN_TMCMC diff_eq_real.m.
     """

@@ -31,11 +31,11 @@ class Gonthier(Levels):
 
     s_dw is the dwell memory: after a rest of duration t, the break-away force is
     N [mu_d + (mu_s - mu_d) (1 - exp(-t/tau_dw))]. sat(x, F_C) equals x up to F_C and rises smoothly
-    to (1 + kappa) F_C beyond. Without this saturation, which is not in the paper, the force in
-    creep well below v_s is F_C + sigma_1 v s/(1 - s), 191 N at 1 um/s; kappa = 0 selects this
+    to (1 + kappa) F_C beyond. Without this saturation, which is not in the paper, the force at
+    velocities well below v_s is F_C + sigma_1 v s/(1 - s), 191 N at 1 um/s; kappa = 0 selects this
     original. tau changes smoothly over s_eps.
     Limits: steady state F_C(s(v)) dir + sigma_2 v for v far above v_s; mu_s = mu_d has no dwell
-    effect. Requires v_d < v_s. dz/dt does not vanish in creep (v < v_s), where only sat bounds F.
+    effect. Needs v_d < v_s. dz/dt does not vanish in creep (v < v_s), where only sat bounds F.
     Source: Gonthier, McPhee, Lange, Piedboeuf, Multibody Syst. Dyn. 11, 2004, 209-233; saturation
     added.
     Checked: the behaviour was checked; the saturation is constructed.
@@ -132,7 +132,7 @@ class Armstrong(Law):
     delay, and q measures the dwell: it is t/(t + gamma) after a rest of duration t and decays
     within tau_r in slip.
     Limits: steady state L(v) sign(v) + sigma_2 v; gamma -> inf, tau_L -> 0, k_t -> inf is the
-    Lorentzian law with the excess mu_a. v_e separates rest from slip; keep it above the creep
+    Lorentzian law with the excess mu_a. Keep v_e, which separates rest from slip, above the creep
     velocity. Not valid for N = 0.
     Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, 1083-1138.
     Checked: the differential form is constructed.

@@ -177,7 +177,7 @@ class ElastoPlastic(Bristle):
     which is wrong for z < 0.
     Limits: steady state g sign(v) + sigma_2 v, approached more slowly than by `LuGre` (0.997 of
     it after 3.4 z_ss). z_ba -> 0 is not `LuGre`, since alpha still rises with z. For passivity and
-    the choice of v_eps see `LuGre`. Requires z_ba < mu_d N / sigma_0, so not valid for small N.
+    the choice of v_eps see `LuGre`. Needs z_ba < mu_d N / sigma_0, so it is not valid for small N.
     Source: Dupont, Hayward, Armstrong, Altpeter, IEEE TAC 47(5), 2002, 787-792.
     Checked: jchristopherson/FrictionModels.jl ElastoPlasticModels.jl; MBDyn.
 

@@ -44,8 +44,8 @@ class MaxwellSlip(Elements):
     and optimisation.
     Limits: steady state (mu_1 + mu_2 + ...) N sign(v); rate-independent; virgin curve
     f(x) = sum min(k_i x, mu_i N). A reversal branch is twice the virgin curve (Masing), and closed
-    inner loops are forgotten. One stiff element is Coulomb friction. |v| is smooth over v_eps;
-    choose v_eps a hundred times below the slowest motion of interest. Not valid for N = 0.
+    inner loops are forgotten. One stiff element is Coulomb friction. |v| is smooth over v_eps.
+    Keep v_eps a hundred times below the slowest motion of interest. Not valid for N = 0.
     Source: Iwan, ASME J. Appl. Mech. 33(4), 1966; Prandtl 1928 (play operators).
     Checked: jchristopherson/friction README; Lampaert, Al-Bender, Swevers 2003.
     """
@@ -149,8 +149,8 @@ class Leuven(StribeckLevel, Elements):
     reversal points, which jumps where a loop closes. s(v) = g sign(v) is odd; with the unsigned s
     of the paper, z diverges for v < 0. |v| and signs are smooth over v_eps and r_eps.
     Limits: steady state g sign(v) + sigma_2 v, for any distribution of the F_i. delta_l -> inf is
-    `MaxwellSlip` until F_h = g. Requires mu_1 + mu_2 + ... >= mu_s, otherwise z diverges. Not valid
-    for N = 0.
+    `MaxwellSlip` until F_h = g. Needs a sum of all mu_i of at least mu_s, otherwise z diverges. Not
+    valid for N = 0.
     Source: Swevers, Al-Bender, Ganseman, Prajogo, IEEE TAC 45(4), 2000; Lampaert, Swevers,
     Al-Bender, IEEE TAC 47(4), 2002.
     Checked: Lampaert, Al-Bender, Swevers 2003, signs corrected.
@@ -238,7 +238,7 @@ class GMS(StribeckLevel, Elements):
 
     The smooth form slips too early by at most the share rho of the limit. Its steady state, lag and
     memory are those of the original, and no state changes at rest. sign and |v| are smooth over
-    v_eps; choose v_eps a hundred times below the slowest motion of interest. Periodic cycles are
+    v_eps. Keep v_eps a hundred times below the slowest motion of interest. Periodic cycles are
     dissipative; within a cycle, decelerating slip may store slightly more energy in the springs
     than the work done on them.
     Limits: steady state g sign(v) + sigma_2 v; C -> inf and mu_s = mu_d is `MaxwellSlip`. At rest

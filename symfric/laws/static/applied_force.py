@@ -32,8 +32,8 @@ class Karnopp(Sticking):
     at which it entered the band, unless the integrator sets it to zero. In the event form the body
     stops immediately and loses the energy m D_v^2/2. D_v -> 0 is Coulomb friction with stiction
     (`ExactCoulomb`). Inside the band friction may drive: F v >= -0.274 mu_s N D_v in the smooth
-    form, F v >= -mu_s N D_v in the original form, but F v >= 0 in the event form. Keep
-    sigma_2 D_v < (mu_s - mu_d) N; otherwise the event form enters the band again when it leaves it.
+    form, F v >= -mu_s N D_v in the original form, but F v >= 0 in the event form. In the event form
+    sigma_2 D_v must be below (mu_s - mu_d) N; otherwise a body that leaves the band reenters it.
     Source: Karnopp, ASME J. Dyn. Syst. Meas. Control 107, 1985 (not read), as in public code.
     Checked: fellipegm/valve_estimation and other public code.
     """
@@ -232,7 +232,7 @@ class Wojewoda(Levels, StaticLaw):
 
     sign(v) is smooth over v_eps, |v| over 1e-4 v_eps, |dv/dt| over a_eps, sign(v dv/dt) over
     v_eps a_eps. The stick branch clip(F_e) of the paper is omitted.
-    Limits: F -> mu_d N for fast sliding; Coulomb friction at dv/dt = 0. Requires mu_s <= 2 mu_d,
+    Limits: F -> mu_d N for fast sliding; Coulomb friction at dv/dt = 0. Needs mu_s <= 2 mu_d,
     otherwise friction drives a decelerating body. The acceleration of the body on which the force
     acts would close an algebraic loop; use a measured or filtered acceleration.
     Source: after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008 (abstract only).

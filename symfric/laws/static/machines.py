@@ -93,8 +93,8 @@ class BAM(StaticLaw):
     Stribeck terms, M2 is M4 without the terms of the load, and M1 is M4 without both. The motor
     drives where |tau_m| > |tau_e|. sign(v) is smooth over v_eps, |v| over 1e-4 v_eps, and the
     magnitudes and cases of the torques over tau_eps.
-    Limits: M1 is Coulomb + viscous, M2 is `Stribeck`. `N` has no effect. Creeps under load, whereas
-    the BAM code limits friction to the torque that stops the motor within a step.
+    Limits: M1 is Coulomb + viscous, M2 is `Stribeck`. `N` has no effect. Creeps under load; the
+    BAM code limits friction to the torque that stops the motor within a step.
     Source: Duclusaud et al. 2025, as in their public code.
     Checked: Rhoban/bam.
     """

@@ -177,7 +177,7 @@ class Ambrosio(StaticLaw):
         F = mu_d N sign(v) s((|v| - v_0) / (v_1 - v_0)),   0 <= v_0 < v_1
         s(t) = t original,   t^3 (10 - 15t + 6t^2) smooth,   0 <= t <= 1
 
-    Limits: F = mu_d N for v >= v_1. Below v_0 there is no friction, so that a loaded contact moves
+    Limits: F = mu_d N for v >= v_1. Below v_0 there is no friction, so that a loaded contact creeps
     freely and the linearisation at rest is singular. The original with v_0 = 0 is `Coulomb` with
     the shape "saturation".
     Source: Ambrosio 2003 (not read), as in public multibody code.
