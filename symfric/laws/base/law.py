@@ -128,8 +128,7 @@ class Switch:
         direction: 1 for rising zeros only, -1 for falling zeros only, 0 for both.
         reset: maps a state to its value after the change, in terms of the values before it.
         halts: True if the sliding velocity is set to exactly zero at the change.
-        at_start: True if the change also occurs at the start of a run whose expression is already
-            beyond zero.
+        at_start: True if it also occurs at the start when the expression is already beyond zero.
         rtol: largest relative tolerance of a run, for laws that require accurate instants.
     """
 
@@ -265,8 +264,7 @@ class Law(Parametric, ABC):
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return the internal states after long sliding at constant `v`; zero at v = 0.
 
-        If |v| is smoothed over v_eps, the rate vanishes at these states, except for rounding
-        errors, for |v| > 20 v_eps.
+        If |v| is smooth over v_eps, their rate vanishes to rounding for |v| > 20 v_eps.
         """
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
