@@ -1,4 +1,4 @@
-"""Choice of a law: laws on the user's machine, ranked by time at equal error."""
+"""Choice of a law: laws in the user's machine, ranked by work at equal error."""
 
 from typing import TYPE_CHECKING
 

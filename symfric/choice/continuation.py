@@ -1,15 +1,15 @@
-"""Runs of one law towards dry friction and at the loosest tolerance at equal error, in a budget.
+"""Runs of one law within a budget: towards dry friction, and at the loosest tolerance.
 
-    error      largest difference from the reference: of law and integrator
-    own error  largest difference from the finest run of the same law: of the integrator alone
+    error      largest difference from the reference, caused by law and integrator
+    own error  largest difference from the finest run of the same law, caused by the integrator
 
-A law that is no model of dry friction, such as a bristle that rings, does not keep a small error
-at any smoothing. It is timed where its own error is the wanted accuracy.
+A law that does not tend to dry friction, such as an undamped bristle, has no small error at any
+smoothing. It is timed at the tolerance at which its own error equals the required accuracy.
 
-The budget is work, attempts of a step times the CasADi instructions of one: no clock influences the
-result. An attempt of a machine with events counts `EVENTS` instructions more, the average cost of
-their search: 60 to 80 of a hundred microseconds of `gms`, `haessig_friedland` and exact dry
-friction.
+The budget is measured as work: attempted steps times CasADi instructions per attempt, so that no
+clock influences the result. In a machine with events an attempt counts `EVENTS` more instructions,
+the average cost of the search for events. For `gms`, `haessig_friedland` and exact dry friction
+this search takes 60 to 80 % of the time.
 """
 
 from contextlib import suppress
@@ -28,18 +28,18 @@ from symfric.model import Model
 from symfric.results.trajectory import Trajectory
 
 EVENTS = 12_000
-"""Instructions that the search for events after an attempt counts for."""
+"""Number of instructions that represents the search for events after an attempt."""
 RUN, RUNS = 250_000_000, 5
-"""Largest work of a run, about 0.7 s, and of all runs of a law in multiples of that."""
+"""Largest work of a run, about 0.7 s, and of all runs of a law as a multiple of it."""
 LEAST, LEAST_WHOLE = 5_000, 30_000
-"""Attempts that a run and all runs may take in any machine."""
+"""Number of attempts that are always allowed for a run, and for all runs."""
 GROWTH = 8
-"""Largest ratio of the attempts of a run to those of the run before, which was softer."""
+"""Largest ratio of the attempts of a run to those of the previous, smoother run."""
 
 
 @final
 class SpentError(RuntimeError):
-    """Exhausted budget of the runs of a law."""
+    """Error for an exhausted budget of the runs of a law."""
 
 
 @final
@@ -48,10 +48,10 @@ class Budget:
     """Counted and cached runs of one law in one machine.
 
     Attributes:
-        held: the law in the machine, at any smoothing.
-        instructions: of an attempt.
+        held: the law in the machine, for any smoothing.
+        instructions: number of instructions per attempt.
         work: largest work of a run.
-        attempts: of each run.
+        attempts: number of attempts of each run.
     """
 
     held: Candidate
@@ -63,23 +63,23 @@ class Budget:
 
     @property
     def most(self) -> int:
-        """Largest number of attempts of a run."""
+        """Largest number of attempts of one run."""
         return max(LEAST, self.work // self.instructions)
 
     @property
     def whole(self) -> int:
-        """Largest number of attempts of all runs."""
+        """Largest number of attempts of all runs together."""
         return max(LEAST_WHOLE, RUNS * self.work // self.instructions)
 
     def left(self, share: float = 1.0) -> bool:
-        """Return True if less than this share of the budget is used."""
+        """Return True if less than `share` of the budget is used."""
         return sum(self.attempts) < share * self.whole
 
     def model(self, s: float) -> Model:
         """Return the machine with the law at the smoothing `s`.
 
         Raises:
-            ValueError: beyond a bound of the law, or the machine refuses it.
+            ValueError: a parameter is out of bounds, or the machine rejects the law.
         """
         if s not in self._models:
             self._models[s] = self.held.model(s)
@@ -89,7 +89,7 @@ class Budget:
         """Return a run at the smoothing `s` with at most `most` attempts.
 
         Raises:
-            SolveError: it failed, or would take more.
+            SolveError: the run failed, or would take more attempts.
         """
         if (s, rtol) in self._runs:
             return self._runs[s, rtol]
@@ -107,7 +107,7 @@ class Budget:
 
 
 def counted(machine: Machine, model: Model, rtol: float) -> tuple[int, str]:
-    """Return the CasADi instructions of an attempt at this tolerance, and the method."""
+    """Return the CasADi instructions of an attempt at the tolerance `rtol`, and the method."""
     formula = chosen("simulate", "auto", rtol)
     inputs = input_data(model, machine.u, 0.0, machine.t_end)
     instructions = built(model, inputs, formula)[0].instructions
@@ -115,30 +115,30 @@ def counted(machine: Machine, model: Model, rtol: float) -> tuple[int, str]:
 
 
 LOOSEST, PER_DECADE = 1e-3, 2
-"""Largest relative tolerance that is tried, and the number of tolerances in a decade."""
+"""Largest relative tolerance that is tried, and the number of tolerances per decade."""
 LOOSER = (1e-6, 1e-5, 1e-4)
-"""Relative tolerances for runs that take too many attempts at a smaller one."""
+"""Relative tolerances for runs that take too many attempts at a smaller tolerance."""
 COARSE, FINEST = 1e-6, 1e-11
 """Relative tolerances of the runs towards dry friction, and of the finest runs."""
 NEAR = 10.0
-"""Error over accuracy above which a coarse run is sufficient."""
+"""Ratio of error to accuracy above which a coarse run is sufficient."""
 AS_NEAR = 2.0
-"""Ratio to the smallest error of a law up to which its errors count as equal."""
+"""Ratio to the smallest error of a law up to which errors count as equal."""
 FINER = 3
-"""Typical ratio of the attempts of a fine and of a coarse run."""
+"""Typical ratio of the attempts of a fine run to those of a coarse run."""
 EFFORT = "see effort"
 """Hint that a larger budget may help."""
 ON_THE_WAY = 0.6
-"""Share of the budget for the runs towards dry friction; the rest is for the run at equal error."""
+"""Share of the budget for runs towards dry friction; runs at equal error use the remainder."""
 
 
 @final
 @dataclass(frozen=True)
 class Wanted:
-    """Wanted errors, and tolerances of runs.
+    """Required errors, and the tolerances of runs that follow from them.
 
     Attributes:
-        accuracy: largest error relative to the motion, of law and integrator together.
+        accuracy: largest allowed error of law and integrator together, relative to the motion.
         softest: largest error of interest.
     """
 
@@ -147,7 +147,7 @@ class Wanted:
 
     @property
     def fine(self) -> float:
-        """Relative tolerance at which the integrator's error is negligible."""
+        """Relative tolerance at which the error of the integrator is negligible."""
         return min(1e-7, max(FINEST, 1e-3 * self.accuracy))
 
     @property
@@ -159,12 +159,12 @@ class Wanted:
 @final
 @dataclass(frozen=True, eq=False)
 class AtEqualError:
-    """Run by which a law is judged.
+    """Run from which the row of a law is computed.
 
     Attributes:
-        s: smoothing.
-        model, run, rtol: model, run and its relative tolerance.
-        error, own: errors from the reference, and from the finest run of the law itself.
+        s: smoothing of the law.
+        model, run, rtol: model, run and relative tolerance of the run.
+        error, own: differences from the reference and from the finest run of the law itself.
     """
 
     s: float
@@ -176,7 +176,7 @@ class AtEqualError:
 
 
 def continued(runs: Budget, reference: Reference, goal: Wanted) -> SmoothingStudy:
-    """Return errors against smoothing, up to two successive runs that keep the accuracy.
+    """Return errors against smoothing, ending with two successive runs within the accuracy.
 
     Raises:
         one of `FAILURES`: the unscaled law does not run at any tolerance.
@@ -189,7 +189,7 @@ def continued(runs: Budget, reference: Reference, goal: Wanted) -> SmoothingStud
         sample, rtol = _first_that_ends(runs, s, goal.coarse, GROWTH * before + LEAST)
         error = reference.off(sample.motion)
         if rtol > goal.fine and error <= NEAR * goal.accuracy:
-            with suppress(SolveError):  # otherwise the coarse run stays
+            with suppress(SolveError):  # then the coarse run is kept
                 sample = runs.run(s, goal.fine, GROWTH * sample.attempts + LEAST)
                 error, rtol = reference.off(sample.motion), goal.fine
         return Smoothed(s, error, sample.attempts, rtol, sample.motion / reference.size[:, None])
@@ -201,10 +201,10 @@ def continued(runs: Budget, reference: Reference, goal: Wanted) -> SmoothingStud
 def _first_that_ends(runs: Budget, s: float, rtol: float, most: int) -> tuple[Sample, float]:
     """Return the run at `rtol`, or at the next of `LOOSER` that takes at most `most` attempts.
 
-    A law with s < 1 has one more try only, since a failed run costs as much as a complete one.
+    For s < 1 only one other tolerance is tried, since a failed run costs as much as a complete one.
 
     Raises:
-        SolveError: none does, or a run fails otherwise.
+        SolveError: no run takes at most `most` attempts, or a run fails for another reason.
     """
     looser = [x for x in LOOSER if x > 1.1 * rtol]
     for next_rtol in looser if s >= 1.0 else looser[-1:]:
@@ -218,7 +218,7 @@ def _first_that_ends(runs: Budget, s: float, rtol: float, most: int) -> tuple[Sa
 
 
 def nearest(levels: SmoothingStudy) -> Smoothed:
-    """Return the softest level whose error is about the smallest one."""
+    """Return the smoothest level whose error is approximately the smallest error."""
     least = min(level.error for level in levels.levels)
     return next(level for level in levels.levels if not level.error > AS_NEAR * least)
 
@@ -226,17 +226,17 @@ def nearest(levels: SmoothingStudy) -> Smoothed:
 def at_equal_error(
     runs: Budget, s: float, reference: Reference, goal: Wanted, near: Smoothed, whole: bool
 ) -> AtEqualError:
-    """Return the loosest tolerance at which an error is at most the accuracy.
+    """Return the run at the loosest tolerance at which an error is at most the accuracy.
 
-    A tolerance counts if the next tighter one keeps the accuracy, too; without any, the finest one
-    within the budget is taken.
+    The next tighter tolerance must satisfy the accuracy as well. If there is no such tolerance, the
+    finest run within the budget is returned.
 
     Args:
-        near: a run at about this smoothing, which shows the cost of a fine one.
-        whole: True for the error from the reference, False for the law's own.
+        near: run at a similar smoothing, which indicates the cost of a fine run.
+        whole: True for the error from the reference, False for the own error of the law.
 
     Raises:
-        SolveError: no run ends.
+        SolveError: no run reaches the end of the motion.
     """
     able = near.rtol <= goal.fine or FINER * near.attempts <= runs.most
     first = goal.fine if able else max(near.rtol, goal.fine)
@@ -245,7 +245,7 @@ def at_equal_error(
     except SolveError:
         if s != near.s:
             raise
-        best, finest = runs.run(s, near.rtol), near.rtol  # which has ended
+        best, finest = runs.run(s, near.rtol), near.rtol  # this run is known to succeed
 
     def own(sample: Sample) -> float:
         return apart(sample.motion, best.motion, best.size)
@@ -270,7 +270,7 @@ def at_equal_error(
 
 
 def short(problem: object) -> str:
-    """Return the first sentence of an error, or the status of a failed run in words."""
+    """Return the first sentence of an error, or a description of the status of a failed run."""
     if isinstance(problem, SolveError) and isinstance(problem.partial, Trajectory):
         run = problem.partial
         words = {

@@ -1,4 +1,4 @@
-"""Friction that all candidates describe, and the numbers with which each law describes it."""
+"""Friction that all candidates describe, and the parameters with which each law describes it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -39,16 +39,16 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True)
 class Friction:
-    """Dry friction that every law is to describe.
+    """Dry friction that all laws must describe.
 
-        F = mu_d N sign(v) sliding,  |F| <= mu_s N at rest
-        F = N [mu_d + (mu_s - mu_d) exp(-(v/v_s)^2)] sign(v)      with v_s
+        F = mu_d N sign(v) in sliding,  |F| <= mu_s N at rest         v_s = None
+        F = N [mu_d + (mu_s - mu_d) exp(-(v/v_s)^2)] sign(v)          with v_s
 
     Attributes:
-        mu_s, mu_d: static and dynamic coefficient.
+        mu_s, mu_d: static and dynamic friction coefficient.
         v_s: Stribeck velocity [m/s], over which friction falls after break-away; None if it falls
-            at once or was not measured. Then the velocities of that fall are scaled as other
-            widths, and only the limit is compared.
+            immediately or was not measured. Without it the Stribeck velocities of laws are scaled
+            like their widths, and only the limit is compared.
     """
 
     mu_s: float = 0.15
@@ -63,24 +63,27 @@ class Friction:
 
     @property
     def exact(self) -> ExactCoulomb:
-        """Return the friction without regularisation."""
+        """Law of this friction without regularisation."""
         if self.v_s is None:
             return ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d)
         return ExactCoulomb(mu_s=self.mu_s, mu_d=self.mu_d, v_s=self.v_s, form="stribeck")
 
     def sliding(self, speed: float) -> float:
-        """Return the coefficient of steady sliding at a speed [m/s] > 0."""
+        """Return the friction coefficient in steady sliding at a speed > 0 [m/s]."""
         fall = 0.0 if self.v_s is None else exp(-((speed / self.v_s) ** 2))
         return self.mu_d + (self.mu_s - self.mu_d) * fall
 
     def __str__(self) -> str:
-        """Return its numbers."""
+        """Return the coefficients and the Stribeck velocity as text."""
         falls = "falling at once" if self.v_s is None else f"v_s = {self.v_s:g} m/s"
         return f"mu_s = {self.mu_s:g}, mu_d = {self.mu_d:g}, {falls}"
 
 
 def friction_of(law: Law) -> Friction:
-    """Return the friction with mu_s and mu_d of `law`; a missing one in the default ratio."""
+    """Return the friction with mu_s and mu_d of `law`.
+
+    If the law has only one of them, the other follows from the default ratio.
+    """
     known, default = parameters(law), Friction()
     levels = {n: float(known[n].value) for n in ("mu_s", "mu_d") if n in known}
     mu_d = levels.get("mu_d", default.mu_d * levels.get("mu_s", default.mu_s) / default.mu_s)
@@ -95,13 +98,13 @@ FALL: dict[type[Law], str] = {
     PoppStelter: "d",
     MakkarDixon: "gamma_3",
 }
-"""Law -> its Stribeck velocity, or the inverse, if it is not called v_s."""
+"""Names of the Stribeck velocity, or of its inverse, by law, if it is not v_s."""
 NO_FALL = (VelocityBased, StickSlip)
-"""Laws whose v_s is the width of the transition."""
+"""Laws in which v_s is the width of the transition and not a Stribeck velocity."""
 
 
 def fall_of(law: Law) -> str | None:
-    """Return the name of the Stribeck velocity of `law`, or of the inverse; None without one."""
+    """Return the name of the Stribeck velocity of `law` or of its inverse; None if it has none."""
     if isinstance(law, NO_FALL):
         return None
     name = FALL.get(type(law), "v_s")
@@ -112,7 +115,7 @@ Levels = Callable[[Friction, float], Mapping[str, float]]
 
 
 def _of_bliman(f: Friction, _: float) -> Mapping[str, float]:
-    """Return mu_1 and mu_2 with the level mu_1 - mu_2 of sliding and the peak mu_s."""
+    """Return mu_1 and mu_2 such that mu_1 - mu_2 is mu_d and the peak is mu_s."""
     eta = BlimanSorine().eta
 
     def peak(mu_2: float) -> float:
@@ -127,9 +130,9 @@ def _of_bliman(f: Friction, _: float) -> Mapping[str, float]:
 
 
 def _shared(law: type[MaxwellSlip | Leuven], total: str) -> Levels:
-    """Return the levels of default elements that carry `total` together, in the same shares."""
+    """Return the levels of the default elements, scaled such that together they carry `total`."""
     mu = {n: p.value for n, p in parameters(law()).items() if n[:3] == "mu_" and n[3:].isdigit()}
-    least = getattr(law(), "mu_s", sum(mu.values()))  # those of Leuven carry more than mu_s
+    least = getattr(law(), "mu_s", sum(mu.values()))  # elements of Leuven carry more than mu_s
     return lambda f, _: {n: value * getattr(f, total) / least for n, value in mu.items()}
 
 
@@ -149,17 +152,19 @@ LEVELS: dict[type[Law], Levels] = {
     RuiWang: lambda f, N: {"D": f.mu_s * N, "C": 2 - 2 / pi * asin(f.mu_d / f.mu_s)},
     MakkarDixon: lambda f, N: {"gamma_1": (f.mu_s - f.mu_d) * N, "gamma_4": f.mu_d * N},
 }
-"""Law -> its levels if they are not mu_s and mu_d; those in newton at a load N."""
+"""Functions (friction, load) -> levels by law, for laws whose levels are not mu_s and mu_d."""
 
 
 def alike(law: Law, friction: Friction, load: float | None) -> Law:
-    """Return `law` with the levels and, if it has one, the Stribeck velocity of `friction`.
+    """Return `law` with the levels of `friction` and, if known, its Stribeck velocity.
 
     Args:
-        load: normal force [N] if it is one number.
+        law: the law.
+        friction: the friction that the law must describe.
+        load: normal force [N]; None if it is not one number.
 
     Raises:
-        ValueError: a law with levels in newton if the load is not one number.
+        ValueError: the levels of the law are forces, and the load is not one number.
     """
     known = parameters(law)
     values = {name: getattr(friction, name) for name in ("mu_s", "mu_d") if name in known}
@@ -181,10 +186,10 @@ def alike(law: Law, friction: Friction, load: float | None) -> Law:
 
 
 def peaked(law: Law, mu_s: float, load: float | None) -> Law:
-    """Return a static law with the highest force mu_s N of steady sliding; any other unchanged.
+    """Return a static law whose largest force in steady sliding is mu_s N.
 
-    The product of a rise over one velocity and a fall over another stays 0.05 % to 7 % below the
-    static level of its formula, whereas measurements give the peak.
+    The product of a smooth sign and a Stribeck weight is at most 0.05 % to 7 % below the static
+    level of the formula, whereas measurements give the peak. All other laws remain unchanged.
     """
     known = parameters(law)
     apart = {"mu_s", "F_S", "gamma_1", "F_sl"} & set(known)
@@ -206,11 +211,11 @@ def peaked(law: Law, mu_s: float, load: float | None) -> Law:
 
 
 PASSES = 12
-"""Corrections of a peak; each leaves a few per cent of the error."""
+"""Largest number of corrections of a peak; each reduces the error to a few per cent."""
 
 
 def _top(law: Law, v: Array, N: float) -> float:
-    """Return the highest force of steady sliding over N, on the grid `v` and one at its peak."""
+    """Return the largest ratio F/N in steady sliding, from the grid `v` and a finer one near it."""
     F = steady_force(law, v, N)
     k = int(np.argmax(F))
     near = np.geomspace(v[max(k - 1, 0)], v[min(k + 1, v.size - 1)], 201)
@@ -218,9 +223,9 @@ def _top(law: Law, v: Array, N: float) -> float:
 
 
 def _raised(law: Law, factor: float, missing: float, N: float, v: Array) -> dict[str, float]:
-    """Return the parameters of a peak higher by a `factor`, or by the coefficient `missing`."""
+    """Return parameters that raise the peak by a `factor`, or by the coefficient `missing`."""
     now = {name: float(p.value) for name, p in parameters(law).items()}
-    if isinstance(law, MakkarDixon):  # gamma_1 times a share of itself makes the peak
+    if isinstance(law, MakkarDixon):  # the excess of the peak is a share of gamma_1
         share = float((np.tanh(now["gamma_2"] * v) - np.tanh(now["gamma_3"] * v)).max())
         return {"gamma_1": now["gamma_1"] + missing * N / share}
     if isinstance(law, Bittencourt):

@@ -1,4 +1,4 @@
-"""A law in the user's machine, and the reference motion from which errors are measured."""
+"""Law in the user's machine, and the reference motion from which errors are measured."""
 
 import warnings
 from collections.abc import Mapping
@@ -25,19 +25,19 @@ from symfric.scenes import Scene
 Array = NDArray[np.float64]
 
 OVERLOAD = "drier bristles creep too slowly for their v_eps or for the rounding of velocities"
-"""Reason for runs whose friction exceeds its static level."""
+"""Reason given for runs whose friction exceeds its static level."""
 FAILURES = (RuntimeError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError)
-"""Errors of a law, or of a function of the user that puts it into a machine."""
+"""Errors of a law, or of a function of the user that inserts it into a machine."""
 
 
 def quiet_run(machine: Machine, model: Model, law: Law, rtol: float, most: int) -> Sample:
     """Return one run of `model` without warnings, with at most `most` attempts of a step.
 
     Raises:
-        SolveError: it failed.
+        SolveError: the run failed.
     """
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # loose tolerances are tried on purpose
+        warnings.simplefilter("ignore")  # loose tolerances are intended
         warnings.simplefilter("error", OverloadWarning)
         try:
             return sample(machine, law, rtol, max_steps=most, model=model)
@@ -48,13 +48,14 @@ def quiet_run(machine: Machine, model: Model, law: Law, rtol: float, most: int) 
 @final
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Law in a machine, with numbers that describe the wanted friction, and its smoothing.
+    """Law in a machine, with parameters that describe the required friction, and its smoothing.
 
     Attributes:
         machine: the machine.
-        law: the law with its numbers.
-        knobs: contact -> smoothing of the law there; "" for a function law -> model.
-        scene: scene that holds the laws; None for a function law -> model.
+        law: the law with its parameters.
+        knobs: maps each contact to the smoothing of its law; the key is "" if `machine` is a
+            function law -> model.
+        scene: scene that contains the laws; None for a function law -> model.
     """
 
     machine: Machine
@@ -64,18 +65,18 @@ class Candidate:
 
     @property
     def power(self) -> float:
-        """Smallest power of the smoothing of its velocities; 0 if nothing is scaled."""
+        """Smallest power of s with which velocities are scaled; 0 if nothing is scaled."""
         return min((k.velocities for k in self.knobs.values() if k.powers), default=0.0)
 
     def law_at(self, s: float) -> Law:
-        """Return the law at the smoothing `s`, with several contacts that of the first."""
+        """Return the law of the first contact at the smoothing `s`."""
         return next(iter(self.knobs.values())).at(s)
 
     def model(self, s: float) -> Model:
         """Return the machine at the smoothing `s`.
 
         Raises:
-            ValueError: beyond a bound of the law, or the machine refuses it.
+            ValueError: a parameter is out of bounds, or the machine rejects the law.
         """
         if self.scene is None:
             return self.machine.model(self.law_at(s))
@@ -83,7 +84,7 @@ class Candidate:
         return replace(self.scene, **laws).model()
 
     def run(self, model: Model, rtol: float, most: int) -> Sample:
-        """Return one run of the law in `model`, the machine at some smoothing; see `quiet_run`."""
+        """Return one run of the law in `model`, a result of the method `model`; see `quiet_run`."""
         return quiet_run(self.machine, model, self.law, rtol, most)
 
     @cached_property
@@ -99,13 +100,15 @@ def candidate(
     """Return `law` in `machine`.
 
     Args:
-        frictions: contact -> friction to describe; "" for any other contact.
-        load: normal force [N] if it is one number.
-        own: True if the law keeps its numbers, because they were fitted, and is not scaled.
+        machine: the machine.
+        law: the law.
+        frictions: maps contacts to the friction to describe; the key "" is for all others.
+        load: normal force [N]; None if it is not one number.
+        own: True if the law was fitted: its parameters are kept, and it is not scaled.
         bristles: power of the velocities of a law with states, see `smoothing`.
 
     Raises:
-        ValueError: the machine refuses the law, or no numbers of the law describe the friction.
+        ValueError: the machine rejects the law, or the law cannot describe the friction.
     """
     same = law if own else alike(law, frictions[""], load)
     made = machine.make(same)
@@ -126,7 +129,10 @@ def candidate(
 
 
 def frictions_of(machine: Machine, given: Friction | None, scene: object) -> dict[str, Friction]:
-    """Return contact -> friction, "" for any: `given`, else that of the laws of the scene."""
+    """Return the friction of each contact: `given`, or by default that of the laws of the scene.
+
+    The key "" is for all contacts without an entry.
+    """
     if given is not None:
         return {"": given}
     if isinstance(scene, Scene):
@@ -144,7 +150,7 @@ def frictions_of(machine: Machine, given: Friction | None, scene: object) -> dic
 
 
 def load_of(model: Model) -> float | None:
-    """Return the normal force [N] of all contacts if it is one number, else None."""
+    """Return the normal force [N] of all contacts, or None if it is not one number."""
     loads = [contact.N for contact in model.contacts]
     if not all(is_number(N) and np.isfinite(float(N)) for N in loads):
         return None
@@ -153,10 +159,10 @@ def load_of(model: Model) -> float | None:
 
 
 FINE = 1e-10
-"""Relative tolerance of references."""
+"""Relative tolerance of reference runs."""
 ATTEMPTS = 400_000
 RATIO, SHARPEST = 4.0, 12
-"""Ratio of successive widths of the sharpest law, and their largest number."""
+"""Ratio of successive widths of the sharpest law, and the largest number of widths."""
 
 
 @final
@@ -165,9 +171,9 @@ class Reference:
     """Motion from which errors are measured.
 
     Attributes:
-        about: its description.
-        motion, size: rows of numbers, and the sizes to which errors are relative.
-        uncertain: its distance from dry friction; 0 for data.
+        about: description of the motion.
+        motion, size: signals in rows, and the size of each row to which errors are relative.
+        uncertain: estimated distance of the motion from dry friction; 0 for data.
         mean: True if errors are root mean squares, for data with noise.
     """
 
@@ -178,23 +184,23 @@ class Reference:
     mean: bool = False
 
     def off(self, motion: Array) -> float:
-        """Return the error of a motion; infinite for one of another shape."""
+        """Return the error of a motion; inf if its shape differs from the reference."""
         return apart(motion, self.motion, self.size, self.mean)
 
 
 OWN = Reference("its own fine run", np.zeros((0, 0)), np.zeros(0), 0.0)
-"""Stands for the fine run of each law itself, which judges the integrator only."""
+"""Placeholder for the fine run of each law itself, for which only the integrator causes errors."""
 
 
 def reference_of(
     where: str, machine: Machine, given: object, frictions: Mapping[str, Friction],
     load: float | None, accuracy: float,
 ) -> tuple[Reference, Machine]:  # fmt: skip
-    """Return the reference, and the machine compared at its times.
+    """Return the reference, and the machine with the compared signals and times.
 
     Raises:
-        ValueError: no reference, or signals that the machine does not have.
-        SolveError: no law comes near dry friction in this machine.
+        ValueError: `given` is not a reference, or has signals that the machine does not have.
+        SolveError: no law approaches dry friction in this machine.
     """
     if isinstance(given, Trajectory):
         signals = machine.of if machine.of and not callable(machine.of) else None
@@ -217,7 +223,7 @@ def reference_of(
         return Reference(type(given).__name__, run.motion, run.size, FINE), machine
     checks.choice(where, given, ("exact", "sharpest"))
     if given == "exact":
-        with suppress(*FAILURES):  # a machine without the applied force, or without events
+        with suppress(*FAILURES):  # the machine may provide no applied force or no events
             return _exact(machine, frictions, load), machine
     return _sharpest(machine, frictions, load, accuracy), machine
 
@@ -225,7 +231,7 @@ def reference_of(
 def _known(
     about: str, machine: Machine, names: tuple[str, ...], times: Array, rows: Array, mean: bool
 ) -> tuple[Reference, Machine]:
-    """Return signals over times as the reference."""
+    """Return known signals as the reference, and the machine compared at their times."""
     moved = np.ptp(rows, axis=1)
     size = np.where(moved > 0, moved, 1.0)
     compared = replace(machine, of=names, times=times, t_end=float(times[-1]))
@@ -242,7 +248,10 @@ def _exact(machine: Machine, frictions: Mapping[str, Friction], load: float | No
 def _sharpest(
     machine: Machine, frictions: Mapping[str, Friction], load: float | None, accuracy: float
 ) -> Reference:
-    """Return the limit of a smooth law, estimated from the power of the width that runs follow."""
+    """Return a smooth law with small widths, and its distance from the limit of zero widths.
+
+    The distance follows from the power of the width with which the runs converge.
+    """
     law = BrownMcPhee() if frictions[""].v_s is None else Stribeck()
     held, runs, gaps = candidate(machine, law, frictions, load, own=False), [], list[float]()
     uncertain = inf

@@ -1,4 +1,4 @@
-"""Measurement of one law in a machine: as smooth as the accuracy allows, at equal error."""
+"""Measurement of one law in a machine, at equal error and as smooth as the accuracy allows."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 WORK = 100_000_000
 """Largest number of CasADi instructions for one step size."""
 FEWEST = 100
-"""Smallest number of steps of the powers of ten that are tried."""
+"""Number of steps of the motion with the largest step size that is tried."""
 CHUNK = 1000
 """Number of steps between checks of the motion."""
 
@@ -53,7 +53,14 @@ CHUNK = 1000
 @final
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Motion that fixed steps must follow: names of positions, their values over times, sizes."""
+    """Motion that fixed steps must follow.
+
+    Attributes:
+        names: names of the positions.
+        t: times [s].
+        values: positions over the times, shape (positions, times).
+        size: size of each row, to which errors are relative.
+    """
 
     names: tuple[str, ...]
     t: Array
@@ -66,13 +73,13 @@ def largest(
 ) -> tuple[float | None, str]:
     """Return the largest step [s] with which the plant follows the motion, or None and the reason.
 
-    The plant block of `symfric.codegen` steps from the start to the end of the motion, with inputs
-    held at their values in the middle of each step. A step size holds if the positions are finite
-    and within `share` of the size of the motion of the adaptive run of the same law, at every step.
-    The result is the largest of 1, 2, 5 times a power of ten that holds, with the power below it
-    holding, too: whole powers are tried first, from large to small, then 2 and 5 times the one that
-    holds.
-    Limits: for steps across the fold of a falling law the eighth digit of a parameter may decide.
+    The plant block of `symfric.codegen` steps from the start to the end of the motion. Inputs are
+    constant in each step, with their values at its middle. A step size is valid if at every step
+    the positions are finite and differ from the adaptive run of the same law by at most `share` of
+    the size of the motion. Powers of ten are tried from large to small. The result is the first
+    valid one, or 2 or 5 times this power if that is valid as well.
+    Limits: if steps cross the peak of a falling law, the result may be sensitive to the eighth
+    digit of a parameter.
     """
     try:
         block = plant_block(model, method=method)
@@ -92,7 +99,7 @@ def largest(
 
 
 def _step(block: Block) -> ca.Function:
-    """Return (states, [inputs; h]) -> states after a step."""
+    """Return the function (states, [inputs; h]) -> states after a step."""
     x = ca.SX.sym("x", len(block.states))
     u = ca.SX.sym("u", len(block.inputs))
     h = ca.SX.sym("h")
@@ -105,7 +112,7 @@ def _follows(
     step: ca.Function, h: float, block: Block, machine: Machine, motion: Motion,
     share: float,
 ) -> bool:  # fmt: skip
-    """Return True if the motion in steps of `h` is finite and follows."""
+    """Return True if the motion in steps of `h` [s] is finite and within `share` of `motion`."""
     count = ceil(machine.t_end / h - 1e-9)
     names = [v.name for v in block.states]
     rows = [names.index(name) for name in motion.names]
@@ -128,27 +135,30 @@ def _follows(
 
 
 TIGHTER = 1e-2
-"""Ratio of tolerances at which a law must keep the accuracy, too."""
+"""Ratio of a tighter tolerance, at which a law must satisfy the accuracy as well."""
 AS_GOOD = 1.1
-"""Ratio to the smallest error from data up to which laws are ranked."""
+"""Largest ratio to the smallest error from data at which a law is ranked."""
 ROUNDS, PATIENCE = 5, 0.2
-"""Largest number of timed calls, and their total time [s] after which no more are made."""
+"""Largest number of timed calls, and the total time [s] after which timing stops."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Requirements on every law.
+    """Requirements that apply to all laws.
 
     Attributes:
-        frictions: contact -> friction to describe, "" for any.
-        load: normal force [N] if it is one number.
-        accuracy: largest error relative to the motion, of law and integrator together.
-        control: largest error of fixed steps.
-        own: True if laws keep their numbers, because they were fitted.
+        machine: the machine.
+        reference: motion from which errors are measured.
+        needs: required phenomena, words of `NEEDS`.
+        frictions: maps contacts to the friction to describe; the key "" is for all others.
+        load: normal force [N]; None if it is not one number.
+        accuracy: largest allowed error of law and integrator together, relative to the motion.
+        control: largest allowed error of fixed steps.
+        own: True if laws were fitted and keep their parameters.
         fixed: True if fixed steps and instructions on a core are measured.
         work: largest number of CasADi instructions of a run.
-        misfits: law -> error from data that were measured elsewhere; None without data.
+        misfits: maps laws to errors from data of another machine; None without such data.
     """
 
     machine: Machine
@@ -165,14 +175,14 @@ class Task:
 
     @property
     def goal(self) -> Wanted:
-        """Wanted errors of the runs."""
+        """Required errors of the runs."""
         return Wanted(self.accuracy, self.control if self.fixed else 0.0)
 
 
 def best_form(task: Task, name: str, laws: Sequence[Law]) -> Row:
-    """Return the row of the first ranked form of a law, or of the best form.
+    """Return the row of the first ranked form of a law, or of its best form if none is ranked.
 
-    A law that lacks a needed phenomenon lacks it in other forms, too.
+    If a form lacks a required phenomenon, the other forms lack it as well and are not measured.
     """
     rows: list[Row] = []
     for law in laws:
@@ -183,7 +193,7 @@ def best_form(task: Task, name: str, laws: Sequence[Law]) -> Row:
 
 
 def measured(task: Task, name: str, law: Law) -> Row:
-    """Return the row of `law`; errors of the law or of the machine become reasons."""
+    """Return the row of `law`; errors of the law or of the machine become the reason."""
     known, hard = nature.physical(law)
     operations, why = nature.c_operations(law)
     row = Row(
@@ -223,7 +233,7 @@ def measured(task: Task, name: str, law: Law) -> Row:
 
 
 def _from_own(task: Task, held: Candidate, runs: Budget) -> Task:
-    """Return the task with the law's own motion as reference if only the integrator is judged."""
+    """Return the task with a fine run of the law as the reference if the reference is `OWN`."""
     if task.reference is not OWN:
         return task
     run = held.run(held.first, 0.1 * task.goal.fine, 10 * runs.most)
@@ -231,7 +241,7 @@ def _from_own(task: Task, held: Candidate, runs: Budget) -> Task:
 
 
 def _by_data(misfits: dict[str, float] | None, row: Row) -> Row:
-    """Return the row with its error from data, ranked if that is about the smallest one."""
+    """Return the row with its error from data; it is ranked if this error is near the smallest."""
     if misfits is None or not row.attempts:
         return row
     misfit, best = misfits[row.law], min(misfits.values())
@@ -246,7 +256,7 @@ def _placed(task: Task, held: Candidate, levels: SmoothingStudy, runs: Budget, r
     """Return the row with the measurements and the standing.
 
     Raises:
-        SolveError: no run ends.
+        SolveError: no run reaches the end of the motion.
     """
     at = _judged(task, levels, runs)
     curve = tuple(
@@ -273,15 +283,15 @@ def _placed(task: Task, held: Candidate, levels: SmoothingStudy, runs: Budget, r
 
 
 def _judged(task: Task, levels: SmoothingStudy, runs: Budget) -> AtEqualError:
-    """Return the run at equal error from the reference, or at equal own error if it is not kept.
+    """Return the run at equal error from the reference, or at equal own error if there is none.
 
     Raises:
-        SolveError: no run ends.
+        SolveError: no run reaches the end of the motion.
     """
     s = levels.softest(MARGIN * task.accuracy)
     last = levels.levels[-1]
     if s is not None:
-        for smoothing in (s, last.s):  # between two levels the error is an estimate
+        for smoothing in (s, last.s):  # s lies between two levels, where the error is estimated
             with suppress(SolveError):
                 at = at_equal_error(runs, smoothing, task.reference, task.goal, last, whole=True)
                 if at.error <= task.accuracy and _holds(task, at, runs):
@@ -293,7 +303,10 @@ def _judged(task: Task, levels: SmoothingStudy, runs: Budget) -> AtEqualError:
 
 
 def _holds(task: Task, at: AtEqualError, runs: Budget) -> bool:
-    """Return True if a far tighter run keeps the accuracy; stiff bristles may fail by rounding."""
+    """Return True if a run at a much tighter tolerance satisfies the accuracy as well.
+
+    Runs of stiff bristles may fail this test because of rounding errors.
+    """
     tighter = max(TIGHTER * at.rtol, FINEST)
     if not runs.held.law.states or tighter >= at.rtol:
         return True
@@ -306,14 +319,14 @@ def _holds(task: Task, at: AtEqualError, runs: Budget) -> bool:
 def _own_numbers(law: Law) -> dict[str, float]:
     """Return the parameters that differ from the defaults of the law."""
     starts = {n: p.default for n, p in parameters(law).items()}
-    with suppress(TypeError):  # a wrapper has no default law; default elements have own numbers
+    with suppress(TypeError):  # a wrapper has no default law
         starts = {n: float(p.value) for n, p in parameters(type(law)()).items()}  # pyright: ignore[reportArgumentType]
     values = {n: float(p.value) for n, p in parameters(law).items()}  # pyright: ignore[reportArgumentType]
     return {n: value for n, value in values.items() if value != starts.get(n, inf)}
 
 
 def _timed(task: Task, law: Law, at: AtEqualError, runs: Budget) -> float:
-    """Return the shortest processor time [s] of a few calls; the integrator is already built."""
+    """Return the shortest processor time [s] of several calls, without building the integrator."""
     best, began = inf, process_time()
     for _ in range(ROUNDS):
         found = quiet_run(task.machine, at.model, law, at.rtol, runs.most)
@@ -324,9 +337,9 @@ def _timed(task: Task, law: Law, at: AtEqualError, runs: Budget) -> float:
 
 
 def _stepped(task: Task, held: Candidate, levels: SmoothingStudy, row: Row) -> Row:
-    """Return the row with the largest fixed steps of the law as smooth as their error allows.
+    """Return the row with the largest fixed steps, for the law as smooth as `control` allows.
 
-    A law that does not come so near to the reference is followed at its judged smoothing.
+    If the law does not satisfy `control` at any smoothing, the smoothing of `row` is used.
     """
     s = levels.softest(task.control)
     try:

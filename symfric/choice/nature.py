@@ -1,4 +1,4 @@
-"""Properties of a law without running it: phenomena, smoothness, parameters, cost in C."""
+"""Properties of a law that need no simulation: phenomena, smoothness, parameters, cost in C."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -30,7 +30,7 @@ NEEDS = {
     "drift-free": ("N", "no creep under vibration below break-away"),
     "dwell": ("T", "static friction grows with the time at rest"),
 }
-"""Word -> code of `symfric.laws.PHENOMENA`, and its meaning."""
+"""Codes of `symfric.laws.PHENOMENA` and their meanings, by word."""
 
 ALIASES = {
     "static": "stiction",
@@ -44,11 +44,13 @@ ALIASES = {
     "no-drift": "drift-free",
     "ageing": "dwell",
 }
-"""Other words of papers."""
+"""Synonyms of the words in `NEEDS`."""
 
 
 def needed(where: str, given: object) -> tuple[str, ...]:
-    """Return the words of `NEEDS` that `given` means: words, aliases or codes, in this order.
+    """Return the words of `NEEDS` for `given`, a sequence of words, aliases or codes.
+
+    The result is in the order of `NEEDS`.
 
     Raises:
         ValueError: a text instead of a sequence, or an unknown word; the message lists all words.
@@ -70,37 +72,37 @@ def lacking(needs: Iterable[str], codes: Iterable[str]) -> list[str]:
 
 
 EASY = ("level", "viscous", "velocity scale", "load", "geometry", "temperature")
-"""Roles of parameters that follow from a pull test and steady sliding."""
+"""Roles of parameters that can be measured in a pull test and in steady sliding."""
 NUMERICAL = ("width", "sampling")
 """Roles of parameters that are chosen, not measured."""
 SHARP = 1e-9
 """Widths [m/s] that are too small to smooth a law for an optimiser or a fixed step."""
 EVENT = "event"
-"""Form of laws with modes, and their class of smoothness."""
+"""Name of the form of laws with modes, and of their class of smoothness."""
 CLASSES = ("jumps", EVENT, "?", "C0", "C1", "C2", "C3", "C4", "C∞")
-"""Classes in the velocity, the least smooth first."""
+"""Classes of smoothness in the velocity, with the least smooth first."""
 CORE, STEPS_ON_CORE = "m4f", 200
-"""Core whose instructions are counted, and the number of steps."""
+"""Core on which instructions are counted, and the number of steps."""
 STEP = 1e-3
-"""Step [s] of the C; the count does not depend on it."""
+"""Step size [s] of the generated C, on which the count does not depend."""
 
 
 def physical(law: Law) -> tuple[list[Parameter], tuple[str, ...]]:
     """Return the parameters that describe friction, and the names of those hard to measure.
 
-    Hard are bristles (micrometres before break-away), times (dwell, lag) and shapes, which only a
-    fit determines. A width that smooths a jump is chosen and belongs to neither.
+    Parameters of bristles (micrometres before break-away), times (dwell, lag) and shapes are hard
+    to measure, since only a fit determines them. Widths that smooth a jump are not included.
     """
     known = [p for p in parameters(law).values() if p.role not in NUMERICAL and not p.width]
     return known, tuple(p.name for p in known if p.role not in EASY)
 
 
 def smoothness(law: Law) -> str:
-    """Return the class in the velocity of `law` with its numbers.
+    """Return the class of smoothness in the velocity of `law` with its parameters.
 
-    A law that is smooth over a width only states its class without: "C∞ (C0 at v = 0 as v_eps ->
-    0)" with v_eps = 1e-15 m/s is C0. A law that switches by events is of the class "event". A law
-    of laws has the least of their classes; "?" is a class that is not stated.
+    A law with a negligible width has the class that it states for zero width: "C∞ (C0 at v = 0 as
+    v_eps -> 0)" with v_eps = 1e-15 m/s is C0. A law with events has the class "event". A law that
+    contains laws has the least smooth of their classes. "?" stands for an unknown class.
     """
     if form(law) == EVENT:
         return EVENT
@@ -118,15 +120,15 @@ def smoothness(law: Law) -> str:
 
 
 def form(law: Law) -> str:
-    """Return the form of `law`, empty for the default one."""
+    """Return the form of `law`, or an empty string for the default form."""
     chosen = options(law).get("form")
     return chosen.value if chosen is not None and chosen.value != chosen.default else ""
 
 
 def forms(law: Law) -> tuple[Law, ...]:
-    """Return `law` with its modes switched by events, if it has that form, and unchanged.
+    """Return the form of `law` with events, if it has one, and the unchanged law.
 
-    The first is tried first: the exact one, unless it has no C for a controller.
+    The form with events is first, unless no C can be generated from it.
     """
     chosen = options(law).get("form")
     if chosen is None or EVENT not in chosen.choices or chosen.value == EVENT:
@@ -136,9 +138,10 @@ def forms(law: Law) -> tuple[Law, ...]:
 
 
 def steepness(law: Law, speed: float) -> float:
-    """Return the largest slope of the force over velocity, relative to the level at `speed` [s/m].
+    """Return the largest slope of the force over velocity, divided by the force at `speed` [s/m].
 
-    NaN for laws with states, whose slope at rest is a stiffness, and for laws with further inputs.
+    Return NaN for laws with further inputs and for laws with states, whose force at rest depends on
+    the displacement.
     """
     if law.states or law.inputs:
         return nan
@@ -153,7 +156,10 @@ def _block(law: Law) -> Block:
 
 
 def c_operations(law: Law) -> tuple[int | None, str]:
-    """Return the operations of the law's step in C, float, parameters constant, or the reason."""
+    """Return the operations of a step of the law in C, or None and the reason.
+
+    The C is in single precision with constant parameters.
+    """
     try:
         every = routines(CBlock(_block(law), REALS["float"]))
     except ValueError as problem:
@@ -163,7 +169,7 @@ def c_operations(law: Law) -> tuple[int | None, str]:
 
 
 def on_core(law: Law) -> tuple[float, str]:
-    """Return the instructions of the law's step on a Cortex-M4F, or NaN and the reason."""
+    """Return the instructions of a step of the law on a Cortex-M4F, or NaN and the reason."""
     try:
         counted = measure(_block(law), "float", CORE, steps=STEPS_ON_CORE)
     except (ValueError, CompileError) as problem:
@@ -172,13 +178,13 @@ def on_core(law: Law) -> tuple[float, str]:
 
 
 FAST, ANOTHER = 0.1, 0.05
-"""Velocity [m/s] of steady sliding, and the relative difference of its friction that counts."""
+"""Velocity [m/s] of steady sliding, and the relative difference of friction that is reported."""
 
 
 def otherwise(law: Law, friction: Friction, load: float | None) -> str:
-    """Return a reason why `law` differs from dry friction at any smoothing, empty if unknown.
+    """Return a reason why `law` differs from dry friction at any smoothing; empty if unknown.
 
-    Reasons are an undamped bristle, times of its own, and another level of steady sliding.
+    Reasons are an undamped bristle, time constants, and a different level of steady sliding.
     """
     known = parameters(law).values()
     if law.states:

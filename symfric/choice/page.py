@@ -1,4 +1,4 @@
-"""Choice as pictures, and as one self-contained page."""
+"""Figures of a ranking of laws, and a self-contained HTML page."""
 
 from collections.abc import Sequence
 from html import escape
@@ -21,29 +21,32 @@ from symfric.foundation.style import MARKERS, colour
 from symfric.page import html
 
 GROUPS = {"M": "memory", "P": "presliding", "St": "Stribeck", "S": "stiction"}
-"""Code of a phenomenon -> group of laws in pictures, the most demanding first."""
+"""Groups of laws in figures by code of phenomenon, with the most demanding first."""
 KINDS = (*GROUPS.values(), "sliding")
 SMALL = 7
 OFFSETS = ((5, 3), (5, -9), (-5, 3), (-5, -9), (0, 8), (0, -13), (9, 9), (9, -15), (-9, 9))
-"""Positions of a label relative to its point [points], the best first."""
+"""Positions of a label relative to its data point [typographic points], in order of preference."""
 BEHIND = {"fc": "w", "alpha": 0.75, "lw": 0.0, "pad": 0.6}
 GAP = 3.0
-"""Margin of a label [pixel], whose background must not hide the next one."""
+"""Margin of a label [pixel], so that its background does not hide the next label."""
 APART = 1e-2
-"""Share of the accuracy below which the error of a ranked law is labelled in the plane."""
+"""Share of the accuracy below which a ranked law is labelled."""
 COLUMN, PLANE, ROW = 3.35, 2.1, 0.135
-"""Width of a column of print, height of the plane and of a row of the list [inch]."""
+"""Width of a printed column, height of the plane, and height of a row of the list [inch]."""
 LEAST = 3
-"""Smallest number of ticks of an axis of work."""
+"""Smallest number of ticks on an axis of work."""
 MOST = 80
-"""Largest number of listed laws: all of the catalogue."""
+"""Largest number of listed laws, which exceeds the size of the catalogue."""
 
 
 def plot_choice(choice: Ranking, path: str | Path | None = None, wide: bool = True) -> Figure:
-    """Draw error against work, marked by phenomena, and a list of all laws by their work.
+    """Draw error against work, with markers for phenomena, and a list of all laws with their work.
 
     Args:
-        wide: panels next to each other; else above each other, in the width of a column of print.
+        choice: the ranking.
+        path: image file.
+        wide: True for panels side by side, False for one panel above the other in the width of a
+            printed column.
     """
     named = choice.placed[:MOST]
     tall = ROW * len(named) + (0.75 if wide else 0.55)
@@ -72,18 +75,18 @@ def plot_choice(choice: Ranking, path: str | Path | None = None, wide: bool = Tr
     )  # fmt: skip
     apart = (row for row in choice.ranked[1:] if row.error < APART * choice.accuracy)
     others = sorted((row for row in rows if not row.ranked), key=lambda row: row.work)
-    _label(figure, plane, [*choice.ranked[:1], *apart, *others], rows)  # after all else is placed
+    _label(figure, plane, [*choice.ranked[:1], *apart, *others], rows)  # needs the final layout
     return save(figure, path)
 
 
 def _kind(row: Row) -> int:
-    """Return the index among `KINDS` of the most demanding phenomenon of a law."""
+    """Return the index in `KINDS` of the most demanding phenomenon of a law."""
     codes = [*GROUPS]
     return next((k for k, code in enumerate(codes) if code in row.phenomena), len(codes))
 
 
 def _point(axis: Axes, row: Row, y: float, size: float) -> None:
-    """Draw the marker of a law at its work, hollow unless it is ranked."""
+    """Draw the marker of a law at its work; filled if it is ranked, otherwise hollow."""
     k = _kind(row)
     axis.plot(
         1e-6 * row.work, y, MARKERS[k], ms=size, mew=0.9, mec=colour(k),
@@ -92,7 +95,7 @@ def _point(axis: Axes, row: Row, y: float, size: float) -> None:
 
 
 def _plane(axis: Axes, choice: Ranking) -> list[Row]:
-    """Draw all laws at equal error, and return those in the picture."""
+    """Draw error against work, and return the rows of the laws within the plotted range."""
     rows = [row for row in choice.placed if 0.0 < row.error < 1e3]
     for row in rows:
         _point(axis, row, row.error, 4.5)
@@ -109,9 +112,9 @@ def _plane(axis: Axes, choice: Ranking) -> list[Row]:
 
 
 def _label(figure: Figure, axis: Axes, named: Sequence[Row], rows: Sequence[Row]) -> None:
-    """Write names next to points without overlaps; omit a name that has no such position."""
+    """Write names next to their points; omit names that would overlap in every position."""
     figure.draw_without_rendering()
-    half = 2.5 * figure.dpi / 72  # of the square that a marker covers [pixel]
+    half = 2.5 * figure.dpi / 72  # half width of a marker [pixel]
     points = (axis.transData.transform((1e-6 * row.work, row.error)) for row in rows)
     taken = [Bbox.from_extents(*(point - half), *(point + half)) for point in points]
     inside = axis.get_window_extent()
@@ -132,7 +135,7 @@ def _label(figure: Figure, axis: Axes, named: Sequence[Row], rows: Sequence[Row]
 
 
 def _list(axis: Axes, named: Sequence[Row], milliseconds: float) -> None:
-    """Draw the work of each law, by rank; a million instructions take `milliseconds`."""
+    """Draw the work of each law by rank; the label states that a million takes `milliseconds`."""
     for y, row in enumerate(named):
         _point(axis, row, y, 4.5)
     axis.set_yticks(range(len(named)), [f"{row.law}  {row.rank}" for row in named], fontsize=SMALL)
@@ -144,7 +147,7 @@ def _list(axis: Axes, named: Sequence[Row], milliseconds: float) -> None:
 
 
 def _round(axis: Axes, values: Sequence[float]) -> None:
-    """Put round numbers on a logarithmic axis, at least three if possible."""
+    """Set ticks at round numbers of a logarithmic axis, at least three if possible."""
     low, high = 0.8 * min(values), 1.25 * max(values)
     ticks: list[float] = []
     for digits in ((1,), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7)):
@@ -174,15 +177,15 @@ COLUMNS = (
     ("shows", "codes of its phenomena"),
     ("numbers", "parameters that differ from the defaults of the law"),
 )
-"""Head of a column, and its meaning."""
+"""Headings of the columns of the table, and their meanings."""
 NARROW = 700
-"""Width of a screen [pixel] below which the narrow picture is shown."""
+"""Width of a screen [pixel] below which the narrow figure is shown."""
 SMALL_WIDTH = 400
-"""Width of the narrow picture [pixel]."""
+"""Width of the narrow figure [pixel]."""
 
 
 def page(choice: Ranking) -> str:
-    """Return the whole document."""
+    """Return the HTML page of a ranking."""
     uncertain = f"{choice.uncertain:.0e}" if isfinite(choice.uncertain) else "an unknown amount"
     about = html.paragraph(
         f"All laws describe {choice.friction}. Errors are measured from {choice.reference}, itself "
@@ -201,7 +204,7 @@ def page(choice: Ranking) -> str:
 
 
 def body(choice: Ranking, width: int = 640) -> str:
-    """Return verdict, picture and tables, for a page or a notebook."""
+    """Return the verdict, the figure and the tables as HTML, for a page or a notebook."""
     sentences = [*choice.verdict, *interruption(choice)]
     parts = [
         html.verdict("good" if choice.ranked else "bad", "", sentences),
@@ -217,7 +220,7 @@ def body(choice: Ranking, width: int = 640) -> str:
 
 
 def _image(choice: Ranking, width: int) -> str:
-    """Return the picture for wide and for narrow screens, at twice its size for sharp ones."""
+    """Return the HTML of the figure for wide and narrow screens, at twice the resolution."""
     wide, narrow = (plot_choice(choice, wide=wide) for wide in (True, False))
     source = data_uri(wide, 2 * width / float(wide.get_size_inches()[0]))
     small = data_uri(narrow, 2 * SMALL_WIDTH / float(narrow.get_size_inches()[0]))
@@ -228,7 +231,7 @@ def _image(choice: Ranking, width: int) -> str:
 
 
 def _placed(choice: Ranking) -> str:
-    """Return the table of all laws that run, grouped by standing."""
+    """Return the HTML table of all laws that run, grouped by standing."""
     head = "".join(f'<th title="{escape(why)}">{escape(name)}</th>' for name, why in COLUMNS)
     lines = list[str]()
     for standing, text in STANDING_TEXTS.items():
@@ -243,7 +246,7 @@ def _placed(choice: Ranking) -> str:
 
 
 def _cells(row: Row) -> str:
-    """Return the cells of a law in the order of `COLUMNS`."""
+    """Return the HTML cells of a law in the order of `COLUMNS`."""
 
     def known(value: float | None, form: str) -> str:
         return "-" if value is None or not isfinite(value) else format(value, form)

@@ -1,4 +1,4 @@
-"""Measurements of laws, their ranks, and both as text: recommendations and a table."""
+"""Measurements and ranks of laws, with the recommendations and the table in text form."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,13 +13,13 @@ from symfric.foundation.checks import check_names
 RANKED, INACCURATE, LACKING, REFUSED, FAILED = (
     "ranked", "inaccurate", "lacks", "cannot run", "failed",
 )  # fmt: skip
-"""Standings: meets all requirements; is less accurate, because it moves otherwise or for reasons
-that are not decided; lacks a needed phenomenon; cannot run on the machine; its run fails."""
+"""Standings of a law: it meets all requirements; it does not satisfy the accuracy; it lacks a
+required phenomenon; the machine rejects it; its run fails."""
 ORDER = (RANKED, INACCURATE, LACKING, FAILED, REFUSED)
 ALIKE = 1.1
-"""Ratio of work up to which laws share a rank: a digit of a tolerance changes it by as much."""
+"""Ratio of work up to which laws share a rank; small changes of tolerances have this effect."""
 FASTER = 1.25
-"""Ratio of times above which the verdict mentions that the clock contradicts the work."""
+"""Ratio of times above which the verdict mentions a law that is faster but takes more work."""
 
 
 @final
@@ -28,35 +28,37 @@ class Row:
     """Measurements of one law.
 
     Attributes:
-        law: its name.
-        form: form of the law if it is not the default one, such as "event".
-        standing: one of `ORDER`; `reason` explains any but the first.
-        rank: rank among all laws that run, from 1; the same for ties; 0 for a law without a run.
+        law: name of the law.
+        form: form of the law if it is not the default form, such as "event".
+        standing: one of `ORDER`; `reason` explains all but the first.
+        rank: rank among all laws that run, starting at 1; equal for ties; 0 for a law without run.
         phenomena: codes of `symfric.laws.PHENOMENA`.
         error: largest difference from the reference relative to the motion; NaN without a run.
-        own_error: the same from the finest run of the law itself: the error of the integrator.
-        smoothing: factor of widths and bristles of the measured law.
-        values: parameters that differ from the defaults of the law; with several contacts those of
-            the first.
-        rtol, method, attempts, instructions: of the run at equal error: relative tolerance, method,
-            attempts of a step, CasADi instructions of one (`continuation.counted`). For ranked laws
-            the equal error is that from the reference, for others their own.
+        own_error: largest difference from the finest run of the law itself, which is the error of
+            the integrator.
+        smoothing: factor by which widths and bristles of the law were scaled.
+        values: parameters that differ from the defaults of the law; those of the first contact if
+            there are several.
+        rtol, method, attempts, instructions: properties of the run at equal error: relative
+            tolerance, method, attempted steps, and CasADi instructions per attempt
+            (`continuation.counted`). For ranked laws the equal error is `error`, for all others
+            `own_error`.
         time_s: processor time of that run [s] in CasADi's virtual machine, the shortest of several.
         fixed_step: largest fixed step [s] of backward Euler with which the plant stays within
-            `control` of the motion; `fixed_why` explains a missing one.
+            `control` of the motion; `fixed_why` explains None.
         explicit_step, explicit_why: the same for an explicit Runge-Kutta method of order 5.
-        steepness: largest slope of the force over velocity of the law at equal error, relative to
-            its level [s/m]; NaN if the force jumps.
-        smoothness: class in the velocity, with the present widths.
-        parameters, hard: number of physical parameters, and names of those that need more than a
-            pull test and steady sliding.
-        c_operations: operations of the law's step in C, all parameters constants, single precision;
-            `c_why` explains a missing number.
-        core: instructions of that step on a Cortex-M4F, averaged over a typical drive; NaN, with
-            `core_why`, if they were not measured.
-        spent: True if its runs used up their budget.
+        steepness: largest slope of the force over velocity, relative to the force [s/m], of the law
+            at equal error; NaN if the force jumps.
+        smoothness: class of smoothness in the velocity with the scaled widths.
+        parameters, hard: number of physical parameters, and names of those that cannot be measured
+            in a pull test and in steady sliding.
+        c_operations: operations of a step of the law in C, with constant parameters, in single
+            precision; `c_why` explains None.
+        core: instructions of that step on a Cortex-M4F, averaged over a typical drive; `core_why`
+            explains NaN.
+        spent: True if the runs exhausted their budget.
         states: number of internal states.
-        curve: (error, work) of the runs of the continuation, softest first.
+        curve: (error, work) of the runs of the continuation, starting with the smoothest.
     """
 
     law: str
@@ -92,17 +94,17 @@ class Row:
 
     @property
     def ranked(self) -> bool:
-        """True if the law shows the needed phenomena and keeps the accuracy."""
+        """True if the law shows the required phenomena and satisfies the accuracy."""
         return self.standing == RANKED
 
     @property
     def called(self) -> str:
-        """Name of the law with its form."""
+        """Name of the law, followed by its form if that is not the default."""
         return f"{self.law} (form = {self.form})" if self.form else self.law
 
     @property
     def work(self) -> int:
-        """Instructions of the whole run, which determine its time on any machine."""
+        """Number of instructions of the whole run, which does not depend on the computer."""
         return self.attempts * self.instructions
 
     def to_dict(self) -> dict[str, Any]:
@@ -112,9 +114,9 @@ class Row:
 
 
 def ordered(rows: Iterable[Row]) -> list[Row]:
-    """Return the rows with their ranks, the best first: ranked laws by work, others by error.
+    """Return the rows with ranks, sorted from best to worst: ranked laws by work, others by error.
 
-    No measured time enters: the same rows come in the same order in every run.
+    The order does not depend on measured times and is therefore reproducible.
     """
     result = list[Row]()
     head, rank = None, 0
@@ -127,26 +129,26 @@ def ordered(rows: Iterable[Row]) -> list[Row]:
 
 
 def place(row: Row) -> tuple[int, float, float, str]:
-    """Return the key by which rows are sorted: errors to one digit, work to the last."""
+    """Return the key by which rows are sorted, with errors rounded to one digit."""
     error = float(f"{row.error:.0e}") if isfinite(row.error) else inf
     return ORDER.index(row.standing), 0.0 if row.ranked else error, row.work or inf, row.law
 
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Laws on a machine, the best first, and the requirements.
+    """Laws in a machine, sorted from best to worst, and the requirements.
 
     Attributes:
-        machine: its name.
-        needs: needed phenomena, words of `NEEDS`.
-        accuracy: largest error relative to the motion.
-        friction: the friction that all laws describe.
-        reference, uncertain: the motion from which errors are measured, and its own uncertainty.
-        control: largest error of fixed steps.
+        machine: name of the machine.
+        needs: required phenomena, words of `NEEDS`.
+        accuracy: largest allowed error relative to the motion.
+        friction: description of the friction that all laws describe.
+        reference, uncertain: description of the reference motion, and its uncertainty.
+        control: largest allowed error of fixed steps.
         t_end: length of the motion [s].
-        rows: one for each candidate.
+        rows: row of each candidate.
         wall_s: duration of the measurements [s].
-        unmeasured: laws without a row because of an interrupt.
+        unmeasured: laws that were not measured because of an interrupt.
     """
 
     machine: str
@@ -172,7 +174,7 @@ class Ranking:
 
     @property
     def interrupted(self) -> bool:
-        """True if an interrupt came before all laws were measured."""
+        """True if an interrupt occurred before all laws were measured."""
         return bool(self.unmeasured)
 
     @property
@@ -182,23 +184,23 @@ class Ranking:
 
     @property
     def ranked(self) -> tuple[Row, ...]:
-        """Rows of laws that show the needed phenomena and keep the accuracy, least work first."""
+        """Rows of laws that meet all requirements, sorted by work."""
         return tuple(row for row in self.rows if row.ranked)
 
     @property
     def best(self) -> Row | None:
-        """First ranked law, None without any."""
+        """Row of the first ranked law; None if no law is ranked."""
         return next(iter(self.ranked), None)
 
     @property
     def title(self) -> str:
-        """Machine and requirements in a line."""
+        """Machine and requirements in one line."""
         laws = f"laws that show {' and '.join(self.needs)}" if self.needs else "all laws"
         return f"{self.machine}: {laws}, {self.accuracy:g} off at most"
 
     @property
     def verdict(self) -> tuple[str, ...]:
-        """Sentences on simulation, optimal control, a controller, and the laws left out."""
+        """Recommendations for simulation, optimal control and controllers, and the omitted laws."""
         if not self.rows:
             return ("Nothing was measured.",)
         shown = " and ".join(self.needs) or "friction"
@@ -221,11 +223,11 @@ LEFT_OUT = (
     (FAILED, "whose run fails"),
     (REFUSED, "that do not fit into this machine"),
 )
-"""Standings of laws that are not ranked, and the reason in words."""
+"""Standings of laws that are not ranked, and their description in the verdict."""
 
 
 def _simulation(ranked: Sequence[Row], shown: str) -> str:
-    """Recommend the law of the least work; name ties, and a law that is faster by the clock."""
+    """Recommend the law with the least work; mention ties and a law that takes less time."""
     best = ranked[0]
     text = (
         f"Simulation: take {best.called}, the least work of {len(ranked)} that show {shown} and "
@@ -244,7 +246,7 @@ def _simulation(ranked: Sequence[Row], shown: str) -> str:
 
 
 def _smooth(ranked: Sequence[Row]) -> str:
-    """Recommend the least steep law with second derivatives, else one with bristles."""
+    """Recommend the least steep law with second derivatives, or the first one with states."""
     smooth = [row for row in ranked if row.smoothness in ("C2", "C∞")]
     if not smooth:
         first = ranked[0]
@@ -262,7 +264,7 @@ def _smooth(ranked: Sequence[Row]) -> str:
 
 
 def _controller(ranked: Sequence[Row], control: float) -> str:
-    """Recommend the law with the least operations per second of motion in fixed steps."""
+    """Recommend the law with the fewest operations per second of motion in fixed steps."""
     if not any(row.fixed_step or row.fixed_why for row in ranked):
         return "Controller: fixed steps were not measured."
     able = [row for row in ranked if row.fixed_step is not None and row.c_operations is not None]
@@ -302,11 +304,14 @@ STANDING_TEXTS = {
     INACCURATE: "do not keep the accuracy, by their error, timed where their own error does:",
     LACKING: "do not show what is needed, by their error, timed likewise:",
 }
-"""Standing -> heading of its laws; those of other standings did not run."""
+"""Headings of the groups of laws by standing; laws of other standings did not run."""
 
 
 def lines(choice: Ranking, most: int | None = None) -> Iterator[str]:
-    """Yield title, reference, table, reasons and verdict; at most `most` rows, of ranked laws."""
+    """Yield the lines of title, reference, table, reasons and verdict.
+
+    With `most` the table has at most that many rows, all of ranked laws, and reasons are omitted.
+    """
     yield choice.title
     yield from wrap(
         f"{choice.friction}; from {choice.reference}, itself known to {choice.uncertain:.0e}", WIDTH
@@ -339,7 +344,7 @@ def lines(choice: Ranking, most: int | None = None) -> Iterator[str]:
 
 
 def interruption(choice: Ranking) -> list[str]:
-    """Return a sentence on the laws without a row if the ranking was interrupted."""
+    """Return a sentence on the laws that were not measured; empty without an interrupt."""
     count, names = len(choice.unmeasured), ", ".join(choice.unmeasured)
     text = f"Interrupted: {count} of {count + len(choice.rows)} laws were not measured: {names}."
     return [text] if choice.interrupted else []
@@ -358,7 +363,7 @@ def _line(row: Row, tie: str, cores: bool) -> str:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a number >= 0 in five places; a dash for NaN."""
+    """Return a number >= 0 as text with about three digits; a dash for NaN and inf."""
     if not isfinite(value):
         return "-"
     if value >= 10 ** (digits - 1):
@@ -367,7 +372,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def short(value: float | None) -> str:
-    """Return a power of ten with one digit; a dash for None and NaN."""
+    """Return a number in exponential notation with one digit; a dash for None, NaN and inf."""
     if value is None or not isfinite(value):
         return "-"
     return f"{value:.0e}".replace("e-0", "e-").replace("e+00", "")

@@ -1,4 +1,4 @@
-"""Choose a law: candidates run on the user's machine, and are ranked by work at equal error."""
+"""Choice of a law: candidates run in the user's machine and are ranked by work at equal error."""
 
 import csv
 import json
@@ -33,17 +33,17 @@ if TYPE_CHECKING:
 
 
 SCREEN = 16
-"""Largest number of rows of the text in a terminal."""
+"""Largest number of rows in the text representation of a `Choice`."""
 
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Choice(Ranking):
-    """Ranking of laws with its text, picture, page and files; see `Ranking` for its attributes."""
+    """Ranking of laws with text, figure, page and files; see `Ranking` for the attributes."""
 
     @property
     def table(self) -> list[dict[str, Any]]:
-        """Row of plain numbers and texts for each law, for CSV and data frames."""
+        """Rows of plain numbers and texts, one for each law, for CSV and data frames."""
         return [flat(row) for row in self.rows]
 
     def __repr__(self) -> str:
@@ -55,22 +55,22 @@ class Choice(Ranking):
         return body(self)
 
     def plot(self, path: str | Path | None = None, *, wide: bool = False) -> "Figure":
-        """Draw error against work, marked by the phenomena of a law; save it to `path` if given.
+        """Draw error against work, with markers for phenomena; save the figure to `path` if given.
 
-        It is as wide as a column of print, 85 mm; `wide` puts the panels next to each other.
+        The figure has the width of a printed column, 85 mm; `wide` places its panels side by side.
         """
         from symfric.choice.page import plot_choice  # noqa: PLC0415  (matplotlib is slow to import)
 
         return plot_choice(self, path, wide)
 
     def to_html(self, path: str | Path) -> None:
-        """Write one self-contained page: verdict, picture, table."""
+        """Write a self-contained HTML page with verdict, figure and table."""
         from symfric.choice.page import page  # noqa: PLC0415  (matplotlib is slow to import)
 
         write_text(path, page(self))
 
     def to_csv(self, path: str | Path) -> None:
-        """Write the table, one law in a line."""
+        """Write the table as CSV, with one line per law."""
         rows = self.table
         with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
             sheet = csv.DictWriter(file, fieldnames=list(rows[0]) if rows else ["law"])
@@ -91,7 +91,7 @@ class Choice(Ranking):
         }
 
     def to_json(self, path: str | Path) -> None:
-        """Write `to_dict` as a file."""
+        """Write the result of `to_dict` to a JSON file."""
         write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
 
 
@@ -107,7 +107,7 @@ def flat(row: Row) -> dict[str, Any]:
 
 Progress = Callable[[str, float], None]
 Candidates = Mapping[str, Law | Sequence[Law]] | Sequence[str]
-"""Name -> law or forms of it; or names of laws."""
+"""Laws, or sequences of forms of a law, by name; or a sequence of names of laws."""
 Forms = Mapping[str, tuple[Law, ...]]
 
 
@@ -131,61 +131,62 @@ def select(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> Choice:
-    """Rank friction laws on a machine by the work of a run at equal error.
+    """Rank friction laws in a machine by the work of a run at equal error.
 
         error = max |x - x_dry| / (largest - smallest x_dry)      over positions and times
 
-    Every law describes the same friction (mu_s, mu_d; the peak of a smooth law is mu_s N), and is
-    as smooth as the accuracy allows: its widths and bristles are scaled together. The loosest
-    tolerance is taken with which law and integrator together keep the accuracy. That run is
-    counted, attempts times instructions, and timed. The count determines the rank, which is the
-    same in every run of `select`; laws within 10 % share a rank.
+    All laws describe the same friction (mu_s, mu_d; the peak of a smooth law is mu_s N). Each law
+    is as smooth as the accuracy allows, with its widths and bristles scaled together. It runs at
+    the loosest tolerance at which law and integrator together satisfy the accuracy. The work of
+    this run is attempted steps times instructions per attempt. It determines the rank, which is
+    therefore reproducible; laws within 10 % share a rank. The run is also timed.
 
-    A law that does not keep the accuracy, or lacks a needed phenomenon, comes after all that do, by
-    its error, and is counted where its own error, that of the integrator, is the accuracy. The
-    reason is another motion if its runs tend to one with an order; otherwise it says what remains
-    undecided: runs fail, cost too much, or creep by less than the rounding of velocities. A law
-    that the machine does not accept has a row with the reason, too. The budget of a law is counted
-    as well (`symfric.choice.continuation`), independently of the load of the computer.
+    Laws that do not satisfy the accuracy or lack a required phenomenon follow, sorted by error.
+    Their work is that of a run whose own error, that of the integrator, satisfies the accuracy. The
+    reason in the row states that the law tends to another motion, if its runs converge to one, or
+    else why this is undecided: runs fail, take too much work, or creep more slowly than rounding
+    errors of velocities. Laws that the machine rejects have a row with the reason as well. Each law
+    has a budget of work (`symfric.choice.continuation`), independent of the load of the computer.
 
     Args:
         scene: a scene, a class of scenes (`Rabinowicz`), or a function law -> scene or `Model`,
             such as `partial(PendulumBox.preset, "jing_mi_table_7")`.
-        laws: name -> law, or names; the whole catalogue by default. A law given by its name is
-            tried in its form with events, if it has one, and, unless that is ranked, in its default
-            form (the other way round if the exact form has no C); its row names the form. A
-            sequence of laws under a name is tried in its order.
+        laws: laws by name, or names of laws; by default the whole catalogue. A law given by its
+            name is tried in its form with events, if it has one, and then, unless that form is
+            ranked, in its default form (in reverse order if no C can be generated from the form
+            with events). Its row states the form. A sequence of laws is tried in its order.
         needs: words of `symfric.choice.NEEDS`, such as "stiction", "presliding", "drift-free".
-        accuracy: largest error relative to the size of the motion; between 0 and 1.
+        accuracy: largest error relative to the size of the motion, between 0 and 1.
         friction: the friction that all laws describe; by default the levels of the scene.
-        reference: "exact" dry friction by events, if the machine accepts it, else as "sharpest",
-            the limit of a smooth law; or a law, or a run.
-        data: t [s] and signals by name, as the reference; errors are then root mean squares, and
-            the laws the fitted ones.
-        misfits: law -> error from data that were measured elsewhere, as on a test rig, and that the
-            laws were fitted to; then `accuracy` is that of the integrator alone, and laws within
-            10 % of the smallest misfit are ranked.
-        t_end: end of the motion [s]; that of the scene.
-        u: inputs; those of the scene.
-        of: compared signals by name, or a function of a trajectory, such as the period of a cycle,
-            if an error of phase would grow with time; by default the positions.
-        fitted: True if laws are neither given the levels of `friction` nor scaled; by default with
-            `data`.
-        control: largest error of fixed steps, of a law that is as smooth as that allows.
-        fixed_steps: measure the needs of a controller, too: the largest fixed steps, and
-            instructions on a Cortex-M4F if a cross compiler and QEMU are installed.
-        effort: budget of the runs of a law, relative to the usual one; a larger one brings laws
-            with undamped bristles, such as GMS, nearer to dry friction.
-        workers: processes; more than one needs a system that can fork (not Windows).
-        progress: called with the name of each finished law and the share of all.
+        reference: "exact", dry friction with events if the machine accepts it, otherwise as
+            "sharpest"; "sharpest", the limit of a smooth law; or a law, or a trajectory.
+        data: t [s] and signals by name, used as the reference. Errors are then root mean squares,
+            and the laws are assumed to be fitted.
+        misfits: error of each law from data of another machine, such as a test rig, to which the
+            laws were fitted. Then `accuracy` applies to the integrator alone, and laws within 10 %
+            of the smallest misfit are ranked.
+        t_end: end of the motion [s]; by default that of the scene.
+        u: inputs; by default those of the scene.
+        of: names of the compared signals, by default the positions; or a function of a trajectory,
+            such as the period of a cycle, if phase errors would grow with time.
+        fitted: True if laws keep their parameters and are not scaled; by default True with `data`
+            or `misfits`.
+        control: largest error of fixed steps, with the law as smooth as this error allows.
+        fixed_steps: True to measure the largest fixed steps, and the instructions on a Cortex-M4F
+            if a cross compiler and QEMU are installed.
+        effort: budget of the runs of a law, relative to the default budget. With a larger budget,
+            laws with undamped bristles, such as GMS, come closer to dry friction.
+        workers: number of processes; more than one requires a system that can fork (not Windows).
+        progress: function called with the name of each finished law and the finished share.
 
     Raises:
         ValueError: bad input.
-        SolveError: not even a reference runs.
+        SolveError: no reference can be computed.
 
-    An interrupt (Ctrl-C) returns the rows so far; `unmeasured` names the other laws.
-    Limits: a motion without a limit as widths vanish, such as a chaotic one over a long time, has
-    no accuracy; shorten it or compare other numbers. Times are those of CasADi's virtual machine.
+    An interrupt (Ctrl-C) returns the rows so far; `unmeasured` contains the other laws.
+    Limits: errors are meaningless for a motion that does not converge as widths vanish, such as a
+    long chaotic motion; shorten it or compare other numbers. Times are those of CasADi's virtual
+    machine.
     """
     where, began = "select", perf_counter()
     words = needed(f"{where}: needs", needs)
@@ -234,10 +235,10 @@ def select(
 
 
 def laws_of(where: str, laws: Candidates | None) -> Forms:
-    """Return the candidates by name, each in the forms that are tried.
+    """Return the forms to try for each candidate, by name.
 
     Raises:
-        ValueError: unknown names, anything but laws, an empty sequence.
+        ValueError: unknown names, elements that are not laws, or an empty sequence.
     """
     if isinstance(laws, Mapping):
         given = checks.named(f"{where}: laws", laws)
@@ -254,9 +255,9 @@ def laws_of(where: str, laws: Candidates | None) -> Forms:
 
 
 def _rows(task: Task, laws: Forms, workers: int) -> Iterator[Row]:
-    """Yield the rows, with several workers as they come from processes with one law each.
+    """Yield the rows; with several workers each law has a process, and rows come as they finish.
 
-    The processes are forked, since functions of a user's file cannot be sent.
+    The processes are forked, since functions defined in a user's file cannot be sent.
     """
     if workers == 1 or "fork" not in get_all_start_methods():
         yield from (best_form(task, name, law) for name, law in laws.items())
@@ -287,6 +288,6 @@ def _rows(task: Task, laws: Forms, workers: int) -> Iterator[Row]:
 
 
 def _work(pipe: Any, task: Task, name: str, law: tuple[Law, ...]) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that collects the rows
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the parent process handles Ctrl-C
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     pipe.send(best_form(task, name, law))

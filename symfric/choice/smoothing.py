@@ -1,17 +1,17 @@
-"""Smoothing of a law, and its continuation towards dry friction until it keeps a wanted error.
+"""Smoothing of a law, and its continuation towards dry friction up to a required error.
 
 Widths and bristles of a law are scaled together by a factor s:
 
     static laws      widths and velocities s
     bristles         stiffness 1/s, paths and widths s, damping 1/sqrt(s), velocities s^p
 
-s -> 0 is dry friction: bristles relax only if they creep, with the loading rate over sigma_0,
-faster than v_eps, so no width is negligible. They break away at mu_s N except for a share of
-(loading rate / (sigma_0 v_s))^(2/3), and their fall behind it takes v_s^(2/3). Both vanish alike
-for p = 1/2, as s^(1/3); which is larger depends on the machine, so a smaller p is tried, too. The
-limit of all this is a creep below the rounding of velocities.
-Limits: if a load reverses within the period of bristles they overshoot and break away, however
-stiff they are, unless sigma_1 damps them: that is their motion, not that of dry friction.
+s -> 0 is dry friction. Bristles relax only if their creep velocity, the loading rate over sigma_0,
+exceeds v_eps, so no width is negligible. The error of their break-away force is of the order of
+(loading rate / (sigma_0 v_s))^(2/3), and that of the subsequent fall of the order of v_s^(2/3). For
+p = 1/2 both vanish as s^(1/3). Which one dominates depends on the machine, so a smaller p is tried
+as well. The continuation ends where creep velocities are below the rounding errors of velocities.
+Limits: if a load reverses within the period of the bristles, they overshoot and break away for any
+stiffness, unless sigma_1 damps them. Then the law does not tend to dry friction.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,13 +32,13 @@ from symfric.laws.base.families import Sticking
 
 Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-7
-"""Widths of static laws below this only round off an absolute value."""
+"""Limit below which a width of a static law only rounds an absolute value."""
 RELATIVE = ("u_eps",)
-"""Widths that are shares of another width."""
+"""Widths that are relative to another width."""
 LEVEL_LIKE: dict[type[Law], tuple[str, ...]] = {LeineSwitch: ("delta", "c"), RateAndState: ("v_0",)}
-"""Velocities that determine the level of friction, and are not widths."""
+"""Parameters that determine the level of friction and are not widths, by law."""
 OF_BRISTLES = 0.45, 0.5
-"""Powers of the velocities of laws with states, tried in this order."""
+"""Powers p of the velocities of laws with states, in the order in which they are tried."""
 
 
 @final
@@ -47,7 +47,7 @@ class Smoothing(Regularisation):
     """Parameters that make `law` smooth, scaled together by a factor s.
 
     Attributes:
-        mu_s, load: peak that static laws keep at every s, and the normal force [N].
+        mu_s, load: ratio F/N at the peak of static laws for every s, and the normal force [N].
         velocities: power of s for velocities; 0 if nothing is scaled.
     """
 
@@ -56,10 +56,10 @@ class Smoothing(Regularisation):
     velocities: float = 0.0
 
     def at(self, s: float) -> Law:
-        """Return the law at the factor `s`; a width stays within its bounds, as it only rounds off.
+        """Return the law at the factor `s`, with its widths limited to their bounds.
 
         Raises:
-            ValueError: another parameter beyond a bound of the law.
+            ValueError: a parameter other than a width is out of bounds.
         """
         known, values = parameters(self.law), self.values(s)
         for name in values:
@@ -71,10 +71,12 @@ class Smoothing(Regularisation):
 def smoothing(
     law: Law, friction: Friction, load: float | None, bristles: float = OF_BRISTLES[0]
 ) -> Smoothing:
-    """Return the scalable parameters of `law`; none for one that rests exactly or has no widths.
+    """Return the scalable parameters of `law`; none for laws that stick exactly or have no widths.
 
     Args:
-        law, friction, load: the law, the friction that it describes, and the load.
+        law: the law.
+        friction: the friction that the law describes.
+        load: normal force [N]; None if it is not one number.
         bristles: power of the velocities of a law with states.
     """
     exact = isinstance(law, Sticking) and law.has_mode
@@ -86,7 +88,7 @@ def smoothing(
 
 
 def _power(law: Law, p: Parameter, of_speed: float) -> float:
-    """Return the power of s for a parameter, 0 for one without smoothing."""
+    """Return the power of s for a parameter, or 0 for a parameter that does not smooth."""
     value = float(p.value)  # pyright: ignore[reportArgumentType]  (numbers only)
     if p.name in RELATIVE or p.field in LEVEL_LIKE.get(type(law), ()):
         return 0.0
@@ -101,30 +103,39 @@ def _power(law: Law, p: Parameter, of_speed: float) -> float:
 
 
 RATIO, SHORTER = 4.0, 2.0
-"""Ratio of successive smoothings; the shorter one towards dry friction after a failed run."""
+"""Ratio of successive smoothings, and the smaller ratio that is used after a failed run."""
 LEAP = 4
-"""Number of such steps in one if errors stay the same."""
+"""Number of such steps that are combined into one if errors do not change."""
 LEAST_ORDER, SAME_ORDER, LONGEST, WITHIN = 0.2, 0.2, 3, 0.8
-"""Errors follow a power of the smoothing if it is at least this large and changes by at most this
-share; then at most so many steps are made in one, to this share of the wanted error."""
+"""Errors follow a power of the smoothing if their order is at least `LEAST_ORDER` and changes by at
+most the share `SAME_ORDER`. Then up to `LONGEST` steps are combined into one, towards the share
+`WITHIN` of the required error."""
 NARROW = 3e-5
-"""Smoothing of the velocities of a law that counts as dry unless a machine is far slower."""
+"""Factor of the velocities of a law below which it counts as dry, except in very slow machines."""
 ORDERS = 0.05, 4.0
-"""Orders of convergence that differences of runs may show."""
+"""Smallest and largest order of convergence that is accepted."""
 CERTAIN = 0.25
-"""Largest distance from the limit, relative to the error, of runs that show another motion."""
+"""Largest distance from the limit, relative to the error, at which this limit is accepted."""
 MOST, SOFTEST = 24, 5
-"""Largest number of steps towards dry friction, and away from it."""
+"""Largest number of steps towards dry friction, and of steps away from it."""
 MARGIN = 0.7
-"""Share of the wanted error for the law; the rest is for the integrator."""
+"""Share of the required error for the law; the integrator may use the remainder."""
 ROUNDING = 5e-3
-"""An error that falls by less than this share over three levels counts as constant."""
+"""Share by which an error must decrease over three levels; otherwise it counts as constant."""
 
 
 @final
 @dataclass(frozen=True)
 class Smoothed:
-    """Run of the continuation: factor of widths, error, attempts, tolerance, motion over size."""
+    """Run of the continuation.
+
+    Attributes:
+        s: factor of the widths.
+        error: difference from the reference.
+        attempts: number of attempted steps.
+        rtol: relative tolerance.
+        motion: compared signals divided by their sizes, shape (signals, times).
+    """
 
     s: float
     error: float
@@ -139,8 +150,8 @@ class SmoothingStudy:
     """Error against smoothing.
 
     Attributes:
-        levels: runs, softest first.
-        stopped: why the continuation ended; empty if the wanted error is kept.
+        levels: runs, starting with the smoothest law.
+        stopped: reason why the continuation ended; empty if the required error was reached.
         decided: True if other powers of the bristles cannot change the result.
     """
 
@@ -149,7 +160,7 @@ class SmoothingStudy:
     decided: bool = False
 
     def softest(self, wanted: float) -> float | None:
-        """Return the softest factor below which every run keeps the error, None without any."""
+        """Return the largest factor below which all errors are at most `wanted`, or None."""
         kept = len(self.levels)
         while kept and self.levels[kept - 1].error <= wanted:
             kept -= 1
@@ -165,7 +176,7 @@ class SmoothingStudy:
 
 FIXED = "nothing of it is scaled"
 Run = Callable[[float], Smoothed]
-"""s -> run; raises one of the `failures` of `study`."""
+"""Function s -> run, which may raise one of the `failures` of `study`."""
 
 
 def study(
@@ -176,18 +187,19 @@ def study(
     failures: tuple[type[Exception], ...],
     reason: Callable[[Exception], str] = str,
 ) -> SmoothingStudy:
-    """Run towards dry friction until two runs keep the error `wanted`, then away to `softest`.
+    """Run towards dry friction until two errors are at most `wanted`, then away up to `softest`.
 
-    A law tends to another motion if its runs converge to a limit that is off. That is concluded
-    from runs at `NARROW` and below only: a law whose widths are far from the speeds of a machine
-    converges to something else first.
+    A law tends to another motion if its runs converge to a limit that differs from the reference.
+    Only runs with velocities scaled by `NARROW` or less are used for this conclusion, because laws
+    with widths above the speeds of the machine appear to converge to something else.
 
     Args:
-        run: one run.
-        wanted, softest: largest errors of the driest and of the softest law of interest.
-        powers: smallest power of s of its velocities; 0 if nothing is scaled.
-        failures: exceptions of a run, which end the continuation on its side.
-        reason: such an exception -> text.
+        run: function that computes a run for a factor s.
+        wanted: required error towards dry friction.
+        softest: largest error of interest away from dry friction.
+        powers: smallest power of s with which velocities are scaled; 0 if nothing is scaled.
+        failures: exceptions of `run` that end the continuation in the current direction.
+        reason: function that describes such an exception.
 
     Raises:
         one of `failures`: the unscaled law, s = 1, does not run.
@@ -207,17 +219,18 @@ def study(
         except failures as problem:
             stopped = reason(problem) if ratio < RATIO else ""
             ratio, leap = (SHORTER, SHORTER) if leap == RATIO else (RATIO, RATIO)
-    with suppress(*failures):  # softer than the law allows
+    with suppress(*failures):  # smoother than the law allows
         while powers and levels[0].error <= softest and levels[0].s < RATIO**SOFTEST:
             levels.insert(0, run(levels[0].s * RATIO))
     return SmoothingStudy(tuple(levels), "" if levels[-1].error <= wanted else stopped, decided)
 
 
 def limit_order(levels: Sequence[Smoothed]) -> float | None:
-    """Return the order in s of the convergence to a motion that is off; None if it is not shown.
+    """Return the order in s of convergence to a limit other than the reference; None if unknown.
 
-    Three runs show the order q of x_0 + c s^q, whose limit is c s_2^q from the last one, if they
-    are leaps apart: at an extremum of their error neighbours are similar, too.
+    The order q of x + c s^q follows from the last three runs x_0, x_1, x_2, and the distance of x_2
+    from the limit is c s_2^q. The factors must differ by `LEAP` steps, because neighbouring runs
+    are also similar near an extremum of the error.
 
         |x_0 - x_1| / |x_1 - x_2| = (s_0^q - s_1^q) / (s_1^q - s_2^q)
     """
@@ -240,13 +253,13 @@ def limit_order(levels: Sequence[Smoothed]) -> float | None:
 
 
 def _apart(one: Smoothed, other: Smoothed) -> float:
-    """Return the largest difference of two motions relative to their size, inf if unknown."""
+    """Return the largest difference of two motions relative to their size; inf if unknown."""
     a, b = one.motion, other.motion
     return inf if a is None or b is None or a.shape != b.shape else float(np.abs(a - b).max())
 
 
 def _stride(levels: list[Smoothed], wanted: float) -> float:
-    """Return the ratio to the next run, at which errors that follow a power are `wanted`."""
+    """Return the ratio to the next factor; larger if errors follow a power of s."""
     if len(levels) < 3 or not all(0.0 < level.error < inf for level in levels[-3:]):
         return RATIO
     e = [log(level.error) for level in levels[-3:]]
@@ -258,6 +271,6 @@ def _stride(levels: list[Smoothed], wanted: float) -> float:
 
 
 def _settled(levels: list[Smoothed]) -> bool:
-    """Return True if the last four errors are the same, or grow."""
+    """Return True if the last four errors are constant or increase."""
     last = [level.error for level in levels[-4:]]
     return len(last) == 4 and min(last[1:]) >= (1 - ROUNDING) * last[0]

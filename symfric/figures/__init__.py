@@ -1,4 +1,4 @@
-"""Figures of the behaviour of friction laws, as in papers: data, and pictures on request."""
+"""Figures of the behaviour of friction laws, as data that can be plotted."""
 
 from typing import TYPE_CHECKING
 

@@ -20,13 +20,13 @@ from symfric.scenes import ALL_SCENES
 
 
 def figure(law: AnyLaw, name: str, N: float = NORMAL_FORCE) -> FigureData:
-    """Return the figure `name` of `law` under the normal force `N` [N], as in the papers.
+    """Return the figure `name` of `law` at the normal force `N` [N].
 
-    The functions of the same names have more options.
+    The function of the same name has further options.
 
     Raises:
-        ValueError: unknown name (the closest one is offered), a law that cannot show it, anything
-            but a law and a name.
+        ValueError: unknown name (the message suggests the closest), a law that cannot show this
+            behaviour, or arguments that are not a law and a name.
         SolveError: a simulation failed.
     """
     if isinstance(law, str) and isinstance(name, Law | Population):
@@ -40,14 +40,14 @@ def figure(law: AnyLaw, name: str, N: float = NORMAL_FORCE) -> FigureData:
 
 
 PANELS = 2
-"""Largest number of drawn signals of a kind, of energies the sum; all signals are columns."""
+"""Largest number of drawn signals of a kind; of energies only the sum is drawn."""
 
 
 def in_scene(law: AnyLaw, scene: str) -> Trajectory:
     """Return the run of `scene` with `law` over its default time.
 
     Raises:
-        ValueError: a population of contacts, a law that the scene refuses.
+        ValueError: a population of contacts, or a law that the scene rejects.
         SolveError: the simulation failed.
     """
     if isinstance(law, Population):
@@ -62,10 +62,10 @@ def in_scene(law: AnyLaw, scene: str) -> Trajectory:
 
 
 def scene_figure(scene: str, runs: Mapping[str, Trajectory]) -> FigureData:
-    """Return the common signals of `runs` (legend entry -> run of `scene`).
+    """Return the figure of the common signals of `runs` of a scene, given by legend entry.
 
-    Columns t [s] and the common signals; a curve for each run. Positions, friction and energy or
-    power are drawn.
+    The columns are t [s] and the common signals, and there is one curve per run. Positions,
+    friction, and energy or power are drawn.
     """
     first = next(iter(runs.values()))
     shared = {n: u for n, u in first.units.items() if all(n in run.units for run in runs.values())}
@@ -92,21 +92,21 @@ def compare(
     scenario: str = "profile",
     N: float = NORMAL_FORCE,
 ) -> FigureData:
-    """Overlay `laws` on the excitation of one `scenario`.
+    """Compare `laws` under the same excitation.
 
     Args:
-        laws: laws or their names, or legend entry -> law.
-        scenario: a figure (profile, hysteresis, lag, ...), or a scene (rabinowicz, drive, ...). The
-            first law determines the amplitudes of a figure.
-        N: normal force [N] of a figure; a scene has its own.
+        laws: laws or names of laws; or laws by legend entry.
+        scenario: name of a figure (profile, hysteresis, lag, ...) or of a scene (rabinowicz,
+            drive, ...). The first law determines the amplitudes of a figure.
+        N: normal force [N] of a figure; a scene has its own normal force.
 
     Returns:
-        One curve per law and case, each under the name of its law. `note` names the laws that are
-        left out because they cannot show it or their simulation failed.
+        Figure with one curve per law and case, labelled with the name of the law. `note` lists the
+        laws that are omitted, because they cannot show the behaviour or their simulation failed.
 
     Raises:
-        ValueError: no law, unknown scenario, no law that can show it.
-        SolveError: the simulations of all failed.
+        ValueError: no law, unknown scenario, or no law that can show the behaviour.
+        SolveError: all simulations failed.
     """
     check_names("compare: scenario", [scenario], [*FIGURES, *ALL_SCENES])
     named = _named(laws)
@@ -129,10 +129,10 @@ Result = TypeVar("Result")
 def _able(
     laws: Mapping[str, AnyLaw], make: Callable[[AnyLaw], Result]
 ) -> tuple[dict[str, Result], str]:
-    """Return the results of `make` by law, and a note on the laws without one.
+    """Return the results of `make` by law, and a note on the laws for which it failed.
 
     Raises:
-        ValueError, SolveError: that of the first law, if there is no result.
+        ValueError, SolveError: the error of the first law, if all laws failed.
     """
     made: dict[str, Result] = {}
     refused: dict[str, ValueError | SolveError] = {}
@@ -150,13 +150,13 @@ def _able(
 
 
 def _reason(text: str) -> str:
-    """Return the expectation in an error message."""
+    """Return the part of an error message that states what was expected."""
     start = text.find("expected ")
     return text[max(start, 0) :].split("; ")[0].split(", got ")[0]
 
 
 def _title(laws: Sequence[AnyLaw], shown: Sequence[FigureData]) -> str:
-    """Return the title of the first figure with the further inputs of all laws."""
+    """Return the title of the first figure, completed by the further inputs of all laws."""
     inputs = [steady_inputs(law) for law in laws]
     named = [text for text, data in zip(inputs, shown, strict=True) if data.title.endswith(text)]
     return shown[0].title.removesuffix(inputs[0]) + "".join(dict.fromkeys(named))

@@ -1,4 +1,4 @@
-"""Data of figures of behaviours, their drawing, and the laws that show them."""
+"""Data and plots of figures, and the check whether a law can show a behaviour."""
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
@@ -36,13 +36,13 @@ Array = NDArray[np.float64]
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Curve:
-    """One curve: columns of equal length by name, shape (n,) each.
+    """Curve of a figure: columns of equal length by name, of shape (n,) each.
 
     Attributes:
-        law: name of its law.
-        case: difference from the other curves of that law, such as "2 Hz"; may be empty.
-        columns: name -> values.
-        reference: drawn dashed, for comparison.
+        law: name of the law.
+        case: difference from other curves of the same law, such as "2 Hz"; may be empty.
+        columns: values by name.
+        reference: True for a dashed curve that is shown for comparison.
     """
 
     law: str
@@ -56,7 +56,7 @@ class Curve:
 
     @property
     def label(self) -> str:
-        """Legend entry: the law and the case."""
+        """Legend entry, which consists of the law and the case."""
         return f"{self.law}, {self.case}" if self.case else self.law
 
     def __getitem__(self, column: str) -> Array:
@@ -69,17 +69,17 @@ class Curve:
 class FigureData(Showing):
     """Data of one figure.
 
-    `figure["2 Hz"]` is the curve of that case, law or label; its columns come by name.
+    `figure["2 Hz"]` is the curve of this case, law or label, and `figure["2 Hz"]["F"]` its column.
 
     Attributes:
         name: name on the command line.
         title: description.
-        units: column -> unit.
-        panels: (abscissa, ordinate) of each panel.
+        units: units of the columns by name.
+        panels: columns (abscissa, ordinate) of each panel.
         curves: the curves.
-        log: columns on a logarithmic axis.
-        dots: True for single points with markers.
-        note: remarks: the swept factor, or laws that are left out and why.
+        log: columns with a logarithmic axis.
+        dots: True for points with markers.
+        note: remarks, such as the swept factor or omitted laws with the reason.
     """
 
     name: str
@@ -92,7 +92,7 @@ class FigureData(Showing):
     note: str = ""
 
     def shown(self) -> Shown:
-        """Describe its curves, with the range of each column."""
+        """Describe the curves with the range of each column."""
         rows = tuple(
             (c.label, *(_range(c.columns[u]) if u in c.columns else "" for u in self.units))
             for c in self.curves
@@ -101,7 +101,7 @@ class FigureData(Showing):
         return Shown(f"figure '{self.name}': {self.title}", (), Table(header, rows))
 
     def thumbnail(self) -> "Figure":
-        """Return the picture of `plot`, small."""
+        """Return the figure of `plot`."""
         return self.plot()
 
     def __getitem__(self, name: str) -> Curve:
@@ -113,13 +113,14 @@ class FigureData(Showing):
         return found[name]
 
     def named(self, law: str) -> "FigureData":
-        """Return the same with another name of its law."""
+        """Return a copy in which `law` is the name of the law of all curves."""
         return replace(self, curves=tuple(replace(c, law=law) for c in self.curves))
 
     def plot(self, path: str | Path | None = None) -> "Figure":
-        """Draw it, labelled with units, a panel per pair of columns; save it to `path` if given.
+        """Draw the figure, with one panel per pair of columns; save it to `path` if given.
 
-        Several laws differ by colours and their cases by line styles; cases of one law by both.
+        Colours distinguish laws and line styles distinguish cases; with a single law both
+        distinguish its cases.
         """
         from symfric.foundation.panels import panels, save  # noqa: PLC0415  (matplotlib is slow to import)
 
@@ -168,10 +169,10 @@ def _range(values: Array) -> str:
 
 
 def clear(curves: Sequence[Curve], *, loops: bool = False) -> tuple[list[Curve], str]:
-    """Return the curves that differ visibly in one picture, and a note on the others.
+    """Return the curves that are distinguishable in one figure, and a note on the others.
 
-    A comparison of laws has no references; of three laws and more it has the first and the last
-    case, and of `loops`, which coincide, the first.
+    A comparison of laws omits references. With three or more laws it contains the first and the
+    last case only, and for `loops`, whose cases coincide, the first case only.
     """
     laws = {c.law for c in curves}
     shown = [c for c in curves if not (c.reference and len(laws) > 1)]
@@ -194,7 +195,11 @@ def draw_curves(
     """Draw the curves of one panel, in readable units.
 
     Args:
-        laws: names that have one colour each; if empty, each case has one.
+        axis: axis of the panel.
+        data: figure with the units of the columns.
+        panel: columns (abscissa, ordinate).
+        curves: the curves to draw.
+        laws: names of laws, each of which has its own colour; if empty, each case has its own.
     """
     x, y = panel
     cases = list(dict.fromkeys(c.case for c in curves))
@@ -228,7 +233,7 @@ GIVEN = ("v", "N", "F_e", "dv")
 
 
 def parts(law: AnyLaw) -> list[type[AnyLaw]]:
-    """Return the classes of the laws in `law`, from the outside in, each once."""
+    """Return the classes of `law` and of the laws that it contains, without duplicates."""
     kinds: list[type[AnyLaw]] = [type(law)]
     for item in fields(law):
         value = getattr(law, item.name)
@@ -238,22 +243,22 @@ def parts(law: AnyLaw) -> list[type[AnyLaw]]:
 
 
 def phenomena(law: AnyLaw) -> list[str]:
-    """Return the codes of all phenomena of `law` and of the laws in it."""
+    """Return the codes of all phenomena of `law` and of the laws that it contains."""
     shown = {code for part in parts(law) for code in part.facts.phenomena}
     return [code for code in PHENOMENA if code in shown]
 
 
 def check_any(where: str, law: object) -> None:
-    """Raise an error for anything but a law or a population of contacts."""
+    """Raise an error if `law` is neither a law nor a population of contacts."""
     if not isinstance(law, Population):
         check_law(where, law)
 
 
 def finite(where: str, law: AnyLaw, F: Array) -> Array:
-    """Return `F` [N] of a law.
+    """Return `F` [N] unchanged if some of its values are finite.
 
     Raises:
-        ValueError: no value is finite, as if parameters leave the range of a root or an arcsine.
+        ValueError: no value is finite, for example because of a root of a negative parameter.
     """
     if F.size and not np.isfinite(F).any():
         raise ValueError(
@@ -264,9 +269,9 @@ def finite(where: str, law: AnyLaw, F: Array) -> Array:
 
 
 def require(where: str, law: AnyLaw, *codes: str) -> None:
-    """Raise an error for a law without any of `codes`, or with inputs that a block does not have.
+    """Raise an error if `law` shows none of `codes`, or needs inputs that a block does not provide.
 
-    The message names the missing phenomenon and laws that show it, or the inputs.
+    The message states the missing phenomenon and the laws that show it, or the inputs.
     """
     check_any(where, law)
     shown = phenomena(law)
@@ -291,20 +296,21 @@ def require(where: str, law: AnyLaw, *codes: str) -> None:
 
 Figures = dict[str, Callable[..., FigureData]]
 FIGURES: Figures = {}
-"""All figures by name: (law, N, given) -> data."""
+"""All figures by name, as functions (law, N, given) -> data."""
 P = ParamSpec("P")
 Content = tuple[str, Sequence[Curve]] | tuple[str, Sequence[Curve], str]
-"""Title and curves of a figure, and a note."""
+"""Title, curves and optional note of a figure."""
 
 
 def behaviour(
     needs: tuple[str, ...], units: Mapping[str, str], *panels: tuple[str, str],
     log: tuple[str, ...] = (), dots: bool = False,
 ) -> Callable[[Callable[P, Content]], Callable[P, FigureData]]:  # fmt: skip
-    """Decorate a function (law, ...) -> title and curves as the figure of its name.
+    """Return a decorator that registers a function (law, ...) -> title and curves as a figure.
 
-    The figure refuses laws that show none of the phenomena `needs`, see `require`; no `needs` admit
-    every law. See `FigureData` for the other arguments.
+    The figure has the name of the function. It rejects laws that show none of the phenomena
+    `needs`, see `require`; with empty `needs` it accepts all laws. See `FigureData` for the other
+    arguments.
     """
 
     def decorate(content: Callable[P, Content]) -> Callable[P, FigureData]:

@@ -1,4 +1,4 @@
-"""Magnitudes of laws, and motions of a contact and of a block that they scale."""
+"""Magnitudes of laws, and motions of a contact or a block that are scaled by them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ from symfric.scenes.base import contact
 from symfric.scenes.blocks import Drive
 
 MASS = 0.8
-"""Mass of a driven block [kg], that of `Rabinowicz`."""
+"""Mass of a driven block [kg], the same as in `Rabinowicz`."""
 
 NORMAL_FORCE = MASS * 9.81
 """Default normal force of the figures [N]."""
@@ -31,18 +31,18 @@ NORMAL_FORCE = MASS * 9.81
 @final
 @dataclass(frozen=True)
 class Scales:
-    """Magnitudes of a law under one normal force.
+    """Magnitudes of a law at one normal force.
 
     Attributes:
-        static: peak of the force in steady sliding, or mu_s N where that is more [N].
-        kinetic: lowest force beyond the peak, up to 10 velocities [N].
-        elastic: largest force without drift by the claim of the law [N]: sigma_0 z_ba of a law with
-            a break-away deflection z_ba, else the kinetic level.
-        stretch: static level over the stiffness at rest, the pre-sliding distance [m]; inf for a
+        static: static level [N]: the peak of the force in steady sliding, or mu_s N if larger.
+        kinetic: kinetic level [N]: the smallest force beyond the peak, up to 10 `velocity`.
+        elastic: largest force without drift according to the law [N]: sigma_0 z_ba for a law with a
+            break-away deflection z_ba, otherwise the kinetic level.
+        stretch: pre-sliding distance [m], the static level over the stiffness at rest; inf for a
             law without pre-sliding.
-        velocity: Stribeck velocity [m/s]: the parameter v_s, else the velocity at which the force
-            has fallen half the way from its peak, else the `velocity_scale` of the law, else 100
-            stretches a second.
+        velocity: Stribeck velocity [m/s]. It is the first that exists of: the parameter v_s; the
+            velocity at which half of the fall from the peak is complete; the `velocity_scale` of
+            the law; 100 `stretch` per second.
     """
 
     static: float
@@ -53,15 +53,15 @@ class Scales:
 
     @property
     def mass(self) -> float:
-        """Mass of a block to push [kg]: 0.8, or more for a strong contact (1.5 m/s^2 at most)."""
+        """Mass of a pushed block [kg]: 0.8, or larger so that static / mass <= 1.5 m/s^2."""
         return max(MASS, self.static / 1.5)
 
 
 def scales(law: AnyLaw, N: float = NORMAL_FORCE) -> Scales:
-    """Return the magnitudes of `law`, with numbers for parameters, under the normal force `N` [N].
+    """Return the magnitudes of `law` at the normal force `N` [N].
 
     Raises:
-        ValueError: no law, symbols for parameters, N that is not positive.
+        ValueError: `law` is not a law, a parameter is a symbol, or N is not positive.
     """
     check_any("figure", law)
     checks.number("figure: N", N, unit="N", above=0.0)
@@ -83,13 +83,13 @@ def scales(law: AnyLaw, N: float = NORMAL_FORCE) -> Scales:
 
 
 def _peak(F: Array) -> int:
-    """Return the index at which `F` first falls, or ends."""
+    """Return the index after which `F` first decreases, or the last index."""
     falls = np.flatnonzero((np.diff(F) <= 0) & (F[:-1] > 0))
     return int(falls[0]) if falls.size else F.size - 1
 
 
 def _half_fall(law: AnyLaw, scale: float, N: float) -> float:
-    """Return the velocity [m/s] at which the force has fallen half the way, by default `scale`."""
+    """Return the velocity [m/s] at which half of the fall is complete; `scale` without a fall."""
     v = scale * np.geomspace(1e-2, 1e3, 1001)
     F = steady_force(law, v, N)
     beyond = F[_peak(F) :]
@@ -110,13 +110,13 @@ def _stiffness(law: AnyLaw, N: float) -> float:
 
 
 REST = 1e6
-"""Time of rest before a motion [s], after which all contacts are old."""
+"""Time of rest [s] before a motion, after which all contacts are old."""
 
 
 def slid(
     law: Population, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX], times: Array, pace: float
 ) -> dict[str, Array]:
-    """Return the columns t, x, v, F at `times` [s] of rested contacts with `velocity(t, pace)`."""
+    """Return columns t, x, v, F at `times` [s] for `velocity(t, pace)` after a rest of `REST`."""
     t, p = ca.SX.sym("t"), ca.SX.sym("pace")
     function = ca.Function("v", [t, p], [velocity(t, p)])
     end = float(times[-1])
@@ -137,13 +137,13 @@ def slid(
 @final
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """Steps of a pushed block: their ends [s], and the signals there."""
+    """Steps of a pushed block: the times of their ends [s], and the signals at these times."""
 
     step_times: Array
     columns: dict[str, Array]
 
     def at(self, t: ArrayLike) -> dict[str, Array]:
-        """Return the signals at the times `t` [s], linear between the steps."""
+        """Return the signals at the times `t` [s], interpolated linearly between the steps."""
         times = np.atleast_1d(np.asarray(t, float))
         return {n: np.interp(times, self.step_times, column) for n, column in self.columns.items()}
 
@@ -157,10 +157,11 @@ def shoved(
     until: float | None,
     way: float = 0.0,
 ) -> Steps:
-    """Return a block of `mass` [kg] on random contacts under `force` [N], by explicit steps.
+    """Return the motion of a block of `mass` [kg] on random contacts under `force` [N].
 
-    A step is a fifth of the inverse frequency of the block on its unloaded contacts; it changes the
-    velocity before the position, which conserves the energy of an elastic contact.
+    The steps are explicit, with a length of 0.2 / omega, where omega is the angular frequency of
+    the block on its unloaded contacts. The velocity is updated before the position, which conserves
+    the energy of elastic contacts. See `pushed` for `until` and `way`.
     """
     h = 0.2 * sqrt(mass / law.stiffness)
     t = np.arange(0.0, t_end + h, h)
@@ -181,7 +182,7 @@ def shoved(
 
 
 def sampled(value: Input, t: Array) -> Array:
-    """Return an input at the times `t` [s], shape (n,)."""
+    """Return the values of an input at the times `t` [s], shape (n,)."""
     if isinstance(value, Hold):
         known = np.searchsorted(np.asarray(value.t), t, "right") - 1
         return np.asarray(value.values, float)[np.clip(known, 0, None)]
@@ -194,14 +195,14 @@ def sampled(value: Input, t: Array) -> Array:
 
 
 UNITS = {"t": "s", "x": "m", "v": "m/s", "F": "N"}
-"""Columns of a prescribed motion."""
+"""Units of the columns of a prescribed motion."""
 
 
 def prescribed(law: Law, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) -> Model:
-    """Return `law` under `velocity(t, pace)` [m/s] from steady sliding at its first value.
+    """Return the model of a contact with the sliding velocity `velocity(t, pace)` [m/s].
 
-    `pace` is a parameter of the model, for several speeds. The law may need the sliding
-    acceleration dv.
+    It starts in steady sliding at the initial velocity. `pace` is a parameter of the model, for
+    motions at several speeds. The law may need the sliding acceleration dv.
     """
     travel = Variable("travel", "m", nominal=1e-5)
     pace, t = Variable("pace", "1", start=1.0), ca.SX.sym("t")
@@ -222,20 +223,20 @@ def prescribed(law: Law, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) ->
 
 
 Run = Steps | Trajectory
-"""Run of a pushed block, with `step_times` and its signals `at` any time."""
+"""Run of a pushed block, with the attribute `step_times` and the method `at`."""
 Slide = Callable[..., Curve]
-"""(case, times [s], pace, jumps=()) -> curve of a motion whose velocity jumps at `jumps` [s]."""
+"""Function (case, times [s], pace, jumps=()) -> curve; the velocity jumps at `jumps` [s]."""
 
 
 def slides(law: AnyLaw, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) -> Slide:
-    """Return the motion `velocity(t, pace)` [m/s] as a function (case, times [s], pace) -> curve.
+    """Return a function that computes the curve of the motion `velocity(t, pace)` [m/s].
 
-    A law starts from steady sliding at the first velocity, a population from unloaded contacts.
+    A law starts in steady sliding at the initial velocity, a population with unloaded contacts.
     """
     if isinstance(law, Population):
 
         def of_contacts(case: str, times: Array, pace: float, jumps: Sequence[float] = ()) -> Curve:
-            del jumps  # its steps are fine everywhere
+            del jumps  # all steps are small
             return Curve(law_name(law), case, slid(law, N, velocity, times, pace))
 
         return of_contacts
@@ -252,7 +253,10 @@ def slides(law: AnyLaw, N: float, velocity: Callable[[ca.SX, ca.SX], ca.SX]) -> 
 
 
 def through(points: Sequence[float], leg: float) -> Callable[[ca.SX, ca.SX], ca.SX]:
-    """Return the velocity of a motion that rests in `points` [m] every `leg` / pace [s]."""
+    """Return the velocity of a motion between `points` [m], each leg of which takes `leg`/pace [s].
+
+    The velocity is zero at the points.
+    """
 
     def velocity(t: ca.SX, pace: ca.SX) -> ca.SX:
         phase = pace * t / leg
@@ -276,7 +280,8 @@ def pushed(
 ) -> Run:
     """Return the run of a block of `mass` [kg] from rest under `force` [N], up to `t_end` [s].
 
-    With `until` it ends when the velocity [m/s] exceeds it and the position exceeds `way` [m].
+    With `until` the run ends when the velocity exceeds `until` [m/s] and the position exceeds `way`
+    [m].
     """
     if isinstance(law, Population):
         return shoved(law, N, mass, force, t_end, until, way)
@@ -290,7 +295,7 @@ def pushed(
 
 
 def fine(run: Run, parts: int = 4) -> Array:
-    """Return the ends of the steps of `run` with `parts` intervals in each [s]."""
+    """Return times [s] that divide each step of `run` into `parts` intervals."""
     inner = np.linspace(0.0, 1.0, parts, endpoint=False)
     starts, lengths = run.step_times[:-1], np.diff(run.step_times)
     return np.append((starts[:, None] + lengths[:, None] * inner).ravel(), run.step_times[-1])

@@ -1,4 +1,4 @@
-"""Pictures of laws: steady curves, and the behaviours that these do not show."""
+"""Plots of laws: steady curves, and behaviours that steady curves do not show."""
 
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -26,14 +26,15 @@ from symfric.laws.base.law import FORCE
 Make = Callable[[AnyLaw, float, Scales], FigureData]
 
 ACCELERATION = "dv"
-"""Further input of a law that every motion provides."""
+"""Name of the sliding acceleration, an input of laws that every motion provides."""
 
 
 def natures(laws: Mapping[str, AnyLaw], N: float) -> list[FigureData]:
-    """Return the figures of the behaviours of `laws` (legend entry -> law) beyond the steady curve.
+    """Return figures of the behaviours of `laws`, given by legend entry, beyond the steady curve.
 
-    Each figure has all laws that show the behaviour, scaled by the first of them; a law that fails
-    is left out, and the note of the figure gives the reason. A law of the velocity alone has none.
+    Each figure contains all laws that show the behaviour, and the first of them determines its
+    scales. A law whose simulation fails is omitted, with the reason in the note of the figure. Laws
+    that depend on the velocity alone have no such figure.
     """
     makers = {label: behaviours(law) for label, law in laws.items()}
     figures: list[FigureData] = []
@@ -56,8 +57,9 @@ def natures(laws: Mapping[str, AnyLaw], N: float) -> list[FigureData]:
 def behaviours(law: AnyLaw) -> dict[str, Make]:
     """Return the figures that characterise `law` beyond its steady curve, by name.
 
-    They show the effect of further inputs, else stiction of a law that needs the applied force,
-    else pre-sliding with lag or reversals, and the growth of static friction with dwell time.
+    For a law with further inputs they show the effect of these, for a law that needs the applied
+    force its stiction, and for all others pre-sliding with lag or reversals, and the increase of
+    static friction with dwell time.
     """
     codes = phenomena(law)
     inputs = [] if isinstance(law, Population) else [i.name for i in law.inputs]
@@ -84,7 +86,8 @@ def behaviours(law: AnyLaw) -> dict[str, Make]:
 def over_input(law: AnyLaw, N: float, given: Scales, name: str) -> FigureData:
     """Show the force in steady sliding at the Stribeck velocity over the further input `name`.
 
-    It ranges over twice its nominal magnitude; the others have their values of steady sliding.
+    The input ranges up to twice its nominal magnitude in both directions. All other inputs have
+    their values of steady sliding.
     """
     if not isinstance(law, Law):
         raise ValueError(f"over_input of {law_name(law)}: expected a law, got a population")
@@ -103,21 +106,21 @@ def over_input(law: AnyLaw, N: float, given: Scales, name: str) -> FigureData:
 
 
 LAYERS = 50.0
-"""Largest half width of the window around rest, in smoothing velocities."""
+"""Largest ratio of the half width of the window around rest to the smoothing velocity."""
 COLUMNS = 3
-"""Behaviours in a row."""
+"""Number of behaviours in a row."""
 
 
 def plot_laws(laws: Mapping[str, AnyLaw], N: float = 1.0, path: str | Path | None = None) -> Figure:
-    """Draw laws: their steady curves, and the behaviours that these do not show.
+    """Draw the steady curves of laws, and the behaviours that steady curves do not show.
 
     The upper panels show the force in steady sliding over the velocity, around rest and over
-    decades. The lower ones show hysteresis in pre-sliding, frictional lag, dwell and stiction of
-    the laws that have them (`symfric.figures.pictures`). Laws of a turning contact have rad/s and
-    N m.
+    several decades. The lower panels show hysteresis in pre-sliding, frictional lag, dwell and
+    stiction of the laws that have them (`symfric.figures.pictures`). Laws of a rotating contact
+    have the units rad/s and N m.
 
     Args:
-        laws: legend entry -> law, with numbers for parameters.
+        laws: laws with numerical parameters, by legend entry.
         N: normal force [N].
         path: image file.
     """
@@ -146,7 +149,7 @@ def plot_laws(laws: Mapping[str, AnyLaw], N: float = 1.0, path: str | Path | Non
 def _steady(near: Axes, far: Axes, laws: Mapping[str, AnyLaw], N: float) -> None:
     """Draw the steady curves around rest and over decades, in the units of the first law.
 
-    A thin line over decades is -F(-v) of a law that is not odd.
+    For a law that is not odd, a thin line over decades shows -F(-v).
     """
     around = _around(max(window(law, N) for law in laws.values()), 600)
     ends = [decades(law, N) for law in laws.values()]
@@ -172,7 +175,7 @@ def _steady(near: Axes, far: Axes, laws: Mapping[str, AnyLaw], N: float) -> None
 
 
 def _around(half: float, samples: int) -> Array:
-    """Return velocities [m/s] up to `half` on both sides of rest, dense at rest."""
+    """Return velocities [m/s] between -`half` and `half`, which are dense near rest."""
     positive = half * np.geomspace(1e-5, 1.0, samples)
     return np.concatenate([-positive[::-1], [0.0], positive])
 
@@ -180,7 +183,7 @@ def _around(half: float, samples: int) -> Array:
 def _units(
     laws: Iterable[AnyLaw], v: Array, forces: Sequence[Array]
 ) -> tuple[float, str, float, str]:
-    """Return factor and unit of velocity and force, those of turning if all laws are of turning."""
+    """Return factor and unit of velocity and force, for rotation if all laws are in rad/s."""
     (by_v, unit_v), (by_F, unit_F) = readable("m/s", [v]), readable("N", forces)
     if all(any(p.unit.startswith("rad/s") for p in parameters(law).values()) for law in laws):
         unit_v, unit_F = turned(unit_v), turned(unit_F)
@@ -196,8 +199,8 @@ def _velocities(law: AnyLaw, N: float) -> tuple[Scales, float]:
 def window(law: AnyLaw, N: float) -> float:
     """Return the half width of the window around rest [m/s].
 
-    It is 5 Stribeck velocities, at most 50 smoothing velocities, and 1 m/s for a law that is
-    viscous only.
+    It is 5 Stribeck velocities, but at most 50 smoothing velocities. For a law with viscous
+    friction only it is 1 m/s.
     """
     if set(phenomena(law)) == {"V"}:
         return 1.0
@@ -208,8 +211,8 @@ def window(law: AnyLaw, N: float) -> float:
 def decades(law: AnyLaw, N: float) -> tuple[float, float]:
     """Return the range of velocities [m/s] that shows the whole steady curve.
 
-    It goes from a hundredth of the smallest velocity of the law to a hundred times its Stribeck
-    velocity, or to where viscous friction has doubled the peak.
+    It extends from a hundredth of the smallest velocity scale of the law to a hundred times its
+    Stribeck velocity, or to the velocity at which viscous friction has doubled the peak.
     """
     if set(phenomena(law)) == {"V"}:
         return 1e-3, 10.0
@@ -221,7 +224,7 @@ def decades(law: AnyLaw, N: float) -> tuple[float, float]:
 
 
 def _behaviour(axis: Axes, data: FigureData, panel: tuple[str, str], laws: Sequence[str]) -> None:
-    """Draw a behaviour in its panel: all cases of one law, the first case of several laws."""
+    """Draw a behaviour in a panel: all cases of a single law, or the first case of each law."""
     several = len(laws) > 1
     first = {c.law: c.case for c in reversed(data.curves)}
     drawn = [c for c in data.curves if not several or c.case == first[c.law]]
@@ -247,16 +250,16 @@ TITLES = {
     "dwell": "peak after a rest",
     "stiction": "stiction, pulled to and fro",
 }
-"""Name of a figure -> title of its panel in the picture of a law."""
+"""Titles of the panels of behaviours, by name of the figure."""
 
 
 def plot_catalogue(
     laws: Mapping[str, AnyLaw], N: float = 1.0, path: str | Path | None = None
 ) -> Figure:
-    """Draw the force in steady sliding over velocity, in a small panel with its own axes per law.
+    """Draw the force in steady sliding over the velocity, in one small panel per law.
 
     Args:
-        laws: title -> law, with numbers for parameters.
+        laws: laws with numerical parameters, by title.
         N: normal force [N].
         path: image file.
     """

@@ -1,4 +1,4 @@
-"""Figures of a block under a given force: stiction, drift, break-away."""
+"""Figures of a block under a prescribed force: stiction, drift, break-away."""
 
 from collections.abc import Sequence
 from math import cbrt, isfinite, sqrt
@@ -23,22 +23,22 @@ def push(
     mass: float = MASS,
     samples: int = 2001,
 ) -> FigureData:
-    """Show the motion of a block of `mass` [kg] on `law` from rest under `force` [N] (t).
+    """Show the motion of a block with friction `law`, from rest under `force` [N].
 
-    Columns t [s], F_e [N], x [m], v [m/s], F [N]. `simulate` with the scene `Drive` gives the same
-    and more for a law; a population of contacts, for which there is no scene, moves by explicit
-    steps.
+    Columns t [s], F_e [N], x [m], v [m/s], F [N]. For a law, `simulate` with the scene `Drive`
+    gives the same motion with more signals. A population of contacts, which has no scene, is
+    integrated by explicit steps.
 
     Args:
         law: any law of a scene, or a population.
         N: normal force [N].
-        force: number, function of the time, or samples (`Linear`, `Hold`).
+        force: a number, a function of time, or samples (`Linear`, `Hold`).
         t_end: end of the motion [s].
         mass: mass of the block [kg].
         samples: number of rows.
 
     Raises:
-        ValueError: no law, numbers that are not positive.
+        ValueError: `law` is not a law, or a number is not positive.
         SolveError: the simulation failed.
     """
     check_any("push", law)
@@ -69,10 +69,10 @@ def stiction(
 ) -> Content:
     """Show friction and velocity of a block under F_e = excess F_S sin(2 pi t/period).
 
-    F_S is the static level; the mass is 0.8 kg, or 1 kg per 1.5 N of F_S if that is more.
-    Columns t [s], F_e, F [N], v [m/s] of one and a half periods from rest. At rest friction equals
-    F_e, the diagonal of the first panel; while the block slides it is the kinetic force with the
-    sign of the velocity.
+    F_S is the static level; the mass is 0.8 kg, or 1 kg per 1.5 N of F_S if that is larger.
+    Columns t [s], F_e, F [N], v [m/s] over one and a half periods, starting at rest. At rest the
+    friction equals F_e, the diagonal of the first panel. While the block slides, it is the kinetic
+    force with the sign of the velocity.
 
     Raises:
         ValueError: a law with neither dynamic nor static friction.
@@ -90,14 +90,15 @@ def stiction(
 
 
 RELEASED, REST, HOLD = 1.05, 0.45, 0.5
-"""End of the push; after it the time without load, at least, and that of the constant load [s]."""
+"""End of the push, shortest time without load after it, and duration of the constant load [s]."""
 
 
 def time_to_rest(law: AnyLaw, N: float, magnitudes: Scales) -> float:
     """Return the time without load [s] in which a block comes to rest after break-away.
 
-    It is `REST`, doubled until the block stays within its pre-sliding distance, or a thousandth of
-    its way, in the last quarter; at most five times, since some laws creep on.
+    It is `REST`, doubled until the block moves by no more than the pre-sliding distance, or a
+    thousandth of its path, during the last quarter. It is doubled at most five times, since some
+    laws continue to creep.
     """
 
     def push(t: ca.SX) -> ca.SX:
@@ -128,18 +129,18 @@ def drift(
 ) -> Content:
     """Show the displacement of a block under a vibrating force (Lampaert et al. 2003, figs. 8, 9).
 
-        F_e = 1.05 F_S t           up to 1 s, held until 1.05 s: it breaks away
-        F_e = 0                    up to 1.5 s, or until the block rests
-        F_e = 0.5 F_b              for 0.5 s
-        F_e = F_b [0.5 + 0.3 sin(2 pi f t)]   beyond: does it move on?
+        F_e = 1.05 F_S t                      up to 1 s, constant until 1.05 s (break-away)
+        F_e = 0                               up to 1.5 s, or until the block rests
+        F_e = 0.5 F_b                         for 0.5 s
+        F_e = F_b [0.5 + 0.3 sin(2 pi f t)]   afterwards
 
-    F_S is the static level and F_b the kinetic one, or sigma_0 z_ba for `ElastoPlastic`, which
-    has no drift below that force only. The mass is 0.8 kg, or 1 kg per 1.5 N of F_S if that is
-    more. Columns t [s], F_e, F [N], x [m], the displacement since the start of the vibration, which
-    lasts until `t_end`, later by the additional time of rest, and x_mean [m], the mean of x over
-    two periods, which is drawn: it is constant for a block that only oscillates. A law without
-    drift stays after the first strokes; LuGre moves on with every period, and a law without states
-    creeps.
+    F_S is the static level. F_b is the kinetic level, or sigma_0 z_ba for `ElastoPlastic`, which is
+    drift-free below that force only. The mass is 0.8 kg, or 1 kg per 1.5 N of F_S if that is
+    larger. Columns t [s], F_e, F [N]; x [m], the displacement since the start of the vibration; and
+    x_mean [m], the mean of x over two periods, which is drawn and constant for a block that only
+    oscillates. The vibration lasts until `t_end`, plus the time by which the block rests later than
+    1.5 s. A law without drift stays in place after the first periods, LuGre moves on with every
+    period, and a law without states creeps.
 
     Raises:
         ValueError: a law with neither static friction nor pre-sliding.
@@ -156,7 +157,7 @@ def drift(
         loaded = ca.if_else(t < hold_from, 0.0, held)
         return ca.if_else(t < RELEASED, peak * ca.fmin(t, 1.0), loaded)
 
-    last = t_end + 1 / frequency  # the mean around the end needs what follows
+    last = t_end + 1 / frequency  # the mean around t_end needs later values
     run = pushed(law, N, magnitudes.mass, force, last)
     t = np.linspace(RELEASED, last, 1 + round(400 * (last - RELEASED)))
     found = run.at(t)
@@ -164,7 +165,7 @@ def drift(
     columns = {"t": t, "F_e": found["force"], "x": found["x"] - rest, "F": found["friction"]}
     keep = (t >= vibrate_from - 0.2) & (t <= t_end + 1e-9)
     once = over_period(t, columns["x"], 1 / frequency)
-    columns["x_mean"] = over_period(t, once, 1 / frequency)  # twice, to remove elastic ringing
+    columns["x_mean"] = over_period(t, once, 1 / frequency)  # twice, to remove elastic oscillation
     title = f"drift under {frequency:g} Hz below break-away, mean over two periods, N = {N:g} N"
     return title, [Curve(law_name(law), "", {name: c[keep] for name, c in columns.items()})]
 
@@ -172,7 +173,7 @@ def drift(
 def over_period(t: Array, x: Array, period: float) -> Array:
     """Return the mean of `x` over the `period` [s] around each of the times `t`, shape (n,).
 
-    At the ends it is that of the first and the last full period.
+    Near the ends it is the mean over the first or the last full period.
     """
     way = np.concatenate([[0.0], np.cumsum((x[1:] + x[:-1]) / 2 * np.diff(t))])
     middle = np.clip(t, t[0] + period / 2, t[-1] - period / 2)
@@ -181,7 +182,7 @@ def over_period(t: Array, x: Array, period: float) -> Array:
 
 
 SLID = 10.0
-"""Pre-sliding distances after which bristles are in steady sliding."""
+"""Number of pre-sliding distances after which bristles are in steady sliding."""
 
 
 @behaviour(("S", "P"), {"rate": "N/s", "F": "N"}, ("rate", "F"), log=("rate",), dots=True)
@@ -191,17 +192,17 @@ def break_away(
     given: Scales | None = None,
     rates: Sequence[float] = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0),
 ) -> Content:
-    """Show the largest friction force of a block under a load of constant rate.
+    """Show the largest friction force of a block under a load that increases at a constant rate.
 
-    Columns rate [N/s], F [N]: the largest friction until the block, of 0.8 kg or 1 kg per 1.5 N,
-    has slid by ten times the pre-sliding distance of its law and is faster than twice the sum of
-    the Stribeck velocity and that of its elastic motion, rate over stiffness. These scales are of
-    the law itself; `given` determines the mass only. The force of LuGre-like laws falls with the
-    rate, down to the kinetic level; laws of the velocity or the path alone reach about the static
-    level at any rate.
+    Columns rate [N/s], F [N]. F is the largest friction until the block has slid by ten times the
+    pre-sliding distance and is faster than twice the sum of the Stribeck velocity and the velocity
+    of elastic motion, rate over stiffness. These scales are those of `law`; `given` determines only
+    the mass, which is 0.8 kg or 1 kg per 1.5 N. For laws like LuGre the force decreases with the
+    rate down to the kinetic level; laws that depend on the velocity or the path alone reach
+    approximately the static level at any rate.
 
     Raises:
-        ValueError: a law with neither static friction nor pre-sliding, a rate that is not positive.
+        ValueError: the law has neither static friction nor pre-sliding, or a rate is not positive.
     """
     if not all(rate > 0 for rate in rates):
         raise ValueError(f"break_away: rates: expected numbers above 0 N/s, got {tuple(rates)}")

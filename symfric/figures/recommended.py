@@ -1,4 +1,4 @@
-"""Widest smoothing of a law that a wanted error allows in a given machine."""
+"""Largest smoothing of a law that a required error allows in a given machine."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -35,13 +35,13 @@ if TYPE_CHECKING:
 RATIO = 4.0
 """Ratio of successive widths."""
 SLOWEST = 0.2
-"""Smallest order of errors that have settled."""
+"""Smallest order of convergence that is accepted."""
 SHARE = 0.2
-"""Largest share of the reference in the wanted error."""
+"""Largest uncertainty of the reference, as a share of the required error."""
 MARGIN = 0.8
-"""Share of the wanted error at which a width between two runs is chosen."""
+"""Share of the required error for which a width between two runs is chosen."""
 DRIEST, SOFTEST = 20, 5
-"""Largest numbers of narrower and of wider widths."""
+"""Largest numbers of narrower widths and of wider widths."""
 MOST_STEPS = 400_000
 """Largest number of attempts of a run."""
 FINEST = 1e-11
@@ -51,22 +51,22 @@ FINEST = 1e-11
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Recommendation(Showing):
-    """Law as smooth as a wanted error allows.
+    """Law that is as smooth as a required error allows.
 
     Attributes:
-        law: the law with its width or stiffness.
+        law: the law with the recommended width or stiffness.
         values: the parameters that were set.
-        error: measured error of a run of `law` at `rtol`: the largest difference from dry friction
-            relative to the motion, and the uncertainty of the reference.
-        wanted: the given error.
-        uncertain: the share of the reference in `error`.
-        order: order of the error in the width at the chosen one; NaN if nothing depends on it.
-        reference: description of dry friction.
-        rtol: relative tolerance of that run.
-        steps, attempts: of that run.
-        time_s: its CPU time [s].
-        curve: error, steps and CPU time against the parameter, of runs in which the integrator's
-            error is negligible.
+        error: error of a run of `law` at `rtol`, the largest difference from dry friction relative
+            to the motion plus the uncertainty of the reference.
+        wanted: the required error.
+        uncertain: uncertainty of the reference, which is included in `error`.
+        order: order of the error in the width at the recommended width; NaN if it was not needed.
+        reference: description of the reference.
+        rtol: relative tolerance of the run.
+        steps, attempts: accepted steps and attempted steps of the run.
+        time_s: CPU time of the run [s].
+        curve: error, steps and CPU time against the parameter, for runs with a negligible error of
+            the integrator.
     """
 
     law: Law
@@ -83,7 +83,7 @@ class Recommendation(Showing):
     curve: FigureData
 
     def __str__(self) -> str:
-        """Return the result in a sentence."""
+        """Return the result as a sentence."""
         values = ", ".join(f"{name} = {value:g}" for name, value in self.values.items())
         return (
             f"{type(self.law).__name__}: {values} is off {self.reference} by {self.error:.2g} "
@@ -91,15 +91,15 @@ class Recommendation(Showing):
         )
 
     def shown(self) -> Shown:
-        """Return the result in a sentence."""
+        """Describe the result in a sentence."""
         return Shown("recommended", tuple(wrap(str(self), WIDTH)))
 
     def thumbnail(self) -> "Figure":
-        """Return the curve."""
+        """Return the figure of `curve`."""
         return self.plot()
 
     def plot(self, path: str | Path | None = None) -> "Figure":
-        """Draw the curve; save it to `path` if given."""
+        """Draw `curve`; save the figure to `path` if given."""
         return self.curve.plot(path)
 
 
@@ -115,37 +115,38 @@ def recommended(
     u: Mapping[str, Input] | None = None,
     rtol: float = 1e-6,
 ) -> Recommendation:
-    """Return `law` with the widest smoothing at which its motion is `error` off dry friction.
+    """Return `law` with the largest smoothing for which the error from dry friction is `error`.
 
         error = max |x - x_dry| / (largest - smallest value of x_dry)     over signals and times
 
-    The widths of the law shrink in steps of 4 until three runs follow a power of the width, from
-    which the distance of the last one from the limit is known (Richardson): that run is x_dry. The
-    widest width is chosen below which every run keeps the error; a run at `rtol` verifies it.
+    The widths of the law are reduced in steps of 4 until successive differences of the runs follow
+    a power of the width. Then the distance of the last run from the limit is known (Richardson),
+    and this run is x_dry. The result is the largest width below which all runs satisfy `error`,
+    verified by a run at `rtol`.
 
     Args:
-        law: start of the search.
+        law: law at which the search starts.
         scene: a machine (`FourMass`, `FourMass(law, k=3.0)`) or a function law -> Model. The width
-            for an error depends on the machine and on the length of its motion.
-        error: wanted error, relative to the size of the motion; between 0 and 1.
-        t_end: end of the motion [s]; that of the scene.
-        parameter: scaled parameters, by default those of certain roles (`regularisation`):
-            stiffnesses of bristles, v_t, widths. Several are scaled together, stiffnesses
-            inversely.
-        exact: a law without regularisation, such as `ExactCoulomb`, as the reference instead of the
-            limit of `law` itself. Different levels then are errors at any width.
-        of: compared signals by name, or a function of a trajectory, such as the period of a cycle,
-            if an error of phase would grow with time; by default positions, the states of the
-            machine that are no rates of others.
+            for a given error depends on the machine and on the length of its motion.
+        error: required error relative to the size of the motion, between 0 and 1.
+        t_end: end of the motion [s]; by default that of the scene.
+        parameter: names of the scaled parameters, by default those of certain roles, see
+            `regularisation`: stiffnesses of bristles, v_t, widths. Several parameters are scaled
+            together, stiffnesses inversely.
+        exact: a law without regularisation, such as `ExactCoulomb`, used as the reference instead
+            of the limit of `law`. Then different levels of friction cause errors at any width.
+        of: names of the compared signals, by default the positions, which are the states of the
+            machine that are not rates of other states; or a function of a trajectory, such as the
+            period of a cycle, if phase errors would grow with time.
         u: inputs, as for `simulate`.
-        rtol: relative tolerance of later runs of the law.
+        rtol: relative tolerance at which the law will be used.
 
     Raises:
         ValueError: bad input.
-        SolveError: the error is not reached; the message gives the smallest one, `partial` is the
-            curve.
+        SolveError: the error is not reached; the message states the smallest error, and `partial`
+            is the curve.
 
-    Limits: a motion without a limit, such as a chaotic one over a long time, does not settle;
+    Limits: a motion that does not converge, such as a long chaotic motion, has no reference;
     shorten it or compare other numbers. Runs are compared at 2001 times.
     """
     where = "recommended"
@@ -164,7 +165,7 @@ def recommended(
 
 @final
 class _Search:
-    """Runs over the width, narrowest last."""
+    """Runs of the search in the order of their widths, with the narrowest last."""
 
     def __init__(self, machine: Machine, knob: Regularisation, wanted: float, rtol: float) -> None:
         self.machine, self.knob, self.wanted, self.rtol = machine, knob, wanted, rtol
@@ -174,12 +175,12 @@ class _Search:
         self.about, self.uncertain = "", inf
 
     def run(self, s: float, rtol: float) -> Sample:
-        """Return the machine with the widths at the factor `s`."""
+        """Return a run of the machine with the widths scaled by the factor `s`."""
         law, values = self.knob.at(s), self.knob.values(s)
         return sample(self.machine, law, rtol, s, values, max_steps=MOST_STEPS)
 
     def narrow(self) -> None:
-        """Run with widths a quarter of the last ones."""
+        """Add a run with a quarter of the last widths."""
         s = self.runs[-1].s / RATIO if self.runs else 1.0
         if len(self.runs) > DRIEST:
             self.give_up("the curve has not settled by then")
@@ -194,14 +195,14 @@ class _Search:
             raise SolveError(start, problem.status, problem.partial) from problem
 
     def settle(self) -> None:
-        """Run until the limit is known well enough, and take the last run as the reference."""
+        """Run until the limit is known accurately, and use the last run as the reference."""
         while self.uncertain > SHARE * self.wanted:
             self.narrow()
             self.uncertain = self.remaining()
         self.reference, self.about = self.runs[-1], self.shown(self.runs[-1].s)
 
     def compare(self, exact: Law) -> None:
-        """Run until two runs keep the wanted error from the motion with the law `exact`."""
+        """Use the motion with `exact` as the reference; run until two runs satisfy the error."""
         self.reference = sample(replace(self.machine, free=False), exact, self.fine)
         self.about, self.uncertain = type(exact).__name__, self.fine
         while len(self.runs) < 2 or max(map(self.off, self.runs[-2:])) > self.wanted:
@@ -211,9 +212,10 @@ class _Search:
                 self.give_up(f"it does not tend to {self.about}: do their levels differ?")
 
     def remaining(self) -> float:
-        """Return the distance of the last run from the limit, from the last four runs.
+        """Return the distance of the last run from the limit, based on the last four runs.
 
-        With differences d and D before, and D/d = 4^q, the sum of all that follow is d / (4^q - 1).
+        If the last difference is d and the previous one D = 4^q d, the sum of all further
+        differences is d / (4^q - 1).
         """
         if len(self.runs) < 3:
             return inf
@@ -226,18 +228,18 @@ class _Search:
         return gaps[-1] / (RATIO**slowest - 1.0) if slowest > SLOWEST else inf
 
     def off(self, run: Sample) -> float:
-        """Return the error of a run and of the reference together; inf without a comparison."""
+        """Return the error of a run plus the uncertainty of the reference; inf if unknown."""
         return inf if self.reference is None else distance(run, self.reference) + self.uncertain
 
     def choose(self) -> Recommendation:
-        """Return the widest width below which all runs keep the wanted error, verified."""
+        """Return the largest width below which all runs satisfy the error, verified by a run."""
         if self.off(self.runs[0]) <= self.wanted:
             self.widen()
         errors = [self.off(run) for run in self.runs]
         kept = len(errors)
         while kept and errors[kept - 1] <= self.wanted:
             kept -= 1
-        # runs[kept] is the widest that keeps it, runs[kept - 1] the narrowest that does not
+        # runs[kept] is the widest one within the error, runs[kept - 1] the narrowest one outside
         keeps = self.runs[kept].s
         factors, order = [keeps], nan
         if kept:
@@ -259,18 +261,18 @@ class _Search:
         )
 
     def widen(self) -> None:
-        """Run with wider widths while the error is kept, as far as the law allows."""
+        """Add runs with larger widths while they satisfy the error and the law allows them."""
         for _ in range(SOFTEST):
             s = self.runs[0].s * RATIO
             try:
                 self.runs.insert(0, self.run(s, self.fine))
             except (SolveError, ValueError):
-                return  # beyond a bound of the law or of what can be simulated
+                return  # out of the bounds of the law, or the simulation failed
             if self.off(self.runs[0]) > self.wanted:
                 return
 
     def rounded(self, s: float) -> float:
-        """Return a factor at which the first parameter has two digits, on the narrow side."""
+        """Return a factor with two digits in the first parameter, rounded to narrower widths."""
         name, power = next(iter(self.knob.powers.items()))
         value = self.knob.values(s)[name]
         size = 10.0 ** (floor(log10(value)) - 1)
@@ -278,11 +280,11 @@ class _Search:
         return (digits * size / float(parameters(self.knob.law)[name].value)) ** (1 / power)
 
     def shown(self, s: float) -> str:
-        """Return the parameters at a factor as text."""
+        """Return the parameters at the factor `s` as text."""
         return ", ".join(f"{name} = {value:.3g}" for name, value in self.knob.values(s).items())
 
     def curve(self) -> FigureData:
-        """Return error, steps and time of the runs; without a reference, against the last run."""
+        """Return error, steps and time of the runs; the default reference is the last run."""
         if self.reference is None and self.runs:
             self.reference, self.uncertain = self.runs[-1], 0.0
         name, law = next(iter(self.knob.powers)), self.knob.law
@@ -305,7 +307,7 @@ class _Search:
         )
 
     def give_up(self, why: str, cause: BaseException | None = None) -> Recommendation:
-        """Raise a SolveError with the smallest error and the curve so far."""
+        """Raise a `SolveError` with the smallest error and the curve of the runs so far."""
         curve, law = self.curve(), type(self.knob.law).__name__
         errors = curve.curves[0]["error"]
         best = f"{errors.min():.2g}" if errors.size else "unknown"

@@ -1,23 +1,23 @@
 """Parameters that make a law smooth, its runs in a machine, and their distance from dry friction.
 
-A smooth law has a width, such as v_t, below which it creeps instead of resting; bristles have a
-stiffness. As all widths of a law shrink with a factor s (stiffnesses grow with 1/s) its motion
-tends to that with dry, set-valued friction,
+A smooth law has a width, such as v_t, below which it creeps instead of resting; a bristle law has a
+stiffness. If all widths of a law are scaled by a factor s (and stiffnesses by 1/s), the motion
+converges to that with dry, set-valued friction:
 
     |x(s) - x(0)| = C s^q
 
-The order q depends on the motion, not on the law alone:
+The order q depends on the motion as well as on the law:
 
-    1      a contact that comes to rest and stays: it creeps at a velocity of order v_t; with tanh
-           times a logarithm
-    2/3    break-away over a falling branch of width v_t (Brown-McPhee): the state stays long at the
-           peak, the fold of the stick branch
-    1/2    reversed bristles: time to slide their deflection F/sigma_0 from rest
-    > 1    a contact that only slides, 3 with Brown-McPhee, whose tail falls like (v_t/v)^3
+    1      a contact that comes to rest and sticks: it creeps at a velocity of order v_t; with tanh
+           there is an additional logarithm
+    2/3    break-away over a falling branch of width v_t (Brown-McPhee): the state stays near the
+           peak, the fold of the stick branch, for a long time
+    1/2    reversal of bristles: the time to slide by their deflection F/sigma_0 from rest
+    > 1    a contact that only slides; 3 with Brown-McPhee, whose tail decreases as (v_t/v)^3
 
-Dry friction does not determine the loads of several contacts that rest together: with mu_s > mu_d
-each smooth law tends to its own instant of break-away. Far from the limit there is no order: if
-rest is longer than motion, creep dominates.
+Dry friction does not determine the loads of several contacts that rest together. With mu_s > mu_d
+the instants of break-away therefore converge to a limit that depends on the smooth law. Far from
+the limit there is no order: if a contact rests for longer than it moves, creep dominates.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -46,15 +46,15 @@ from symfric.scenes import Scene
 
 Array = NDArray[np.float64]
 Measure = Sequence[str] | Callable[[Trajectory], Array]
-"""Signals by name, or a function trajectory -> numbers, such as periods."""
+"""Names of signals, or a function trajectory -> numbers, such as periods."""
 SAMPLES = 2001
 """Number of times at which motions are compared."""
 NEGLIGIBLE = 1e-9
-"""Widths [m/s] below this only round off an absolute value and do not make a law smooth."""
+"""Limit [m/s] below which a width only rounds an absolute value and does not smooth a law."""
 DIGITS = 12
 """Number of digits to which scaled parameters are rounded."""
 STILL = 1e-9
-"""Ratio to its nominal size below which the motion of a signal is measured by that size."""
+"""Ratio of motion to nominal value below which the size of a signal is its nominal value."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,9 +62,10 @@ class Regularisation:
     """Parameters that make `law` smooth, scaled together by a factor s; dry friction at s = 0.
 
     Attributes:
-        powers: parameter -> power of s: widths, velocities and paths are scaled by s, stiffnesses
-            and inverse velocities by 1/s, the damping of bristles by 1/sqrt(s), the same part of
-            critical.
+        law: the law at s = 1.
+        powers: power of s for each parameter. Widths, velocities and paths are scaled by s,
+            stiffnesses and inverse velocities by 1/s, and the damping of bristles by 1/sqrt(s),
+            which preserves the damping ratio.
     """
 
     law: Law
@@ -72,11 +73,11 @@ class Regularisation:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
+        """Names of the scaled parameters."""
         return tuple(self.powers)
 
     def values(self, s: float) -> dict[str, float]:
-        """Return their values at the factor `s`."""
+        """Return the values of the scaled parameters at the factor `s`."""
         known = parameters(self.law)
         scaled = {n: float(known[n].value) * s**power for n, power in self.powers.items()}
         return {n: float(f"{value:.{DIGITS}g}") for n, value in scaled.items()}
@@ -89,13 +90,14 @@ class Regularisation:
 def regularisation(
     where: str, law: Law, parameter: str | Iterable[str] | None = None
 ) -> Regularisation:
-    """Return the parameters that make `law` smooth: `parameter`, or those of certain roles.
+    """Return the parameters that make `law` smooth: `parameter`, or by default those of some roles.
 
-    The roles are stiffness, damping and length of bristles, transition velocities called v_t and
-    smoothing widths [m/s]; a law without any of these has its only velocity.
+    These roles are stiffness, damping and length of bristles, transition velocities named v_t, and
+    smoothing widths [m/s]. If a law has none of these, its only velocity scale is used.
 
     Raises:
-        ValueError: no law, no such parameter, or several velocities without `parameter`.
+        ValueError: `law` is not a law, a parameter does not exist, or the law has several velocity
+            scales and `parameter` is not given.
     """
     check_law(f"{where}: law", law)
     known = parameters(law)
@@ -132,7 +134,7 @@ def regularisation(
 
 
 def _scaled(where: str, law: Law, names: Iterable[str]) -> Regularisation:
-    """Return the parameters `names` with their powers; their values must be positive numbers."""
+    """Return the parameters `names` with their powers; raise an error for values <= 0."""
     powers: dict[str, float] = {}
     for name in names:
         p = parameters(law)[name]
@@ -149,15 +151,16 @@ class Machine:
     """Machine that accepts any law, and the signals by which laws are compared.
 
     Attributes:
-        name: of the machine.
-        make: law -> scene or model.
+        name: name of the machine.
+        make: function law -> scene or model.
         t_end: length of the motion [s].
         of: compared signals or numbers; None for the positions.
         u: inputs of the model.
-        times: times of the comparison [s]; None for equally spaced ones.
-        places: fields of the scene that hold the law; None for all that hold its class.
-        free: True if the widths are parameters of one model and not numbers in each.
-        backend: engine of the runs, see `simulate`.
+        times: times of the comparison [s]; None for equally spaced times.
+        places: fields of the scene that contain the law; None for all fields with a law of its
+            class.
+        free: True if the widths are parameters of one model, False if they are constants of it.
+        backend: backend of the runs, see `simulate`.
     """
 
     name: str
@@ -174,7 +177,7 @@ class Machine:
         """Return the model with `law`.
 
         Raises:
-            ValueError: the machine refuses it, or gives neither scene nor model.
+            ValueError: the machine rejects the law, or `make` returns neither scene nor model.
         """
         made = self.make(law)
         if isinstance(made, Scene):
@@ -185,13 +188,13 @@ class Machine:
 @final
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """One run.
+    """Run of a law in a machine.
 
     Attributes:
         s: factor of the widths.
-        values: the widths.
+        values: the scaled parameters.
         rtol: relative tolerance of the run.
-        steps, attempts: of the integrator.
+        steps, attempts: accepted and attempted steps of the integrator.
         time_s: CPU time of the call [s].
         motion: compared signals, shape (signals, times).
         size: size of each row, to which errors are relative.
@@ -216,12 +219,12 @@ def machine_of(
     probe: Law,
     backend: str = "auto",
 ) -> Machine:
-    """Return a scene, a class of scenes, or a function law -> scene or model, as a machine.
+    """Return the machine of a scene, a class of scenes, or a function law -> scene or model.
 
-    Inputs are those of the scene and `u`. A function is called once with `probe`.
+    Its inputs are those of the scene, updated by `u`. A function is called once with `probe`.
 
     Raises:
-        ValueError: none of these, or no end of the motion.
+        ValueError: `scene` is none of these, or the end of the motion is unknown.
     """
     if of is not None and not callable(of):
         of = checks.names(f"{where}: of", of)
@@ -251,10 +254,10 @@ def _in_scene(scene: Scene, law: Law) -> Scene:
 def driven(
     where: str, kind: type, t_end: float | None, u: Mapping[str, Input] | None
 ) -> tuple[float, Mapping[str, Input]]:
-    """Return the end [s] and the inputs of a motion, by default those of the scenes `kind`.
+    """Return the end [s] and the inputs of a motion, by default those of the class `kind`.
 
     Raises:
-        ValueError: no end, or one that is not positive.
+        ValueError: the end is unknown or not positive.
     """
     given = dict(u or {})
     if issubclass(kind, Scene):
@@ -275,11 +278,11 @@ def sample(
     max_steps: int = 10_000_000,
     model: Model | None = None,
 ) -> Sample:
-    """Run `machine` with `law`, in `model` if it is given; the time is the shortest of `repeats`.
+    """Run `machine` with `law`, in `model` if given; the time is the shortest of `repeats` runs.
 
     Raises:
         SolveError: the run failed.
-        KeyboardInterrupt: the user stopped it.
+        KeyboardInterrupt: the user interrupted the run.
     """
     made = machine.model(law) if model is None else model
 
@@ -294,7 +297,7 @@ def sample(
 
     spent, run = min((timed() for _ in range(repeats)), key=lambda pair: pair[0])
     if run.status is Status.INTERRUPTED:
-        raise KeyboardInterrupt  # a part of a motion is no sample
+        raise KeyboardInterrupt  # an incomplete motion cannot be compared
     motion, size = looked_at(machine, made, run, law)
     steps, lost = run.statistics.steps, run.statistics.rejections
     return Sample(s, values or {}, rtol, steps, steps + lost, spent, motion, size)
@@ -316,7 +319,7 @@ def looked_at(machine: Machine, model: Model, run: Trajectory, law: Law) -> tupl
 
 
 def positions(model: Model, law: Law) -> tuple[str, ...]:
-    """Return the states of the machine, not of friction, that are no rates of others."""
+    """Return the states of the machine that are neither friction states nor rates of others."""
     inside = {state.name for contact in model.contacts for state in contact.states}
     inside |= {state.name for state in law.states}
     machine = [v for v in model.x if v.name not in inside and v.kind not in (FRICTION_STATE, MODE)]
@@ -326,7 +329,7 @@ def positions(model: Model, law: Law) -> tuple[str, ...]:
 
 
 def distance(one: Sample, reference: Sample) -> float:
-    """Return the largest difference of two runs, relative to the size of the reference."""
+    """Return the largest difference of two runs relative to the size of the reference."""
     return apart(one.motion, reference.motion, reference.size)
 
 
@@ -334,7 +337,7 @@ def apart(one: Array, reference: Array, size: Array, mean: bool = False) -> floa
     """Return the largest difference of two motions, shape (signals, times), relative to `size`.
 
     With `mean` it is the largest root mean square, for data with noise. It is infinite for motions
-    of another shape, for example of another number of cycles.
+    of different shapes, for example with different numbers of cycles.
     """
     if one.shape != reference.shape or not one.size:
         return inf

@@ -1,4 +1,4 @@
-"""Figures of a contact under a given velocity: steady curves, hysteresis, lag, jumps, dwell."""
+"""Figures of a contact with a prescribed velocity: steady curves, hysteresis, lag, jumps, dwell."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -16,15 +16,15 @@ over_velocity = behaviour((), {"v": "m/s", "F": "N"}, ("v", "F"))
 
 @over_velocity
 def profile(law: AnyLaw, N: float = NORMAL_FORCE, given: Scales | None = None) -> Content:
-    """Show the force-velocity profile over +-5 Stribeck velocities, of any law.
+    """Show the force-velocity profile over +-5 Stribeck velocities, for any law.
 
-    Columns v [m/s], F [N]. Further inputs of a law, such as the applied force, have the values in
-    the title, with the sign of v.
+    Columns v [m/s], F [N]. Further inputs of a law, such as the applied force, have the values
+    stated in the title, with the sign of v.
 
     Args:
-        law: with numbers for parameters.
+        law: law with numerical parameters.
         N: normal force [N].
-        given: magnitudes that determine the range, by default those of the law.
+        given: magnitudes that determine the range; by default those of the law.
     """
     V = (given or scales(law, N)).velocity
     fine = np.geomspace(1e-4 * V, 5 * V, 600)
@@ -43,7 +43,7 @@ SWEPT = {
     "C": ("shape factor", "up to 1 gives a plateau, above 1 a peak from which the force falls"),
     "E": ("curvature factor", "moves the peak to another velocity and leaves height and slope"),
 }
-"""Factor -> its name and its effect."""
+"""Name and effect of each factor."""
 
 
 @over_velocity
@@ -53,11 +53,11 @@ def sweep_b(
 ) -> Content:  # fmt: skip
     """Show profiles for the stiffness factors `values` as shares of B.
 
-    Columns v [m/s], F [N]. B scales the velocity and leaves the height of the peak (doi
+    Columns v [m/s], F [N]. B scales the velocity and does not change the height of the peak (doi
     10.1177/14644193231169325, fig. 8).
 
     Raises:
-        ValueError: neither `SelfTuning` nor `RuiWang`.
+        ValueError: the law is neither `SelfTuning` nor `RuiWang`.
     """
     return _sweep("B", law, N, given, values)
 
@@ -69,11 +69,11 @@ def sweep_c(
 ) -> Content:  # fmt: skip
     """Show profiles for the shape factors `values` in [0, 2] (same source, fig. 7).
 
-    Columns v [m/s], F [N]. `SelfTuning` computes C >= 1 from mu_d / mu_s; here C is set, as in
-    `RuiWang` with D = mu_s N. C = 0 is no friction, C <= 1 monotone, C > 1 has a peak.
+    Columns v [m/s], F [N]. `SelfTuning` computes C >= 1 from mu_d / mu_s; this figure sets C, as
+    in `RuiWang` with D = mu_s N. C = 0 gives no friction, C <= 1 is monotone, C > 1 has a peak.
 
     Raises:
-        ValueError: neither of these laws.
+        ValueError: the law is neither `SelfTuning` nor `RuiWang`.
     """
     return _sweep("C", law, N, given, values)
 
@@ -85,10 +85,10 @@ def sweep_e(
 ) -> Content:  # fmt: skip
     """Show profiles for the curvature factors `values` below 1 (same source, fig. 9).
 
-    Columns v [m/s], F [N]. E moves the peak and leaves its height and the slope at rest.
+    Columns v [m/s], F [N]. E moves the peak but changes neither its height nor the slope at rest.
 
     Raises:
-        ValueError: neither `SelfTuning` nor `RuiWang`.
+        ValueError: the law is neither `SelfTuning` nor `RuiWang`.
     """
     return _sweep("E", law, N, given, values)
 
@@ -96,7 +96,7 @@ def sweep_e(
 def _sweep(
     factor: str, law: AnyLaw, N: float, given: Scales | None, values: Sequence[float]
 ) -> Content:
-    """Return profiles of the magic formula of `law`, its shape factor free, for `values`."""
+    """Return profiles of the magic formula of `law` for `values` of one factor."""
     if isinstance(law, RuiWang):
         base = law
     elif isinstance(law, SelfTuning):
@@ -119,7 +119,7 @@ def _sweep(
 
 
 ROUTE = (0.0, 2.0, -2.0, 1.0, -1.0, 1.0, -2.0, 2.0)
-"""Turning points in pre-sliding distances: a loop from -1 to 1 within one from -2 to 2."""
+"""Turning points in pre-sliding distances: a loop from -1 to 1 inside a loop from -2 to 2."""
 
 
 @behaviour(("P",), UNITS, ("x", "F"))
@@ -133,13 +133,13 @@ def hysteresis(
 ) -> Content:
     """Show the force over position along nested loops at several `speeds` (Lampaert et al. 2003).
 
-    Columns t [s], x [m], v [m/s], F [N]. The loops turn at 1 and 2 pre-sliding distances, or at
-    the positions `route` [m], and take `duration` [s] at speed 1. A law with non-local memory
-    returns to the force of a turning point that is reached again (the second arrival at 1 and at
-    -2); a rate-independent one has the same curve at every speed.
+    Columns t [s], x [m], v [m/s], F [N]. The turning points of the loops are +-1 and +-2
+    pre-sliding distances, or the positions `route` [m]. The motion takes `duration` [s] at speed 1.
+    A law with non-local memory returns to the force of a turning point that is reached again (the
+    second arrival at 1 and at -2). A rate-independent law has the same curve at every speed.
 
     Raises:
-        ValueError: a law without pre-sliding displacement, or one that needs the applied force.
+        ValueError: the law has no pre-sliding displacement, or needs the applied force.
     """
     if route is None:
         stretch = (given or scales(law, N)).stretch
@@ -162,18 +162,18 @@ def lag(
     frequencies: Sequence[float] = (2.0, 5.0, 10.0),
     periods: int = 3,
 ) -> Content:
-    """Show the force over a velocity without reversal (Lampaert et al. 2003, fig. 6).
+    """Show the force over an oscillating velocity without reversal (Lampaert et al. 2003, fig. 6).
 
         v = V [2.5 + 2 sin(2 pi f t)],   V the Stribeck velocity
 
-    Columns t [s], x [m], v [m/s], F [N] of the last of `periods`, for each f of `frequencies` [Hz];
-    the curve "steady" is F in steady sliding. With lag the force is higher while v rises than
-    while it falls. A memory much longer than the periods is not settled: rate-and-state friction
-    renews its contacts over D_c, here within seconds, and shows its direct effect; a larger
-    velocity of `given` settles it.
+    Columns t [s], x [m], v [m/s], F [N] of the last of `periods`, for each f of `frequencies` [Hz].
+    The curve "steady" is F in steady sliding. With lag the force is larger while v rises than while
+    it falls. Periods that are much shorter than the memory of the law do not reach a periodic
+    state: rate-and-state friction renews its contacts over D_c, which takes seconds, and shows only
+    its direct effect; a larger velocity in `given` avoids this.
 
     Raises:
-        ValueError: a law without frictional lag.
+        ValueError: the law has no frictional lag.
     """
     V = (given or scales(law, N)).velocity
 
@@ -199,10 +199,10 @@ def transition(
     """Show the force over a sinusoidal velocity of 5 Stribeck velocities (Lampaert et al. 2003).
 
     Columns t [s], x [m], v [m/s], F [N] of the last of `periods`, for each of `frequencies` [Hz].
-    The contact goes from pre-sliding to sliding and back twice a period.
+    The contact changes from pre-sliding to sliding and back twice per period.
 
     Raises:
-        ValueError: a law without pre-sliding displacement, or one that needs the applied force.
+        ValueError: the law has no pre-sliding displacement, or needs the applied force.
     """
     V = 5 * (given or scales(law, N)).velocity
 
@@ -217,7 +217,7 @@ def transition(
 def last_period(
     slide: Slide, frequencies: Sequence[float], periods: int, samples: int
 ) -> tuple[Curve, ...]:
-    """Return the last of `periods` at each of `frequencies` [Hz]."""
+    """Return the curve of the last of `periods` at each of `frequencies` [Hz]."""
     return tuple(
         slide(f"{f:g} Hz", np.linspace((periods - 1) / f, periods / f, samples), f)
         for f in frequencies
@@ -225,7 +225,7 @@ def last_period(
 
 
 LEG = 20.0
-"""Path at each velocity, in paths that renew the contacts."""
+"""Ratio of the path at each velocity to the path that renews the contacts."""
 
 
 @behaviour(("L",), UNITS, ("x", "F"))
@@ -234,13 +234,13 @@ def velocity_step(
 ) -> Content:
     """Show the force along a path on which the velocity jumps from V to `factor` V and back.
 
-    V is the Stribeck velocity, for `RateAndState` the reference velocity. Columns t [s], x [m],
-    v [m/s], F [N]. The path at each velocity is 20 times that which renews the contacts, D_c or the
-    pre-sliding distance. Rate-and-state friction jumps by a ln(factor) N, then falls by
+    V is the Stribeck velocity, or the reference velocity of `RateAndState`. Columns t [s], x [m],
+    v [m/s], F [N]. The path at each velocity is 20 times the path that renews the contacts, D_c or
+    the pre-sliding distance. Rate-and-state friction jumps by a ln(factor) N, then falls by
     b ln(factor) N.
 
     Raises:
-        ValueError: a law without frictional lag.
+        ValueError: the law has no frictional lag.
     """
     magnitudes = given or scales(law, N)
     V = magnitudes.velocity
@@ -270,7 +270,7 @@ def dwell(
     and slides again. Columns hold [s], F [N], the largest force after the rest.
 
     Raises:
-        ValueError: a law whose static friction does not depend on the dwell time.
+        ValueError: the static friction of the law does not depend on the dwell time.
     """
     magnitudes = given or scales(law, N)
     V, way = magnitudes.velocity, 20 * memory(law, magnitudes)
@@ -299,9 +299,9 @@ def steady_state(
 ) -> Content:
     """Show the force in steady sliding up to 10 Stribeck velocities V (thesis, Lund 2015).
 
-    Columns v [m/s], F [N]. A law with the viscous coefficient sigma_2 is shown with its own one
-    and, dashed, with those that add `shares` of the kinetic level at 10 V; the first, zero, is its
-    dry part.
+    Columns v [m/s], F [N]. A law with the viscous coefficient sigma_2 is shown with its own value
+    and, dashed, with values for which viscous friction at 10 V is each of `shares` of the kinetic
+    level. The share 0 is the dry part of the law.
     """
     magnitudes = given or scales(law, N)
     v = np.geomspace(1e-3, 10.0, 601) * magnitudes.velocity
@@ -320,7 +320,7 @@ def steady_state(
 
 
 def memory(law: AnyLaw, magnitudes: Scales) -> float:
-    """Return the path that renews the contacts [m]: D_c, the pre-sliding distance, or 1e-5."""
+    """Return the path [m] that renews the contacts: D_c, the pre-sliding distance, or 1e-5 m."""
     known = parameters(law)
     if "D_c" in known:
         return float(known["D_c"].value)

@@ -1,4 +1,4 @@
-"""Catalogue of laws by name, and laws from text."""
+"""Catalogue of laws by name, and the conversion between laws and text."""
 
 from re import fullmatch
 
@@ -57,7 +57,7 @@ STATIC_LAWS: dict[str, type[Law]] = {
     "bam": machines.BAM,
     "capstan": machines.Capstan,
 }
-"""Memoryless laws by name, the widely used ones first."""
+"""Memoryless laws by name, with the most widely used laws first."""
 
 DYNAMIC_LAWS: dict[str, type[Law]] = {
     "dahl": dahl.Dahl,
@@ -81,14 +81,14 @@ DYNAMIC_LAWS: dict[str, type[Law]] = {
 """Laws with states by name."""
 
 ALL_LAWS: dict[str, type[Law]] = {**STATIC_LAWS, **DYNAMIC_LAWS}
-"""All laws by name; the contract tests cover each of them."""
+"""All laws by name; the contract tests cover every entry."""
 
 
 POPULATIONS: dict[str, type[GenericAsperity | RandomBristles]] = {
     "generic_asperity": GenericAsperity,
     "random_bristles": RandomBristles,
 }
-"""Populations of random contacts by name, as references: figures and a force along a motion."""
+"""Populations of random contacts by name: reference models with figures and a force history."""
 
 ALIASES = {
     "bo_pavelescu": "stribeck",
@@ -103,7 +103,7 @@ ALIASES = {
     "dieterich_ruina": "rate_and_state",
     "haessig_friedland_bristles": "random_bristles",
 }
-"""Other names of laws in papers and programs."""
+"""Other names of laws that papers and programs use."""
 
 WRAPPERS: dict[str, type[LoadDependent | LoadNormalised | Lagged | TemperatureDependent]] = {
     "load_dependent": LoadDependent,
@@ -111,7 +111,7 @@ WRAPPERS: dict[str, type[LoadDependent | LoadNormalised | Lagged | TemperatureDe
     "lagged": Lagged,
     "temperature_dependent": TemperatureDependent,
 }
-"""Wrappers of one law, by the name before the parentheses."""
+"""Wrappers of a single law, by the name that precedes the parentheses in a text."""
 
 
 DEEPEST = 20
@@ -119,9 +119,7 @@ DEEPEST = 20
 
 
 def law_name(law: AnyLaw) -> str:
-    """Return the text from which `any_from_text` makes this law; the class name for other
-    classes.
-    """
+    """Return the text from which `any_from_text` creates the law; the class name if unknown."""
     if not isinstance(law, Law | Population):  # pyright: ignore[reportUnnecessaryIsInstance]
         check_law("law_name", law)
     if isinstance(law, Sum):
@@ -136,8 +134,9 @@ def law_name(law: AnyLaw) -> str:
 
 
 def any_from_text(text: str) -> AnyLaw:
-    """Return the law or population with default parameters of this name; raises as
-    `law_from_text`.
+    """Return the law or population given by `text`, with default parameters.
+
+    Raises the errors of `law_from_text`.
     """
     checks.text("law", text, "the name of a law, such as lugre")
     name = ALIASES.get(text.strip(), text.strip())
@@ -145,14 +144,15 @@ def any_from_text(text: str) -> AnyLaw:
 
 
 def law_from_text(text: str) -> Law:
-    """Return the law with default parameters given by `text`.
+    """Return the law given by `text`, with default parameters.
 
-    Examples are `brown_mcphee`, another name of a law such as `adams`, sums `coulomb+viscous`,
-    wrappers `asymmetric(coulomb+viscous)`, `load_dependent(lugre)`, `load_normalised(lugre)`,
-    `lagged(stribeck)` and `temperature_dependent(lugre)`.
+    The text is a name such as `brown_mcphee`, an alias such as `adams`, a sum such as
+    `coulomb+viscous`, or a wrapped law: `asymmetric(coulomb+viscous)`, `load_dependent(lugre)`,
+    `load_normalised(lugre)`, `lagged(stribeck)` or `temperature_dependent(lugre)`.
 
     Raises:
-        ValueError: unknown name (the closest one is offered), empty term, unbalanced parentheses.
+        ValueError: unknown name (the message suggests the closest), empty term, unbalanced
+            parentheses.
     """
     checks.text("law", text, "the name of a law, such as lugre")
     terms = _split_terms(text)
@@ -180,7 +180,7 @@ def _single(term: str, text: str) -> Law:
 
 
 def _split_terms(text: str) -> list[str]:
-    """Split at the plus signs outside parentheses."""
+    """Split `text` at the plus signs outside parentheses."""
     where = f"law {checks.shown(text)}"
     terms, depth = [""], 0
     for letter in text.replace(" ", ""):

@@ -1,4 +1,4 @@
-"""Models: the interface between equations and solvers."""
+"""Models, which are the interface between equations and solvers."""
 
 from typing import TYPE_CHECKING
 

@@ -1,12 +1,12 @@
 """Contacts with friction: sliding velocity, normal force and friction force in a model.
 
-Equations written with the symbol of the friction force are closed by a law,
+The equations of a model contain the symbol of the friction force. A law closes them,
 
     F = law.force(slip, N, z),   z' = law.rate(slip, N, z)
 
-or by another expression: another law, the force of sliding to one side, an unknown that keeps the
-contact sticking. `Model.contacts` lists them, `Model.open` has the forces as inputs, and
-`Model.with_forces` closes it again.
+or another expression does: another law, the force of sliding to one side, or an unknown that keeps
+the contact sticking. `Model.contacts` contains the contacts, `Model.open` has their forces as
+inputs, and `Model.with_forces` closes the open model with other forces.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,7 +32,7 @@ APPLIED = "F_e"
 
 
 class FrictionLaw(Protocol):
-    """Interface of a friction law for models; `symfric.laws.Law` implements it."""
+    """Interface of friction laws that models require; `symfric.laws.Law` implements it."""
 
     @property
     def states(self) -> tuple[Any, ...]: ...  # noqa: D102
@@ -54,29 +54,30 @@ class FrictionLaw(Protocol):
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Contact:
-    """Friction at one place of a model, along one direction.
+    """Friction between two bodies of a model along one direction.
 
-    Write the equations with `force`, and pass the contact to `Model(contacts=...)`: the model then
-    contains the law, with its states after those of the model and its changes of mode as events.
+    The equations of the model contain `force`, and the contact is passed to `Model(contacts=...)`.
+    The model then contains the law: its states follow those of the model, and its changes of mode
+    are events.
 
     Attributes:
-        name: prefix of its states and events, "<name>_<state>".
+        name: prefix of states and events of the law, as in "<name>_<state>".
         slip: sliding velocity [m/s], a variable or an expression of the model, shape (1, 1).
-        N: normal force [N], an expression or an algebraic variable of the model; NaN if a
-            mechanism's law does not depend on it.
-        law: any friction law of a scalar slip.
-        given: further inputs of the law by name. The applied force F_e, if omitted, follows from
-            the equations of the model.
-        rest: state of the model -> its value at which `slip` is exactly zero, set by a law with
-            modes when sliding ends; by default the first state in which `slip` is linear.
-        states: variables for the states of the law, by default new ones that start in steady
+        N: normal force [N], an expression or an algebraic variable of the model; NaN in a mechanism
+            if the law does not depend on it.
+        law: any friction law for a scalar sliding velocity.
+        given: further inputs of the law by name. If the applied force F_e is omitted, it is derived
+            from the equations of the model.
+        rest: maps a state of the model to its value at which `slip` is exactly zero. A law with
+            modes assigns it when sliding ends. By default it is a state in which `slip` is linear.
+        states: variables of the states of the law; by default new variables that start in steady
             sliding.
-        force: SX symbol of the friction force [N] that opposes the slip, by default a new one.
-        turning: True if the law is one of a rate [rad/s], and its force a moment [N m].
-        widths: further smoothing widths: name -> parameter of `Model.open`, whose start value is
-            the number in the closed model. `JointFriction.eps` is one.
-        bare: True if states and events have the names of the law, without "<name>_"; None: True if
-            the model has one contact.
+        force: SX symbol of the friction force [N] that opposes the slip; by default a new symbol.
+        turning: True if the slip is a rate [rad/s] and the force a moment [N m].
+        widths: further smoothing widths, such as `JointFriction.eps`, by name. They are parameters
+            of `Model.open`, and constants with their start values in the closed model.
+        bare: True if states and events have the names of the law, without "<name>_"; None for True
+            if the model has only one contact.
     """
 
     name: str
@@ -130,35 +131,35 @@ class Contact:
         return f"<contact '{self.name}' by {type(self.law).__name__}{states}>"
 
     def unit(self, of_sliding: str) -> str:
-        """Return a unit of the law, of sliding or of turning."""
+        """Return the unit `of_sliding`, converted to rotation if the contact is `turning`."""
         return turned(of_sliding) if self.turning else of_sliding
 
     def called(self, name: str) -> str:
-        """Return the name of a state or an event of the law in the model."""
+        """Return the name that a state or an event of the law has in the model."""
         return f"{self.name}_{name}" if self.bare is False else name
 
     @property
     def variable(self) -> Variable:
-        """Friction force as an input, "<name>_F"."""
+        """Friction force as an input variable named "<name>_F"."""
         return Variable(f"{self.name}_F", self.unit("N"), symbol=self.force, doc="friction force")
 
     @property
     def further(self) -> dict[str, Scalar]:
-        """Inputs of the law except the applied force, for `sliding` and `static_level`."""
+        """Further inputs of the law except the applied force, for `sliding` and `static_level`."""
         return {name: value for name, value in self.given.items() if name != APPLIED}
 
     @cached_property
     def friction(self) -> ca.SX:
-        """Friction force by the law [N]."""
+        """Friction force [N] of the law."""
         return self._of_law("force", 1)
 
     @cached_property
     def rate(self) -> ca.SX:
-        """Rates of the states of the law, (n, 1)."""
+        """Rates of the states of the law, shape (n, 1)."""
         return self._of_law("rate", len(self.states))
 
     def _of_law(self, what: str, rows: int) -> ca.SX:
-        """Return the force or the rates by the law, (rows, 1)."""
+        """Return the force or the rates of the law, shape (rows, 1)."""
         if any(i.name == APPLIED for i in self.law.inputs) and APPLIED not in self.given:
             raise checks.refused(
                 f"contact '{self.name}': {APPLIED}", "an applied force", None,
@@ -177,21 +178,21 @@ class Contact:
         return found
 
     def sliding(self, side: int) -> ca.SX:
-        """Return the force of sliding to one side in the limit of zero widths [N]."""
+        """Return the force [N] of sliding to one side in the limit of zero widths."""
         return ca.SX(self.law.sliding(self.slip, self.N, side, **self.further))
 
     def static_level(self, side: int = 1) -> ca.SX:
-        """Return the largest force in stick against a pull to one side [N]."""
+        """Return the largest force [N] in stick against a pull to one side."""
         return ca.SX(self.law.static_level(self.N, side, **self.further))
 
     @property
     def most_held(self) -> ca.SX:
-        """Largest force that the states of the law carry in any motion [N]."""
+        """Upper bound [N] of the force of the states of the law for any motion."""
         sides = [ca.SX(self.law.most_held(self.N, s, **self.further)) for s in (1, -1)]
         return ca.fmax(*sides)
 
     def events(self) -> tuple[Event, ...]:
-        """Return the changes of mode of the law."""
+        """Return the changes of mode of the law as events of the model."""
         names = {s.name: v.name for s, v in zip(self.law.states, self.states, strict=True)}
         return tuple(
             Event(
@@ -207,9 +208,10 @@ class Contact:
         )
 
     def monitors(self, p: Sequence[Variable]) -> tuple[Monitor, ...]:
-        """Return the monitor of the sliding velocity, on the law's scale, for error control.
+        """Return the monitor of the sliding velocity for error control, as a tuple.
 
-        The scale follows `p`; a law without a scale at the start values of `p` has no monitor.
+        Its scale is the velocity scale of the law, which may depend on the parameters `p`. The
+        tuple is empty if this scale is infinite at the start values of `p`.
         """
         scale = self.law.velocity_scale
         return (Monitor(self.slip, scale),) if isfinite(float(at_start(scale, p))) else ()

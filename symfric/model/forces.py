@@ -1,16 +1,16 @@
-"""Friction forces of a model: by its laws, as inputs, or replaced by others.
+"""Friction forces of a model: given by its laws, used as inputs, or replaced by expressions.
 
 The force that a contact must carry to keep its sliding velocity follows from the equations. The
 rate of a sliding velocity s_i is affine in the friction forces F of a model,
 
     ds_i/dt = a_i - M_i F,   M = -(d slip/dx) (d ode/dF)
 
-and the applied force F_e of contact i is the force with which ds_i/dt = 0 while every other contact
-keeps its mode: it slides with the force of its law, or it sticks and keeps its own velocity.
+The applied force F_e of contact i is the force for which ds_i/dt = 0 while all other contacts keep
+their modes: they slide with the force of their law, or they stick with constant velocity.
 
     ds_i/dt = 0,   and for j != i   ds_j/dt = 0 if j sticks, else F_j = force of its law
 
-These linear equations are solved symbolically. Contacts that do not act on each other have
+These linear equations are solved symbolically. For contacts that do not interact the solution is
 F_e = a_i / M_ii.
 Source: Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, ch. 5.
 """
@@ -31,15 +31,15 @@ from symfric.model.parts import Event, Monitor, Output
 from symfric.model.start import System
 
 STICKS = 0.5
-"""Absolute value of a mode below which a contact sticks; modes are -1, 0 or 1 up to integration
-errors."""
+"""Absolute value of a mode below which a contact sticks. Modes are -1, 0 or 1, except for
+integration errors."""
 
 
 def completed(model: System) -> tuple[Contact, ...]:
     """Return the contacts of an open model with default values of `F_e`, `rest` and `bare`.
 
     Raises:
-        ValueError: an applied force that the equations do not determine.
+        ValueError: the equations do not determine an applied force.
     """
     contacts = tuple(_named(c, len(model.contacts)) for c in model.contacts)
     contacts = tuple(_resting(c, model) if _mode(c) is not None else c for c in contacts)
@@ -65,17 +65,17 @@ def _complete(c: Contact) -> bool:
 
 
 def _mode(c: Contact) -> ca.SX | None:
-    """Return the mode of a law that sticks, 0 in stick; None for a law without one."""
+    """Return the mode of a law that needs the applied force, which is 0 in stick; None without."""
     modes = [v.symbol for s, v in zip(c.law.states, c.states, strict=True) if s.whole]
     needs = any(i.name == APPLIED for i in c.law.inputs)
     return modes[0] if needs and modes else None
 
 
 def _resting(c: Contact, model: System) -> Contact:
-    """Set `rest` to a state in which the slip is linear, and its value for zero slip.
+    """Set `rest` to a state in which the slip is linear, with its value for zero slip.
 
-    Of several such states it is the one in the fewest sliding velocities, since a reset also
-    changes these.
+    If there are several such states, the one that appears in the fewest sliding velocities is
+    chosen, since a reset changes all of these.
     """
     slip = ca.SX(c.slip)
     slopes = {v: ca.jacobian(slip, v.symbol) for v in model.x}
@@ -88,7 +88,7 @@ def _resting(c: Contact, model: System) -> Contact:
 
 
 def _applied(i: int, contacts: tuple[Contact, ...], model: System) -> ca.SX:
-    """Solve for the force of contact `i` that keeps its sliding velocity."""
+    """Return the force of contact `i` that keeps its sliding velocity constant."""
     if model.ode is None:
         raise _refused(contacts[i], "explicit equations, ode")
     F = stacked(c.force for c in contacts)
@@ -117,13 +117,13 @@ def _applied(i: int, contacts: tuple[Contact, ...], model: System) -> ca.SX:
 
 
 def _change(c: Contact, model: System) -> ca.SX:
-    """Return the rate of the sliding velocity."""
+    """Return the rate of the sliding velocity of a contact."""
     slip, ode = ca.SX(c.slip), ca.SX(0, 1) if model.ode is None else model.ode
     return ca.jtimes(slip, symbols_of(model.x), ode) + ca.jacobian(slip, model.t)
 
 
 def _row(c: Contact, model: System) -> ca.SX:
-    """Return the equation (= 0) of a contact that keeps its mode."""
+    """Return the residual of the equation of a contact that keeps its mode."""
     mode = _mode(c)
     if mode is None:
         return c.force - c.friction if _complete(c) else c.force
@@ -133,7 +133,7 @@ def _row(c: Contact, model: System) -> ca.SX:
 
 
 def _connected(i: int, rows: list[ca.SX], F: ca.SX) -> list[int]:
-    """Return the contacts whose forces the equation of contact `i` depends on, with `i` last."""
+    """Return the contacts on whose forces the equation of contact `i` depends, with `i` last."""
     known, queue = {i}, [i]
     while queue:
         slope = ca.jacobian(rows[queue.pop()], F)
@@ -146,8 +146,9 @@ def _connected(i: int, rows: list[ca.SX], F: ca.SX) -> list[int]:
 def _last_unknown(A: ca.SX, b: ca.SX) -> ca.SX | None:
     """Return the last unknown of A y = b by elimination, or None if it does not appear.
 
-    No pivoting: each leading block has rows of the identity, of sliding contacts, and rows of a
-    matrix M that is positive definite if contacts do not depend on each other.
+    Pivoting is not necessary: each leading block consists of rows of the identity, for sliding
+    contacts, and rows of a matrix M that is positive definite if contacts do not depend on each
+    other.
     """
     n = b.numel()
     rows = ca.SX(ca.horzcat(A, b))
@@ -173,10 +174,10 @@ M = TypeVar("M", bound=System)
 
 
 def by_laws(model: System, expression: ca.SX) -> ca.SX:
-    """Return `expression` with the laws of all contacts in place of their forces.
+    """Return `expression` with the forces of all contacts replaced by those of their laws.
 
     Raises:
-        ValueError: friction forces that depend on each other.
+        ValueError: friction forces depend on each other.
     """
     forces = {c.name: c.friction for c in model.contacts}
     return _Put(f"model '{model.name}': contacts", model.contacts, forces)(expression)
@@ -186,8 +187,8 @@ def closed(model: System) -> dict[str, Any]:
     """Return the parts of an open model that change when the laws of its contacts close it.
 
     Raises:
-        ValueError: `holonomic`, which a mechanism closes itself; friction forces that depend on
-            each other.
+        ValueError: the model has contacts together with `holonomic`, although a mechanism creates
+            its contacts; or friction forces depend on each other.
     """
     where = f"model '{model.name}': contacts"
     if model.holonomic is not None:
@@ -211,13 +212,13 @@ def closed(model: System) -> dict[str, Any]:
 
 
 def opened(given: Mapping[str, Any], make: Callable[..., M]) -> M:
-    """Return the model of the parts `given`, with its friction forces as inputs."""
+    """Return the model with the parts `given`, in which friction forces are inputs."""
     inputs = (*given["u"], *(c.variable for c in given["contacts"]))
     return make(**{**given, "u": inputs, "contacts": (), "opening": None})
 
 
 def reopened(model: System, made: M) -> M:
-    """Return the open model `made` of a model; raise an error if its variables were changed."""
+    """Return the open model `made`; raise an error if the variables of `model` were changed."""
     inputs = {c.variable.name for c in model.contacts}
     now, then = ({letter: {v.name for v in getattr(m, letter)} for letter in "xup"}
                  for m in (model, made))  # fmt: skip
@@ -243,17 +244,19 @@ def with_forces(
     States, events and monitors of the laws are removed.
 
     Args:
-        forces: contact -> force [N] opposing its slip, in the symbols of the model, of `p` and of
-            `z`; it may contain the forces of other contacts.
-        p, z: additional parameters and algebraic variables. A width of a contact stays a parameter
-            if it is in `p`, else it is its number. In a mechanism `z` are constraint forces of
-            sticking contacts, placed next to its multipliers.
-        alg: as many more algebraic equations as `z`; in a mechanism they may be written with the
+        model: the model with its contacts.
+        bare: the open form of `model`.
+        forces: force [N] opposing the slip of each contact, by name, in the symbols of the model,
+            of `p` and of `z`; it may contain the forces of other contacts.
+        p, z: additional parameters and algebraic variables. A width of a contact remains a
+            parameter if it is in `p`; otherwise it is a constant. In a mechanism `z` contains the
+            constraint forces of sticking contacts, which are placed after its multipliers.
+        alg: additional algebraic equations, as many as `z`. In a mechanism they may contain the
             accelerations `holonomic.a`.
-        monitors: for error control of these contacts.
+        monitors: additional monitors for error control of these contacts.
 
     Raises:
-        ValueError: a contact that does not exist, or one without a force.
+        ValueError: a contact does not exist, or a contact has no force.
     """
     where, contacts = f"model '{model.name}': with_forces", model.contacts
     names = [c.name for c in contacts]
@@ -273,7 +276,7 @@ def with_forces(
     if bare.holonomic is not None:
         mechanics = bare.holonomic
         known = put(mechanics.implicit)
-        # stick forces follow the multipliers, their equations the constraints
+        # forces in stick follow the multipliers, and their equations follow the constraints
         count = mechanics.phi.numel()
         first = mechanics.n + count
         columns = (*bare.z[:count], *z, *bare.z[count:])
@@ -297,7 +300,7 @@ def with_forces(
 
 @final
 class _Put:
-    """Substitution of expressions for the symbols of friction forces."""
+    """Substitution that replaces the symbols of friction forces by expressions."""
 
     def __init__(
         self, where: str, contacts: Sequence[Contact], forces: Mapping[str, Scalar],
@@ -322,7 +325,7 @@ class _Put:
         return ca.substitute(ca.SX(expression), self.old, self.new)
 
     def explicit(self, model: System) -> dict[str, Any]:
-        """Return equations, outputs, monitors and events of a model."""
+        """Return equations, outputs, monitors and events of a model after the substitution."""
         names = list(model.outputs)
         parts = [ca.SX(0, 1) if model.ode is None else ca.SX(model.ode), ca.SX(model.alg)]
         parts += [ca.SX(model.outputs[name].expression) for name in names]
@@ -338,14 +341,14 @@ class _Put:
         }
 
     def outputs(self, write: Callable[[], Mapping[str, Output]]) -> dict[str, Output]:
-        """Return further results, written on demand."""
+        """Return the further results of `write` after the substitution."""
         return {n: replace(o, expression=self(o.expression)) for n, o in write().items()}
 
     def monitor(self, monitor: Monitor) -> Monitor:
-        """Return a monitor for error control."""
+        """Return a monitor after the substitution."""
         return replace(monitor, expression=self(monitor.expression))
 
     def event(self, event: Event) -> Event:
-        """Return an event."""
+        """Return an event after the substitution."""
         reset = {name: self(value) for name, value in event.reset.items()}
         return replace(event, expression=self(event.expression), reset=reset)

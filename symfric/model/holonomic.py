@@ -13,15 +13,15 @@ from symfric.foundation.packed import state_of
 @final
 @dataclass(frozen=True, eq=False)
 class Inner:
-    """Equations with inner unknowns l, so that each depends on few unknowns.
+    """Equations with inner unknowns l, so that each equation depends on few unknowns.
 
         0 = f(y, l),   l_k = g_k(y, l_1 ... l_{k-1})
 
     Attributes:
-        l: SX symbols (k, 1).
-        values: SX (k, 1), g.
-        f: SX, in terms of l.
-        groups: symbols of unknowns and of l, in the best order of elimination.
+        l: SX symbols (k, 1) of the inner unknowns.
+        values: SX (k, 1), the expressions g.
+        f: SX, the residual f in terms of l.
+        groups: symbols of all unknowns, including l, in the best order of elimination.
     """
 
     l: ca.SX  # noqa: E741
@@ -33,7 +33,7 @@ class Inner:
 @final
 @dataclass(frozen=True, eq=False)
 class Solving:
-    """Solution M^-1 r as an expression in the symbols r, SX (n, 1) both."""
+    """Solution M^-1 r, SX (n, 1), as an expression in the symbols r, SX (n, 1)."""
 
     r: ca.SX
     result: ca.SX
@@ -48,34 +48,35 @@ class Solving:
 class Holonomic:
     """Structure of a mechanical model beyond its equations: constraints on its coordinates.
 
-    The states of the model begin with coordinates q and their rates q', its algebraic variables
-    with the multipliers lam of the constraints phi(q, t) = 0. With the accelerations a as symbols
-    no mass matrix needs to be inverted:
+    The states of the model begin with the coordinates q and their rates q', and the algebraic
+    variables with the multipliers lam of the constraints phi(q, t) = 0. The accelerations a are
+    symbols, so that the mass matrix need not be inverted:
 
         M a + phi_q' lam = Q,   d^2 phi / dt^2 = phi_q a + ... = 0,   further algebraic equations
 
-    These are the equations of the model: its `ode` and `alg` follow from them by elimination of a.
+    `ode` and `alg` of the model are derived from these equations by elimination of a.
 
     Attributes:
         n: number of coordinates.
-        phi: SX (m, 1); no rows for a tree.
-        a: SX symbols (n, 1).
+        phi: SX (m, 1), the constraints; without rows for a tree.
+        a: SX symbols (n, 1) of the accelerations.
         implicit: SX (n + nz, 1), the equations above in q, q', the other states, a, z, u, p, t;
             the first n are affine in a.
         rates: SX (nx - 2 n, 1), rates of the other states.
-        solve: applies M^-1 to a column, if there is a shorter way than to factorise M.
-        norms: number of multipliers, the last ones, that belong to norms of Euler parameters: they
+        solve: function that applies M^-1 to a column, if this costs less than factorising M.
+        norms: number of multipliers, the last ones, that belong to norms of Euler parameters; they
             carry no load, and error control ignores them.
-        index: 0 for integration in the tangent space of its constraints, with as many unknowns as
-            degrees of freedom; 1 for all coordinates, which are projected onto the constraints at
-            the end of every step. The solution is the same, to the tolerance.
-        inner: the same equations for long chains, whose derivatives are sparse only with inner
-            unknowns; None otherwise.
-        pressing: SX (k, 1), normal forces over their typical size, which must not be negative.
+        index: 0 for integration in the tangent space of the constraints, with as many unknowns as
+            degrees of freedom; 1 for integration of all coordinates, which are projected onto the
+            constraints at the end of each step. Both solutions agree within the tolerance.
+        inner: the same equations with inner unknowns for long chains, which make the derivatives
+            sparse; None for all other mechanisms.
+        pressing: SX (k, 1), normal forces divided by their typical magnitude, which must not be
+            negative.
         pressed: names of these normal forces.
-        advice: hint if friction and reactions have no solution; may be empty.
-        applied: number of forces carried in stick among the algebraic variables, next to the
-            multipliers, with their equations next to those of the constraints.
+        advice: hint that is shown if friction and reactions have no solution; may be empty.
+        applied: number of algebraic variables that are forces in stick. They follow the
+            multipliers, and their equations follow the constraints.
     """
 
     n: int
@@ -93,7 +94,7 @@ class Holonomic:
     applied: int = 0
 
     def to_pack(self) -> dict[str, Any]:
-        """Return the fields and derived expressions; `solve` as an expression."""
+        """Return the fields and derived expressions, with `solve` converted to an expression."""
         state = state_of(self)
         if self.solve is not None:
             right = ca.SX.sym("right", self.n)

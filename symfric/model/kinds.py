@@ -1,4 +1,4 @@
-"""Types of signals for tables and figures: `Variable.kind` and `Output.kind`."""
+"""Kinds of signals for tables and figures, the values of `Variable.kind` and `Output.kind`."""
 
 import casadi as ca
 import numpy as np
@@ -7,17 +7,17 @@ from symfric.foundation.numeric import Scalar, is_casadi
 
 POSITION, RATE, FRICTION_STATE = "position", "rate", "state of friction"
 MODE = "mode of friction"
-"""Integer that only jumps; results round off the integration error within a step."""
+"""Integer state that changes only by jumps; results are rounded to remove integration errors."""
 NORMAL_FORCE, FRICTION, ENERGY = "normal force", "friction", "energy"
 CONSTRAINTS = "constraints"
 """Norms of the residuals of constraints on positions, velocities and accelerations."""
 INPUT = "input"
 WORK = "work rate"
-"""Powers [W] that change the energy of a mechanism."""
+"""Power [W] that changes the energy of a mechanism."""
 
 
 def in_results(kind: str, value: Scalar) -> Scalar:
-    """Return the value of a variable of this type for results: a mode as an integer."""
+    """Return the value of a variable of this kind for results; modes are rounded to integers."""
     if kind != MODE:
         return value
     return ca.floor(value + 0.5) if is_casadi(value) else np.floor(value + 0.5)

@@ -1,8 +1,8 @@
-"""Models: the interface between equations and solvers.
+"""Models, which are the interface between equations and solvers.
 
-Scenes and mechanisms produce a `Model`; simulation, optimal control, identification and code
-generation use it. Letters as in CasADi's DaeBuilder: time t, differential states x, algebraic
-variables z, inputs u, parameters p.
+Scenes and mechanisms create a `Model`; simulation, optimal control, identification and code
+generation use it. The letters are those of CasADi's DaeBuilder: time t, differential states x,
+algebraic variables z, inputs u, parameters p.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,32 +24,32 @@ from symfric.model.problems import GROUPS, equation_problems, kind_problems, nam
 from symfric.model.start import System, accelerations
 
 Variables = tuple[Variable, ...]
-"""Variables in their order; () for none."""
+"""Ordered variables; () without variables."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Model(Showing, System):
     """Dynamic system 0 = F(t, x', x, z, u, p), explicit where possible.
 
-    Explicit form (semi-explicit DAE of index 1; an ODE without z):
+    The explicit form is a semi-explicit DAE of index 1, or an ODE without z:
 
         x' = ode(t, x, z, u, p),   0 = alg(t, x, z, u, p)
 
-    Give `ode` and `alg`, or `residual` with `xdot` for a fully implicit model of index 1, whose
-    matrix of rates may be singular (capacitors between nodes), or `holonomic` for a mechanism,
-    whose equations then define `ode` and `alg`.
+    A model is defined by `ode` and `alg`; by `residual` and `xdot` for a fully implicit model of
+    index 1, whose matrix of rates may be singular (as for capacitors between nodes); or by
+    `holonomic` for a mechanism, from which `ode` and `alg` are derived.
 
-    Equations are SX expressions of the variables, which stand for their symbols:
+    Equations are SX expressions of the variables, which can be used like their symbols:
 
         x, v, u = Variable("x", "m"), Variable("v", "m/s"), Variable("u", "N")
         Model("mass", x=(x, v), u=(u,), ode=ca.vertcat(v, (u - 50 * x) / 2.0))
 
     Attributes:
-        name: of the model.
-        x, z, u, p: named variables; an absent group is empty and costs nothing.
+        name: name of the model.
+        x, z, u, p: named variables; a group without variables is empty and adds no cost.
         ode: SX (nx, 1), or None for an implicit model.
         alg: SX (nz, 1).
-        xdot: SX symbols (nx, 1) of an implicit model; created for an explicit one.
+        xdot: SX symbols (nx, 1) of the rates; created automatically for an explicit model.
         residual: SX (nx + nz, 1).
         outputs: named results in addition to x, z and u.
         monitors: expressions that error control monitors in addition to x.
@@ -57,15 +57,15 @@ class Model(Showing, System):
         t: SX symbol of time [s].
         holonomic: equations of a mechanism, with constraints on its coordinates that the integrator
             enforces on positions, velocities and accelerations.
-        details: writes further results, such as reactions, on demand; put one into `outputs` to use
-            it in derivatives and in C.
-        sketch: writes a drawing of the machine, on demand.
-        contacts: places with friction; their laws close equations written with their forces.
-        opening: writes `open` of a model that is already closed.
+        details: function that returns further results, such as reactions; add a result to `outputs`
+            to use it in derivatives and in C.
+        sketch: function that returns a drawing of the machine.
+        contacts: contacts with friction, whose laws close the equations.
+        opening: function that returns `open` of a closed model.
 
     Raises:
-        ValueError: all problems at once: repeated names, wrong row counts, undeclared symbols; an
-            `ode` or `alg` that contradicts `holonomic`.
+        ValueError: repeated names, wrong row counts, undeclared symbols, or an `ode` or `alg` that
+            contradicts `holonomic`; the message lists all problems.
     """
 
     opening: "Callable[[], Model] | None" = None
@@ -93,12 +93,12 @@ class Model(Showing, System):
         self._refuse([*naming_problems(self), *equation_problems(self, self._symbols())])
 
     def check_fields(self) -> None:
-        """Check a model from a file, without constructing it again."""
+        """Check a model that was read from a file, without constructing it again."""
         self._refuse(kind_problems(self))
         self._refuse([*naming_problems(self), *equation_problems(self, self._symbols())])
 
     def shown(self) -> Shown:
-        """Describe its parts, without its expressions."""
+        """Describe the parts of the model without their expressions."""
         return shown(self)
 
     def _refuse(self, problems: list[str]) -> None:
@@ -106,16 +106,17 @@ class Model(Showing, System):
             raise ValueError(f"model {self.name!r}: " + "; ".join(problems))
 
     def _close(self) -> None:
-        """Replace the contact forces by their laws, and keep the open form."""
+        """Replace the contact forces by those of their laws, and store the open form."""
         object.__setattr__(self, "opening", partial(opened, self.__getstate__(), Model))
         for name, value in closed(self).items():
             object.__setattr__(self, name, value)
 
     @cached_property
     def open(self) -> "Model":
-        """Model with the forces of its `contacts` as inputs, "<name>_F".
+        """Model with the forces of its `contacts` as inputs named "<name>_F".
 
-        Further widths (`Contact.widths`) are parameters; ValueError if variables were replaced.
+        Further widths (`Contact.widths`) are parameters. A `ValueError` is raised if variables were
+        replaced.
         """
         return self if self.opening is None else reopened(self, self.opening())
 
@@ -123,7 +124,10 @@ class Model(Showing, System):
         self, forces: Mapping[str, Scalar], p: Variables = (), z: Variables = (),
         alg: Scalar | None = None, monitors: tuple[Monitor, ...] = (),
     ) -> "Model":  # fmt: skip
-        """Return the model with other friction forces than those of its laws: see `with_forces`."""
+        """Return the model with friction forces other than those of its laws.
+
+        The arguments are those of `symfric.model.forces.with_forces`.
+        """
         bare = self.open
         return replace(bare, **with_forces(self, bare, forces, p, z, alg, monitors))
 
@@ -149,17 +153,17 @@ class Model(Showing, System):
         return {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields; a copy has no caches."""
+        """Return the fields without caches."""
         return packed.state_of(self)
 
     def __copy__(self) -> "Model":
-        """Return a model of the same symbols."""
+        """Return a model with the same symbols and without caches."""
         made = object.__new__(Model)
         vars(made).update(self.__getstate__())
         return made
 
     def to_pack(self) -> dict[str, Any]:
-        """Return the fields, with all parts that are written on demand."""
+        """Return the fields, with the results of all functions that create parts on demand."""
         state, Given = self.__getstate__(), packed.Given
         state["details"] = Given(dict(self.further))
         state["sketch"] = None if self.sketch is None else Given(self.sketch())
@@ -167,21 +171,21 @@ class Model(Showing, System):
         return state
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the whole model; symbols keep their identity."""
+        """Pickle the whole model; expressions that share a symbol share it after loading."""
         return packed.loads, (packed.dumps(self),)
 
     @cached_property
     def signals(self) -> dict[str, str]:
-        """Name -> unit of everything a trajectory holds besides time: x, z, u, outputs."""
+        """Units by name of all signals of a trajectory except time: x, z, u and outputs."""
         found = {v.name: v.unit for group in (self.x, self.z, self.u) for v in group}
         return found | {name: output.unit for name, output in self.outputs.items()}
 
     @cached_property
     def further(self) -> dict[str, Output]:
-        """`details`, written out, and accelerations, `<q>_acc`, unless these names are in use.
+        """Results of `details`, and accelerations `<q>_acc` unless these names are in use.
 
         Raises:
-            ValueError: a name that the model already has.
+            ValueError: `details` uses a name of the model.
         """
         found = dict(self.details())
         repeated = sorted(found.keys() & {*self.signals, *(v.name for v in self.p)})
@@ -211,12 +215,12 @@ class Model(Showing, System):
         """Return a CasADi Function with named arguments.
 
         Args:
-            what: "ode" and "alg" (t, x, z, u, p), "residual" (t, xdot, x, z, u, p), "signals"
-                (t, x, z, u, p), which stacks x, z, u and the outputs in the order of `signals`, or
-                the name of one output or detail.
+            what: "ode" or "alg" with the arguments (t, x, z, u, p); "residual" with (t, xdot, x, z,
+                u, p); "signals" with (t, x, z, u, p), which stacks x, z, u and the outputs in the
+                order of `signals`; or the name of an output or detail.
 
         Raises:
-            ValueError: unknown name, or "ode" of an implicit model.
+            ValueError: unknown name, or "ode" for an implicit model.
         """
         checks.text(f"model '{self.name}'", what, "the name of a function")
         outputs = {name: ca.SX(output.expression) for name, output in self.outputs.items()}
@@ -233,12 +237,12 @@ class Model(Showing, System):
 
 
 def _same(a: ca.SX, b: ca.SX) -> bool:
-    """Return True if two columns hold the same expressions."""
+    """Return True if two columns contain the same expressions."""
     return a.shape == b.shape and ca.is_equal(ca.densify(a), ca.densify(b))
 
 
 def check_model(where: str, model: object) -> None:
-    """Raise an error for anything but a model: a law, a scene, a mechanism that was not built."""
+    """Raise an error if `model` is not a model, with a hint for laws, scenes and mechanisms."""
     if isinstance(model, Model):
         return
     ways = {
@@ -261,7 +265,7 @@ WORDS = {
 
 
 def shown(model: System) -> Shown:
-    """Describe names, units and start values of all variables, and the laws of all contacts."""
+    """Return the names, units and start values of all variables, and the laws of all contacts."""
     counts = [counted(len(getattr(model, g)), *words) for g, words in WORDS.items()]
     counts += [counted(len(model.outputs), "output")]
     rows = [
@@ -283,7 +287,7 @@ def shown(model: System) -> Shown:
 
 
 def friction(model: System) -> str:
-    """Return contacts and laws, such as "belt by LuGre"; the contacts of one law together."""
+    """Return the contacts grouped by law as text, such as "belt by LuGre"."""
     laws: dict[str, list[str]] = {}
     for contact in model.contacts:
         laws.setdefault(type(contact.law).__name__, []).append(contact.name)

@@ -1,4 +1,4 @@
-"""Parts of a model besides its equations: results, monitors of error control, events."""
+"""Parts of a model in addition to its equations: outputs, monitors for error control, events."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,10 +15,10 @@ class Output:
     """Named result of a model, as in `Model(outputs={"force": Output(50 * s, "N")})`.
 
     Attributes:
-        expression: in t, x, z, u, p, shape (1, 1).
-        unit: as text; an unknown unit warns.
+        expression: function of t, x, z, u, p, shape (1, 1).
+        unit: unit as text; an unknown unit causes a warning.
         doc: short description.
-        kind: type among the signals, see `symfric.model.kinds`; it may be empty.
+        kind: kind of the signal, see `symfric.model.kinds`; may be empty.
     """
 
     expression: Scalar
@@ -39,15 +39,15 @@ class Output:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Monitor:
-    """Expression in t, x, z, u, p whose relative error is controlled along with the states.
+    """Expression whose error is controlled in addition to the errors of the states.
 
-    A sliding velocity is the difference of two velocities that may be a thousand times larger;
-    `nominal` is the scale on which the friction force changes with it. Near zero, steps change it
-    by no more than a few `nominal`, so that narrow features there are not skipped.
+    An example is a sliding velocity, which is the difference of velocities that may be a thousand
+    times larger. `nominal` is the scale on which the friction force changes with it. Near zero a
+    step changes the expression by at most a few `nominal`, so that narrow features are not skipped.
 
     Attributes:
-        expression: in t, x, z, u, p.
-        nominal: above zero; a number, or an expression in p.
+        expression: function of t, x, z, u, p.
+        nominal: scale above zero; a number, or a function of p.
     """
 
     expression: Scalar
@@ -69,22 +69,23 @@ class Monitor:
 class Event:
     """Action when an expression passes through zero.
 
-    A jump, of an input or by the reset of another event, also counts if it leads beyond zero. Two
-    crossings within a step are found: if the values at the quarters of a step allow a pair of them,
-    the step is subdivided, down to the event tolerance. That is certain for an expression that is
-    linear in the states between two events, because it is a polynomial of degree 4 there. Other
-    expressions are detected if the quarters show their bends: one that oscillates within a quarter
-    may be missed, and so may one that was not finite before. Expressions in time alone limit the
-    steps.
+    A jump of the expression through zero, caused by an input or by the reset of another event, is
+    also an event. Two zero crossings within a step are detected: if the values at the quarters of
+    the step allow a pair of crossings, the step is subdivided down to the event tolerance. This is
+    reliable for expressions that are linear in the states between two events, because their dense
+    output is a polynomial of degree 4. For all others, crossings of an oscillation within a quarter
+    of a step may be missed, as may crossings after the expression was not finite. Expressions of
+    time alone limit the steps.
 
     Attributes:
-        expression: in t, x, z, u, p.
-        direction: +1 only rising, -1 only falling, 0 both.
-        terminal: the simulation ends there.
-        reset: state -> its value after the event, in terms of the values before it.
-        at_start: True if it also happens at the start if the expression is already beyond zero in
-            the given direction, 1 or -1, or leaves zero in it.
-        rtol: largest relative tolerance of a run with this event; it replaces a larger one.
+        name: name of the event.
+        expression: function of t, x, z, u, p.
+        direction: 1 for rising zeros only, -1 for falling zeros only, 0 for both.
+        terminal: True if the event ends the simulation.
+        reset: maps a state to its value after the event, in terms of the values before it.
+        at_start: True if the event also occurs at the start when the expression is already beyond
+            zero in the given direction, 1 or -1, or leaves zero in this direction.
+        rtol: largest relative tolerance of a run with this event; it replaces a larger tolerance.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Consistency checks of a model: types of its parts, names, rows, undeclared symbols."""
+"""Consistency checks of a model: types of parts, names, row counts and undeclared symbols."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -13,7 +13,7 @@ from symfric.model.parts import Event, Monitor, Output
 from symfric.model.start import System
 
 RESERVED = {"t", "ode", "alg", "residual", "signals"}
-"""Names that `Model.function` uses itself."""
+"""Names that `Model.function` reserves."""
 
 GROUPS: dict[str, tuple[type, str]] = {
     **dict.fromkeys("xzup", (Variable, "variables")),
@@ -21,7 +21,7 @@ GROUPS: dict[str, tuple[type, str]] = {
     "events": (Event, "events"),
     "contacts": (Contact, "contacts"),
 }
-"""Groups of a model: type and name of their elements."""
+"""Groups of a model, with the type and the name of their elements."""
 
 
 def kind_problems(model: System) -> list[str]:
@@ -48,7 +48,7 @@ def _wrong_kinds(model: System) -> Iterator[str]:
 
 
 def _message(check: Any, *arguments: Any) -> str:
-    """Return the message of a failed check, else an empty text."""
+    """Return the message of a failed check, or an empty text."""
     try:
         check(*arguments)
     except ValueError as error:
@@ -111,7 +111,7 @@ def naming_problems(model: System) -> list[str]:
 
 
 def equation_problems(model: System, known: ca.SX) -> list[str]:
-    """Return messages about wrong row counts, and symbols that are not among the `known`."""
+    """Return messages about wrong row counts, and about symbols that are not in `known`."""
     nx, nz = len(model.x), len(model.z)
     problems: list[str] = []
     if model.ode is None and nx and model.residual.is_empty():

@@ -1,4 +1,4 @@
-"""Drawing of a machine: places that move, and symbols at and between them."""
+"""Drawing of a machine: moving places, and symbols at and between these places."""
 
 from dataclasses import dataclass
 from typing import final
@@ -9,12 +9,14 @@ import casadi as ca
 @final
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Body: lines from its centre to its places.
+    """Body, drawn as lines from its centre to its places.
 
     Attributes:
-        centre: index of the place at its centre of mass.
-        corners: indices of its frames; a body whose frames all coincide with its centre is a block.
-        ends: indices of places with only springs and dampers.
+        name: name of the body.
+        centre: index of the place at the centre of mass.
+        corners: indices of the frames; a body whose frames all coincide with its centre is drawn as
+            a block.
+        ends: indices of places that have only springs and dampers.
         fixed: True for the ground, which has no lines.
     """
 
@@ -31,14 +33,14 @@ class Symbol:
     """Drawing style of a joint, a rod or a spring between two places a and b.
 
     Attributes:
-        marker: shape of the marker at b; empty for none.
-        line: from a to b: "rod", "spring", "damper"; empty for none.
-        axes: lines through b along axes of a or b, each ("a" or "b", number of the axis).
+        marker: shape of the marker at b; empty for no marker.
+        line: line from a to b: "rod", "spring" or "damper"; empty for no line.
+        axes: lines through b along axes of a or b, each given as ("a" or "b", number of the axis).
         hinge: True for a pure rotation about z of b.
         guide: True for sliding along z of a.
         slot: True for sliding along z of a in a slot attached to the origin of a.
         plate: True for motion in the plane x, y of a.
-        anchored: True if its attachment to the ground is drawn.
+        anchored: True if the attachment to the ground is drawn.
     """
 
     marker: str = ""
@@ -52,23 +54,22 @@ class Symbol:
 
     @property
     def turnable(self) -> bool:
-        """True if a and b may be swapped: neither has an axis of its own while the other has
-        one, nor a slot.
-        """
+        """True if a and b may be exchanged: at most one has axes, and there is no slot."""
         return len({end for end, _ in self.axes}) < 2 and not self.slot
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """Element between two places: a joint, a rod, a spring.
+    """Element between two places, such as a joint, a rod or a spring.
 
     Attributes:
-        symbol: its drawing style.
-        a, b: indices of its two places; the first is on the ground if one is.
-        slips: name of the sliding velocity of each contact and the velocity [m/s] below which it
-            counts as sticking.
-        grounded: True if one is.
+        name: name of the element.
+        symbol: drawing style.
+        a, b: indices of the two places; if one of them is on the ground, it is a.
+        slips: name of the sliding velocity of each contact, and the velocity [m/s] below which the
+            contact counts as sticking.
+        grounded: True if a is on the ground.
     """
 
     name: str
@@ -85,11 +86,11 @@ class Sketch:
     """Drawing of a machine.
 
     Attributes:
-        places: SX (12, k) in the symbols of a model: for each place its axes in the world, column
-            by column, and its position [m].
+        places: SX (12, k) in the symbols of a model: the axes of each place in the world, column by
+            column, followed by its position [m].
         parts: bodies.
         marks: elements between the places.
-        symbols: size of the symbols of joints, relative to that in a mechanism.
+        symbols: size of the symbols of joints relative to their size in a mechanism.
     """
 
     places: ca.SX

@@ -23,7 +23,7 @@ PER_SECOND = {"m/s": "m/s^2", "rad/s": "rad/s^2", "1/s": "1/s^2"}
 
 @dataclass(frozen=True, eq=False, repr=False)
 class System:
-    """Variables, equations and results of a model, see `Model`, and start values of its states."""
+    """Base class of `Model`: variables, equations and results, and start values of the states."""
 
     name: str
     x: Variables = ()
@@ -52,11 +52,11 @@ class System:
         return {letter: symbols_of(getattr(self, letter)) for letter in "xzup"}
 
     def nominal(self, letter: str) -> NDArray[np.float64]:
-        """Return typical magnitudes of a group, shape (n,)."""
+        """Return the typical magnitudes of a group of variables, shape (n,)."""
         return np.array([v.nominal for v in getattr(self, letter)], dtype=float)
 
     def values(self, letter: str, given: Mapping[str, float] | None = None) -> NDArray[np.float64]:
-        """Return the values of the group "u" or "p": those `given` by name, else start values."""
+        """Return the values of the group "u" or "p": start values, replaced by those in `given`."""
         group: Variables = getattr(self, letter)
         if not group and given is None:
             return np.zeros(0)
@@ -73,7 +73,7 @@ class System:
         """Return the values `given` by name for "x0", "u" or "p"; empty for None.
 
         Raises:
-            ValueError: not a mapping, or a name that is not in the group.
+            ValueError: `given` is not a mapping, or has a name that is not in the group.
         """
         if given is None:
             return {}
@@ -95,11 +95,11 @@ class System:
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None,
         t: float = 0.0,
     ) -> NDArray[np.float64]:  # fmt: skip
-        """Return the start values of x at the time `t` [s], shape (nx,), or those `given` by name.
+        """Return the start values of x at the time `t` [s], replaced by those in `given`.
 
-        A start value that is an expression (a bristle in steady sliding depends on the sliding
-        velocity) is evaluated with the given values of the other states and parameters, and with
-        the start values of algebraic variables.
+        A start value may be an expression: a bristle in steady sliding depends on the sliding
+        velocity. It is evaluated with the given values of the other states and the parameters, and
+        with the start values of the algebraic variables. The result has the shape (nx,).
         """
         start = evaluate(self._start, *self._start_arguments(given, p, t))
         for v, x in zip(self.x, start.tolist(), strict=True):
@@ -113,9 +113,9 @@ class System:
         count: int,
         t: float | NDArray[np.float64] = 0.0,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return start values (count, nx) and parameters (count, n_p) of `count` members.
+        """Return the start values (count, nx) and parameters (count, n_p) of `count` members.
 
-        `t` [s] is the start time, of shape (count,) if it differs between members.
+        `t` [s] is the start time; it has the shape (count,) if it differs between members.
         """
         given, p = self.named("x0", given), self.named("p", p)
 
@@ -146,7 +146,7 @@ class System:
         p: Mapping[str, float] | None = None,
         t: float = 0.0,
     ) -> NDArray[np.float64]:
-        """Return the derivative of `initial_state` by the start value of a state, shape (nx,)."""
+        """Return the derivative of `initial_state` with respect to a start value, shape (nx,)."""
         i = [v.name for v in self.x].index(name)
         chosen = dict(given or {}) | {name: float(self.initial_state(given, p, t)[i])}
         return evaluate_all(self._start_slopes, *self._start_arguments(chosen, p, t))[1][:, i]
@@ -162,12 +162,12 @@ class System:
 
     @cached_property
     def _start(self) -> ca.Function:
-        """Start values as a Function of (values given, mask of given ones, u, p, t)."""
+        """Start values as a Function of (given values, mask of given values, u, p, t)."""
         return start_function(self.x, self.vector("u"), self.vector("p"), self.t, self.z)
 
     @cached_property
     def _start_slopes(self) -> ca.Function:
-        """Derivatives of `_start` by p and by the values given."""
+        """Derivatives of `_start` with respect to p and to the given values."""
         arguments = self._start.sx_in()
         x = self._start(*arguments)
         slopes = [ca.densify(ca.jacobian(x, arguments[i])) for i in (3, 0)]
@@ -177,10 +177,10 @@ class System:
 def start_function(
     x: Sequence[Variable], u: ca.SX, p: ca.SX, t: ca.SX, z: Sequence[Variable] = ()
 ) -> ca.Function:
-    """Return start values of the states as a Function of (values, mask of given ones, u, p, t).
+    """Return start values of states as a Function of (values, mask of given values, u, p, t).
 
-    Start values that depend on algebraic variables `z` use the start values of these: the solution
-    of the equations is known only after the states.
+    Start values that depend on the algebraic variables `z` use the start values of `z`, because the
+    solution of the algebraic equations requires the states.
     """
     n, states = len(x), symbols_of(x)
     known, chosen = ca.SX.sym("known", n), ca.SX.sym("chosen", n)
@@ -197,9 +197,9 @@ def start_function(
 def accelerations(model: System) -> dict[str, Output]:
     """Return the rate of r as the output `<q>_acc` for every state q whose rate is a state r.
 
-    A speed that is not the rate of a state, for example if angles do not matter, has `<speed>_acc`.
-    States of friction laws have none, and neither have implicit models, whose rates are no
-    expressions.
+    A speed that is not the rate of a state, as in models without angles, has the output
+    `<speed>_acc`. States of friction laws have no such output. Neither have implicit models, since
+    their rates are not expressions.
     """
     if model.ode is None:
         return {}
@@ -207,7 +207,7 @@ def accelerations(model: System) -> dict[str, Output]:
     of_laws = {v.name for contact in model.contacts for v in contact.states}
     found: dict[str, Output] = {}
     rates = ca.vertsplit(ca.densify(model.ode))
-    # a symbol is identified by its node, which copies of it share
+    # copies of a symbol share its node, so the hash of the node identifies the symbol
     pairs = [(v, places.get(r.__hash__()) if r.is_symbolic() else None)
              for v, r in zip(model.x, rates, strict=True)]  # fmt: skip
     taken = {i for _, i in pairs if i is not None}

@@ -1,4 +1,4 @@
-"""Scene: a parametric machine with a friction law, which gives a `Model`."""
+"""Base class of scenes, which are parametric machines with a friction law, and their contacts."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 ALONG = {"x": ca.DM([0, 1, 0, 0, 0, 1, 1, 0, 0]), "z": ca.DM([1, 0, 0, 0, 1, 0, 0, 0, 1])}
-"""Direction of a rail -> axes of a place, column by column; the rail runs along the third axis."""
+"""Axes of a place, column by column, by direction of its rail, which is along the third axis."""
 RAIL = Symbol("s", guide=True)
 TICK, HUB = Symbol("|"), Symbol("o")
 LINES = {line: Symbol(line=line, anchored=True) for line in ("spring", "damper")}
@@ -43,13 +43,13 @@ LINES = {line: Symbol(line=line, anchored=True) for line in ("spring", "damper")
 @final
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Body on a rail.
+    """Body on a rail in a drawing.
 
     Attributes:
         x, z: position [m], expressions of the model.
-        along: direction of its rail, "x" or "z"; empty for no rail.
-        slip: name of its sliding velocity among the signals; empty for none.
-        law: its friction; a slip below the velocity scale of the law counts as sticking.
+        along: direction of the rail, "x" or "z"; empty for no rail.
+        slip: name of the signal of the sliding velocity; empty for no friction.
+        law: friction law; a slip below its velocity scale counts as sticking.
     """
 
     x: Scalar
@@ -70,12 +70,12 @@ def drawn(
     """Return the drawing of a machine that is not a mechanism.
 
     Args:
-        blocks: name -> body.
-        fixed: name -> place (x, z) [m] on the ground or on a moving ground such as a road.
+        blocks: bodies by name.
+        fixed: places (x, z) [m], by name, on the ground or on a moving ground such as a road.
         links: (line, from, to) between blocks and fixed places; a line is "spring" or "damper".
-        hands: name -> angle [rad] and length [m] of a hand that turns about the origin.
+        hands: angle [rad] and length [m], by name, of hands that rotate about the origin.
         ticks: places (x, z) [m] of marks on a moving ground such as a belt.
-        hub: centre of the hands, if it has friction.
+        hub: centre of the hands if it has friction.
     """
     columns: list[ca.SX] = []
     parts: list[Part] = []
@@ -108,13 +108,13 @@ def drawn(
 
 
 def around(way: Scalar, low: Scalar, high: Scalar) -> ca.SX:
-    """Return `way` [m] shifted into [low, high) by whole turns, as a mark on a belt."""
+    """Return `way` [m] shifted into [low, high) by whole periods, as for a mark on a belt."""
     length = high - low
     return ca.SX(way - length * ca.floor((way - low) / length))
 
 
 def _slips(block: Block) -> tuple[tuple[str, float], ...]:
-    """Return the sliding velocity of a block and the velocity scale of its law, if it has one."""
+    """Return the sliding velocity of a block and the velocity scale of its law, as in `Mark`."""
     if not block.slip or block.law is None:
         return ()
     try:
@@ -127,14 +127,14 @@ def _slips(block: Block) -> tuple[tuple[str, float], ...]:
 @final
 @dataclass(frozen=True, eq=False)
 class GivenInput:
-    """Default input of a scene: a function of time, and its text."""
+    """Default input of a scene: a function of time, and the text that describes it."""
 
     text: str
     function: Callable[[ca.SX], ca.SX]
 
 
 class _Published:
-    """Presets of a class of scenes, read when they are first used."""
+    """Descriptor for the presets of a class of scenes, which reads them at first use."""
 
     def __get__(self, scene: "Scene | None", kind: "type[Scene]") -> Mapping[str, Preset]:
         return presets_of(kind)
@@ -142,11 +142,11 @@ class _Published:
 
 @parametric
 class Scene(Parametric, ABC):
-    """Machine with one friction law; `model()` writes its equations.
+    """Machine with a friction law; `model()` returns its equations.
 
     Raises:
-        ValueError: a parameter of scene or law that is an array or an MX symbol. One machine has
-            one number or SX symbol each; `simulate_many` runs many.
+        ValueError: a parameter of the scene or the law is an array or an MX symbol. A scene
+            requires numbers or SX symbols; `simulate_many` runs many values.
     """
 
     t_end: ClassVar[float]
@@ -156,35 +156,38 @@ class Scene(Parametric, ABC):
     """Default inputs by name."""
 
     integrals: ClassVar[Mapping[str, str]] = {}
-    """State -> the input that is its rate; the command line takes samples of the state for it."""
+    """Inputs that are the rate of a state, by state.
+
+    The command line accepts samples of the state instead of the input.
+    """
 
     presets = _Published()
-    """Numbers of papers by name, see `preset` and presets.toml."""
+    """Parameters from publications by name, see `preset` and presets.toml."""
 
     law: Law
 
     @classmethod
     def places(cls) -> dict[str, str]:
-        """Return the places with a law of their own, see `other_law`: keyword -> meaning."""
+        """Return the descriptions of the fields created by `other_law`, by keyword."""
         return _marked(cls, "place")
 
     @classmethod
     def structures(cls) -> dict[str, str]:
-        """Return the fields that determine the equations, see `structure`: keyword -> meaning."""
+        """Return the descriptions of the fields created by `structure`, by keyword."""
         return _marked(cls, "structure")
 
     @classmethod
     def preset(cls, name: str, law: Law, **others: Any) -> Self:
-        """Return the scene and `law` with the numbers of a paper.
+        """Return the scene and `law` with the parameters of a publication.
 
         Args:
             name: one of `presets`.
-            law: any law; one that the paper does not use gets the levels of friction only.
-            others: further fields of the scene: laws, such as `hinge`, which get the numbers of
-                their place, too, or parameters that replace those of the paper.
+            law: any law; a law that the publication does not use gets only the levels of friction.
+            others: further fields of the scene: laws, such as `hinge`, which also get the
+                parameters of their contact, or parameters that replace those of the publication.
 
         Raises:
-            ValueError: no such preset, or what the scene refuses.
+            ValueError: the preset does not exist, or the scene rejects an argument.
         """
         where = f"{cls.__name__}: preset"
         checks.text(where, name, "the name of a preset")
@@ -198,22 +201,22 @@ class Scene(Parametric, ABC):
         return cls(**arguments)
 
     def law_of(self, place: str) -> Law:
-        """Return the law of one of `places`, `law` by default."""
+        """Return the law of one of `places`; by default `law`."""
         special = getattr(self, place)
         return self.law if special is None else special
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
-        cls.__repr__ = Scene.__repr__  # otherwise the dataclass writes one of a single line
+        cls.__repr__ = Scene.__repr__  # replaces the single-line text of the dataclass
 
     def __repr__(self) -> str:
-        """Return the call that makes the scene, in lines of a screen."""
+        """Return the call that creates the scene, wrapped to the width of a terminal."""
         values = ", ".join(f"{item.name}={getattr(self, item.name)!r}" for item in fields(self))
         text = f"{type(self).__name__}({values})"
         return fill(text, WIDTH, subsequent_indent="    ", break_long_words=False)
 
     def thumbnail(self) -> "Figure | None":
-        """Return the small figure of its law."""
+        """Return the small figure of `law`."""
         return self.law.thumbnail()
 
     def __post_init__(self) -> None:
@@ -231,12 +234,12 @@ class Scene(Parametric, ABC):
 
     @abstractmethod
     def equations(self, p: Variables) -> Model:
-        """Return the model of this machine, with `p` as its parameters."""
+        """Return the model of this machine with the parameters `p`."""
 
     def model(self, free: Iterable[str] = ()) -> Model:
         """Return the model, with the parameters named in `free` as symbols in `Model.p`.
 
-        All others are constants of the equations, so terms they switch off vanish.
+        All other parameters are constants of the equations, so terms multiplied by zero vanish.
         """
         name = type(self).__name__
         scene, p = symbolise(self, *checks.names(f"{name}: free", free))
@@ -250,12 +253,13 @@ class Scene(Parametric, ABC):
 
 
 def other_law(doc: str) -> Any:
-    """Declare a field of a scene that holds the law of another place, or None.
+    """Declare a field of a scene for the law of another contact, or None.
 
-    Its parameters are added to those of `law`, with the endings _1 and _2 for shared names.
+    The parameters of this law are added to those of `law`, with the suffixes _1 and _2 for shared
+    names.
 
     Args:
-        doc: the place, and its friction by default.
+        doc: description of the contact and of its default friction.
     """
     return field(default=None, metadata={"place": doc})
 
@@ -263,8 +267,8 @@ def other_law(doc: str) -> Any:
 def structure(default: bool | int, doc: str) -> Any:
     """Declare a field of a scene that determines its equations: a count or a truth value.
 
-    It is chosen when the scene is made and leaves no switch in the equations; forms with names are
-    declared by `option`.
+    Its value is chosen when the scene is created, so that the equations contain no branches. Use
+    `option` for a choice between named forms.
     """
     return field(default=default, metadata={"structure": doc})
 
@@ -284,10 +288,11 @@ def contact(
     *, least: Scalar | None = None, bare: bool | None = None, turning: bool = False,
     **inputs: Scalar,
 ) -> Contact:  # fmt: skip
-    """Return the contact of two bodies that slide at `v` under `N`, for equations of your own.
+    """Return a contact of two bodies with the sliding velocity `v`, for user-defined equations.
 
-    Write them with `force` of the contact and pass the contact to the `Model`, which then has the
-    states of the law after its own, its changes of mode as events, and error control of the slip:
+    The equations contain `force` of the contact, and the contact is passed to the `Model`. The
+    model then also has the states of the law, its changes of mode as events, and error control of
+    the slip:
 
         x, v, pull = Variable("x", "m"), Variable("v", "m/s"), Variable("pull", "N")
         slip = contact("floor", LuGre(), v, 10.0)
@@ -296,23 +301,23 @@ def contact(
                      contacts=(slip,), outputs={"friction": Output(slip.force, "N")})
 
     Args:
-        name: of the contact.
-        law: any law of a scalar slip.
+        name: name of the contact.
+        law: any law for a scalar sliding velocity.
         v: sliding velocity [m/s], a variable or an expression; `force` opposes it.
         N: normal force [N], a number, a variable or an expression.
-        rest: state of the model -> its value at which `v` is exactly zero, for laws that stick; if
-            omitted, the first state of the model in which `v` is linear is set.
+        rest: maps a state of the model to its value at which `v` is exactly zero, for laws that
+            stick; by default a state of the model in which `v` is linear.
         least: smallest value of a varying `N`, at which the law must be defined.
-        bare: states and events have the names of the law (True) or "<name>_<state>" (False);
-            None: names of the law if the model has one contact.
+        bare: True if states and events have the names of the law, False for "<name>_<state>", None
+            for True if the model has only one contact.
         turning: True if `v` is a rate [rad/s] and `force` a moment [N m].
-        inputs: further inputs of the law. The applied force F_e, all forces but friction along
-            the slip, follows from the equations if omitted; it must be given where these are
-            implicit or have algebraic variables that depend on friction.
+        inputs: further inputs of the law. The applied force F_e is the sum of all forces along the
+            slip except friction. By default it is derived from the equations; it is required if the
+            equations are implicit or have algebraic variables that depend on friction.
 
     Raises:
-        ValueError: no law, a law that needs another input, a law that divides by N = 0, or a
-            variable in other units than those of the SI.
+        ValueError: `law` is not a law, needs another input, or divides by N = 0; or a variable has
+            a unit that is not an SI unit.
     """
     where = f"contact '{checks.text('contact: name', name, 'a text, and then a law')}'"
     check_law(f"{where}: law", law)
@@ -335,7 +340,7 @@ def contact(
             f"{type(law).__name__}: expected a normal force above 0 N, by which the law divides, "
             "got 0; lugre_normalised does not, and load_dependent(...) rounds it off"
         )
-    if least is not None and is_number(least):  # laws that need a load refuse a number only
+    if least is not None and is_number(least):  # laws check their load only if it is a number
         law.rate(ca.SX(1.0), least, ca.SX([s.nominal for s in law.states]))
     v = checks.expression(f"{where}: v", v)
     turns = checks.flag(f"{where}: turning", turning)
@@ -343,7 +348,7 @@ def contact(
 
 
 def divides_by_load(law: Law) -> bool:
-    """Return True if a law is not finite at N = 0; symbols get their default values."""
+    """Return True if a law is not finite at N = 0, with default values in place of symbols."""
     known = parameters(law).items()
     law = with_values(law, {name: p.default for name, p in known if is_symbolic(p.value)})
     v, z = ca.SX(1.0), ca.SX([state.nominal for state in law.states])
@@ -355,7 +360,7 @@ def divides_by_load(law: Law) -> bool:
 
 
 def friction_outputs(slip: Contact, name: str) -> dict[str, Output]:
-    """Return the outputs friction and power of a contact that slides at the signal `name`."""
+    """Return the outputs friction and power of a contact whose slip is the signal `name`."""
     return {
         "friction": Output(slip.force, slip.unit("N"), f"friction force opposing {name}"),
         "power": Output(slip.force * slip.slip, "W", "power taken by friction"),

@@ -30,7 +30,7 @@ from symfric.scenes.base import (
 
 
 def sine(t: ca.SX) -> ca.SX:
-    """Return 2 sin(pi t) N, beyond the default break-away force of 1.18 N in both directions."""
+    """Return 2 sin(pi t) N, which exceeds the default break-away force of 1.18 N."""
     return 2 * ca.sin(ca.pi * t)
 
 
@@ -40,9 +40,9 @@ class Drive(Scene):
 
         x' = v,   m v' = force - F(v, N) - offset
 
-    `force` is the input. With the normal force N = 1 N the coefficients mu of a law read as force
-    levels in newton, which is how the friction of a drive of unknown load is identified. With
-    turning = True the axis turns: the same equations in rad, rad/s, N m and kg m^2.
+    `force` is the input. For N = 1 N the coefficients mu of a law are force levels in newton; this
+    is used to identify the friction of a drive with unknown load. turning = True is a rotary axis,
+    with the same equations in rad, rad/s, N m and kg m^2.
     Defaults: mass and load of the block of `Rabinowicz` (N = m g).
     """
 
@@ -81,7 +81,7 @@ class Drive(Scene):
         )
 
     def _sketch(self, x: ca.SX) -> Sketch:
-        """Return the mass on its guide, or a hand that turns."""
+        """Return the mass on its guide, or a rotating hand."""
         if self.turning:
             return drawn({}, hands={"axis": (x, 1.0)})
         return drawn({"mass": Block(x, 0.0, "x", "v", self.law)})
@@ -105,8 +105,8 @@ class Rabinowicz(Scene):
         x' = v,   m v' = -k x - F(v - v_belt, N),   N = m g
 
     x is the spring elongation, positive in the direction of the belt. The sliding velocity is that
-    of the block relative to the belt, so while the belt carries the block the friction force F is
-    negative: it opposes the block's motion relative to the belt.
+    of the block relative to the belt. Therefore the friction force F is negative while the belt
+    pulls the block forward.
 
     Defaults: Jing and Mi, Selection Mechanism of Friction Models, tables 2 and 3 (m = 0.8 kg,
     k = 2.1 N/m, belt 0.1 m/s); the block starts at x = 0 at rest.
@@ -142,7 +142,7 @@ class Rabinowicz(Scene):
         )
 
     def _sketch(self, x: ca.SX, t: ca.SX) -> Sketch:
-        """Return the block on the belt, whose marks move with it, and its spring."""
+        """Return the block with its spring, and the belt with marks that move with it."""
         way = 0.15 * self.m * self.g / self.k if not equals(self.k, 0.0) else 1.0
         marks = [(around(self.v_belt * t + i * way / 3, -way, 2 * way), 0.0) for i in range(9)]
         return drawn(
@@ -170,12 +170,12 @@ class CoupledBlocks(Scene):
         m_2 v_2' = -k_2 x_2 - k_c (x_2 - x_1) - F_2(v_2 - v_belt, m_2 g)
         x_1' = v_1,   x_2' = v_2
 
-    x_1 and x_2 are the elongations of the springs, signs as in `Rabinowicz`. A block that breaks
-    away pushes the other one: the smallest model of earthquakes, which slides in turns, together,
-    or without a rule. `block_2` is the law of the second block.
+    x_1 and x_2 are the elongations of the springs, with the signs of `Rabinowicz`. A block that
+    breaks away pushes the other block. This is the smallest model of earthquakes, in which the
+    blocks slide alternately, together, or irregularly. `block_2` is the law of the second block.
 
-    Defaults: two blocks of `Rabinowicz` of which one starts displaced.
-    Limits: motions without a rule agree between tolerances for a few break-aways only.
+    Defaults: two blocks of `Rabinowicz`, one of which starts displaced.
+    Limits: runs of an irregular motion at different tolerances agree for a few break-aways only.
     Source: Galvanetto and Bishop, Int. J. Mech. Sci. 36, 1994 (two-block model; not read).
     """
 
@@ -234,7 +234,7 @@ class CoupledBlocks(Scene):
         )
 
     def _sketch(self, x_1: ca.SX, x_2: ca.SX, t: ca.SX) -> Sketch:
-        """Return the blocks on the belt, whose marks move with it, and their springs."""
+        """Return the blocks with their springs, and the belt with marks that move with it."""
         stiff = smallest(self.k_1, self.k_2)
         way = 0.15 * self.m_1 * self.g / stiff if not equals(stiff, 0.0) else 1.0
         marks = [(around(self.v_belt * t + i * way / 3, -way, 4 * way), 0.0) for i in range(15)]

@@ -14,7 +14,7 @@ S = TypeVar("S", bound=Scene, covariant=True)
 
 @final
 class Catalogue(Mapping[str, type[S]]):
-    """Scenes by name, each loaded when it is first used."""
+    """Scenes by name; the module of a scene is imported at its first use."""
 
     def __init__(self, places: Mapping[str, str]) -> None:
         self._places = dict(places)
@@ -43,7 +43,7 @@ _MECHANISMS = {
     "arm": "spatial Arm",
 }
 MECHANISMS: "Catalogue[MechanismScene]" = Catalogue(_MECHANISMS)
-"""Scenes with several bodies and the law in several joints, by name."""
+"""Scenes that are mechanisms with friction in their joints, by name."""
 
 ALL_SCENES: Catalogue[Scene] = Catalogue(
     {
@@ -58,4 +58,4 @@ ALL_SCENES: Catalogue[Scene] = Catalogue(
         **_MECHANISMS,
     }
 )
-"""All scenes by the name on the command line."""
+"""All scenes by their name on the command line."""

@@ -1,4 +1,4 @@
-"""Plane linkages with friction in their hinges: pendulums, one on a box, and a four-bar."""
+"""Linkages with friction in their joints: pendulums, a pendulum on a box, and closed loops."""
 
 from abc import abstractmethod
 from math import pi
@@ -22,7 +22,7 @@ from symfric.scenes.base import Scene, other_law
 
 @parametric
 class MechanismScene(Scene):
-    """Machine described by a `Mechanism`; `mechanism()` may be changed before it is built."""
+    """Machine described by a `Mechanism`; the result of `mechanism()` may be modified."""
 
     @abstractmethod
     def mechanism(self) -> Mechanism:
@@ -34,11 +34,11 @@ class MechanismScene(Scene):
 
 
 def reach(scene: str, square: Scalar, expected: str) -> Scalar:
-    """Return the root of `square`, a distance that the links must bridge at the start.
+    """Return the root of `square`, a distance that results from closing a loop at the start.
 
     Raises:
-        ValueError: `square` <= 0: the links do not reach, or lie in line, where the rates of the
-            loop are not determined.
+        ValueError: `square` <= 0: the links are too short to close the loop, or they are collinear
+            and do not determine its rates.
     """
     if is_number(square) and not float(square) > 0.0:
         raise ValueError(f"{scene}: expected {expected} at the start, got links that do not reach")
@@ -50,20 +50,20 @@ X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 @parametric
 class SliderCrank(MechanismScene):
-    """Crank, a slider and a massless rod between them; one degree of freedom.
+    """Crank and slider connected by a massless rod, with one degree of freedom.
 
-    The crank turns about x through (0, b, c); its pin stands at r, above at the start. The rod of
-    length l ends at the height e on the slider:
+    The crank rotates about x through (0, b, c). Its pin has the radius r and is at the top at the
+    start. The rod of length l is attached to the slider at the height e:
 
         slider^2 = l^2 - (b - r sin(crank))^2 - (c - e + r cos(crank))^2
 
-    The slider stores and returns most of the crank's energy, so the rod's force changes its sign,
-    and its magnitude by orders.
+    The slider stores and returns most of the energy of the crank. Therefore the force of the rod
+    changes its sign, and its magnitude varies by orders of magnitude.
 
-    `guide` is the law of the slider's guide, whose stations and width are `a`; by default only the
-    bearing of the crank has friction.
+    `guide` is the law of the guide of the slider, whose stations and width are `a`; by default only
+    the bearing of the crank has friction.
 
-    Defaults: Haug's spatial example, friction in the bearing of the crank; t_end = 0.25 s.
+    Defaults: Haug's spatial example with friction in the bearing of the crank; t_end = 0.25 s.
     """
 
     t_end: ClassVar[float] = 0.25
@@ -106,7 +106,7 @@ class SliderCrank(MechanismScene):
 
 
 HINGE = (0.0, -1.0, 0.0)
-"""Axis of a hinge: angles turn x towards z, against the clock as seen on the page."""
+"""Axis of a hinge: angles rotate x towards z, which is counterclockwise in drawings."""
 
 
 @parametric
@@ -115,8 +115,8 @@ class Pendulum(MechanismScene):
 
         (J + m L^2) phi'' = -m g L sin(phi) - R F(R phi', N)
 
-    phi is the angle from hanging; N is the size of the bearing force, weight and centrifugal force
-    together. Defaults: a rod of 1 kg and 1 m.
+    phi is the angle from the hanging position. N is the magnitude of the bearing force, which
+    includes weight and centrifugal force. Defaults: a rod of 1 kg and 1 m.
     """
 
     t_end: ClassVar[float] = 10.0
@@ -141,10 +141,11 @@ class Pendulum(MechanismScene):
 
 @parametric
 class DoublePendulum(MechanismScene):
-    """Two equal rods, the second one hinged to the end of the first, with friction in both hinges.
+    """Two equal rods, the second hinged to the end of the first, with friction in both hinges.
 
-    phi_1 is the angle of the first rod from hanging, phi_2 that of the second from the first. Its
-    motion is chaotic: runs of small tolerances agree for a few seconds only.
+    phi_1 is the angle of the first rod from the hanging position, phi_2 that of the second rod
+    relative to the first. The motion is chaotic: runs at small tolerances agree for a few seconds
+    only.
     """
 
     t_end: ClassVar[float] = 5.0
@@ -174,19 +175,19 @@ class DoublePendulum(MechanismScene):
 
 @parametric
 class PendulumBox(MechanismScene):
-    """Box on rough ground and a pendulum on it, friction under the box and in the hinge.
+    """Box on rough ground with a pendulum, and friction under the box and in the hinge.
 
-    x is the position of the box, phi the angle of the pendulum from hanging; the normal force
-    under the box is the whole vertical reaction, that of the hinge the size of its reaction.
-    `hinge` is the law of the hinge, by default that of the box; parameters of the same name get
-    the endings _1 and _2.
+    x is the position of the box, phi the angle of the pendulum from the hanging position. The
+    normal force under the box is the whole vertical reaction, and that of the hinge is the
+    magnitude of its reaction. `hinge` is the law of the hinge, by default that of the box;
+    parameters with the same name get the suffixes _1 and _2.
 
     Defaults: Jing and Mi, Selection Mechanism of Friction Models, tables 6 and 7 (box 6 kg,
-    pendulum 20 kg on 0.3 m, from 30 degrees), with a point mass. Its 1.8 kg m^2 equal m L^2, and
-    may be meant about the hinge; the preset has them about the mass, with which the standard
-    deviation of positions at equal times is that of its table 8. The text does not decide. No
-    radius of the hinge is given; 0.01 m here.
-    Limits: the ground does not pull; lift-off of the box, at N < 0, is not checked.
+    pendulum 20 kg at 0.3 m, starting at 30 degrees), with a point mass. The paper's inertia of
+    1.8 kg m^2 equals m L^2, and its text does not state whether it is about the hinge. The preset
+    has it about the mass, which reproduces the standard deviation of positions in table 8. The
+    paper gives no radius of the hinge; 0.01 m is assumed.
+    Limits: the ground cannot pull the box, but its lift-off, at N < 0, is not checked.
     """
 
     t_end: ClassVar[float] = 15.0
@@ -219,12 +220,13 @@ class PendulumBox(MechanismScene):
 
 @parametric
 class FourBar(MechanismScene):
-    """Crank, coupler and rocker between two hinges of the ground, friction in the hinges.
+    """Crank, coupler and rocker between two hinges on the ground, with friction in the hinges.
 
-    crank and rocker are angles against x, coupler the angle of the coupler against the crank. The
-    fourth hinge, between coupler and rocker, closes the loop as a `PlanarRevolute`: a `Revolute`
-    would leave the reactions out of the plane undetermined. `pin` is the law of its friction; by
-    default it has none. Parameters of several laws with the same name get the endings _1, _2, ...
+    The angles of crank and rocker are relative to x, that of the coupler is relative to the crank.
+    The fourth hinge, between coupler and rocker, closes the loop as a `PlanarRevolute`; with a
+    `Revolute` the reactions normal to the plane would be undetermined. `pin` is the friction law of
+    this hinge; by default it has no friction. Parameters of several laws with the same name get the
+    suffixes _1, _2, ...
 
     Defaults: a crank-rocker (0.1 + 0.4 < 0.3 + 0.35 m) that starts with 10 rad/s.
     """
@@ -245,7 +247,7 @@ class FourBar(MechanismScene):
     g: Scalar = fields.GRAVITY(9.81)
 
     def closed(self) -> tuple[Any, ...]:
-        """Return the start angles of coupler and rocker against x, and their rates."""
+        """Return the start angles of coupler and rocker relative to x, and their rates."""
         theta = self.angle
         x, z = self.base - self.crank * cos(theta), -self.crank * sin(theta)
         square = x * x + z * z

@@ -1,4 +1,4 @@
-"""Presets: numbers of papers for scenes and for the laws in their contacts, from presets.toml."""
+"""Presets: published parameters of scenes and of the laws in their contacts, from presets.toml."""
 
 import tomllib
 from collections.abc import Mapping
@@ -18,11 +18,11 @@ L = TypeVar("L", bound=Law)
 @final
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """Friction coefficients of one contact from a source.
+    """Published friction parameters of one contact.
 
     Attributes:
-        common: numbers with the same meaning in every law, such as mu_s.
-        laws: further numbers of single laws, by the names of their parameters.
+        common: parameters with the same meaning in all laws, such as mu_s.
+        laws: further parameters of individual laws, by class of the law.
     """
 
     common: Mapping[str, float]
@@ -31,15 +31,15 @@ class Numbers:
     )
 
     def given(self, law: L) -> L:
-        """Return `law` with these numbers, also inside a sum or a wrapper.
+        """Return `law` with these parameters, including laws inside a sum or a wrapper.
 
-        Other parameters and the form stay. A law that the source does not use gets the common
-        numbers that it has. Default elements that carry a level together (mu_1, mu_2, ...) carry
-        the new one in the same shares; elements given by the user are not changed.
+        Other parameters and the form do not change. A law that the source does not use gets those
+        of the common parameters that it has. Default elements that carry a level together (mu_1,
+        mu_2, ...) are scaled to the new level; elements given by the user are not changed.
 
         Raises:
-            ValueError: numbers that contradict each other, such as given elements that do not carry
-                the level.
+            ValueError: parameters contradict each other, for example if elements given by the user
+                do not carry the level.
         """
         inner: dict[str, Law | tuple[Law, ...]] = {}
         for item in fields(law):
@@ -67,13 +67,13 @@ class Numbers:
 @final
 @dataclass(frozen=True, eq=False)
 class Preset:
-    """Numbers of a source for a scene.
+    """Published parameters of a scene.
 
     Attributes:
-        doc: description, and what the source does not give.
+        doc: description, including parameters that the source does not give.
         source: authors, title, table.
         values: parameters and structure of the machine.
-        friction: contact -> its numbers; "law" is the contact of the scene's law.
+        friction: friction parameters by contact; "law" is the contact of the law of the scene.
     """
 
     doc: str
@@ -83,14 +83,14 @@ class Preset:
 
 
 def presets_of(kind: type) -> Mapping[str, Preset]:
-    """Return the presets of a class of scenes, or of the nearest base that has any."""
+    """Return the presets of a class of scenes, or of its nearest base class that has presets."""
     every = _published()
     return next((every[c.__name__] for c in kind.__mro__ if c.__name__ in every), {})
 
 
 @cache
 def _published() -> dict[str, dict[str, Preset]]:
-    """Return scene -> name -> preset."""
+    """Return all presets by name of the class and name of the preset."""
     read = tomllib.loads(Path(__file__).with_name("presets.toml").read_text("utf-8"))
     numbers = {
         name: Numbers(table.pop("common"), {laws.ALL_LAWS[law]: x for law, x in table.items()})

@@ -1,4 +1,4 @@
-"""Test rigs: a tribometer, whose motion is given, and a quarter car."""
+"""Test rigs: a tribometer with a prescribed motion, and a quarter car."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -26,24 +26,26 @@ from symfric.scenes.base import Block, GivenInput, Scene, contact, drawn, fricti
 
 
 def strokes(t: ca.SX) -> ca.SX:
-    """Return 0.005 sin(2 pi t) m/s, through rest and five Stribeck velocities of most laws."""
+    """Return 0.005 sin(2 pi t) m/s, up to five times the default Stribeck velocity of most laws."""
     return 5e-3 * ca.sin(2 * ca.pi * t)
 
 
 @parametric
 class Prescribed(Scene):
-    """Law under measured or imagined motion: velocity in, friction out.
+    """Contact with a prescribed or measured motion: the input is velocity, the output friction.
 
         x' = v,   z' = rate(v, N, z),   friction = F(v, N, z)
 
-    `v` is the input, constant, a function of time or samples (`Hold`, `Linear`). A measured
-    position is given by `rate_of(Linear(t, x))`, linear between its samples; on the command line
-    write `--input x=FILE.csv:COLUMN`. With load = "input" the normal force is the input `load`, by
-    default N, and not below `N_least`: noise around an open contact gives no negative load. Further
-    inputs of a law, such as an acceleration or a temperature, are inputs of the same name.
+    The input `v` is a constant, a function of time or samples (`Hold`, `Linear`). For a measured
+    position use `rate_of(Linear(t, x))`, which is linear between the samples, or
+    `--input x=FILE.csv:COLUMN` on the command line. With load = "input" the normal force is the
+    input `load`, by default N. It is limited to `N_least` and above, so that noise of an open
+    contact gives no negative load. Further inputs of a law, such as an acceleration or a
+    temperature, are inputs with the same name.
 
-    Limits: no laws with the applied force F_e (`Karnopp`, `ExactCoulomb`, ...), which a given
-    motion does not determine. Internal states start as after long rest, at any first velocity.
+    Limits: laws with the applied force F_e (`Karnopp`, `ExactCoulomb`, ...) are rejected, since the
+    motion does not determine it. The internal states start as after a long rest, for any initial
+    velocity.
     """
 
     t_end: ClassVar[float] = 2.0
@@ -92,32 +94,35 @@ class Prescribed(Scene):
 
 
 ANY = 1e100
-"""Scale [N] at which error control does not resolve a load, but checks that it is finite."""
+"""Scale [N] that is so large that error control only checks whether a load is finite."""
 LINKAGE = ("k_s", "b_d", "theta", "L_d")
-"""Parameters that the rig shares with laws of its guide."""
+"""Parameters that the rig assigns to laws of its guide that have them."""
 
 
 @parametric
 class QuarterCar(Scene):
-    """Quarter car over a road that rises to its middle, then by an amplitude, and falls by two.
+    """Quarter car on a road that rises in two ramps and then falls by twice the second ramp.
 
         M_b X_b'' = f_sd - F(X_b', N),   f_sd = k_s (X_w - X_b) + b_d (X_w' - X_b')
         M_w X_w'' = -f_sd + k_t (X_r - X_w) + b_t (X_r' - X_w')
         N = N_0 + |f_sd| / tan(theta - d_theta)
 
-    Displacements of body, wheel and road from rest under the weight. The strut leans by theta, so
-    that the force whose vertical part is f_sd presses the body against its guide; as the strut
-    shortens it leans by d_theta more (`tilt`). Laws that need them get x_rel = X_w - X_b, v_rel
-    its rate and F_e = f_sd; a law that has k_s, b_d, theta or L_d of its own gets those of the rig.
+    X_b, X_w and X_r are the displacements of body, wheel and road from the equilibrium under the
+    weight. The strut is inclined by theta, so that its force, with the vertical component f_sd,
+    presses the body against its guide. If the strut shortens, its inclination changes by d_theta
+    (`tilt`). Laws that need these inputs get x_rel = X_w - X_b, its rate v_rel, and F_e = f_sd. The
+    parameters k_s, b_d, theta and L_d of a law are set to those of the rig.
 
-    Written in the paper's coordinates and not as a `Mechanism`: its friction depends on x_rel and
-    v_rel, which joints do not offer, and its side force of the strut is no reaction of a joint
-    (a mechanism with the strut's force on two guides is the test's second opinion).
+    The scene uses the coordinates of the paper and is not a `Mechanism`, since its friction depends
+    on x_rel and v_rel, which joints do not provide, and the side force of the strut is not the
+    reaction of a joint. A test compares it with a mechanism with the force of a strut on two
+    guides.
 
-    Defaults: section 3 of the paper, and its road of 50 mm (30 and 70 mm in its other runs). It
-    does not give L_d and the times of the road; by its text the first ramp is the gentlest, which
-    takes a t_first above 1.7 s (its presets have 2.4 s). N_0 is chosen so that a law with mu_s =
-    0.15 breaks away at the paper's 193.8 N; the paper has none, and its own law needs none.
+    Defaults: section 3 of the paper, with its road of 50 mm (other runs have 30 and 70 mm). The
+    paper does not give L_d and the times of the road. According to its text the first ramp has the
+    smallest slope, which requires t_first > 1.7 s (the presets have 2.4 s). The paper has no N_0,
+    which its law does not need; it is chosen such that a law with mu_s = 0.15 breaks away at the
+    193.8 N of the paper.
     Source: Al-Zughaibi, quarter-car friction, equations 1-13.
     """
 
@@ -151,7 +156,7 @@ class QuarterCar(Scene):
         object.__setattr__(self, "law", with_values(self.law, shared))
 
     def road(self, t: Scalar) -> Scalar:
-        """Return the height X_r of the road [m] at time t [s]: three ramps, a rest after each."""
+        """Return the height X_r of the road [m] at time t [s]: three ramps with level parts."""
         heights = (self.middle, self.amplitude, -2 * self.amplitude)
         second = self.t_0 + self.t_first + self.t_hold
         starts = (self.t_0, second, second + self.t_ramp + self.t_hold)
@@ -176,7 +181,7 @@ class QuarterCar(Scene):
         N = self.normal_force(f_sd, x_rel)
         given: dict[str, Any] = {"x_rel": x_rel, "v_rel": v_rel, "F_e": f_sd}
         slip = contact("guide", self.law, v_b.symbol, N, rest={"v_b": 0.0}, **given)
-        # beyond the reach of the strut N is not a number: a run must stop there under any law
+        # N is NaN where the strut is too short; a run must stop there for every law
         load = ca.SX.sym("N")
         probe = contact("guide", self.law, v_b.symbol, load, rest={"v_b": 0.0}, **given)
         loaded = ca.depends_on(ca.vertcat(probe.friction, probe.rate), load)
@@ -203,7 +208,7 @@ class QuarterCar(Scene):
         )
 
     def _sketch(self, X_b: ca.SX, X_w: ca.SX, X_r: ca.SX) -> Sketch:
-        """Return the body on its guide, strut, wheel, and the road below the tyre."""
+        """Return the body on its guide, the strut, the wheel, and the road below the tyre."""
         wheel, body = 0.5 * self.L_d, 1.5 * self.L_d
         return drawn(
             {

@@ -1,4 +1,4 @@
-"""Machines that turn: a clutch, a drill string, and the rollers of a laminator nip."""
+"""Rotating machines: a clutch, a drill string, and the rollers of a laminator nip."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -33,20 +33,20 @@ def closing(t: ca.SX) -> ca.SX:
 
 @parametric
 class Clutch(Scene):
-    """Engine and load on both sides of plates that are pressed together.
+    """Clutch between an engine and a load, with plates that are pressed together.
 
         J_1 w_1' = T_1 - T,   J_2 w_2' = T - T_2,   T = n R F(v, N)
         v = R (w_1 - w_2),   N = N_0 + max(pressure A, 0),   heat' = T (w_1 - w_2)
 
-    R is the friction radius of the plates, n the number of faces, each under N. The input is the
-    pressure of the piston [Pa]; below zero the plates are apart. The motion is
-    computed in w_2 and the slip w_1 - w_2, whose rest is exact. Coulomb friction at full pressure
-    from t = 0 locks after w / a, and takes T w^2 / (2 a), with w the slip at the start and
-    a = T (1/J_1 + 1/J_2) - T_1/J_1 - T_2/J_2.
+    R is the friction radius of the plates and n the number of faces, each with the normal force N.
+    The input is the pressure of the piston [Pa]; the plates are separated if it is negative. The
+    states are w_2 and the slip w_1 - w_2, so that zero slip is exact. With Coulomb friction at full
+    pressure from t = 0 the clutch locks after the time w / a and dissipates the energy
+    T w^2 / (2 a), where w is the slip at the start and a = T (1/J_1 + 1/J_2) - T_1/J_1 - T_2/J_2.
 
-    Defaults: made up, of a car of 1.2 t in first gear (J_2 and T_2 at the gearbox) with laws of
+    Defaults: assumed, for a car of 1.2 t in first gear (J_2 and T_2 at the gearbox) and laws with
     mu_d = 0.1: 200 N m at 4 bar.
-    Limits: N_0, the drag of the open clutch, keeps the load of laws that divide by it above zero.
+    Limits: the open clutch has the normal force N_0, since some laws divide by the normal force.
     """
 
     t_end: ClassVar[float] = 0.6
@@ -104,28 +104,29 @@ class Clutch(Scene):
 
 
 def slow(t: ca.SX) -> ca.SX:
-    """Return 0.3 rad/s, slower than in drilling since default laws have less friction than rock."""
+    """Return 0.3 rad/s, slower than in drilling because default laws have less friction."""
     return ca.SX(0.3)
 
 
 @parametric
 class DrillString(Scene):
-    """String of inertias under a top drive whose speed is given, friction at the bit.
+    """String of inertias below a top drive with given speed, with friction at the bit.
 
         twist_i' = w_(i-1) - w_i,   w_0 = w_top
         t_i = n k twist_i + n c (w_(i-1) - w_i)
         J_i w_i' = t_i - t_(i+1),   at the bit t_(n+1) = R F(R w_n, N) + c_b w_n
 
-    w_top is the input [rad/s], k and c the stiffness and the damping of the whole string, n =
-    lumps; the lumps of the string have J_string/n, the bit has J_bit and half a lump more. N is the
-    weight on the bit, R the radius at which the law acts. The states are the twists of the n
-    pieces, not angles, so many turns cost no accuracy; `phi` is the angle of the bit.
+    w_top is the input [rad/s]. k and c are the stiffness and the damping of the whole string, and
+    n = lumps. The lumps of the string have the inertia J_string/n, the bit has J_bit plus half a
+    lump. N is the weight on the bit and R the radius at which the law acts. The states are the
+    twists of the n pieces instead of angles, so that accuracy is kept over many turns; `phi` is the
+    angle of the bit.
 
-    Defaults: Navarro-Lopez and Cortes (J_bit, k, c, c_b, R, N); four lumps and J_string, that of
-    1.1 km of 5 inch pipe of this stiffness, are chosen here. Rock has coefficients of 0.5 to 0.8,
-    see the preset, with which the bit sticks up to 4 rad/s; with those of default laws it sticks
-    under the slow default input.
-    Limits: torsion only: no axial motion, no cutting of the rock; the top drive is stiff.
+    Defaults: Navarro-Lopez and Cortes (J_bit, k, c, c_b, R, N). Four lumps and J_string, that of
+    1.1 km of 5 inch pipe with this stiffness, are assumed. Rock has friction coefficients of 0.5 to
+    0.8, see the preset, with which the bit sticks up to 4 rad/s. With the coefficients of default
+    laws it sticks at the slow default input.
+    Limits: torsion only, without axial motion and cutting of the rock; the top drive is stiff.
     Source: Navarro-Lopez and Cortes, J. Sound Vib. 307, 2007, 152-171 (as quoted; there the top is
     an inertia driven by a torque).
     """
@@ -190,7 +191,7 @@ class DrillString(Scene):
         )
 
     def _sketch(self, phi: ca.SX, twists: ca.SX) -> Sketch:
-        """Return hands of bit and top drive, seen from above, with the twist between them."""
+        """Return hands of bit and top drive as seen from above, with the twist between them."""
         hands = {"bit": (phi, 0.7), "top": (phi + ca.sum1(twists), 1.0)}
         return drawn({}, hands=hands, hub=Block(0.0, 0.0, "", "v_rel", self.law))
 
@@ -201,31 +202,32 @@ def machine_start(t: ca.SX) -> ca.SX:
 
 
 def pressing(t: ca.SX) -> ca.SX:
-    """Return 500 N +- 5 % with every turn of an eccentric roller at full speed."""
+    """Return 500 N +- 5 %, as of an eccentric roller at full speed."""
     return 500 + 25 * ca.sin(5 * t)
 
 
 @parametric
 class Nip(Scene):
-    """Carton between a steel chill roll, which carries it, and a rubber roller that lags behind.
+    """Carton between a steel chill roll, which carries it, and a slower rubber nip roller.
 
         J w' = R F(v, N) + k twist + d (w_0 - w),   twist' = w_0 - w
         v = v_line - R w,   w_0 = (1 - lag) v_line / R,   N = N_0 + max(load, 0)
         tau v_line' = v_set - v_line
 
-    The web has the speed v_line of the line, which follows the input v_set, and slips by v over the
-    nip roller, whose drive turns by `lag` slower, 1 to 2 % in practice. Friction drags the roller
-    forward against its shaft (stiffness k, damping d), as the belt does the block of `Rabinowicz`:
-    where the curve falls, the slip oscillates. The input `load` [N] presses the roller; below zero
-    the nip is open. The contact is flat under even pressure. -F is the force on the web, the step
-    of its tension across the nip.
+    The web has the speed v_line of the line, which follows the input v_set, and slips with the
+    velocity v on the nip roller. The drive of this roller is slower by the share `lag`, in practice
+    1 to 2 %. Friction pulls the roller forward against its shaft (stiffness k, damping d), like the
+    belt pulls the block of `Rabinowicz`; if friction falls with the velocity, the slip oscillates.
+    The input `load` [N] presses the roller; the nip is open if it is negative. The contact is flat
+    with uniform pressure. -F is the force on the web, the change of its tension across the nip.
 
-    Defaults: slip and its range of at most 650 mm/min from the thesis; it has no numbers of the
-    machine: roller, shaft and load are made up. Its measured laws are presets of `Prescribed`.
-    Limits: with falling friction, even slip and stick-slip are both possible, and start and law
-    decide between them: under the defaults dry friction from rest oscillates for ever, the soft
-    bristles of `LuGre` (1e5 N/m) come to even slip. The web does not slip on the chill roll
-    and does not stretch; no edge effects of the cylinder.
+    Defaults: slip and its range of at most 650 mm/min from the thesis. The thesis has no parameters
+    of the machine; those of roller, shaft and load are assumed. Its measured laws are presets of
+    `Prescribed`.
+    Limits: if friction falls with the velocity, both uniform slip and stick-slip are possible,
+    depending on start and law. With the defaults, dry friction from rest oscillates permanently,
+    whereas the soft bristles of `LuGre` (1e5 N/m) reach uniform slip. The web neither slips on the
+    chill roll nor stretches; edge effects of the cylinder are neglected.
     Source: A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, section 2.9.
     """
 

@@ -24,7 +24,7 @@ from symfric.scenes.linkages import MechanismScene
 
 UP, SIDE, OUT = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
 AXES = (UP, SIDE, SIDE, OUT, SIDE, OUT)
-"""Axes of the joints while all angles are zero and the arm reaches along x."""
+"""Axes of the joints if all angles are zero, where the arm extends along x."""
 LENGTHS = (0.0, 0.4, 0.35, 0.1, 0.1, 0.08)
 MASSES = (8.0, 6.0, 4.0, 1.5, 1.0, 0.4)
 STARTS = (0.3, -0.8, 1.2, 0.4, -0.6, 0.2)
@@ -32,12 +32,12 @@ STARTS = (0.3, -0.8, 1.2, 0.4, -0.6, 0.2)
 
 @parametric
 class Arm(MechanismScene):
-    """Six revolute joints: base, shoulder, elbow and three of the wrist, with a torque in each.
+    """Arm with six revolute joints (base, shoulder, elbow, three of the wrist) and their torques.
 
-    q1 ... q6 are the joint angles, tau1 ... tau6 the inputs [N m]. The bearing of every joint
-    carries the reaction of all links beyond it at two stations, so the friction of the shoulder
-    depends on the motion of the wrist. Defaults: a made-up arm of 21 kg and 1 m that falls from
-    rest.
+    q1 ... q6 are the joint angles, tau1 ... tau6 the inputs [N m]. The bearing of each joint
+    carries the reaction of all subsequent links at two stations, so that the friction of the
+    shoulder depends on the motion of the wrist. Defaults: an assumed arm of 21 kg and 1 m that
+    falls from rest.
     """
 
     t_end: ClassVar[float] = 1.0
@@ -80,13 +80,14 @@ X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 @parametric
 class FourMass(MechanismScene):
-    """Four sliders: 1 and 4 on the axis x, 2 on y, 3 on z; two degrees of freedom.
+    """Four sliders, 1 and 4 on the axis x, 2 on y, 3 on z, with two degrees of freedom.
 
-    Massless rods of lengths 5 and 7 m connect 1 to 2 and 2 to 3; springs of rate k connect 1, 2, 3
-    to the ground (free at 3, 4, 3 m), and one of rate k_4 connects 4 to 1 (free at 1 m). The normal
-    force of every guide follows from the forces in the rods, so friction acts back on itself.
+    Massless rods of 5 and 7 m connect slider 1 to 2 and slider 2 to 3. Springs of rate k connect
+    sliders 1, 2, 3 to the ground (unloaded at 3, 4, 3 m), and a spring of rate k_4 connects sliders
+    4 and 1 (unloaded at 1 m). The normal force of each guide results from the forces of the rods,
+    which depend on friction.
 
-    Defaults: Haug's spatial example, with friction; t_end = 4 s.
+    Defaults: Haug's spatial example with friction; t_end = 4 s.
     """
 
     t_end: ClassVar[float] = 4.0
@@ -130,12 +131,12 @@ class FourMass(MechanismScene):
 
 @parametric
 class Robot(MechanismScene):
-    """Robot of a URDF file, with the law at the friction level of every joint.
+    """Robot from a URDF file, with the law scaled to the friction of each joint.
 
-    `source` is the path of the file or its text. The normal force of the law is the joint's
-    `<dynamics friction>`, by default `level`; the law `relative(LuGre())` breaks away at it.
-    `<dynamics damping>` is added. See `read_urdf` for names, inputs and limits. `laws` are
-    the laws of the `joints`; parameters with the same name get endings.
+    `source` is the path of the file or its text. The normal force of the law is the
+    `<dynamics friction>` of the joint, by default `level`; the law `relative(LuGre())` breaks away
+    at this value. `<dynamics damping>` is added. See `read_urdf` for names, inputs and limits.
+    `laws` are the laws of `joints`, by default `law`; parameters with the same name get suffixes.
     """
 
     t_end: ClassVar[float] = 2.0

@@ -1,4 +1,4 @@
-"""Families of laws: with two levels, with one formula for both directions, with a stick mode."""
+"""Base classes of laws with two levels, with one formula for both directions, or with stick."""
 
 from abc import abstractmethod
 from collections.abc import Callable
@@ -11,12 +11,12 @@ from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import APPLIED_FORCE, Input, Law, State, StaticLaw, Switch
 
 Fall = Callable[[Scalar, Scalar, Scalar], Scalar]
-"""(v, v_s, delta) -> the Stribeck weight exp(-|v / v_s|^delta)."""
+"""Function that maps (v, v_s, delta) to the Stribeck weight exp(-|v / v_s|^delta)."""
 
 
 @parametric
 class Levels(Law):
-    """Law with a static level mu_s N that is not below its dynamic level mu_d N."""
+    """Law with a static level mu_s N and a dynamic level mu_d N, where mu_s >= mu_d."""
 
     ordered = (("mu_d", "mu_s"),)
 
@@ -24,12 +24,12 @@ class Levels(Law):
     mu_d: Scalar = fields.MU_D(0.1)
 
     def coefficient(self, share: Scalar) -> Scalar:
-        """Return mu_d + (mu_s - mu_d) share, the coefficient at a share of the static excess."""
+        """Return the friction coefficient mu_d + (mu_s - mu_d) share."""
         return self.mu_d + (self.mu_s - self.mu_d) * share
 
 
 class TwoLevels(Levels):
-    """Law with mu_s N at rest and mu_d N as its limit in sliding."""
+    """Law with the static level mu_s N at rest and the limit mu_d N in sliding."""
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Return the sliding force [N] at a speed >= 0 in the limit of zero widths."""
@@ -46,9 +46,9 @@ class Curve(StaticLaw):
 
         F = formula(v, N, s, fall)
 
-    `force` uses s = tanh(v / v_eps), and a fall that rounds |v| over 1e-4 v_eps; `outside` uses
-    s = 1 and the fall on one side of rest. v_eps is the first parameter that is a width, or the
-    inverse of a steepness.
+    `force` uses s = tanh(v / v_eps) and a Stribeck weight in which |v| is rounded over 1e-4 v_eps.
+    `outside` uses s = 1 and the Stribeck weight for speeds >= 0. v_eps is the first parameter that
+    is a width, or the inverse of the first steepness.
     """
 
     @abstractmethod
@@ -71,17 +71,17 @@ class Curve(StaticLaw):
 
 
 FINEST = 1e-7
-"""Largest relative tolerance of runs with such a law, a reference for other laws."""
+"""Largest relative tolerance of runs with a law with modes, which is a reference for others."""
 
 
 @parametric
 class Sticking(Law):
-    """Law with a mode: the direction of sliding, or 0 in stick.
+    """Law whose state is a mode: the direction of sliding, or 0 in stick.
 
         F = slip force in the direction `mode`   while sliding
         F = F_e                                  in stick, mode = 0, up to the static level
 
-    A form without modes (`has_mode` false) has no states.
+    A form of the law without modes (`has_mode` is False) has no states.
     """
 
     mu_s: Scalar = fields.MU_S(0.15)
@@ -89,25 +89,25 @@ class Sticking(Law):
     @property
     @abstractmethod
     def has_mode(self) -> bool:
-        """True if stick is a mode and not a band of velocities."""
+        """True if stick is a mode, False if stick is a band of velocities."""
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Mode: direction of sliding, or 0 at rest."""
+        """Direction of sliding, or 0 at rest; no states if `has_mode` is False."""
         mode = State("mode", "1", 1.0, doc="direction of sliding, 0 at rest", whole=True)
         return (mode,) if self.has_mode else ()
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """Applied force F_e [N], which is carried in stick."""
+        """Applied force F_e [N], which the contact carries in stick."""
         return (APPLIED_FORCE,)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
-        """Return zero [1/s]; in stick beyond the static level (F_e -+ level) / (|F_e| + 1 N).
+        """Return zero [1/s], or (F_e -+ level) / (|F_e| + 1 N) in stick above the static level.
 
-        Nothing depends on this overload, and stick ends at the instant where it would become
-        nonzero. It lets error control detect a short overload, which a long step would otherwise
-        skip: in stick nothing moves.
+        The nonzero rate has no effect on the motion, since stick ends when |F_e| reaches the static
+        level. Its purpose is error control: steps are long in stick, and without this rate a step
+        could skip a short overload.
         """
         if not self.has_mode:
             return empty(v)
@@ -117,7 +117,7 @@ class Sticking(Law):
         return column(smooth.choose(rests(z[0]), share, 0.0 * v))
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the break-away force [N], mu_s N, the largest force in stick."""
+        """Return the break-away force mu_s N [N], which is the largest force in stick."""
         return self.mu_s * N
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
@@ -127,11 +127,11 @@ class Sticking(Law):
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
     ) -> tuple[Switch, ...]:
-        """Return the end of sliding at v = 0, and its start where the load exceeds the level.
+        """Return two switches: to stick at v = 0, and to slip where |F_e| exceeds the static level.
 
-        Sliding continues in the other direction if the contact cannot hold `F_e`; stick ends at
-        once if the load exceeds the static level from the start. While such a load pulls forward,
-        v = 0 is a start of sliding, not an end.
+        At v = 0, sliding continues in the other direction if the contact cannot hold `F_e`. If
+        |F_e| exceeds the static level at the start of a run, stick ends immediately. While such a
+        force pulls in the direction of sliding, v = 0 does not end the sliding.
         """
         if not self.has_mode:
             return ()
@@ -149,14 +149,14 @@ class Sticking(Law):
 
 
 def rests(mode: Scalar) -> Scalar:
-    """Return True if `mode`, up to the overload for error control -1, 0 or 1, is stick."""
+    """Return True if `mode` is stick; apart from the overload in `Sticking.rate` it is -1, 0, 1."""
     return smooth.magnitude(mode, 0.0) < 0.5
 
 
 def carried(mode: Scalar, F_e: Scalar, slip: Scalar) -> Scalar:
     """Return the force [N] of the contact: `slip` while sliding, the applied force in stick.
 
-    It is not clipped to the static level: the equations of stick stay smooth beyond its end, and so
-    does the dense output on which that end is located.
+    The force in stick is not limited to the static level. Therefore the equations stay smooth
+    beyond the end of stick, as does the dense output on which this end is located.
     """
     return smooth.choose(rests(mode), F_e, slip)

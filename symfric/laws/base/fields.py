@@ -1,6 +1,6 @@
 """Parameter fields shared by many laws: name, unit, role, bounds and meaning.
 
-A law gives the default, as in `mu_s: Scalar = MU_S(0.15)`, and its deviations, as in
+A law specifies the default, as in `mu_s: Scalar = MU_S(0.15)`, and may override properties, as in
 `mu_d: Scalar = MU_D(0.1, lower=1e-12)` if it divides by the level.
 """
 
@@ -43,8 +43,8 @@ BAND = partial(WIDTH, unit="m/s", width=1)
 F_EPS = partial(WIDTH, unit="N", doc="rounding of the break-away")
 U_EPS = partial(WIDTH, doc="rounding of the peak", lower=0.0, upper=1.0)
 REST_EPS = partial(WIDTH, unit="m/s", doc="smoothing velocity of |v|", lower=0.0)
-"""Width for laws with states, whose bristles smooth the jump at rest: it is not a width of that
-jump."""
+"""Smoothing velocity of |v| in laws with states. It does not smooth the jump of the force at rest,
+since the bristles do, so it is not marked as a `width`."""
 R_EPS = partial(WIDTH, doc="smoothing of the load share")
 
 SAMPLING = partial(param, unit="1", role="sampling")

@@ -50,15 +50,15 @@ CONFIDENCE = {
 
 @dataclass(frozen=True)
 class Facts:
-    """Facts about a law, as data.
+    """Properties of a law that are not part of its equations.
 
     Attributes:
         phenomena: codes of `PHENOMENA`.
-        smoothness: differentiability class in the velocity, and where it breaks.
-        confidence: one of `CONFIDENCE`.
-        source: publication, read or not; by default the section "Source:" of the docstring.
-        odd: True if the force changes sign with v, states and further inputs together.
-        load: how the dry force depends on N: "proportional", "independent" or a description.
+        smoothness: differentiability class in the velocity, and the exceptions.
+        confidence: a key of `CONFIDENCE`.
+        source: publication of the law; by default the section "Source:" of its docstring.
+        odd: True if the force changes sign when v, the states and the further inputs do.
+        load: dependence of the dry force on N: "proportional", "independent" or a description.
         checked: reference of the comparison; by default the section "Checked:" of the docstring.
     """
 
@@ -79,7 +79,7 @@ class Facts:
 
     @property
     def formula(self) -> str:
-        """Confidence in the formula, in words."""
+        """Confidence in the formula as text, with the reference of the comparison."""
         text = f"{self.confidence} ({CONFIDENCE[self.confidence]})"
         return f"{text}: {self.checked}" if self.checked else text
 
@@ -88,9 +88,9 @@ class Facts:
 class State:
     """Internal state of a law: name, unit, typical magnitude and description.
 
-    `even` states (a mode, an age) keep their value when the motion is mirrored; the others, such as
-    deflections and forces, change sign with it. A `whole` state is a mode: -1, 0 or 1, also in
-    results.
+    An `even` state, such as an age, keeps its value when the motion is mirrored; all other states,
+    such as deflections and forces, change sign. A `whole` state is a mode with the value -1, 0 or
+    1, in results as well.
     """
 
     name: str
@@ -103,9 +103,9 @@ class State:
 
 @dataclass(frozen=True)
 class Input:
-    """Input of a law besides v and N: a keyword-only argument of its methods.
+    """Input of a law in addition to v and N: a keyword-only argument of its methods.
 
-    `nominal` is its typical magnitude, `steady` its value in figures of steady sliding (v > 0).
+    `nominal` is its typical magnitude. `steady` is its value in figures of steady sliding, v > 0.
     """
 
     name: str
@@ -125,12 +125,12 @@ class Switch:
     """Change of mode: the states in `reset` jump when `expression` passes through zero.
 
     Attributes:
-        expression: in v, N, z and the further inputs of the law.
-        direction: +1 only rising, -1 only falling, 0 both.
-        reset: state -> its value afterwards, in terms of the values before.
-        halts: True if the sliding velocity, zero at this instant, is set to exactly zero.
-        at_start: True if it also happens at the start if the expression is already beyond zero.
-        rtol: largest relative tolerance of a run, if the law requires exact instants.
+        expression: function of v, N, z and the further inputs of the law.
+        direction: 1 for rising zeros only, -1 for falling zeros only, 0 for both.
+        reset: maps a state to its value after the change, in terms of the values before it.
+        halts: True if the sliding velocity is set to exactly zero at the change.
+        at_start: True if it also occurs at the start when the expression is already beyond zero.
+        rtol: largest relative tolerance of a run, for laws that require accurate instants.
     """
 
     name: str
@@ -143,10 +143,10 @@ class Switch:
 
 
 def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap `method(law, v, N, z)` so that it accepts states in any common form, and checks them.
+    """Wrap `method(law, v, N, z)` so that it accepts and checks states in any common form.
 
     Raises:
-        ValueError: another number of states than the law has; an integer too large for a float.
+        ValueError: the number of states is wrong, or an integer is too large for a float.
     """
 
     @wraps(method)
@@ -165,16 +165,16 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
 class Law(Parametric, ABC):
     """Friction law F(v, N, z) with internal states dz/dt = rate(v, N, z).
 
-    Sign: `force` has the sign of the sliding velocity in steady sliding; it is applied to a body
-    with a minus (m dv/dt = F_e - force).
+    Sign: in steady sliding, `force` has the sign of the sliding velocity. It opposes the motion of
+    a body, so it is applied with a minus sign (m dv/dt = F_e - force).
 
-    `v` is the sliding velocity [m/s], `N` >= 0 the normal force [N], `z` the column of internal
-    states, shape (n, 1) for CasADi types and (n, ...) for arrays, n = len(states); for one state it
-    may be a number. Any of them may be a float, a NumPy array, SX, MX or DM. A law that needs
-    another input, such as the applied tangential force, lists it in `inputs` and takes it as a
-    keyword-only argument with default 0.
+    `v` is the sliding velocity [m/s], `N` >= 0 the normal force [N], and `z` the column of internal
+    states, of shape (n, 1) for CasADi types and (n, ...) for arrays, with n = len(states). If n is
+    1, `z` may be a number. All of them may be floats, NumPy arrays, SX, MX or DM. A law that needs
+    another input, such as the applied tangential force, lists it in `inputs` and accepts it as a
+    keyword-only argument with the default 0.
 
-    A law with modes (stick, slip) keeps them in states that only jump, at its `switches`.
+    The modes of a law (stick, slip) are states that change only by jumps, at its `switches`.
     """
 
     facts: ClassVar[Facts]
@@ -188,19 +188,19 @@ class Law(Parametric, ABC):
     @property
     @abstractmethod
     def states(self) -> tuple[State, ...]:
-        """The internal states, in the order of the rows of `z`."""
+        """Internal states, in the order of the rows of `z`."""
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """Further inputs of `force`, `rate` and `switches`, by keyword."""
+        """Further inputs of `force`, `rate` and `switches`, which are passed by keyword."""
         return ()
 
     @property
     def velocity_scale(self) -> Scalar:
-        """Sliding velocity [m/s] over which the force changes; inf if there is none.
+        """Sliding velocity [m/s] over which the force changes; inf if the law has no such scale.
 
-        By default it is that of its first nonzero width or, without one, its first parameter with
-        the role "velocity scale"; the inverse of a steepness [s/m].
+        By default it is the first nonzero width or, without one, the first parameter with the role
+        "velocity scale". If that parameter is a steepness [s/m], it is the inverse.
         """
         known, widths = parameters(self), self.widths
         scales = [p for p in known.values() if p.role == "velocity scale" and not p.width]
@@ -210,15 +210,15 @@ class Law(Parametric, ABC):
 
     @abstractmethod
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Return the friction force [N] opposing the sliding velocity."""
+        """Return the friction force [N], which opposes the motion and is positive for v > 0."""
 
     @property
     def widths(self) -> dict[str, int]:
-        """Parameters that smooth the jump at v = 0: name -> exponent of their unit in m/s.
+        """Names of the parameters that smooth the jump at v = 0, with the exponent of m/s.
 
-        If all of them are scaled by s^exponent, the band of velocities in which the law differs
-        from `sliding` is s times as wide. Empty for laws without smoothing: those with modes, and
-        bristles, whose stiffness is physical. A float 0 is not a width.
+        If each width is scaled by s^exponent, the band of velocities in which the law differs from
+        `sliding` becomes s times as wide. The result is empty for laws with modes and for bristle
+        laws, whose stiffness is physical. A width that is the float 0 is omitted.
         """
         known = parameters(self).items()
         return {name: p.width for name, p in known if p.width and not equals(p.value, 0.0)}
@@ -226,34 +226,34 @@ class Law(Parametric, ABC):
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Return the force [N] of steady sliding at a speed >= 0, in the limit of zero `widths`.
 
-        It has one-sided derivatives at speed 0, and is finite below. An odd law defines this
-        method, and `sliding` and `static_level` follow from it. All three take further inputs
-        except F_e by keyword.
+        The force has one-sided derivatives at speed 0 and is finite at negative speeds. An odd law
+        defines this method; `sliding` and `static_level` are derived from it. All three accept
+        further inputs, except F_e, by keyword.
 
         Raises:
-            ValueError: the law does not define it, or has no such limit.
+            ValueError: the law does not define this method, or has no such limit.
         """
         raise one_sided(self, "it is not defined; write its method `outside(speed, N)`")
 
     def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
         """Return the force [N] of steady sliding to one `side`, 1 or -1, for zero `widths`.
 
-        It is smooth in v from v = 0 on, with the sign of `side`; a Stribeck curve with a velocity
-        of its own stays. Raises as `outside`.
+        The force has the sign of `side` and is smooth in v on this side, including v = 0. A
+        Stribeck curve with its own velocity scale is retained. Raises the errors of `outside`.
         """
         return side * self.outside(side * v, N, **inputs)
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the largest force [N] in stick against a pull to `side`, for zero `widths`.
 
-        By default it is the top of the curve at rest. Raises as `outside`.
+        By default it is the force of `outside` at speed 0. Raises the errors of `outside`.
         """
         return self.outside(0.0, N, **inputs)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return an upper bound of the force [N] of the states in any motion at a steady load.
+        """Return an upper bound of the force [N] of the states for any motion at constant load.
 
-        By default it is the static level. Raises as `outside`.
+        By default it is the static level. Raises the errors of `outside`.
         """
         return self.static_level(N, side, **inputs)
 
@@ -265,7 +265,7 @@ class Law(Parametric, ABC):
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return the internal states after long sliding at constant `v`; zero at v = 0.
 
-        With a smoothing velocity the rate vanishes there to rounding beyond 20 v_eps.
+        If |v| is smooth over v_eps, their rate vanishes to rounding for |v| > 20 v_eps.
         """
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
@@ -273,26 +273,26 @@ class Law(Parametric, ABC):
         return ()
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """Return states after a step of `h` [s] with v and N held, and their means over it.
+        """Return the states after a step of `h` [s] at constant v and N, and their means over it.
 
-        None if they are not known in closed form; needed for laws with modes, where rates are not
-        enough.
+        Return None if they are not known in closed form. Laws with modes need this method, because
+        the rates alone do not determine their step.
         """
         return None
 
     def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
         """Return the equilibrium of each state while v, N and the other states stay constant.
 
-        None for a law with a known `steady_state` only, in which all states are steady.
+        Return None if only `steady_state` is known, in which all states are in equilibrium.
         """
         return None
 
     def warnings(self) -> tuple[str, ...]:
-        """Return warnings about the parameters, such as missing passivity, one sentence each."""
+        """Return warnings about the parameters, such as a lack of passivity, one sentence each."""
         return ()
 
     def thumbnail(self) -> "Figure | None":
-        """Return a small figure of steady sliding under 1 N; None for a law with symbols."""
+        """Return a small figure of the force in steady sliding at N = 1 N; None with symbols."""
         from matplotlib.figure import Figure  # noqa: PLC0415  (matplotlib is slow to import)
 
         if any(is_symbolic(p.value) for p in parameters(self).values()):
@@ -323,12 +323,12 @@ def one_sided(law: Law, reason: str) -> ValueError:
 
 
 def chosen(law: Law, inputs: Mapping[str, Scalar]) -> dict[str, Scalar]:
-    """Return those of `inputs` that `law` takes."""
+    """Return the entries of `inputs` that `law` accepts."""
     return {i.name: inputs[i.name] for i in law.inputs if i.name in inputs}
 
 
 def check_law(where: str, law: object) -> None:
-    """Raise an error for anything but a law, such as its class or its name."""
+    """Raise an error if `law` is not a law; the hint covers the class and the name of a law."""
     if isinstance(law, Law):
         return
     hint = ""
@@ -341,11 +341,11 @@ def check_law(where: str, law: object) -> None:
 
 @parametric
 class StaticLaw(Law):
-    """Memoryless law: no internal states, no rows of the rate."""
+    """Memoryless law, which has no internal states."""
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Return no internal states: the force is a function of v and N."""
+        """Empty tuple, since the force is a function of v and N only."""
         return ()
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
@@ -355,7 +355,7 @@ class StaticLaw(Law):
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
     ) -> tuple[Switch, ...]:
-        """Return no changes of mode."""
+        """Return an empty tuple, since the law has no modes."""
         return ()
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
@@ -364,9 +364,9 @@ class StaticLaw(Law):
 
 
 def states_of(law: Law, v: Scalar, z: Scalar) -> Scalar:
-    """Return `z` with a row for each state of `law`.
+    """Return `z` with one row for each state of `law`.
 
-    For a law of one state a number is its row, and so is an array with an array of velocities.
+    If the law has one state, `z` may be a number, or an array of the shape of the velocities.
     """
     given = z
     if is_casadi(z):

@@ -1,8 +1,8 @@
-"""Smooth approximations of sign, abs, max and powers: all regularisation of laws.
+"""Smooth approximations of sign, abs, max and powers, which regularise all laws.
 
-`fabs`, `sign`, `if_else`, `norm` and fractional powers have silently wrong or NaN derivatives at
-zero; no law uses them. A width `eps` is always a parameter of the law, in the unit of `x`. The
-float `eps = 0.0` selects the original, non-smooth function where one is offered.
+The derivatives of `fabs`, `sign`, `if_else`, `norm` and fractional powers at zero are wrong or NaN,
+so laws use the functions of this file instead. A width `eps` is always a parameter of the law, in
+the unit of `x`. Where documented, the float `eps = 0.0` selects the original, non-smooth function.
 """
 
 import casadi as ca
@@ -12,16 +12,16 @@ from symfric.foundation.numeric import Scalar, equals, exp, expm1, is_casadi, is
 from symfric.foundation.vector import ROUND, TINY, NotIsotropicError, Vector, Vectors, no_vector
 
 BACK = 1e16
-"""Yielding factor above which an element returns to its limit at once."""
+"""Yielding factor above which an element returns to its limit immediately."""
 
 SHARE = 1e-6
-"""Fraction of the Stribeck velocity over which one side of its fall is rounded at rest."""
+"""Fraction of the Stribeck velocity over which `fall` is rounded at rest."""
 
 CORNER = 1e-4
-"""Fraction of the smoothing velocity over which a static law rounds |v| in its fall.
+"""Fraction of the smoothing velocity over which a static law rounds |v| in its Stribeck weight.
 
-The smooth sign multiplied with the fall is as small as this fraction there: the force differs from
-the formula with |v| by less than this fraction of its fall.
+Within this range the smooth sign is not larger than this fraction. Therefore the force differs from
+the formula with |v| by less than this fraction of the static excess.
 """
 
 
@@ -40,7 +40,7 @@ def sign(x: Scalar, eps: Scalar) -> Scalar:
 def magnitude(x: Scalar, eps: Scalar) -> Scalar:
     """Return the smooth |x| = x tanh(x / eps), exactly 0 at x = 0.
 
-    Since it is zero at rest, it does not relax a bristle at rest; beyond 20 eps it equals |x| to
+    Since it is zero at rest, a bristle at rest does not relax. Beyond 20 eps it equals |x| to
     rounding. The float `eps = 0.0` gives |x| itself, with its kink at x = 0.
     """
     if equals(eps, 0.0):
@@ -53,9 +53,9 @@ def magnitude(x: Scalar, eps: Scalar) -> Scalar:
 def power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
     """Return the smooth |x|^exponent = (x^2 + eps^2)^(exponent/2) - eps^exponent, 0 at x = 0.
 
-    It is finite with all derivatives in x and in the exponent. The float `exponent = 2.0` gives x^2
-    exactly and costs one multiplication; the float `eps = 0.0` gives |x|^exponent itself, without a
-    derivative at x = 0 for exponents below 1.
+    All its derivatives with respect to x and the exponent are finite. The float `exponent = 2.0`
+    gives x^2 exactly, with one multiplication. The float `eps = 0.0` gives |x|^exponent itself,
+    which has no derivative at x = 0 for exponents below 1.
     """
     if equals(exponent, 2.0):
         return x * x
@@ -65,15 +65,15 @@ def power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
 
 
 def overload(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
-    """Return `power` of a load share that may be far above 1, bounded to avoid overflow in float.
+    """Return `power` of a load share that may be far above 1, without overflow in float.
 
         w^(n/2) [1 + n/2 (1 - w/q)] - eps^n,   q = x^2 + eps^2
         w = q well below Q = BACK^(2/n), w = Q well above it, smooth
 
-    It equals `power` bit for bit up to q = (1 + Q)/2, and is monotonic. An element that yields
-    faster returns to its limit within a path of 1/BACK of its stretch, the rounding of a double, so
-    its exact rate does not affect any result. In contrast, |x|^50 of a load that fell to a sixth
-    overflows in float, and |x|^1000 of one that fell to a half in double.
+    It equals `power` bit for bit up to q = (1 + Q)/2, and it is monotonic. Above Q an element
+    returns to its limit within a path of 1/BACK of its stretch, which is the rounding error of a
+    double, so the exact rate does not affect results. By contrast, |x|^50 overflows in float if the
+    load falls to a sixth, and |x|^1000 overflows in double if it falls to a half.
     """
     if equals(exponent, 2.0) or equals(eps, 0.0):
         return power(x, exponent, eps)
@@ -89,7 +89,7 @@ def signed_power(x: Scalar, exponent: Scalar, eps: Scalar) -> Scalar:
 
 
 def positive(x: Scalar, eps: Scalar) -> Scalar:
-    """Return the smooth max(x, 0) = (x + sqrt(x^2 + eps^2)) / 2; value eps/2 at x = 0.
+    """Return the smooth max(x, 0) = (x + sqrt(x^2 + eps^2)) / 2, with the value eps/2 at x = 0.
 
     The float `eps = 0.0` gives max(x, 0) itself, with its kink at x = 0.
     """
@@ -100,7 +100,7 @@ def positive(x: Scalar, eps: Scalar) -> Scalar:
 
 
 def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
-    """Return `x` limited to [low, high], with kinks; vectors are limited to +-`high` by `hold`."""
+    """Return `x` limited to [low, high], with kinks; `hold` limits the length of a vector."""
     if isinstance(x, Vector):
         if is_number(low) and equals(high, -low):
             return hold(x, high, 0.0)
@@ -113,8 +113,8 @@ def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
 def hold(x: Scalar, top: Scalar, eps: Scalar) -> Scalar:
     """Return `x` limited to +-`top`: exactly x up to top - eps, exactly +-top from top + eps, C2.
 
-    A contact that carries hold(F_e) does not creep under a load below top - eps, as it would with
-    tanh. The float `eps = 0.0` gives the kinks. A vector keeps its direction.
+    Unlike with tanh, a contact that carries hold(F_e) does not creep under a load below top - eps.
+    The float `eps = 0.0` gives the limit with kinks. A vector keeps its direction.
     """
     if isinstance(x, Vector):
         return x.odd(lambda size: hold(size, top, eps), ROUND * top)
@@ -125,7 +125,7 @@ def hold(x: Scalar, top: Scalar, eps: Scalar) -> Scalar:
         t = positive((y - top) / (2 * eps) + 0.5, 0.0)
         return t * t * t * (2 - t) * eps
 
-    # a single clip: several could disagree by rounding about the side of a knot
+    # a single clip, since several could round to different sides of a knot
     within = clip(x, -top - eps, top + eps)
     return within - corner(within) + corner(-within)
 
@@ -149,7 +149,7 @@ def fraction(x: Scalar) -> Scalar:
 
 
 def choose(condition: Scalar, yes: Scalar, no: Scalar) -> Scalar:
-    """Return `yes` where the condition holds, else `no`: for modes and for originals that jump."""
+    """Return `yes` where the condition holds, else `no`; for modes and for non-smooth originals."""
     if isinstance(yes, Vector) or isinstance(no, Vector):
         return _chosen(condition, yes, no)
     if is_casadi(condition, yes, no):
@@ -167,9 +167,9 @@ def _chosen(condition: Scalar, yes: Vectors, no: Vectors) -> Vector:
 def stribeck(v: Scalar, v_s: Scalar, delta: Scalar, eps: Scalar) -> Scalar:
     """Return the Stribeck weight exp(-|v / v_s|^delta): 1 at rest, 0 far above v_s.
 
-    It is rounded at rest over `eps`, and beyond 1e3 eps equals that weight to 4e-6 for every delta
-    from 0 to 10. The float `delta = 2.0` needs no rounding; the float `eps = 0.0` gives the
-    original, for delta < 2 with a kink at rest.
+    The weight is rounded at rest over `eps`. Beyond 1e3 eps the rounding changes it by at most 4e-6
+    for every delta from 0 to 10. The float `delta = 2.0` needs no rounding. The float `eps = 0.0`
+    gives the original weight, which has a kink at rest for delta < 2.
     """
     u = v / v_s
     if equals(delta, 2.0) or equals(eps, 0.0):
@@ -180,17 +180,18 @@ def stribeck(v: Scalar, v_s: Scalar, delta: Scalar, eps: Scalar) -> Scalar:
 def _rounded_power(u: Scalar, exponent: Scalar, width: Scalar) -> Scalar:
     """Return |u|^exponent = u^2 (u^2 + width^2)^(exponent/2 - 1), exactly 0 at u = 0.
 
-    The relative error decreases like (width/u)^2. That of `power`, with its offset width^exponent,
-    does not for exponents below 2: 3e-3 at u = 1 for the exponent 0.5 and the width 1e-5.
+    The relative error decreases as (width/u)^2. The error of `power`, which has the offset
+    width^exponent, decreases more slowly for exponents below 2: it is 3e-3 at u = 1 for the
+    exponent 0.5 and the width 1e-5.
     """
     return u * u * (u * u + width * width) ** (exponent / 2 - 1)
 
 
 def onward(x: Scalar) -> Scalar:
-    """Return `x` for x >= 0 and tanh(2 x) / 2 below, C2, to extend formulas for speeds >= 0.
+    """Return `x` for x >= 0 and tanh(2 x) / 2 for x < 0, C2, to extend formulas for speeds >= 0.
 
-    Iterates of a solver may have a negative speed; a fall that grows exponentially there would make
-    it diverge.
+    Iterates of a solver may have negative speeds. A Stribeck weight that grows exponentially there
+    would make the solver diverge.
     """
     return choose(x < 0, tanh(2 * x) / 2, x)
 
@@ -198,9 +199,9 @@ def onward(x: Scalar) -> Scalar:
 def fall(speed: Scalar, v_s: Scalar, delta: Scalar) -> Scalar:
     """Return the Stribeck weight exp(-(speed / v_s)^delta) on one side of rest, for speeds >= 0.
 
-    A float `delta` that is an integer has all derivatives at rest. Others round the power over
-    `SHARE` of v_s, since for delta < 2 it has no second derivative there. Bounded below zero, see
-    `onward`.
+    If `delta` is a float with an integer value, all derivatives exist at rest. Otherwise the power
+    is rounded over `SHARE` of v_s, since for delta < 2 it has no second derivative at rest. The
+    weight is bounded for negative speeds, see `onward`.
     """
     if equals(delta, 2.0):
         return exp(-((speed / v_s) ** 2))
@@ -211,10 +212,10 @@ def fall(speed: Scalar, v_s: Scalar, delta: Scalar) -> Scalar:
 
 
 def phi1(x: Scalar) -> Scalar:
-    """Return (exp(x) - 1) / x, with value 1 and all derivatives correct at x = 0.
+    """Return (exp(x) - 1) / x, with the value 1 and correct derivatives at x = 0.
 
-    A Taylor polynomial replaces the quotient for |x| < 1e-2 (next term x^5/720, 1.4e-13): the usual
-    guarded quotient has derivative 0 at x = 0 instead of 1/2.
+    For |x| < 1e-2 a Taylor polynomial replaces the quotient (next term x^5/720, 1.4e-13). A
+    quotient that is only guarded against x = 0 has the derivative 0 there instead of 1/2.
     """
     series = 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5)))
     if not is_casadi(x):

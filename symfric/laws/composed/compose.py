@@ -1,4 +1,4 @@
-"""Sum, asymmetric and load-dependent laws, which wrap other laws."""
+"""Laws that combine or wrap other laws: sums, asymmetric and load-dependent laws."""
 
 from dataclasses import fields as fields_of
 from dataclasses import replace
@@ -21,13 +21,13 @@ from symfric.laws.composed.wrap import Wrapper
 
 @parametric
 class Sum(Law):
-    """Sum of friction forces; its states are those of the terms, one after another.
+    """Sum of friction laws, with the states of all terms.
 
         F = F_1 + F_2 + ...
 
-    A sum of sums is flattened. Parameters and states that share a name get the number of their
-    term: mu_d_1, mu_d_2, ...
-    Limits: those of the terms.
+    A sum of sums is flattened. The states are in the order of the terms. If parameters or states of
+    several terms have the same name, the number of the term is appended: mu_d_1, mu_d_2, ...
+    Limits: the limits of the terms.
     Source: superposition, as in Coulomb + viscous friction.
     """
 
@@ -57,11 +57,11 @@ class Sum(Law):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """Further inputs of all terms, each once."""
+        """Further inputs of all terms, without duplicates."""
         return tuple(dict.fromkeys(i for law in self.laws for i in law.inputs))
 
     def terms(self, z: Scalar) -> list[tuple[Law, Scalar]]:
-        """Return the laws, each with its rows of `z`."""
+        """Return each law with its rows of `z`."""
         ends = accumulate((len(law.states) for law in self.laws), initial=0)
         return [(law, z[a:b]) for law, (a, b) in zip(self.laws, pairwise(ends), strict=True)]
 
@@ -83,7 +83,7 @@ class Sum(Law):
         return total(law.static_level(N, side, **chosen(law, inputs)) for law in self.laws)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the sum of the bounds of the terms."""
+        """Return the sum of the bounds [N] of the terms."""
         return total(law.most_held(N, side, **chosen(law, inputs)) for law in self.laws)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
@@ -107,7 +107,7 @@ class Sum(Law):
         return tuple(switches)
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """Return the held steps of the terms, if every term with states has one."""
+        """Return the held steps of the terms; None if a term with states has none."""
         known = [law.held_step(v, N, part, h) for law, part in self.terms(z) if law.states]
         steps = [step for step in known if step is not None]
         if not steps or len(steps) < len(known):
@@ -115,7 +115,10 @@ class Sum(Law):
         return _join(v, [end for end, _ in steps]), _join(v, [mean for _, mean in steps])
 
     def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
-        """Return the equilibria of the terms; steady states for terms without them."""
+        """Return the equilibria of the terms, or None if no term with states has any.
+
+        For a term without equilibria these are its steady states.
+        """
         known = [(law, law.held_rest(v, N, part)) for law, part in self.terms(z) if law.states]
         if all(rest is None for _, rest in known):
             return None
@@ -136,8 +139,8 @@ class Asymmetric(Wrapper):
 
         p(v) = p_pos w + p_neg (1 - w),   w = [1 + tanh(v / v_blend)] / 2
 
-    Every parameter that differs between `positive` and `negative` is blended: a bristle law keeps
-    its one state, and equal parameters cost nothing.
+    Only parameters that differ between `positive` and `negative` are blended, so equal parameters
+    add no cost. The number of states is the one of a single law.
     Limits: one-sided curves beyond 3 v_blend; keep v_blend below the smoothing velocity of the law.
     Source: separate parameter sets per direction, usual for drives (Armstrong-Helouvry 1991).
     """
@@ -160,11 +163,11 @@ class Asymmetric(Wrapper):
 
     @property
     def inner(self) -> Law:
-        """Law of one side."""
+        """Law of positive velocities."""
         return self.positive
 
     def inner_at(self, v: Scalar) -> Law:
-        """Return the law with the parameters of the direction of `v`."""
+        """Return the law with its parameters blended at the velocity `v`."""
         w = (1 + smooth.sign(v, self.v_blend)) / 2
         rest = 1 - w
         sides = (parameters(law).values() for law in (self.positive, self.negative))
@@ -181,11 +184,11 @@ class Asymmetric(Wrapper):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """Smaller velocity scale of the sides [m/s]."""
+        """Smaller velocity scale [m/s] of the two sides."""
         return smallest(self.positive.velocity_scale, self.negative.velocity_scale)
 
     def warnings(self) -> tuple[str, ...]:
-        """Return the warnings of both sides, each once."""
+        """Return the warnings of both sides, without duplicates."""
         return tuple(dict.fromkeys(self.positive.warnings() + self.negative.warnings()))
 
 
@@ -195,9 +198,9 @@ class LoadDependent(Wrapper):
 
         N_eff = N_0 + c max(N, 0)
 
-    N_0 is the preload (seal, bearing), c the share of the external load; max is smooth over N_eps,
-    so that there is no division by zero and no negative load at lift-off (with N_0 = 0 down to
-    N = -1e7 N_eps, where the difference of the square root rounds to zero).
+    N_0 is the preload (of a seal or a bearing) and c the share of the external load. The maximum is
+    smooth over N_eps. Therefore N_eff is positive at lift-off and laws may divide by it; with
+    N_0 = 0 this holds down to N = -1e7 N_eps, where N_eff rounds to zero.
     Limits: N_0 = 0, c = 1, N_eps = 0 is the law itself for N >= 0.
     Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (linear load part).
     """
@@ -215,7 +218,7 @@ class LoadDependent(Wrapper):
 
 
 def _structure(value: object) -> object:
-    """Return a law without its numbers: class, options, and the same for its parts."""
+    """Return the class and the options of a law and of its parts, without its parameters."""
     if isinstance(value, Parametric):
         held = (
             getattr(value, item.name) for item in fields_of(value) if "unit" not in item.metadata

@@ -23,25 +23,25 @@ class Isotropic(Parametric):
         F = F(w, N)/w v,   w = sqrt(v'v + v_eps^2)      laws without states
         F = F(v, N, z),    dz/dt = rate(v, N, z)        laws with states, v and z vectors
 
-    Quantities that change sign with the motion, v and deflections, are vectors; those that do not,
-    an age or a level, stay numbers. The expressions of the law are evaluated with vectors, |a| for
-    a size, a/|a| for a sign, a'b for a product: see `symfric.foundation.vector`. Elements that
-    yield reduce slip along their load only, by the component of the slip along it (radial return,
-    rounded over `turn`). Maxwell-slip, Bouc-Wen and elasto-plastic elements then are those of
-    plasticity in the plane, and LuGre, Dahl, Gonthier those of the literature. Further inputs, such
-    as F_e, are vectors (d, 1). In components: vector states along x, then along y, then along z,
-    then the states that are numbers.
-    Limits: slip along a line is the law itself. Equivariant under rotations. Every vector state
-    stays within the bound that it has in straight slip. v_eps is for laws without states; the
-    others have their own.
+    Quantities that change sign with the motion, such as v and deflections, become vectors. All
+    others, such as an age or a level, remain numbers. The expressions of the law are evaluated with
+    vectors: |a| is a magnitude, a/|a| a sign and a'b a product, see `symfric.foundation.vector`. An
+    element that yields reduces only the component of slip along its load (radial return, rounded
+    over `turn`). Therefore Maxwell-slip, Bouc-Wen and elasto-plastic elements agree with plasticity
+    in the plane, and LuGre, Dahl and Gonthier with their published vector forms. Further inputs,
+    such as F_e, are vectors (d, 1). The rows of z are the vector states along x, then along y, then
+    along z, then the states that are numbers.
+    Limits: the law itself for slip along a line; equivariant under rotations. Every vector state
+    satisfies the bound that it has in straight slip. v_eps applies to laws without states only;
+    laws with states have their own smoothing velocity.
 
     Raises:
-        ValueError: a law that distinguishes forward from backward, has modes (they change where v
+        ValueError: the law distinguishes forward from backward, has modes (which change where v
             passes through zero), or contains expressions that are undefined for vectors.
     """
 
     axes: ClassVar[str] = ""
-    """Names of the dimensions."""
+    """Names of the d axes, one letter each."""
 
     law: Law
     v_eps: Scalar = fields.REST_EPS(1e-9, doc="smoothing of the speed", lower=1e-15)
@@ -57,7 +57,7 @@ class Isotropic(Parametric):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Vector states along x, then along y, and so on, then the states that are numbers."""
+        """Vector states along x, then along y and z, then the states that are numbers."""
         vectors = [s for s in self.law.states if not s.even]
         numbers = tuple(s for s in self.law.states if s.even)
         along = (replace(s, name=f"{s.name}_{x}") for x in self.axes for s in vectors)
@@ -72,7 +72,7 @@ class Isotropic(Parametric):
         return Vector([a[i] for i in range(len(self.axes))], self.turn)
 
     def _vectors(self, z: Scalar) -> list[Vectors]:
-        """Return the states of the law, vectors and numbers, from the rows of `z`."""
+        """Return the states of the law as vectors and numbers, from the rows of `z`."""
         d, even = len(self.axes), [s.even for s in self.law.states]
         n = even.count(False)
         vectors = (self._vector([z[i * n + k] for i in range(d)]) for k in range(n))
@@ -96,14 +96,14 @@ class Isotropic(Parametric):
         return self._rows([F])
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Return the rates of the states, in their order."""
+        """Return the rates of the states, in the order of `states`."""
         if not self.law.states:
             return empty(v[0])
         given = self._given(inputs)
         return self._rows(_rate(self.law, self._vector(v), N, self._vectors(z), given))
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return the states after long sliding along `v`, in their order."""
+        """Return the states after long sliding along `v`, in the order of `states`."""
         if not self.law.states:
             return empty(v[0])
         slip = self._vector(v)
@@ -113,13 +113,13 @@ class Isotropic(Parametric):
         return self._rows([z[k] if s.even else z[k] / w * slip for k, s in states])
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
-        """Return no changes of mode: laws with modes are refused."""
+        """Return an empty tuple, since laws with modes are rejected."""
         return ()
 
 
 @parametric
 class PlanarSlip(Isotropic):
-    """Isotropic friction law for slip in a plane, d = 2: see `Isotropic`.
+    """Isotropic friction law for slip in a plane, d = 2; see `Isotropic`.
 
     Source: isotropy; LuGre in two dimensions: Velenis, Tsiotras, Canudas de Wit, Vehicle Syst. Dyn.
     43(1), 2005; Bouc-Wen: Park, Wen, Ang, Earthq. Eng. Struct. Dyn. 14(4), 1986 (not read), with
@@ -131,9 +131,9 @@ class PlanarSlip(Isotropic):
 
 @parametric
 class SpatialSlip(Isotropic):
-    """Isotropic friction law for slip in space, d = 3, such as a ball in its socket: `Isotropic`.
+    """Isotropic friction law for slip in space, d = 3, as in a ball joint; see `Isotropic`.
 
-    Limits: bristles have the direction they have in the axes in which v is given.
+    Limits: bristles do not rotate relative to the axes in which v is expressed.
     Source: isotropy.
     """
 
@@ -141,7 +141,7 @@ class SpatialSlip(Isotropic):
 
 
 def anisotropy(law: Law) -> str:
-    """Return the reason why a law has no isotropic form in several dimensions; empty if it has."""
+    """Return the reason why a law has no isotropic form, or an empty string if it has one."""
     if not _is_odd(law):
         return "it distinguishes forward from backward slip, which has no meaning in a plane"
     N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
@@ -162,7 +162,7 @@ def anisotropy(law: Law) -> str:
 
 
 def _is_odd(law: Law) -> bool:
-    """Return True if mirrored motion mirrors the force of a law and of all laws it holds."""
+    """Return True if mirrored motion mirrors the force of a law and of all laws it contains."""
     held = [getattr(law, item.name) for item in fields_of(law)]
     inner = [x for value in held for x in (value if isinstance(value, tuple) else (value,))]
     mirrored = law.facts.odd and not isinstance(law, Asymmetric)
@@ -180,7 +180,7 @@ def _terms(law: Law, z: Scalar) -> list[tuple[Law, Scalar]]:
 def _force(
     law: Law, v: Vector, N: Scalar, z: Sequence[Vectors], inputs: Inputs, v_eps: Scalar
 ) -> Vector:
-    """Return the force of a law in vectors, of a sum term by term."""
+    """Return the force of a law as a vector; a sum is evaluated term by term."""
     first, *rest = (_term(term, v, N, part, inputs, v_eps) for term, part in _terms(law, z))
     return sum(rest, start=first)
 
@@ -188,7 +188,7 @@ def _force(
 def _term(
     law: Law, v: Vector, N: Scalar, z: Sequence[Vectors], inputs: Inputs, v_eps: Scalar
 ) -> Vector:
-    """Return the force of a term, without states along v, or along the lagged velocity."""
+    """Return the force of a term; without states it acts along v or along the lagged velocity."""
     if law.inputs or (z and not isinstance(law, Lagged)):
         return law.force(v, N, z, **chosen(law, inputs))
     law, slip = (law.law, z[0]) if isinstance(law, Lagged) else (law, v)
@@ -197,7 +197,7 @@ def _term(
 
 
 def _rate(law: Law, v: Vector, N: Scalar, z: Sequence[Vectors], inputs: Inputs) -> list[Vectors]:
-    """Return the rates of the states of a law in vectors and numbers."""
+    """Return the rates of the states of a law as vectors and numbers."""
     rows: list[Vectors] = []
     for term, part in _terms(law, z):
         if part:

@@ -1,8 +1,8 @@
-"""Friction of many random contacts: seeded reference models, not usable in optimisation.
+"""Friction of many random contacts: reference models that cannot be used in optimisation.
 
-Their force depends on a history of contacts made and lost at random. Smooth laws are identified
-from, and compared with, their results. One contact is an expression like a law, so a population
-runs in NumPy, all contacts at once, and as generated C, in a loop.
+The force depends on the history of contacts that are made and lost at random. Smooth laws are
+identified from the results and compared with them. A single contact is an expression, like a law.
+Therefore a population runs in NumPy, on arrays of all contacts, and as generated C, in a loop.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from symfric.laws.base.law import Facts, Input, Law, State
 
 Array = NDArray[np.float64]
 SPEEDS = 20
-"""Speeds per decade at which the mean force is computed; between them it is interpolated."""
+"""Number of speeds per decade at which the mean force is computed."""
 
 
 @final
@@ -33,9 +33,9 @@ class Contacts:
     """Contacts of a population at one time.
 
     Attributes:
-        z: their states, shape (states, count).
-        r: a random number of each, shape (count,).
-        random: generator for new random numbers.
+        z: states of the contacts, shape (states, count).
+        r: random number of each contact, shape (count,).
+        random: generator of new random numbers.
     """
 
     z: Array
@@ -47,8 +47,8 @@ class Contacts:
 class Population(Parametric, ABC):
     """Friction of `count` contacts that are made and lost at random, reproducible by `seed`.
 
-    It has figures and a force along a motion, but no rate: it is not a `Law`, and cannot be used in
-    scenes.
+    A population has figures and a force along a prescribed motion. It has no rate, so it is not a
+    `Law` and cannot be used in scenes.
     """
 
     facts: ClassVar[Facts]
@@ -71,13 +71,13 @@ class Population(Parametric, ABC):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """Return no inputs besides v and N."""
+        """Empty tuple, since v and N are the only inputs."""
         return ()
 
     @property
     @abstractmethod
     def velocity_scale(self) -> float:
-        """Sliding velocity [m/s] over which the mean force changes; inf if there is none."""
+        """Sliding velocity [m/s] over which the mean force changes; inf without such a scale."""
 
     @property
     @abstractmethod
@@ -87,35 +87,35 @@ class Population(Parametric, ABC):
     @property
     @abstractmethod
     def path(self) -> float:
-        """Path that renews every contact [m]."""
+        """Length of the path [m] after which every contact has been renewed."""
 
     @property
     def step(self) -> float:
-        """Longest path of one step of a contact [m]."""
+        """Largest path [m] of one step of a contact."""
         return self.path / 20
 
     @abstractmethod
     def contact(self, z: Scalar, r: Scalar, dx: Scalar, dt: Scalar, N: Scalar) -> Scalar:
-        """Return the states of one contact after a step, with its force [N] as last row.
+        """Return the states of one contact after a step, followed by its force [N].
 
-        The step is the path dx [m] in the time dt [s]. `z` are its states and `r` its random
-        number; N [N] is the load of the whole population. Floats, arrays of all contacts and CasADi
-        symbols are accepted.
+        The step is the path dx [m] in the time dt [s]. `z` contains the states of the contact, `r`
+        is its random number, and N [N] is the load of the whole population. The arguments are
+        floats, arrays over all contacts or CasADi symbols.
         """
 
     @abstractmethod
     def _draw(self, random: np.random.Generator) -> tuple[Array, Array]:
-        """Return states (states, count) and random numbers (count,) of unloaded contacts."""
+        """Return the states (states, count) and random numbers (count,) of unloaded contacts."""
 
     def begin(self) -> Contacts:
-        """Return unloaded contacts at their random places."""
+        """Return unloaded contacts at random positions."""
         random = np.random.default_rng(self.seed)
         return Contacts(*self._draw(random), random)
 
     def advance(self, contacts: Contacts, dx: float, dt: float, N: float) -> tuple[Contacts, float]:
-        """Return the contacts, and their force, after the path `dx` [m] in the time `dt` [s].
+        """Return the contacts and their force [N] after the path `dx` [m] in the time `dt` [s].
 
-        N [N] is the load. A long path is divided into steps.
+        N [N] is the load. A path longer than `step` is divided into several steps.
         """
         z, r, rows = contacts.z, contacts.r, np.zeros(0)
         parts = max(1, ceil(abs(dx) / self.step * (1 - 1e-9)))
@@ -127,10 +127,12 @@ class Population(Parametric, ABC):
         return Contacts(z, r, contacts.random), float(rows[-1].sum())
 
     def force(self, t: ArrayLike, x: ArrayLike, N: float) -> Array:
-        """Return the force [N] along the motion x(t) [m] under N [N], from unloaded contacts.
+        """Return the force [N] along the motion x(t) [m] at the load N [N].
+
+        The contacts are unloaded at the first time.
 
         Raises:
-            ValueError: t not increasing, or other lengths.
+            ValueError: t does not increase, or t and x differ in length.
         """
         where = f"{type(self).__name__}.force"
         t, x = checks.times(f"{where}: t", t), checks.array(f"{where}: x", x)
@@ -149,7 +151,7 @@ class Population(Parametric, ABC):
     def steady_force(self, v: ArrayLike, N: float) -> Array:
         """Return the mean force [N] in steady sliding at `v` [m/s]; 0 at rest.
 
-        It is computed at 20 speeds a decade over the range of `v`, and interpolated between them.
+        It is computed at 20 speeds per decade over the range of `v` and interpolated between them.
         """
         where = f"{type(self).__name__}.steady_force"
         v = checks.array(f"{where}: v", v, ndim=None)
@@ -164,19 +166,19 @@ class Population(Parametric, ABC):
         return np.where(v == 0, 0.0, smooth.sign(v, 0.0) * at)
 
     def _mean_force(self, v: float, N: float) -> float:
-        """Return the mean force [N] at the speed `v` [m/s] over the second renewal of contacts."""
+        """Return the mean force [N] at the speed `v` [m/s], after all contacts were renewed."""
         contacts, F, parts = self.begin(), np.zeros(80), 40
         for i in range(F.size):
             contacts, F[i] = self.advance(contacts, self.path / parts, self.path / parts / v, N)
         return float(F[parts:].mean())
 
     def warnings(self) -> tuple[str, ...]:
-        """Return no warnings: all parameters within their bounds are valid."""
+        """Return an empty tuple, since all parameters within their bounds are valid."""
         return ()
 
 
 AnyLaw = Law | Population
-"""Law or population, with a name, facts and figures."""
+"""Law or population; both have a name, facts and figures."""
 
 
 @parametric
@@ -190,15 +192,15 @@ class GenericAsperity(Population):
         d+   = d + dx within +-mu N_c/k_c in contact, else 0
         F    = sum of k_c d over `count` asperities
 
-    Each asperity meets a counterface of period lam at a random phase s, loaded like a half sine;
-    the loads of all add up to N. In contact it is a spring of random stiffness k_c (1/2 to 3/2 of
-    the mean) that sticks, and slips at a force that grows with its age. When contact is lost its
-    energy is.
-    Limits: the force lies between mu_0 N in fast and mu_inf N in slow sliding, less what the
-    springs lack; hysteresis with memory, velocity weakening, lag and dwell emerge. The
-    scatter of the force falls like 1/sqrt(count). A reconstruction from words.
+    Each asperity meets a counterface of period lam at a random phase s. Its load is a half sine of
+    s, and the loads of all asperities add up to N. In contact it is a spring of random stiffness
+    k_c (1/2 to 3/2 of the mean), which sticks up to a force that grows with its age and then slips.
+    When the contact is lost, the energy of the spring is dissipated.
+    Limits: mu_0 N in fast sliding and mu_inf N in slow sliding, both reduced by springs that have
+    not reached their limit. Hysteresis with memory, velocity weakening, lag and dwell result from
+    the contacts. The scatter of the force decreases as 1/sqrt(count). Reconstructed from the text.
     Source: Al-Bender, Lampaert, Swevers, Tribol. Lett. 16(1-2), 2004.
-    Checked: from words.
+    Checked: reconstructed from the description in the text.
     """
 
     facts: ClassVar[Facts] = Facts(
@@ -221,7 +223,7 @@ class GenericAsperity(Population):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Place in the period, stretch and age of one asperity."""
+        """Position in the period, stretch and age of one asperity."""
         stretch = State("d", "m", 1e-6, doc="stretch of the asperity")
         place = State("s", "1", 1.0, even=True, doc="place in the period")
         return (place, stretch, State("t_c", "s", 0.1, even=True, doc="age of the contact"))
@@ -242,9 +244,9 @@ class GenericAsperity(Population):
         return self.lam
 
     def contact(self, z: Scalar, r: Scalar, dx: Scalar, dt: Scalar, N: Scalar) -> Scalar:
-        """Return place, stretch, age and force [N] of an asperity after a step.
+        """Return the position, stretch, age and force [N] of an asperity after a step.
 
-        Its stiffness is (1 + r/2) times the mean, r in [-1, 1].
+        The stiffness of the asperity is (1 + r/2) times the mean, with r in [-1, 1].
         """
         s = smooth.fraction(z[0] + dx / self.lam)
         along, k_c = s / self.duty, self.k / (self.count * self.duty) * (1 + r / 2)
@@ -265,13 +267,13 @@ class GenericAsperity(Population):
 class RandomBristles(Population):
     """Bristle friction of Haessig and Friedland (a population).
 
-        d+ = d + dx, or anew at random within +-delta_s where |d + dx| > delta_s
+        d+ = d + dx, or a new random value within +-delta_s where |d + dx| > delta_s
         F  = sigma_0/count sum of d over `count` bristles
 
     A bristle snaps when it is stretched beyond delta_s, and bonds again on either side.
-    Limits: the mean force in sliding lies between 0 and sigma_0 delta_s, about half of it; it
-    depends neither on the velocity nor on the load. `HaessigFriedland` is the reset integrator of
-    the same paper.
+    Limits: the mean force in sliding is about half of sigma_0 delta_s, and at most sigma_0 delta_s.
+    It depends neither on the velocity nor on the load. `HaessigFriedland` is the reset integrator
+    of the same paper.
     Source: Haessig and Friedland, ASME J. Dyn. Syst. Meas. Control 113(3), 1991.
     """
 
@@ -292,7 +294,7 @@ class RandomBristles(Population):
 
     @property
     def velocity_scale(self) -> float:
-        """Always infinite: the force depends on the path only."""
+        """Infinite velocity scale, since the force depends on the path only."""
         return float("inf")
 
     @property
@@ -308,7 +310,7 @@ class RandomBristles(Population):
     def contact(self, z: Scalar, r: Scalar, dx: Scalar, dt: Scalar, N: Scalar) -> Scalar:
         """Return the stretch and the force [N] of a bristle after a step.
 
-        After it snaps, it bonds again at r delta_s, r in [-1, 1].
+        A bristle that snaps bonds again at r delta_s, with r in [-1, 1].
         """
         d = z[0] + dx
         d = smooth.choose(smooth.magnitude(d, 0.0) > self.delta_s, r * self.delta_s, d)
@@ -320,10 +322,10 @@ class RandomBristles(Population):
 
 
 def steady_force(law: AnyLaw, v: Array, N: float) -> Array:
-    """Return the force in steady sliding [N] at the velocities `v` [m/s].
+    """Return the force [N] in steady sliding at the velocities `v` [m/s].
 
-    Further inputs of the law have their values `Input.steady`, with the sign of v if the law is
-    odd: an applied force pulls forward.
+    Further inputs of the law have the value `Input.steady`, multiplied by the sign of v if the law
+    is odd, so that an applied force pulls in the direction of sliding.
     """
     if isinstance(law, Population):
         return law.steady_force(v, N)
@@ -334,9 +336,9 @@ def steady_force(law: AnyLaw, v: Array, N: float) -> Array:
 
 
 def steady_inputs(law: AnyLaw) -> str:
-    """Return the further inputs of `steady_force` as text: ", F_e = 1 N"; empty without inputs.
+    """Return the further inputs of `steady_force` as text, such as ", F_e = 1 N".
 
-    For an odd law these are the values at v > 0.
+    The text is empty for a law without further inputs. For an odd law the values hold for v > 0.
     """
     return "".join(f", {i.name} = {i.steady:g} {i.unit}" for i in law.inputs)
 
@@ -346,8 +348,9 @@ class Cost:
     """Number of CasADi instructions, including inputs and outputs.
 
     Attributes:
-        value: of force and rate together, or of one contact of a population.
-        gradient: of their derivatives by v, N, the states and further inputs.
+        value: instructions for force and rate together, or for one contact of a population.
+        gradient: instructions for their derivatives with respect to v, N, the states and further
+            inputs.
     """
 
     value: int
@@ -355,7 +358,7 @@ class Cost:
 
 
 def cost(law: AnyLaw) -> Cost:
-    """Return the cost of `law` with its numbers, common parts counted once."""
+    """Return the cost of `law` with numerical parameters; common subexpressions count once."""
     v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
     if isinstance(law, Population):
         r, dt = ca.SX.sym("r"), ca.SX.sym("dt")

@@ -1,4 +1,4 @@
-"""Laws that wrap a law: lagged, temperature-dependent, and normalised by the load."""
+"""Laws that wrap one other law: lagged, temperature-dependent, and normalised by the load."""
 
 from dataclasses import fields as fields_of
 
@@ -9,11 +9,11 @@ from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law
 
 
 class Wrapper(Law):
-    """Law that wraps another law, with other parameters or another normal force.
+    """Law that evaluates another law with modified parameters or a modified normal force.
 
         F = F_inner(v)(v, load(N), z)
 
-    A wrapper overrides `inner`, `inner_at`, `load`, or a method.
+    Subclasses override `inner`, `inner_at`, `inner_of`, `load` or methods of `Law`.
     """
 
     law: Law
@@ -30,11 +30,11 @@ class Wrapper(Law):
         return self.law
 
     def inner_at(self, v: Scalar) -> Law:
-        """Return the wrapped law, with its parameters at the sliding velocity `v`."""
+        """Return the wrapped law with its parameters at the sliding velocity `v`."""
         return self.inner
 
     def inner_of(self, side: int) -> Law:
-        """Return the wrapped law, with its parameters on one side of v = 0."""
+        """Return the wrapped law with its parameters on one side of v = 0."""
         return self.inner
 
     def load(self, N: Scalar) -> Scalar:
@@ -65,11 +65,11 @@ class Wrapper(Law):
         return self.inner_of(side).sliding(v, self.load(N), side, **inputs)
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the largest force [N] of the wrapped law in stick, on its side."""
+        """Return the largest force [N] of the wrapped law in stick against a pull to `side`."""
         return self.inner_of(side).static_level(self.load(N), side, **inputs)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the bound of the wrapped law, on its side."""
+        """Return the bound [N] of the wrapped law for motion to `side`."""
         return self.inner_of(side).most_held(self.load(N), side, **inputs)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
@@ -101,16 +101,17 @@ class Wrapper(Law):
 
 @parametric
 class Lagged(Wrapper):
-    """Law without states that follows the velocity with a lag (one state).
+    """Law without states whose force follows the velocity with a lag (one state).
 
         dw/dt = (v - w) / tau_L
         F     = F_law(w, N)
 
-    It adds frictional lag to any static law: while the velocity rises the force is that of a lower
-    velocity, and after a reversal it keeps its sign for about tau_L, so it may push for an instant.
-    Limits: the law itself for v that changes slowly against tau_L; tau_L of bearings 1 to 50 ms.
-    As C in float the force is as uncertain as w, 1e-7 of the largest velocity: use double if that
-    is not small against the smoothing velocity.
+    The wrapper adds frictional lag to a static law: while the velocity rises, the force is the one
+    of a lower velocity. After a reversal of v the force keeps its sign for about tau_L, during
+    which it drives the motion.
+    Limits: the law itself if v changes slowly compared with tau_L; for bearings tau_L is 1 to
+    50 ms. In C with float, w has an error of 1e-7 of the largest velocity: use double if this is
+    not small compared with the smoothing velocity.
     Source: Hess and Soom, ASME J. Tribol. 112(1), 1990 (pure delay); first-order form constructed.
     """
 
@@ -129,7 +130,7 @@ class Lagged(Wrapper):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Velocity that the force follows."""
+        """Lagged velocity w, at which the force is evaluated."""
         return (State("w", "m/s", 0.1, doc="velocity that the force follows"),)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
@@ -137,7 +138,7 @@ class Lagged(Wrapper):
         return self.law.force(z[0], N, **inputs)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Return the rate of the velocity that the force follows [m/s^2], shape (1, 1)."""
+        """Return the rate of the lagged velocity [m/s^2], shape (1, 1)."""
         return column((v - z[0]) / self.tau_L)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
@@ -145,20 +146,20 @@ class Lagged(Wrapper):
         return column(v)
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> None:
-        """Return None: the rate is sufficient."""
+        """Return None, since the law has no modes."""
 
 
 @parametric
 class TemperatureDependent(Wrapper):
-    """Law whose coefficients fall with the temperature.
+    """Law whose coefficients decrease with the temperature.
 
         mu(T)      = mu      exp(-k_dry (T - T_0))   every dry level: coefficient or force
         sigma_2(T) = sigma_2 exp(-k_wet (T - T_0))   every viscous coefficient
 
-    The `role` of a parameter, "level" or "viscous", selects it. T [K] is a parameter: a
-    number, or a symbol of another model.
-    Limits: T = T_0 is the law itself. The exponential holds over some ten kelvin, for oils with
-    k_wet of 0.02 to 0.05 1/K.
+    All parameters with the `role` "level" or "viscous" are scaled. T [K] is a parameter, so that it
+    may be a number or a symbol of another model.
+    Limits: T = T_0 is the law itself. The exponentials are valid over some tens of kelvins. For
+    oils k_wet is 0.02 to 0.05 1/K.
     Source: Reynolds' viscosity equation; for robot joints Bittencourt and Gunnarsson, J. Dyn. Syst.
     Meas. Control 134(5), 2012, with other functions of T.
     """
@@ -192,19 +193,20 @@ class TemperatureDependent(Wrapper):
 
 @parametric
 class LoadNormalised(Wrapper):
-    """Law under one load, whose force is scaled with the actual load.
+    """Law evaluated at a fixed load, with its force scaled to the actual load.
 
         F     = N / N_0 F_law(v, N_0, z)
         dz/dt = rate_law(v, N_0, z)
 
-    Bristles of laws in newtons deflect with the load; if it falls they keep their force, which in
-    joints with friction from reactions can leave no solution. Here the deflection does not depend
-    on the load, the force follows the load at once, and N = 0 gives zero force.
-    Limits: N = N_0 is the law itself, and so is any N for a law whose force is proportional to the
-    load and without states; `LuGre` becomes `LuGreNormalised` with sigma_i / N_0. All of the force
-    is scaled, including viscous friction. A load that grows over a bent bristle does work.
-    Source: LuGre in coefficients of friction, Canudas de Wit and Tsiotras, CDC 1999; for other laws
-    constructed.
+    The deflection of a bristle law in newtons depends on the load. If the load falls, the bristles
+    keep their force, so that joints with friction from reactions may have no solution. In this
+    wrapper the deflection does not depend on the load, the force follows the load immediately, and
+    N = 0 gives zero force.
+    Limits: N = N_0 is the law itself, as is any N for a law without states whose force is
+    proportional to the load; `LuGre` becomes `LuGreNormalised` with sigma_i / N_0. The whole force
+    is scaled, including viscous friction. A load that increases on a deflected bristle does work.
+    Source: LuGre in coefficients of friction, Canudas de Wit and Tsiotras, CDC 1999; constructed
+    for other laws.
     """
 
     facts = Facts((), "that of its law", "constructed")
@@ -222,21 +224,21 @@ class LoadNormalised(Wrapper):
             )
 
     def load(self, N: Scalar) -> Scalar:
-        """Return N_0 [N], independent of the load."""
+        """Return N_0 [N] for every load."""
         return self.N_0
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Return the friction force [N], scaled."""
+        """Return the friction force [N], scaled by N / N_0."""
         return N / self.N_0 * super().force(v, N, z)
 
     def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
-        """Return the sliding force [N] on one side, scaled."""
+        """Return the sliding force [N] on one side, scaled by N / N_0."""
         return N / self.N_0 * super().sliding(v, N, side)
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the largest force [N] at rest, scaled."""
+        """Return the largest force [N] at rest, scaled by N / N_0."""
         return N / self.N_0 * super().static_level(N, side)
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the bound at N_0, scaled."""
+        """Return the bound [N] at the load N_0, scaled by N / N_0."""
         return N / self.N_0 * super().most_held(N, side)

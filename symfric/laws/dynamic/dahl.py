@@ -19,12 +19,13 @@ class Dahl(Law):
 
     `z` is the mean bristle deflection [m].
     Limits: steady state mu_d N sign(v); rate-independent; drifts under vibration; n = 1 has the
-    virgin curve F = mu_d N (1 - exp(-sigma_0 x / (mu_d N))). |v| and sign(v) are smooth over
-    v_eps, to be kept ten times below the slowest motion of interest; v_eps = 0 is
-    the original with a kink at v = 0. n < 1 reaches the level within a finite distance, with a
-    corner that rho_eps rounds to a layer of z as wide as rho_eps^(1-n) of its level: keep that
-    ten times above rtol, or the element is so stiff there that a step leaps over a reversal of
-    slip and no error is estimated (n = 0.1 with the default at rtol 1e-3). Not valid for N = 0.
+    virgin curve F = mu_d N (1 - exp(-sigma_0 x / (mu_d N))). |v| and sign(v) are smooth over v_eps.
+    Keep v_eps ten times below the slowest motion of interest. v_eps = 0 is the original, with a
+    kink at v = 0. For n < 1 the force reaches its level within a finite distance, with a corner
+    that rho_eps smooths over the fraction rho_eps^(1-n) of the level of z. This fraction should be
+    ten times above rtol. Otherwise the element is so stiff in the corner that a step can skip a
+    reversal of slip without an error estimate (n = 0.1, default rho_eps, rtol 1e-3). Not valid for
+    N = 0.
     Source: Dahl, Aerospace Corp. TOR-0158(3107-18)-1, 1968; exponent: Dahl, AIAA J. 14, 1976.
     Checked: n = 1: Altair MotionSolve's manual and public code; n is unverified.
     """
@@ -39,7 +40,7 @@ class Dahl(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Deflection z of the contact [m], positive with v."""
+        """Mean bristle deflection z [m], positive for v > 0."""
         return (State("z", "m", deflection(self.sigma_0), doc="mean bristle deflection"),)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -66,23 +67,23 @@ class Dahl(Law):
 
 @parametric
 class BlimanSorine(Law):
-    """Bliman-Sorine friction of second order (two states), or of first order (one).
+    """Bliman-Sorine friction of second order (two states) or first order (one state).
 
         dF_1/dt = ( mu_1 N v - |v| F_1) / (eta s_f)
         dF_2/dt = (-mu_2 N v - |v| F_2) / s_f
         F = F_1 + F_2
 
-    Linear in the path |v| t, hence rate-independent: each reversal is followed by a peak at the
-    path s_p = eta s_f/(1 - eta) ln(mu_1/(eta mu_2)), of the height
+    The law is linear in the path |v| t and hence rate-independent. Each reversal is followed by a
+    peak at the path s_p = eta s_f/(1 - eta) ln(mu_1/(eta mu_2)), of the height
     N [mu_1 (1 - exp(-s_p/(eta s_f))) - mu_2 (1 - exp(-s_p/s_f))].
-    order = "1" keeps F_1 alone, with mu_2 = 0 and the path eta s_f: that is `Dahl`.
+    order = "1" uses F_1 only, which is `Dahl` with the level mu_1 N and the path constant eta s_f.
     Limits: steady state (mu_1 - mu_2) N sign(v), no Stribeck effect in steady sliding; initial
-    stiffness N (mu_1/eta - mu_2)/s_f. Weakly damped at velocity reversals, so that a block on
-    a belt rings, and its break-away magnifies errors; dissipative for the
-    default set, not for every one. |v| is smooth over v_eps.
+    stiffness N (mu_1/eta - mu_2)/s_f. Weakly damped at velocity reversals: a block on a belt
+    oscillates, and the instant of its break-away is sensitive to errors. Dissipative for the
+    default parameters, but not for all. |v| is smooth over v_eps.
     Source: Bliman and Sorine, Proc. European Control Conf. 1995; Olsson et al., Eur. J. Control 4,
     1998.
-    Checked: its closed forms hold.
+    Checked: the closed forms of peak and steady state hold.
     """
 
     facts = Facts(
@@ -102,16 +103,16 @@ class BlimanSorine(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Fast and slow part of the force."""
+        """Fast and slow part of the force [N]."""
         count = range(1, int(self.order) + 1)
         return tuple(State(f"F_{i}", "N", 1.0, doc=f"part {i} of the force") for i in count)
 
     @property
     def velocity_scale(self) -> Scalar:
-        """Path constant per second [m/s]; inf without the peak of order 2.
+        """Path constant per second [m/s]; inf for the order 1, which has no peak.
 
-        The force depends on the path only. However, a contact that rings below its peak breaks away
-        by the phase in which it meets the peak, and error control must resolve the ringing.
+        Although the force depends on the path only, error control must resolve oscillations of a
+        sticking contact, because their phase determines when it passes the peak and breaks away.
         """
         return self.s_f if self.order == "2" else inf
 
@@ -120,7 +121,7 @@ class BlimanSorine(Law):
         return (self.mu_1 if self.order == "1" else self.mu_1 - self.mu_2) * N
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the height [N] of the peak at the path s_p, which the order 1 does not have."""
+        """Return the height [N] of the peak at the path s_p; mu_1 N for the order 1."""
         if self.order == "1":
             return self.mu_1 * N
         q = self.eta * self.mu_2 / self.mu_1  # exp(-s_p (1 - eta)/(eta s_f))
@@ -128,7 +129,7 @@ class BlimanSorine(Law):
         return N * (self.mu_1 * (1 - fast) - self.mu_2 * (1 - slow))
 
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the sum of both parts, which have the same sign after a reversal."""
+        """Return the bound [N]: the sum of both parts, which have equal signs after a reversal."""
         return N * (self.mu_1 if self.order == "1" else self.mu_1 + self.mu_2)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -157,13 +158,14 @@ class BoucWen(Law):
         dz/dt = (v / x_0) [A - |z|^n (beta sign(v z) + gamma)]
         F     = mu_d N z
 
-    z is the friction force over its limit; x_0 = mu_d N / sigma_0 is the stretch at which an
-    elastic element would reach it. A = 1, beta = gamma = 1/2 unloads elastically; n = 1 then has
-    the virgin curve of `Dahl`, n -> inf is an element of `MaxwellSlip`.
+    z is the ratio of the friction force to its limit, and x_0 = mu_d N / sigma_0 is the stretch at
+    which an elastic element reaches the limit. With A = 1 and beta = gamma = 1/2 it unloads
+    elastically; n = 1 then has the virgin curve of `Dahl`, and n -> inf is an element of
+    `MaxwellSlip`.
     Limits: steady state mu_d N (A / (beta + gamma))^(1/n) sign(v); rate-independent. n = 1,
-    beta = 1, gamma = 0 is `Dahl`. Dissipates for -beta < gamma <= beta; one element
-    has no non-local memory and drifts under vibration with an offset. sign(v) and sign(z) are
-    smooth over v_eps and z_eps; v_eps ten times below the slowest motion. Not valid for N = 0.
+    beta = 1, gamma = 0 is `Dahl`. Dissipative for -beta < gamma <= beta. One element has no
+    non-local memory and drifts under vibration with an offset. sign(v) and sign(z) are smooth over
+    v_eps and z_eps. Keep v_eps ten times below the slowest motion. Not valid for N = 0.
     Source: Bouc 1967; Wen, J. Eng. Mech. Div. ASCE 102(2), 1976, 249-263.
     Checked: diegoandresalvarez/BWBN_TMCMC diff_eq_real.m.
     """
@@ -196,7 +198,7 @@ class BoucWen(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Fraction z of the limit that the hysteretic part carries, within -1 ... 1."""
+        """Ratio z of the friction force to its limit."""
         return (State("z", "1", 1.0, doc="friction force over its limit"),)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -209,7 +211,7 @@ class BoucWen(Law):
         return self.mu_d * N * z[0]
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Return the rate of the load share [1/s], shape (1, 1)."""
+        """Return the rate of z [1/s], shape (1, 1)."""
         used = smooth.overload(z[0], self.n, self.z_eps)
         t, s = smooth.sign(v, self.v_eps), smooth.sign(z[0], self.z_eps)
         yielded = (self.beta - self.gamma) * s + self.gamma * onward(t, s)
@@ -217,6 +219,6 @@ class BoucWen(Law):
         return column(self.sigma_0 / (self.mu_d * N) * stretch)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return the load share in steady sliding, shape (1, 1)."""
+        """Return z in steady sliding, shape (1, 1)."""
         share = (self.A / (self.beta + self.gamma)) ** (1 / self.n)
         return column(share * smooth.sign(v, self.v_eps))

@@ -1,4 +1,4 @@
-"""Friction with memory of the time in stick: Gonthier, Armstrong, and rate and state."""
+"""Laws that depend on the time in stick: Gonthier, Armstrong, and rate-and-state friction."""
 
 from symfric.foundation.numeric import (
     Scalar,
@@ -29,16 +29,16 @@ class Gonthier(Levels):
         ds_dw/dt = (s - s_dw) / tau,  tau = tau_dw while dwelling (s > s_dw), else sigma_1 / sigma_0
         F        = sat(sigma_0 z + sigma_1 dz/dt, F_C) + sigma_2 v
 
-    s_dw is the memory of the dwell: after a rest of duration t, break-away takes
-    N [mu_d + (mu_s - mu_d) (1 - exp(-t/tau_dw))]. sat(x, F_C) is x up to F_C and bends over to
-    (1 + kappa) F_C. Without it the printed law creeps under any load when v_s is above the
-    creep velocity: its force there is F_C + sigma_1 v s/(1 - s), 191 N at 1 um/s; kappa = 0
-    selects that original. tau changes smoothly over s_eps.
+    s_dw is the dwell memory: after a rest of duration t, the break-away force is
+    N [mu_d + (mu_s - mu_d) (1 - exp(-t/tau_dw))]. sat(x, F_C) equals x up to F_C and rises smoothly
+    to (1 + kappa) F_C beyond. Without this saturation, which is not in the paper, the force at
+    velocities well below v_s is F_C + sigma_1 v s/(1 - s), 191 N at 1 um/s; kappa = 0 selects this
+    original. tau changes smoothly over s_eps.
     Limits: steady state F_C(s(v)) dir + sigma_2 v for v far above v_s; mu_s = mu_d has no dwell
     effect. Needs v_d < v_s. dz/dt does not vanish in creep (v < v_s), where only sat bounds F.
-    Source: Gonthier, McPhee, Lange, Piedboeuf, Multibody Syst. Dyn. 11, 2004, 209-233; the
-    saturation is added here.
-    Checked: behaviour checked; the saturation is constructed.
+    Source: Gonthier, McPhee, Lange, Piedboeuf, Multibody Syst. Dyn. 11, 2004, 209-233; saturation
+    added.
+    Checked: the behaviour was checked; the saturation is constructed.
     """
 
     facts = Facts(
@@ -71,7 +71,7 @@ class Gonthier(Levels):
         return self.v_d
 
     def _sticking(self, v: Scalar) -> Scalar:
-        """Return s(v)."""
+        """Return s(v), which is 1 at rest and 0 in sliding."""
         return exp(-((v / self.v_s) ** 2))
 
     def _level(self, N: Scalar, s_dw: Scalar) -> Scalar:
@@ -90,7 +90,7 @@ class Gonthier(Levels):
         return column(s * v + (1 - s) * pull, (s - z[1]) / tau)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Return the steady sliding force [N] at a speed >= 0, in its limit of small v_d."""
+        """Return the steady sliding force [N] at a speed >= 0 in the limit of small v_d."""
         return self._level(N, self._sticking(speed)) + self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -102,11 +102,11 @@ class Gonthier(Levels):
         return smooth.hold(bristle, self._level(N, z[1]) + rounding, rounding) + self.sigma_2 * v
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return the dwell memory s(v), and the deflection at which the force is constant.
+        """Return the deflection at which the force is constant, and the dwell memory s(v).
 
-        dz/dt vanishes at sigma_0 z = F_C dir + sigma_1 v s/(1 - s). In creep that is far above the
-        level F_C, at which the saturated force is reached: the deflection returned is the one at
-        saturation; it continues to grow without effect on the force except for kappa F_C.
+        dz/dt vanishes at sigma_0 z = F_C dir + sigma_1 v s/(1 - s). In creep this is far above the
+        level F_C, where the force saturates. There the deflection at saturation is returned; z
+        continues to grow, but the force changes by at most kappa F_C.
         """
         s, x = self._sticking(v), v / self.v_s
         F_C = self._level(N, s)
@@ -125,14 +125,15 @@ class Armstrong(Law):
         dq/dt = rest (1 - q)^2/gamma - (1 - rest) q/tau_r,   rest = exp(-(v/v_e)^2)
         F     = k_t xi + sigma_2 v
 
-    The seven are k_t, mu_d, sigma_2, mu_inf (excess of the static over the dynamic level after long
-    rest), v_s, tau_L (lag of the Stribeck curve) and gamma (dwell); mu_a is the excess right after
-    slip. The paper switches between a stiction spring k_t x and a sliding law with a pure delay
-    tau_L and a dwell clock; here one spring yields, a filter makes the delay, and
-    q = t/(t + gamma) counts the rest of duration t, forgotten within tau_r of slip.
+    The seven parameters are k_t, mu_d, sigma_2, mu_inf (static excess over the dynamic level after
+    a long rest), v_s, tau_L (lag of the Stribeck curve) and gamma (dwell); mu_a is the excess
+    immediately after slip. The paper switches between a stiction spring k_t x and a sliding law
+    with a pure delay tau_L and a dwell clock. In this form the spring yields, a filter replaces the
+    delay, and q measures the dwell: it is t/(t + gamma) after a rest of duration t and decays
+    within tau_r in slip.
     Limits: steady state L(v) sign(v) + sigma_2 v; gamma -> inf, tau_L -> 0, k_t -> inf is the
-    Lorentzian law with the excess mu_a. v_e separates rest from slip; keep it above the creep.
-    Not valid for N = 0.
+    Lorentzian law with the excess mu_a. Keep v_e, which separates rest from slip, above the creep
+    velocity. Not valid for N = 0.
     Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, 1083-1138.
     Checked: the differential form is constructed.
     """
@@ -161,7 +162,7 @@ class Armstrong(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Spring, filtered velocity and dwell."""
+        """Stretch of the spring, filtered velocity and dwell memory."""
         return (
             State("xi", "m", 1e-5, doc="stretch of the stiction spring"),
             State("w", "m/s", 1e-2, doc="velocity that the level follows"),
@@ -170,7 +171,7 @@ class Armstrong(Law):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """Velocity that ends the rest [m/s]."""
+        """Velocity v_e [m/s] that separates rest from slip."""
         return self.v_e
 
     def level(self, N: Scalar, w: Scalar, q: Scalar) -> Scalar:
@@ -179,11 +180,11 @@ class Armstrong(Law):
         return N * (self.mu_d + excess / (1 + (w / self.v_s) ** 2))
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Return the sliding force [N] at a speed >= 0 above v_e, without memory of a rest."""
+        """Return the sliding force [N] at a speed >= 0 without dwell memory, as well above v_e."""
         return self.level(N, speed, 0.0) + self.sigma_2 * speed
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the force [N] of break-away after a long rest."""
+        """Return the break-away force [N] after a long rest."""
         return self.level(N, 0.0, 1.0)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -191,7 +192,7 @@ class Armstrong(Law):
         return self.k_t * z[0] + self.sigma_2 * v
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Return the rates of the spring [m/s], the filter [m/s^2] and the dwell [1/s]."""
+        """Return the rates of the spring [m/s], the filter [m/s^2] and the dwell memory [1/s]."""
         xi, w, q = z[0], z[1], z[2]
         rest, slip = self._shares(v)
         share = self.k_t * xi / self.level(N, w, q)
@@ -202,23 +203,24 @@ class Armstrong(Law):
         )
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return the spring at its level, the filter at v and the dwell at which growth is loss."""
+        """Return the spring at its level, the filter at v and the dwell memory in equilibrium."""
         q = self._balance(v)
         return column(self._yielded(v, N, v, q), v, q)
 
     def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
-        """Return the same with the spring at the level of the present filter and dwell."""
+        """Return the equilibria; that of the spring is the level of the present w and q."""
         return column(self._yielded(v, N, z[1], z[2]), v, self._balance(v))
 
     def _shares(self, v: Scalar) -> tuple[Scalar, Scalar]:
-        """Return the shares of rest and slip in v, with sum 1, each accurate if small."""
+        """Return the shares of rest and slip at v, with the sum 1; each is accurate if small."""
         x = -((v / self.v_e) ** 2)
         return exp(x), -expm1(x)
 
     def _balance(self, v: Scalar) -> Scalar:
-        """Return the dwell at which growth equals loss.
+        """Return the dwell memory at which growth equals loss.
 
-        The root of the loss, `slip` gamma, is written with |v|: it has a slope at rest, too.
+        The square root of `slip` gamma is written as a multiple of |v|, so that its one-sided
+        derivative exists at rest.
         """
         rest, slip = self._shares(v)
         grow, lose = rest * self.tau_r, slip * self.gamma
@@ -240,20 +242,20 @@ class RateAndState(Law):
         dpsi/dt = v_0/D_c [exp(-psi) - w/v_0]             evolution = "ageing"
         dpsi/dt = -w/D_c [ln(w/v_0) + psi]                evolution = "slip"
 
-    theta [s] is the mean age of the contacts and w = sqrt(v^2 + v_eps^2); the age stops growing at
-    D_c/v_eps. For v >> v_0 exp(-mu_0/a) the force is N [mu_0 + a ln(v/v_0) + b psi].
+    theta [s] is the mean age of the contacts and w = sqrt(v^2 + v_eps^2), so that the age is at
+    most D_c/v_eps. For v >> v_0 exp(-mu_0/a) the force is N [mu_0 + a ln(v/v_0) + b psi].
     Limits: steady state N [mu_0 + (a - b) ln(|v|/v_0)] sign(v): weakening for a < b, unstable on a
-    spring softer than N (b - a)/D_c. A step of the velocity by the factor e raises mu by a, then
-    lowers it by b over a few D_c. Creeps under any load; no pre-sliding. At rest the slope
-    is N a/(2 v_0) exp((mu_0 + b psi)/a): from 1e15 N s/m on, the rounding of velocities in a
-    mechanism hides it, and steps fall without end. Meant for slow slip: at high velocity ratios the
-    logarithm makes mu small or negative where a < b.
+    spring softer than N (b - a)/D_c. If the velocity is multiplied by e, mu rises by a, then falls
+    by b over a few D_c. Creeps under any load; no pre-sliding. The slope at rest is
+    N a/(2 v_0) exp((mu_0 + b psi)/a). If it exceeds 1e15 N s/m, it is lost in the rounding errors
+    of the velocities of a mechanism, and step sizes decrease without limit. Intended for slow slip:
+    for a < b the logarithm makes mu small or negative at velocities far above v_0.
     Source: Dieterich, J. Geophys. Res. 84, 1979; Ruina, J. Geophys. Res. 88, 1983; asinh form:
     Rice, Ben-Zion, PNAS 93, 1996.
     Checked: jrleeman/rsfmodel and public MATLAB code (inverse hyperbolic sine).
 
     Raises:
-        ValueError: mu_0/a above 150, or with the oldest contact's above 200: derivatives overflow.
+        ValueError: mu_0 > 150 a, or mu_0 + b ln(v_0/v_eps) > 200 a; derivatives would overflow.
     """
 
     facts = Facts(("D", "St", "L", "T"), "C∞", "two sources", load="proportional")
@@ -282,14 +284,14 @@ class RateAndState(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Logarithm of the age."""
+        """Logarithm psi of the age of the contacts."""
         return (State("psi", "1", 1.0, even=True, doc="logarithm of the contacts' age"),)
 
     def _speed(self, v: Scalar) -> Scalar:
         return sqrt(v * v + self.v_eps * self.v_eps)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Raise an error: the steady force follows ln v, and any load causes creep."""
+        """Raise an error, since the steady force contains ln v and any load causes creep."""
         raise one_sided(self, "it creeps under any load, and ln v has no limit at rest")
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -305,11 +307,11 @@ class RateAndState(Law):
         return column(self.v_0 / self.D_c * (exp(-z[0]) - w / self.v_0))
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return the psi of steady sliding, shape (1, 1); 0, an age of D_c/v_0, below v_eps.
+        """Return psi in steady sliding, shape (1, 1); 0, the age D_c/v_0, for |v| < v_eps.
 
-        A contact at rest has no steady age. The oldest one, D_c/v_eps, would be months old: a body
-        released under more load than such a contact holds would accelerate faster than a step can
-        resolve.
+        A contact at rest has no steady age. The largest age D_c/v_eps is of the order of months; a
+        body released under a load above the break-away force of such a contact would accelerate
+        faster than a step can resolve.
         """
         moves = smooth.magnitude(v, 0.0) >= self.v_eps
         return column(smooth.choose(moves, -log(self._speed(v) / self.v_0), 0.0))

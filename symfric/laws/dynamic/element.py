@@ -1,4 +1,4 @@
-"""Parts of laws with states: Stribeck levels, parallel elements, yielding."""
+"""Parts that several laws with states share: Stribeck levels, parallel elements, yielding."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from symfric.laws.base.law import Law, State, Switch
 
 
 class _Smoothed(Law):
-    """Law with viscous friction and a smoothing velocity, which its subclasses declare."""
+    """Law with viscous friction and a smoothing velocity, both declared by subclasses."""
 
     sigma_2: Scalar
     v_eps: Scalar
@@ -22,7 +22,7 @@ class _Smoothed(Law):
 
 @parametric
 class StribeckLevel(Levels, _Smoothed):
-    """Law with states that slides at a Stribeck curve.
+    """Law with states whose sliding force is a Stribeck curve.
 
     g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
     """
@@ -44,13 +44,13 @@ class StribeckLevel(Levels, _Smoothed):
 
 @parametric
 class Elements(Law):
-    """Law of parallel elements, each a spring whose force F_i is a state.
+    """Law of parallel elements, which are springs whose forces F_i are the states.
 
-    In the event form each has a mode, 0 in stick and 1 in slip.
+    In the event form each element also has a mode, which is 0 in stick and 1 in slip.
     """
 
     kind: ClassVar[type[Parametric]]
-    """Class of an element."""
+    """Class of the elements."""
 
     elements: tuple[Any, ...] = ()
 
@@ -77,9 +77,9 @@ class Elements(Law):
     def slip_switches(
         self, v: Scalar, z: Scalar, limits: Sequence[Scalar], resets: Sequence[dict[str, Scalar]]
     ) -> tuple[Switch, ...]:
-        """Return slip of each element at its limit [N], and stick of all when v changes sign.
+        """Return the switch of each element to slip at its limit [N], and of all to stick at v = 0.
 
-        `resets` are the new states of each element, its mode last.
+        `resets` contains the new states of each element, with its mode last.
         """
         direction = smooth.sign(v, 0.0)
         slips = tuple(
@@ -95,45 +95,50 @@ class Elements(Law):
 
 
 def held_columns(parts: Iterable[tuple[Scalar, Scalar, Scalar]]) -> tuple[Scalar, Scalar]:
-    """Return the columns of ends and means of a held step, from (end, mean, mode) of elements."""
+    """Return the end and mean columns of a held step from (end, mean, mode) of each element."""
     ends, means, modes = zip(*parts, strict=True)
     return column(*ends, *modes), column(*means, *modes)
 
 
 TYPICAL, FIRM = 1e-5, 1e5
-"""Deflection of bristles [m], and the force [N] that defines that of stiffer ones."""
+"""Typical deflection [m] of bristles, and the force [N] that bounds it for stiff bristles."""
 
 
 def deflection(sigma_0: Scalar) -> float:
-    """Return the nominal deflection [m] of a bristle of the stiffness `sigma_0` [N/m], if known.
+    """Return the nominal deflection [m] of a bristle of stiffness `sigma_0` [N/m].
 
-    Absolute tolerances follow it: 1e-5 m is no scale for a bristle of 1e15 N/m, which breaks away
-    at 1e-14 m. The scale is that of a large force, since on that of 10 N the ringing of a bristle
-    of 1e12 N/m is resolved: a thousand times the steps, for the same motion.
+    Absolute tolerances are proportional to it. For a bristle of 1e15 N/m, which breaks away at
+    1e-14 m, the typical value of 1e-5 m would be too large. The force `FIRM` is large because with
+    10 N the solver would resolve the vibrations of a bristle of 1e12 N/m, in a thousand times as
+    many steps for the same motion.
     """
     return min(TYPICAL, FIRM / float(sigma_0)) if is_number(sigma_0) else TYPICAL
 
 
 def along(t: Vector, s: Vector) -> Scalar:
-    """Return the share a of slip along t that loads along s: 1 for t = s, 0 for t = -s.
+    """Return the share a of the slip along t that loads along s: 1 for t = s, 0 for t = -s.
 
         a = [1 + c + sqrt(c^2 + w^2) - sqrt(1 + w^2)] / 2,   c = t.s, w the `turn` of s
 
-    For w -> 0 it is max(c, 0): only the component of the slip along s loads.
+    For w -> 0 it is max(c, 0), so that only the component of the slip along s loads.
     """
     c, w2 = t.dot(s), s.turn * s.turn
     return (1 + c + sqrt(c * c + w2) - sqrt(1 + w2)) / 2
 
 
 def onward(t: Vectors, s: Vectors) -> Vectors:
-    """Return t + s: 2 s if slip along t loads, 0 if it unloads; of vectors 2 a s, see `along`."""
+    """Return t + s, which is 2 s if slip along t loads and 0 if it unloads.
+
+    For vectors the result is 2 a s, with a from `along`.
+    """
     return 2 * along(t, s) * s if isinstance(s, Vector) else t + s
 
 
 def ahead(f: Callable[[Scalar], Scalar], t: Vectors, r: Vectors) -> Scalar:
-    """Return f(t r) of the load share r ahead of the slip along t.
+    """Return f(t r), where r is the load share of an element and t the direction of slip.
 
-    For vectors a f(|r|) + (1 - a) f(-|r|), a = `along` of both: between loading and unloading.
+    For vectors the result is a f(|r|) + (1 - a) f(-|r|), with a from `along`, which interpolates
+    between loading and unloading.
     """
     if not isinstance(r, Vector):
         return f(t * r)
@@ -143,11 +148,12 @@ def ahead(f: Callable[[Scalar], Scalar], t: Vectors, r: Vectors) -> Scalar:
 
 
 def spent(f: Callable[[Scalar], Scalar], v: Vectors, t: Vectors, r: Vectors) -> Vectors:
-    """Return the part of the slip v along t that does not stretch an element: v f(t r).
+    """Return the part v f(t r) of the slip v along t that does not stretch an element.
 
-    r is its load share. For vectors it is |v| r/|r| [a f(|r|) - (1 - a) f(-|r|)], a = `along` of
-    both, parallel to r. Then |r| grows at most as fast as in straight slip, so bounds of the scalar
-    law hold in any slip, and this part dissipates energy where it does in straight slip.
+    r is the load share of the element. For vectors the result is parallel to r:
+    |v| r/|r| [a f(|r|) - (1 - a) f(-|r|)], with a from `along`. Then |r| grows at most as fast as
+    in straight slip. Therefore the bounds of the scalar law hold for any slip, and this part is
+    dissipative whenever it is in straight slip.
     """
     if not isinstance(r, Vector):
         return v * f(t * r)
@@ -160,13 +166,13 @@ def spent(f: Callable[[Scalar], Scalar], v: Vectors, t: Vectors, r: Vectors) -> 
 @final
 @dataclass(frozen=True, eq=False)
 class Held:
-    """Step of h [s] of every element of a law, with held velocity and load.
+    """Step of h [s] at constant velocity and load, which is common to all elements of a law.
 
         way = v h,   s = sign(v)
 
     Attributes:
-        still: True if nothing moves.
-        some: `way`, or a nonzero divisor if nothing moves.
+        still: True if v = 0.
+        some: `way`, or a nonzero divisor if v = 0.
     """
 
     way: Scalar
@@ -189,16 +195,16 @@ class Held:
         slips: Scalar,
         slipped: tuple[Scalar, Scalar],
     ) -> tuple[Scalar, Scalar, Scalar]:
-        """Return the step of an element with the load F, the mode p and the stiffness k.
+        """Return (F+, mean, p+) of an element with the load F, the mode p and the stiffness k.
 
-        It slips at +-limit. Its load at the end and in the mean of the step, and its mode at the
-        end are:
+        F+ and p+ are the load and the mode at the end of the step, and `mean` is the mean load. The
+        element slips at +-limit. There are three cases:
 
-            slips     all along:  F+ and mean as given in `slipped`,               p+ = 1
-            reaches   the limit:  F+ = s limit,   mean = F+ - (F+ - F)^2 / (2 k way),  p+ = 1
-            sticks:               F+ = F + k way, mean = F + k way / 2,            p+ = 0
+            slips throughout:   F+ and mean as given in `slipped`,                     p+ = 1
+            reaches the limit:  F+ = s limit,   mean = F+ - (F+ - F)^2 / (2 k way),    p+ = 1
+            sticks:             F+ = F + k way, mean = F + k way / 2,                  p+ = 0
 
-        The load rises linearly, so the limit cuts a triangle off the mean. At rest p is unchanged.
+        The load rises linearly up to the limit. At v = 0 the mode p does not change.
         """
         goal, tried = self.s * limit, F + k * self.way
         reaches = self.s * tried >= limit
@@ -216,22 +222,22 @@ class Held:
     def yielded(
         self, F: Scalar, p: Scalar, k: Scalar, limit: Scalar
     ) -> tuple[Scalar, Scalar, Scalar]:
-        """Return the same for an element that stays at its limit as long as it slips."""
+        """Return the result of `stretched` for an element that slips at its limit."""
         goal = self.s * limit
         return self.stretched(F, p, k, limit, self.s * F >= limit, (goal, goal))
 
 
 def yielding(v: Scalar, r: Scalar, n: Scalar, v_eps: Scalar, r_eps: Scalar) -> Scalar:
-    """Return the rate at which an element under slip velocity `v` stretches.
+    """Return the rate at which an element stretches at the slip velocity `v`.
 
         v - |v| |r|^n [1 + sign(v r)]/2 sign(r)
 
-    r is its load over its limit. It stretches elastically while unloading and, for n -> inf, up to
-    |r| = 1, where it slips; vectors return radially, by the slip along the load. sign is smooth
-    over v_eps and r_eps, |r| over r_eps; at v = 0 the rate is exactly zero, so that an element at
-    rest keeps its load. At r = 1 it vanishes to rounding for r_eps <= 1e-8. The yielding never
-    drives, so an element beyond its limit, because the load has dropped, returns in either
-    direction of motion and at any speed.
+    r is the ratio of the load to the limit. The element is elastic while it unloads and, for
+    n -> inf, up to |r| = 1, where it slips. A vector returns radially, by the slip along the load.
+    The signs are smooth over v_eps and r_eps, and |r| over r_eps. At v = 0 the rate is exactly
+    zero, so that an element at rest keeps its load. At r = 1 it vanishes to rounding for
+    r_eps <= 1e-8. The yielding always dissipates: an element above its limit, because the normal
+    force has dropped, returns to it for either direction of motion and at any speed.
     """
     t, s = smooth.sign(v, v_eps), smooth.sign(r, r_eps)
     return v - smooth.overload(r, n, r_eps) / 2 * (v * t) * onward(t, s)

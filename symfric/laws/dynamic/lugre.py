@@ -1,4 +1,4 @@
-"""Bristle laws with a Stribeck level: LuGre in three forms, and elasto-plastic."""
+"""Bristle laws that slide at a Stribeck level: three forms of LuGre, and elasto-plastic."""
 
 from math import pi
 
@@ -17,7 +17,7 @@ class Bristle(StribeckLevel):
         dz/dt = v - sigma_0 |v| z / g
         F     = sigma_0 z + sigma_1 dz/dt + sigma_2 v
 
-    The laws differ in dz/dt, in the damping or in the dependence on the load.
+    Subclasses differ in dz/dt, in the damping or in the dependence on the load.
     """
 
     sigma_0: Scalar = fields.SIGMA_0(1e5)
@@ -27,11 +27,11 @@ class Bristle(StribeckLevel):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Mean deflection z of the bristles [m], positive with v."""
+        """Mean deflection z of the bristles [m], positive for v > 0."""
         return (State("z", "m", deflection(self.sigma_0), doc="mean bristle deflection"),)
 
     def relaxation(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return sigma_0 |v| / g [1/s]."""
+        """Return the relaxation rate sigma_0 |v| / g [1/s]."""
         return self.sigma_0 * smooth.magnitude(v, self.v_eps) / self.level(v, N)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -47,7 +47,7 @@ class Bristle(StribeckLevel):
         return column(self.level(v, N) / self.sigma_0 * smooth.sign(v, self.v_eps))
 
     def warnings(self) -> tuple[str, ...]:
-        """Return a warning if the law is not passive for lack of viscous friction."""
+        """Return a warning if viscous friction is too small for the law to be passive."""
         needed = (self.mu_s - self.mu_d) / self.mu_d * self.sigma_1
         if not is_number(needed) or not is_number(self.sigma_2) or self.sigma_2 >= needed:
             return ()
@@ -69,13 +69,13 @@ class LuGre(Bristle):
     `z` is the mean bristle deflection [m].
     Limits: steady state g sign(v) + sigma_2 v; drifts under vibration. |v| is smooth over v_eps
     and exactly zero at rest; v_eps = 0 is the original with a kink at v = 0, for which
-    |z| <= mu_s N / sigma_0 is invariant. A bristle under a creep below v_eps does not relax: it
-    stretches on instead of breaking away. Keep v_eps ten times below the creep of a contact that
-    sticks, the loading rate over sigma_0, on a belt k v_belt / sigma_0; the default is below it on
-    belts of 1e-9 m/s and more, and a run whose bristles stretch on ends with an `OverloadWarning`.
-    Passive from v to F only if sigma_2 >= sigma_1 (mu_s - mu_d) / mu_d, which the default set does
-    not meet: after a jump in v the force may point forward for an instant. Not valid for N = 0 or a
-    fast-varying N, since the deflection does not shrink with the load.
+    |z| <= mu_s N / sigma_0 is invariant. A bristle that creeps below v_eps does not relax: it keeps
+    stretching instead of breaking away. Keep v_eps ten times below the creep velocity of a sticking
+    contact, which is the loading rate over sigma_0, or k v_belt / sigma_0 on a belt. The default
+    suffices for belts of 1e-9 m/s and more; otherwise a run ends with an `OverloadWarning`.
+    Passive from v to F only if sigma_2 >= sigma_1 (mu_s - mu_d) / mu_d, which the defaults do not
+    satisfy: after a jump in v the force may point forward for an instant. Not valid for N = 0 or a
+    fast-varying N, since the deflection does not decrease with the load.
     Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE TAC 40(3), 1995, 419-425.
     Checked: auralius/LuGre lugre.m; jchristopherson/FrictionModels.jl.
     """
@@ -93,9 +93,10 @@ class LuGreNormalised(Bristle):
         dz/dt = v - sigma_0 |v| z / g
         F     = N (sigma_0 z + sigma_1 dz/dt + sigma_2 v)
 
-    The deflection does not depend on the load and the force follows it at once; there is no
-    division by N, and N = 0 gives F = 0. Smoothing as in `LuGre`. Passive for constant load only,
-    with the bound of `LuGre`: a load that grows over a bent bristle does work.
+    The deflection does not depend on the load, and the force follows the load immediately. The
+    equations do not divide by N, and N = 0 gives F = 0. |v| is smooth as in `LuGre`. Passive for
+    constant load only, under the condition of `LuGre`: a load that increases on a deflected bristle
+    does work.
     Limits: at constant N it is `LuGre` with sigma_i N; steady state N (g sign(v) + sigma_2 v).
     Source: Canudas de Wit et al., IEEE TAC 40(3), 1995, in coefficients (the "amended" form that
     tyre models use; Canudas de Wit and Tsiotras, CDC 1999).
@@ -129,15 +130,15 @@ class LuGreNormalised(Bristle):
 
 @parametric
 class LuGrePassive(Bristle):
-    """LuGre friction whose bristle damping fades with the velocity (one state).
+    """LuGre friction whose bristle damping decreases with the velocity (one state).
 
         g     = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
         dz/dt = v - sigma_0 |v| z / g
         F     = sigma_0 z + sigma_1 exp(-(v/v_d)^2) dz/dt + sigma_2 v
 
-    With v_d of the order of v_s the force does not point forward after a jump in v, without the
-    viscous friction that `LuGre` needs; smoothing as there. The force is dissipative where
-    |v| exp(-(v/v_d)^2) <= 4 g / sigma_1, so everywhere if sigma_1 v_d <= 9.3 mu_d N.
+    If v_d is of the order of v_s, the force does not point forward after a jump in v, even without
+    the viscous friction that `LuGre` needs. |v| is smooth as in `LuGre`. The force is dissipative
+    where |v| exp(-(v/v_d)^2) <= 4 g / sigma_1, so everywhere if sigma_1 v_d <= 9.3 mu_d N.
     Limits: v_d -> inf is `LuGre`; steady state g sign(v) + sigma_2 v. Not valid for N = 0.
     Source: Olsson, Control Systems with Friction, PhD thesis, Lund 1996 (velocity-dependent
     damping).
@@ -156,7 +157,7 @@ class LuGrePassive(Bristle):
         return self.sigma_0 * z[0] + damping * self.rate(v, N, z)[0] + self.sigma_2 * v
 
     def warnings(self) -> tuple[str, ...]:
-        """Return no warnings: the fading damping makes the bound of `LuGre` unnecessary."""
+        """Return an empty tuple, since the damping makes the condition of `LuGre` unnecessary."""
         return ()
 
 
@@ -166,22 +167,22 @@ class ElastoPlastic(Bristle):
 
         g     = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)],   z_ss = g / sigma_0
         r     = (z sign(v) - z_ba) / (z_ss - z_ba)
-        alpha = 0 for r <= 0,  1 for r >= 1,  between them a step of r
+        alpha = 0 for r <= 0,  1 for r >= 1,  a smooth step of r between them
         dz/dt = v - alpha sigma_0 |v| z / g
         F     = sigma_0 z + sigma_1 dz/dt + sigma_2 v
 
     Below the break-away deflection z_ba [m] the bristle is a spring: it returns exactly and does
     not drift under vibration. The step is 10r^3 - 15r^4 + 6r^5; v_eps = 0 is the original, with
-    sign(v), |v| and the step (1 + sin(pi (r - 1/2))) / 2. In the printed original z stands for
-    z sign(v), which is wrong for z < 0.
+    sign(v), |v| and the step (1 + sin(pi (r - 1/2))) / 2. The paper prints z in place of z sign(v),
+    which is wrong for z < 0.
     Limits: steady state g sign(v) + sigma_2 v, approached more slowly than by `LuGre` (0.997 of
-    it after 3.4 z_ss); z_ba -> 0 is not `LuGre`, since alpha still rises with z. Passivity and the
-    choice of v_eps as in `LuGre`. Needs z_ba < mu_d N / sigma_0, hence not valid for small N.
+    it after 3.4 z_ss). z_ba -> 0 is not `LuGre`, since alpha still rises with z. For passivity and
+    the choice of v_eps see `LuGre`. Needs z_ba < mu_d N / sigma_0, so it is not valid for small N.
     Source: Dupont, Hayward, Armstrong, Altpeter, IEEE TAC 47(5), 2002, 787-792.
     Checked: jchristopherson/FrictionModels.jl ElastoPlasticModels.jl; MBDyn.
 
     Raises:
-        ValueError: from `rate` and `force`: z_ba beyond what the load, a number, allows.
+        ValueError: in `rate` and `force`, if z_ba >= mu_d N / sigma_0 and all of these are numbers.
     """
 
     facts = Facts(
@@ -193,7 +194,7 @@ class ElastoPlastic(Bristle):
     z_ba: Scalar = fields.LENGTH(1e-7, doc="break-away deflection", lower=0.0)
 
     def sliding_share(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
-        """Return alpha, 0 while the bristle is elastic and 1 when it slides."""
+        """Return alpha, which is 0 while the bristle is elastic and 1 while it slides."""
         z_ss = self.level(v, N) / self.sigma_0
         elastic = self.z_ba / z_ss
 

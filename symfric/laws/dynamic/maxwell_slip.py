@@ -1,4 +1,4 @@
-"""Laws of parallel elements: Maxwell-slip, and Leuven and GMS with a Stribeck effect and lag."""
+"""Laws of parallel elements: Maxwell-slip, and with Stribeck effect and lag Leuven and GMS."""
 
 from symfric.foundation.numeric import Scalar, both, column, either, expm1, is_number, total
 from symfric.foundation.parameters import Parametric, option, parametric
@@ -16,36 +16,36 @@ from symfric.laws.dynamic.element import (
 
 @parametric
 class Slider(Parametric):
-    """Spring of stiffness k on a slider that carries mu N."""
+    """Spring of stiffness k in series with a slider that slips at mu N."""
 
     k: Scalar = fields.STIFFNESS(1e5, doc="stiffness")
     mu: Scalar = fields.COEFFICIENT(0.1, doc="friction coefficient of the slider", lower=1e-12)
 
 
 SLIDERS = (Slider(5e4, 0.025), Slider(2.5e4, 0.025), Slider(1.5e4, 0.025), Slider(1e4, 0.025))
-"""Four sliders, together 1e5 N/m and mu = 0.1, which slip one after the other."""
+"""Four sliders of 1e5 N/m and mu = 0.1 in total, which slip one after another."""
 
 
 @parametric
 class MaxwellSlip(Elements):
-    """Maxwell-slip (Iwan) friction of n elements, the exact hysteresis with non-local memory.
+    """Maxwell-slip (Iwan) friction of n elements, with exact hysteresis and non-local memory.
 
         stick: dF_i/dt = k_i v     until |F_i| = mu_i N
         slip:  dF_i/dt = 0         until v changes sign
         F = F_1 + F_2 + ...
 
-    form = "event" is this law, with a mode slip_i of 0 or 1 for each element, for constant N.
-    form = "smooth" (n elements, n states) rounds the corner by the sharpness n:
+    form = "event" is this law for constant N, with a mode slip_i of 0 or 1 for each element.
+    form = "smooth" has no modes and rounds the corner with the sharpness n:
 
         smooth: dF_i/dt = k_i v [1 - |F_i/(mu_i N)|^n (1 + sign(v F_i)) / 2]
 
-    With n = 1, 2, 10, 50 an element reaches 63, 76, 94, 99 % of its limit over the stretch at which
-    the exact one slips. `update` is the exact law for increments of position, for discrete time and
-    optimisation.
+    With n = 1, 2, 10, 50 an element reaches 63, 76, 94, 99 % of its limit at the stretch at which
+    the exact element slips. `update` is the exact law for increments of position, for discrete time
+    and optimisation.
     Limits: steady state (mu_1 + mu_2 + ...) N sign(v); rate-independent; virgin curve
-    f(x) = sum min(k_i x, mu_i N); a reversal branch is twice the virgin curve (Masing), and closed
-    inner loops are forgotten. One stiff element is Coulomb friction. |v| is smooth over v_eps, to
-    be kept a hundred times below the slowest motion of interest. Not valid for N = 0.
+    f(x) = sum min(k_i x, mu_i N). A reversal branch is twice the virgin curve (Masing), and closed
+    inner loops are forgotten. One stiff element is Coulomb friction. |v| is smooth over v_eps.
+    Keep v_eps a hundred times below the slowest motion of interest. Not valid for N = 0.
     Source: Iwan, ASME J. Appl. Mech. 33(4), 1966; Prandtl 1928 (play operators).
     Checked: jchristopherson/friction README; Lampaert, Al-Bender, Swevers 2003.
     """
@@ -67,7 +67,7 @@ class MaxwellSlip(Elements):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Spring forces, and in the event form the modes."""
+        """Spring forces [N], followed by the modes in the event form."""
         if self.form == "smooth":
             return super().states
         count, mode = range(1, len(self.elements) + 1), "1 while the element slips"
@@ -83,7 +83,7 @@ class MaxwellSlip(Elements):
         return total(self.springs(z))
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Return the rates of the spring forces [N/s] and, zero, of the modes."""
+        """Return the rates of the spring forces [N/s], and zero for the modes."""
         count = len(self.elements)
         if self.form == "event":
             forces = [(1 - z[count + i]) * e.k * v for i, e in enumerate(self.elements)]
@@ -91,14 +91,14 @@ class MaxwellSlip(Elements):
         return column(*stretched(self, v, N, z))
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return sliders at their limits, with modes in slip."""
+        """Return the spring forces at their limits [N], and the modes of slip."""
         direction = smooth.sign(v, 0.0 if self.form == "event" else self.v_eps)
         forces = [e.mu * N * direction for e in self.elements]
         modes = [direction**2 for _ in self.elements] if self.form == "event" else []
         return column(*forces, *modes)
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
-        """Return slip of each element at its limit, and stick of all when v changes sign."""
+        """Return the switch of each element to slip at its limit, and of all to stick at v = 0."""
         if self.form == "smooth":
             return ()
         direction, limits = smooth.sign(v, 0.0), [e.mu * N for e in self.elements]
@@ -109,7 +109,7 @@ class MaxwellSlip(Elements):
         return self.slip_switches(v, z, limits, resets)
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """Return the exact step in the event form."""
+        """Return the exact step in the event form, and None in the smooth form."""
         if self.form == "smooth":
             return None
         count, held = len(self.elements), Held.over(v, h)
@@ -118,13 +118,13 @@ class MaxwellSlip(Elements):
         )
 
     def update(self, F: Scalar, dx: Scalar, N: Scalar) -> Scalar:
-        """Return the spring forces after the slip `dx` [m] in one direction, exactly."""
+        """Return the exact spring forces [N] after the slip `dx` [m] in one direction."""
         pairs = zip(self.springs(F), self.elements, strict=True)
         return column(*(smooth.clip(F_i + e.k * dx, -e.mu * N, e.mu * N) for F_i, e in pairs))
 
 
 def stretched(law: "MaxwellSlip | Leuven", v: Scalar, N: Scalar, z: Scalar) -> list[Scalar]:
-    """Return the rates of the spring forces [N/s] of sliders that are moved at `v`, smooth form."""
+    """Return the rates of the spring forces [N/s] in the smooth form at the slip velocity `v`."""
     return [
         e.k * yielding(v, F / (e.mu * N), law.n, law.v_eps, law.r_eps)
         for e, F in zip(law.elements, law.springs(z), strict=True)
@@ -132,12 +132,12 @@ def stretched(law: "MaxwellSlip | Leuven", v: Scalar, N: Scalar, z: Scalar) -> l
 
 
 LEUVEN_SLIDERS = (Slider(5e4, 0.05), Slider(2.5e4, 0.05), Slider(1.5e4, 0.05), Slider(1e4, 0.05))
-"""Four sliders, together 1e5 N/m and mu = 0.2, above the static level."""
+"""Four sliders of 1e5 N/m and mu = 0.2 in total, which is above the static level."""
 
 
 @parametric
 class Leuven(StribeckLevel, Elements):
-    """Leuven friction, modified (n states of the hysteresis).
+    """Modified Leuven friction (one state for each of n elements).
 
         g       = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)]
         r       = F_h sign(v) / g,   F_h = F_1 + F_2 + ...
@@ -145,11 +145,12 @@ class Leuven(StribeckLevel, Elements):
         dF_i/dt = k_i dz/dt [1 - |F_i/(mu_i N)|^n (1 + sign(dz/dt F_i)) / 2]
         F       = F_h + sigma_1 dz/dt + sigma_2 v
 
-    The hysteresis force F_h is a `MaxwellSlip` force in z instead of the original stack of
+    The hysteresis force F_h is a `MaxwellSlip` force in z. It replaces the original stack of
     reversal points, which jumps where a loop closes. s(v) = g sign(v) is odd; with the unsigned s
-    that is printed, z runs away for v < 0. |v| and signs are smooth over v_eps and r_eps.
-    Limits: steady state g sign(v) + sigma_2 v, whatever the F_i. delta_l -> inf is `MaxwellSlip`
-    until F_h = g. Needs mu_1 + mu_2 + ... >= mu_s, else z runs away. Not valid for N = 0.
+    of the paper, z diverges for v < 0. |v| and signs are smooth over v_eps and r_eps.
+    Limits: steady state g sign(v) + sigma_2 v, for any distribution of the F_i. delta_l -> inf is
+    `MaxwellSlip` until F_h = g. Needs a sum of all mu_i of at least mu_s, otherwise z diverges. Not
+    valid for N = 0.
     Source: Swevers, Al-Bender, Ganseman, Prajogo, IEEE TAC 45(4), 2000; Lampaert, Swevers,
     Al-Bender, IEEE TAC 47(4), 2002.
     Checked: Lampaert, Al-Bender, Swevers 2003, signs corrected.
@@ -181,7 +182,7 @@ class Leuven(StribeckLevel, Elements):
             )
 
     def stretching(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar:
-        """Return dz/dt [m/s] of the hysteretic deflection."""
+        """Return the rate dz/dt [m/s] of the hysteretic deflection."""
         share = total(self.springs(z)) / self.level(v, N)
         spent = smooth.signed_power(share, self.delta_l, self.r_eps)
         return v - smooth.magnitude(v, self.v_eps) * spent
@@ -196,7 +197,10 @@ class Leuven(StribeckLevel, Elements):
         return column(*stretched(self, self.stretching(v, N, z), N, z))
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return one of the states with the sum g sign(v): all elements at the same load share."""
+        """Return spring forces with the sum g sign(v), at the same load share of all elements.
+
+        The steady state is not unique: other spring forces with this sum are steady as well.
+        """
         whole = total(e.mu for e in self.elements)
         level = self.level(v, N) * smooth.sign(v, self.v_eps)
         return column(*(e.mu / whole * level for e in self.elements))
@@ -204,14 +208,14 @@ class Leuven(StribeckLevel, Elements):
 
 @parametric
 class Element(Parametric):
-    """Element: a spring of stiffness k that carries the share alpha of the friction."""
+    """Spring of stiffness k that carries the share alpha of the friction."""
 
     k: Scalar = fields.STIFFNESS(1e5, doc="stiffness")
     alpha: Scalar = fields.SHAPE(1.0, doc="share of the friction", lower=1e-12)
 
 
 ELEMENTS = (Element(5e4, 0.25), Element(2.5e4, 0.25), Element(1.5e4, 0.25), Element(1e4, 0.25))
-"""Four elements, together 1e5 N/m, which slip one after the other."""
+"""Four elements of 1e5 N/m in total, which slip one after another."""
 
 
 @parametric
@@ -223,26 +227,27 @@ class GMS(StribeckLevel, Elements):
         slip:  dF_i/dt = C (alpha_i sign(v) - F_i/g(v))       until v passes through zero
         F = F_1 + F_2 + ... + sigma_2 v
 
-    The shares alpha_i are divided by their sum. C [N/s] makes the lag: all elements follow g with
-    the time constant g/C.
+    The shares alpha_i are divided by their sum. C [N/s] determines the lag: in slip all elements
+    follow g with the time constant g/C.
     form = "event" is this law with a mode p_i of 0 (stick) or 1 (slip) for each element.
-    form = "smooth" lets p_i latch over a short path, with r_i = F_i sign(v) / (alpha_i g),
+    form = "smooth" changes p_i over a short path, with r_i = F_i sign(v) / (alpha_i g),
     on = step((r_i - 1)/rho + 1), off = step(-5 r_i) and w_i = p_i (1 - off):
 
         dp_i/dt = |v| k_i / (alpha_i g rho) [on (1 - p_i) - off p_i]
         dF_i/dt = (1 - w_i) stick + w_i slip
 
-    It slips too early by up to the share rho of the limit; steady state, lag and memory are those
-    of the original and no state moves at rest. sign and |v| are smooth over v_eps, to be kept a
-    hundred times below the slowest motion of interest. Settled cycles dissipate; within one, slip
-    that slows down stretches the springs in time, by a little more than the work done on them.
-    Limits: steady state g sign(v) + sigma_2 v; C -> inf and mu_s = mu_d is `MaxwellSlip`; at rest
-    and in pre-sliding its forces are those of `MaxwellSlip` with limits alpha_i g(0). Not valid
-    for N = 0. Nothing damps a body that the springs hold: it rings with sqrt(sum k_i/m), and every
-    turn is a switch. The block of `Rabinowicz` takes 40 000 steps over 20 s, 20 000 with
+    The smooth form slips too early by at most the share rho of the limit. Its steady state, lag and
+    memory are those of the original, and no state changes at rest. sign and |v| are smooth over
+    v_eps. Keep v_eps a hundred times below the slowest motion of interest. Periodic cycles are
+    dissipative; within a cycle, decelerating slip may store slightly more energy in the springs
+    than the work done on them.
+    Limits: steady state g sign(v) + sigma_2 v; C -> inf and mu_s = mu_d is `MaxwellSlip`. At rest
+    and in pre-sliding the forces are those of `MaxwellSlip` with the limits alpha_i g(0). Not valid
+    for N = 0. A sticking body is undamped: it oscillates with the frequency sqrt(sum k_i/m), and
+    every reversal is a switch. The block of `Rabinowicz` takes 40 000 steps over 20 s, 20 000 with
     sigma_2 = 0.5 N s/m and 3 700 with 2 N s/m, which ends its stick-slip.
     Source: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003; Al-Bender, Lampaert, Swevers, IEEE TAC
-    50(11), 2005. The smooth form is constructed here; it is not that of Boegli et al.
+    50(11), 2005. The smooth form is constructed and differs from that of Boegli et al.
     Checked: jchristopherson/friction README; the paper of 2003; smooth form constructed.
     """
 
@@ -270,7 +275,7 @@ class GMS(StribeckLevel, Elements):
         return (*super().states, *modes)
 
     def shares(self) -> list[Scalar]:
-        """Return all alpha_i, divided by their sum."""
+        """Return the shares alpha_i, divided by their sum."""
         whole = total(e.alpha for e in self.elements)
         return [e.alpha / whole for e in self.elements]
 
@@ -304,13 +309,16 @@ class GMS(StribeckLevel, Elements):
         return column(*forces, *modes)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return all elements slipping on the Stribeck curve."""
+        """Return the states in which all elements slip on the Stribeck curve."""
         direction = self._direction(v)
         forces = [alpha * self.level(v, N) * direction for alpha in self.shares()]
         return column(*forces, *(direction**2 for _ in forces))
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """Return the exact step in the event form: stick up to the limit, or exponential slip."""
+        """Return the exact step in the event form: stick up to the limit, or exponential slip.
+
+        Return None in the smooth form.
+        """
         if self.form == "smooth":
             return None
         count, g, held = len(self.elements), self.level(v, N), Held.over(v, h)
@@ -327,7 +335,7 @@ class GMS(StribeckLevel, Elements):
         return held_columns(parts)
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
-        """Return slip of each element at its limit, and stick of all when v passes through zero."""
+        """Return the switch of each element to slip at its limit, and of all to stick at v = 0."""
         if self.form == "smooth":
             return ()
         g = self.level(v, N)

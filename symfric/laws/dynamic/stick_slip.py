@@ -1,4 +1,4 @@
-"""Laws with true stick up to a static level: exact, blended, by a reset integrator, in a plane."""
+"""Laws that stick up to a static level: by modes, by blending, by a reset, and in a plane."""
 
 from math import inf
 
@@ -16,17 +16,17 @@ class ExactCoulomb(Sticking):
 
         F = mu N mode + sigma_2 v    slip, mode = sign(v), until v passes through zero
         F = F_e                      stick, mode = 0, until |F_e| = mu_s N
-        mu = mu_d                                           form = "jump": it falls at once
+        mu = mu_d                                           form = "jump"
         mu = mu_d + (mu_s - mu_d) exp(-(v / v_s)^2)         form = "stribeck"
 
-    F_e is the applied force: what the contact must carry for no acceleration. Sliding ends where
-    v passes through zero; the contact sticks there if it can, or slides on to the other side. This
-    is the reference for regularised laws; it needs a scene with events. A load
-    beyond mu_s N from the very start breaks away there. In joints of a mechanism F_e follows from
-    the constraints, see `JointFriction`.
+    F_e is the applied force, which the contact must carry for zero acceleration. Sliding ends where
+    v passes through zero. There the contact sticks if it can hold F_e; otherwise it slides in the
+    other direction. The law is the reference for regularised laws, and requires a scene with
+    events. If |F_e| exceeds mu_s N at the start of a run, the contact breaks away immediately. In
+    joints of a mechanism F_e follows from the constraints, see `JointFriction`.
     Limits: `Coulomb`, `Stribeck` and others tend to it as their smoothing width tends to zero.
-    Between the switches the mode is constant. A run has a relative tolerance of 1e-7 or less,
-    whatever the requested one: then the block of `Rabinowicz` is exact to 1e-7 m over 20 s.
+    Between the switches the mode is constant. The relative tolerance of a run is at most 1e-7, even
+    if a larger one is requested: then the block of `Rabinowicz` is exact to 1e-7 m over 20 s.
     Source: Coulomb 1785; as a hybrid system Olsson et al., Eur. J. Control 4, 1998.
     Checked: Modelica Standard Library; rleine/Keynote_Nonsmooth_Dynamics_ENOC2024.
     """
@@ -42,12 +42,12 @@ class ExactCoulomb(Sticking):
 
     @property
     def has_mode(self) -> bool:
-        """True: stick and slip are modes."""
+        """True, since stick and slip are modes in both forms."""
         return True
 
     @property
     def velocity_scale(self) -> Scalar:
-        """Velocity scale of the fall [m/s]; at v = 0 there is an event instead."""
+        """Stribeck velocity [m/s]; inf in the form "jump", where an event replaces it."""
         return self.v_s if self.form == "stribeck" else inf
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -55,7 +55,7 @@ class ExactCoulomb(Sticking):
         return self._coefficient(smooth.fall(speed, self.v_s, 2.0)) * N + self.sigma_2 * speed
 
     def _coefficient(self, falling: Scalar) -> Scalar:
-        """Return mu by the Stribeck weight `falling`."""
+        """Return mu for the Stribeck weight `falling`."""
         if self.form == "jump":
             return self.mu_d
         return self.mu_d + (self.mu_s - self.mu_d) * falling
@@ -67,7 +67,7 @@ class ExactCoulomb(Sticking):
 
 
 ROOT_STEPS = 10
-"""Newton steps that reach a root to rounding for every allowed sharpness."""
+"""Number of Newton steps that find the root to rounding for every allowed sharpness."""
 
 
 @parametric
@@ -80,15 +80,15 @@ class StickSlip(Levels):
         F     = N [(1 - beta) mu_v + beta mu_D]
         dD/dt = beta v [1 - |D/D_max|^n (1 + sign(v D))/2] - (1 - beta) |v| D/D_max
 
-    D [m] is the stiction deformation, forgotten in slip over the path D_max. The step is the
-    quintic one. branch = "published" lets mu_v fall to zero within v_s, as in mu_v of
-    `VelocityBased`: the blend then dips below mu_s, which leaves a second, creeping equilibrium
-    under load; "plateau" keeps mu_s there.
-    Limits: mu_v N for |v| >= v_s; holds any load below mu_s N at rest. The spring at rest,
-    15/8 mu_s N / D_max, is stiff and undamped. An interpretation: the structure is published, the
-    formulas of the blend and of D are not known here.
+    D [m] is the stiction deformation, which decays in slip over the path D_max. The step is the
+    quintic one. With branch = "published", mu_v decreases to zero within v_s, as in
+    `VelocityBased`. The blended coefficient is then below mu_s within v_s, which allows a second
+    equilibrium under load in which the contact creeps. "plateau" keeps mu_v = mu_s within v_s.
+    Limits: mu_v N for |v| >= v_s; holds any load below mu_s N at rest. The stiffness at rest,
+    15/8 mu_s N / D_max, is large, and the contact is undamped. An interpretation: the structure is
+    published, but the formulas of the blend and of D were not available.
     Source: Cha, Choi, Ryu, Choi, J. Mech. Sci. Technol. 25, 2011 (abstract).
-    Checked: the structure is that of the abstract, the formulas are made here.
+    Checked: the structure is that of the abstract; the formulas are constructed.
     """
 
     facts = Facts(("D", "S", "St", "P"), "C2", "rebuilt")
@@ -104,7 +104,7 @@ class StickSlip(Levels):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Deformation D of the contact while it sticks [m]."""
+        """Deformation D [m] of the contact in stick."""
         return (State("D", "m", 1e-6, doc="stiction deformation"),)
 
     def _slipping(self, v: Scalar) -> Scalar:
@@ -135,9 +135,10 @@ class StickSlip(Levels):
         return column((1 - slip) * stretch - slip * forgotten)
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return the deformation at which growth equals loss, zero beyond v_s, shape (1, 1).
+        """Return the deformation at which growth equals loss, shape (1, 1); zero beyond v_s.
 
-        It is the root of slip r + (1 - slip) (r^n - 1), convex, by Newton's method from r = 1.
+        It is the root of the convex function slip r + (1 - slip) (r^n - 1), by Newton's method from
+        r = 1.
         """
         slip, r = self._slipping(v), 1.0 + 0.0 * v
         for _ in range(ROOT_STEPS):
@@ -155,14 +156,14 @@ class HaessigFriedland(TwoLevels):
         slip:  dz/dt = 0 until v changes sign
         F = sigma_0 z mu_s/mu_d + sigma_1 dz/dt  in stick,  sigma_0 z  in slip
 
-    The stiction gradient of the paper is a = (mu_s - mu_d) / mu_d. form = "event" is this law, for
-    constant N; the force drops from mu_s N to mu_d N at once. form = "smooth" yields with the
-    sharpness n, and loses the excess in a step of |r| from 1 - knee to 1:
+    The stiction gradient of the paper is a = (mu_s - mu_d) / mu_d. form = "event" is this law for
+    constant N, in which the force jumps from mu_s N to mu_d N. form = "smooth" yields with the
+    sharpness n, and the excess decreases in a smooth step as |r| rises from 1 - knee to 1:
 
         smooth: dz/dt = v [1 - |r|^n (1 + sign(v r)) / 2]
 
     Limits: steady state mu_d N sign(v); rate-independent for sigma_1 = 0; drifts as little as
-    `MaxwellSlip` with one element. While the bristle unloads F v < 0: it gives back what it stored,
+    `MaxwellSlip` with one element. F v < 0 while the bristle unloads: it returns its stored energy,
     at most mu_s mu_d N^2 / (2 sigma_0). |v| is smooth over v_eps. Not valid for N = 0.
     Source: Haessig and Friedland, ASME J. Dyn. Syst. Meas. Control 113(3), 1991.
     Checked: the smooth form is constructed.
@@ -186,7 +187,7 @@ class HaessigFriedland(TwoLevels):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Bristle deflection, and in the event form the mode."""
+        """Bristle deflection [m], followed by the mode in the event form."""
         slip = State("slip", "1", 1.0, even=True, doc="1 in slip", whole=True)
         bristle = State("z", "m", deflection(self.sigma_0), doc="bristle deflection")
         return (bristle, slip) if self.form == "event" else (bristle,)
@@ -195,7 +196,7 @@ class HaessigFriedland(TwoLevels):
         return self.sigma_0 * z[0] / (self.mu_d * N)
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Return the rate of the deflection [m/s] and, zero, of the mode."""
+        """Return the rate of the deflection [m/s], and zero for the mode."""
         if self.form == "event":
             return column((1 - z[1]) * v, 0.0 * v)
         return column(yielding(v, self._share(N, z), self.n, self.v_eps, self.r_eps))
@@ -211,13 +212,16 @@ class HaessigFriedland(TwoLevels):
         return stiffness * z[0] + self.sigma_1 * self.rate(v, N, z)[0]
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return the deflection at its limit [m], with the mode in slip."""
+        """Return the deflection at its limit [m], and the mode of slip in the event form."""
         direction = smooth.sign(v, 0.0 if self.form == "event" else self.v_eps)
         z = self.mu_d * N / self.sigma_0 * direction
         return column(z, direction**2) if self.form == "event" else column(z)
 
     def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """Return the exact step in the event form; the mode is that at the end of the step."""
+        """Return the exact step in the event form, and None in the smooth form.
+
+        The mean of the mode is its value at the end of the step.
+        """
         if self.form == "smooth":
             return None
         held = Held.over(v, h)
@@ -225,7 +229,7 @@ class HaessigFriedland(TwoLevels):
         return column(end, slip), column(mean, slip)
 
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
-        """Return slip at the limit, and stick when v changes sign."""
+        """Return the switches to slip at the limit and to stick when v changes sign."""
         if self.form == "smooth":
             return ()
         direction = smooth.sign(v, 0.0)
@@ -238,25 +242,25 @@ class HaessigFriedland(TwoLevels):
 
 
 CUBIC_STEPS = 40
-"""Newton steps that reach a cubic root of 1e-15 of its start."""
+"""Number of Newton steps that find a root as small as 1e-5, the cube root of 1e-15."""
 
 
 @parametric
 class Bristle2D(Levels):
-    """Bristle friction that slides where a disc ends (one state, in a plane a vector).
+    """Bristle friction that slides at the edge of a friction disc (one state, a vector in a plane).
 
         g     = N [mu_d + (mu_s - mu_d) exp(-|v|^2/v_s^2)]
         F_tr  = sigma_0 z + sigma_1 v
         F     = F_tr sat(|F_tr|, g) / |F_tr|
         dz/dt = (F - sigma_0 z) / sigma_1
 
-    Made for slip in a plane, with vectors v, z and F: `PlanarSlip(Bristle2D())`. sat is the
-    identity up to (1 - kappa) g, so that the bristle returns exactly and does not drift, and g
-    beyond (1 + kappa) g; kappa = 0 is the projection on the disc of radius g, with its kink.
+    For slip in a plane with vectors v, z and F use `PlanarSlip(Bristle2D())`. sat is the identity
+    up to (1 - kappa) g, so that the bristle returns exactly and does not drift, and g beyond
+    (1 + kappa) g. kappa = 0 is the projection onto the disc of radius g, with a kink at its edge.
     Limits: isotropic; steady state g v/|v| for |v| > kappa g / sigma_1, down to (1 - kappa) g in
-    creep; one bristle and damper in parallel below g. sigma_1 -> 0 tends to Coulomb friction.
+    creep; a bristle and a damper in parallel below g. sigma_1 -> 0 tends to Coulomb friction.
     Source: Kikuuwe, Takesue, Sano, Mochiyama, Fujimoto, IEEE T-RO 22(6), 2006 (elastoplastic
-    form); the use for contact of Liang, Fillmore, Ma, J. Comput. Nonlinear Dynam. 7(4), 2012.
+    form); contact as in Liang, Fillmore, Ma, J. Comput. Nonlinear Dynam. 7(4), 2012.
     Checked: JuliaRobotics/RigidBodyDynamics.jl contact.jl (viscoelastic Coulomb friction).
     """
 
@@ -275,7 +279,7 @@ class Bristle2D(Levels):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Deflection z of the bristle [m], a vector in a plane."""
+        """Deflection z of the bristle [m], which is a vector for slip in a plane."""
         return (State("z", "m", deflection(self.sigma_0), doc="bristle deflection"),)
 
     def _level(self, v: Scalar, N: Scalar) -> Scalar:
@@ -298,9 +302,10 @@ class Bristle2D(Levels):
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return the deflection in steady sliding [m], exact to rounding of g.
 
-        Its force F solves F = sat(F + sigma_1 v). With t = (F + sigma_1 v - g) / (2 kappa g) + 1/2,
-        the place in the corner of sat, it is the root of t^3 (2 - t) = sigma_1 |v| / (kappa g) in
-        [0, 1], convex, by Newton's method from t = 1.
+        The force F satisfies F = sat(F + sigma_1 v). The position in the corner of sat,
+        t = (F + sigma_1 v - g) / (2 kappa g) + 1/2, is the root of t^3 (2 - t) =
+        sigma_1 |v| / (kappa g) in [0, 1]. The function is convex, and Newton's method starts at
+        t = 1.
         """
         g, drawn = self._level(v, N), self.sigma_1 * smooth.magnitude(v, 0.0)
         held = g

@@ -1,4 +1,4 @@
-"""Laws that use the applied force: true sticking without an internal state."""
+"""Laws that depend on the applied force or the acceleration; most of them stick exactly."""
 
 from dataclasses import replace
 from math import inf, pi
@@ -18,22 +18,23 @@ class Karnopp(Sticking):
     """Karnopp friction: inside a band around rest the contact carries the applied force.
 
         F = clip(F_e, -mu_s N, mu_s N)        for |v| < D_v, original
-        F = mu_d N sign(v) + sigma_2 v        beyond
+        F = mu_d N sign(v) + sigma_2 v        for |v| >= D_v, original
         F = (1 - w) hold(F_e, mu_s N) + w (mu_d N sign(v) + sigma_2 v)    smooth
         w = S(|v| / D_v),   S(t) = t^3 (10 - 15t + 6t^2) for 0 <= t <= 1
 
-    hold is the clip with corners rounded over +-F_eps; below them F(0) = F_e exactly.
-    form = "event" (two states, the mode and whether it is leaving the band) is the original in
-    which the band counts as rest: a sliding body that enters it stops, and one that is pulled by
-    more than mu_s N leaves it, against mu_s N up to |v| = D_v. It needs a scene with events.
+    hold is the clip with corners rounded over +-F_eps; below the corners F(0) = F_e exactly.
+    form = "event" (two states: the mode, and whether the body is leaving the band) is the original
+    with the band treated as rest: a sliding body that enters the band stops. A body that is pulled
+    by more than mu_s N leaves the band, against the force mu_s N up to |v| = D_v. This form
+    requires a scene with events.
     Limits: at rest dv/dt = 0 for |F_e| <= mu_s N - F_eps. In the smooth form a moving body comes to
-    rest only asymptotically, v ~ t^(-1/2) inside the band; in the original one v stays where it
-    entered the band unless the integrator sets it to zero; in the event form it stops at once,
-    which takes m D_v^2/2 of energy. D_v -> 0 is Coulomb friction with stiction (`ExactCoulomb`).
-    Inside the band friction may drive: F v >= -0.274 mu_s N D_v smooth, -mu_s N D_v original, and
-    never below zero in the event form. Keep sigma_2 D_v < (mu_s - mu_d) N: else that form enters
-    the band again as soon as it has left it.
-    Source: Karnopp, ASME J. Dyn. Syst. Meas. Control 107, 1985 (not read), as in public codes.
+    rest only asymptotically, v ~ t^(-1/2) inside the band. In the original form v keeps the value
+    at which it entered the band, unless the integrator sets it to zero. In the event form the body
+    stops immediately and loses the energy m D_v^2/2. D_v -> 0 is Coulomb friction with stiction
+    (`ExactCoulomb`). Inside the band friction may drive: F v >= -0.274 mu_s N D_v in the smooth
+    form, F v >= -mu_s N D_v in the original form, but F v >= 0 in the event form. In the event form
+    sigma_2 D_v must be below (mu_s - mu_d) N; otherwise a body that leaves the band reenters it.
+    Source: Karnopp, ASME J. Dyn. Syst. Meas. Control 107, 1985 (not read), as in public code.
     Checked: fellipegm/valve_estimation and other public code.
     """
 
@@ -57,17 +58,17 @@ class Karnopp(Sticking):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """Mode, and 1 while the contact leaves the band."""
+        """Mode, and a state that is 1 while the body leaves the band; none without modes."""
         leaving = State("leaving", "1", 1.0, True, "1 while it leaves the band", whole=True)
         return (*super().states, leaving) if self.has_mode else ()
 
     def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
-        """Return the rate of the mode [1/s], and zero."""
+        """Return the rate of the mode [1/s], and zero for the second state."""
         rate = super().rate(v, N, z, F_e=F_e)
         return column(rate[0], 0.0 * v) if self.has_mode else rate
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return the direction of sliding; a contact that moves within the band is leaving it."""
+        """Return the direction of sliding; a body that moves within the band is leaving it."""
         mode = super().steady_state(v, N)
         if not self.has_mode:
             return mode
@@ -76,7 +77,7 @@ class Karnopp(Sticking):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """Half width of the band [m/s]; inf in the event form, where it is an event."""
+        """Half width of the band [m/s]; inf in the event form, where its edge is an event."""
         return inf if self.has_mode else self.D_v
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -99,7 +100,7 @@ class Karnopp(Sticking):
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
     ) -> tuple[Switch, ...]:
-        """Return stick and slip, the stop at the edge of the band, and the way out of it."""
+        """Return the switches to stick and slip, and those of entering and leaving the band."""
         stuck = [
             replace(s, reset={**s.reset, "leaving": smooth.magnitude(s.reset["mode"], 0.0)})
             for s in super().switches(v, N, z, F_e=F_e)
@@ -113,21 +114,21 @@ class Karnopp(Sticking):
 
 @parametric
 class Awrejcewicz(Levels, StaticLaw):
-    """Awrejcewicz-Grzelczyk-Pyryev friction: four branches, continuous, in one expression.
+    """Awrejcewicz-Grzelczyk-Pyryev friction: four continuous branches in one expression.
 
         u = |v| / epsilon
         F = (1 - A) clip(F_e, -mu_s N, mu_s N) + A g sign(v)
         g = N {mu_d + (mu_s - mu_d) exp(-[max(|v| - epsilon, 0) / v_s]^2)}
         A = u^2 (3 - 2u) original,   u^3 (10 - 15u + 6u^2) smooth,   0 <= u <= 1
 
-    Within |v| <= epsilon g = mu_s N, and the expression equals the four branches of the paper. The
-    corners of the clip are rounded over +-F_eps in the smooth form. The fall beyond epsilon is a
-    choice made here.
+    For |v| <= epsilon, g = mu_s N and the expression equals the four branches of the paper. In the
+    smooth form the corners of the clip are rounded over +-F_eps. The paper does not specify the
+    fall beyond epsilon; its form is a choice.
     Limits: F(0) = F_e for |F_e| <= mu_s N - F_eps; F(epsilon) = mu_s N. Inside the window friction
-    may drive: F v >= -0.204 mu_s N epsilon. A moving body comes to rest only asymptotically, as
-    with `Karnopp`.
-    Source: Awrejcewicz, Grzelczyk, Pyryev 2008 (not read; branches checked to join).
-    Checked: its four branches join.
+    may drive: F v >= -0.204 mu_s N epsilon. As with `Karnopp`, a moving body comes to rest only
+    asymptotically.
+    Source: Awrejcewicz, Grzelczyk, Pyryev 2008 (not read).
+    Checked: the four branches join continuously.
     """
 
     facts = Facts(
@@ -143,7 +144,7 @@ class Awrejcewicz(Levels, StaticLaw):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """Applied force F_e [N], which is carried in stick."""
+        """Applied force F_e [N], which the contact carries in stick."""
         return (APPLIED_FORCE,)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -163,19 +164,19 @@ class Awrejcewicz(Levels, StaticLaw):
 
 @parametric
 class LeineSwitch(Sticking):
-    """Switch model of Leine et al., and its smooth stand-in.
+    """Switch model of Leine et al., and its smooth approximation.
 
         smooth:    F = mu_s N (2/pi) atan(v / v_eps) / (1 + delta |v|)
         original:  F = mu_s N sign(v) / (1 + delta |v|)          for |v| > eta, slip
                    F = clip(F_e + c v, -mu_s N, mu_s N)          for |v| <= eta, stick
 
-    c v draws a sticking body to the middle of the band: with m alpha for c, dv/dt = -alpha v.
-    |v| of the smooth form is rounded over 1e-4 v_eps.
-    form = "event" (one state, the mode) has no band: sliding ends where v passes through zero,
-    rest where |F_e| reaches mu_s N. It needs a scene with events. In the band of the original
-    friction may drive: F v >= -mu_s N eta.
-    Limits: the level falls from mu_s N to zero, with no dynamic level. The smooth form creeps under
-    load and is 6 % short of the original at 10 v_eps, since atan is slow.
+    The term c v moves a sticking body to v = 0: with c = m alpha, dv/dt = -alpha v. In the smooth
+    form |v| is rounded over 1e-4 v_eps.
+    form = "event" (one state, the mode) has no band: sliding ends where v passes through zero, and
+    stick ends where |F_e| reaches mu_s N. It requires a scene with events. In the band of the
+    original form friction may drive: F v >= -mu_s N eta.
+    Limits: the level decreases from mu_s N to zero; there is no dynamic level. The smooth form
+    creeps under load and is 6 % below the original at 10 v_eps, since atan converges slowly.
     Source: Leine et al., Nonlinear Dynam. 16, 1998 (not read); smooth form and slip law as in the
     author's public code.
     Checked: rleine's stickslipsmooth.m (slip law, smooth form); switching unverified.
@@ -224,18 +225,18 @@ class LeineSwitch(Sticking):
 
 @parametric
 class Wojewoda(Levels, StaticLaw):
-    """Hysteretic friction of Wojewoda et al.: other branches for speeding up and slowing down.
+    """Hysteretic friction of Wojewoda et al., with branches for acceleration and deceleration.
 
         F = N [mu_d + (mu_s - mu_d) h sign(v dv/dt)] sign(v)
         h = exp(-a_1 |v| / (|dv/dt| + a_2))
 
     sign(v) is smooth over v_eps, |v| over 1e-4 v_eps, |dv/dt| over a_eps, sign(v dv/dt) over
-    v_eps a_eps. The stick branch of the paper, clip(F_e), is left to laws with modes.
-    Limits: F -> mu_d N for fast sliding; at dv/dt = 0 it is Coulomb friction. Needs mu_s <= 2 mu_d,
-    or the branch of deceleration turns forward. Given the acceleration of the body that it brakes,
-    it closes an algebraic loop: pass a measured or filtered one.
+    v_eps a_eps. The stick branch clip(F_e) of the paper is omitted.
+    Limits: F -> mu_d N for fast sliding; Coulomb friction at dv/dt = 0. Needs mu_s <= 2 mu_d,
+    otherwise friction drives a decelerating body. The acceleration of the body on which the force
+    acts would close an algebraic loop; use a measured or filtered acceleration.
     Source: after Wojewoda, Stefanski, Wiercigroch, Kapitaniak 2008 (abstract only).
-    Checked: of the paper only the abstract was read.
+    Checked: only the abstract of the paper was read.
     """
 
     facts = Facts(("D", "S", "St", "L"), "C∞", "rebuilt")
@@ -259,7 +260,7 @@ class Wojewoda(Levels, StaticLaw):
         return (Input("dv", "m/s^2", "sliding acceleration"),)
 
     def outside(self, speed: Scalar, N: Scalar, *, dv: Scalar = 0.0) -> Scalar:
-        """Raise an error: the branch at the start or end of sliding depends on dv."""
+        """Raise an error, since the branch near rest depends on dv."""
         raise one_sided(self, "its branches change with the sign of v dv/dt")
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, dv: Scalar = 0.0) -> Scalar:

@@ -1,4 +1,4 @@
-"""Coulomb friction with a smooth sign, viscous friction, and a table of measured coefficients."""
+"""Laws without a formula for the Stribeck effect: Coulomb, viscous, and measured coefficients."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -27,7 +27,7 @@ SHAPES: dict[str, Callable[[Scalar], Scalar]] = {
     "saturation": lambda u: smooth.clip(u, -1.0, 1.0),
     "quadratic": _quadratic,
 }
-"""Approximations of sign(u): odd, increasing, -1 to 1."""
+"""Approximations of sign(u): odd functions that increase from -1 to 1."""
 
 
 @parametric
@@ -41,12 +41,12 @@ class Coulomb(StaticLaw):
     atan         (2/pi) atan u                2/pi         0.937   C∞
     erf          erf u                        2/sqrt(pi)   1.000   C∞
     sqrt         u / sqrt(1 + u^2)            1            0.995   C∞
-    saturation   u, held within +-1           1            1       C0, kinks at u = +-1
-    quadratic    u (2 - |u|), held likewise   2            1       C1 at u = 0, +-1
+    saturation   u, limited to +-1            1            1       C0, kinks at u = +-1
+    quadratic    u (2 - |u|) for |u| <= 1     2            1       C1 at u = 0, +-1
 
-    Limits: tends to mu_d N sign(v) as v_eps -> 0; the float v_eps = 0 is sign(v) itself, 0 at rest.
+    Limits: tends to mu_d N sign(v) as v_eps -> 0; the float v_eps = 0 uses sign(v), 0 at rest.
     Never sticks: under a load F_e < mu_d N it creeps, with tanh at v = v_eps atanh(F_e / (mu_d N)).
-    Slope at rest mu_d N / v_eps times that of the table.
+    The slope at rest is mu_d N / v_eps times that of the table.
     Source: Amontons 1699, Coulomb 1785; tanh as in Project Chrono and MORe, atan in Leine's codes,
     quadratic in the incremental potential contact and TAMSI methods.
     Checked: projectchrono/chrono ChContactSMC (tanh); rleine's stickslipsmooth.m (arctangent).
@@ -88,7 +88,7 @@ class Viscous(StaticLaw):
     sigma_2: Scalar = fields.SIGMA_2(0.4)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Return the sliding force [N] at a speed >= 0; none at rest."""
+        """Return the sliding force [N] at a speed >= 0, which is zero at rest."""
         return self.sigma_2 * speed
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -102,8 +102,8 @@ class PowerLawViscous(StaticLaw):
 
         F = sigma_2 |v|^d sign(v)        smooth: sigma_2 v (v^2 + v_eps^2)^((d - 1)/2)
 
-    Limits: d = 1 is `Viscous`, d = 2 drag; for d < 1 the original is infinitely steep at rest and
-    the smooth one has the slope sigma_2 v_eps^(d - 1). Relative error (d - 1)/2 (v_eps/v)^2.
+    Limits: d = 1 is `Viscous`, d = 2 drag. For d < 1 the original is infinitely steep at rest, and
+    the smooth form has the slope sigma_2 v_eps^(d - 1). Relative error (d - 1)/2 (v_eps/v)^2.
     Source: textbook; the general exponent as in drive and fluid-film models.
     """
 
@@ -119,7 +119,7 @@ class PowerLawViscous(StaticLaw):
         return inf if equals(self.d, 1.0) else self.v_eps
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Return the force itself [N]: it does not jump at rest."""
+        """Return the force of the law [N], since it does not jump at rest."""
         return self.force(speed, N)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -131,13 +131,13 @@ class PowerLawViscous(StaticLaw):
 
 @parametric
 class Table(StaticLaw):
-    """Friction coefficients measured at some speeds, interpolated without overshoot.
+    """Friction coefficients measured at several speeds, interpolated without overshoot.
 
         F = N mu(|v|) sign(v)
 
-    `mu` passes through (speeds, coefficients) as a monotone cubic (PCHIP of Fritsch and Carlson)
-    and is constant outside them; sign(v) is smooth over v_eps. One cubic per interval, all of them
-    evaluated: for tens of points, not for thousands.
+    `mu` is the monotone cubic interpolant (PCHIP of Fritsch and Carlson) of (speeds, coefficients),
+    constant outside the table; sign(v) is smooth over v_eps. All intervals are evaluated, which is
+    suitable for tens of points, not for thousands.
     Limits: between two equal coefficients mu is constant; a table of two points is nearly a ramp.
     Creeps under load.
     Source: Fritsch and Carlson, SIAM J. Numer. Anal. 17, 1980, in the form of Fritsch and Butland
@@ -175,7 +175,7 @@ class Table(StaticLaw):
         return N * mu * smooth.sign(v, self.v_eps)
 
     def coefficient(self, speed: Scalar) -> Scalar:
-        """Return the coefficient mu at a speed >= 0."""
+        """Return the coefficient mu at a speed >= 0 [m/s]."""
         mu = self.coefficients[0]
         pieces = zip(pairwise(self.speeds), pairwise(self.coefficients), self._slopes, strict=True)
         for (a, b), (low, high), (left, right) in pieces:
@@ -187,7 +187,7 @@ class Table(StaticLaw):
 
     @cached_property
     def _slopes(self) -> list[tuple[float, float]]:
-        """Slopes at both ends of every interval: weighted harmonic means, zero at the ends."""
+        """Slopes at both ends of each interval: weighted harmonic means, zero at the end points."""
         h = np.diff(self.speeds)
         secant = np.diff(self.coefficients) / h
         before, after = secant[:-1], secant[1:]

@@ -13,9 +13,9 @@ class Stribeck(Levels, Curve):
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)] tanh(v / v_eps) + sigma_2 v
 
-    delta = 1 is Tustin's law, delta = 2 the Gaussian one. For other delta |v| is rounded over
+    delta = 1 is Tustin's law, delta = 2 the Gaussian form. For other delta |v| is rounded over
     1e-4 v_eps, which changes F by less than 1e-4 (mu_s - mu_d) N. Keep v_eps << v_s: for delta = 2
-    the peak is 0.968 mu_s N at v_eps = v_s/10 and tends to mu_s N as v_eps -> 0; the float
+    the peak is 0.968 mu_s N at v_eps = v_s/10 and tends to mu_s N as v_eps -> 0. The float
     v_eps = 0 is the original with sign(v), 0 at rest.
     Limits: mu_s = mu_d gives `Coulomb` + `Viscous`; at |v| = v_s the bracket is
     mu_d + (mu_s - mu_d)/e for every delta. Creeps under load like `Coulomb`.
@@ -37,15 +37,15 @@ class Stribeck(Levels, Curve):
 
 @parametric
 class Tustin(Levels, Curve):
-    """Tustin friction: Coulomb, viscous and an exponential fall.
+    """Tustin friction: Coulomb and viscous friction with an exponential fall.
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v|/v_s)] sign(v) + sigma_2 v
 
     sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original.
     Limits: `Stribeck` with delta = 1; mu_s = mu_d gives Coulomb + viscous, which some papers call
-    Tustin's law. Keep v_eps << v_s, as there. Creeps under load.
+    Tustin's law. Keep v_eps << v_s. Creeps under load.
     Source: Tustin, J. IEE 94, 1947, in the form of Armstrong-Helouvry 1994 (neither was read).
-    Checked: MassWithStopAndFriction of the Modelica Standard Library; not the name.
+    Checked: MassWithStopAndFriction of the Modelica Standard Library, for the formula only.
     """
 
     facts = Facts(("D", "S", "St", "V"), "C∞", "one source")
@@ -83,12 +83,12 @@ class Benson(Levels, Curve):
 
 @parametric
 class Berger(Levels, Curve):
-    """Berger friction, an interpretation: the exponential fall of his review, with a smooth sign.
+    """Berger friction, an interpretation: an exponential fall with a smooth sign.
 
         F = N [mu_d + (mu_s - mu_d) exp(-|v|/v_s)] tanh(v / v_t)
 
-    |v| is smooth over 1e-4 v_t. Berger's paper is a review that lists mu(v) laws and proposes no
-    single one; this is the choice here for papers that compare "Berger's model".
+    |v| is smooth over 1e-4 v_t. Berger's paper is a review that lists laws mu(v) and proposes none.
+    This law is intended for papers that compare "Berger's model".
     Limits: `Tustin` with v_eps = v_t, without viscous friction. Creeps under load.
     Source: interpretation of Berger, Appl. Mech. Rev. 55(6), 2002 (not read).
     Checked: an interpretation of a review that proposes no law.
@@ -106,7 +106,7 @@ class Berger(Levels, Curve):
 
 @parametric
 class DuanSingh(Levels, Curve):
-    """Duan-Singh friction: conditioned dry friction with a static to kinetic ratio.
+    """Duan-Singh friction: smoothed dry friction with a ratio of static to kinetic friction.
 
         F = mu_d N [1 + (mu_s/mu_d - 1) exp(-c |v|)] tanh(sigma v)
 
@@ -159,9 +159,9 @@ class SteadyStateLuGre(Curve):
         F = [F_C + (F_S - F_C) exp(-|v/v_s|^delta)] sign(v) + sigma_2 v
 
     sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original. The
-    levels are forces, since the normal force of the published sets is not reported. The sets
-    `pilot` and `main` hold from 140 to 500 mm/min only: at 1 m/s the viscous term of `pilot` alone
-    is 230 N.
+    levels are forces, since the thesis does not report the normal force. The parameter sets `pilot`
+    and `main` are valid from 140 to 500 mm/min only: at 1 m/s the viscous term of `pilot` alone is
+    230 N.
     Limits: `LuGre` in steady sliding; `Stribeck` with N mu = F.
     Source: A Friction Model for Laminator Nips, MSc thesis, Lund 2015, equation 4.1, tables 5.1
     and 5.2.
@@ -185,10 +185,10 @@ class SteadyStateLuGre(Curve):
 
     @classmethod
     def pilot(cls) -> "SteadyStateLuGre":
-        """Return the set of the pilot plant, table 5.1, which is the default."""
+        """Return the law with the parameters of the pilot plant, table 5.1, the defaults."""
         return cls()
 
     @classmethod
     def main(cls) -> "SteadyStateLuGre":
-        """Return the set of the main plant, table 5.2."""
+        """Return the law with the parameters of the main plant, table 5.2."""
         return cls(F_S=4.2672, F_C=2.6063, v_s=4.9e-3, sigma_2=5.0, delta=3.2)

@@ -1,4 +1,4 @@
-"""Friction of special machines: robot joints, ropes, a quarter-car rig."""
+"""Laws of specific machines: robot joints, servo drives, belts, and a quarter-car rig."""
 
 from math import inf, pi
 
@@ -23,21 +23,21 @@ from symfric.laws.base.law import Facts, Input, StaticLaw, one_sided
 
 @parametric
 class Bittencourt(Curve):
-    """Friction torque of a robot joint under load N at temperature T, after Bittencourt.
+    """Friction torque of a robot joint at load N and temperature T, after Bittencourt.
 
         static(T)  = max(F_s0 + F_sT T, 0),   v_s(T) = v_s0 + v_sT T
         F = {F_c0 + F_cl N + F_sl N exp(-|v/v_sl|^delta)
              + static(T) exp(-|v/v_s(T)|^delta)} sign(v) + (F_v0 + F_vT exp(-T/T_v)) v
 
     N is the magnitude of the load torque [N m], v in rad/s, F in N m. sign(v) is smooth over v_eps,
-    |v| over 1e-4 v_eps, the maximum over F_eps. Temperature is a parameter, so that it may be a
-    symbol. The defaults of levels, velocities and viscous coefficients are those of the paper's
-    table of an industrial robot as it is remembered, unverified; its torques are normalised, and
-    it was identified from about 30 degC on. v_s(T) is above zero from 25 degC on only.
+    |v| over 1e-4 v_eps, the maximum over F_eps. The temperature is a parameter, so that it may be a
+    symbol. The default levels, velocities and viscous coefficients are those of an industrial robot
+    in the paper, quoted from memory and unverified. The torques of the paper are normalised, and
+    the robot was identified at 30 degC and above. v_s(T) is positive above 25 degC only.
     Limits: at fixed N and T a `Stribeck` law with two falls; not valid outside the temperatures of
-    its identification. Creeps under load.
+    the identification. Creeps under load.
     Source: Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012 (abstract only).
-    Checked: formula and defaults.
+    Checked: formula and defaults are from memory.
     """
 
     facts = Facts(("D", "S", "St", "V"), "C∞", "unverified", load="affine")
@@ -88,12 +88,13 @@ class BAM(StaticLaw):
                     only while tau_e and tau_m oppose each other
         F = K sign(v) + K_v v
 
-    tau_m is the torque of the motor, tau_e the external one. Zero coefficients switch terms off:
-    M5 has no quadratic; M4 also K_e = K_m and K_es = K_ms; M3 of M4 no Stribeck part; M2 of M4 no
-    load; M1 neither. The motor drives where |tau_m| > |tau_e|. sign(v) is smooth over v_eps, |v|
-    over 1e-4 v_eps, magnitudes and cases of the torques over tau_eps.
-    Limits: M1 is Coulomb + viscous, M2 is `Stribeck`. `N` has no effect. Creeps under load; BAM
-    itself limits the torque that stops the motor within a step.
+    tau_m is the torque of the motor and tau_e the external torque. M6 is the complete law. M5 has
+    no quadratic terms, and M4 in addition has K_e = K_m and K_es = K_ms. M3 is M4 without the
+    Stribeck terms, M2 is M4 without the terms of the load, and M1 is M4 without both. The motor
+    drives where |tau_m| > |tau_e|. sign(v) is smooth over v_eps, |v| over 1e-4 v_eps, and the
+    magnitudes and cases of the torques over tau_eps.
+    Limits: M1 is Coulomb + viscous, M2 is `Stribeck`. `N` has no effect. Creeps under load; the
+    BAM code limits friction to the torque that stops the motor within a step.
     Source: Duclusaud et al. 2025, as in their public code.
     Checked: Rhoban/bam.
     """
@@ -116,7 +117,7 @@ class BAM(StaticLaw):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """Torques on both sides of the gear, if a coefficient needs them."""
+        """Torques on both sides of the gear; empty if all their coefficients are zero."""
         of_load = (self.K_e, self.K_m, self.K_es, self.K_ms, self.Q_e, self.Q_m)
         if all(equals(coefficient, 0.0) for coefficient in of_load):
             return ()
@@ -140,7 +141,7 @@ class BAM(StaticLaw):
         return self._level(falling, tau_m, tau_e) + self.K_v * speed
 
     def _level(self, falling: Scalar, tau_m: Scalar, tau_e: Scalar) -> Scalar:
-        """Return K [N m] by the Stribeck weight `falling` and the torques."""
+        """Return K [N m] for the Stribeck weight `falling` and the torques."""
         dynamic = smooth.magnitude(self.K_e * tau_e - self.K_m * tau_m, self.tau_eps)
         static = smooth.magnitude(self.K_es * tau_e - self.K_ms * tau_m, self.tau_eps)
         if not (equals(self.Q_e, 0.0) and equals(self.Q_m, 0.0)):
@@ -158,10 +159,11 @@ class Capstan(StaticLaw):
 
         F = T_1 - T_2 = N [exp(mu_d beta sign(v)) - 1]
 
-    N is the tension T_2 of the belt on one side; the tension T_1 on the other is larger while the
-    belt slides towards it (v > 0) and smaller while it slides back. sign(v) is smooth over v_eps.
-    Limits: mu_d beta -> 0 gives `Coulomb` with the coefficient mu_d beta. Not odd: sliding back,
-    |F| is smaller by exp(-mu_d beta). Creeps under load.
+    N is the tension T_2 on one side of the belt. The tension T_1 on the other side is larger than
+    T_2 while the belt slides towards it (v > 0) and smaller otherwise. sign(v) is smooth over
+    v_eps.
+    Limits: mu_d beta -> 0 gives `Coulomb` with the coefficient mu_d beta. Not odd: for v < 0 |F| is
+    smaller by the factor exp(-mu_d beta). Creeps under load.
     Source: Euler 1769, Eytelwein 1808; textbook.
     """
 
@@ -172,11 +174,11 @@ class Capstan(StaticLaw):
     v_eps: Scalar = fields.V_EPS(1e-3)
 
     def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
-        """Return the sliding force [N] to one side for zero widths."""
+        """Return the sliding force [N] to one `side` for zero widths."""
         return N * expm1(self.mu_d * self.beta * side)
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the force [N] of break-away: larger towards the tension T_1."""
+        """Return the break-away force [N], which is larger towards the tension T_1."""
         return side * self.sliding(0.0, N, side)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -185,12 +187,13 @@ class Capstan(StaticLaw):
 
 
 def tilt(x_rel: Scalar, theta: Scalar, L_d: Scalar) -> Scalar:
-    """Return the change d_theta of the strut's angle [rad], positive for a shortened spring.
+    """Return the change d_theta of the strut's angle [rad], positive for a compressed spring.
 
         sin d_theta = x_rel cos(theta) / (L_d - x_rel sin(theta))
 
-    for a strut of length L_d [m] at the angle theta [rad] whose wheel rose by x_rel [m] relative
-    to the body. The paper writes sin(theta) for cos(theta), which is the same at its 45 degrees.
+    The strut has the length L_d [m] and the angle theta [rad], and the wheel has moved up by x_rel
+    [m] relative to the body. The paper prints sin(theta) in place of cos(theta), which is equal at
+    its angle of 45 degrees.
     """
     return asin(x_rel * cos(theta) / (L_d - x_rel * sin(theta)))
 
@@ -206,15 +209,15 @@ class QuarterCarGeneral(StaticLaw):
         F      = f_sd at v = 0, else C_e exp(-|v|/e_1) sign(v) + mu f_sd / tan(theta - d_theta)
                  + sigma_v v,                                                as printed
 
-    S is the quintic step of `Karnopp`, hold its rounded clip. `N` has no effect: the load is
-    |f_sd| / tan. `v` is the velocity of the body, x_rel the wheel's position minus the body's.
-    As printed, the Coulomb term has the sign of the spring force and may drive the body, the branch
-    at rest is not limited, and exp(|v|/e_1) needs e_1 < 0: here e_1 is its magnitude.
-    C_e, e_1, mu, sigma_v and L_d are not given in the paper; their defaults are invented, sigma_v
-    so that friction lessens the overshoot of the body, as the paper says.
-    Limits: holds |f_sd| <= F_brk - F_eps at rest; within v_eps friction may drive, F v >= -0.274
-    F_brk v_eps (as printed at any speed); mu = 0 leaves the simple law beyond v_eps;
-    x_rel < L_d / (2 sin(theta)).
+    S is the quintic step and hold the rounded clip of `Karnopp`. `N` has no effect: the load is
+    |f_sd| / tan. `v` is the velocity of the body, and x_rel the position of the wheel minus that of
+    the body. As printed, the Coulomb term has the sign of the spring force and may drive the body,
+    the force at rest is not limited, and exp(|v|/e_1) requires e_1 < 0; here e_1 is its magnitude.
+    The paper does not give C_e, e_1, mu, sigma_v and L_d. Their defaults are assumptions; sigma_v
+    is chosen such that friction reduces the overshoot of the body, as stated in the paper.
+    Limits: holds |f_sd| <= F_brk - F_eps at rest. Within v_eps friction may drive,
+    F v >= -0.274 F_brk v_eps; as printed it may drive at any speed. mu = 0 gives
+    `QuarterCarSimple` beyond v_eps. Requires x_rel < L_d / (2 sin(theta)).
     Source: Al-Zughaibi, quarter-car friction, equations 7-12 and 24, corrected as described.
     Checked: the paper, corrected as described.
     """
@@ -251,7 +254,7 @@ class QuarterCarGeneral(StaticLaw):
     def outside(
         self, speed: Scalar, N: Scalar, *, x_rel: Scalar = 0.0, v_rel: Scalar = 0.0
     ) -> Scalar:
-        """Return the sliding force [N] at a speed >= 0 for zero widths; refuses "as_printed"."""
+        """Return the sliding force [N] at a speed >= 0; raise an error for form = "as_printed"."""
         if self.form == "as_printed":
             raise one_sided(self, "as printed, it holds any force at rest and may drive the body")
         f_sd = self.k_s * x_rel + self.b_d * v_rel
@@ -260,12 +263,12 @@ class QuarterCarGeneral(StaticLaw):
         return dry + self._leverage(x_rel) * load + self.sigma_v * speed
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the force [N] of break-away; refuses "as_printed"."""
+        """Return the break-away force [N]; raise an error for form = "as_printed"."""
         self.outside(0.0, N)
         return self.F_brk
 
     def _leverage(self, x_rel: Scalar) -> Scalar:
-        """Return the ratio of Coulomb friction and |f_sd|."""
+        """Return the ratio of Coulomb friction to |f_sd|."""
         if equals(self.mu, 0.0):
             return 0.0
         return self.mu / tan(self.theta - tilt(x_rel, self.theta, self.L_d))
@@ -293,10 +296,9 @@ class QuarterCarSimple(Curve):
 
         F = C_e exp(-|v|/e_1) sign(v) + sigma_v v
 
-    sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original. As
-    printed the exponent grows: here e_1 is the magnitude of the paper's. `N` has no effect. C_e,
-    e_1 and sigma_v are not given in the paper; their defaults are invented, as for
-    `QuarterCarGeneral`.
+    sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original. The
+    paper prints exp(|v|/e_1) with e_1 < 0; here e_1 is its magnitude. `N` has no effect. The paper
+    does not give C_e, e_1 and sigma_v; their defaults are assumptions, as in `QuarterCarGeneral`.
     Limits: `Tustin` with a dynamic level of zero. Creeps under load; `QuarterCarGeneral` with
     mu = 0 holds at rest.
     Source: Al-Zughaibi, quarter-car friction, equation 21, with the sign of e_1 corrected.

@@ -1,4 +1,4 @@
-"""Laws of pieces, as multibody codes compose them: ramps, steps and a fall."""
+"""Piecewise laws of multibody codes, which consist of ramps, steps and falls."""
 
 from abc import abstractmethod
 from math import exp as exp_of_float
@@ -16,7 +16,7 @@ RISE = 1 - exp_of_float(-3.0)
 
 @parametric
 class Rise(StaticLaw):
-    """Law that rises to mu_d N within the velocity v_r, in its smooth form as tanh(3 v / v_r)."""
+    """Law that rises to mu_d N over the velocity v_r; the smooth form is tanh(3 v / v_r)."""
 
     mu_d: Scalar = fields.MU_D(0.1)
     v_r: Scalar = fields.VELOCITY(1e-3, width=1, doc="velocity of the transition")
@@ -24,7 +24,7 @@ class Rise(StaticLaw):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """Third of the transition velocity [m/s]."""
+        """One third of the transition velocity [m/s]."""
         return self.v_r / 3
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -39,11 +39,11 @@ class Rise(StaticLaw):
 
     @abstractmethod
     def original(self, v: Scalar) -> Scalar:
-        """Return the original form of the force over mu_d N."""
+        """Return the original form of the force, divided by mu_d N."""
 
 
 def rise(u: Scalar) -> Scalar:
-    """Return (1 - exp(-3 |u|)) sign(u), with its slope 3 at zero."""
+    """Return (1 - exp(-3 |u|)) sign(u), which has the slope 3 at zero."""
     return 3 * u * smooth.phi1(-3 * smooth.magnitude(u, 0.0))
 
 
@@ -52,11 +52,11 @@ class Threlfall(Rise):
     """Threlfall friction.
 
         original:  F = mu_d N (1 - exp(-3 |v|/v_r)) sign(v)   for |v| <= v_r
-                   F = 0.95 mu_d N sign(v)                    beyond
+                   F = 0.95 mu_d N sign(v)                    for |v| > v_r
         smooth:    F = mu_d N tanh(3 v / v_r)
 
-    Both have the slope 3 mu_d N / v_r at rest.
-    Limits: the original never reaches mu_d N, being 5 % short for ever, and jumps by
+    Both forms have the slope 3 mu_d N / v_r at rest.
+    Limits: the original remains 5 % below mu_d N at all speeds above v_r, and jumps by
     -2.1e-4 mu_d N at v_r; the smooth form tends to mu_d N. Creeps under load.
     Source: Threlfall, Mech. Mach. Theory 13, 1978 (not read), as in public multibody code.
     Checked: public Python code of a multibody simulation.
@@ -69,11 +69,11 @@ class Threlfall(Rise):
         return self.mu_d * N * (1.0 if self.form == "smooth" else 0.95)
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the largest force [N]; the original drops by 2e-4 mu_d N behind it."""
+        """Return the largest force [N]; the original falls by 2e-4 mu_d N beyond it."""
         return self.mu_d * N * (1.0 if self.form == "smooth" else RISE)
 
     def original(self, v: Scalar) -> Scalar:
-        """Return the original form of the force over mu_d N."""
+        """Return the original form of the force, divided by mu_d N."""
         u = v / self.v_r
         within = smooth.magnitude(u, 0.0) <= 1
         return smooth.choose(within, rise(u), 0.95 * smooth.sign(v, 0.0))
@@ -84,33 +84,34 @@ class ModifiedThrelfall(Rise):
     """Threlfall friction modified by Marques et al., so that it reaches the dynamic level.
 
         original:  F = mu_d N (1 - exp(-3 |v|/v_r)) / (1 - exp(-3)) sign(v)   for |v| <= v_r
-                   F = mu_d N sign(v)                                         beyond
+                   F = mu_d N sign(v)                                         for |v| > v_r
         smooth:    F = mu_d N tanh(3 v / v_r)
 
     Limits: F(v_r) = mu_d N in the original, 0.995 mu_d N in the smooth form, which is that of
-    `Threlfall`. The coefficient is an interpretation: with it the law is continuous; with 0.95
-    instead of 1 - exp(-3) it would overshoot by 2.2e-4. Creeps under load.
+    `Threlfall`. The coefficient 1 - exp(-3) is an interpretation that makes the law continuous;
+    with 0.95 it would overshoot by 2.2e-4. Creeps under load.
     Source: Marques et al., Nonlinear Dynam. 86, 2016 (not read).
-    Checked: the coefficient is an interpretation.
+    Checked: the coefficient 1 - exp(-3) is an interpretation.
     """
 
     facts = Facts(("D",), "C∞ (original: C0 at |v| = v_r, C1 at 0)", "unverified")
 
     def original(self, v: Scalar) -> Scalar:
-        """Return the original form of the force over mu_d N."""
+        """Return the original form of the force, divided by mu_d N."""
         return rise(smooth.clip(v / self.v_r, -1.0, 1.0)) / RISE
 
 
 @parametric
 class BengisuAkay(Levels, StaticLaw):
-    """Bengisu-Akay friction: a parabola up to the static level, then a fall.
+    """Bengisu-Akay friction: a parabola up to the static level, followed by a fall.
 
         F = mu_s N u (2 - |u|)                                  u = v/v_0, for |u| <= 1
         F = N [mu_d + (mu_s - mu_d) exp(-xi (|v| - v_0))] sign(v)       beyond, original
         F = N [mu_d + (mu_s - mu_d) exp(-xi^2 (|v| - v_0)^2)] sign(v)   beyond, smooth
 
-    Limits: the peak F(v_0) = mu_s N is exact; F -> mu_d N. The slope of the original jumps at v_0
-    from 0 to -xi (mu_s - mu_d) N, that of the smooth form is 0 on both sides. Creeps under load.
+    Limits: the peak F(v_0) = mu_s N is exact; F -> mu_d N. At v_0 the slope of the original jumps
+    from 0 to -xi (mu_s - mu_d) N; the slope of the smooth form is 0 on both sides. Creeps under
+    load.
     Source: Bengisu and Akay, J. Sound Vib. 171, 1994 (not read).
     Checked: parabola and fall join at the static level.
     """
@@ -138,14 +139,15 @@ class BengisuAkay(Levels, StaticLaw):
 
 @parametric
 class VelocityBased(TwoLevels, StaticLaw):
-    """Velocity-based friction of MSC ADAMS: a step up to the static level, a step down.
+    """Velocity-based friction of MSC ADAMS: a step up to the static level, then a step down.
 
         F = N [2 S((v + v_s) / (2 v_s)) - 1] [mu_s - (mu_s - mu_d) S((|v| - v_s) / (v_d - v_s))]
         S(t) = t^2 (3 - 2t) original,   t^3 (10 - 15t + 6t^2) smooth,   0 <= t <= 1
 
     With u = v/v_s the first bracket is u (3 - u^2)/2 or u (15 - 10 u^2 + 3 u^4)/8, |u| <= 1.
-    Limits: F(v_s) = mu_s N and F = mu_d N from v_d on, both exactly. Slope at rest 1.5 mu_s N / v_s
-    original, 1.875 mu_s N / v_s smooth. ADAMS joints take v_d = 1.5 v_s. Creeps under load.
+    Limits: F(v_s) = mu_s N, and F = mu_d N for v >= v_d, both exactly. The slope at rest is
+    1.5 mu_s N / v_s in the original and 1.875 mu_s N / v_s in the smooth form. Joints of ADAMS use
+    v_d = 1.5 v_s. Creeps under load.
     Source: documentation of MSC ADAMS, contact friction and STEP, two pages.
     Checked: two pages of the documentation of MSC ADAMS.
     """
@@ -170,14 +172,14 @@ class VelocityBased(TwoLevels, StaticLaw):
 
 @parametric
 class Ambrosio(StaticLaw):
-    """Ambrosio friction: nothing below v_0, a ramp to the dynamic level at v_1.
+    """Ambrosio friction: zero below v_0, then a ramp to the dynamic level at v_1.
 
         F = mu_d N sign(v) s((|v| - v_0) / (v_1 - v_0)),   0 <= v_0 < v_1
         s(t) = t original,   t^3 (10 - 15t + 6t^2) smooth,   0 <= t <= 1
 
-    Limits: F = mu_d N from v_1 on; no friction at all below v_0, so a loaded contact creeps freely
-    there and the linearisation at rest is singular; v_0 = 0 in the original is `Coulomb` with the
-    shape saturation.
+    Limits: F = mu_d N for v >= v_1. Below v_0 there is no friction, so that a loaded contact creeps
+    freely and the linearisation at rest is singular. The original with v_0 = 0 is `Coulomb` with
+    the shape "saturation".
     Source: Ambrosio 2003 (not read), as in public multibody code.
     Checked: public Python code of a multibody simulation.
     """
@@ -209,14 +211,14 @@ class Ambrosio(StaticLaw):
 
 @parametric
 class Hollars(TwoLevels, StaticLaw):
-    """Hollars friction, of Simbody.
+    """Hollars friction of Simbody.
 
         u = |v| / v_t
         F = N {min(u, 1) [mu_d + 2 (mu_s - mu_d) / (1 + u^2)] + mu_v |v|} sign(v)
 
     min(u, 1) is rounded over 1 +- u_eps; the float u_eps = 0 is the original.
-    Limits: F(v_t) = mu_s N in the original, (1 - 0.19 u_eps) mu_s N here; the excess over mu_d N
-    falls like 2/u^2. Slope at rest N (2 mu_s - mu_d) / v_t. Creeps under load.
+    Limits: F(v_t) = mu_s N in the original, (1 - 0.19 u_eps) mu_s N with rounding. The excess over
+    mu_d N decreases as 2/u^2. The slope at rest is N (2 mu_s - mu_d) / v_t. Creeps under load.
     Source: Simbody, three public headers.
     Checked: simbody/simbody HuntCrossleyForce.h.
     """
@@ -242,16 +244,16 @@ class Hollars(TwoLevels, StaticLaw):
 
 @parametric
 class Exudyn(TwoLevels, StaticLaw):
-    """Regularised friction of Exudyn: a ramp up to the static level, an exponential fall.
+    """Regularised friction of Exudyn: a ramp up to the static level, then an exponential fall.
 
         F = N mu_s u                                                u = v/v_reg, for |u| <= 1
         F = N {mu_d + (mu_s - mu_d) exp(-w/v_exp) + mu_v w} sign(v),   w = |v| - v_reg, beyond
 
-    The ramp's corner at |u| = 1 is rounded over 1 +- u_eps, and w with it; the float u_eps = 0 is
-    the original, with its kink.
-    Limits: F(v_reg) = mu_s N in the original, some 0.19 u_eps less here; F -> mu_d N without mu_v;
-    v_reg -> 0 is `Benson`. Slope at rest mu_s N / v_reg. Creeps under load.
-    Source: Exudyn, public source; its text writes the ramp without the division by v_reg.
+    The corner of the ramp at |u| = 1 is rounded over 1 +- u_eps, and w accordingly; the float
+    u_eps = 0 is the original, with a kink.
+    Limits: F(v_reg) = mu_s N in the original, lower by about 0.19 u_eps with rounding; F -> mu_d N
+    for mu_v = 0; v_reg -> 0 is `Benson`. The slope at rest is mu_s N / v_reg. Creeps under load.
+    Source: Exudyn, public source; its manual omits the division by v_reg in the ramp.
     Checked: jgerstmayr/EXUDYN, source of its regularised friction.
     """
 
@@ -282,14 +284,14 @@ class Exudyn(TwoLevels, StaticLaw):
 
 @parametric
 class Step5(TwoLevels, StaticLaw):
-    """Quintic-step Stribeck friction, of Simbody and of the early Drake.
+    """Quintic-step Stribeck friction of Simbody and of early versions of Drake.
 
         u = |v| / v_t,   S(t) = t^3 (10 - 15t + 6t^2) for 0 <= t <= 1
         F = N {mu_s S(u) - (mu_s - mu_d) S((u - 1)/2) + mu_v |v|} sign(v)
 
-    Limits: F(v_t) = mu_s N, F(3 v_t) = mu_d N exactly (without mu_v). The slope at rest is zero:
-    nothing resists slow creep and the linearisation at rest is singular. The viscous coefficient of
-    Simbody is mu_v v_t.
+    Limits: F(v_t) = mu_s N, F(3 v_t) = mu_d N exactly (for mu_v = 0). The slope at rest is zero, so
+    that slow creep meets no resistance and the linearisation at rest is singular. The viscous
+    coefficient of Simbody is mu_v v_t.
     Source: Simbody, public source.
     Checked: simbody/simbody CompliantContactSubsystem.cpp, function stribeck.
     """

@@ -1,4 +1,4 @@
-"""The magic formula as friction: a sine of an arctangent, and laws that tune its factors."""
+"""Laws based on the magic formula, the sine of an arctangent, and on rules for its factors."""
 
 import math
 from math import pi
@@ -12,17 +12,17 @@ from symfric.laws.base.law import Facts, StaticLaw
 
 @parametric
 class RuiWang(StaticLaw):
-    """Rui-Wang static friction, a reconstruction: the magic formula with constant level.
+    """Rui-Wang static friction, reconstructed: the magic formula with a constant level.
 
         y = B v,   phi = (1 - E) y + E atan(y)
         F = D sin(C atan(phi))
 
-    Recorded of the original are only that it is continuously differentiable in v and knows neither
-    mu_d, nor N, nor a transition velocity, and that `SelfTuning` modifies it and keeps sine and
-    arctangent; the equation is presumed.
+    The original is known only from descriptions: it is continuously differentiable in v, it does
+    not depend on mu_d, N or a transition velocity, and `SelfTuning` is a modification of it with
+    the same sine and arctangent. The equation is an assumption.
     Limits: `SelfTuning` with D = mu_s N and its C; F -> D sin(C pi/2). `N` has no effect. C <= 1 is
     monotone, C > 1 has a peak. Creeps under load.
-    Source: reconstruction; the equation of Wang and Rui 2000 is lost and was not read.
+    Source: reconstruction; the equation of Wang and Rui 2000 was not available.
     """
 
     facts = Facts(("D", "S", "St"), "C∞", "rebuilt", load="independent")
@@ -37,7 +37,7 @@ class RuiWang(StaticLaw):
         return self.D * sin(self.C * pi / 2)
 
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the peak [N], or the limit of a curve without one."""
+        """Return the peak [N], or the limit of a curve without a peak."""
         return self.D * sin(smooth.clip(self.C, 0.0, 1.0) * pi / 2)
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -52,13 +52,14 @@ class SelfTuning(TwoLevels, StaticLaw):
         y = B v,   phi = (1 - E) y + E atan(y)
         F = mu_s N sin(C atan(phi)),   C = 2 - (2/pi) asin(mu_d / mu_s)
 
-    C fixes the magnitudes: the peak is mu_s N exactly and F -> mu_d N as v -> inf. B fixes only
-    the velocity scale; the peak lies at phi = tan(pi / (2C)), for E = 0 at v = tan(pi/(2C)) / B.
-    `from_peak_velocity` and `from_slope` choose B; `BrittleSelfTuning` lets it follow the load.
+    C determines the magnitudes: the peak is exactly mu_s N, and F -> mu_d N as v -> inf. B
+    determines only the velocity scale: the peak is at phi = tan(pi/(2C)), for E = 0 at
+    v = tan(pi/(2C)) / B. `from_peak_velocity` and `from_slope` choose B; in `BrittleSelfTuning` it
+    depends on the load.
     Limits: mu_s = mu_d gives C = 1, monotone without a peak, but the gradient of C with respect
-    to mu_s and mu_d is infinite there. Creeps under load. Slope at rest mu_s N B C.
-    Source: reconstruction of doi 10.1177/14644193231169325, whose printed equations are lost; the
-    bracket with E and the function for B are interpretations.
+    to mu_s and mu_d is infinite there. Creeps under load. The slope at rest is mu_s N B C.
+    Source: reconstruction of doi 10.1177/14644193231169325, whose printed equations were not
+    available; the bracket with E and the function for B are interpretations.
     """
 
     facts = Facts(("D", "S", "St"), "C∞", "rebuilt")
@@ -80,9 +81,9 @@ class SelfTuning(TwoLevels, StaticLaw):
     def from_peak_velocity(
         cls, v_p: Scalar, mu_s: Scalar = 0.15, mu_d: Scalar = 0.1, E: float = 0.0
     ) -> "SelfTuning":
-        """Return the law whose peak mu_s N lies at the velocity `v_p` [m/s].
+        """Return the law with its peak mu_s N at the velocity `v_p` [m/s].
 
-        Ill-posed as mu_d -> mu_s, where the peak moves to infinity.
+        The problem is ill-posed as mu_d -> mu_s, where the peak moves to infinity.
 
         Raises:
             ValueError: E != 0 with symbols for mu_s or mu_d, since phi is inverted numerically.
@@ -96,23 +97,23 @@ class SelfTuning(TwoLevels, StaticLaw):
     def from_slope(
         cls, k: Scalar, N: Scalar, mu_s: Scalar = 0.15, mu_d: Scalar = 0.1, E: Scalar = 0.0
     ) -> "SelfTuning":
-        """Return the law of the slope `k` [N s/m] at rest under the normal force `N`, for any E."""
+        """Return the law with the slope `k` [N s/m] at rest at the normal force `N`, for any E."""
         return cls(mu_s=mu_s, mu_d=mu_d, B=k / (mu_s * N * shape_factor(mu_d / mu_s)), E=E)
 
 
 @parametric
 class BrittleSelfTuning(TwoLevels, StaticLaw):
-    """Self-tuning friction whose stiffness factor follows from load and brittleness.
+    """Self-tuning friction whose stiffness factor depends on load and brittleness.
 
         B = B_0 + (B_max - B_0) [1 - exp(-(mu_s - mu_d)/difference_ref N/N_ref)]
         F = SelfTuning(mu_s, mu_d, B, E)
 
-    A large mu_s - mu_d means brittle bristles and a faster transition, and so does load.
-    Limits: N -> 0 or mu_s = mu_d gives B_0, a heavy load B_max; the levels mu_s N and mu_d N are
-    those of `SelfTuning` whatever B is. With N from the multiplier of a mechanism dF/dN holds the
-    part by B, too.
+    A large mu_s - mu_d means brittle bristles and a faster transition, as does a large load.
+    Limits: N -> 0 or mu_s = mu_d gives B_0, a large load B_max. The levels mu_s N and mu_d N are
+    those of `SelfTuning` for any B. If N is a multiplier of a mechanism, dF/dN contains the
+    derivative of B.
     Source: reconstruction of doi 10.1177/14644193231169325, which states the trends of B; its
-    formula is lost and this one is a candidate.
+    formula was not available, and this one is a candidate.
     """
 
     facts = Facts(
@@ -132,7 +133,7 @@ class BrittleSelfTuning(TwoLevels, StaticLaw):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """Velocity 1/B_max [m/s]."""
+        """Smallest velocity scale, 1/B_max [m/s]."""
         return 1 / self.B_max
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -144,7 +145,7 @@ class BrittleSelfTuning(TwoLevels, StaticLaw):
 
 
 def magic_formula(v: Scalar, D: Scalar, C: Scalar, B: Scalar, E: Scalar) -> Scalar:
-    """Return D sin(C atan((1 - E) y + E atan(y))) of y = B v."""
+    """Return D sin(C atan((1 - E) y + E atan(y))) with y = B v."""
     y = B * v
     phi = y if equals(E, 0.0) else (1 - E) * y + E * atan(y)
     return D * sin(C * atan(phi))
@@ -156,7 +157,7 @@ def shape_factor(ratio: Scalar) -> Scalar:
 
 
 def _inverse_phi(target: Scalar, E: float) -> float:
-    """Return y >= 0 with (1 - E) y + E atan(y) = target, by bisection; the left rises for E < 1."""
+    """Return the root y >= 0 of (1 - E) y + E atan(y) = target by bisection, for E < 1."""
     if is_casadi(target, E):
         raise ValueError(
             "SelfTuning.from_peak_velocity: expected numbers for mu_s, mu_d and E, got symbols; "
@@ -183,7 +184,7 @@ def brittleness(
 
         B = B_0 + (B_max - B_0) [1 - exp(-(difference/difference_ref) (N/N_ref))]
 
-    Large mu_s - mu_d means brittle bristles and a faster transition. The paper's own formula is
-    lost; this one is a candidate with its stated trends.
+    A large mu_s - mu_d means brittle bristles and a faster transition. The formula of the paper was
+    not available; this one is a candidate with the trends that the paper states.
     """
     return B_0 + (B_max - B_0) * (1 - exp(-(difference / difference_ref) * (N / N_ref)))

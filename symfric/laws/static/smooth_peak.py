@@ -1,4 +1,4 @@
-"""Smooth laws with a peak or a fall that is not exponential."""
+"""Laws with a smooth peak, or with a fall that is not exponential."""
 
 from math import e, sqrt
 
@@ -16,9 +16,10 @@ class BrownMcPhee(TwoLevels, StaticLaw):
         x = v / v_t
         F = N [mu_d tanh(4x) + (mu_s - mu_d) x / (x^2/4 + 3/4)^2] + mu_v v tanh(4 N / N_t)
 
-    Limits: F(v_t) = N (mu_s - 6.7e-4 mu_d), so the static level is met to 0.1 %; the excess over
-    mu_d N falls like 16 (v_t/v)^3; mu_s = mu_d gives mu_d N tanh(4x). Creeps under load. Slope at
-    rest N [4 mu_d + (16/9)(mu_s - mu_d)] / v_t sets the stiffness of the scene.
+    Limits: F(v_t) = N (mu_s - 6.7e-4 mu_d), so the static level is met to 0.1 %. The excess over
+    mu_d N decreases as 16 (v_t/v)^3; mu_s = mu_d gives mu_d N tanh(4x). Creeps under load. The
+    slope at rest, N [4 mu_d + (16/9)(mu_s - mu_d)] / v_t, determines the stiffness of the equations
+    of motion.
     Source: Brown and McPhee, ASME J. Comput. Nonlinear Dynam. 11(5), 2016, 054502.
     Checked: public MATLAB function Friction_B and the code of a railway simulator.
     """
@@ -52,9 +53,9 @@ class SimscapeBreakaway(TwoLevels, StaticLaw):
         u = v / (sqrt(2) v_brk)
         F = N {sqrt(2e) (mu_s - mu_d) u exp(-u^2) + mu_d tanh(10 v / v_brk)} + sigma_2 v
 
-    Limits: F(v_brk) = mu_s N to 4e-9 (without sigma_2), the peak for small mu_d; at 10 v_brk the
-    excess over mu_d N is below 1e-20. Slope at rest N [1.65 (mu_s - mu_d) + 10 mu_d] / v_brk.
-    Creeps under load.
+    Limits: F(v_brk) = mu_s N to 4e-9 (for sigma_2 = 0), which is the peak for small mu_d. At
+    10 v_brk the excess over mu_d N is below 1e-20. The slope at rest is
+    N [1.65 (mu_s - mu_d) + 10 mu_d] / v_brk. Creeps under load.
     Source: documentation of Simscape, four pages.
     Checked: documentation of Simscape, four pages.
     """
@@ -66,7 +67,7 @@ class SimscapeBreakaway(TwoLevels, StaticLaw):
 
     @property
     def velocity_scale(self) -> Scalar:
-        """Tenth of the breakaway velocity [m/s]."""
+        """One tenth of the breakaway velocity [m/s]."""
         return self.v_brk / 10
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
@@ -87,10 +88,10 @@ class Specker(TwoLevels, StaticLaw):
         F_p = N [mu_s - mu_d tanh(v_sp / v_t)] - sigma_2 v_sp
         F   = F_p (v/v_sp) exp(1/2 - (v/v_sp)^2 / 2) + mu_d N tanh(v / v_t) + sigma_2 v
 
-    Limits: F(v_sp) = mu_s N exactly; with v_t = v_sp/10 it is `SimscapeBreakaway` to 4e-9. With
-    sigma_2 v_sp above the static excess the peak turns into a dip. Creeps under load.
+    Limits: F(v_sp) = mu_s N exactly; with v_t = v_sp/10 it is `SimscapeBreakaway` to 4e-9. If
+    sigma_2 v_sp exceeds the static excess, the peak becomes a minimum. Creeps under load.
     Source: Specker, Buchholz, Dietmayer 2014 (not read; the correction by sigma_2 is uncertain).
-    Checked: v_t = v_sp/10 is SimscapeBreakaway; the part of sigma_2 is uncertain.
+    Checked: SimscapeBreakaway for v_t = v_sp/10; the correction by sigma_2 is uncertain.
     """
 
     facts = Facts(("D", "S", "St", "V"), "C∞", "unverified")
@@ -123,10 +124,10 @@ class MakkarDixon(StaticLaw):
 
         F = gamma_1 [tanh(gamma_2 v) - tanh(gamma_3 v)] + gamma_4 tanh(gamma_5 v) + gamma_6 v
 
-    gamma_1 + gamma_4 is about the static level, gamma_4 the dynamic one.
-    Limits: F -> gamma_4 + gamma_6 v. The peak stays below gamma_1 + gamma_4, at 0.905 of it with
-    the default steepnesses. gamma_2 > gamma_3 makes it dissipative and the parameters unique.
-    Creeps under load.
+    gamma_1 + gamma_4 is approximately the static level, gamma_4 the dynamic level.
+    Limits: F -> gamma_4 + gamma_6 v. The peak is below gamma_1 + gamma_4; it is 0.905 of it with
+    the default parameters. With gamma_2 > gamma_3 the law is dissipative and its parameters are
+    unique. Creeps under load.
     Source: Makkar, Dixon, Sawyer, Hu 2005 (not read), as in public code.
     Checked: public code, in which a parenthesis is misplaced.
     """
@@ -159,10 +160,10 @@ class Lorentzian(Levels, Curve):
         F = N [mu_d + (mu_s - mu_d) / (1 + (v/v_s)^2)] sign(v) + sigma_2 v
 
     sign(v) is smooth over v_eps; the float v_eps = 0 is the original.
-    Limits: halfway between the levels at v = v_s; the excess over mu_d N falls like (v_s/v)^2.
+    Limits: halfway between the levels at v = v_s; the excess over mu_d N decreases as (v_s/v)^2.
     Creeps under load.
     Source: Hess and Soom, ASME J. Tribol. 112, 1990, as cited by Armstrong-Helouvry (not read).
-    Checked: g(v) of jchristopherson/friction README with alpha = 2; not the name.
+    Checked: g(v) of jchristopherson/friction README with alpha = 2, for the formula only.
     """
 
     facts = Facts(("D", "S", "St", "V"), "C∞", "one source")
@@ -185,8 +186,8 @@ class PoppStelter(StaticLaw):
         F = N {mu_s [(1 - eta) / (1 + d |v|) + eta] + kappa v^2} sign(v)
 
     sign(v) is smooth over v_eps, |v| over 1e-4 v_eps; the float v_eps = 0 is the original.
-    Limits: eta mu_s N is the level that the fall tends to. The braces are the coefficient mu(v),
-    so that the quadratic rise is proportional to the load, too. Creeps under load.
+    Limits: the fall tends to the level eta mu_s N. The quadratic rise is proportional to the load,
+    since it is part of the coefficient mu(v) in braces. Creeps under load.
     Source: Popp and Stelter, Phil. Trans. R. Soc. A 332, 1990 (not read).
     """
 
