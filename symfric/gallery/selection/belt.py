@@ -56,7 +56,7 @@ def drawn(
 
 
 def leaving(one: Trajectory) -> Array:
-    """Return the instants [s] at which the block is slower than the belt by a tenth."""
+    """Return the instants [s] at which the block becomes slower than the belt by a tenth."""
     v = one["v_rel"]
     falls = np.flatnonzero((v[:-1] >= -0.1 * V_BELT) & (v[1:] < -0.1 * V_BELT))
     return one.t[falls]
