@@ -44,7 +44,7 @@ COEFFICIENTS = {
 
 
 def law(label: str, v_t: float) -> Law:
-    """Return one of `LAWS` with its peak at `v_t` [m/s], or `TUNED`, whose peak is its own."""
+    """Return one of `LAWS` with its peak at `v_t` [m/s], or `TUNED`, which determines its peak."""
     if label == TUNED:
         return BrittleSelfTuning(**MU)
     if label == "self-tuning":
