@@ -7,28 +7,28 @@
     run.plot()
     run.save("run.npz")
 
-What there is; `help` of each tells more:
+Contents; `help` describes each name:
 
     laws        LuGre, BrownMcPhee, GMS, ... (ALL_LAWS by name, POPULATIONS of random contacts);
-                Law, StaticLaw, State, Input, Facts (PHENOMENA) to write them, Element and Slider to
+                Law, StaticLaw, State, Input, Facts (PHENOMENA) to write laws, Element and Slider to
                 compose them; law_from_text and any_from_text (AnyLaw), law_name; steady_force,
                 steady_inputs; PlanarSlip and SpatialSlip in a plane and in space
     machines    rabinowicz, drive; more in symfric.scenes (ALL_SCENES by name)
-    equations   Model of Variable, Output, Event and Monitor; contact puts a law into it (Contact)
-    mechanisms  Mechanism of bodies and joints that rub, read_urdf; more in symfric.multibody
+    equations   Model of Variable, Output, Event and Monitor; contact adds a law to it (Contact)
+    mechanisms  Mechanism of bodies and joints with friction, read_urdf; more in symfric.multibody
     running     simulate, simulate_many, stepper, flow; inputs as numbers, functions of time or
-                samples, Hold and Linear (rate_of: their rate); SolveError, Status where runs fail,
-                OverloadWarning, EnergyWarning where they are in doubt
+                samples, Hold and Linear (rate_of: their rate); SolveError, Status of failed runs,
+                OverloadWarning, EnergyWarning of doubtful runs
     results     Trajectory (run["x"], run.at(times), run.at(run.step_times), run.extremes, plot,
                 animate, save, to_csv, to_dataframe), load_run, Statistics, Plant, report; Ensemble
                 (varied, extremes, plot, save, to_dataframe), load_ensemble; for_print
     choice      select ranks laws on a machine at equal error (Choice)
-    behaviour   figure and compare of laws (FigureData); recommended finds a smoothing for a wanted
-                error (Recommendation)
+    behaviour   figure and compare show laws (FigureData); recommended finds the smoothing for a
+                required error (Recommendation)
     parameters  Parameter, parameters, with_values, symbolise
 
-Optimal control is the package `ocp`, identification `identification`; C is written by
-`symfric.codegen`, units of FMI by `symfric.fmu`. The command line is `symfric`.
+The package `ocp` solves optimal control problems, `identification` fits parameters to data,
+`symfric.codegen` writes C, and `symfric.fmu` writes FMI units. The command line is `symfric`.
 """
 
 from typing import TYPE_CHECKING

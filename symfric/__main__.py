@@ -1,6 +1,6 @@
 """Entry point of `symfric` and of `python -m symfric`.
 
-It imports the command line inside `main`, so that Ctrl-C during that import ends in a sentence.
+`main` imports the command line itself, so that Ctrl-C during this import prints one sentence.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""Benchmarks of run time and error. May import every other package."""
+"""Benchmarks of run time and error; may import every other package."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ def measure(
 
     Args:
         subject: name of the subject.
-        quick: fewer points and fewer other tools.
+        quick: measure fewer points and fewer other tools.
         progress: called with the current item and the fraction done.
         more: options of the subject, such as `links` of "multibody".
     """

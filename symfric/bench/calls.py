@@ -1,7 +1,7 @@
 """Benchmarks of many short calls, of events, and of imports.
 
-Times are processor times of whole calls from Python, the shortest of several rounds in which all
-methods take turns. Ratios are relative to the first method of each task, which is symfric.
+Times are processor times of whole calls from Python, the shortest of several rounds in which the
+methods alternate. Ratios are relative to the first method of each task, which is symfric.
 """
 
 import sys
@@ -31,13 +31,13 @@ Array = NDArray[np.float64]
 Calls = dict[str, Callable[[], object]]
 SEED, RTOL = 10, 1e-6
 TORQUES = (30.0, 30.0, 15.0, 2.0, 1.0, 0.2)
-"""Largest torques [N m] of the joints of the arm, from the base on."""
+"""Largest torques [N m] of the joints of the arm, starting at the base."""
 FREE = ("mu_s", "mu_d", "k", "v_belt")
 TITLE = "Processor time of short tasks"
 
 
 def bench(quick: bool = False, progress: Progress = None) -> Report:
-    """Measure all tasks; `quick`: fewer steps, elements, points and rounds."""
+    """Measure all tasks; with `quick`, use fewer steps, elements, points and rounds."""
 
     def quietly(task: Callable[[bool], Iterator[Found]]) -> list[Found]:
         with unwarned():
@@ -70,7 +70,7 @@ def _drive(quick: bool) -> Iterator[Found]:
 
 
 def _arm(quick: bool) -> Iterator[Found]:
-    """Measure an arm of six joints under torques held for 1 ms: smooth ones, and noise."""
+    """Measure an arm of six joints under torques held for 1 ms: smooth torques and noise."""
     model, count = Arm(BrownMcPhee()).model(), 20 if quick else 1000
     t = 1e-3 * np.arange(count)
     torques = {
@@ -109,7 +109,7 @@ def _stepped(task: str, model: Model, dt: float, u: Array, rounds: int) -> Itera
 
 
 def _stepping_peer(model: Model, dt: float, u: Array) -> Callable[[], Array]:
-    """Return the steps of CasADi's `rosenbrock`, compiled if possible and called by its buffer."""
+    """Return the steps of CasADi's `rosenbrock`, compiled if possible and called with buffers."""
     inputs = input_data(model, {v.name: Hold([0.0, dt], [0.0, 1.0]) for v in model.u}, 0.0, dt)
     whole = system(model, inputs)
     problem = peer(whole, inputs, np.zeros(0), tolerances(whole, RTOL), "rosenbrock")
@@ -156,7 +156,7 @@ def _events(quick: bool) -> Iterator[Found]:
 
 
 def _gms(count: int, form: str) -> Law:
-    """Return elements of equal shares and different stiffnesses, 1e5 N/m in total."""
+    """Return a law with elements of equal shares and different stiffnesses, 1e5 N/m in total."""
     weights = np.linspace(5.0, 1.0, count)
     stiffness = 1e5 * weights / weights.sum()
     return GMS(elements=tuple(Element(float(k), 1.0 / count) for k in stiffness), form=form)

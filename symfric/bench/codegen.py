@@ -27,7 +27,7 @@ FUZZ = (
 
 
 def cores(quick: bool) -> Iterator[Found]:
-    """Measure every block; `quick` omits the C of CasADi."""
+    """Measure every block; with `quick`, omit the C of CasADi."""
     tools = find_tools()
     if isinstance(tools, Absent):
         yield f"cores: {tools.advice}"
@@ -52,7 +52,7 @@ FUZZED = ("brown_mcphee", "lugre", "maxwell_slip", "haessig_friedland", "velocit
 
 
 def fuzzing(quick: bool) -> Iterator[Found]:
-    """Fuzz every law and two plants in both types; `quick`: five laws, 20 000 steps."""
+    """Fuzz every law and two plants in both types; with `quick`, five laws over 20 000 steps."""
     compiler = find_compiler()
     if compiler is None:
         yield "fuzz: no C compiler found; install gcc or clang"
@@ -106,7 +106,7 @@ SECTIONS: Mapping[str, Callable[[bool], Iterator[Found]]] = {
 def bench(
     quick: bool = False, sections: Sequence[str] = tuple(SECTIONS), progress: Progress = None
 ) -> Report:
-    """Measure `sections`; `quick` omits slow comparisons.
+    """Measure `sections`; with `quick`, omit slow comparisons.
 
     Raises:
         ValueError: an unknown section.

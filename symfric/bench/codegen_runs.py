@@ -53,7 +53,7 @@ DIFFERENCE, MESSAGES = "largest difference [rtol]", "messages of FMPy's validato
 
 
 def units(quick: bool) -> Iterator[Found]:
-    """Measure every scene and law that `simulate` finishes; `quick`: three scenes."""
+    """Measure every scene and law that `simulate` finishes; with `quick`, three scenes."""
     if find_compiler() is None:
         yield "fmu: no C compiler found ($CC, gcc, clang or cc)"
         return
@@ -84,7 +84,7 @@ def _unit(scene: Scene) -> Row:
         given = {v.name: 2.0 * np.sin(np.pi * times) for v in model.u}
         held: dict[str, Input] = {name: Hold(times, values) for name, values in given.items()}
         same = simulate(model, float(times[-1]), t_eval=times, rtol=RTOL, u=held)
-        # an event at a communication point, or at the start, occurs in the step after it
+        # an event at a communication point or at the start belongs to the following step
         names = [v.name for v in model.x if not v.name.endswith("mode")]
         found, attempts, each = _stepped(unit, names, times, given)
         worst = max(
@@ -113,7 +113,7 @@ def _unit(scene: Scene) -> Row:
 def _stepped(
     unit: Exported, names: list[str], times: Array, given: Mapping[str, Array]
 ) -> tuple[Array, float, float]:
-    """Return states at `times`, attempts, and time of a communication step [s]."""
+    """Return states at `times`, number of attempts, and run time of a communication step [s]."""
     rows: list[Array] = []
     with running(unit.path, **{name: float(values[0]) for name, values in given.items()}) as one:
         rows.append(one.get(names))
@@ -128,7 +128,7 @@ def _stepped(
 
 
 CURVE = {"mu_s": 6.0, "mu_d": 4.0, "v_s": 5e-3, "sigma_2": 20.0}
-"""Coefficients of friction; with N = 1 N they are forces in newtons."""
+"""Coefficients of friction, which are forces in newtons because N = 1 N."""
 BELIEVED = LuGre(sigma_0=1e5, sigma_1=300.0, **CURVE)
 SPRINGS = tuple(Element(k, 0.25) for k in (1.5e5, 7.5e4, 4.5e4, 3e4))
 SOFTER = tuple(Element(element.k / 2, element.alpha) for element in SPRINGS)
@@ -154,7 +154,7 @@ class Trial:
 
 
 def plants(quick: bool) -> dict[str, Law]:
-    """Return the friction laws of the plants; those with events take longer."""
+    """Return the friction laws of the plants; with `quick`, omit laws with events."""
     found: dict[str, Law] = {
         "LuGre": LuGre(sigma_0=2e5, sigma_1=400.0, **CURVE),
         "elasto": ElastoPlastic(sigma_0=2e5, sigma_1=400.0, **CURVE),
@@ -213,7 +213,7 @@ def compensation(quick: bool) -> Iterator[Found]:
 
 
 def _cost() -> str:
-    """Describe the cost of the compensator's C on a small core."""
+    """Return a sentence on the cost of the C of the compensator on a small core."""
     both, alone = on_core(trials()[0].blocks[0]), on_core(law_block(BELIEVED))
     if not both.ok:
         return f"no instructions counted, {both.status}"

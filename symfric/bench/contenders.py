@@ -1,9 +1,9 @@
 """Compared integrators: those of symfric, CasADi and SciPy on the same model, and C by hand.
 
-Each is built for one tolerance and then called repeatedly. The measured call is what a user waits
-for once everything is built. `simulate` starts from names, solves for a consistent start and
-returns named signals; the others get that start and return states. So does `loop`, the compiled
-loop of symfric alone, for comparison if a run takes a few milliseconds or less.
+Each integrator is built for one tolerance and then called repeatedly. The measured time is that of
+a call after everything is built. `simulate` starts from names, solves for a consistent start and
+returns named signals; the others start from that solution and return states, as does `loop`, the
+compiled loop of symfric alone. `loop` is for comparison if a run takes a few milliseconds or less.
 """
 
 import ctypes
@@ -41,13 +41,13 @@ Watched = tuple[str, ...]
 """Names of states."""
 Solve = Callable[..., tuple[Array, Callable[[], int]]]
 """Start values by keyword -> watched states at the times, shape (watched, times), and a function
-that counts the steps outside the measured time."""
+that returns the number of steps, called outside the measured time."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Contender:
-    """Solver built for one tolerance; `compile_s` is the time of the C compiler for it [s]."""
+    """Solver built for one tolerance; `compile_s` is the time [s] that the C compiler took."""
 
     solve: Solve
     compile_s: float = 0.0
@@ -74,7 +74,7 @@ def ours(
 
 
 def loop(model: Model, times: Array, watched: Watched, rtol: float) -> Contender:
-    """Return the compiled loop of `simulate` alone, from a consistent start to states."""
+    """Return the compiled loop of `simulate` alone, which maps a consistent start to states."""
     whole, inputs = equations(model, float(times[-1]))
     made = Integrator(model, inputs, chosen("bench", "auto", rtol))
     engine, end = made.compiled, float(times[-1])
@@ -111,11 +111,12 @@ def casadi(
     """Return CasADi's integrator `plugin`, with states scaled by nominal values as in symfric.
 
     Args:
-        model, times, watched, rtol: as in `Solve`, and the relative tolerance.
+        model, times, watched: equations, times [s] of the results, and names of states.
+        rtol: relative tolerance.
         plugin: name of the integrator.
         as_c: compile the whole integrator.
-        explicit: eliminate the accelerations, x' = ode(x, z), instead of solving for them along
-            with multipliers and normal forces.
+        explicit: eliminate the accelerations, x' = ode(x, z), instead of solving for them together
+            with the multipliers and normal forces.
     """
     whole, inputs = equations(model, float(times[-1]))
     problem = peer(whole, inputs, np.zeros(0), tolerances(whole, rtol), "rosenbrock")
@@ -230,7 +231,7 @@ MECHANISMS: dict[str, tuple[str, Callable[..., Contender]]] = {
     "idas absolute": ("absolute", partial(idas, name="sundials")),
     "idas joint": ("joint", partial(idas, name="sundials")),
 }
-"""Name -> formulation, and function that makes a contender; "ode": accelerations eliminated."""
+"""Name -> formulation, and function that returns a contender; "ode": eliminated accelerations."""
 
 
 def equations(model: Model, end: float) -> tuple[System, InputData]:
@@ -240,12 +241,12 @@ def equations(model: Model, end: float) -> tuple[System, InputData]:
 
 
 def tolerances(whole: System, rtol: float) -> Tolerances:
-    """Return the tolerances of other integrators: absolute ones are 0.1 rtol times nominal."""
+    """Return tolerances for other integrators; absolute ones are 0.1 rtol times nominal values."""
     return Tolerances(rtol, 0.1 * rtol * whole.nominal, 0.0, 10_000_000)
 
 
 def _beginning(model: Model, whole: System) -> Callable[..., Array]:
-    """Return a cached function from start values by keyword to all consistent unknowns."""
+    """Return a function from start values by keyword to all consistent unknowns, with a cache."""
 
     @cache
     def begin(**start: float) -> Array:
@@ -256,13 +257,13 @@ def _beginning(model: Model, whole: System) -> Callable[..., Array]:
 
 
 def buffered(function: ca.Function) -> tuple[Array, Callable[[], None], Array]:
-    """Return buffer of the first argument, call and buffer of the first result of a Function."""
+    """Return the buffer of the argument, the call, and the buffer of the result of a Function."""
     given, found = np.zeros(function.numel_in(0)), np.zeros(function.numel_out(0))
     return given, bound(function, (given,), (found,)), found
 
 
 def compiled(function: ca.Function) -> tuple[ca.Function, float]:
-    """Return `function` from generated C, and the time of the compiler [s]; never from a cache.
+    """Return `function` compiled from generated C without a cache, and the compile time [s].
 
     Raises:
         CompileError: no compiler.
@@ -278,10 +279,10 @@ def compiled(function: ca.Function) -> tuple[ca.Function, float]:
 def by_hand(model: Model, times: Array, watched: Watched, rtol: float) -> Contender:
     """Return Rabinowicz's stick-slip with Brown-McPhee friction in C: a bound for general codes.
 
-    RADAU5 (Hairer and Wanner, IV.8) for this one equation of two states: derivatives by hand, 2 by
-    2 systems in closed form, derivatives kept while Newton's method converges fast, the collocation
-    polynomial as dense output and first guess, Gustafsson's controller. It checks nothing. Scene
-    and law have their default parameters; only `watched` = ("x",) is returned.
+    The code is RADAU5 (Hairer and Wanner, IV.8) for this equation of two states only: derivatives
+    by hand, 2 by 2 systems in closed form, derivatives kept while Newton's method converges fast,
+    the collocation polynomial as dense output and initial guess, and Gustafsson's controller. It
+    has no checks. Scene and law have default parameters; only `watched` = ("x",) is returned.
 
     Raises:
         CompileError: no compiler, or an error of the compiler.
@@ -310,7 +311,7 @@ def by_hand(model: Model, times: Array, watched: Watched, rtol: float) -> Conten
 
 
 def collocation() -> dict[str, float]:
-    """Return constants of the three-stage Radau method: T^-1 A^-1 T is a real and a complex block.
+    """Return the constants of the three-stage Radau method, with T^-1 A^-1 T block diagonal.
 
     Source: Hairer and Wanner, IV.8.
     """
@@ -324,7 +325,7 @@ def collocation() -> dict[str, float]:
     )
     values, vectors = np.linalg.eig(np.linalg.inv(A))
     real, pair = int(np.argmin(np.abs(np.imag(values)))), int(np.argmax(np.imag(values)))
-    # (a + ib)(w2 + i w3) in the plane of Re and -Im of the eigenvector of a + ib
+    # (a + ib)(w2 + i w3) in the plane spanned by Re and -Im of the eigenvector of a + ib
     plane = vectors[:, pair]
     T = np.column_stack([np.real(vectors[:, real]), np.real(plane), -np.imag(plane)])
     found = {"gamma": np.real(values[real]), "alpha": np.real(values[pair])}

@@ -16,7 +16,7 @@ from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.scenes import Arm, rabinowicz
 
 TEN = tuple(Element(5e4 * 2.0**-i, 0.1) for i in range(10))
-"""Ten elements with a tenth of the friction each and stiffnesses over three decades."""
+"""Ten elements, each with a tenth of the friction, and stiffnesses over three decades."""
 TARGETS = (*((core, "float") for core in CORES), ("m7", "double"))
 """Cores and floating point types; double is used only on a core with an FPU for it."""
 TITLE = (
@@ -28,7 +28,7 @@ TITLE = (
 @final
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Block with its goals on a Cortex-M4F in float.
+    """Block with its goals on a Cortex-M4F in single precision.
 
     Attributes:
         name: name in the table.
@@ -63,7 +63,7 @@ CASES = (
 
 
 def bench(quick: bool = False, progress: Progress = None) -> Report:
-    """Measure and test every block on every core; `quick`: on the M4F alone."""
+    """Measure and test every block on every core; with `quick`, only on the M4F."""
     tools = find_tools()
     if isinstance(tools, Absent):
         return Report(notes=[f"embedded: skipped, {tools.advice}"])
@@ -91,5 +91,5 @@ def _rows(case: Case, targets: Sequence[tuple[str, str]], tools: Tools) -> Itera
 
 
 def whole(value: float) -> float:
-    """Round to an integer; NaN stays."""
+    """Return a value rounded to an integer; NaN is unchanged."""
     return round(value) if isfinite(value) else value

@@ -54,7 +54,7 @@ CASES = (
 
 
 def bench(quick: bool = False, progress: Progress = None) -> Report:
-    """Measure all cases; `quick`: two, with few members."""
+    """Measure all cases; with `quick`, two cases with few members."""
     tasks: dict[str, Callable[[], Iterator[Found]]] = {
         case.name: partial(_lanes, case, 20 if quick else MEMBERS // case.fewer)
         for case in (CASES[:2] if quick else CASES)
@@ -63,7 +63,7 @@ def bench(quick: bool = False, progress: Progress = None) -> Report:
 
 
 def _starts(model: Model, members: int) -> tuple[str, Array]:
-    """Return the first velocity of a model, and start values around its default."""
+    """Return the name of the first velocity of a model, and start values around its default."""
     start = dict(zip((v.name for v in model.x), model.initial_state(None, None), strict=True))
     name = next(v.name for v in model.x if v.unit in ("m/s", "rad/s"))
     return name, start[name] + np.linspace(-0.1, 0.1, members)
@@ -75,17 +75,18 @@ def _ends(model: Model, many: Ensemble) -> Array:
 
 
 def _difference(y: Array, x: Array) -> float:
-    """Return the median over members of the largest difference of a state, relative to the largest
-    state of all members.
+    """Return the median over members of the largest relative difference of a state.
+
+    Differences are relative to the largest value of the state over all members.
     """
     return float(np.median((np.abs(y - x) / (np.abs(x).max(axis=0) + 1e-300)).max(axis=1)))
 
 
 def _lanes(case: Case, members: int) -> Iterator[Found]:
-    """Measure `simulate_many` and the compiled loop of `simulate`, which writes no results here.
+    """Measure `simulate_many`, and the compiled loop of `simulate` without its results.
 
-    Attempts may differ between both because vector versions of exp, tanh, sin ... differ from libm
-    in the last digit.
+    Their attempts may differ because the vector versions of exp, tanh, sin, ... differ from libm in
+    the last digit.
     """
     model, end = case.make(), case.t_end
     state, values = _starts(model, members)
@@ -119,7 +120,7 @@ def _lanes(case: Case, members: int) -> Iterator[Found]:
 def _one_by_one(
     model: Model, x0: dict[str, Array], end: float
 ) -> Callable[[], tuple[Array, Array]]:
-    """Return a function that runs all members in the compiled loop; it returns states, attempts."""
+    """Return a function that runs all members one by one and returns states and attempts."""
     inputs = input_data(model, None, 0.0, end)
     integrator, _ = built(model, inputs, ADAPTIVE["rodas5p"])
     engine, members = integrator.compiled, next(iter(x0.values())).size
@@ -160,9 +161,9 @@ TOLERANCES = {"double": 1e-6, "float": 1e-4}
 
 
 def cuda(quick: bool = False) -> Iterator[Found]:
-    """Measure all cases in both types; `quick`: one case, a hundredth of the members.
+    """Measure all cases in both types; with `quick`, one case with a hundredth of the members.
 
-    The compiled code runs on all cores, on a sample of the members.
+    The compiled code runs a sample of the members on all cores.
     """
     try:
         device = Device.found().name

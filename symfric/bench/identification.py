@@ -1,6 +1,4 @@
-"""Identification and its goals: convergence to the true parameters, from which starts, at what
-cost.
-"""
+"""Identification with goals: convergence to the true parameters, admissible starts, and cost."""
 
 import tempfile
 import warnings
@@ -22,9 +20,9 @@ from symfric.foundation.status import SolveError
 TRUTH = {"m": 95.0, "offset": -3.0, "mu_s": 28.0, "mu_d": 20.0, "v_s": 0.01, "sigma_2": 200.0}
 """Parameters of the stage of `identification_files`."""
 CLOSE = 0.05
-"""Relative error of a parameter that counts as right."""
+"""Largest relative error of a parameter that counts as right."""
 EVERY = 5
-"""Quick runs read one of so many files."""
+"""Quick runs read every fifth file."""
 
 
 class Outcome(NamedTuple):
@@ -44,7 +42,7 @@ class Outcome(NamedTuple):
 
 
 def outcome(file: File) -> Outcome:
-    """Read, check and fit one file."""
+    """Return the outcome of reading, checking and fitting one file."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("error")
         path = Path(folder) / f"log{file.suffix}"
@@ -63,7 +61,7 @@ def _judged(path: Path, file: File) -> tuple[str, str]:
     findings = data.check()
     if findings.errors:
         return "refused", findings.errors[0].sentence
-    if {"gap", "irregular"} & set(findings.kinds):  # as the findings advise
+    if {"gap", "irregular"} & set(findings.kinds):  # the findings advise it
         data = data.resampled()
     fit = Fit(InverseDynamics(), "stribeck", data).solve()
     wrong = [f"{name} {fit.values[name]:.4g}" for name in TRUTH if not _is_close(fit, name)]
@@ -77,7 +75,7 @@ def _judged(path: Path, file: File) -> tuple[str, str]:
 
 
 def _is_close(fit: Fitted, name: str) -> bool:
-    """Return True if a parameter is right, or its interval includes the truth."""
+    """Return True if a parameter is right or if its interval includes the true value."""
     estimate = fit.parameters[name]
     error = abs(estimate.value - TRUTH[name])
     low, high = estimate.low, estimate.high
@@ -86,19 +84,19 @@ def _is_close(fit: Fitted, name: str) -> bool:
 
 
 def files(quick: bool = False) -> Iterator[Found]:
-    """Measure silent errors and crashes on damaged files, and right results on intact ones.
+    """Measure silent errors and crashes on damaged files, and right results on intact files.
 
     Each file of `identification_files` is read, checked and fitted by inverse dynamics with a
-    Stribeck law, with default settings. It ends as
+    Stribeck law and default settings. Its outcome is one of
 
         refused   the reader, the fit or the status explains why there is no result,
-        flagged   there is a result, with a warning about the data or the residuals,
-        right     every parameter within 5 % or its 95 % interval of the truth,
-        silent    a wrong result without a warning,
-        crashed   an error without an explanation.
+        flagged   the result has a warning about the data or the residuals,
+        right     every parameter is within 5 % of the truth, or its 95 % interval includes it,
+        silent    the result is wrong and has no warning,
+        crashed   there is an error without an explanation.
 
-    All good files must be right, and no bad one silent. Files whose defects leave no trace are
-    counted separately.
+    All good files must be right, and no bad file may be silent. Files whose defects leave no trace
+    are counted separately.
     """
     chosen = [*campaign()][:: EVERY if quick else 1]
     seconds, found = timed(lambda: [outcome(file) for file in chosen])
@@ -131,7 +129,7 @@ CASES: Mapping[str, Callable[[bool], Iterator[Found]]] = {
 def bench(
     quick: bool = False, cases: Sequence[str] = tuple(CASES), progress: Progress = None
 ) -> Report:
-    """Measure `cases`; `quick` takes fewer seeds.
+    """Measure `cases`; with `quick`, use fewer seeds.
 
     Raises:
         ValueError: an unknown case.
@@ -142,6 +140,6 @@ def bench(
 
 
 def _named(case: str, quick: bool) -> Iterator[Found]:
-    """Yield the rows of a case with its name in front."""
+    """Yield the rows of a case, with its name in the first column."""
     for item in CASES[case](quick):
         yield item if isinstance(item, str) else (item[0], {"case": case, **item[1]})

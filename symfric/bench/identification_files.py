@@ -1,13 +1,13 @@
-"""A hundred files of one simulated stage: intact ones, damaged ones, and implausible physics.
+"""A hundred files of one simulated stage: intact files, damaged files, and implausible physics.
 
 The stage is that of `synthetic_drive_data`, 95 kg with Stribeck friction, moved at four speeds. All
-files are written from the same record, and the fit of each is compared with the true parameters.
+files contain the same record, and the fit of each file is compared with the true parameters.
 
-Some defects leave no trace in a file and are marked "hidden": a force times a constant (a wrong
-gain, kN for N), times or positions times a plausible constant, a velocity that is consistent with
-them, a gain of the force that differs by its sign by up to 15 % (1.1 for one sign gives a mass of
-99.9 kg and an offset of -1.7 N without a warning; 1.2 is reported). Fits of such files are right
-for the numbers in them.
+Some defects leave no trace in a file and are marked "hidden": a force multiplied by a constant (a
+wrong gain, kN for N), times or positions multiplied by a plausible constant, a velocity consistent
+with them, and a gain of the force that depends on its sign by up to 15 % (1.1 for one sign gives a
+mass of 99.9 kg and an offset of -1.7 N without a warning; 1.2 is reported). Fits of such files are
+right for the numbers in them.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -34,11 +34,11 @@ class File:
     """File of the campaign.
 
     Attributes:
-        name: its defect or peculiarity.
-        truth: "good": the fit must be right; "bad": it must be refused, flagged, or right;
+        name: defect or peculiarity of the file.
+        truth: "good": the fit must be right; "bad": the file must be refused, flagged, or right;
             "hidden": the file does not reveal its defect.
-        content: its bytes.
-        suffix: suffix of its name.
+        content: bytes of the file.
+        suffix: suffix of the file name.
         options: arguments of `Dataset.read`.
     """
 
@@ -52,13 +52,13 @@ class File:
 def table(
     a: Array, header: str = HEADER, separator: str = ",", decimal: str = ".", end: str = "\n"
 ) -> bytes:
-    """Return a matrix as text."""
+    """Return a matrix as encoded text."""
     rows = (separator.join(f"{x:.10g}".replace(".", decimal) for x in row) for row in a.tolist())
     return (end.join([*([header] if header else []), *rows]) + end).encode()
 
 
 def campaign(seed: int = 3) -> Iterator[File]:
-    """Yield all files."""
+    """Yield all files of the campaign."""
     record = synthetic_drive_data(speeds=(0.004, 0.012, 0.03, 0.08), seed=seed)[0]
     a = np.column_stack([record.time, record["x"], record["force"]])
     rng = np.random.default_rng(seed)
@@ -187,7 +187,7 @@ def _incomplete(a: Array) -> Iterator[File]:
 
 Spoil = Callable[[Array], Array]
 Column = Callable[[Array, Array, Array], Any]
-"""New values of a column from t, x and F."""
+"""Function that returns new values of a column from t, x and F."""
 T, X, F = 0, 1, 2
 
 
@@ -202,7 +202,7 @@ def put(column: int, new: Column, rows: Any = slice(None)) -> Spoil:
 
 
 def _harmless(rng: np.random.Generator) -> dict[str, Spoil]:
-    """Return harmless changes, which a fit has to tolerate."""
+    """Return harmless changes that a fit has to tolerate."""
 
     def noisy(column: int, size: float) -> Spoil:
         return lambda a: a + size * rng.standard_normal(a.shape) * (np.arange(3) == column)
@@ -305,7 +305,7 @@ def _physics(rng: np.random.Generator) -> dict[str, Spoil]:
 
 
 def _disturbed(rng: np.random.Generator) -> dict[str, Spoil]:
-    """Return disturbances that act on the drive, or between it and its sensors."""
+    """Return disturbances that act on the drive, or between the drive and its sensors."""
 
     def fading(t: Array, x: Array, F: Array) -> Array:
         return F - 0.3 * t / t[-1] * 22 * np.tanh(np.gradient(x, 1e-3) / 1e-3)

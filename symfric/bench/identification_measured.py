@@ -1,4 +1,4 @@
-"""Measured machines: EMPS, a drive; the joints of an arm at low speed."""
+"""Fits of measured machines: the drive EMPS, and joints of an arm at low speed."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -35,18 +35,18 @@ ESTIMATION, VALIDATION = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
 DIRECTIONS = ("coulomb+viscous", "asymmetric(coulomb+viscous)")
 WIDTHS = {DIRECTIONS[0]: ["v_eps"], DIRECTIONS[1]: ["v_eps_pos", "v_eps_neg"]}
 HALVES, ROUND = (12.42, 6.21, 3.105, 1.5525, 0.77625), (1.0, 2.0, 3.0, 4.0, 6.0, 12.0)
-"""Window lengths to choose from [s]: halves, quarters ... of the record, and round numbers."""
+"""Candidate window lengths [s]: halves, quarters, ... of the record, and round numbers."""
 SOME = slice(1, 4)
-"""Part of either list in quick runs."""
+"""Part of each list that quick runs use."""
 BLOCKS = 4
 LEFT_OUT, TRIM = 20, 50
-"""Samples left out of the open-loop error at the start, and of the others at both ends."""
+"""Samples excluded from the open-loop error at the start, from closed-loop errors at both ends."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Law and method of its fit, with the error on data that were left out."""
+    """Law and method of its fit, with the error on left-out data."""
 
     law: str
     free: Sequence[str] | None
@@ -54,7 +54,7 @@ class Candidate:
     error: float = inf
 
     def fit(self, data: Dataset) -> Fitted:
-        """Fit the law from one start, which follows from the data."""
+        """Return the fit of the law from one start, which is computed from the data."""
         return Fit(self.kind, self.law, data, free=self.free, starts=1).solve(throw=False)
 
 
@@ -64,7 +64,7 @@ def best(candidates: Iterator[Candidate], error: Callable[[Candidate], float]) -
 
 
 def closed_loop(data: Dataset) -> Candidate:
-    """Return the law with the smallest force error in the second half, fitted to the first."""
+    """Return the law that, fitted to the first half, has the least force error in the second."""
     first, second = data.split(0.5)
     every = (Candidate(law, free, ClosedLoop())
              for law in DIRECTIONS for free in (None, WIDTHS[law]))  # fmt: skip
@@ -72,7 +72,7 @@ def closed_loop(data: Dataset) -> Candidate:
 
 
 def loop_errors(fit: Fitted, data: Dataset) -> dict[str, float]:
-    """Return signal -> norm of the error over that of the signal [%], without both ends."""
+    """Return signal -> norm of the error relative to that of the signal [%], without both ends."""
     if fit.live is None:
         return {"x": nan, "force": nan}
     residuals = ClosedLoop().prepare(fit.live.subject, data)
@@ -99,7 +99,7 @@ def open_loop(
 
 
 def _left_out(record: Record, candidate: Candidate) -> float:
-    """Return the root mean square over blocks of the error of free runs [m]."""
+    """Return the root mean square over left-out blocks of the error of free runs [m]."""
     edges = np.linspace(0, record.size, BLOCKS + 1).astype(int)
     errors = list[float]()
     for a, b in pairwise(edges.tolist()):
@@ -114,11 +114,10 @@ def _left_out(record: Record, candidate: Candidate) -> float:
 
 
 def free_run(model: Model, record: Record, first: int = 0, end: int | None = None) -> float:
-    """Return the root mean square error [m] of the motion under the measured force, without its
-    first samples.
+    """Return the root mean square error [m] of the motion under the measured force.
 
-    The motion starts at the measured position, with the velocity of a cubic through the positions
-    around it.
+    The motion starts at the measured position, with the velocity of a cubic through neighbouring
+    positions. The error excludes the first samples.
     """
     x, rows = record["x"], slice(first, end)
     begin = local(record.time, x, first, noise_of(x))
@@ -137,32 +136,34 @@ def emps(quick: bool) -> Iterator[Found]:
     """Measure errors on the validation record of EMPS, and the time of the engine.
 
     Source of data and measure: Janot, Gautier, Brunot, "Data set and reference models of EMPS",
-    Nonlinear System Identification Benchmarks 2019. Everything is chosen on the estimation record:
+    Nonlinear System Identification Benchmarks 2019. All choices use only the estimation record:
 
     closed loop  each candidate law is fitted to position and force of the first half and judged by
-                 the force of the second; the best is fitted to all. In the closed loop nothing
-                 drifts. The width of the change of sign (1.5 mm/s) decides: below it the drive
-                 yields.
-    open loop    laws and window lengths: fitted to three of four blocks, a candidate predicts the
-                 fourth under the measured force, from the measured start; the smallest root mean
-                 square error decides. The force is held for a sample, as the amplifier holds it.
+                 the force of the second half; the best law is fitted to the whole record. The
+                 closed loop prevents drift. The width of the change of sign (1.5 mm/s) is decisive:
+                 below it the drive yields.
+    open loop    a candidate is a law and a window length. Fitted to three of four blocks, it
+                 predicts the fourth block under the measured force, from the measured start; the
+                 candidate with the smallest root mean square error is chosen. The force is constant
+                 for a sample, as in the amplifier.
 
     In the open loop, symmetric friction predicts left-out blocks to 2.9 mm at best, friction with
-    two directions to 1.7-2.2 mm at every window length from 1 to 6 s: the direction matters, the
-    length hardly. A Stribeck part, a quadratic one, a slope along the way, or a 2.5 mm ripple
-    matters as little (1.9-2.1 mm) although residuals depend on the position; so do start values
-    held at the data (1.8 mm) and a mean over shifted windows (1.9 mm).
+    two directions to 1.7-2.2 mm at every window length from 1 to 6 s: the direction has a large
+    influence, the length a small one. A Stribeck part, a quadratic part, a slope over the position
+    or a 2.5 mm ripple has as little influence (1.9-2.1 mm), although residuals depend on the
+    position; so do start values fixed at the data (1.8 mm) and a mean over shifted windows
+    (1.9 mm).
 
     On the other record, these equally good candidates range from 5.4 to 14 mm, the mean over
-    shifted windows from 8 to 12 mm, because its friction differs: fitted alike, in windows of 1 s,
-    it is 1.1 N (3 %) larger at 0.1 m/s. Along the estimation record friction falls by 0.3 N, as in
-    a drive that warms up. An offset of 0.04 N moves the end by a millimetre. Therefore the
+    shifted windows from 8 to 12 mm, because the friction differs: in the same fit, with windows of
+    1 s, it is 1.1 N (3 %) larger at 0.1 m/s. During the estimation record friction falls by 0.3 N,
+    as in a drive that warms up. An offset of 0.04 N moves the end by a millimetre. Therefore the
     estimation record does not determine the best candidate for the other record. Round window
-    lengths, which were tried first, select 2 s and give 5.8 mm; halves of the record, as
-    `Shooting(windows="choose")` takes them, give 1.55 s, as good on left-out blocks (1.7 to 1.9 mm
-    depending on their start), and 7.9 mm. Both rows are shown: the goal is not reached, and a
-    number below it would be luck. The structure is sufficient: fitted to the pulses themselves,
-    it leaves 0.7 mm.
+    lengths, which were tried first, select 2 s and give 5.8 mm; halves of the record, as in
+    `Shooting(windows="choose")`, select 1.55 s, which is as good on left-out blocks (1.7 to 1.9 mm
+    depending on their start), and give 7.9 mm. Both rows are shown: the goal is not reached, and a
+    number below it would be accidental. The structure is sufficient: fitted to the pulses
+    themselves, it leaves 0.7 mm.
     """
     if not (EMPS / VALIDATION).is_file():
         for what, limit in (("closed loop x [%]", 1.4e-3), ("closed loop force [%]", 4.65),
@@ -214,18 +215,18 @@ JOINTS = {3: ("q2", 0.148), 4: ("q7", 0.046)}
 """Case -> joint, goal [N m]."""
 ELEMENTS = 3
 THIN = 2
-"""Thinning of the samples; elements slip over more than one of them."""
+"""Thinning factor of the samples; an element takes more than one sample to slip."""
 GEARED = (
     "met only by parameters that the law refuses: mu_s below mu_d and sigma_2 below 0 leave .045"
 )
 
 
 def franka(quick: bool) -> Iterator[Found]:
-    """Fit LuGre and GMS under the measured velocity from default starts, in some 15 s.
+    """Fit LuGre and GMS under the measured velocity from default starts, in about 15 s.
 
-    Measured at joints 2 and 7 with reversals (some 400 Hz); the paper that published them reports
-    .280 and .260 N m for its LuGre and .077 and .035 for its neural network, trained on other
-    motions. Levels, viscous coefficient and Stribeck velocity are free as well.
+    The records are from joints 2 and 7 with reversals (about 400 Hz). The paper that published them
+    reports .280 and .260 N m for its LuGre and .077 and .035 for its neural network, trained on
+    other motions. Levels, viscous coefficient and Stribeck velocity are free as well.
     """
     del quick
     elements = tuple(Element(1e3, 1 / ELEMENTS) for _ in range(ELEMENTS))
@@ -248,7 +249,7 @@ def franka(quick: bool) -> Iterator[Found]:
 
 
 def halves(path: Path, joint: str) -> tuple[Dataset, Dataset]:
-    """Return friction and velocity; the velocity is the difference quotient of the encoder."""
+    """Return both halves of a record, with the velocity as difference quotient of the encoder."""
     columns = {"t": "time", "x": joint, "F": f"{joint}_tau_J_compensate"}
     units = {"t": "s", "x": "rad", "F": "N m"}
     record = Dataset.read(path, columns=columns, units=units).thinned(THIN)[0]

@@ -1,4 +1,4 @@
-"""Friction with memory: six parameters of LuGre, and GMS."""
+"""Identification of friction with memory: six parameters of LuGre, and GMS."""
 
 from collections.abc import Iterator
 from functools import lru_cache, partial
@@ -33,7 +33,7 @@ NOISE, SWEEP_NOISE = 0.5e-6, 0.05
 """Standard deviations of the positions [m] and of the forces of the sweep [N]."""
 STEP = 1e-3
 OFF = 3.0
-"""Largest factor between the start values of stiffness and damping and their guess."""
+"""Largest factor between the guesses of stiffness and damping and their start values."""
 GUESS = 3.8e4
 """Mean of the start values of the stiffness [N/m]."""
 SEEDS = 100
@@ -61,7 +61,7 @@ def positions() -> tuple[Array, ...]:
 
 
 def case(seed: int) -> Fit:
-    """Return the fit of the six parameters to the data of a seed; mass and offset are known."""
+    """Return the fit of the six parameters to the data of a seed, with known mass and offset."""
     rng = np.random.default_rng(500 + seed)
     records = [
         Dataset.of(t=t, x=x + NOISE * rng.standard_normal(x.size), force=u, name=f"record {k}")
@@ -82,7 +82,7 @@ def case(seed: int) -> Fit:
 
 
 def within(fit: Fitted) -> bool:
-    """Return True if all six are within 5 % and three standard errors of the truth."""
+    """Return True if all six parameters are within 5 % and three standard errors of the truth."""
     for name, value in TRUTH.items():
         found = fit.parameters[name]
         if abs(found.value - value) > min(0.05 * value, 3 * (found.standard_error or 0.0)):
@@ -91,13 +91,13 @@ def within(fit: Fitted) -> bool:
 
 
 def lugre(quick: bool) -> Iterator[Found]:
-    """Measure seeds that find the truth, and the time of a fit.
+    """Measure the percentage of seeds whose fits find the truth, and the time of a fit.
 
-    A mass of 1 kg is driven by a force that is held for each millisecond: pre-sliding, break-away
-    with reversals, gross sliding; three records, 2600 samples. Each seed has other noise. Its start
-    comes from a noisy velocity sweep (levels, Stribeck velocity, viscous part; force noise 0.05 N);
-    stiffness and damping of the bristles are off by factors of up to 3 from a value that is itself
-    too low.
+    A mass of 1 kg is driven by a force that is constant for each millisecond. Three records with
+    2600 samples show pre-sliding, break-away with reversals, and gross sliding. The noise differs
+    between seeds. A noisy velocity sweep gives the start values of levels, Stribeck velocity and
+    viscous part (force noise 0.05 N). Those of stiffness and damping of the bristles differ by
+    factors of up to 3 from a value that is too low.
     """
     seeds = 4 if quick else SEEDS
     right, doubted, seconds = 0, 0, list[float]()
@@ -116,7 +116,7 @@ def lugre(quick: bool) -> Iterator[Found]:
 # ---- Maxwell-slip elements and GMS ----
 
 FORCE_NOISE = 0.01
-"""Standard deviation of the measured force [N], of 1 N."""
+"""Standard deviation of the measured force [N], which is about 1 N."""
 MICRO = 1e-6
 TURNS = {
     "hysteresis": ((5.0, 0.05), (2.0, 0.13), (1.0, 0.31)),
@@ -128,7 +128,7 @@ Path = tuple[Array, Array]
 
 
 def gms(quick: bool) -> Iterator[Found]:
-    """Fit a law to a slow path and a fast one, and predict another path."""
+    """Fit laws to a slow and a fast path, and predict another path."""
     count, thin = (4, 2) if quick else (10, 1)
     law, rng = _true(count), np.random.default_rng(1)
     slow, fast = _slow("hysteresis", 0.02 * thin), _fast(2e-3 * thin)
@@ -155,7 +155,7 @@ def gms(quick: bool) -> Iterator[Found]:
 
 
 def ranked() -> Ranking:
-    """Rank GMS with equal shares and LuGre on data of four unequal elements, by another path."""
+    """Return the ranking of GMS and LuGre on data of four unequal elements and another path."""
     law, rng = _true(4), np.random.default_rng(0)
     slow = _record(law, _slow("hysteresis", 0.04), "hysteresis", rng)
     fast = _record(law, _fast(4e-3), "sliding", rng)
@@ -165,7 +165,7 @@ def ranked() -> Ranking:
 
 
 def _true(count: int) -> GMS:
-    """Return levels, lag and Stribeck curve of Lampaert et al. 2003, with random elements."""
+    """Return GMS with levels, lag and Stribeck curve of Lampaert et al. 2003, random elements."""
     rng = np.random.default_rng(3)
     radii = np.sort(np.geomspace(8e-8, 9e-6, count) * np.exp(0.25 * rng.standard_normal(count)))
     shares = rng.uniform(0.5, 1.5, count)
@@ -180,20 +180,21 @@ def _gms(k: Array, shares: Array) -> GMS:
 
 
 def _slow(name: str, step: float) -> Path:
-    """Return a path of some micrometres with nested reversals, for a minute."""
+    """Return a path of a few micrometres with nested reversals over a minute."""
     t = np.arange(0.0, 60.0, step)
     return t, MICRO * np.sum([a * np.sin(2 * np.pi * f * t) for a, f in TURNS[name]], axis=0)
 
 
 def _fast(step: float) -> Path:
-    """Return sliding up to five times the Stribeck velocity, both ways."""
+    """Return a path in both directions at up to five times the Stribeck velocity."""
     t = np.arange(0.0, 4.0, step)
     return t, 80 * MICRO * np.sin(2 * np.pi * t) * np.sin(0.25 * np.pi * t + 0.5)
 
 
 def forces(law: Law, t: Array, x: Array) -> Array:
-    """Return the force [N] along a path, exact for straight pieces, after sliding in its first
-    direction.
+    """Return the force [N] along a path, exact for straight pieces.
+
+    The first force is that of steady sliding in the first direction of the path.
     """
     v = np.diff(x) / np.diff(t)
     z: Any = law.steady_state(float(v[0]), 1.0)
@@ -208,16 +209,14 @@ def forces(law: Law, t: Array, x: Array) -> Array:
 
 
 def _record(law: Law, path: Path, name: str, rng: np.random.Generator) -> Dataset:
-    """Return velocity and noisy force along a path."""
+    """Return a record of velocity and noisy force along a path."""
     t, x = path
     F = forces(law, t, x) + FORCE_NOISE * rng.standard_normal(t.size)
     return Dataset.of(t=t, v=np.gradient(x, t), F=F, units={"v": "m/s", "F": "N"}, name=name)
 
 
 def _elements(law: GMS, path: Path, rng: np.random.Generator) -> float:
-    """Fit elements to a record of the same elements without Stribeck effect; return error over
-    noise.
-    """
+    """Return the error over the noise of elements fitted to a record without Stribeck effect."""
     t, x = path
     sliders = tuple(Slider(float(e.k), float(e.alpha)) for e in law.elements)
     true = forces(MaxwellSlip(elements=sliders, form="event"), t, x)
@@ -228,7 +227,7 @@ def _elements(law: GMS, path: Path, rng: np.random.Generator) -> float:
 
 
 def _fitted(law: GMS, count: int, slow: Path, fast: Path, rng: np.random.Generator) -> Fitted:
-    """Fit all parameters from default starts; the share of the strongest element is held."""
+    """Return the fit of all parameters from default starts; the strongest share is not fitted."""
     first, second = _record(law, slow, "hysteresis", rng), _record(law, fast, "sliding", rng)
     t, x = slow
     measured = Measured(np.gradient(x, t), first[0]["F"], x, t)

@@ -1,4 +1,4 @@
-"""Repeated fits: with other noise, for the coverage of intervals; from distant starts."""
+"""Repeated fits: with different noise, for the coverage of intervals, and from distant starts."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -28,11 +28,11 @@ Array = NDArray[np.float64]
 
 SEEDS, QUICK = 200, 20
 STAGE = {"m": 95.0, "offset": -3.0, "mu_d": 20.0, "sigma_2": 200.0}
-"""True parameters of the inverse dynamics, with levels like those of EMPS."""
+"""True parameters of the inverse dynamics, similar to those of EMPS."""
 BLOCK = {"m": 2.0, "mu_d": 1.0, "sigma_2": 0.8}
 """True parameters of the simulated motion."""
 FORCE, POSITION, VELOCITY = 0.5, 1e-4, 0.2
-"""Standard deviations of the noise [N, m, m/s]; of coloured noise, of its innovations."""
+"""Standard deviations of the noise [N, m, m/s], or of the innovations of coloured noise."""
 INVERSE: Any = InverseDynamics()
 COULOMB = "coulomb+viscous"
 T = np.linspace(0.0, 4.0, 201)
@@ -40,13 +40,13 @@ U = 3 * np.sin(2 * np.pi * 0.7 * T) + 2 * np.sin(2 * np.pi * 1.9 * T + 1)
 
 
 def coverage(quick: bool) -> Iterator[Found]:
-    """Measure the coverage of intervals; `quick` takes a tenth of the seeds.
+    """Measure the coverage of intervals; with `quick`, use a tenth of the seeds.
 
-    A known drive is measured repeatedly with other noise, white or AR(1) with 0.9 from sample to
-    sample, and fitted by inverse dynamics (force noise) and by simulation (position noise, start
-    values unknown). Counted are the 95 % intervals that include the truth, right models that are
-    called doubtful, and wrong ones that are not. The estimate from positions and a hundred times
-    noisier velocities is compared with that from positions alone.
+    A known drive is measured repeatedly with different noise, white or AR(1) with 0.9 from sample
+    to sample, and fitted by inverse dynamics (force noise) and by simulation (position noise,
+    unknown start values). The benchmark counts the 95 % intervals that include the truth, right
+    models that are reported as doubtful, and wrong models that are not. It compares the estimate
+    from positions and a hundred times noisier velocities with that from positions alone.
     """
     seeds = QUICK if quick else SEEDS
     for kind, fit, truth in (("inverse dynamics", _inverse, STAGE), ("shooting", _shooting, BLOCK)):
@@ -65,7 +65,7 @@ def coverage(quick: bool) -> Iterator[Found]:
 @final
 @dataclass(frozen=True, eq=False)
 class _Repeat:
-    """Errors, standard errors, whether intervals include the truth, verdict and time of a fit."""
+    """Errors, standard errors, coverage of the truth by intervals, verdict and time of a fit."""
 
     off: Array
     error: Array
@@ -121,7 +121,7 @@ def _covered(where: str, truth: Mapping[str, float], found: list[_Repeat]) -> It
 
 
 def _added(seeds: int) -> float:
-    """Return the rms error with a noisy velocity besides the position over that without."""
+    """Return the rms error with a noisy velocity in addition, relative to that without it."""
     off: dict[str, list[Array]] = {"x": [], "x and v": []}
     true = np.array(list(BLOCK.values()))
     for seed in range(seeds):
@@ -135,7 +135,7 @@ def _added(seeds: int) -> float:
 
 
 def _wrong(seeds: int) -> int:
-    """Return how often data with a Stribeck peak are fitted without one and called solved."""
+    """Return how many fits without a Stribeck peak to data with one are reported as solved."""
     peak = Stribeck(mu_s=28.0, mu_d=20.0, v_s=0.01, v_eps=1e-4, sigma_2=200.0)
     fits = (Fit(INVERSE, COULOMB, synthetic_drive_data(peak, seed=k), starts=1)
             for k in range(seeds))  # fmt: skip
@@ -175,7 +175,7 @@ def coloured(noise: np.random.Generator, n: int, rho: float) -> Array:
 
 FAR_SEEDS, FAR_QUICK = 20, 4
 NEAR, ERRORS = 0.05, 5.0
-"""Largest relative error, and error over its standard error, of a parameter that was found."""
+"""Largest relative error, and largest error in standard errors, of a parameter that was found."""
 HYSTERESIS = {"m": 2.0, "c": 10.0, "k": 5e4, "alpha": 5e4, "beta": 800.0, "gamma": 1100.0}
 """Parameters of the oscillator, in SI units."""
 SAMPLES, RATE, BAND = 2048, 750.0, (5.0, 150.0)
@@ -189,7 +189,7 @@ CARS = {
 
 
 def hysteretic() -> Model:
-    """Return an oscillator with the hysteresis of Bouc and Wen, as a user writes it.
+    """Return an oscillator with the hysteresis of Bouc and Wen, in the form of a user's model.
 
         m v' = u - k y - c v - z,   z' = alpha v - beta |v| z + gamma v |z|
 
@@ -213,8 +213,9 @@ def hysteretic() -> Model:
 
 
 def hysteretic_data(model: Model, seed: int) -> Dataset:
-    """Simulate the oscillator under a multisine of 50 N rms with random phases; its position has
-    noise of 8 um.
+    """Return simulated data of the oscillator under a multisine of 50 N rms with random phases.
+
+    The position has noise of 8 um.
     """
     t, f = np.arange(SAMPLES) / RATE, np.arange(1, SAMPLES // 2) * RATE / SAMPLES
     f = f[(f >= BAND[0]) & (f <= BAND[1])]
@@ -227,9 +228,7 @@ def hysteretic_data(model: Model, seed: int) -> Dataset:
 
 
 def car_data(car: QuarterCar, seed: int) -> Dataset:
-    """Simulate displacements of body and wheel over three ramps of the road, with noise of
-    50 um.
-    """
+    """Return simulated displacements of body and wheel over three ramps, with noise of 50 um."""
     t = np.linspace(0.0, car.t_end, 2001)
     run = simulate(car.model(), car.t_end, rtol=1e-9, t_eval=t)
     body, wheel = 5e-5 * np.random.default_rng(seed).standard_normal((2, t.size))
@@ -240,13 +239,13 @@ def car_data(car: QuarterCar, seed: int) -> Dataset:
 
 
 def far(truth: Mapping[str, float], factor: float, seed: int) -> dict[str, float]:
-    """Return a start that is off by up to `factor` in every parameter."""
+    """Return start values that differ from the truth by factors of up to `factor`."""
     rng = np.random.default_rng([seed, 2])
     return {n: float(x * factor ** rng.uniform(-1, 1)) for n, x in truth.items()}
 
 
 def was_found(fit: Fitted, truth: Mapping[str, float]) -> bool:
-    """Return True if a fit has a good status and is right."""
+    """Return True if a fit has a good status and every parameter is close to the truth."""
     for name, value in truth.items():
         estimate = fit.parameters[name]
         error = abs(estimate.value - value)
@@ -258,9 +257,9 @@ def was_found(fit: Fitted, truth: Mapping[str, float]) -> bool:
 def starts(quick: bool = False) -> Iterator[Found]:
     """Measure how many of 20 fits find the truth, and their times.
 
-    Each seed has other noise and another start, with all parameters multiplied by random factors
-    that are uniform in their logarithm. A fit has found the truth if its status is good and every
-    parameter is within 5 % and five of its standard errors.
+    Noise and start differ between seeds; the start values are the true parameters multiplied by
+    random factors that are uniform in their logarithm. A fit has found the truth if its status is
+    good and every parameter is within 5 % and five standard errors of the truth.
     """
     seeds = range(FAR_QUICK if quick else FAR_SEEDS)
     model = hysteretic()

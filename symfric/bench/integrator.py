@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 T_END = 20.0
 TIMES = np.linspace(0.0, T_END, 401)[1:]
 STARTS = (-0.05, -0.01, 0.03, 0.06, 0.09)
-"""Start velocities [m/s]; the result of a single run may be accidental."""
+"""Start velocities [m/s]; several of them, because a single result may be accidental."""
 CASES: dict[str, Law] = {"rabinowicz/brown_mcphee": BrownMcPhee(), "rabinowicz/lugre": LuGre()}
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 ERRORS = (1e-4, 1e-5, 1e-7)
@@ -44,7 +44,7 @@ SLOPES = "Derivatives; ratios compare the run with derivatives to the run alone"
 def bench(quick: bool = False, progress: Progress = None) -> Report:
     """Measure all installed integrators in one run.
 
-    `quick`: fewer tolerances, start velocities and members, no SciPy.
+    With `quick`, use fewer tolerances and start velocities, and omit SciPy.
     """
     makers, skipped = _integrators(quick)
     draw = curves("case", ("integrator",), "relative error", "time per run [ms]")
@@ -86,7 +86,7 @@ def _integrators(quick: bool) -> tuple[dict[str, tuple[Maker, float]], dict[str,
 
 
 def _first(case: str, law: Law) -> Iterator[Found]:
-    """Measure a new model, with the current compiler cache."""
+    """Measure the first run of a new model, with the current compiler cache."""
     run = simulate(rabinowicz(law), T_END, backend=backend()).statistics
     yield FIRST, {
         "case": case, "build time [s]": run.build_time,
@@ -97,10 +97,10 @@ def _first(case: str, law: Law) -> Iterator[Found]:
 def _runs(
     case: str, law: Law, makers: Mapping[str, tuple[Maker, float]], quick: bool
 ) -> Iterator[Found]:
-    """Measure every integrator at every tolerance; medians over the start velocities.
+    """Measure every integrator at every tolerance, as medians over the start velocities.
 
-    The error is the largest position error at 400 times, relative to the largest position. Steps
-    are evaluations for SciPy.
+    The error is the largest position error at 400 times, relative to the largest position. For
+    SciPy, the number of evaluations replaces that of steps.
     """
     model = rabinowicz(law)
     starts = STARTS[:1] if quick else STARTS
@@ -136,10 +136,11 @@ Call = Callable[[], Array]
 
 
 def _derivatives(case: str, law: Law) -> Iterator[Found]:
-    """Measure derivatives of the final state by one and by all parameters.
+    """Measure derivatives of the final state with respect to one and to all parameters.
 
-    The forward ratio includes derivatives of all states, the adjoint one the gradient of the
-    position. The error is the largest relative error of a derivative of the position.
+    The forward ratio is that of the derivatives of all states, the adjoint ratio that of the
+    gradient of the position. The error is the largest relative error of a derivative of the
+    position.
     """
     for names in (FREE[:1], FREE):
         model = rabinowicz(law, free=names)
@@ -162,7 +163,7 @@ def _derivatives(case: str, law: Law) -> Iterator[Found]:
 
 
 def _repeated(call: Call) -> tuple[float, Array]:
-    """Return the shortest time of later calls; the first call builds and compiles."""
+    """Return the shortest time [s] of calls after the first one, which builds and compiles."""
     call()
     return best_time(call)
 

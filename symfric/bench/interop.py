@@ -1,10 +1,10 @@
-"""Moves with friction in Opti, rockit and do-mpc; a block under CasADi's integrators.
+"""Moves with friction in Opti, rockit and do-mpc, and a block in CasADi's integrators.
 
     min  integral of u^2,   0.1 m in 1 s from rest to rest,   |u| <= 20 N,   50 intervals
 
-of a drive of 1 kg pressed by 10 N. The law is part of the right-hand side of the model
-("collocation") or of a discrete step by `flow` ("flow"). All controls are verified by `simulate`
-with the original law: `miss` is the final distance from rest at the goal.
+for a drive of 1 kg with a normal force of 10 N. The law is part of the right-hand side of the model
+("collocation") or of a discrete step of `flow` ("flow"). `simulate` verifies all controls with the
+original law: `miss` is the final distance from rest at the goal.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ from symfric.scenes import drive, rabinowicz
 Array = NDArray[np.float64]
 GOAL, T, N, LIMIT, LOAD = 0.1, 1.0, 50, 20.0, 10.0
 STEPS = 10
-"""Steps of `flow` in each interval: 2 ms, which resolves the bristles."""
+"""Number of steps of `flow` in each interval; steps of 2 ms resolve the bristles."""
 IPOPT = {
     "print_time": False,
     "ipopt.print_level": 0,
@@ -51,7 +51,7 @@ RUNS = "20 s of stick-slip with CasADi's integrators and with symfric without a 
 
 
 def bench(quick: bool = False, progress: Progress = None) -> Report:
-    """Measure all tools that are installed; `quick`: two laws."""
+    """Measure all installed tools; with `quick`, only two laws."""
     absent = [tool for tool in ("rockit", "do_mpc") if find_spec(tool) is None]
     tasks: dict[str, Callable[[], Iterator[Found]]] = {
         f"{tool}, {route}, {law}": lambda t=tool, r=route, k=law: iter([(MOVES, move(t, r, k))])
@@ -73,9 +73,9 @@ STATUS = {
 
 
 def move(tool: str, route: str, law: str) -> Row:
-    """Solve the move with one law by one tool on one route; return its row.
+    """Return the row of the move with one law, solved by one tool on one route.
 
-    The miss combines the distance from the goal [m] and the speed there times 1 s [m]. The time
+    The miss combines the distance from the goal [m] and the final speed times 1 s [m]. The time
     includes building.
     """
     begin = process_time()
@@ -99,7 +99,7 @@ def move(tool: str, route: str, law: str) -> Row:
 
 
 def missed(model: Model, controls: Array) -> float:
-    """Return the distance of the simulated end from rest at the goal; NaN if a run fails."""
+    """Return the distance of the simulated end from rest at the goal; NaN if the run fails."""
     held = Hold(np.linspace(0.0, T, N + 1)[:-1], controls)
     rest = {v.name: 0.0 for v in model.x}
     run = simulate(model, T, u={"force": held}, x0=rest, rtol=1e-8, throw=False)
@@ -107,14 +107,14 @@ def missed(model: Model, controls: Array) -> float:
 
 
 def right_hand_side(model: Model) -> ca.Function:
-    """Return (x, u) -> dx/dt, all that other tools need of an explicit model."""
+    """Return the Function (x, u) -> dx/dt, which other tools need of an explicit model."""
     if model.ode is None:
         raise ValueError(f"bench interop: expected an explicit model, got '{model.name}'")
     return ca.Function("f", [model.vector("x"), model.vector("u")], [model.ode])
 
 
 def opti_flow(model: Model, start: Array) -> tuple[Array, str, int]:
-    """Solve by multiple shooting with `flow`."""
+    """Return the solution by multiple shooting with `flow` in Opti."""
     o, advance, nx = ca.Opti(), flow(model, steps=STEPS), len(model.x)
     x, u = o.variable(nx, N + 1), o.variable(1, N)
     o.subject_to(x[:, 0] == 0)
@@ -125,7 +125,7 @@ def opti_flow(model: Model, start: Array) -> tuple[Array, str, int]:
 
 
 def opti_collocation(model: Model, start: Array) -> tuple[Array, str, int]:
-    """Solve by Radau collocation of degree 3, as in CasADi's own example."""
+    """Return the solution by Radau collocation of degree 3 in Opti, as in CasADi's example."""
     o, f, nx, degree = ca.Opti(), right_hand_side(model), len(model.x), 3
     tau = ca.collocation_points(degree, "radau")
     slopes, ends, _ = ca.collocation_coeff(tau)
@@ -156,7 +156,7 @@ def _solved(o: ca.Opti, end: ca.MX, u: ca.MX) -> tuple[Array, str, int]:
 
 
 def rockit_move(model: Model, start: Array, by_flow: bool) -> tuple[Array, str, int]:
-    """Solve with rockit: `set_next` takes `flow`, `set_der` the right-hand side."""
+    """Return the solution by rockit; `set_next` takes `flow`, `set_der` the right-hand side."""
     rockit: Any = import_module("rockit")
     o = rockit.Ocp(T=T)
     x, u = o.state(len(model.x)), o.control()
@@ -170,7 +170,7 @@ def rockit_move(model: Model, start: Array, by_flow: bool) -> tuple[Array, str, 
         o.add_objective(o.integral(u**2))
     o.subject_to(o.at_t0(x) == 0)
     o.subject_to(o.at_tf(x)[:2] == ca.DM([GOAL, 0.0]))
-    o.subject_to(-LIMIT <= (u <= LIMIT))  # noqa: SIM300  (how rockit writes it)
+    o.subject_to(-LIMIT <= (u <= LIMIT))  # noqa: SIM300  (syntax of rockit)
     o.set_initial(x, start)
     o.solver("ipopt", IPOPT)
     try:
@@ -182,9 +182,9 @@ def rockit_move(model: Model, start: Array, by_flow: bool) -> tuple[Array, str, 
 
 
 def do_mpc_move(model: Model, start: Array, by_flow: bool) -> tuple[Array, str, int]:
-    """Solve with do-mpc: the first plan of a controller whose horizon is the whole move."""
+    """Return the solution by do-mpc, the first plan of a controller over the whole move."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # do-mpc warns about all extras that are not installed
+        warnings.simplefilter("ignore")  # do-mpc warns about each missing optional package
         do_mpc: Any = import_module("do_mpc")
     nx = len(model.x)
     plant = do_mpc.model.Model("discrete" if by_flow else "continuous", "MX")
@@ -220,8 +220,8 @@ ROUTES: dict[tuple[str, str], Callable[[Model, Array], tuple[Array, str, int]]] 
     ("do_mpc", "flow"): partial(do_mpc_move, by_flow=True),
     ("do_mpc", "collocation"): partial(do_mpc_move, by_flow=False),
 }
-"""(tool, route) -> what a user of the tool writes: model and start -> controls, status of Ipopt,
-iterations."""
+"""(tool, route) -> function that solves the move with the tool; it maps model and start to
+controls, status of Ipopt and number of iterations."""
 
 SUNDIALS = {"reltol": 1e-8, "abstol": 1e-10, "max_num_steps": 100_000}
 INTEGRATORS: dict[str, dict[str, Any]] = {
@@ -230,14 +230,14 @@ INTEGRATORS: dict[str, dict[str, Any]] = {
     "collocation": {"number_of_finite_elements": 100},
     "rk": {"number_of_finite_elements": 100},
 }
-"""Options for an accuracy of 1e-5; elements are those between two results."""
+"""Options for an accuracy of 1e-5; the number of elements is that between two results."""
 
 
 def integrators(law: str) -> Iterator[Found]:
-    """Compare CasADi's integrators of the block on a belt with `simulate` at rtol 1e-10.
+    """Compare CasADi's integrators on the block on a belt with `simulate` at rtol 1e-10.
 
-    The error is the largest of the elongation at 401 times; times are processor times relative to
-    `simulate` in its virtual machine.
+    The error is the largest error of the elongation at 401 times; times are processor times
+    relative to `simulate` in the virtual machine.
     """
     model = rabinowicz(LAWS[law]())
     times = np.linspace(0.0, 20.0, 401)
@@ -250,7 +250,7 @@ def integrators(law: str) -> Iterator[Found]:
                       "ratio of time to symfric": ratio, "status": status}  # fmt: skip
 
     call = partial(simulate, model, 20.0, samples=401, backend="vm")
-    call()  # builds, as `ca.integrator` does below
+    call()  # the first call builds the integrator, as `ca.integrator` does below
     spent, ours = timed(call)
     yield row("symfric", ours["x"], 1.0)
     x = model.vector("x")

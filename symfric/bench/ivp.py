@@ -22,7 +22,7 @@ DRIFT = "Drift of constraints that are imposed on the accelerations only"
 def bench(
     quick: bool = False, problems: Sequence[Problem] = PROBLEMS, progress: Progress = None
 ) -> Report:
-    """Measure all problems; `quick`: at rtol 1e-6 only."""
+    """Measure all problems; with `quick`, at rtol 1e-6 only."""
     tasks = {problem.name: partial(_rows, problem, quick) for problem in problems}
     draw = curves("problem", ("method",), "relative error", "time per run [ms]")
     source = f"Problems and published values: {TEST_SET}."
@@ -40,12 +40,12 @@ def _rows(problem: Problem, quick: bool) -> Iterator[Found]:
 def measure(
     problem: Problem, model: Model, method: str, rtol: float, engine: str | None = None
 ) -> Iterator[Found]:
-    """Integrate one problem, and yield the row of its digits and that of its drift.
+    """Integrate one problem; yield the row of its correct digits and the row of its drift.
 
     Args:
         problem, model: problem and its equations.
         method, rtol: as in `simulate`.
-        engine: `backend` of `simulate`; default: compiled if there is a compiler.
+        engine: `backend` of `simulate`; by default compiled if there is a compiler.
     """
     solve = partial(
         simulate, model, problem.t_end, rtol=rtol, method=method, backend=engine or backend(),
@@ -70,11 +70,11 @@ def measure(
 
 
 def correct_digits(problem: Problem, run: Trajectory) -> tuple[float, str]:
-    """Return the correct digits of the worst signal at the end, and its name."""
+    """Return the number of correct digits of the worst signal at the end, and its name."""
     end = run.final
     errors = {
         name: abs(end[name] - value) / abs(value) for name, value in problem.reference.items()
     }
     worst = max(errors, key=lambda name: errors[name])
-    # rounding limits the digits of a double
+    # rounding limits the number of correct digits
     return -float(np.log10(max(errors[worst], float(np.finfo(float).eps)))), worst

@@ -1,4 +1,4 @@
-"""Initial-value problems of mechanisms: Andrews' squeezer (two formulations) and car axis."""
+"""Initial-value problems of mechanisms: Andrews' squeezer and the car axis."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -95,7 +95,7 @@ def andrews() -> Model:
 
         M(q) a + G(q)' lam = f(q, q'),   G(q) a + g_qq(q) (q', q') = 0
 
-    Seven angles, their rates, accelerations and six multipliers.
+    The unknowns are seven angles, their rates and accelerations, and six multipliers.
     """
     angles = tuple(Variable(n, "rad", start=s) for n, s in zip(ANGLES, START, strict=True))
     rates = tuple(Variable(f"{n}_rate", "rad/s", nominal=1e3) for n in ANGLES)
@@ -146,8 +146,8 @@ TURNED = {
 def mechanism() -> Mechanism:
     """Andrews' squeezer as a mechanism of bodies and joints.
 
-    Seven bodies are attached to three pins of the ground; three pins close their loops at one
-    point, E. A motor drives the first hinge; a spring connects C and D.
+    Seven bodies are attached to three pins of the ground; three pins at one point, E, close their
+    loops. A motor drives the first hinge; a spring connects C and D.
     """
     m = Mechanism("squeezer", gravity=(0.0, 0.0, 0.0))
     numbers = zip(MASSES, INERTIAS, CENTRES, strict=True)
@@ -165,7 +165,7 @@ def mechanism() -> Mechanism:
 
 
 def squeezer(formulation: str) -> Model:
-    """Return its equations; in absolute coordinates, outputs include the sines of all angles."""
+    """Return the equations of `mechanism`; absolute coordinates also give sines of all angles."""
     made = mechanism().build(formulation=formulation)
     if formulation == "joint":
         return made
@@ -186,13 +186,13 @@ MASS = EPSILON**2 * M / 2
 
 
 def _road(t: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return the position of the right wheel contact; the left one is at the origin."""
+    """Return the position of the right wheel contact; the left wheel contact is at the origin."""
     y = BUMP * ca.sin(OMEGA * t)
     return ca.sqrt(L**2 - y**2), y
 
 
 def _axle(p: ca.SX, t: ca.SX) -> ca.SX:
-    """Return constraints: left spring normal to the base of the chassis, constant axle length."""
+    """Return constraints: left spring normal to the base of the chassis; constant axle length."""
     (xl, yl, xr, yr), (xb, yb) = ca.vertsplit(p), _road(t)
     return ca.vertcat(xl * xb + yl * yb, (xl - xr) ** 2 + (yl - yr) ** 2 - L**2)
 
@@ -213,9 +213,9 @@ def car_axis() -> Model:
     """Car axis: an axle on two springs over a bumpy road.
 
     The test set uses index 3. Here accelerations and multipliers are unknowns, and the constraints
-    are imposed on accelerations (index 1): K p'' = f(p, t) + c_p' lam, d^2 c / dt^2 = 0. Positions
-    of both ends of the axle, their rates, accelerations and two multipliers. Nominal values are
-    small because one end moves by 3 mm only.
+    are imposed on accelerations (index 1): K p'' = f(p, t) + c_p' lam, d^2 c / dt^2 = 0. The
+    unknowns are the positions of both ends of the axle, their rates and accelerations, and two
+    multipliers. Nominal values are small because one end moves by only 3 mm.
     """
     starts = {"xl": 0.0, "yl": 0.5, "xr": 1.0, "yr": 0.5}
     rates = {"xl": -0.5, "yl": 0.0, "xr": -0.5, "yr": 0.0}

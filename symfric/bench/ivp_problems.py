@@ -21,16 +21,16 @@ TEST_SET = (
 @final
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Initial-value problem and its published solution at the end.
+    """Initial-value problem with its published solution at the end.
 
     Attributes:
         name: name in the literature.
         model: function that builds the equations.
         t_end: end time; the problem starts at 0.
         reference: signal -> published value at the end.
-        digits: rtol -> required correct digits.
-        drift: outputs that are zero on the exact solution: constraints of a problem of higher
-            index in its index-reduced form.
+        digits: rtol -> required number of correct digits.
+        drift: outputs that are zero on the exact solution: the constraints of a problem of higher
+            index, which is solved in an index-reduced form.
         laborious: methods that need millions of steps below rtol 1e-6.
     """
 
@@ -66,7 +66,7 @@ def unknowns(
 def hires() -> Model:
     """HIRES: high irradiance responses of photomorphogenesis, eight reactions of phytochrome.
 
-    Stiff, eight concentrations.
+    The problem is stiff and has eight concentrations.
     """
     x = unknowns([1, 0, 0, 0, 0, 0, 0, 0.0057], [1, 0.1, 0.1, 0.1, 0.1, 0.5, 0.005, 0.005])
     y1, y2, y3, y4, y5, y6, y7, y8 = (v.symbol for v in x)
@@ -86,7 +86,7 @@ def hires() -> Model:
 def robertson() -> Model:
     """Robertson's autocatalytic reactions, over eleven decades of time.
 
-    Two of the three concentrations end at 2e-8 and 8e-14, which determine their nominal values.
+    Two of the three concentrations end at 2e-8 and 8e-14; their nominal values are as small.
     """
     x = unknowns([1, 0, 0], [1e-8, 1e-13, 1])
     y1, y2, y3 = (v.symbol for v in x)
@@ -97,7 +97,7 @@ def robertson() -> Model:
 def van_der_pol() -> Model:
     """Van der Pol oscillator, with relaxations a million times faster than its period.
 
-    Scaled to a period of order 1.
+    Time is scaled to a period of order 1.
     """
     EPSILON = 1e-6
     x = unknowns([2, 0], [2, 2])
@@ -106,9 +106,9 @@ def van_der_pol() -> Model:
 
 
 def oregonator() -> Model:
-    """The Oregonator: Field and Noyes' model of the Belousov-Zhabotinskii reaction.
+    """Oregonator: Field and Noyes' model of the Belousov-Zhabotinskii reaction.
 
-    Concentrations run over five decades within a period.
+    Concentrations vary over five decades within a period.
     """
     x = unknowns([1, 2, 3], [1, 1, 1])
     y1, y2, y3 = (v.symbol for v in x)
@@ -121,7 +121,7 @@ def oregonator() -> Model:
 
 
 def akzo_nobel() -> Model:
-    """Chemical Akzo Nobel: two species mixed while carbon dioxide is added; index 1.
+    """Chemical Akzo Nobel: two species are mixed while carbon dioxide is added; index 1.
 
     The sixth concentration follows from an equilibrium.
     """
@@ -147,7 +147,8 @@ def akzo_nobel() -> Model:
 def transistor_amplifier() -> Model:
     """Transistor amplifier: M y' = f(y, t) with a singular M, capacitors between nodes; index 1.
 
-    Node voltages; currents at each node sum to zero. The equations stay implicit in y'.
+    The unknowns are node voltages; the currents at each node sum to zero. The equations remain
+    implicit in y'.
     """
     SUPPLY, THERMAL, ALPHA, BETA, R0, R = 6.0, 0.026, 0.99, 1e-6, 1e3, 9e3
     x = unknowns([0, 3, 3, 6, 3, 3, 6, 0], [1] * 8, "V")
@@ -176,7 +177,7 @@ def transistor_amplifier() -> Model:
 def pleiades() -> Model:
     """Pleiades: seven stars in a plane, with near collisions; not stiff.
 
-    Positions x, y and velocities of stars with masses 1 ... 7.
+    The states are positions x, y and velocities of stars with masses 1 ... 7.
     """
     START = (
         *(3, 3, -1, -3, 2, -2, 2), *(3, -3, 2, 0, 0, -4, 4),
@@ -202,9 +203,9 @@ def pleiades() -> Model:
 
 
 def ring_modulator() -> Model:
-    """Ring modulator: mixes a low and a high frequency; parasitic capacitances of 2 pF.
+    """Ring modulator: mixer of a low and a high frequency, with parasitic capacitances of 2 pF.
 
-    Seven voltages and eight currents; highly oscillatory, and stiff because CS is small.
+    Seven voltages and eight currents are highly oscillatory, and stiff because CS is small.
     """
     C, CS, CP, R, RP = 1.6e-8, 2e-12, 1e-8, 25e3, 50.0
     LH, LS1, LS2, LS3 = 4.45, 2e-3, 5e-4, 5e-4

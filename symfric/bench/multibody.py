@@ -1,4 +1,4 @@
-"""Mechanisms: run time at equal error compared with other tools, size and cost of the step."""
+"""Mechanisms: run time at equal error compared with other tools, and size and cost of a step."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -50,13 +50,13 @@ DRIFTS = "Energy of frictionless mechanisms"
 SIZES = (2, 4, 8, 16, 32, 64)
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 BUDGET = 120.0
-"""Build time [s] above which no longer chain is measured."""
+"""Build time [s] of a chain above which no longer chains are measured."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Scene and its compared states.
+    """Scene and the states that are compared.
 
     Attributes:
         scene: machine.
@@ -83,10 +83,10 @@ CASES: dict[str, Case] = {
 
 
 def bench(quick: bool = False, links: Sequence[int] = SIZES, progress: Progress = None) -> Report:
-    """Measure everything in one run on one machine, so that ratios hold.
+    """Measure all subjects in one run on one machine, so that ratios are meaningful.
 
     Args:
-        quick: three tolerances and joint coordinates only, short runs.
+        quick: use three tolerances, joint coordinates only, and short runs.
         links: lengths of the chains.
         progress: called with the current item and the fraction done.
     """
@@ -121,10 +121,10 @@ def _runs(case: str, name: str, quick: bool) -> Iterator[Found]:
 
 
 def _run(case: str, name: str, setting: float, make: Callable[[], Contender]) -> Found:
-    """Return time and error of one integrator at one setting; a note if it fails.
+    """Return time and error of one integrator at one setting, or a note if it fails.
 
-    The error is the largest position error at 25 times over the largest position. The compile time
-    is 0 if one compilation serves all tolerances.
+    The error is the largest position error at 25 times, relative to the largest position. The
+    compile time is 0 if one compilation is used for all tolerances.
     """
     try:
         with unwarned():
@@ -144,7 +144,7 @@ def _run(case: str, name: str, setting: float, make: Callable[[], Contender]) ->
 
 @cache
 def _exact(case: str) -> Array:
-    """Return positions by another method at a tolerance far below all measured ones."""
+    """Return positions computed by another method at a tolerance far below those measured."""
     what = CASES[case]
     run = simulate(
         what.scene.model(), what.t_end, rtol=1e-12, t_eval=what.times, method="rodas4p"
@@ -156,7 +156,7 @@ def _exact(case: str) -> Array:
 
 
 def four_mass(joints: tuple[str, ...] = (), friction: JointFriction | None = None) -> Mechanism:
-    """Return the four-mass system with friction in `joints` only, by default that of the scene."""
+    """Return the four-mass system with friction in `joints` only; by default the scene's law."""
     m = FourMass(LAW).mechanism()
     m.joints = [
         replace(j, friction=(friction or j.friction) if j.name in joints else None)
@@ -166,7 +166,7 @@ def four_mass(joints: tuple[str, ...] = (), friction: JointFriction | None = Non
 
 
 def turned_pendulum() -> Mechanism:
-    """Return the double pendulum with its second hinge turned, which makes the motion spatial."""
+    """Return the double pendulum with a turned second hinge, which makes the motion spatial."""
     m = DoublePendulum(LAW).mechanism()
     m.frame("upper.turned", at=(0.0, 0.0, -0.5), z=(1.0, 0.0, 0.0), x=(0.0, 0.0, -1.0))
     m.frame("lower.turned", at=(0.0, 0.0, 0.5), z=(1.0, 0.0, 0.0), x=(0.0, 0.0, -1.0))
@@ -193,7 +193,7 @@ def integrator(model: Model) -> Integrator:
 
 @cache
 def count(mechanism: str, variant: str, coordinates: str) -> Row:
-    """Count unknowns, CasADi instructions and nonzeros of one of `VARIANTS`."""
+    """Return the numbers of unknowns, CasADi instructions and nonzeros of one of `VARIANTS`."""
     model = VARIANTS[mechanism, variant]().build(formulation=coordinates)
     made = integrator(model)
     return {
@@ -206,13 +206,14 @@ def count(mechanism: str, variant: str, coordinates: str) -> Row:
 
 
 def counts(coordinates: Iterable[str] = BOTH) -> Iterator[Found]:
-    """Count all variants."""
+    """Yield the rows of all variants."""
     yield from ((COUNTS, count(*key, c)) for c in coordinates for key in VARIANTS)
 
 
 def chain(links: int, law: Law | None = None) -> Model:
-    """Return a hanging chain of equal rods with hinges about x and y in turn; friction from
-    reactions.
+    """Return a hanging chain of equal rods with hinges about alternating axes x and y.
+
+    With a law, the hinges have friction from reactions.
     """
     m, length = Mechanism("chain"), 1.0
     m.frame("ground.end", z=Y)
@@ -231,7 +232,7 @@ def chain(links: int, law: Law | None = None) -> Model:
 def chains(
     make: Callable[[int], Model], sizes: Sequence[int] = SIZES, budget: float = BUDGET
 ) -> Iterator[Found]:
-    """Measure the step of `make(n)` for each n of `sizes`, until building exceeds `budget` [s]."""
+    """Measure the step of `make(n)` for n in `sizes`, until the build time exceeds `budget` [s]."""
     rows: list[Row] = []
     for n in sizes:
         begin = perf_counter()
@@ -250,7 +251,7 @@ def chains(
 
 
 def exponent(rows: Sequence[Row], column: str, smallest: int = 8) -> float:
-    """Return the slope of the logarithm of a column over that of the links, from `smallest` on."""
+    """Return the slope of log(column) over log(links), for at least `smallest` links."""
     used = [row for row in rows if float(row["links"]) >= smallest]
     used = used if len(used) > 1 else rows[-2:]
     links, values = (np.log([float(row[c]) for row in used]) for c in ("links", column))
@@ -258,7 +259,7 @@ def exponent(rows: Sequence[Row], column: str, smallest: int = 8) -> float:
 
 
 def step_time(made: Integrator) -> float:
-    """Return the time [s] of an attempt from the start, in the virtual machine."""
+    """Return the time [s] of an attempted step from the start, in the virtual machine."""
     whole, model = made.system, made.model
     y = first_guess(whole, model, model.initial_state())
     d = np.zeros(whole.d.numel())
@@ -276,7 +277,7 @@ DRIFT_S = 100.0
 def drifts(t_end: float = DRIFT_S) -> Iterator[Found]:
     """Measure the change of energy of frictionless mechanisms over `t_end` [s] at rtol 1e-10.
 
-    It is relative to the largest kinetic energy, or to the energy at the start if that is larger.
+    The change is relative to the largest kinetic energy, or to the initial energy if it is larger.
     """
     for kind in (FourMass, SliderCrank):
         run = simulate(kind(Viscous(sigma_2=0.0)).model(), t_end, rtol=1e-10)

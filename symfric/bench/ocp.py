@@ -1,9 +1,9 @@
 """Optimal control: solutions from many starts, their verification, and their cost.
 
-`ocp.solve` is compared with Radau collocation by CasADi's Opti and, if installed, by rockit, on the
-same models from the same starts with the same Ipopt. All controls are verified alike: by the model
-with layers of 1e-5, and by exact Coulomb friction with stiction. Times are processor times of a
-whole call, with building and verification.
+`ocp.solve` is compared with Radau collocation in CasADi's Opti and, if installed, in rockit, on the
+same models, from the same starts and with the same Ipopt. All controls are verified in the same
+way: with the model and layers of 1e-5, and with exact Coulomb friction with stiction. Times are
+processor times of a whole call, including building and verification.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -44,7 +44,7 @@ WANTED = 1e-4
 BEST = 1e-3
 """Largest relative difference from the best cost that counts as equal."""
 WIDTHS = (1e-1, 1e-2, 1e-3)
-"""Layers [m/s] of the problems for other tools."""
+"""Widths [m/s] of the layers of problems for other tools."""
 INTERVALS = 100
 TITLE = (
     "Optimal control: medians over the starts; verified solutions miss no end condition by more "
@@ -56,11 +56,11 @@ EXACT = "relative miss, exact friction"
 def bench(
     quick: bool = False, cases: Sequence[str] | None = None, progress: Progress = None
 ) -> Report:
-    """Measure all problems on this machine in some minutes, or one minute with `quick`.
+    """Measure all problems on this machine in a few minutes, or in one minute with `quick`.
 
     Args:
-        quick: 3 starts, no far ones, other tools on one layer only.
-        cases: names of ready problems; default: all, and controllers.
+        quick: use 3 near starts, and one layer for other tools.
+        cases: names of ready problems; by default all problems, and controllers.
         progress: called with the current item and the fraction done.
     """
     tasks: dict[str, Callable[[], Iterator[Found]]] = {
@@ -76,7 +76,7 @@ def bench(
 
 
 def starts_of(problem: Problem, count: int, scale: float) -> Iterator[dict[str, Array]]:
-    """Yield guesses of all states and inputs by name; the first of near starts is the default."""
+    """Yield guesses of all states and inputs by name; the first near start is the default one."""
     into = discretise(problem, Radau()).on(make_meshes(problem, 50))
     points = initial_points(into)
     model = problem.spans[0].model
@@ -95,7 +95,7 @@ def starts_of(problem: Problem, count: int, scale: float) -> Iterator[dict[str, 
 
 
 def _case(ready: Ready, quick: bool) -> Iterator[Found]:
-    """Solve one problem by all tools; those without homotopy solve it with smooth layers."""
+    """Solve one problem with all tools; tools without homotopy solve it with smooth layers."""
     problem = ready.make()
     row = partial(_row, ready, problem)
     near = list(starts_of(problem, 3 if quick else STARTS, NEAR))
@@ -126,7 +126,7 @@ SOLVED = ("SOLVED", "ACCEPTABLE", "SUCCESS", "Solve_Succeeded", "Solved_To_Accep
 def _row(
     ready: Ready, problem: Problem, solver: str, starts: str, found: Sequence[Attempt]
 ) -> Found:
-    """Return medians over the starts; the best cost is the known one or the best of this run."""
+    """Return medians over the starts; the best cost is the known cost or the best of this run."""
     misses = [landed(problem, a) for a in found]
     exact = [landed(problem, a, exact=True) if ready.friction else nan for a in found]
     holds = [
@@ -151,12 +151,12 @@ def _row(
 
 
 def _middle(values: Sequence[float]) -> float:
-    """Return the median; a motion that could not be simulated counts as infinitely far off."""
+    """Return the median; the error of a motion that could not be simulated counts as infinite."""
     known = [v if v == v else inf for v in values]
     return median(known) if min(known) < inf else nan
 
 
-# ---- verification of controls, whatever tool found them ----
+# ---- verification of the controls of all tools ----
 
 
 def attempt_of(solution: Solution, time_s: float) -> Attempt:
@@ -184,7 +184,7 @@ def landed(problem: Problem, attempt: Attempt, *, exact: bool = False, rtol: flo
 
     Args:
         problem, attempt: problem and its solution.
-        exact: use exact Coulomb friction with stiction in place of the laws.
+        exact: use exact Coulomb friction with stiction instead of the laws.
         rtol: relative tolerance of the simulation.
     """
     state: dict[str, float] = {}
@@ -235,15 +235,15 @@ def _miss(span: Span, signals: Mapping[str, Array], times: Sequence[float]) -> f
     return worst
 
 
-# ---- a model predictive controller on plants with other friction than its model ----
+# ---- a model predictive controller on plants whose friction differs from its model ----
 
 MPC = "Model predictive controller of a drive"
 STEP, HORIZON = 0.01, 20
 GOAL = 0.1
 """Distance between the positions of the controller [m]."""
 LOOK = 0.75
-"""Time [s] at which the distance from the goal is measured; the controller knows that it will move
-back at 1 s."""
+"""Time [s] at which the distance from the goal is measured; the controller anticipates the return
+at 1 s."""
 CYCLES = 1000
 
 
@@ -261,7 +261,7 @@ PLANTS: dict[str, Callable[[], Law]] = {
 
 
 def receding() -> Problem:
-    """Return the problem of a drive that moves to a position and stays: 20 intervals of 10 ms."""
+    """Return the problem of a drive that moves to a position and stays, with 20 steps of 10 ms."""
     cost = track("x", "goal", 900.0) + track("v", 0.0, 1.0) + effort("force", 1e-3)
     cost += at_end(lambda s: 100.0 * (s.x - s.goal) ** 2 + s.v**2)
     stage = _drive(guide(1e-2))
@@ -271,15 +271,15 @@ def receding() -> Problem:
 
 
 def controllers(quick: bool) -> Iterator[Found]:
-    """Move every plant between two positions.
+    """Measure a controller that moves each plant between two positions.
 
-    Unreported failures are cycles that report convergence but did not converge.
+    Unreported failures are cycles that report convergence although they did not converge.
     """
     controller = receding().to_mpc(step=STEP)
     cycles = CYCLES // 10 if quick else CYCLES
 
     def goal(times: Array) -> Array:
-        """GOAL in every other second."""
+        """Return `GOAL` in every other second, and 0 otherwise."""
         return GOAL * (np.floor(times + 1e-9) % 2 == 0)
 
     for name, law in PLANTS.items():

@@ -1,6 +1,6 @@
-"""Optimal control problems in other tools, as users of CasADi's Opti or of rockit write them.
+"""Optimal control problems in other tools, in the style of users of CasADi's Opti and rockit.
 
-Both get the same model, mesh, start and Ipopt; neither refines its mesh or verifies its result.
+Both tools use the same model, mesh, start and Ipopt; neither refines its mesh or verifies results.
 """
 
 import contextlib
@@ -37,12 +37,12 @@ class Attempt:
     """Result of a solver.
 
     Attributes:
-        cost: J as the solver reports it.
+        cost: J reported by the solver.
         iterations: number of iterations.
-        status: status that the solver reports.
+        status: status reported by the solver.
         time_s: processor time [s] of building and solving.
         durations: duration of each phase [s].
-        controls: for each phase, input -> values held on the intervals.
+        controls: for each phase, input -> constant values on the intervals.
         meshes: for each phase, starts of the intervals as fractions; None: equal intervals.
     """
 
@@ -56,16 +56,16 @@ class Attempt:
 
 
 Guesses = Mapping[str, Array]
-"""State -> samples at equal distances from 0 to the end of the problem."""
+"""State -> equally spaced samples from 0 to the end of the problem."""
 
 
 def opti(problem: Problem, intervals: int, guess: Guesses | None = None) -> Attempt:
-    """Solve by Radau collocation written in a Python loop with CasADi's Opti.
+    """Return the solution by Radau collocation, written as a Python loop with CasADi's Opti.
 
     Args:
         problem: problem of one scenario, without chosen parameters and periodic states.
-        intervals: number of all intervals.
-        guess: start of the states; straight lines for missing ones.
+        intervals: total number of intervals.
+        guess: initial guess of the states; missing states start from straight lines.
     """
     if problem.periodic or problem.choose or problem.scenarios:
         raise ValueError("opti: expected one motion with given ends and parameters")
@@ -108,7 +108,7 @@ def _named(span: Span, rows: Array) -> dict[str, Array]:
 
 
 def straight(span: Span) -> Callable[[float], Array]:
-    """Return straight lines through the conditions on each state; rates are slopes of them."""
+    """Return straight lines through the conditions on each state; rates are their slopes."""
     duration = span.T.start if isinstance(span.T, Free) else span.T
     names = [v.name for v in span.model.x]
     points = {
@@ -160,7 +160,7 @@ def _collocated(
     before: ca.MX | None,
     guess: Callable[[float], Array],
 ) -> tuple[ca.MX, ca.MX, list[ca.MX]]:
-    """Add the equations of a phase; return its cost, its end and its inputs."""
+    """Add the equations of a phase; return its cost, its final state and its inputs."""
     model = span.model
     path = ca.vertcat(ca.SX(0, 1), *(row.expression for row in span.path))
     point = ca.Function("point", span.symbols, [_ode(span), model.alg, span.running, path])
@@ -236,9 +236,9 @@ def has_rockit() -> bool:
 
 
 def rockit(problem: Problem, intervals: int) -> Attempt:
-    """Solve by collocation with rockit.
+    """Return the solution by collocation with rockit.
 
-    Limits: explicit models without algebraic variables; bounds of states and inputs; phases of
+    Limits: explicit models without algebraic variables, bounds on states and inputs, and phases of
     given durations.
     """
     other: Any = import_module("rockit")

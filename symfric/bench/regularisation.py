@@ -3,17 +3,17 @@
     error = max over signals and times of |x(s) - x(0)| / (largest - smallest value of x(0))
 
 The factor s scales v_t or, inversely, the stiffness of bristles. The reference x(0) is the motion
-with set-valued friction of the same levels, `ExactCoulomb`. In a machine that does not allow it,
-the reference is a run at a sixteenth of the smallest width, whose own error follows from the order
-of convergence of the last runs. Each width is run at several tolerances: the error of the law is
-where their curves agree, that of the integrator where they part. For a periodic motion, the error
-of period and amplitude of the last cycle, which does not grow with the number of cycles, is
-measured as well.
+with set-valued friction of the same levels, `ExactCoulomb`. In a machine that does not allow this
+law, the reference is a run at a sixteenth of the smallest width; its error is estimated from the
+order of convergence of the last runs. Each width is run at several tolerances. Where their curves
+agree, they show the error of the law; where they differ, that of the integrator. For a periodic
+motion, the error of period and amplitude of the last cycle is measured as well, since it does not
+grow with the number of cycles.
 
-Limits: in the four-mass system three contacts rest as one. Set-valued friction does not determine
-their loads and, with mu_s > mu_d, the instant of their break-away; each smooth law chooses them by
-its creep (1e-4 to 1e-3 apart). There, Brown-McPhee is compared with its own limit, and a law with
-mu_s = mu_d with set-valued friction.
+Limits: in the four-mass system three contacts are at rest together. Set-valued friction does not
+determine their loads and, with mu_s > mu_d, the instant of their break-away; the creep of each
+smooth law determines them (1e-4 to 1e-3 apart). There, Brown-McPhee is compared with its limit,
+and a law with mu_s = mu_d with set-valued friction.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -53,13 +53,13 @@ RTOLS = (1e-5, 1e-6, 1e-8)
 FINE = 1e-10
 """Relative tolerance of references."""
 HALF_DECADES = tuple(10.0 ** (-k / 2) for k in range(9))
-"""Factors of the widths: four decades."""
+"""Factors of the widths over four decades."""
 BEYOND = 1 / 16
-"""Factor of the smallest width of the reference in a machine without an exact law."""
+"""Ratio of the width of a reference without an exact law to the smallest measured width."""
 STILL = 1e-12
-"""Largest distance [s] of an extreme from a sample that counts as the sample."""
+"""Largest distance [s] at which an extreme counts as coincident with a sample."""
 ROUNDS = 9
-"""Number of calls; the shortest time counts."""
+"""Number of calls, of which the shortest time is used."""
 TITLE = "Error of smooth friction relative to dry friction"
 
 
@@ -73,7 +73,7 @@ class Case:
         law: law at its largest width.
         scene: function from a law to the machine.
         t_end: end time [s].
-        exact: function to the limit of the law; None if the machine does not allow it.
+        exact: function from the law to its limit; None if the machine does not allow the limit.
         cycle: True for a periodic motion.
         of: compared signals.
     """
@@ -126,7 +126,7 @@ CASES = (
     Case("pendulum_box lugre_normalised", _lugre(LuGreNormalised), PendulumBox, 15.0, _falling),
     Case("four_mass coulomb", Coulomb(mu_d=0.1, v_eps=1e-2), FourMass, 4.0, _flat),
     Case("four_mass brown_mcphee", _brown(0.12, 0.1), FourMass, 4.0),
-    # at 1 rad/s the crank comes to rest
+    # with 1 rad/s at the start the crank comes to rest
     Case("slider_crank brown_mcphee", _brown(0.1, 0.08), partial(SliderCrank, omega=1.0), 5.0,
          _coulomb),
 )  # fmt: skip
@@ -141,7 +141,7 @@ def bench(
 ) -> Report:
     """Run every case at every width and tolerance, compiled if there is a compiler.
 
-    `quick` takes every second width, twice, in the virtual machine.
+    With `quick`, every second width is run twice in the virtual machine.
     """
     factors = factors[::2] if quick else factors
     how = {"rounds": 2 if quick else ROUNDS, "engine": "vm" if quick else backend()}
@@ -205,10 +205,11 @@ def _reference(
 
 
 def last_cycle(run: Trajectory) -> Array:
-    """Return period [s] and amplitude [m] of the last stick-slip cycle of `x`; empty without two.
+    """Return period [s] and amplitude [m] of the last stick-slip cycle of `x`.
 
-    A cycle lasts from one largest elongation to the next; the smallest is between them. Extremes
-    are zeros of the cubic through four samples of the velocity.
+    A cycle lasts from one largest elongation to the next, with the smallest elongation between
+    them. Extremes are zeros of the cubic through four samples of the velocity. The result is empty
+    if there are fewer than two largest elongations.
     """
     t, x, v = run.t, run["x"], run["v"]
     falls = np.flatnonzero((v[1:-2] > 0) & (v[2:-1] <= 0)) + 1

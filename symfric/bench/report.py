@@ -1,4 +1,4 @@
-"""Results of a benchmark: rows of tables that are printed, stored and drawn; goals; timing."""
+"""Results of a benchmark: tables that are printed, stored and drawn, goals, and timing."""
 
 import os
 import warnings
@@ -49,8 +49,8 @@ class Report:
     """Results of a benchmark.
 
     Attributes:
-        draw: title of a table, and the function that draws its rows; None without a picture.
-        tables: title -> rows. Rows of one table may lack columns.
+        draw: title of a table, and the function that draws its rows; None if there is no picture.
+        tables: title -> rows; the rows of a table may have different columns.
         notes: sentences, for example about tools that are not installed.
     """
 
@@ -69,7 +69,7 @@ class Report:
     def collect(
         self, tasks: Mapping[str, Callable[[], Iterable[Found]]], progress: Progress = None
     ) -> Self:
-        """Run tasks and append what they yield; Ctrl-C ends the loop and keeps the rows so far.
+        """Run tasks and append their results; Ctrl-C ends the loop and keeps the rows so far.
 
         Raises:
             KeyboardInterrupt: Ctrl-C before the first row.
@@ -93,7 +93,7 @@ class Report:
         yield from self.notes
 
     def to_dict(self) -> dict[str, Any]:
-        """Return rows by table, and notes."""
+        """Return the rows by table, and the notes."""
         return {"tables": self.tables, "notes": self.notes}
 
     def write_csv(self, path: str | Path) -> None:
@@ -117,7 +117,7 @@ class Report:
 
 
 def _short(cell: Cell) -> Cell:
-    """Round a number to significant digits; integers and NaN stay."""
+    """Return a number rounded to significant digits; integers and NaN are unchanged."""
     return float(f"{cell:.{DIGITS}g}") if isinstance(cell, float) else cell
 
 
@@ -138,10 +138,10 @@ def goal(
 
     Args:
         quantity: measured quantity, with its unit.
-        measured, limit: measured number, and the number to be reached.
-        side: side of the goal on which it is met.
+        measured, limit: measured number, and the number to reach.
+        side: relation of the measured number to the limit at which the goal is met.
         seconds: processor time of the measurement [s].
-        note: remark for the reader, for example that data are absent.
+        note: remark for the user, for example that data are absent.
     """
     met = measured <= limit if side == "<=" else measured >= limit
     return GOALS, {
@@ -156,7 +156,7 @@ RATIOS = "Time at equal error"
 
 
 def ratios(rows: Sequence[Row], reference: str, errors: Sequence[float]) -> Iterator[Found]:
-    """Yield times relative to `reference` at equal error, where both integrators reach it."""
+    """Yield times relative to `reference` at errors that both integrators reach."""
     for case in dict.fromkeys(r["case"] for r in rows):
         own = [r for r in rows if r["case"] == case]
         for error in errors:
@@ -174,10 +174,10 @@ def ratios(rows: Sequence[Row], reference: str, errors: Sequence[float]) -> Iter
 
 
 def time_at(rows: Sequence[Row], error: float) -> float:
-    """Return the time [ms] to reach `error`, log-log interpolated; NaN if not reached."""
+    """Return the time [ms] to reach `error`, interpolated log-log; NaN if no row reaches it."""
     points = sorted((float(r["relative error"]), float(r["time per run [ms]"])) for r in rows)
     best: list[tuple[float, float]] = []
-    for e, t in points:  # from the most accurate; keep rows that are cheaper than all before
+    for e, t in points:  # from the smallest error; keep rows that are faster than all before
         if e > 0 and t < (best[-1][1] if best else inf):
             best.append((e, t))
     below, above = ([p for p in best if (p[0] > error) is side] for side in (False, True))
@@ -192,19 +192,19 @@ def time_at(rows: Sequence[Row], error: float) -> float:
 # ---- curves ----
 
 ABREAST = 5
-"""Most panels in a row."""
+"""Largest number of panels in a row."""
 LEAST = 1e-14
 """Smallest value that is drawn."""
 
 
 def curves(panel: str, lines: Sequence[str], x: str, *ys: str) -> Draw:
-    """Return a function that draws columns of rows over another one, with logarithmic axes.
+    """Return a function that draws some columns over another column, with logarithmic axes.
 
     Args:
-        panel: column whose values have a panel each.
-        lines: columns whose values have a curve each.
-        x: column of the abscissae; decreasing ones run to the right.
-        ys: columns of the ordinates; each has its own panels.
+        panel: column with a panel for each value.
+        lines: columns with a curve for each combination of values.
+        x: column of the abscissae; the axis is inverted if they decrease from row to row.
+        ys: columns of the ordinates, each in separate panels.
     """
     return partial(_draw_curves, panel, lines, x, ys)
 
@@ -270,7 +270,7 @@ def backend() -> str:
 
 @contextmanager
 def unwarned() -> Generator[None]:
-    """Suppress warnings: loose tolerances are measured on purpose."""
+    """Suppress warnings, since loose tolerances are measured deliberately."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
@@ -284,7 +284,7 @@ def best_time(
 ) -> tuple[float, T]:
     """Return the shortest time [s] of `call` over repeats within `budget` seconds, and its result.
 
-    The shortest time is the cost of the code; longer ones include other load of the machine. For
+    The shortest time is the cost of the code; longer times include other load of the machine. For
     calls without threads, processor time (`time.process_time`) is the better clock.
     """
     best, spent, result = inf, 0.0, None
@@ -306,14 +306,14 @@ def timed(call: Callable[[], T]) -> tuple[float, T]:
 def interleaved(
     calls: Mapping[str, Callable[[], object]], rounds: int = 7, budget: float = 0.0
 ) -> dict[str, float]:
-    """Return the shortest processor time [s] of each of the `calls`, which take turns.
+    """Return the shortest processor time [s] of each of the `calls`, which alternate.
 
-    A temporary load of the machine affects all of them equally, so that ratios hold.
+    A temporary load of the machine affects all calls equally, so that ratios are meaningful.
 
     Args:
         calls: functions by name; the first call of each is not measured.
-        rounds: least number of measurements of each.
-        budget: total time [s] up to which further rounds are made.
+        rounds: smallest number of measurements of each function.
+        budget: total time [s] up to which further rounds are measured.
     """
     best = dict.fromkeys(calls, inf)
     for call in calls.values():

@@ -1,3 +1,3 @@
-"""The command line: one file per command; knows all packages, and nothing knows it."""
+"""Command line, with one file per command; it may import all packages, and none imports it."""
 
 from symfric.cli.app import main as main

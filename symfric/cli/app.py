@@ -1,9 +1,9 @@
-"""Command line application: its commands, and conversion of errors to exit statuses.
+"""Command line application: its commands, and the conversion of errors to exit statuses.
 
-The options of a command are the parameters of its function; `options.toml` has their forms and
-meanings. Typer parses the line, without its conversions and messages. Its conversions load
-pydantic, which takes longer than a simulation. Its messages name neither the value nor a remedy;
-the classes of its errors tell them apart, but are not exported.
+The options of a command are the parameters of its function; `options.toml` contains their forms and
+meanings. Typer parses the line, but its conversions and messages are not used. The conversions load
+pydantic, which takes longer than a simulation. The messages name neither the value nor a remedy;
+the classes of Typer's errors distinguish them, but are not exported.
 """
 
 import os
@@ -42,9 +42,9 @@ COMMANDS = {
     "bench": "Compare symfric with other tools in run time and error.",
     "stress": "Verify runs of random laws in random scenes.",
 }
-"""Commands with the first line of their help."""
+"""Command -> first line of its help."""
 MODULES = dict.fromkeys(("bench", "gallery", "stress"), "campaigns") | {"report": "run"}
-"""Commands that are defined in a module of another name."""
+"""Command -> name of its module, if the names differ."""
 
 SETTINGS: dict[str, Any] = {
     "pretty_exceptions_enable": False,
@@ -64,7 +64,7 @@ def forms() -> dict[str, dict[str, list[str]]]:
 
 
 def declared(function: Callable[..., None]) -> Callable[..., None]:
-    """Return the function of a command with the options that Typer needs, which accept texts."""
+    """Return the function of a command with parameters for Typer, which accept texts."""
     own, command = forms().get(function.__name__, {}), function.__name__.replace("_", "-")
     module, hints = vars(sys.modules[function.__module__]), get_type_hints(function)
     completions = vars(import_module("symfric.cli.completions"))
@@ -96,7 +96,7 @@ def declared(function: Callable[..., None]) -> Callable[..., None]:
 
 
 def converted(where: str, hint: Any, value: Any) -> Any:
-    """Return a text of the command line as a value of the type `hint`."""
+    """Return a text of the command line, converted to the type `hint`."""
     kind = next((k for k in (int, float, Path) if k in (hint, *get_args(hint))), str)
     try:
         return kind(value) if isinstance(value, str) else value
@@ -106,20 +106,20 @@ def converted(where: str, hint: Any, value: Any) -> Any:
 
 
 def unconverted(command: Any) -> Any:
-    """Return a command of Typer whose parameters pass their values on without conversion."""
+    """Return a command of Typer whose parameters do not convert their values."""
     for parameter in command.params:
         parameter.process_value = partial(_processed, parameter, parameter.process_value)
     return command
 
 
 def _processed(parameter: Any, process: Callable[..., Any], context: Any, value: Any) -> Any:
-    """Return a value as it is; Typer refuses missing values and calls functions of options."""
+    """Return a value unchanged; let Typer refuse missing values and call callbacks of options."""
     needed = bool(value) if parameter.callback else parameter.required and not value
     return process(context, value) if needed else value
 
 
 class Commands(TyperGroup):
-    """Command group that loads only the command that is called."""
+    """Command group that imports only the module of the called command."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
@@ -131,7 +131,7 @@ class Commands(TyperGroup):
         return [*COMMANDS]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the command of that name, or None if there is none."""
+        """Return the command of this name, or None if there is none."""
         if cmd_name not in COMMANDS:
             return None
         one = typer.Typer(add_completion=False, **SETTINGS)
@@ -141,7 +141,7 @@ class Commands(TyperGroup):
         return unconverted(typer.main.get_command(one))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the command of the first word; refuse an unknown word with a suggestion."""
+        """Return the command that the first word names; suggest a name for an unknown word."""
         if not (args[0] in COMMANDS or ctx.resilient_parsing or args[0].startswith("-")):
             from symfric.foundation.checks import check_names  # noqa: PLC0415  (CasADi is slow)
 
@@ -158,7 +158,7 @@ class Command(TyperCommand):
     """Command whose help ends with examples to copy."""
 
     def collect_usage_pieces(self, ctx: Any) -> list[str]:
-        """Return the words of the usage line after the name."""
+        """Return the words of the usage line that follow the name of the command."""
         return ["[OPTIONS]", *(argument_shown(p) for p in arguments(self))]
 
     def format_help_text(self, ctx: Any, formatter: Any) -> None:
@@ -185,7 +185,7 @@ class Command(TyperCommand):
 
 
 def is_option(parameter: Any) -> bool:
-    """Return True if a parameter of a command is an option, not an argument."""
+    """Return True if a parameter of a command is an option, False if it is an argument."""
     return parameter.opts[0].startswith("-")
 
 
@@ -201,14 +201,14 @@ def argument_shown(parameter: Any) -> str:
 
 
 def prose_and_examples(text: str) -> tuple[str, list[str]]:
-    """Split the docstring of a command into its prose and its example lines."""
+    """Return the prose and the example lines of the docstring of a command."""
     paragraphs = cleandoc(text).split("\n\n")
     examples = [" ".join(p.split())[len(EXAMPLE) :] for p in paragraphs if p.startswith(EXAMPLE)]
     return "\n\n".join(p for p in paragraphs if not p.startswith(EXAMPLE)), examples
 
 
 def continued(line: str, indent: int) -> str:
-    """Wrap a shell command before options, with backslashes at the line ends."""
+    """Return a shell command wrapped before options, with backslashes at the line ends."""
     start, *rest = line.split(" --")
     rows = [" " * indent + start]
     for option in rest:
@@ -235,7 +235,7 @@ def symfric(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Show the version and exit.")] = False,
 ) -> None:
-    """Show the version, or the help if no command is given."""
+    """Print the version on request, or the help if no command is given."""
     if version:
         typer.echo(f"symfric {__version__}")
         raise typer.Exit
@@ -251,7 +251,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status.
 
     0: success; 1: a solve failed (partial results are written); 2: bad input; 130: Ctrl-C. Every
-    error is one sentence on standard error. If SYMFRIC_DEBUG is set, errors are raised instead.
+    error is printed as one sentence on standard error, or raised if SYMFRIC_DEBUG is set.
     """
     debug = bool(os.environ.get("SYMFRIC_DEBUG"))
     if arguments is None:

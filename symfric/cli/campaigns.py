@@ -1,7 +1,7 @@
-"""`symfric bench`, `symfric gallery`, `symfric stress`: computations of minutes to hours.
+"""Commands `symfric bench`, `symfric gallery` and `symfric stress`, which take minutes to hours.
 
 Benchmarks compare run time and error, as ratios measured in one run. The gallery reproduces the
-figures of the papers. Stress tests verify random cases by an independent reference solver or by
+figures of the papers. Stress tests verify random cases with an independent reference solver or with
 other methods.
 """
 
@@ -44,15 +44,16 @@ def bench(
 ) -> None:
     """Compare symfric with other tools in run time and error.
 
-    integrator: stick-slip of one mass, and derivatives. calls: many short steps, events. ensemble:
-    ensembles and the same runs one by one, on one core. multibody: mechanisms, cost and size of
-    their equations, energy. ivp: correct digits on problems with published solutions (Test Set for
-    IVP Solvers). regularisation: error of smooth laws relative to dry friction, over their width or
-    stiffness. ocp: optimal control from many starts, verification, controllers; CasADi's Opti and
-    rockit. interop: laws in Opti, rockit, do-mpc and CasADi's integrators, as their users write
-    them. identification: fits from many starts and with many noise seeds, confidence intervals,
-    measured machines, damaged files. codegen: generated C, its goals, and C of CasADi. embedded:
-    instructions and memory of generated C on Cortex-M cores under QEMU.
+    integrator: stick-slip of one mass, and derivatives. calls: many short steps, and events.
+    ensemble: ensembles, and the same runs one by one on one core. multibody: mechanisms, the cost
+    and size of their equations, and energy. ivp: correct digits on problems with published
+    solutions (Test Set for IVP Solvers). regularisation: error of smooth laws relative to dry
+    friction, over their width or stiffness. ocp: optimal control from many starts, verification,
+    controllers, and a comparison with CasADi's Opti and rockit. interop: laws in Opti, rockit,
+    do-mpc and CasADi's integrators. identification: fits from many starts and with many noise
+    seeds, confidence intervals, measured machines, damaged files. codegen: generated C, its
+    requirements, and C of CasADi. embedded: instructions and memory of generated C on Cortex-M
+    cores under QEMU.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """
@@ -85,7 +86,7 @@ def lengths(text: str) -> tuple[int, ...]:
     """Return the numbers of `--links` in increasing order.
 
     Raises:
-        ValueError: anything but positive whole numbers separated by commas.
+        ValueError: the text is not a list of positive whole numbers separated by commas.
     """
     parts = text.split(",")
     if not all(part.strip().isdigit() and int(part) > 0 for part in parts):
@@ -103,10 +104,10 @@ def gallery(
     """Reproduce the figures of the source papers.
 
     Each figure states the compared quantities and their distance, observations of the paper that
-    are reproduced, explanations that are refuted, and questions that the text leaves open. Writes a
-    picture and a JSON file of the numbers for every figure, and index.html with all of them.
-    Ctrl-C keeps the finished figures. If a figure fails, it is reported, the others continue, and
-    the exit status is 1; it is 130 after Ctrl-C.
+    are reproduced, explanations that are refuted, and questions that the text does not decide. The
+    command writes a picture and a JSON file of the numbers for every figure, and index.html with
+    all figures. A figure that fails is reported, the others continue, and the exit status is 1.
+    Ctrl-C keeps the finished figures; the exit status is then 130.
 
     Example: symfric gallery --list
 
@@ -144,7 +145,7 @@ def show_gallery(done: "Gallery") -> None:
         records = {short(name).partition("/")[2]: done.records[name] for name in names}
         paper = next(iter(records.values()))["paper"]
         output.show(f"{folder}: {paper}")
-        # of each comparison the first sentence or clause, shortened to two lines of the table
+        # show the first sentence or clause of each comparison, on at most two lines of the table
         rows = [
             (name, shorten(split(r"(?<!\.)[.;:](?: |$)", r["compared"])[0], 84, placeholder=" ..."),
              r["how_far"], r["seconds"])
@@ -169,11 +170,11 @@ def stress(
 ) -> None:
     """Verify runs of random laws in random scenes.
 
-    Half of the cases use ten laws and six scenes with an independent implementation, which SciPy
-    solves at 1e-10; the others are compared with other methods at smaller tolerances. Parameters,
+    Half of the cases use ten laws and six scenes that have an independent implementation, solved by
+    SciPy at 1e-10; the others are compared with other methods at smaller tolerances. Parameters,
     tolerances, methods, inputs and start values are random, too. A case is right, refused, loose,
-    undecided, silently wrong, not finite, a crash or a hang. The last four are failures: they are
-    saved, and the exit status is 1. The files are updated every minute.
+    undecided, silently wrong, not finite, a crash or a hang. The last four classes are failures:
+    these cases are saved, and the exit status is 1. The files are updated every minute.
 
     Example: symfric stress --cases 1000 --seed 7 --json stress.json
 
@@ -212,7 +213,7 @@ def stress(
 
 
 def show_report(report: "Report") -> None:
-    """Print the number of cases in each class, with the reasons."""
+    """Print the number of cases in each class, and the reasons."""
     from symfric.stress.judge import CLASSES  # noqa: PLC0415  (for this command only)
 
     rows: list[tuple[str, str, str]] = []

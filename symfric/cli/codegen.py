@@ -55,7 +55,7 @@ APPLIES = {
     "--preset": (PLANT,),
     "--law-of": (PLANT,),
 }
-"""Options that apply to some subjects only -> these subjects."""
+"""Option that applies only to some subjects -> these subjects."""
 
 WHY = {
     "--step-size": "which has no step",
@@ -70,7 +70,7 @@ class Chosen(NamedTuple):
     Attributes:
         text: name of the law.
         law: law with its parameters.
-        drive: drive of the fit.
+        drive: drive of the fit, if the law is from a fit of a drive.
         forces: coefficients that are forces because the load is unknown.
     """
 
@@ -114,9 +114,9 @@ def codegen(
     """Write a friction law, a plant or inverse dynamics as C99, and verify it.
 
     The C is compiled and compared with CasADi over more than 20 000 steps, including bad inputs and
-    other parameters. The exit status is 1 if it differs or could not be verified, for example
-    without a compiler; the files are written anyway.
-    The law of a fit has the fitted parameters, and so has its drive with `--scene drive`.
+    other parameters. The exit status is 1 if the results differ or could not be compared, for
+    example without a compiler; the files are written in any case. The law of a fit has the fitted
+    parameters; with `--scene drive` the drive also has them.
 
     Example: symfric codegen --law lugre --out build --step-size 0.001
 
@@ -186,7 +186,7 @@ def report(
     measured: Sequence[Measured],
     json: str | None,
 ) -> None:
-    """Print or write the verification and the sizes, and print the names of the files."""
+    """Print or write the verification and the sizes, and print the file names."""
     content = {
         "law": law,
         "files": [str(path) for path in generated.files],
@@ -206,7 +206,7 @@ def report(
 
 
 def subject_of(chosen: Chosen | None, scene: str | None, compensator: bool) -> str:
-    """Return the type of subject.
+    """Return the type of the subject, a key of `APPLIES`.
 
     Raises:
         ValueError: a compensator together with a scene or inverse dynamics.
@@ -226,7 +226,7 @@ def subject_of(chosen: Chosen | None, scene: str | None, compensator: bool) -> s
 
 
 def check_applicable(subject: str, given: list[str]) -> None:
-    """Refuse all options that do not apply to the subject in one error."""
+    """Raise one error that lists all options that do not apply to the subject."""
     problems: list[str] = []
     for option in given:
         fits = [s for s in APPLIES[option] if s != FUNCTION]
@@ -243,7 +243,8 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
     """Return the law of a fit or of a name.
 
     Raises:
-        ValueError: both or neither, a robot, no fit in the file, or a fit without a law.
+        ValueError: both or neither, the file of a robot, a file without a fit, or a fit without a
+            law of the catalogue.
     """
     if (fit is None) == (law is None):
         got = "neither" if fit is None else "both"
@@ -275,7 +276,9 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
 def machine_of(
     scene: str, kind: Callable[[Law], Scene], chosen: Chosen, texts: dict[str, str]
 ) -> Scene:
-    """Return the scene with the law and --set; a fitted drive includes its mass and offset.
+    """Return the scene with the law and the values of --set.
+
+    A fitted drive has the fitted mass and offset.
 
     Raises:
         ValueError: coefficients that are forces in a scene with a load, or unknown names.
@@ -299,7 +302,7 @@ def machine_of(
 
 
 def compensated(law: AnyLaw, drive: Drive | None, texts: Sequence[str], **how: Any) -> Block:
-    """Return the compensator of a law, with load and offset of the drive of its fit."""
+    """Return the compensator of a law, with the load and offset of the fitted drive if given."""
     if not isinstance(law, Law):
         raise ValueError(f"{COMPENSATOR}: expected a law, got a population, whose force is random")
     subject = law if drive is None else replace(drive, law=law)
@@ -309,15 +312,15 @@ def compensated(law: AnyLaw, drive: Drive | None, texts: Sequence[str], **how: A
 def robot(
     file: Path | None, scene: str | None, law: str | None, values: dict[str, float]
 ) -> Mechanism:
-    """Return the mechanism of a robot's file or of a scene, which may also be a robot's file.
+    """Return the mechanism of the file of a robot or of a scene.
 
     Args:
-        file, scene: one of them.
+        file, scene: one of the two; the scene may also be the file of a robot.
         law: law of all joints; None for the friction tags of a file.
-        values: parameters of the scene or of the law, which become its defaults.
+        values: parameters of the scene or of the law, used as defaults of the mechanism.
 
     Raises:
-        ValueError: both or neither of them, or no mechanism.
+        ValueError: both or neither are given, or the scene is not a mechanism.
     """
     if (file is None) == (scene is None):
         got = "neither" if scene is None else "both"
@@ -360,14 +363,14 @@ def show_verification(verification: Verification) -> None:
 
 
 def compared(check: Check) -> str:
-    """Describe the comparison of the C with CasADi: the distance in double, or rounding."""
+    """Return a description of the comparison: distance in double precision, or within rounding."""
     if check.ulp is None:
         return "within rounding" if check.near else "differs"
     return "bit for bit equal" if check.ulp == 0 else f"{check.ulp} ulp apart"
 
 
 def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
-    """Print memory on this machine, by size and -fstack-usage, and cost on other cores, by QEMU."""
+    """Print memory on this machine (from `size`, -fstack-usage) and cost on other cores (QEMU)."""
     rows: list[tuple[str | float, ...]] = []
     for real in generated.reals:
         found = generated.manifest["real"][real].get("measured")

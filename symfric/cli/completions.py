@@ -1,7 +1,7 @@
-"""Shell completions: names of laws, scenes, figures, problems, and parameters of `--set`.
+"""Shell completions: names of laws, scenes, figures and problems, and parameters of `--set`.
 
-These functions never print or raise; without a match they return an empty list. They import what
-one command needs only.
+These functions never print or raise; without a match they return an empty list. They import only
+the modules that the completed command needs.
 """
 
 from collections.abc import Callable, Iterable
@@ -19,7 +19,7 @@ def _of(names: Iterable[str], incomplete: str) -> list[str]:
 
 
 def _last(names: Iterable[str], incomplete: str, separators: str = ",") -> list[str]:
-    """Complete the part of a text behind the last of its separators."""
+    """Return completions of the part of a text after its last separator."""
     cut = max(map(incomplete.rfind, separators)) + 1
     return [incomplete[:cut] + name for name in _of(names, incomplete[cut:])]
 
@@ -43,17 +43,17 @@ problems = _names("ocp.problems", "READY")
 
 
 def all_laws(incomplete: str) -> list[str]:
-    """Complete laws and populations of random contacts."""
+    """Return completions among laws and populations of random contacts."""
     return [*laws(incomplete), *_of(POPULATIONS, incomplete)]
 
 
 def figures(incomplete: str) -> list[str]:
-    """Complete figures of laws, and scenes."""
+    """Return completions among figures of laws and scenes."""
     return [*_names("symfric.figures", "FIGURES")(incomplete), *scenes(incomplete)]
 
 
 def plates(incomplete: str) -> list[str]:
-    """Complete papers of the gallery and, after the slash, their figures."""
+    """Return completions among papers of the gallery or, after the slash, their figures."""
     from symfric.gallery import scripts, short  # noqa: PLC0415  (for this completion only)
 
     names = [short(name) for name in scripts()]
@@ -62,12 +62,12 @@ def plates(incomplete: str) -> list[str]:
 
 
 def presets(context: typer.Context, incomplete: str) -> list[str]:
-    """Complete presets of the scene on the command line."""
+    """Return completions among presets of the scene on the command line."""
     return _of((name for kind in _machines(context) for name in kind.presets), incomplete)
 
 
 def places(context: typer.Context, incomplete: str) -> list[str]:
-    """Complete `PLACE=LAW` for the scene on the command line."""
+    """Return completions of `PLACE=LAW` for the scene on the command line."""
     if "=" in incomplete:
         return _last(ALL_LAWS, incomplete, "=+(")
     return _of((f"{name}=" for kind in _machines(context) for name in kind.places()), incomplete)
@@ -82,7 +82,7 @@ def _machines(context: typer.Context) -> list[Any]:
 
 
 def settings(context: typer.Context, incomplete: str) -> list[str]:
-    """Complete `NAME=` of parameters and options of the laws, or of the scene with them."""
+    """Return completions of `NAME=` for the laws, or for the scene with the laws."""
     machines, named = _machines(context), context.params.get("law") or context.params.get("name")
     texts = [named] if isinstance(named, str) else list(named or ())
     if not (texts or machines):

@@ -22,10 +22,10 @@ from symfric.laws import Law, law_name
 from symfric.scenes import Rabinowicz
 
 STAGE = Path("..", "shared", "data", "EMPS")
-"""Default folder of the measured stage: the EMPS benchmark next to the working folder."""
+"""Default folder of the records of the EMPS benchmark, next to the working folder."""
 
 RECORDS = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
-"""Record for identification and record for validation."""
+"""Files of the records for identification and for validation."""
 
 DISTANCE, LIMIT, INTERVALS = 0.05, 200.0, 100
 """Distance of the optimal move [m], largest force [N], and intervals of its mesh."""
@@ -43,7 +43,7 @@ class Chapter(NamedTuple):
 def demo(out: Path = Path("out"), data: Path | None = None) -> None:
     """Simulate, identify, optimise and generate C.
 
-    Results are written to DIR, with a README.md that lists them.
+    The results are written to DIR; README.md there lists them.
 
     Example: symfric demo --out out
     """
@@ -66,7 +66,7 @@ def demo(out: Path = Path("out"), data: Path | None = None) -> None:
 
 
 def load_records(data: Path | None) -> tuple[tuple[Dataset, Dataset], tuple[str, ...], str]:
-    """Return two records, the laws to identify from them, and their origin."""
+    """Return two records, the laws to identify from them, and the origin of the records."""
     folder = data or (STAGE if STAGE.is_dir() else None)
     if folder is not None:
         one, other = (Dataset.read(folder / name) for name in RECORDS)
@@ -78,7 +78,7 @@ def load_records(data: Path | None) -> tuple[tuple[Dataset, Dataset], tuple[str,
 
 
 def stick_slip(folder: Path) -> Chapter:
-    """Simulate a block on a belt with a smooth law and a bristle law."""
+    """Simulate a block on a belt with a smooth law and with a bristle law."""
     from symfric.figures.pictures import plot_laws  # noqa: PLC0415  (matplotlib is slow)
     from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
 
@@ -107,7 +107,7 @@ def identified(records: tuple[Dataset, Dataset], law: str) -> Fitted:
 def identification(
     folder: Path, found: list[Fitted], origin: str, records: tuple[Dataset, Dataset]
 ) -> Chapter:
-    """Write pages, numbers and pictures, and simulated records."""
+    """Write pages, numbers and pictures of the fits, and the records if they are simulated."""
     numbers: dict[str, Any] = {}
     for fit in found:
         stem = fit.name.replace("+", "_").replace("(", "_").replace(")", "")
@@ -127,7 +127,7 @@ def identification(
 def optimal_moves(folder: Path, found: Fitted) -> Chapter:
     """Compute the fastest move of the drive, and the move of least effort in 1.5 times that time.
 
-    The speed is bounded by the largest one in the record, since friction is unknown beyond it.
+    The largest speed in the record bounds the speed, since friction is unknown beyond it.
     """
     from ocp.solving.solution import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
 
@@ -166,7 +166,7 @@ def optimal_moves(folder: Path, found: Fitted) -> Chapter:
 
 
 def generated_c(folder: Path, found: Fitted) -> Chapter:
-    """Generate C of LuGre, and of the identified law for friction compensation."""
+    """Generate C for LuGre, and for the identified law for friction compensation."""
     laws: dict[str, Law | None] = {"lugre": LuGre(), "stage_friction": found.law}
     numbers: dict[str, Any] = {"failed": False}
     for name, law in laws.items():

@@ -1,4 +1,4 @@
-"""`symfric export-fmu`: export a scene or a model of a Python file as Functional Mock-up Unit."""
+"""`symfric export-fmu`: export a scene or a model in a Python file as Functional Mock-up Unit."""
 
 from pathlib import Path
 from typing import Any
@@ -33,8 +33,8 @@ def export_fmu(
 ) -> None:
     """Write a scene or a model as a Functional Mock-up Unit.
 
-    The FMU contains sources and the binary of this platform and needs neither Python nor CasADi. It
-    takes the steps of `symfric run`, for any communication step.
+    The FMU contains sources and the binary for this platform, and needs neither Python nor CasADi.
+    It takes the same steps as `symfric run`, for any communication step.
 
     Example: symfric export-fmu drive --law lugre --fmi 2 --out drive.fmu
 

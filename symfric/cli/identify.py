@@ -43,14 +43,14 @@ def reader(
     step: float | None = None,
     variable: str | None = None,
 ) -> Callable[[list[str]], Dataset]:
-    """Return a function that reads files as --column, --unit, --kind and the like say.
+    """Return a function that reads files according to --column, --unit, --kind and other options.
 
-    --column and --unit are SIGNAL=NAME, repeated, or all columns in their order. Points are a time
-    series if a column t or a step is given. With `resample` records have equal intervals, and are
+    --column and --unit are SIGNAL=NAME, repeated, or list all columns in order. Points are a time
+    series if a column t or a step is given. With `resample`, records have equal intervals and are
     split at gaps.
 
     Raises:
-        ValueError: both forms mixed, or a name without a value.
+        ValueError: a mixture of both forms, or a name without a value.
     """
     named = _named_or_all("--column", columns, "x=pos", "t,x,-,force")
     each = _named_or_all("--unit", units, "x=mm", '"rad, N m"')
@@ -83,7 +83,7 @@ def _named_or_all(
 def residuals_of(name: str, windows: str | None, free: dict[str, Any]) -> Any:
     """Return the type of residuals; `windows` is a length [s] or "choose", for shooting only.
 
-    For points, `offset` in `free` is removed from it and adds a constant force to friction.
+    For points, `offset` is removed from `free` and adds a constant force to friction.
     """
     check_names("--kind", [name], KINDS)
     if windows is not None and name != "shooting":
@@ -100,7 +100,7 @@ def residuals_of(name: str, windows: str | None, free: dict[str, Any]) -> Any:
 
 
 def free_in(texts: Iterable[str] | None) -> dict[str, Any]:
-    """Return the fitted parameters with their specifications, see `free_one`."""
+    """Return the parameters to fit with their specifications, see `free_one`."""
     found: dict[str, Any] = {}
     for text in texts or ():
         name, equals, how = (part.strip() for part in text.partition("="))
@@ -111,11 +111,11 @@ def free_in(texts: Iterable[str] | None) -> dict[str, Any]:
 
 
 def free_one(name: str, how: str) -> Any:
-    """Convert one entry of --free to an entry of `free` in Python.
+    """Return one entry of --free as the corresponding entry of `free` in Python.
 
     `1.5` is a start value; `0:2` are bounds, either of which may be omitted; `log(1e3, 1e7)`,
-    `linear(0, 2, 1)`, `above(mu_d)` and `tied(mu_d, 1.2)` are the functions of `identification`.
-    `x0` and `dead_time` accept the values of `Shooting`.
+    `linear(0, 2, 1)`, `above(mu_d)` and `tied(mu_d, 1.2)` call functions of `identification`.
+    `x0` and `dead_time` accept the values that `Shooting` accepts.
     """
     number = partial(checks.parsed, f"--free {name}")
     called = fullmatch(r"(\w+)\((.*)\)", how)
@@ -162,8 +162,9 @@ def identify(
 ) -> None:
     """Fit friction laws to measured data and assess the result.
 
-    Prints the assessment of the residuals, parameters with 95 % intervals, and parameters that the
-    data do not identify. The exit status is 1 if data or residuals make the result meaningless.
+    The command prints the assessment of the residuals, parameters with 95 % intervals, and
+    parameters that the data do not identify. The exit status is 1 if the data or the residuals make
+    the result meaningless.
 
     Example: symfric identify run*.csv --law stribeck,lugre --validate v.csv --html out.html
     """
@@ -211,7 +212,7 @@ def identify(
 def judged(
     fit: Fitted, other: Dataset | None, names: Sequence[str]
 ) -> tuple[Fitted, list[Profile], list[str]]:
-    """Return the fit with its errors on other data, profiles, and reasons why these failed."""
+    """Return the fit with its errors on other data, the profiles, and the reasons of failures."""
     failed: list[str] = []
     profiles: list[Profile] = []
     if other is not None:
@@ -230,7 +231,7 @@ def judged(
 
 
 def show(fit: Fitted, profiles: Sequence[Profile], ranking: Ranking | None) -> None:
-    """Print the ranking, the fit of the best law, and profiles."""
+    """Print the ranking, the fit of the best law, and the profiles."""
     if ranking is not None:
         typer.echo(f"{ranking}\n")
     typer.echo(str(fit))

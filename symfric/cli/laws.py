@@ -33,9 +33,10 @@ def laws(
 ) -> None:
     """List the friction laws, or show one in full.
 
-    In full: equation, limits, source, parameters with units and bounds, and a picture. --figure
-    and --compare show its behaviour instead, computed as in the papers; --figure also accepts
-    scenes such as rabinowicz. --set then applies to every law, and --set gms.C=10 to one of them.
+    A law in full has its equation, limits, source, parameters with units and bounds, and a picture.
+    --figure and --compare show the behaviour of laws instead, computed as in the papers; --figure
+    also accepts scenes such as rabinowicz. --set then applies to every law, and --set gms.C=10 to
+    the law gms only.
 
     Example: symfric laws gms --figure hysteresis --compare lugre --plot loops.png
     """
@@ -75,7 +76,7 @@ def laws_with(texts: Sequence[str], settings: Strings) -> list[AnyLaw]:
     `LAW.NAME=VALUE` sets the parameter of one law only.
 
     Raises:
-        ValueError: a name that one of them does not have.
+        ValueError: a name that one of the laws does not have.
     """
     made = {text: any_from_text(text) for text in texts}
     chosen: dict[str, dict[str, str]] = {text: {} for text in texts}
@@ -97,7 +98,7 @@ def laws_with(texts: Sequence[str], settings: Strings) -> list[AnyLaw]:
 
 
 def show_figure(data: FigureData) -> None:
-    """Print the range of every column that is drawn, for each curve."""
+    """Print the range of each column in the plot, for each curve."""
     drawn = list(dict.fromkeys(column for panel in data.panels for column in panel))
     rows = [
         (curve.label, name, data.units[name], float(curve[name].min()), float(curve[name].max()))
@@ -135,7 +136,7 @@ def to_dict(law: AnyLaw) -> dict[str, Any]:
 
 
 def costs(law: AnyLaw) -> str:
-    """Return the quantity whose cost in instructions is reported."""
+    """Return the name of the quantity whose cost in instructions is reported."""
     return "a step of one contact" if isinstance(law, Population) else "force and rate"
 
 
@@ -166,7 +167,7 @@ def show_list(chosen: dict[str, AnyLaw]) -> None:
 
 
 def show_law(name: str, law: AnyLaw) -> None:
-    """Print docstring, properties and parameters of one law."""
+    """Print the docstring, the properties and the parameters of one law."""
     for part in parts(law):
         output.show_doc(getdoc(part) or "")
     output.show(

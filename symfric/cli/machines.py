@@ -1,4 +1,4 @@
-"""Scenes from command line options: laws, preset, parameters, inputs and start values."""
+"""Scenes according to command line options: laws, preset, parameters, inputs, start values."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -31,7 +31,7 @@ def kind_of(
         law_of: texts of --law-of.
 
     Raises:
-        ValueError: unknown scene, preset, place or law.
+        ValueError: an unknown scene, preset, place or law.
     """
     others = {place: law_from_text(text) for place, text in assignments("--law-of", law_of).items()}
     if scene.endswith(".urdf"):
@@ -64,13 +64,13 @@ def scenes_with(
     Args:
         scene: name, or FILE.urdf.
         laws: texts of --law.
-        settings: texts of --set: parameters of scene and laws, forms of laws, structure of the
-            scene; they override a preset.
+        settings: texts of --set: parameters of the scene and the laws, forms of the laws, and
+            structure of the scene; they override a preset.
         preset: value of --preset.
         law_of: texts of --law-of.
 
     Raises:
-        ValueError: unknown law, a parameter that none of the scenes has; see also `kind_of`.
+        ValueError: an unknown law, or a parameter that none of the scenes has; see also `kind_of`.
     """
     kind, texts = kind_of(scene, preset=preset, law_of=law_of), assignments("--set", settings)
     machines = {law: formed(kind(law_from_text(law)), texts) for law in laws}
@@ -89,7 +89,7 @@ def formed(machine: Scene, texts: Mapping[str, str]) -> Scene:
     """Return the scene with the forms and the structure in `texts`.
 
     Raises:
-        ValueError: a text that is not one of the choices, a count, or true or false.
+        ValueError: a text that is neither one of the choices nor a count, true or false.
     """
     law = {n: text for n, text in texts.items() if n in options(machine.law)}
     if law:
@@ -102,7 +102,7 @@ def formed(machine: Scene, texts: Mapping[str, str]) -> Scene:
 
 
 def _structure(where: str, text: str, like: bool | int) -> bool | int:
-    """Convert a text to the type of `like`."""
+    """Return a text converted to the type of `like`."""
     if isinstance(like, bool):
         return checks.choice(where, text, ("true", "false")) == "true"
     number = checks.parsed(where, text)
@@ -110,7 +110,7 @@ def _structure(where: str, text: str, like: bool | int) -> bool | int:
 
 
 def forms(machine: Scene) -> list[str]:
-    """Return the names of a scene that --set accepts besides parameters."""
+    """Return the names of a scene that --set accepts in addition to parameters."""
     return [*options(machine.law), *options(machine), *machine.structures()]
 
 
@@ -119,7 +119,7 @@ class Driven(NamedTuple):
 
     Attributes:
         signals: inputs by name.
-        texts: inputs as written on the command line.
+        texts: inputs as texts, in the form of the command line.
         start: state -> value.
         until: end time [s].
     """
@@ -137,14 +137,15 @@ def driven(
     x0: Sequence[str] | None = None,
     t_end: float | None = None,
 ) -> Driven:
-    """Convert the texts of --input, --x0 and --t-end for a scene.
+    """Return inputs, start values and end time for the texts of --input, --x0 and --t-end.
 
     Inputs that are not given are those of the scene. The default end time is that of the samples,
-    or that of the scene. Samples of a state whose rate is an input (`Scene.integrals`) determine
-    that input and the start value of the state.
+    or otherwise that of the scene. Samples of a state whose rate is an input (`Scene.integrals`)
+    determine this input and the start value of the state.
 
     Raises:
-        ValueError: unknown names, an input together with its integral; see also `input_from_text`.
+        ValueError: unknown names, or an input together with its integral; see also
+            `input_from_text`.
     """
     given, units = assignments("--input", texts), {v.name: v.unit for v in model.u}
     rates = {state: rate for state, rate in scene.integrals.items() if rate in units}
@@ -171,10 +172,10 @@ def driven(
 
 
 def input_from_text(name: str, text: str, unit: str) -> Linear | float:
-    """Return the input `2.0`, or `FILE.csv:COLUMN` interpolated linearly over its column t.
+    """Return the input `2.0`, or `FILE.csv:COLUMN` interpolated linearly over the column t.
 
-    Units in the header are converted to SI, as in `symfric identify`; columns without a unit are in
-    SI.
+    Units in the header are converted to SI, as in `symfric identify`; columns without a unit have
+    SI units.
 
     Args:
         name: name of the input.

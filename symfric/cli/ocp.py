@@ -1,4 +1,4 @@
-"""`symfric ocp`: solve a ready optimal control problem, or one in a Python file."""
+"""`symfric ocp`: solve a predefined optimal control problem, or a problem in a Python file."""
 
 from functools import partial
 from pathlib import Path
@@ -36,8 +36,8 @@ def ocp(
 ) -> None:
     """Solve an optimal control problem and check it.
 
-    Without a name, list the ready problems. --set accepts their parameters, and those of a function
-    in a file.
+    Without a name, the command lists the ready problems. --set accepts the parameters of a ready
+    problem, or of a function in a file.
 
     Example: symfric ocp out_and_back --plot move.png
 
@@ -91,7 +91,7 @@ def scheme_of(text: str) -> Scheme:
     """Return the transcription scheme of `--scheme`.
 
     Raises:
-        ValueError: not of the form radau3, legendre4 or shooting:METHOD:STEPS.
+        ValueError: a text that does not have the form radau3, legendre4 or shooting:METHOD:STEPS.
     """
     for kind, scheme in {"radau": Radau, "legendre": Legendre}.items():
         degree = text.removeprefix(kind)

@@ -1,4 +1,4 @@
-"""Texts of options: assignments, laws with settings, output files, and Python files of the user."""
+"""Conversion of options: assignments, laws with settings, output files, Python files of users."""
 
 import runpy
 import traceback
@@ -45,7 +45,7 @@ def numbers(option: str, texts: dict[str, str] | Iterable[str] | None) -> dict[s
 
 
 def law_names(texts: Sequence[str]) -> list[str]:
-    """Return the laws of --law, which may be repeated or hold several names with commas.
+    """Return the laws of --law, which may be repeated or list several names with commas.
 
     Raises:
         ValueError: an empty, repeated or unknown name.
@@ -69,7 +69,7 @@ def with_settings(law: L, text: str, settings: dict[str, str]) -> L:
 
 
 def check_outputs(*paths: str | Path | None, picture: Path | None = None) -> None:
-    """Check before the work starts that output files can be written.
+    """Check that output files can be written, before the computation starts.
 
     Raises:
         ValueError: a folder instead of a file, a missing permission, or an unknown picture format.
@@ -85,7 +85,7 @@ def check_outputs(*paths: str | Path | None, picture: Path | None = None) -> Non
 
 
 def called_with(text: str, make: Callable[..., Any], values: dict[str, float]) -> Any:
-    """Call a function with the numbers of --set."""
+    """Return the result of a function called with the numbers of --set."""
     check_names(f"--set of {text}", values, list(signature(make).parameters))
     return make(**values)
 
@@ -93,19 +93,19 @@ def called_with(text: str, make: Callable[..., Any], values: dict[str, float]) -
 def held_by_file(
     command: str, text: str, default: str, values: dict[str, float], wanted: str, kind: Any
 ) -> Any:
-    """Return the object in FILE.py[:NAME], or the result of that function with --set as arguments.
+    """Return the object FILE.py[:NAME]; if it is a function, its result with --set as arguments.
 
     Args:
         command: name of the command for messages.
         text: FILE.py or FILE.py:NAME.
-        default: name if none is given.
+        default: name of the object if `text` names none.
         values: numbers of --set.
-        wanted: expected type in words.
+        wanted: name of the expected type in messages.
         kind: expected types.
 
     Raises:
-        ValueError: no such file or name, an error in the file, unknown names in --set, or an object
-            of another type.
+        ValueError: a missing file or name, an error in the file, unknown names in --set, or an
+            object of another type.
     """
     name, found = named_in_file(command, text, default, lambda value: isinstance(value, kind))
     if callable(found):
@@ -121,11 +121,11 @@ def held_by_file(
 def named_in_file(
     command: str, text: str, default: str, fits: Callable[[Any], bool]
 ) -> tuple[str, Any]:
-    """Return the name in FILE.py[:NAME] and its object; errors of a function name their line.
+    """Return the name in FILE.py[:NAME] and its object; errors of a function state the line.
 
     Raises:
-        ValueError: no such file, an error in the file, or no such name; lists names of objects that
-            fit, and of public functions and classes of the file.
+        ValueError: a missing file, an error in the file, or a missing name; the message lists
+            suitable objects and the public functions and classes of the file.
     """
     path, _, name = text.partition(".py")
     file, name = Path(f"{path}.py"), name.removeprefix(":") or default
@@ -153,7 +153,7 @@ def named_in_file(
 
 @contextmanager
 def errors_with_line(command: str, file: Path, *plain: type[Exception]) -> Generator[None]:
-    """Raise errors of a user's file, except those of the types `plain`, with their line in it."""
+    """Add the line number to errors of a user's file, except those of the types `plain`."""
     try:
         yield
     except plain:

@@ -1,4 +1,4 @@
-"""Output of the commands: tables and notes for readers, JSON for programs."""
+"""Output of the commands: tables and notes for users, JSON for programs."""
 
 import json
 import math
@@ -20,13 +20,13 @@ from symfric.foundation.files import write_text
 EXACT = 12
 """Significant digits of numbers that a user may enter again."""
 UNLIMITED = 100_000
-"""Width of tables in files and pipes [columns]: cells are never wrapped there."""
+"""Width of tables in files and pipes [columns], where cells are never wrapped."""
 GAP = 3
 """Blanks between the columns of a table."""
 
 
 def number(value: float, digits: int = 6) -> str:
-    """Return a number rounded to significant digits; a dash if it is not finite."""
+    """Return a number rounded to significant digits, or a dash if it is not finite."""
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
@@ -64,16 +64,16 @@ def show_table(
 def show_part(
     columns: Sequence[str], rows: Sequence[Sequence[str | float]], digits: int = 6
 ) -> None:
-    """Print a table and an empty line; nothing if there are no rows."""
+    """Print a table and an empty line, unless there are no rows."""
     if rows:
         show_table(columns, rows, digits=digits)
         show()
 
 
 def column_widths(rows: Sequence[Sequence[str]], total: int) -> list[int]:
-    """Return the widths of the columns of `rows`, of the `total` width of a table if possible.
+    """Return the widths of the columns of `rows` in a table of `total` width, if possible.
 
-    Every column is at least as wide as its longest word; columns share the remaining width.
+    Every column is at least as wide as its longest word; the columns share the remaining width.
     """
     cells = list(zip(*rows, strict=True))
     widths = [max((len(w) for text in column for w in text.split()), default=0) for column in cells]
@@ -92,7 +92,7 @@ def show(text: str = "") -> None:
 
 
 def show_doc(text: str) -> None:
-    """Print a docstring: equations unchanged, paragraphs wrapped again."""
+    """Print a docstring with equations unchanged and paragraphs wrapped at the terminal width."""
     paragraph: list[str] = []
     for line in [*text.splitlines(), ""]:
         kept = not line or line.startswith(" ")
@@ -140,7 +140,7 @@ def finish(
     show: Callable[[], None],
     *paths: str | Path | None,
 ) -> None:
-    """Write JSON, call `show` unless it went to standard output, and name the files written."""
+    """Write JSON, call `show` unless JSON goes to standard output, and print the file names."""
     emit_json(content, json)
     if json != "-":
         show()
@@ -148,7 +148,7 @@ def finish(
 
 
 def say_written(*paths: str | Path | None) -> None:
-    """Print the names of the files written on standard error."""
+    """Print the names of written files on standard error."""
     names = [str(path) for path in paths if path is not None and str(path) != "-"]
     if names:
         note(f"wrote {', '.join(names)}")

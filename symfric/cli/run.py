@@ -133,7 +133,7 @@ def report(
             throw=False, progress=tell,
         ),
     )  # fmt: skip
-    # in the C locale, Python keeps bytes that it cannot decode as lone surrogates
+    # in the C locale, Python represents bytes that it cannot decode as lone surrogates
     command = os.fsencode(shlex.join(["symfric", *sys.argv[1:]])).decode(errors="replace")
     values = {name: parameters(machine) for name, machine in machines.items()}
     write_report(found, html, settings=values, command=command)
@@ -145,7 +145,7 @@ def prepared(
     scene: str, laws: list[str], settings: Strings, preset: str | None, law_of: Strings,
     inputs: Strings, x0: Strings, t_end: float | None,
 ) -> tuple[dict[str, Scene], dict[str, Model], Driven]:  # fmt: skip
-    """Return scene and model with each law, and inputs, start values and end of the runs."""
+    """Return scene and model for each law, and inputs, start values and end time of the runs."""
     machines = scenes_with(scene, laws, settings, preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
     return machines, models, driven(machines[laws[0]], models[laws[0]], inputs, x0, t_end)
@@ -156,7 +156,7 @@ def simulated(
     models: Mapping[str, Model],
     integrate: Callable[[Model, Callable[[float], None]], Trajectory],
 ) -> dict[str, Trajectory]:
-    """Simulate the models of a scene, by name of the law; `integrate` reports its progress."""
+    """Return the runs of the models of a scene, by name of the law; show their progress."""
     found: dict[str, Trajectory] = {}
     for name, model in models.items():
         with output.progress(f"{scene} with {name}") as tell:
@@ -168,7 +168,7 @@ def refuse_failed(runs: Iterable[Trajectory]) -> None:
     """Raise an error for the first run that did not reach its end.
 
     Raises:
-        SolveError: message and partial result of that run.
+        SolveError: a run failed; the error has its message and its partial result.
     """
     for run in runs:
         if not run.status.ok:
@@ -176,7 +176,7 @@ def refuse_failed(runs: Iterable[Trajectory]) -> None:
 
 
 def check_movie(path: Path | None, scene: str, model: Model) -> None:
-    """Check before the work starts that an animation can be written.
+    """Check that an animation can be written, before the computation starts.
 
     Raises:
         ValueError: a scene without geometry, or an unknown file format.
@@ -213,18 +213,18 @@ def to_dict(law: str, scene: Scene, trajectory: Trajectory) -> dict[str, Any]:
 
 
 def largest_norms(trajectory: Trajectory) -> dict[str, float]:
-    """Return the largest violation of the constraints on each level."""
+    """Return the largest violation of the constraints, by name of their norm."""
     return {name: float(trajectory[name].max()) for name in norms(trajectory.model)}
 
 
 TABLE = ("position", "rate", "normal force", "friction", "energy")
-"""Types of signals that the table of a mechanism shows; --csv and --json contain all."""
+"""Kinds of signals in the table of a mechanism; --csv and --json contain all signals."""
 
 
 def show_runs(found: Mapping[str, Trajectory], machines: Mapping[str, Scene]) -> None:
-    """Print the runs, and warnings about changed parameters of their laws.
+    """Print the runs, and the warnings of laws whose parameters differ from the defaults.
 
-    `symfric laws` warns of defaults.
+    `symfric laws` prints the warnings about default values.
     """
     for name, trajectory in found.items():
         show_trajectory(name, trajectory)
@@ -239,7 +239,7 @@ def show_runs(found: Mapping[str, Trajectory], machines: Mapping[str, Scene]) ->
 def show_trajectory(law: str, trajectory: Trajectory) -> None:
     """Print the range of every signal, the status and the cost of a simulation.
 
-    For mechanisms the table is limited to the main signals, followed by constraints and energy.
+    For mechanisms, the table contains only the main signals; constraints and energy follow it.
     """
     s, names = trajectory.statistics, list(trajectory.units)
     mechanism = is_mechanism(trajectory.model)

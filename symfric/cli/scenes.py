@@ -18,7 +18,7 @@ from symfric.model import Model
 from symfric.scenes import ALL_SCENES, Scene
 
 LAW = "brown_mcphee"
-"""Default law, which runs in every scene."""
+"""Default law, which is suitable for every scene."""
 
 
 def scenes(
@@ -32,8 +32,8 @@ def scenes(
 ) -> None:
     """List the scenes, or show one in full.
 
-    In full: equations, limits, source, inputs with defaults, parameters with units and bounds,
-    results, places that accept a law of their own, presets of papers, and a picture of a run.
+    A scene in full has equations, limits, source, inputs with defaults, parameters with units and
+    bounds, results, contacts that accept a separate law, presets of papers, and a picture of a run.
 
     Example: symfric scenes drive
 
@@ -82,7 +82,7 @@ def summary(name: str, machine: Scene) -> dict[str, Any]:
 
 
 def title(machine: Scene) -> str:
-    """Return the first sentence of the docstring."""
+    """Return the first sentence of the docstring of a scene."""
     return " ".join((getdoc(type(machine)) or "").partition("\n\n")[0].split()).removesuffix(".")
 
 
@@ -127,7 +127,7 @@ def _variable(v: Variable) -> dict[str, Any]:
 
 
 def _forms(machine: Scene) -> dict[str, dict[str, str]]:
-    """Return the names of the scene that `--set` accepts besides parameters."""
+    """Return the names of the scene that `--set` accepts in addition to parameters."""
     found = {
         o.name: {"value": o.value, "choices": ", ".join(o.choices), "doc": o.doc}
         for o in options(machine).values()
@@ -177,7 +177,7 @@ TABLES = {
 
 
 def show_scene(found: dict[str, Any]) -> None:
-    """Print docstring and tables of one scene."""
+    """Print the docstring and the tables of one scene."""
     output.show_doc(found["doc"])
     output.show(f"Default end time: {found['t_end']:g} s.")
     if found["python"]:
@@ -197,7 +197,7 @@ def show_scene(found: dict[str, Any]) -> None:
 
 
 def _cell(entry: dict[str, Any], key: str) -> Any:
-    """Return an entry of a table; start values as texts."""
+    """Return a cell of a table; start values are texts."""
     value = entry.get("given", entry[key]) if key == "start" else entry[key]
     if key != "start" or isinstance(value, str):
         return value

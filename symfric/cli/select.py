@@ -33,7 +33,7 @@ from symfric.laws import ALL_LAWS
 from symfric.scenes import Scene
 
 OFTEN = 10.0
-"""Seconds between progress lines if standard error is not a terminal."""
+"""Interval between progress lines if standard error is not a terminal [s]."""
 OF_FRICTION = ("mu_s", "mu_d", "v_s")
 
 
@@ -66,12 +66,12 @@ def select(
 ) -> None:
     """Rank friction laws on a machine and recommend one.
 
-    With --data, candidates with the required phenomena are fitted first, and those are ranked that
-    fit as well as the best. Without data, every law describes the same friction (--set mu_s=0.2
-    --set mu_d=0.15, and v_s if known) and is smoothed as far as --accuracy allows. --set also
-    accepts parameters of the scene, and --set lugre.sigma_1=2 sets a parameter of one law. If a law
-    has an exact form with events, this form is tried first unless --set gms.form=smooth (or
-    form=smooth, for all laws) chooses one. Ctrl-C returns the results so far.
+    With --data, the candidates with the required phenomena are fitted first, and only laws that fit
+    as well as the best one are ranked. Without data, every law describes the same friction (--set
+    mu_s=0.2 --set mu_d=0.15, and v_s if known) and is smoothed as far as --accuracy allows. --set
+    also accepts parameters of the scene, and --set lugre.sigma_1=2 sets a parameter of one law. If
+    a law has an exact form with events, this form is tried first, unless --set gms.form=smooth
+    selects the form (or form=smooth for all laws). Ctrl-C returns the results so far.
 
     Example: symfric select rabinowicz --need stiction,stribeck --accuracy 1e-4 --html choice.html
 
@@ -123,7 +123,7 @@ def select(
 
 @contextmanager
 def stoppable() -> Generator[None]:
-    """Treat SIGTERM, as sent by `timeout`, as Ctrl-C, which returns the results so far."""
+    """Treat SIGTERM, which `timeout` sends, as Ctrl-C, which returns the results so far."""
 
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
@@ -137,7 +137,7 @@ def stoppable() -> Generator[None]:
 
 @contextmanager
 def reported(text: str) -> Generator[Callable[[str, float], None]]:
-    """Report progress by a bar on a terminal, else by lines on standard error."""
+    """Report progress with a bar on a terminal, otherwise with lines on standard error."""
     last = began = perf_counter()
     with output.progress(text) as tell:
 
@@ -152,10 +152,12 @@ def reported(text: str) -> Generator[Callable[[str, float], None]]:
 
 
 def _candidates(names: list[str], given: dict[str, str]) -> tuple[dict[str, Law], set[str]]:
-    """Return the laws with their settings, taken out of `given`, and names with a form in --set.
+    """Return the laws with their settings, and the names of laws whose form is set.
+
+    The settings of laws are removed from `given`.
 
     Raises:
-        ValueError: an option value that no law has; unknown laws or parameters.
+        ValueError: an option value that no law has, or unknown laws or parameters.
     """
     laws, chosen = {text: law_from_text(text) for text in names}, set[str]()
     choices: dict[str, dict[str, tuple[str, ...]]] = {}
@@ -179,7 +181,7 @@ def _candidates(names: list[str], given: dict[str, str]) -> tuple[dict[str, Law]
 
 
 def _function_of_file(text: str, values: dict[str, float]) -> Callable[..., Any]:
-    """Return the callable in FILE.py[:NAME], with the numbers of --set as keyword arguments."""
+    """Return the callable FILE.py[:NAME], with the numbers of --set as keyword arguments."""
     _, found = opt.named_in_file("select", text, "machine", callable)
     if not callable(found):
         raise checks.refused(f"select '{text}'", "a function law -> Model, or a scene", found)
@@ -189,7 +191,7 @@ def _function_of_file(text: str, values: dict[str, float]) -> Callable[..., Any]
 
 
 def _with(kind: Callable[[Law], Scene], scene: str, texts: dict[str, str]) -> Any:
-    """Return the scene with its own settings of --set: parameters, forms, structure."""
+    """Return the scene with its settings in --set: parameters, forms and structure."""
     if not texts:
         return kind
     one = kind(law_from_text("coulomb"))
@@ -215,7 +217,7 @@ def fitted(
     Laws that cannot be fitted are reported on standard error.
 
     Raises:
-        ValueError: no law can be fitted.
+        ValueError: none of the laws can be fitted.
     """
     from identification.select import select as rank_fits  # noqa: PLC0415  (only with data)
 
@@ -235,7 +237,7 @@ def fitted(
 
 
 def _paper(scene: str, json: str | None, others: bool) -> None:
-    """Print the tables of the paper and those of symfric.
+    """Print the tables of the paper and the corresponding tables of symfric.
 
     Raises:
         ValueError: a scene that is not in the paper, or other options.

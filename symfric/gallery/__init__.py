@@ -1,6 +1,6 @@
-"""The figures of the source papers, a function each, with what is compared and how far we are.
+"""Figures of the source papers, one function each, with comparisons and distances.
 
-What users do with the packages, from data or equations to a result, is in the folder `examples`.
+The folder `examples` shows the use of the packages, from data or equations to a result.
 
 from symfric.gallery import plates
 

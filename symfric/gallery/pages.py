@@ -1,4 +1,4 @@
-"""The index page of a gallery, next to its pictures."""
+"""Index page of a gallery, in the folder of its pictures."""
 
 from collections.abc import Mapping, Sequence
 from html import escape
@@ -14,7 +14,7 @@ REDUCED = (
 
 
 def index_page(records: Sequence[Mapping[str, Any]]) -> str:
-    """One page of HTML with the figures `records` by paper; its pictures are in the same folder."""
+    """Return an HTML page of the figures `records` by paper; pictures are in the same folder."""
     papers: dict[str, list[Mapping[str, Any]]] = {}
     for record in records:
         papers.setdefault(record["paper"], []).append(record)
@@ -34,7 +34,7 @@ def index_page(records: Sequence[Mapping[str, Any]]) -> str:
 
 
 def figure_block(record: Mapping[str, Any]) -> str:
-    """One plate: heading, picture, what is said about it, its numbers."""
+    """Return the HTML of one plate: heading, picture, texts and numbers."""
     said = {
         "compared": record["compared"],
         "how far": f"{record['how_far']}: {record['measure']}",
@@ -52,12 +52,12 @@ def figure_block(record: Mapping[str, Any]) -> str:
 
 
 def written(text: str) -> str:
-    """Text of a docstring as HTML, names between backquotes as code."""
+    """Return the text of a docstring as HTML, with names between backquotes as code."""
     return sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
 def anchor(record: Mapping[str, Any]) -> str:
-    """Anchor of a plate on the page."""
+    """Return the anchor of a plate on the page."""
     return str(record["name"]).replace("/", "-").replace("_", "-")
 
 

@@ -1,4 +1,4 @@
-"""A plate: one figure of a paper, recomputed, with its distance from the paper."""
+"""Plates: recomputed figures of papers, with their distances from the papers."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -21,11 +21,11 @@ VERDICTS = {
     "Refuted": "explanation refuted",
     "Undecided": "not decidable from the text",
 }
-"""Section of a docstring -> kind of verdict on the paper; a figure has at least one."""
+"""Section of a docstring -> kind of verdict on the paper; a figure has at least one verdict."""
 SECTIONS = ("Compared", "Distance", *VERDICTS)
 """Sections of the docstring of a figure."""
 SCRIPT = re.compile(r"fig_(\d+)(?:_(\d+))?_\w+")
-"""Name of the function that computes a figure."""
+"""Pattern of the name of a function that computes a figure."""
 
 Drawn = tuple[Figure, float, Mapping[str, float], Mapping[str, Any]]
 """Picture, distance, numbers and claims, see `plate_of`."""
@@ -34,9 +34,9 @@ Drawn = tuple[Figure, float, Mapping[str, float], Mapping[str, Any]]
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Plate(Showing):
-    """One figure of a paper, recomputed.
+    """Recomputed figure of a paper.
 
-    The texts are those of the docstrings of its function and of its folder.
+    The texts are from the docstrings of its function and of its folder.
 
     Attributes:
         paper: authors and title.
@@ -47,13 +47,13 @@ class Plate(Showing):
         compared: compared quantities.
         measure: definition of `distance`.
         verdicts: kind of `VERDICTS` -> statements of this kind with their evidence; empty at
-            reduced size, as verdicts rest on the full one.
+            reduced size, since verdicts require the full size.
         distance: distance from the paper or the reference, in `unit`; at most `within`.
-        unit: SI, "1" for a ratio.
+        unit: SI unit, "1" for a ratio.
         within: largest distance of a figure that counts as recomputed.
         picture: figure created without pyplot.
         numbers: name with unit, such as "period [s]" -> value; the evidence of the verdicts.
-        checked: statements that were checked on these numbers and hold.
+        checked: statements that have been checked with these numbers and hold.
         quick: True at reduced size.
     """
 
@@ -75,12 +75,12 @@ class Plate(Showing):
 
     @property
     def how_far(self) -> str:
-        """The distance with its unit and its bound."""
+        """Distance with its unit and its bound."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"{self.distance:.2g}{unit} (at most {self.within:.2g}{unit})"
 
     def shown(self) -> Shown:
-        """Return figure, compared quantities, distance, and numbers."""
+        """Return the figure, compared quantities, distance, and numbers."""
         rows = tuple((name, f"{value:.6g}") for name, value in self.numbers.items())
         texts = (
             self.paper,
@@ -98,7 +98,7 @@ class Plate(Showing):
         return self.picture
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything but the picture as plain data."""
+        """Return all fields except the picture as plain data."""
         fields = {n: v for n, v in vars(self).items() if n != "picture"}
         return fields | {"how_far": self.how_far, "checked": [*self.checked]}
 
@@ -106,12 +106,13 @@ class Plate(Showing):
 def plate(
     unit: str, within: float | tuple[float, float], like: object = None
 ) -> Callable[[Callable[[bool], Drawn]], Callable[..., Plate]]:
-    """Decorate a function `fig_07_what_it_shows(quick)` that draws a figure: it returns a `Plate`.
+    """Return a decorator that makes a function `fig_07_what_it_shows(quick)` return a `Plate`.
 
     Args:
         unit: unit of the distance; "1" for a ratio.
         within: see `plate_of`; a pair for reduced and full size.
-        like: function with a docstring that several figures share; each section continues it.
+        like: function with a docstring that several figures share; the sections of a figure are
+            appended to those of `like`.
     """
     bounds = within if isinstance(within, tuple) else (within, within)
 
@@ -144,20 +145,20 @@ def plate_of(
     """Return the plate of a function, with the texts of its docstring.
 
     Args:
-        function: function that draws it; its folder names the paper.
+        function: function that draws the figure; its folder names the paper.
         picture: figure.
         distance: distance from the paper or the reference.
         numbers: evidence of the verdicts, by names with units.
-        claims: statement -> True if it holds for the numbers. At reduced size these are the only
-            statements; a plate with an untrue text raises an error.
+        claims: statement -> True if it holds for the numbers. At reduced size the plate has no
+            other statements.
         unit: unit of the distance; "1" for a ratio.
         within: largest distance of a figure that counts as recomputed; for the error of two
-            integrations four times that of one machine, as steps depend on rounding.
+            integrations, four times that on one machine, since steps depend on rounding.
         quick: True at reduced size.
 
     Raises:
         ValueError: a missing section of the docstring, numbers without a unit or not finite, a
-            distance above its bound, an untrue claim.
+            distance above its bound, or an untrue claim.
     """
     folder, name = function.__module__.rpartition(".")[0], function.__name__
     where = f"gallery '{folder.rpartition('.')[2]}/{name}'"
@@ -199,7 +200,7 @@ def plate_of(
 
 
 def sections(doc: str | None) -> dict[str, str]:
-    """Split a docstring into "title" (its first line), "text", and each of SECTIONS."""
+    """Return the parts of a docstring: "title" (first line), "text", and each of `SECTIONS`."""
     title, _, rest = cleandoc(doc or "").partition("\n")
     found = {"title": title.rstrip("."), "text": ""}
     at = "text"
@@ -211,7 +212,7 @@ def sections(doc: str | None) -> dict[str, str]:
 
 
 def figure_of(name: str) -> str:
-    """Return the figure of a function: fig_07_... is Figure 7, fig_3_2_... Figure 3.2."""
+    """Return the number of a figure: fig_07_... is Figure 7, fig_3_2_... is Figure 3.2."""
     match = SCRIPT.fullmatch(name)
     if match is None:
         raise ValueError(f"gallery: expected a function fig_07_what_it_shows, got {name}")
@@ -219,14 +220,14 @@ def figure_of(name: str) -> str:
 
 
 def about_paper(folder: str) -> dict[str, str]:
-    """Return "paper", the first paragraph of the docstring of a folder, and "note", the rest."""
+    """Return the first paragraph of the docstring of a folder, "paper", and the rest, "note"."""
     paper, _, note = cleandoc(import_module(folder).__doc__ or "").partition("\n\n")
     return {"paper": " ".join(paper.split()).rstrip("."), "note": " ".join(note.split())}
 
 
 @cache
 def scripts() -> dict[str, str]:
-    """Return the module of each figure by its name, such as self_tuning/fig_07_shape_factor."""
+    """Return name -> module of every figure; a name is, e.g., self_tuning/fig_07_shape_factor."""
     found = {
         f"{path.parent.name}/{name}": f"symfric.gallery.{path.parent.name}.{path.stem}"
         for path in Path(__file__).parent.glob("*/*.py")
@@ -243,23 +244,23 @@ def script(name: str) -> Callable[..., Plate]:
 def plates() -> dict[str, Callable[..., Plate]]:
     """Return every figure of the gallery: name -> function (quick=False) that computes it.
 
-    With `quick` it takes about a second: shorter, coarser, or with fewer laws.
+    With `quick`, a function takes about a second: runs are shorter or coarser, or have fewer laws.
     """
     return {name: script(name) for name in scripts()}
 
 
 def short(name: str) -> str:
-    """Return a name without the content of the figure, such as self_tuning/fig_07."""
+    """Return a name without the description of the figure, such as self_tuning/fig_07."""
     return re.sub(r"(fig_\d+(?:_\d+(?=_))?)_.*", r"\1", name)
 
 
 def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
     """Return the figures that begin with one of `names`, in the order of the gallery; () is all.
 
-    A figure without its paper, such as fig_07 or fig_7, selects that of every paper.
+    A figure without its paper, such as fig_07 or fig_7, selects this figure of every paper.
 
     Raises:
-        ValueError: a name that begins no figure.
+        ValueError: a name with which no figure begins.
     """
     known, names = [*scripts()], tuple(name.rstrip("/") for name in names)
     found = {name: [one for one in known if begins(one, name)] for name in names}
@@ -271,7 +272,7 @@ def chosen(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def begins(name: str, start: str) -> bool:
-    """Return True if `start` is the beginning of a name; fig_7 is fig_07, but not fig_70."""
+    """Return True if a name begins with `start`; fig_7 selects fig_07, but not fig_70."""
     full = re.sub(r"fig_(\d)(?=_[^\d]|$)", r"fig_0\1", start)
     return any(
         f"{one}/".startswith((f"{begin}_", f"{begin}/"))
@@ -281,6 +282,6 @@ def begins(name: str, start: str) -> bool:
 
 
 def about(name: str) -> dict[str, str]:
-    """Return the texts of a figure without computing it: paper, figure, title, sections."""
+    """Return the texts of a figure, without computing it: paper, figure, title, sections."""
     figure, texts = figure_of(name.rpartition("/")[2]), sections(script(name).__doc__)
     return about_paper(scripts()[name].rpartition(".")[0]) | {"figure": figure} | texts

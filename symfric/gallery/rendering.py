@@ -1,4 +1,4 @@
-"""Compute figures in parallel and write their pictures and numbers."""
+"""Parallel computation of figures, and output of their pictures and numbers."""
 
 import json
 import os
@@ -19,7 +19,7 @@ from symfric.stress.workers import Crashed, TimedOut, outcomes
 LIMIT = 600.0
 """Largest processor time [s] of the figures of one process."""
 Record = dict[str, Any]
-"""Figure as plain data, with its name, picture and seconds."""
+"""Figure as plain data, with its name, its picture and its run time."""
 
 
 @final
@@ -30,9 +30,9 @@ class Gallery:
     Attributes:
         folder: folder of pictures, numbers and `index.html`.
         asked: names of the requested figures.
-        records: name -> figure as plain data, of those that were computed.
+        records: name -> figure as plain data, for each computed figure.
         failures: name -> reason of a failure.
-        seconds: wall time.
+        seconds: wall time [s].
     """
 
     folder: Path
@@ -55,16 +55,16 @@ def render(
     workers: int | None = None,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> Gallery:
-    """Compute figures; write a picture and a JSON file of each, and `index.html` of all.
+    """Compute figures; write a picture and a JSON file of each figure, and `index.html`.
 
-    Figures of a module share a process and its cached runs. An interrupt (Ctrl-C) returns the
-    finished figures.
+    Figures of one module run in one process and share cached runs. An interrupt (Ctrl-C) returns
+    the finished figures.
 
     Args:
         folder: output folder.
-        names: names of figures, or their beginnings, such as a paper; default: all.
+        names: names of figures, or their beginnings, such as a paper; by default all figures.
         quick: compute at reduced size.
-        workers: number of processes; default: one per core.
+        workers: number of processes; by default one per core.
         progress: called with the fraction done.
 
     Raises:
@@ -90,7 +90,7 @@ def render(
 
 
 def read(folder: Path) -> dict[str, Record]:
-    """Return the figures that were written into `folder`, in the order of the gallery."""
+    """Return the figures written to `folder`, in the order of the gallery."""
     found: dict[str, Record] = {}
     for name in scripts():
         with suppress(FileNotFoundError):
@@ -99,7 +99,7 @@ def read(folder: Path) -> dict[str, Record]:
 
 
 def draw(name: str, folder: Path, quick: bool = False) -> Record:
-    """Compute one figure, write its picture and numbers, and return the content of its file."""
+    """Compute a figure, write its picture and its JSON file, and return the content of the file."""
     began = perf_counter()
     plate = script(name)(quick=quick)
     save(plate.picture, folder / f"{name}.png")
@@ -111,7 +111,7 @@ def draw(name: str, folder: Path, quick: bool = False) -> Record:
 
 
 def together(names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Group figures by process: those of a module share its cached runs."""
+    """Return the figures grouped by module, since figures of one module share cached runs."""
     groups: dict[str, list[str]] = {}
     for name in names:
         groups.setdefault(scripts()[name], []).append(name)
@@ -119,7 +119,7 @@ def together(names: Sequence[str]) -> list[tuple[str, ...]]:
 
 
 def _rendered(task: tuple[tuple[str, ...], str, bool]) -> dict[str, str]:
-    """Draw the figures of one process; return the reasons of failures."""
+    """Draw the figures of one process; return name -> reason for each failure."""
     names, folder, quick = task
     failures: dict[str, str] = {}
     for name in names:

@@ -1,6 +1,6 @@
-"""Quantities, looks, and the exact belt that several figures of the gallery share.
+"""Quantities, line styles, and the exact belt that several figures of the gallery share.
 
-Looks of laws, references and sweeps are the same in all pictures; legends stand below panels.
+Laws, references and sweeps have the same style in all pictures; legends are below the panels.
 """
 
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def acceleration(run: Trajectory, rate: str, times: ArrayLike | None = None) -> Array:
-    """Derivative of the state `rate`, by the equations of its model."""
+    """Return the derivative of the state `rate`, computed from the equations of the model."""
     model = run.model
     if model.ode is None:
         raise ValueError(f"acceleration: expected explicit equations, got '{model.name}'")
@@ -30,31 +30,31 @@ def acceleration(run: Trajectory, rate: str, times: ArrayLike | None = None) -> 
 
 
 def rms(difference: Array) -> float:
-    """Root mean square."""
+    """Return the root mean square."""
     return float(np.sqrt(np.mean(np.square(difference))))
 
 
 def largest(difference: Array) -> float:
-    """Largest magnitude."""
+    """Return the largest magnitude."""
     return float(np.abs(difference).max())
 
 
 def spread(x: Array) -> float:
-    """The S x 100 [m] of Jing and Mi: 100 times the standard deviation of positions."""
+    """Return S x 100 [m] of Jing and Mi: 100 times the standard deviation of positions."""
     return 100 * float(np.std(x, ddof=1))
 
 
 REFERENCE: Mapping[str, Any] = {"color": QUIET, "linewidth": 3.2, "solid_capstyle": "butt"}
-"""Keywords of a curve that the others are compared with: wide and grey, behind them."""
+"""Keywords of a reference curve: wide and grey, behind the other curves."""
 
 
 def shade(part: float) -> Any:
-    """Colour of a parameter, from its first value (0, violet) to its last (1, light green)."""
+    """Return the colour of a parameter value, from the first (0, violet) to the last (1, green)."""
     return colormaps["viridis"](0.9 * part)
 
 
 def legend_below(figure: Figure, axis: Axes, ncols: int = 3) -> None:
-    """The legend of one panel, under all panels."""
+    """Draw the legend of one panel below all panels."""
     entries = axis.get_legend_handles_labels()
     figure.legend(*entries, loc="outside lower center", ncols=ncols, frameon=False)
 
@@ -66,11 +66,11 @@ LOOKS = {
     "bliman_sorine": 15, "self_tuning": 16, "gms": 24, "quarter_car_general": 0,
     "quarter_car_simple": 1, "viscous": 5, "steady_state_lugre": 0,
 }  # fmt: skip
-"""Name in the catalogue -> number in `style.CYCLE`; laws that never meet may share one."""
+"""Name in the catalogue -> number in `style.CYCLE`; laws of different figures may share one."""
 
 
 def look(law: str) -> Line:
-    """Colour and line style of a law by its name, as keywords of `Axes.plot`."""
+    """Return the colour and line style of a law by its name, as keywords of `Axes.plot`."""
     check_names("gallery", [law], LOOKS)
     return line(LOOKS[law])
 
@@ -78,10 +78,10 @@ def look(law: str) -> Line:
 @final
 @dataclass(frozen=True)
 class Belt:
-    """A block of mass m on a belt of velocity v_belt, held by a spring k, with F_S and F_C.
+    """Block of mass m on a belt of velocity v_belt, held by a spring k, with F_S and F_C.
 
-    Exact dry friction, phase by phase in closed form: sticking lines and arcs. Plotted with the
-    laws as what they approximate, and uses nothing of the library.
+    The motion with exact dry friction is in closed form, phase by phase: lines while the block
+    sticks, and arcs. It is the reference of the laws and uses no code of the library.
 
     Attributes:
         stops: instants [s] at which the block joins the belt.
@@ -97,9 +97,10 @@ class Belt:
     leaves: list[float] = field(default_factory=list[float])
 
     def motion(self, times: Array) -> dict[str, Array]:
-        """Elongation, velocity relative to the belt, acceleration and friction at `times` [s].
+        """Return elongation, relative velocity, acceleration and friction at `times` [s].
 
-        From rest at x = 0; friction opposes the relative velocity, so F < 0 while the belt pulls.
+        The block starts from rest at x = 0. Friction opposes the velocity relative to the belt, so
+        F < 0 while the belt pulls.
         """
         w, centre = sqrt(self.k / self.m), self.F_C / self.k
         x, v, F = (np.empty_like(times) for _ in range(3))
@@ -107,7 +108,7 @@ class Belt:
         while begin <= times[-1]:
             if sticks:
                 lasts = (self.F_S / self.k - at) / self.v_belt
-            else:  # until the velocity is that of the belt from below: a phase behind the crest
+            else:  # until the velocity rises to that of the belt, after the crest
                 lasts = self._until_it_stops(at - centre, rate, w)
             s = times - begin
             here = (s >= 0) & (s <= lasts)
@@ -126,9 +127,9 @@ class Belt:
         return {"x": x, "v_rel": v - self.v_belt, "a": -(self.k * x + F) / self.m, "friction": F}
 
     def _until_it_stops(self, a: float, rate: float, w: float) -> float:
-        """Time until the velocity of the arc reaches the belt's again."""
+        """Return the time until the velocity on the arc reaches that of the belt again."""
         b, size = rate / w, hypot(a, rate / w)
-        # v = w size cos(w s + phase); it rises through v_belt where the cosine does
+        # v = w size cos(w s + phase) rises through v_belt where the cosine rises
         phase = atan2(a, b)
         angle = (-np.arccos(min(self.v_belt / (w * size), 1.0)) - phase) % (2 * pi)
         return float(angle / w) if angle > 1e-9 else 2 * pi / w

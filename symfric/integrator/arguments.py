@@ -18,20 +18,20 @@ Array = NDArray[np.float64]
 LOOSE = 1e-5
 """Relative tolerance above which whole stick phases may be missed without notice."""
 BACKENDS = ("auto", "vm", "compiled")
-"""Engines: whichever is faster, CasADi's virtual machine, and the step as machine code."""
+"""Engines: the faster one, CasADi's virtual machine, and machine code of the step."""
 MOST_SAMPLES = 10**7
-"""Limit of samples: beyond it the times alone need gigabytes."""
+"""Largest number of samples; beyond it, the array of times alone takes gigabytes."""
 
 
 def check_span(
     where: str, model: Model, t_start: float, t_end: float, rtol: float, stacklevel: int = 4
 ) -> tuple[float, float, float]:
-    """Check start and end [s] and relative tolerance, limited to that of the model's events.
+    """Return start and end [s] and the relative tolerance, limited to that of the model's events.
 
-    A loose tolerance warns at the line that is `stacklevel` calls above this function.
+    A loose tolerance issues a warning for the line `stacklevel` calls above this function.
 
     Raises:
-        ValueError: not numbers, an empty span, a tolerance out of range.
+        ValueError: a value that is not a number, an empty span, or a tolerance out of range.
     """
     t_start = checks.number(f"{where}: t_start", t_start, unit="s")
     t_end = checks.number(f"{where}: t_end", t_end, unit="s")
@@ -70,7 +70,7 @@ def result_times(
 
 
 def check_flags(where: str, progress: object = None, **flags: object) -> None:
-    """Check that flags are bool and that `progress`, if given, is callable."""
+    """Check that the flags are bool and that `progress`, if given, is callable."""
     for name, value in flags.items():
         if value is not True and value is not False:
             checks.flag(f"{where}: {name}", value)
@@ -90,13 +90,13 @@ def tolerances(
     """Return the checked tolerances and limits of a run.
 
     Args:
-        where: for messages.
+        where: name of the caller in messages.
         rtol: relative tolerance.
-        atol: in multiples of `nominal`; 0.1 rtol by default.
+        atol: absolute tolerance in multiples of `nominal`; 0.1 rtol by default.
         nominal: typical magnitude of each state.
         event_tolerance: tolerance of event times [s].
-        max_steps: attempts allowed; None for as many as the progress rate of the run needs.
-        max_step: longest step [s]; any by default.
+        max_steps: largest number of attempts; with None it follows from the progress of the run.
+        max_step: longest step [s]; unlimited by default.
     """
     relative = 0.1 * rtol if atol is None else checks.number(f"{where}: atol", atol, above=0.0)
     event = checks.number(f"{where}: event_tolerance", event_tolerance, unit="s", above=0.0)
@@ -111,16 +111,14 @@ def tolerances(
 def stopping(
     where: str, inputs: InputData, times: ArrayLike, t_start: float, t_end: float
 ) -> InputData:
-    """Return `inputs` with a step end at each of `times` [s]."""
+    """Return `inputs` with additional times [s] at which a step has to end."""
     if (isinstance(times, tuple) and not times) or np.size(times) == 0:
         return inputs
     return inputs.stopping_at(checks.times(f"{where}: times", times, t_start, t_end))
 
 
 def another(method: Method) -> str:
-    """Return a formula that is unlike `method`: with an iteration instead of without, or vice
-    versa.
-    """
+    """Return the name of an iterative formula if `method` is not iterative, and vice versa."""
     return "rodas5p" if isinstance(method, Radau) else "radau5"
 
 
@@ -128,7 +126,7 @@ def chosen(where: str, name: str, rtol: float) -> Method:
     """Return the adaptive method of this name; "auto" is Rodas5P, and Radau5 at loose tolerances.
 
     Raises:
-        ValueError: unknown name, or a method of fixed steps.
+        ValueError: an unknown name, or a method with fixed steps.
     """
     name = checks.choice(f"{where}: method", name, ["auto", *METHODS])
     if name in METHODS and name not in ADAPTIVE:

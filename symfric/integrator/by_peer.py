@@ -1,20 +1,20 @@
 """Simulate a model with CasADi's own implicit integrators, as an independent check.
 
-The integrators are rosenbrock and SUNDIALS' cvodes and idas.
+The integrators are rosenbrock, and cvodes and idas of SUNDIALS.
 
 Mechanisms are integrated in the form of index 1, whose constraints drift, or with idas in the
-stabilised form of index 2 ("ggl"). Nothing is projected: the norms of the constraints among the
-results show the drift.
+stabilised form of index 2 ("ggl"). No result is projected; the results contain the norms of the
+constraints, which show the drift.
 
-The stabilised form of a mechanism has positions and velocities on the constraints:
+The stabilised form enforces the constraints on positions and velocities:
 
     q' = q_rate + phi_q' eta,   M a + phi_q' lam = Q,   phi(q) = 0,   phi_q q_rate = 0
 
 The accelerations a, the multipliers lam and eta and the normal forces are algebraic unknowns; eta
-is zero along the exact solution. The form of index 1 enforces only phi_q a + gamma = 0, so
+is zero along the exact solution. The form of index 1 enforces only phi_q a + gamma = 0, so the
 constraints drift.
 
-Limits: of index 2, so the methods of this package, which take index 1, do not apply.
+Limits: the methods of this package require index 1 and do not apply to the stabilised form.
 Source: Gear, Leimkuhler, Gupta, J. Comput. Appl. Math. 12-13, 1985.
 """
 
@@ -55,10 +55,10 @@ from symfric.results.trajectory import Trajectory
 
 
 def stabilised(system: System) -> System:
-    """Return `system` with multipliers eta as last unknowns and the constraints on two levels.
+    """Return `system` with constraints on positions and velocities and multipliers eta, put last.
 
     Raises:
-        ValueError: it is not a mechanism.
+        ValueError: the system is not a mechanism.
     """
     manifold = system.manifold
     if manifold is None:
@@ -93,21 +93,21 @@ COUNTS = {
     "jacobians": ("n_jac", "nlinsetups"),
     "factorisations": ("n_jac", "nlinsetups"),
 }
-"""Entry of the statistics -> its names in CasADi's integrators; the first that exists counts."""
+"""Entry of the statistics -> its names in CasADi's integrators; the first available one is used."""
 STEPS_PER_INTERVAL = 100_000
-"""Limit of SUNDIALS, which would otherwise spend minutes before a singularity."""
+"""Step limit of SUNDIALS, which would otherwise spend minutes in front of a singularity."""
 HINTS = {
     1: "look for a discontinuity or a NaN there, or loosen rtol",
     2: "its corrector seldom converges below rtol = 1e-8 in this form of index 2, loosen rtol; "
     "or look for a discontinuity there",
 }
-"""Advice if CasADi's integrator stops, by the index of the equations."""
+"""Index of the equations -> advice if CasADi's integrator stops."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Peer:
-    """System for `casadi.integrator`, its differential states scaled by nominal values."""
+    """System for `casadi.integrator`, with differential states scaled by their nominal values."""
 
     system: System
     inputs: InputData
@@ -118,11 +118,11 @@ class Peer:
     index: int = 1
 
     def over(self, grid: Array, y: Array | None = None) -> tuple[ca.Function, Array]:
-        """Return the integrator from grid[0] over grid[1:], and the input data for it.
+        """Return the integrator from grid[0] with results at grid[1:], and its input data.
 
         Args:
             grid: times [s].
-            y: consistent unknowns at the first of them; index 2 needs them.
+            y: consistent unknowns at grid[0]; required for index 2.
         """
         first = self.inputs.interval((grid[:-1] + grid[1:]) / 2)
         extra: dict[str, Any] = {}
@@ -142,18 +142,16 @@ class Peer:
         return solver, self.inputs.values[:, first]
 
     def _begin(self, grid: Array, y: Array, data: Array) -> dict[str, Any]:
-        """Return start options for idas, whose search for consistent values is singular with
-        index 2.
-        """
+        """Return the start options of idas; its own search for them is singular for index 2."""
         rates, nominal = rates_of(self.system)
         f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
         slope = f(y, np.concatenate([self.p, data])).full().ravel()[rates] / nominal
-        # its own first step is so long that tight tolerances are never met
+        # the default first step of idas is too long for tight tolerances
         return {"init_xdot": slope.tolist(), "step0": first_step(float(grid[-1] - grid[0]))}
 
 
 def rates_of(system: System) -> tuple[list[int], Array]:
-    """Return the rows of the differential states, and their nominal values."""
+    """Return the rows of the differential states and their nominal values."""
     still = {*system.algebraic[1], *(system.manifold.basis if system.manifold else ())}
     rates = [i for i in range(system.n) if i not in still]
     nominal = np.ones(system.n)
@@ -162,16 +160,16 @@ def rates_of(system: System) -> tuple[list[int], Array]:
 
 
 def peer(system: System, inputs: InputData, p: Array, tolerances: Tolerances, name: str) -> Peer:
-    """Return the semi-explicit DAE of `system` for CasADi, with time as its own variable.
+    """Return the semi-explicit DAE of `system` for CasADi.
 
     Args:
         system, inputs, p, tolerances: equations and data of the run.
         name: "sundials" (cvodes, or idas if there are algebraic unknowns), "rosenbrock" or "ggl",
-            which is idas on the stabilised form of index 2.
+            which is idas applied to the stabilised form of index 2.
 
     Raises:
-        ValueError: a mass matrix that is not diagonal, which CasADi does not take, or "ggl" for a
-            model that is not a mechanism.
+        ValueError: a mass matrix that is not diagonal, which CasADi does not accept, or "ggl" for
+            a model that is not a mechanism.
     """
     if name == "ggl":
         system = stabilised(system)
@@ -193,10 +191,10 @@ def peer(system: System, inputs: InputData, p: Array, tolerances: Tolerances, na
         "max_num_steps": min(tolerances.max_steps, STEPS_PER_INTERVAL),
     }
     if plugin != "rosenbrock":
-        # without it SUNDIALS adjoints of several parameters are silently wrong (casadi#4383)
+        # without this option, adjoints for several parameters are silently wrong (casadi#4383)
         options["quad_err_con"] = True
     if name == "ggl":
-        # multipliers of index 2 carry an error / h, which no step size brings below a tolerance
+        # multipliers of index 2 have errors of order 1 / h, which smaller steps do not reduce
         options |= {"suppress_algebraic": True, "calc_ic": False}
     ode = f[rates] / (scale * ca.diag(mass))
     dae = {
@@ -219,7 +217,7 @@ def integrate_by_peer(
     tolerances: Tolerances,
     name: str,
 ) -> tuple[Run, dict[str, int]]:
-    """Integrate with CasADi over `times`; a failure keeps the results before it."""
+    """Integrate with CasADi over `times`; after a failure, return the results before it."""
     problem = peer(system, inputs, p, tolerances, name)
     (rates, nominal), columns = rates_of(problem.system), problem.system.algebraic[1]
     y = consistent(system, "simulate_by_peer", y0, np.concatenate([p, inputs.values[:, 0]]))
@@ -236,7 +234,7 @@ def integrate_by_peer(
             result = solver(x0=found[rates, -1] / nominal, z0=found[columns, -1], p=p, u=data)
         except RuntimeError as error:
             if piece.size == grid.size - 1 > 1:
-                # repeat in pieces to keep everything before the failure
+                # repeat in pieces to keep the results before the failure
                 pieces = np.array_split(piece, min(CHUNKS, piece.size))
                 continue
             last = [line for line in str(error).splitlines() if line.strip()][-1]
@@ -261,7 +259,10 @@ def integrate_by_peer(
 
 
 def _dense(system: System, inputs: InputData, p: Array, grid: Array, y: Array) -> Dense:
-    """Interpolate the columns with rates by cubics on the grid, the algebraic ones linearly."""
+    """Return the cubic Hermite interpolation of the unknowns on the grid.
+
+    Algebraic unknowns have no rates; their slopes are finite differences.
+    """
     if grid.size < 2:
         return Dense(grid, np.nextafter(grid, np.inf), y.T, y.T, np.zeros((1, 2, system.n)))
     d = np.vstack([np.tile(p[:, None], (1, grid.size)), inputs.values[:, inputs.interval(grid)]])
@@ -290,8 +291,8 @@ def simulate_by_peer(
 ) -> Trajectory:
     """Integrate `model` as `simulate` does, with one of CasADi's own integrators.
 
-    It is meant for comparisons: the constraints of mechanisms drift, jamming friction goes
-    unnoticed, friction peaks and pulses of inputs may be skipped, and events are not supported.
+    The function is intended for comparisons: the constraints of mechanisms drift, jamming friction
+    is not detected, friction peaks and input pulses may be missed, and events are not supported.
 
     Args:
         model: the equations; the mass matrix must be diagonal.
@@ -302,10 +303,11 @@ def simulate_by_peer(
         t_start, x0, u, p, rtol, atol, t_eval, samples, max_steps, throw: as in `simulate`.
 
     Returns:
-        The trajectory. A failure keeps the results before it.
+        The trajectory; after a failure, the part before it.
 
     Raises:
-        ValueError: bad input; events; coupled rates; "ggl" for a model that is not a mechanism.
+        ValueError: bad input, a model with events or coupled rates, or "ggl" for a model that is
+            not a mechanism.
         SolveError: the integration failed; its `partial` is the trajectory so far.
     """
     where = "simulate_by_peer"

@@ -55,15 +55,15 @@ if TYPE_CHECKING:
     from symfric.integrator.cuda.on_device import OnDevice
 
     Task = Job | EventJob | OnDevice
-    """Common part of all chunks of an ensemble."""
+    """Part of the work that all chunks of an ensemble share."""
 
 Array = NDArray[np.float64]
 CUDA, REALS = "cuda", ("double", "float")
 EXECUTORS = ("serial", "threads", "processes")
 RESULTS = 3
-"""Format of the result folders, raised with every change."""
+"""Format number of the result folders, incremented with every change."""
 CHUNK = 500
-"""Members of a CPU task."""
+"""Number of members of a task on a CPU."""
 
 
 def simulate_many(
@@ -95,44 +95,44 @@ def simulate_many(
         model: the equations.
         t_end: last time [s], or an array with one per member.
         t_start: first time [s], common to all members.
-        x0, p: start values and parameters by name: numbers, or arrays with an entry per member.
-        u: inputs by name, as in `simulate`, for all members; or an array with a number per member;
-            or `Hold` or `Linear` with values of shape (members, n), a row per member at common
+        x0, p: start values and parameters by name: numbers, or arrays with one entry per member.
+        u: inputs by name: as in `simulate`, for all members; an array with one number per member;
+            or `Hold` or `Linear` with values of shape (members, n), one row per member at common
             times.
-        t_eval: times of the results [s]; NaN after the end of a member. By default the `t_end` of
-            each member.
+        t_eval: times of the results [s]; results after the end of a member are NaN. By default the
+            `t_end` of each member.
         rtol, method, event_tolerance, max_steps, max_step, times: as in `simulate`; the absolute
             tolerance is 0.1 rtol nominal, for each member with the defaults of `simulate`.
         backend: "compiled", "vm", or "auto": compiled if there is a compiler. Compiled members run
-            in parallel in the lanes of vector instructions; the last digits of exp, sin, pow, ...
-            may differ from "vm" and `simulate`, and the number of steps with stick and slip by a
-            few, within the tolerance. "cuda": on a graphics processor through CuPy (extra 'cuda'),
-            one member per thread, for ensembles of a hundred thousand members and more; models
-            without events, with the same equations, steps, failures and counts as the others, up
-            to last digits. "auto" never chooses it, and there is no fallback.
+            in parallel in the lanes of vector instructions. The last digits of exp, sin, pow, ...
+            may differ from "vm" and `simulate`; with stick and slip, the number of steps may then
+            differ by a few, within the tolerance. "cuda" uses a graphics processor through CuPy
+            (extra 'cuda'), with one member per thread, for a hundred thousand members and more. It
+            supports models without events; equations, steps, failures and counts equal those of
+            the other backends up to last digits. "auto" never chooses it; there is no fallback.
         executor: "serial", "threads" (the compiled loop holds no lock), "processes", or any
-            `concurrent.futures.Executor`, such as a dask client's or mpi4py's: a task is plain data
-            and the C source, so a worker needs only this package and, for compiled code, a
-            compiler. The task of a model with events holds the model, and each worker builds its
+            `concurrent.futures.Executor`, such as those of dask and mpi4py. A task is plain data
+            and C source, so a worker needs only this package and, for compiled code, a compiler.
+            The task of a model with events contains the model, and each worker builds its
             integrator once.
         workers: number of threads or processes, or of the executor's workers; default all cores of
             this machine. Twice as many chunks are in progress at once.
-        chunk: members per task; default 500, on a graphics processor so many that an attempt of all
-            is a billion operations, or their results are a gigabyte.
-        real: "double", or with backend="cuda" "float", single precision: for rtol of 1e-5 and more
+        chunk: members per task; default 500. On a graphics processor the default is limited by a
+            billion operations per attempt of all members, or a gigabyte of results.
+        real: "double", or "float" (single precision) with backend="cuda" and rtol of 1e-5 or more
             (`symfric.integrator.cuda`).
-        out: folder for the results, written chunk by chunk, so that memory stays bounded; a call
-            with the same arguments resumes an interrupted one, after checking the checksums of
-            stored chunks.
+        out: folder for the results, written chunk by chunk to bound the memory. A call with the
+            same arguments verifies the checksums of the stored chunks and resumes an interrupted
+            run.
         progress: called with the fraction done.
 
     Returns:
-        The ensemble. A member that fails is reported by number and does not affect the others; an
-        interrupt (Ctrl-C) returns the finished members.
+        The ensemble. A failed member is reported by number and does not affect the others. After
+        an interrupt (Ctrl-C) the ensemble contains the finished members.
 
     Raises:
         ValueError: bad input; arrays of different lengths.
-        SolveError: a worker process ended; its `partial` has the finished members.
+        SolveError: a worker process ended; its `partial` contains the finished members.
         RuntimeError: compiled code was requested without a working compiler, or a graphics
             processor without a device or CuPy.
 
@@ -296,7 +296,7 @@ def _task(
     backend: str,
     executor: str | Executor,
 ) -> Task:
-    """Return the task of the workers; for those on this machine its C is compiled before."""
+    """Return the task of the workers; compile its C first if they run on this machine."""
     if integrator.model.events:
         parts = integrator.tableau, tuple(points), allowed, backend, looks
         return EventJob(integrator.model, inputs, *parts)
@@ -312,7 +312,7 @@ def _task(
 
 
 def _chunk(integrator: Integrator, given: MemberData, tolerances: Tolerances, pick: slice) -> Chunk:
-    """Return start columns and run data of members, and their inputs and ends."""
+    """Return the start columns, run data, inputs and end times of the members in `pick`."""
     y, p = given.starts(integrator.system, pick)
     data, ends = given.data(pick), given.ends[pick]
     t_start = float(given.inputs.breaks[0])
@@ -327,7 +327,7 @@ def _chunk(integrator: Integrator, given: MemberData, tolerances: Tolerances, pi
 def _identity(
     task: Task, integrator: Integrator, allowed: Tolerances, looks: Array, chunks: tuple[str, ...]
 ) -> str:
-    """Return a hash of everything that the results depend on, and of the division into chunks."""
+    """Return a hash of the division into chunks and of all data that determine the results."""
     events = [
         (e.name, e.direction, e.terminal, e.at_start, *e.reset) for e in integrator.model.events
     ]
@@ -342,7 +342,7 @@ def solved(
     prepare: Callable[[slice], Chunk],
     todo: dict[int, slice],
 ) -> Generator[tuple[int, Solved]]:
-    """Yield results as they are completed; only a few chunks are in progress at once."""
+    """Yield the results in order of completion; only a few chunks are in progress at once."""
     if pool is None:
         for first, pick in todo.items():
             yield first, task.solve(prepare(pick))
@@ -366,7 +366,7 @@ def solved(
 
 
 def _solve_pickled(task: bytes, chunk: Chunk) -> Solved:
-    """Integrate the members of a chunk by a task that a process reads once."""
+    """Integrate the members of a chunk; each process unpickles the task once."""
     return _task_of(task).solve(chunk)
 
 
@@ -377,7 +377,7 @@ def _task_of(task: bytes) -> Task:
 
 @contextmanager
 def pool_of(executor: str | Executor, workers: int | None) -> Generator[Executor | None]:
-    """Yield the executor of this name, None for "serial"; a given executor is not shut down."""
+    """Yield the executor of this name, or None for "serial"; do not shut down a given executor."""
     if isinstance(executor, Executor):
         yield executor
     elif executor == "serial":

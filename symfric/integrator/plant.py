@@ -1,4 +1,4 @@
-"""Plant: a model that advances from sample to sample with held inputs."""
+"""Model that advances from sample to sample with held inputs."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ Numbers = Mapping[str, ArrayLike]
 
 @final
 class Plant:
-    """Model that advances from sample to sample; made by `stepper`.
+    """Model that advances from sample to sample; created by `stepper`.
 
     Attributes:
-        model: its equations.
-        dt: interval [s].
-        failed: number of a plant that did not reach its sample -> reason, after a `SolveError`.
+        model: the equations.
+        dt: interval between samples [s].
+        failed: after a `SolveError`, number of each plant that did not reach its sample -> reason.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Plant:
         self._use(integrator)
 
     def _use(self, integrator: Integrator) -> None:
-        """Continue with an integrator of the same equations."""
+        """Continue with another integrator of the same equations."""
         self._integrator, plants = integrator, self._plants
         try:
             self._advance = self._loop(integrator)
@@ -94,15 +94,16 @@ class Plant:
 
         Args:
             u: inputs in the order of the model, shape (nu,) or (batch, nu); a number if there is
-                one input and one plant; or by name, where a number applies to all plants and
-                other inputs keep their values. By default the inputs held last; at first, the
-                start values of the model.
+                one input and one plant; or values by name, where a number applies to all plants
+                and the other inputs keep their values. The default is the inputs held last, or
+                the start values of the model in the first interval.
 
         Raises:
-            ValueError: unknown names, another shape, not finite; the plant is unchanged.
+            ValueError: unknown names, a wrong shape or values that are not finite; the plant is
+                unchanged.
             SolveError: a plant did not reach its sample; `failed` gives the plants and reasons, and
-                `partial` holds the states. Call `reset` for it, or `step` with other inputs, which
-                continues to that sample from its current time.
+                `partial` the states. Call `reset` for this plant, or `step` with other inputs,
+                which continues from its current time to the sample.
             KeyboardInterrupt: Ctrl-C; the plant is unchanged. Compiled code finishes first.
         """
         if not self._in_python:
@@ -137,18 +138,20 @@ class Plant:
         p: Numbers | None = None,
         members: Sequence[int] | None = None,
     ) -> Array:
-        """Put plants back to the start, with inputs at the start values of the model.
+        """Return plants to the start, with inputs at the start values of the model.
 
         Args:
-            x0: start values by name; the others start at the model's defaults.
-            p: parameters by name; the others keep their values.
-            members: numbers of the plants; default all. Arrays in `x0` and `p` have an entry each.
+            x0: start values by name; the other states start at the model's defaults.
+            p: parameters by name; the other parameters keep their values.
+            members: numbers of the plants; default all. Arrays in `x0` and `p` have one entry for
+                each of them.
 
         Returns:
-            The states of all plants, as `step` does.
+            The states of all plants, in the shape that `step` returns.
 
         Raises:
-            ValueError: unknown names, other lengths, no consistent start; the plant is unchanged.
+            ValueError: unknown names, arrays of wrong length or no consistent start; the plant is
+                unchanged.
         """
         which = self._which(members)
         guesses, values = self._starts(
@@ -186,7 +189,7 @@ class Plant:
 
     @property
     def t(self) -> Any:
-        """Time [s]: a number, or of every plant, shape (batch,)."""
+        """Time [s]: a number, or with a batch one per plant, shape (batch,)."""
         t = self._plants.S[:, State.T]
         return float(t[0]) if self._batch is None else t.copy()
 
@@ -204,20 +207,20 @@ class Plant:
 
     @property
     def attempts(self) -> int:
-        """Attempts of all plants in the last interval."""
+        """Number of attempted steps of all plants in the last interval."""
         return int(self._plants.made.sum())
 
     @property
     def happened(self) -> list[Any]:
-        """(time [s], name) of the events of the last interval; with a batch (plant, time, name)."""
+        """Events of the last interval: (time [s], name), or (plant, time, name) with a batch."""
         found = self._plants.happened
         return [event[1:] for event in found] if self._batch is None else list(found)
 
     @property
     def terminated(self) -> Any:
-        """True if a terminal event has ended the run of a plant; it then stays there until `reset`.
+        """True if a terminal event has ended the run of a plant, which then waits for `reset`.
 
-        With a batch it is an array for all plants, shape (batch,).
+        With a batch, the value is an array, shape (batch,).
         """
         over = self._plants.why == OVER
         return bool(over[0]) if self._batch is None else over
@@ -243,7 +246,7 @@ class Plant:
         return self._values
 
     def _take(self, u: ArrayLike | Numbers) -> None:
-        """Store the inputs to hold next."""
+        """Store the inputs of the next interval."""
         where, own = f"plant of '{self.model.name}': u", self._u
         if isinstance(u, Mapping):
             for name, value in self.model.named("u", u).items():
@@ -253,7 +256,7 @@ class Plant:
             self._write(where, own, u)
 
     def _write(self, where: str, place: Array, value: Any, common: bool = False) -> None:
-        """Store `value` in its `place`; with `common` a number applies to all plants."""
+        """Store `value` in `place`; with `common`, a number applies to all plants."""
         given = np.asarray(value)
         single = place.shape[-1] == 1 and given.shape == place.shape[:-1]
         if given.dtype.kind not in "fiub":
@@ -267,12 +270,12 @@ class Plant:
             raise ValueError(f"{where}: expected shape {place.shape}{or_}, got {given.shape}")
 
     def _hold_on(self) -> None:
-        """Discard the inputs to hold next."""
+        """Discard the inputs of the next interval, so that the current ones remain."""
         plants = self._plants
         plants.u[:] = plants.R[:, plants.R.shape[1] - plants.u.shape[1] :]
 
     def _settle(self) -> None:
-        """Make the starts of new plants consistent with the inputs to hold."""
+        """Make the start values of new plants consistent with the inputs of the next interval."""
         plants, system = self._plants, self._integrator.system
         nu = plants.u.shape[1]
         if not np.isfinite(plants.u).all():
@@ -286,7 +289,7 @@ class Plant:
         self._fresh.clear()
 
     def _mend(self, short: int) -> None:
-        """Resolve plants that did not reach their sample; raise an error for the others."""
+        """Continue the plants that did not reach their sample; raise an error for lost ones."""
         plants = self._plants
         if short == REFUSED:
             given = self._u.tolist()
@@ -311,7 +314,7 @@ class Plant:
             raise SolveError(which + message + more, status, self._x.copy())
 
     def _help(self, b: int) -> tuple[Status, str] | None:
-        """Let a plant continue, or return why it cannot."""
+        """Prepare a plant to continue, or return the reason why it cannot."""
         plants, system = self._plants, self._integrator.system
         t, y, d = plants.S[b, State.T], plants.S[b, State.Y], plants.R[b, Given.d(system.nx)]
         where = f"stepper '{self.model.name}' at t = {t:.9g} s"
@@ -332,7 +335,7 @@ class Plant:
         return None
 
     def _found_pivots(self, y: Array, d: Array) -> bool:
-        """Return True if other pivots are stable where steps failed; they are used from now on."""
+        """Return True if other pivots are stable where steps failed; use them from then on."""
         if len(self._places) > MOST_ORDERS:
             return False
         other = self._integrator.suited([*self._places, (y, d)], SAMPLES * self.dt)
@@ -343,7 +346,7 @@ class Plant:
         return True
 
     def _which(self, members: Sequence[int] | None) -> list[int]:
-        """Return numbers of plants."""
+        """Return the checked numbers of plants; all of them by default."""
         count = self._plants.S.shape[0]
         if members is None:
             return list(range(count))
@@ -355,7 +358,7 @@ class Plant:
         return found
 
     def _each(self, what: str, given: Numbers | None, which: list[int]) -> dict[str, Array]:
-        """Return values by name, an entry for each of the plants `which`."""
+        """Return checked values by name, each with one entry per plant of `which`."""
         found: dict[str, Array] = {}
         for name, value in self.model.named(what, given).items():
             where = f"plant of '{self.model.name}': {what}: {name}"
@@ -372,7 +375,7 @@ class Plant:
     def _starts(
         self, x0: dict[str, Array], p: dict[str, Array], which: list[int]
     ) -> tuple[Array, Array]:
-        """Return initial guesses of the unknowns, and parameters, a row for each plant."""
+        """Return initial guesses of the unknowns and the parameters, one row for each plant."""
         plants, system, count = self._plants, self._integrator.system, len(which)
         own = plants.R[which, Given.d(system.nx)].T
         every = {v.name: own[i] for i, v in enumerate(self.model.p)} | p

@@ -1,6 +1,6 @@
-"""Simulate a model: one call for every method and engine.
+"""Simulation of a model: one function for every method and engine.
 
-Checked settings are cached per model: checking the arguments takes longer than a short run.
+Checked settings are cached per model, because checking them takes longer than a short run.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from symfric.results.trajectory import Trajectory
 Array = NDArray[np.float64]
 PLAIN: frozenset[type] = frozenset((float, int, bool, str, type(None)))
 REMEMBERED, MOST_TIMES = 16, 10_000
-"""Settings cached per model (the oldest is dropped first), and the longest cached result grid."""
+"""Number of settings cached per model (the oldest is removed first), and largest cached grid."""
 
 
 @final
@@ -60,8 +60,8 @@ class Settings:
     Attributes:
         t_start, t_end: time span [s].
         formula: the method.
-        allowed: tolerances; `atol` is per state of the model.
-        times: times of the result [s]; shared between runs, so callers must copy it.
+        allowed: tolerances; `atol` has one entry per state of the model.
+        times: times of the result [s]; shared between runs, so callers must copy them.
     """
 
     t_start: float
@@ -72,7 +72,7 @@ class Settings:
 
 
 def settings(model: Model, asked: tuple[Any, ...]) -> Settings:
-    """Check the settings of `simulate`, which are the arguments of `_checked`; cached.
+    """Return the checked settings of `simulate`, the arguments of `_checked`, with a cache.
 
     Raises:
         ValueError: bad input.
@@ -84,7 +84,7 @@ def settings(model: Model, asked: tuple[Any, ...]) -> Settings:
     # 1.0 and True are equal keys, but only 1.0 is a valid time
     key = (*asked, *map(type, asked))
     if not PLAIN.issuperset(key[len(asked) :]):
-        return _checked(model, *asked)  # arrays and expressions of a number are numbers, no keys
+        return _checked(model, *asked)  # scalar arrays and expressions are numbers but not keys
     found = known.get(key)
     if found is not None:
         warn_of_loose("simulate", found.allowed.rtol, stacklevel=4)
@@ -116,13 +116,13 @@ def _checked(
 
 
 NOTHING = 1e-9
-"""Derivatives below this, in nominal values, are treated as rounding of zero."""
+"""Derivatives below this multiple of their nominal value are treated as rounding errors."""
 
 
 def difference(model: Model, one: Trajectory, other: Trajectory) -> float:
-    """Return the largest difference of a state over both runs, relative to its magnitude.
+    """Return the largest difference of a state between two runs, relative to its magnitude.
 
-    The magnitude is its nominal value, or its largest value if that is larger or tiny
+    The magnitude is the nominal value of the state, or its largest value if that is larger or tiny
     (`own_scale`).
     """
     n = min(one.t.size, other.t.size)
@@ -138,14 +138,14 @@ def difference(model: Model, one: Trajectory, other: Trajectory) -> float:
 def differences_of_derivatives(
     model: Model, names: Sequence[str], one: Trajectory, other: Trajectory
 ) -> dict[str, float]:
-    """Return the largest difference of each derivative over both runs.
+    """Return the largest difference of each derivative between two runs.
 
-    It is relative to the largest value of that derivative. Derivatives jump at events, so times at
-    which only one of the runs has passed an event are not compared.
+    The difference is relative to the largest value of the derivative. Derivatives jump at events,
+    so times at which only one of the runs has passed an event are not compared.
 
     Returns:
-        Name -> relative difference; NaN for all of them if the derivative at an event is undefined
-        (`Trajectory.sensitivities` reports that).
+        Name -> relative difference; NaN for all names if the derivative at an event is undefined
+        (reported by `Trajectory.sensitivities`).
     """
     try:
         found, finer = one.sensitivities, other.sensitivities
@@ -165,8 +165,9 @@ def differences_of_derivatives(
 
 
 def _on_the_same_side(one: Trajectory, other: Trajectory) -> NDArray[np.bool_]:
-    """Return True at times of `one` after equally many events of both runs; all True if totals
-    differ.
+    """Return True for each time of `one` that has equally many events of both runs before it.
+
+    If the runs differ in their total number of events, return True for all times.
     """
     times = [np.array([t for t, _ in run.happened]) for run in (one, other)]
     if times[0].size != times[1].size:
@@ -201,31 +202,32 @@ def simulate(
     """Integrate `model` from `t_start` to `t_end` [s].
 
     Args:
-        model: the equations; its events and monitored expressions are respected.
+        model: the equations, with their events and monitored expressions.
         t_end: last time [s].
         t_start: first time [s].
-        x0: start values of states by name; the others start at the model's defaults (bristles in
-            steady sliding).
-        u: inputs by name: a number, `Hold` or `Linear` samples, or a function of symbolic time,
-            sampled at 8193 times and within its jumps to detect short pulses; list those in
-            `times` that lie between two samples and leave no jump.
+        x0: start values of states by name; the other states start at the model's defaults (those
+            of bristles are steady sliding).
+        u: inputs by name: a number, `Hold` or `Linear` samples, or a function of symbolic time. A
+            function is sampled at 8193 times and within its jumps to detect short pulses; list in
+            `times` the pulses that lie between two samples and have no jump.
         p: values of the model's parameters by name.
         rtol: relative tolerance of each step.
         atol: absolute tolerance in multiples of each state's nominal value; default 0.1 rtol. For
             motions below 1e-3 nominal the default is scaled to the size of the motion, found by a
             first run. Motion below 1e-12 nominal is treated as zero.
-        t_eval: times of the result [s]; default `samples` equally spaced. They force no steps.
+        t_eval: times of the result [s]; default `samples` equally spaced times. No step has to end
+            at them.
         samples: number of equally spaced times.
         method: the formula; the numbers below refer to Rabinowicz's stick-slip over 20 s.
-            "auto": rodas5p, and radau5 if rtol > 1e-5 or if derivatives are requested, then with
-            steps of at most half a law's width where it slides slowly.
+            "auto": rodas5p, or radau5 if rtol > 1e-5 or if derivatives are requested; steps are
+            then at most half a law's width where it slides slowly.
             "rodas5p": order 5, the fewest steps at 1e-6 and below; error about rtol.
-            "rodas4p": order 4; a step costs 2/3, but the number of steps grows faster with tighter
-            rtol.
+            "rodas4p": order 4; a step costs 2/3 of one of rodas5p, but the number of steps grows
+            faster with tighter rtol.
             "rodas3": order 3; for comparisons with fixed-step plants.
-            "radau5": order 5, the most robust one: its iteration fails if a contact changes
-            within a step, so no slip is missed even at rtol = 1e-3; error a tenth of rtol, for
-            1.5 to 2 times the steps. Order 4 between steps.
+            "radau5": order 5, the most robust method: its iteration fails if a contact changes
+            within a step, so no slip is missed even at rtol = 1e-3. The error is a tenth of rtol,
+            for 1.5 to 2 times the steps; between steps the order is 4.
             "dopri5": order 5, explicit, for non-stiff ODEs: orbits, pendulums, contacts that only
             slide, and mechanisms without friction from reactions (their multipliers have no error
             estimate). With bristles and sticking it needs 20 to 100 times the steps. "auto" never
@@ -233,31 +235,30 @@ def simulate(
         backend: the engine: "vm" needs no compiler; "compiled" compiles the step once and keeps
             it in the user's cache; "auto" starts in the VM, compiles the step in a background
             thread if that is expected to save time, and switches to the compiled step once it is
-            available, in this run or a later one. Signals are handled the same way. Both give the
-            same bits. For third-party integrators see `simulate_by_peer`.
-        event_tolerance: events this near [s] happen together; they are located to a thousandth of
-            it, or to rounding.
-        max_steps: attempts allowed. By default a run takes as many as it needs, unless the last
-            10 million advance so little that a billion more would not reach `t_end`.
-        max_step: longest step [s]; none by default. For features that error control cannot detect
-            in advance: a model with short events of its own, such as a function of time in its
-            equations.
+            available, in this run or a later one. The functions of signals are treated likewise.
+            Both engines give the same bits. For third-party integrators see `simulate_by_peer`.
+        event_tolerance: events closer than this [s] are simultaneous; event times are accurate to
+            a thousandth of it, or to rounding.
+        max_steps: largest number of attempts. By default a run takes as many as it needs, unless
+            the last 10 million advance so little that a billion more would not reach `t_end`.
+        max_step: longest step [s]; unlimited by default. Set it for features that error control
+            cannot detect in advance, such as short pulses of a function of time in the equations.
         times: increasing times [s] at which a step has to end.
-        sensitivities: names of free parameters, and of start values as "x0.v"; the trajectory then
+        sensitivities: names of free parameters, and of start values as "x0.v". The trajectory then
             gives the derivatives of all signals (`Trajectory.sensitivities`), gradients of sums of
-            them (`Trajectory.gradient`) and those of event times
+            signals (`Trajectory.gradient`) and derivatives of event times
             (`Trajectory.event_sensitivities`), exact for the steps that were taken. Error control
             monitors states only, and derivatives have larger errors: at rtol = 1e-6, 1e-5 of their
             largest value with smooth laws, 1e-4 or 1e-3 of a peak where bristles slip or bearings
             are unloaded for a moment. A `method` given by name takes the same steps as without
             derivatives.
-        measure_error: run again at rtol/100, by another formula in steps half as long, and report
-            the difference in the statistics, also that of each of the `sensitivities`.
+        measure_error: repeat the run at rtol/100, with another formula and steps half as long, and
+            report the difference in the statistics, including that of each of `sensitivities`.
         progress: called with the fraction done every few tens of milliseconds.
         throw: raise `SolveError` on failure; with False the partial trajectory is returned.
 
     Returns:
-        The trajectory. An interrupt (Ctrl-C) also returns it, with status INTERRUPTED.
+        The trajectory. After an interrupt (Ctrl-C) its status is INTERRUPTED.
 
     Raises:
         ValueError: bad input.
@@ -267,7 +268,7 @@ def simulate(
         UserWarning: rtol above 1e-5, where stick phases may be missed.
         OverloadWarning: friction above its static level, for example from a bristle that does not
             relax. The run is still returned; its `doubts` give the contact and the time.
-        EnergyWarning: friction that adds energy to the motion, for example a law of the wrong sign.
+        EnergyWarning: friction adds energy to the motion, for example a law with the wrong sign.
     """
     check_model("simulate", model)
     check_flags("simulate", progress, measure_error=measure_error, throw=throw)
@@ -332,7 +333,7 @@ def simulate(
 def _statistics(
     integrator: Integrator, run: Run, build_time: float, compile_time: float, run_time: float
 ) -> Statistics:
-    """Return the cost of a run; times in [s]."""
+    """Return the statistics of a run; the arguments are times [s]."""
     evaluations, jacobians, factorisations = integrator.tableau.work(integrator.system)
     return Statistics(
         backend=run.engine,

@@ -1,4 +1,4 @@
-"""Step a model from sample to sample: plants for control loops, and differentiable flow maps."""
+"""Steps of a model from sample to sample: plants for control loops, differentiable flow maps."""
 
 from __future__ import annotations
 
@@ -44,29 +44,29 @@ def stepper(
         x = plant.step({"force": 2.0})      # or plant.step(2.0), plant.step([2.0])
         plant.t, plant["friction"]
 
-    Adaptive steps of the method of `simulate` are made inside an interval, so results are accurate
-    for any `dt`; a step ends at every sample, and the step size control continues in the next
-    interval. The numbers equal those of one `simulate` over `Hold` samples at k dt. They agree bit
-    for bit if that run has 1000 intervals (its first step depends on the span), stable pivots, and
-    motions that are not tiny (`simulate` repeats those with a smaller `atol`).
+    Each interval takes adaptive steps of the method of `simulate`, so results are accurate for any
+    `dt`. A step ends at every sample, and the step size control continues in the next interval.
+    The results equal those of one `simulate` over `Hold` samples at k dt. They agree bit for bit
+    if that run has 1000 intervals (its first step depends on the span), stable pivots, and motions
+    that are not tiny (`simulate` repeats tiny motions with a smaller `atol`).
 
     Args:
-        model: the equations. Events happen inside the intervals; plants with events advance one
-            after the other, and each costs some tens of microseconds more.
+        model: the equations. Events may occur inside the intervals; plants with events advance one
+            after the other, and each takes some tens of microseconds more.
         dt: interval [s] between samples.
         t_start: time [s] of the start.
-        x0, p: start values and parameters by name, as in `simulate`; with `batch` arrays, too.
+        x0, p: start values and parameters by name, as in `simulate`; with `batch` also arrays.
         batch: number of plants that advance together in one call; inputs, states and signals then
-            have a row for each plant. Compiled, eight and more run in parallel in vector lanes,
-            three to four times faster: the results equal those of a single plant up to rounding,
-            and do not depend on the other plants.
+            have one row per plant. Compiled code advances eight or more plants in parallel in
+            vector lanes, three to four times faster. The results equal those of a single plant up
+            to rounding and do not depend on the other plants.
         rtol, atol, method, event_tolerance, max_step: as in `simulate`.
         backend: "compiled", "vm", or "auto": compiled (once, kept in the user's cache) if there is
             a compiler.
-        max_steps: attempts allowed in one interval.
+        max_steps: largest number of attempts in one interval.
 
     Raises:
-        ValueError: bad input; no consistent start.
+        ValueError: bad input, or no consistent start.
         CompileError: compiled code was requested without a working compiler.
 
     Warns:
@@ -80,7 +80,7 @@ def stepper(
     formula = chosen(where, method, rtol)
     checks.choice(f"{where}: backend", backend, BACKENDS)
     members = 1 if batch is None else checks.count(f"{where}: batch", batch)
-    # as held samples, each input is one entry of the run data
+    # constant inputs have one entry each in the run data
     inputs = input_data(model, {v.name: float(v.start) for v in model.u}, t_start, t_end)
     integrator, _ = built(model, inputs, formula)
     allowed = tolerances(
@@ -95,7 +95,7 @@ def stepper(
 def _plants(
     integrator: Integrator, members: int, dt: float, t_start: float, allowed: Tolerances
 ) -> Plants:
-    """Return plants without a start."""
+    """Return plants whose start values are not yet set."""
     model, system = integrator.model, integrator.system
     u = np.tile(model.values("u"), (members, 1))
     d = np.hstack([np.tile(model.values("p"), (members, 1)), u])
@@ -115,19 +115,19 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
 
         xf = x(T),   x(0) = x0,   u and p constant
 
-    It makes `steps` equal steps of the method; CasADi gives derivatives of any order, exact for the
-    discrete map. Time in the equations counts from 0. Algebraic variables start where their
-    equations hold, by Newton's method from their start values. Compare a result with `simulate`:
-    fixed steps have no error control, and do not detect friction that jams.
+    The function takes `steps` equal steps of the method; CasADi provides its derivatives of any
+    order, exact for the discrete map. Time in the equations starts at 0. Newton's method computes
+    consistent algebraic variables from their start values. Compare a result with `simulate`: fixed
+    steps have no error control and do not detect friction that jams.
 
     Args:
         model: explicit or implicit model without events.
         steps: number of steps; choose it so that h = T/steps resolves the transition velocity.
-        method: as in `simulate`, or one of fixed steps: "backward_euler" (order 1, stays bounded
-            if h resolves nothing), "exponential" (order 1, one evaluation).
+        method: as in `simulate`, or one for fixed steps: "backward_euler" (order 1, bounded even
+            if h does not resolve the transition), "exponential" (order 1, one evaluation).
 
     Raises:
-        ValueError: unknown method, events, fewer than one step.
+        ValueError: an unknown method, a model with events, or fewer than one step.
     """
     check_model("flow", model)
     checks.choice("flow: method", method, METHODS)
@@ -152,7 +152,7 @@ def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Functi
 
 
 def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
-    """Return all unknowns at time 0, the algebraic ones consistent."""
+    """Return all unknowns at time 0, with consistent algebraic unknowns."""
     guess = first_guess(whole, model, np.zeros(whole.nx))[whole.nx :]
     y, free = ca.vertcat(x0, ca.DM(guess)), ca.DM(whole.free)
     if whole.manifold is not None:
@@ -167,7 +167,7 @@ def _start(model: Model, whole: System, x0: ca.MX, data: ca.MX) -> ca.MX:
 
 
 def _on_constraints(whole: System, manifold: Manifold) -> ca.Function:
-    """Return (y, d) -> y on the constraints, with a basis of the tangent space if needed."""
+    """Return the projection (y, d) -> y on the constraints, with a tangent basis if needed."""
     y = ca.SX(manifold.project(whole.y, whole.d))
     if manifold.charted:
         phi = manifold.defect(whole.y, whole.d)[: manifold.m]

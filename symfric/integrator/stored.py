@@ -1,4 +1,4 @@
-"""Run results: the trajectory of a run, and its data for files and pickles."""
+"""Results of a run: its trajectory, and its data for files and pickles."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -32,13 +32,13 @@ Slopes = dict[str, dict[str, Array]]
 @final
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """Data that derivatives along stored steps need in addition.
+    """Additional data for derivatives along stored steps.
 
     Attributes:
-        which: names to differentiate with respect to.
+        which: parameters and start values to differentiate with respect to.
         guess: initial guess of the consistent start values.
-        jumps: events that were carried out.
-        tolerance: of their location [s].
+        jumps: events of the run, with their resets.
+        tolerance: tolerance of event times [s].
     """
 
     which: Seeds
@@ -50,20 +50,21 @@ class Basis:
 @final
 @dataclass(frozen=True, eq=False)
 class Stored:
-    """Run as data.
+    """Run as data for files and pickles.
 
     Attributes:
-        model, inputs, p: of the run.
-        method: a key of `METHODS`.
-        backend, engine: for signals, and for the steps.
-        steps: all accepted ones.
-        times, reached: of the result, and the unknowns there.
-        signals: at `times`, in the order of `Model.signals`.
+        model, inputs, p: equations, inputs and parameters of the run.
+        method: key of `METHODS`.
+        backend: engine of the signals.
+        engine: engine of the steps.
+        steps: all accepted steps.
+        times, reached: times of the result [s], and the unknowns at these times.
+        signals: signals at `times`, in the order of `Model.signals`.
         happened: (time [s], name) of every event.
-        status, message, statistics: how it ended, and its cost.
-        slopes, delays: derivatives at `times` and of the events, if requested.
-        unable: reason if requested derivatives do not exist.
-        basis: data for other derivatives; None in files of the first format.
+        status, message, statistics: outcome and cost of the run.
+        slopes, delays: derivatives of signals at `times` and of event times, if requested.
+        unable: reason why requested derivatives do not exist.
+        basis: data for derivatives at other times; None in files of the first format.
     """
 
     model: Model
@@ -90,7 +91,7 @@ class Stored:
         cls, integrator: Integrator, inputs: InputData, run: Run, p: Array, backend: str,
         trajectory: Trajectory, basis: Basis | None = None,
     ) -> "Stored":  # fmt: skip
-        """Build from a run and its trajectory; steps that were not kept are recomputed."""
+        """Return the data of a run and its trajectory; recompute steps that were not kept."""
         stored = cls(
             integrator.model,
             inputs,
@@ -111,7 +112,7 @@ class Stored:
         return stored if trajectory.differentiate is None else stored._with_slopes(trajectory)
 
     def check_fields(self) -> None:
-        """Check that the arrays of a file match: compiled code does not check them again."""
+        """Check that the arrays of a file match, since compiled code does not check them."""
         steps, inputs, model = self.steps, self.inputs, self.model
         (k, n), m = steps.y0.shape, self.times.size
         agree(
@@ -177,7 +178,7 @@ class Stored:
         )  # fmt: skip
 
     def _derivatives(self, integrator: Callable[[], Integrator], t: Array) -> dict[str, Any]:
-        """Return the derivative functions: those at `t` are stored, others use the steps."""
+        """Return the derivative functions: values at `t` are stored, others use the steps."""
         if self.slopes is None and not self.unable:
             return {}
 
@@ -226,7 +227,7 @@ class Stored:
         )  # fmt: skip
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write it to a file."""
+        """Write the run to a file."""
         RUN.save(path, self)
 
 
@@ -236,18 +237,18 @@ RUN = Format("symfric run", 3, "load_run", "a saved run", Stored)
 def load_run(
     path: str | PathLike[str], own: Iterable[type | Callable[..., Any]] = ()
 ) -> Trajectory:
-    """Load the run that `run.save(path)` wrote, equal bit for bit.
+    """Return the run that `run.save(path)` wrote, equal bit for bit.
 
-    Reading runs no code from the file: it holds arrays, lists of elementary operations and fields
-    of known classes, which are checked before use.
+    No code from the file is executed. The file contains arrays, lists of elementary operations and
+    fields of known classes, which are checked before use.
 
     Args:
         path: the file.
-        own: your own classes in it, such as a law.
+        own: the user's own classes in the file, such as laws.
 
     Raises:
-        ValueError: no such file, a file of another program, a damaged one, another format, or
-            unknown classes.
+        ValueError: a file that does not exist, is damaged, or has another origin or format, or
+            that contains unknown classes.
     """
     return RUN.load(path, own).unpacked()
 
@@ -264,14 +265,14 @@ def trajectory_of(
     """Return the trajectory of a run.
 
     Args:
-        model, inputs, p: of the run.
-        integrator: returns its integrator, built on first use for a stored run.
-        run: its results; only output times that were reached are used.
+        model, inputs, p: equations, inputs and parameters of the run.
+        integrator: returns the integrator of the run; a stored run builds it on first use.
+        run: results; only output times that were reached are used.
         count: returns the statistics.
-        backend: for signals: "vm", otherwise the engine that is expected to be fastest.
+        backend: engine of the signals: "vm", otherwise the engine expected to be fastest.
 
-    Third-party integrators let the constraints of mechanisms drift, and their results show it;
-    symfric's methods hold them to the tolerance between steps, and exactly in results.
+    With third-party integrators the constraints of mechanisms drift, and the results show the
+    drift. The methods of symfric satisfy them to the tolerance between steps, exactly in results.
     """
     outputs, names, drifts = run.outputs, model.signals, run.engine.startswith("casadi")
     times, engine = outputs.times, "vm" if backend == "vm" else "auto"

@@ -1,4 +1,4 @@
-"""Random campaigns: each case is compared with a reference. May import every other package."""
+"""Random campaigns that compare each case with a reference; may import every other package."""
 
 from typing import TYPE_CHECKING
 

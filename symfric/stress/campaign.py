@@ -1,4 +1,4 @@
-"""Campaigns: cases judged in worker processes, counted, and saved while they run."""
+"""Campaigns: cases are judged in worker processes, counted, and saved during the run."""
 
 import os
 from collections import Counter
@@ -17,7 +17,7 @@ from symfric.stress.problem import WORK
 from symfric.stress.workers import Crashed, TimedOut, outcomes
 
 LIMIT = 120.0
-"""Processor time [s] after which a case counts as hanging; the slowest need ten."""
+"""Processor time [s] after which a case counts as a hang; the slowest cases need 10 s."""
 NOTABLE = ("loose", "undecided", *FAILING)
 """Classes whose cases a report lists."""
 
@@ -25,13 +25,13 @@ NOTABLE = ("loose", "undecided", *FAILING)
 @final
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Result of a campaign, or of its part so far.
+    """Result of a campaign, or of the part that has finished.
 
     Attributes:
         seed: seed of the campaign.
-        asked: number of cases requested; larger than `len(verdicts)` before the end.
+        asked: number of requested cases; larger than `len(verdicts)` before the end.
         verdicts: number of a case -> verdict.
-        seconds: wall time.
+        seconds: wall time [s].
     """
 
     seed: int
@@ -47,7 +47,7 @@ class Report:
 
     @property
     def groups(self) -> dict[str, dict[str, int]]:
-        """Class -> group of reasons -> cases, the largest group first."""
+        """Class -> group of reasons -> number of cases, the largest group first."""
         count = Counter((v.kind, v.group) for v in self.verdicts.values() if v.group)
         return {
             name: {group: n for (kind, group), n in count.most_common() if kind == name}
@@ -65,7 +65,7 @@ class Report:
         return not any(self.classes[name] for name in FAILING)
 
     def errors(self) -> dict[str, float]:
-        """Return median, 99 % and greatest error [tolerances] of right and loose runs."""
+        """Return the median, 99 % quantile and maximum of the errors of right and loose runs."""
         found = [v.error for v in self.verdicts.values() if v.kind in ("right", "loose")]
         errors = np.array([e for e in found if e is not None] or [0.0])
         return {
@@ -75,7 +75,7 @@ class Report:
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return counts, and every case that is neither right nor refused."""
+        """Return the counts, and every case that is neither right nor refused."""
         return {
             "seed": self.seed,
             "cases": len(self.verdicts),
@@ -111,7 +111,7 @@ def campaign(
     limit: float = LIMIT,
     progress: Callable[[Report], None] | None = None,
 ) -> Report:
-    """Run the cases 0 ... `cases` - 1 of `seed`, or those whose numbers are given.
+    """Run the cases 0 ... `cases` - 1 of `seed`, or the cases with the given numbers.
 
     The same seed and number give the same case on any machine. An interrupt (Ctrl-C) returns the
     report so far.
@@ -119,7 +119,7 @@ def campaign(
     Args:
         cases: number of cases, or their numbers.
         seed: seed of the campaign.
-        work: attempts of a run, see `judge`.
+        work: limit of attempts times unknowns of a run, see `judge`.
         workers: number of processes; default one per core.
         limit: processor time of a case [s].
         progress: called with the report so far after each case.
@@ -151,13 +151,13 @@ def campaign(
 
 
 def rerun(case: Case, limit: float = LIMIT) -> Verdict:
-    """Judge one case in its own process, in which a crash is a verdict, too."""
+    """Judge one case in a separate process, so that a crash is a verdict, too."""
     ((_, outcome),) = outcomes(_judged, [(0, (case.to_dict(), WORK))], 1, limit)
     return _verdict(outcome)
 
 
 def _judged(task: tuple[dict[str, Any], int]) -> dict[str, Any]:
-    """Judge a case, given as its data, with a limit of work."""
+    """Judge a case for a task (data of the case, limit of work)."""
     return judge(Case.from_dict(task[0]), task[1]).to_dict()
 
 

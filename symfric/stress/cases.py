@@ -1,6 +1,6 @@
 """Random cases: laws, scenes, parameters, tolerances, methods, inputs and start values.
 
-A case is plain data; a file of a few lines reproduces it on another machine.
+A case is plain data; a file of a few lines reproduces it on other machines.
 """
 
 import json
@@ -23,42 +23,42 @@ from symfric.stress.referee.solve import Signal, knows
 T = TypeVar("T")
 
 SCENES = ("rabinowicz",) * 6 + ("drive",) * 6 + ("quarter_car",) * 2 + tuple(MECHANISMS)
-"""Scenes, repeated by their weight: those of one contact find most for their cost."""
+"""Scenes, repeated by their weight; those with one contact find the most errors for their cost."""
 
 REFEREED = 0.5
-"""Share of the cases with laws and scenes of the reference solver."""
+"""Fraction of the cases with laws and scenes of the independent reference solver."""
 
 OFFERED: dict[str, set[str]] = {
     "quarter_car": {"F_e", "x_rel", "v_rel"},
     **{scene: {"F_e"} for scene in ("rabinowicz", "drive", *MECHANISMS)},
 }
-"""Inputs of laws besides v and N that scenes provide."""
+"""Scene -> inputs of laws, in addition to v and N, that the scene provides."""
 
 WRAPPED = ("{}+viscous", "asymmetric({})", "lagged({})", "load_dependent({})",
            "temperature_dependent({})")  # fmt: skip
 METHODS = ("auto",) * 3 + ("rodas5p", "radau5") * 2 + ("rodas4p", "rodas3", "dopri5")
 ADAPTED = METHODS[:-1]
-"""Methods for mechanisms: dopri5 has no algebraic unknowns."""
+"""Methods for mechanisms; dopri5 does not support their algebraic unknowns."""
 LOOPS = ("four_mass", "slider_crank", "four_bar")
-"""Scenes whose start values must be consistent: few are drawn."""
+"""Scenes whose start values must be consistent, so that few start values are drawn."""
 SPREADS = (0.3, 1.0, 2.5)
-"""Largest distances of the parameters of a case from their defaults [decades]."""
+"""Largest deviations of the parameters of a case from their defaults [decades]."""
 
 
 @final
 @dataclass(frozen=True)
 class Case:
-    """One simulation, as data.
+    """Data of one simulation.
 
     Attributes:
         seed, number: seed of the campaign, and number of the case.
         law, scene: names, as on the command line.
         values: parameters of scene and law that differ from their defaults.
         forms: options of the law.
-        free: those of `values` that are given at run time, `simulate(p=...)`.
+        free: names in `values` whose values are given at run time, `simulate(p=...)`.
         x0: start values of states.
         inputs: input -> signal.
-        t_start, t_end: start and end [s].
+        t_start, t_end: start and end time [s].
         rtol, method, backend: as in `simulate`.
     """
 
@@ -83,7 +83,7 @@ class Case:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Case":
-        """Restore a case from `to_dict`.
+        """Return the case for the output of `to_dict`.
 
         Raises:
             ValueError: unknown, missing or wrong fields.
@@ -113,10 +113,10 @@ class Case:
 
     @classmethod
     def read(cls, path: str | Path) -> "Case":
-        """Read a case, alone or with the verdict of a campaign.
+        """Return the case in a file that contains a case, or a case and its verdict.
 
         Raises:
-            ValueError: no such file, or its content is not a case.
+            ValueError: the file does not exist, or its content is not a case.
         """
         data = read_json("case", path, "JSON of a case")
         content = data.get("case", data)
@@ -133,7 +133,7 @@ class Case:
 class Draws:
     """Random numbers of one case, equal on every machine and in every version of Python.
 
-    All come from `Random.random`, whose sequence Python guarantees.
+    All numbers are computed from `Random.random`, whose sequence Python guarantees.
     """
 
     def __init__(self, seed: int, number: int) -> None:
@@ -148,29 +148,29 @@ class Draws:
         return self.unit() < probability
 
     def pick(self, items: Sequence[T]) -> T:
-        """Return one of `items`; repeat an item to draw it more often."""
+        """Return one of `items`; repeated items are drawn more often."""
         return items[int(self.unit() * len(items))]
 
     def between(self, low: float, high: float) -> float:
-        """Return a number in [low, high), to three digits."""
+        """Return a number in [low, high), rounded to three digits."""
         return rounded(low + (high - low) * self.unit())
 
     def decade(self, low: float, high: float) -> float:
-        """Return 10^e with e in [low, high), to three digits."""
+        """Return 10^e with e in [low, high), rounded to three digits."""
         return rounded(10.0 ** (low + (high - low) * self.unit()))
 
     def signed(self, low: float, high: float) -> float:
-        """Return a decade of either sign."""
+        """Return `decade(low, high)` with a random sign."""
         return self.decade(low, high) * self.pick((1.0, -1.0))
 
 
 def rounded(value: float) -> float:
-    """Round to three significant digits, which absorbs differences in the last bit of powers."""
+    """Return a value rounded to three significant digits, so that last bits of powers cancel."""
     return float(f"{value:.3g}")
 
 
 def draw(seed: int, number: int) -> Case:
-    """Draw case `number` of the campaign `seed` from a random sequence of its own."""
+    """Return case `number` of the campaign `seed`; each case has a separate random sequence."""
     rng = Draws(seed, number)
     refereed = rng.chance(REFEREED)
     scene = rng.pick(tuple(referee_scenes.SCENES) if refereed else SCENES)
@@ -210,7 +210,7 @@ def _of_the_referee(rng: Draws, scene: str) -> tuple[str, Law]:
 
 
 def _law(rng: Draws, scene: str) -> tuple[str, Law]:
-    """Draw a law, one in six in a wrapper or a sum; few need inputs that the scene lacks."""
+    """Draw a law, one in six in a wrapper or a sum; few need inputs that are not available."""
     name = rng.pick(list(ALL_LAWS))
     while not {i.name for i in ALL_LAWS[name]().inputs} <= OFFERED.get(scene, set()):
         if rng.chance(0.1):
@@ -219,12 +219,12 @@ def _law(rng: Draws, scene: str) -> tuple[str, Law]:
     text = rng.pick(WRAPPED).format(name) if rng.chance(1 / 6) else name
     try:
         return text, law_from_text(text)
-    except ValueError:  # some wrap laws without states only
+    except ValueError:  # some wrappers accept only laws without states
         return name, law_from_text(name)
 
 
 def _values(rng: Draws, machine: Scene) -> dict[str, float]:
-    """Draw numbers of law and scene; they refuse few of them, such as mu_d > mu_s."""
+    """Draw numbers of law and scene; few of them are invalid, such as mu_d > mu_s."""
     while True:
         found = _numbers(rng, parameters(machine))
         try:
@@ -236,7 +236,7 @@ def _values(rng: Draws, machine: Scene) -> dict[str, float]:
 
 
 def _numbers(rng: Draws, known: Mapping[str, Parameter]) -> dict[str, float]:
-    """Draw parameters: one in three is decades off its default, sometimes zero or of other sign."""
+    """Draw values for one parameter in three, decades from the default, zero or of other sign."""
     spread = rng.pick(SPREADS)
     found: dict[str, float] = {}
     for name, parameter in known.items():
@@ -270,7 +270,7 @@ def _starts(rng: Draws, scene: str, law: Law, values: Mapping[str, float]) -> di
 
 
 def _signal(rng: Draws, span: float, t_start: float) -> Signal:
-    """Draw an input over decades in size: constant, samples, a sine or a short pulse."""
+    """Draw an input: constant, samples, a sine or a short pulse, with a size over decades."""
     kind = rng.pick(("constant", "hold", "linear", "sine", "sine", "pulse"))
     size = rng.signed(-1.5, 1.5)
     if kind == "constant":
@@ -287,7 +287,7 @@ def _signal(rng: Draws, span: float, t_start: float) -> Signal:
 
 @cache
 def _states(scene: str) -> tuple[tuple[str, str, float], ...]:
-    """Return names, units and starts of the states of a scene without those of its law."""
+    """Return name, unit and start value of the states of a scene, without those of its law."""
     states = ALL_SCENES[scene](Viscous()).model().x
     return tuple((v.name, v.unit, float(v.start)) for v in states)
 

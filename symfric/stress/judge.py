@@ -1,15 +1,15 @@
-"""Verdicts on cases, by a referee that shares no code with symfric, or by other methods.
+"""Verdicts on cases, from a referee that shares no code with symfric, or from other methods.
 
     tolerance of a state = rtol max|x| + atol,   error = max over states and times of
                                                          |run - truth| / tolerance
 
 The error of a right run is at most RIGHT tolerances. The truth is the motion of the referee if it
-knows law and scene and its own error, the difference of two of its solves, is small; otherwise that
-of two other methods of symfric at a hundredth and a thousandth of the tolerance, which must agree.
-A larger error may have reasons other than the run: the problem may amplify a tolerance (a block at
-the edge of sticking, a chaotic pendulum), and without damping the errors of all steps add up; the
-error then falls with rtol. A case that no reference decides is "undecided", never "right". A run
-that reports that its steps were used up is refused, and its partial result is compared.
+knows law and scene and if its error, the difference of two of its solves, is small. Otherwise it is
+the motion of two other methods of symfric at a hundredth and a thousandth of the tolerance, which
+must agree. A larger error may have other reasons than the run: the problem may amplify a tolerance
+(a block at the limit of sticking, a chaotic pendulum), and without damping the errors of all steps
+add up; the error then decreases with rtol. A case that no reference decides is "undecided", never
+"right". A run that reports too many steps is refused, and its partial result is compared.
 """
 
 from collections.abc import Mapping
@@ -53,25 +53,25 @@ CLASSES = {
     "crash": "a foreign exception, or the process died",
     "hang": "no end within the limit",
 }
-"""Name -> meaning, in the order of the table."""
+"""Class -> meaning, in the order of the table."""
 
 FAILING = ("silent", "nan", "crash", "hang")
-"""Classes that must be empty."""
+"""Classes whose cases are failures."""
 
 LOOSE = 100.0
 SENSITIVE = 1e-2
-"""Relative error above which the sum of errors is not small and each step is judged; and relative
-growth of one tolerance above which the error of a step proves nothing."""
+"""Relative error above which the sum of errors is not small, so that each step is judged; and
+relative growth of one tolerance above which the error of a step decides nothing."""
 SUSPECT = "adds up over steps"
-"""Group of undecided runs that are silently wrong if a single step is wrong."""
+"""Group of undecided runs, which are silently wrong if a single step is wrong."""
 LADDER, FINEST = (1e-2, 1e-5, 1e-1), 1e-13
 """Tolerances of the references relative to that of the case, and the smallest tolerance."""
 DOUBT = RIGHT / 3
-"""Largest error [tolerances] of the referee with which it judges."""
+"""Largest error [tolerances] of the referee at which its solution is used."""
 CHECKED = 3000
-"""Number of steps of a stopped run that are compared."""
+"""Largest number of steps of a stopped run that are compared."""
 RAW = ("Traceback", ".cpp:", "casadi::", "Assertion")
-"""Texts that no message to users contains."""
+"""Texts that messages to users must not contain."""
 
 
 @final
@@ -101,17 +101,17 @@ class Verdict:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Verdict":
-        """Restore the output of `to_dict`."""
+        """Return the verdict for the output of `to_dict`."""
         return cls(**data)
 
 
 def judge(case: Case, work: int = WORK) -> Verdict:
-    """Run a case and its references; exceptions of defects in symfric are not caught.
+    """Return the verdict on a case; exceptions due to defects of symfric are not caught.
 
     Args:
-        case: case.
+        case: data of the case.
         work: largest number of attempts of a run times its unknowns; a reference may take this
-            number and ten times the attempts of the run.
+            number plus ten times the attempts of the run.
     """
     try:
         ready = problem(case, work)
@@ -137,7 +137,7 @@ def _refused(group: str, sentence: str, steps: int = 0) -> Verdict:
 
 
 def _failed(ready: Problem, error: SolveError) -> Verdict:
-    """Judge a solve that reports a failure; the group states if another method succeeds."""
+    """Judge a solve that reports a failure; the group states whether another method succeeds."""
     if error.status is Status.MAX_STEPS:
         return _stopped(ready, error)
     steps = error.partial.statistics.steps if isinstance(error.partial, Trajectory) else 0
@@ -149,7 +149,7 @@ def _failed(ready: Problem, error: SolveError) -> Verdict:
 
 
 def _stopped(ready: Problem, error: SolveError) -> Verdict:
-    """Judge a run whose steps were used up: refused if its partial result is right."""
+    """Judge a run with too many steps, which is refused if its partial result is right."""
     run, case = error.partial, ready.case
     if not isinstance(run, Trajectory) or run.step_times.size < 2:
         return _refused("too many steps", str(error))
@@ -168,7 +168,7 @@ def _stopped(ready: Problem, error: SolveError) -> Verdict:
 
 
 def _compared(ready: Problem, run: Trajectory) -> Verdict:
-    """Judge by the referee or by other methods; if they cannot decide, by each step."""
+    """Judge a run by the referee or by other methods; if they cannot decide, by each step."""
     answer = answered(ready, lambda y, states: apart(ready, y, states).max(0))
     if answer is None or answer.doubt[1:].min() > DOUBT:
         verdict = by_methods(ready, run)
@@ -187,7 +187,7 @@ def _compared(ready: Problem, run: Trajectory) -> Verdict:
 
 
 def _by_referee(ready: Problem, run: Trajectory, answer: Answer) -> Verdict:
-    """Judge by the referee while its own error is small, and by other methods after that."""
+    """Judge a run by the referee while its error is small, and by other methods afterwards."""
     sure = int(np.argmax(answer.doubt > DOUBT)) or TIMES
     over_time = apart(ready, table(run, ready.times), answer.states).max(0)
     error, steps = float(over_time[:sure].max()), run.statistics.steps
@@ -203,7 +203,7 @@ def _by_referee(ready: Problem, run: Trajectory, answer: Answer) -> Verdict:
 
 
 def by_methods(ready: Problem, run: Trajectory) -> Verdict:
-    """Judge by methods of other families at decreasing tolerances."""
+    """Judge a run by methods of other families at decreasing tolerances."""
     verdicts = list[Verdict]()
     for factor in LADDER:
         verdicts.append(_by_two(ready, run, max(factor * ready.case.rtol, FINEST)))
@@ -213,7 +213,7 @@ def by_methods(ready: Problem, run: Trajectory) -> Verdict:
 
 
 def _by_two(ready: Problem, run: Trajectory, rtol: float) -> Verdict:
-    """Judge by two methods, one at `rtol` and, if needed, the other at a tenth of it."""
+    """Judge a run by a method at `rtol` and, if needed, another method at a tenth of it."""
     case, steps = ready.case, run.statistics.steps
     limit = 10 * (steps + run.statistics.rejections) + ready.attempts
     reference = attempt(ready, rtol, other_method(case), limit)
@@ -247,7 +247,7 @@ def _graded(
     limit: int,
     answer: Answer | None = None,
 ) -> Verdict:
-    """Decide between loose and silently wrong by the growth of a tolerance in the problem."""
+    """Judge a run with a large error by the growth of one tolerance in the problem."""
     steps, y = run.statistics.steps, truth(ready.times)
     grown = amplification(ready, y, limit, answer)
     text = f"{error:.3g} tolerances off; the problem amplifies one to {grown:.3g}"
@@ -271,7 +271,7 @@ def _explained(
     if (between := at_steps(ready, run, truth)) <= RIGHT:
         text += f", and the ends of its steps by {between:.3g}"
         return replace(loose, reason=text, group="between steps only")
-    # the error of a corner scatters by an order of magnitude with the steps at it
+    # the error at a corner varies by an order of magnitude with the position of the steps
     for divisor, share in ((10, 3), (100, 9)):
         rtol = max(ready.case.rtol / divisor, FINEST)
         finer = attempt(ready, rtol, ready.case.method, divisor * ready.attempts)

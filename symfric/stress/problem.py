@@ -24,18 +24,18 @@ from symfric.stress.referee.solve import NO_FORCE, SINE, Question, Signal, knows
 Array = NDArray[np.float64]
 WORK = 120_000
 TIMES = 101
-"""Times at which runs are compared."""
+"""Number of times at which runs are compared."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Case that is ready to run.
+    """Model and data of a case, ready to run.
 
     Attributes:
         case: data of the case.
         model: equations.
-        inputs: arguments of `simulate`.
+        inputs: inputs for `simulate`.
         p: parameters given at run time.
         work: largest number of attempts times unknowns; attempts of large machines cost more.
     """
@@ -67,7 +67,7 @@ class Problem:
         t_eval: NDArray[np.float64] | None = None,
         **options: Any,
     ) -> Trajectory:
-        """Simulate once, without warnings; errors are those of `simulate`."""
+        """Return a run of `simulate` without warnings; errors are those of `simulate`."""
         times = self.times if t_eval is None else t_eval
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)
@@ -88,7 +88,7 @@ class Problem:
 
 
 def problem(case: Case, work: int = WORK) -> Problem:
-    """Build the model of a case.
+    """Return the model of a case.
 
     Raises:
         ValueError: the law, the scene or the equations refuse the numbers.
@@ -97,7 +97,7 @@ def problem(case: Case, work: int = WORK) -> Problem:
     law = replace(law, **case.forms) if case.forms else law
     scene = with_values(ALL_SCENES[case.scene](law), case.values)
     p = {name: case.values[name] for name in case.free}
-    if p:  # the model has the defaults; the numbers are given at run time
+    if p:  # the model has default values; the values of the case are given at run time
         known = parameters(ALL_SCENES[case.scene](law))
         scene = with_values(scene, {name: known[name].value for name in p})
     inputs = {name: signal(s) for name, s in case.inputs.items()}
@@ -128,14 +128,15 @@ def signal(s: Signal) -> Input:
 States = Callable[[Array], Array]
 """Function from times to states, shape (nx, times)."""
 RTOL, ENOUGH = 1e-10, 0.3
-"""Tolerance of the reference solver, and its largest accepted error [tolerances]."""
+"""Relative tolerance of the reference solver, and its largest accepted error [tolerances]."""
 GAVE_UP = (ArithmeticError, ValueError)
 
 
 def question(ready: Problem, times: Array) -> Question | None:
-    """Return the case at `times`, which begin at its start; None if the referee does not know it.
+    """Return the case as data for the referee; None if the referee does not know it.
 
-    Start values are those of the model: a bristle starts at its steady state.
+    The first of `times` is the start. Start values are those of the model, in which a bristle
+    starts at its steady state.
     """
     case, model = ready.case, ready.model
     if not knows(case.law, case.scene) or any(name.endswith("mode") for name in case.x0):
@@ -157,12 +158,12 @@ def question(ready: Problem, times: Array) -> Question | None:
 @final
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Motion of a case by the reference solver.
+    """Motion of a case, computed by the reference solver.
 
     Attributes:
-        asked: case.
+        asked: data of the case.
         rtol: relative tolerance of SciPy.
-        doubt: difference [tolerances] from another solve, at the requested times.
+        doubt: difference [tolerances] from another solve at the requested times.
     """
 
     asked: Question
@@ -175,7 +176,7 @@ class Answer:
         return solve(replace(self.asked, times=at), self.rtol)[:, back[1:]]
 
     def onward(self, times: Array, start: Array) -> Array | None:
-        """Return states at `times` of the motion that begins at the first with `start`."""
+        """Return states at `times` of the motion that starts at times[0] with `start`."""
         try:
             return solve(replace(self.asked, times=times, y=start), self.rtol)
         except GAVE_UP:
@@ -186,7 +187,7 @@ def answered(ready: Problem, distance: Callable[[Array, States], Array]) -> Answ
     """Return the reference solution, or None if there is none.
 
     The solve at 1e-10 is compared with one at 1e-9 and, if they differ too much, with one at 1e-12.
-    `distance` returns the difference of states at the times of the problem from others, over time.
+    `distance` returns the difference [tolerances] of two motions at the times of the problem.
     """
     asked = question(ready, ready.times)
     if asked is None:
@@ -206,9 +207,9 @@ def answered(ready: Problem, distance: Callable[[Array, States], Array]) -> Answ
 RIGHT = 10.0
 """Largest error [tolerances] of a right run."""
 STATIONS = (0, TIMES // 3, 2 * TIMES // 3)
-"""Numbers of the times at which a tolerance is added."""
+"""Indices of the times at which a tolerance is added."""
 STRIDES = 100
-"""Least number of steps of a reference, which must not leap over events."""
+"""Smallest number of steps of a reference, which must not miss short events."""
 
 
 def attempt(
@@ -219,14 +220,14 @@ def attempt(
     x0: Mapping[str, float] | None = None,
     times: Array | None = None,
 ) -> Trajectory | SolveError:
-    """Run a reference in short steps; a failure is returned.
+    """Return a reference run with short steps, or its error if it fails.
 
     Args:
         ready: problem.
         rtol, method: as in `simulate`.
         limit: largest number of attempts.
-        x0: start values; default: those of the case.
-        times: times of the results; default: those of the problem.
+        x0: start values; by default those of the case.
+        times: times of the results [s]; by default those of the problem.
     """
     try:
         span = ready.case.t_end - ready.case.t_start
@@ -238,12 +239,12 @@ def attempt(
 
 
 def other_method(case: Case) -> str:
-    """Return a method of another family than that of the case."""
+    """Return the name of a method of another family than that of the case."""
     return "rodas5p" if chosen("case", case.method, case.rtol).name == "radau5" else "radau5"
 
 
 def third_method(case: Case) -> str:
-    """Return the method of the second reference."""
+    """Return the name of the method of the second reference."""
     return "radau5" if other_method(case) == "rodas5p" else "rodas5p"
 
 
@@ -255,7 +256,7 @@ def distance(ready: Problem, run: Trajectory, truth: States) -> float:
 def at_steps(ready: Problem, run: Trajectory, truth: States) -> float:
     """Return the largest difference [tolerances] at the ends of the steps of the run.
 
-    An implicit step over a fast transient may end right although its polynomial is off in between.
+    An implicit step over a fast transient may end right although its interpolation is inaccurate.
     """
     times = run.step_times[run.step_times <= ready.case.t_end]
     times = times[:: 1 + times.size // TIMES]
@@ -266,7 +267,7 @@ def at_steps(ready: Problem, run: Trajectory, truth: States) -> float:
 def apart(ready: Problem, y: Array, truth: States) -> Array:
     """Return differences of states y at the times of the problem [tolerances], shape (nx, times).
 
-    In a model with events y may be early or late by rtol of the duration, as regimes jump.
+    In a model with events, regimes jump, so y may be early or late by rtol times the duration.
     """
     if not ready.model.events:
         z = truth(ready.times)
@@ -296,7 +297,7 @@ def table(run: Trajectory, times: Array) -> Array:
 
 
 def amplification(ready: Problem, y: Array, limit: int, answer: Answer | None = None) -> float:
-    """Return the growth of one tolerance [tolerances] that is added at a station of y."""
+    """Return the largest growth of one tolerance that is added to y at one of `STATIONS`."""
     size, worst = tolerances(ready, y), 1.0
     for k in STATIONS:
         times, ends = ready.times[k:], list[Array]()
@@ -314,21 +315,22 @@ def amplification(ready: Problem, y: Array, limit: int, answer: Answer | None = 
 
 
 def onward(ready: Problem, times: Array, y: Array, limit: int) -> Array | None:
-    """Return states at `times` of the motion that begins at the first with y; None if it fails."""
+    """Return states at `times` of the motion that starts with y; None if the run fails."""
     start = dict(zip((v.name for v in ready.model.x), y.tolist(), strict=True))
     try:
         run = attempt(ready, ready.case.rtol / 100, third_method(ready.case), limit, start, times)
-    except ValueError:  # no algebraic unknowns found for these states
+    except ValueError:  # these states have no consistent algebraic unknowns
         return None
     return None if isinstance(run, SolveError) else table(run, times)
 
 
 def worst_step(ready: Problem, run: Trajectory, size: Array, limit: int) -> float:
-    """Return the largest error of a single step [tolerances] from its own start.
+    """Return the largest error of a single step [tolerances], relative to a run from its start.
 
-    Another method follows stretches of steps. Those with an error above `RIGHT` are halved until
-    one step is left, whose error is returned; otherwise the largest error of a stretch. Infinite if
-    the other method fails. Errors that are damped within a stretch do not affect the run.
+    Another method repeats sequences of steps. A sequence with an error above `RIGHT` is halved
+    until one step is left, whose error is returned. Without such a sequence, the result is the
+    largest error of a sequence; errors that are damped within a sequence do not affect the run. The
+    result is infinite if the other method fails.
     """
     t = run.step_times[run.step_times <= ready.case.t_end]
     y = table(run, t)
@@ -343,7 +345,7 @@ def worst_step(ready: Problem, run: Trajectory, size: Array, limit: int) -> floa
             other = attempt(
                 part, ready.case.rtol / 100, other_method(ready.case), limit, start, span
             )
-        except ValueError:  # no algebraic unknowns found for these states
+        except ValueError:  # these states have no consistent algebraic unknowns
             return float("inf")
         if isinstance(other, SolveError):
             return float("inf")

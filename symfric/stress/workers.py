@@ -1,4 +1,4 @@
-"""Tasks in processes of their own, which may crash or hang."""
+"""Tasks in separate processes, which may crash or hang."""
 
 import os
 import signal
@@ -12,16 +12,16 @@ from time import monotonic
 from typing import Any, NamedTuple, final
 
 WALL = 10
-"""Wall time over processor time after which a task counts as blocked."""
+"""Ratio of wall time to the limit of processor time above which a task counts as blocked."""
 
 Work = Callable[[Any], Any]
 Task = tuple[int, Any]
-"""Number of a task, and the argument of the work."""
+"""Number of a task, and the argument of its function."""
 
 
 @final
 class Crashed(NamedTuple):
-    """The process of a task ended: its signal or exit status, and its last line of output."""
+    """Signal or exit status of a process that ended without a result, and its last output line."""
 
     how: str
     last_line: str
@@ -29,7 +29,7 @@ class Crashed(NamedTuple):
 
 @final
 class TimedOut(NamedTuple):
-    """A task took more processor time than its limit [s]."""
+    """Limit of processor time [s] that a task exceeded."""
 
     limit: float
 
@@ -46,17 +46,17 @@ class _Running:
 def outcomes(
     work: Work, tasks: Iterable[Task], size: int, limit: float
 ) -> Generator[tuple[int, Any]]:
-    """Yield number and result of each task as they come, or `Crashed` or `TimedOut`.
+    """Yield number and result (or `Crashed` or `TimedOut`) of the tasks in order of completion.
 
-    Each task has a process, a copy of one that has imported the module of `work`. Closing the
-    iterator ends all processes.
+    Each task runs in a separate process, forked from one that has imported the module of `work`.
+    Closing the iterator ends all processes.
 
     Args:
         work: function of a module, called with the argument of a task.
         tasks: numbers and arguments.
-        size: number of processes at a time.
-        limit: processor time of a task [s], which a loaded machine does not change; wall time is
-            limited to `WALL` times as much.
+        size: number of simultaneous processes.
+        limit: processor time of a task [s], which does not depend on the load of the machine; wall
+            time is limited to `WALL` times this value.
     """
     context = get_context("forkserver")
     context.set_forkserver_preload(["__main__", work.__module__])
@@ -94,7 +94,7 @@ def _end(pipe: Any, one: _Running) -> None:
 
 
 def _result(pipe: Any, one: _Running, limit: float) -> Any:
-    """Return the result of a task, or describe how its process ended."""
+    """Return the result of a task, or the reason why its process ended without a result."""
     try:
         return pipe.recv()
     except (EOFError, ConnectionError):
@@ -108,9 +108,9 @@ def _result(pipe: Any, one: _Running, limit: float) -> Any:
 
 
 def _run(work: Work, argument: Any, pipe: Any, log: str, limit: float) -> None:
-    """Run one task; an exception ends the process, its traceback in `log`.
+    """Run one task; an exception ends the process, with the traceback in `log`.
 
-    The timer counts processor time and ends the process by SIGPROF, inside compiled code, too.
+    The timer counts processor time and ends the process with SIGPROF, also inside compiled code.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the parent handles Ctrl-C
     with open(log, "w", encoding="utf-8") as output:

@@ -1,4 +1,4 @@
-"""Figures 2, 6 and 7: how the force answers a velocity that rises and falls."""
+"""Figures 2, 6 and 7: response of the force to a velocity that rises and falls."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -25,19 +25,19 @@ from symfric.gallery.shared import look
 from symfric.laws import AnyLaw, steady_force
 
 Motion = tuple[float, float, tuple[float, ...], int]
-"""Mean and amplitude of a velocity [m/s], frequencies [Hz], periods that are run."""
+"""Mean and amplitude of a velocity [m/s], frequencies [Hz], and number of periods."""
 POINTS = 1600
-"""Samples a period."""
+"""Number of samples per period."""
 
 
 def slid(model: GenericAsperity, frequency: float, periods: int) -> tuple[np.ndarray, ...]:
-    """Time, velocity, force, its rate and the steady force over the mean period."""
+    """Return time, velocity, force, its rate and the steady force over the mean period."""
     t = np.arange(periods * POINTS + 1) / POINTS / frequency
     turn = 2 * np.pi * frequency
     x = 250e-6 * t - 240e-6 * np.sin(turn * t) / turn
     F = model.force(t, x, 1.0)[2 * POINTS : -1].reshape(-1, POINTS).mean(axis=0)
     waves = np.fft.rfft(F)
-    waves[25:] = 0.0  # what is left beyond is the scatter of the asperities
+    waves[25:] = 0.0  # higher harmonics are scatter of the asperities
     rate = np.fft.irfft(1j * turn * np.arange(waves.size) * waves, POINTS)
     t = t[:POINTS]
     v = 250e-6 - 240e-6 * np.cos(turn * t)
@@ -45,13 +45,13 @@ def slid(model: GenericAsperity, frequency: float, periods: int) -> tuple[np.nda
 
 
 def explained(X: np.ndarray, rate: np.ndarray) -> tuple[float, float]:
-    """The best factor k in rate = k X, and which share of the rate it explains."""
+    """Return the best factor k in rate = k X, and the share of the rate that it explains."""
     k = float(X @ rate / (X @ X))
     return k, float(1 - np.sum((rate - k * X) ** 2) / np.sum(rate**2))
 
 
 def faster(model: GenericAsperity) -> dict[str, float]:
-    """Shares of dF/dt that powers of |v| explain where the velocity changes eight times as fast."""
+    """Return the shares of dF/dt that powers of |v| explain at eight times the frequency."""
     _, v, force, rate, s = slid(model, 2.0, 4)
     powers = {"C/|v|": 0.0, "|v|^(-1/2)": 0.5, "a constant h": 1.0}
     return {
@@ -64,23 +64,24 @@ def faster(model: GenericAsperity) -> dict[str, float]:
 
 @plate("1", within=0.078)
 def fig_02_lag_of_the_generic_model(quick: bool) -> Drawn:
-    """The generic model slides at a velocity that changes slowly: its force, and the function h.
+    """Generic model in sliding at a velocity that changes slowly: its force, and the function h.
 
     v = 250 um/s - 240 um/s cos(2 pi t / 4 s), from the third period on, averaged over periods; the
     signal, velocity range and contact of the figure are not given (its axes end at 2 mm/s and 12
-    N). h is what dF/dt = v (1 - F/s(v)) h asks for; the paper replaces it by C/|v|.
+    N). The function h follows from dF/dt = v (1 - F/s(v)) h; the paper replaces it by C/|v|.
 
     Compared: the steady force of the generic model with the Stribeck curve of table 1, to which one
-    number of it is fitted, and with its mean over the life of a rigid contact, in closed form.
+    number of the model is fitted, and with its mean over the life of a rigid contact, in closed
+    form.
 
-    Distance: largest difference from the Stribeck curve of table 1, over F_s.
+    Distance: largest difference from the Stribeck curve of table 1, relative to F_s.
 
-    Reproduced: at this pace C/|v| explains dF/dt, and a constant h, as in LuGre, does not.
+    Reproduced: at this frequency C/|v| explains dF/dt, and a constant h, as in LuGre, does not.
 
-    Undecided: whether that is so at every pace, since the generic model is a reconstruction. In it,
-    as the velocity changes eight times faster, a constant explains more than C/|v|, and a power of
-    about -1/2 more than both: a contact forgets over a path as well as over a time. The C = 24 N/s
-    of table 1 is missed by a third, as the counterface is ours.
+    Undecided: whether this holds at every frequency, since the generic model is a reconstruction.
+    If its velocity changes eight times faster, a constant explains more than C/|v|, and a power of
+    about -1/2 more than both: a contact forgets over a path as well as over a time. C differs from
+    the 24 N/s of table 1 by a third, since the counterface is our choice.
     """
     model = generic(100 if quick else 4000)
     t, v, F, rate, s = slid(model, 0.25, 3 if quick else 4)
@@ -144,7 +145,7 @@ def fig_02_lag_of_the_generic_model(quick: bool) -> Drawn:
 
 
 def draw_loops(chosen: Mapping[str, AnyLaw], runs: Mapping[str, Sequence[Curve]]) -> Figure:
-    """Draw force over velocity."""
+    """Return a picture of the force over the velocity."""
     loops = {name: {c.case: (1e6 * c["v"], c["F"]) for c in each} for name, each in runs.items()}
     return law_grid(chosen, loops, ("velocity [µm/s]", "friction force [N]"))
 
@@ -152,7 +153,7 @@ def draw_loops(chosen: Mapping[str, AnyLaw], runs: Mapping[str, Sequence[Curve]]
 def off_by_hand(
     runs: Mapping[str, Sequence[Curve]], names: Iterable[str], motion: Motion, steps: int
 ) -> dict[str, float]:
-    """Largest difference [N] of each law from the equations by hand, in `steps` per period."""
+    """Return the largest difference [N] of each law from equations by hand, `steps` per period."""
     mean, swing, frequencies, periods = motion
     numbers: dict[str, float] = {}
     for name in names:
@@ -173,22 +174,21 @@ TRANSITION: Motion = (0.0, 500e-6, (2.0, 10.0), 2)
 def fig_06_frictional_lag(quick: bool) -> Drawn:
     """Frictional lag: a velocity that rises and falls without reversal, at 2, 5 and 10 Hz.
 
-    v = 250 um/s + 200 um/s sin(2 pi f t); the paper says a sine plus an offset, without numbers.
+    v = 250 um/s + 200 um/s sin(2 pi f t); the paper states a sine plus an offset, without numbers.
 
-    Compared: the force over the velocity in the third period with the equations written again by
-    hand.
+    Compared: the force over the velocity in the third period with the equations written by hand.
 
-    Distance: largest difference from them, over the force at break-away. For the elasto-plastic law
-    it is that of its step, a quintic here and a sine in the paper.
+    Distance: largest difference, relative to the force at break-away. For the elasto-plastic law it
+    is due to its step function, a quintic here and a sine in the paper.
 
-    Reproduced: all laws with lag carry less while the velocity falls, and their loops grow with the
-    frequency, as the paper says.
+    Reproduced: all laws with lag have a lower force while the velocity falls, and their loops grow
+    with the frequency, as the paper states.
 
-    Undecided: whether LuGre and Leuven are alike and GMS like the generic model. With the numbers
-    of table 1 and our elements Leuven has less than an eighteenth of the loop of LuGre, since its
-    hysteresis is that much stiffer than sigma_0, and LuGre is nearer to the generic model than GMS
-    at 2 Hz, as near at 5 Hz, and farther away at 10 Hz; but elements, generic model and velocities
-    are ours.
+    Undecided: whether LuGre is similar to Leuven, and GMS to the generic model. With the numbers of
+    table 1 and our elements the loop of Leuven is less than an eighteenth of that of LuGre, since
+    its hysteresis is stiffer than sigma_0 by this factor, and LuGre is nearer to the generic model
+    than GMS at 2 Hz, as near at 5 Hz, and farther away at 10 Hz; but elements, generic model and
+    velocities are our choice.
     """
     chosen = laws(count=100 if quick else 2000)
     runs = {name: curves(law) for name, law in chosen.items()}
@@ -221,7 +221,7 @@ def fig_06_frictional_lag(quick: bool) -> Drawn:
 
 
 def curves(law: AnyLaw) -> tuple[Curve, ...]:
-    """The last period at each frequency; a law without lag follows its steady force."""
+    """Return the last period at each frequency; a law without lag has its steady force."""
     if "L" in phenomena(law):
         _, _, frequencies, periods = LAG
         return lag(law, 1.0, SIGNALS, frequencies, periods).curves[: len(frequencies)]
@@ -233,17 +233,16 @@ def curves(law: AnyLaw) -> tuple[Curve, ...]:
 def fig_07_transition(quick: bool) -> Drawn:
     """From pre-sliding to sliding and back: a sinusoidal velocity at 2 and 10 Hz.
 
-    v = 500 um/s sin(2 pi f t): the amplitude is read off the axes, which end at 500 um/s.
+    v = 500 um/s sin(2 pi f t): the amplitude is that of the axes, which end at 500 um/s.
 
-    Compared: the force over the velocity in the second period with the equations written again by
-    hand.
+    Compared: the force over the velocity in the second period with the equations written by hand.
 
-    Distance: largest difference from them, over the force at break-away.
+    Distance: largest difference, relative to the force at break-away.
 
     Reproduced: GMS and the generic model have their peak while the velocity rises, by 9 % or more,
-    LuGre and Leuven while it falls, by a quarter or more, as the paper says. The elasto-plastic
-    law, which the paper leaves out here, goes with LuGre. All of them stay within the 0.8 N at
-    which the axes of the paper end; Maxwell slip, which knows no velocity, does not.
+    LuGre and Leuven while it falls, by a quarter or more, as the paper states. The elasto-plastic
+    law, which the paper omits here, behaves like LuGre. All of them remain within the 0.8 N at
+    which the axes of the paper end; Maxwell slip, which does not depend on the velocity, does not.
     """
     chosen = laws(count=100 if quick else 2000)
     _, _, frequencies, periods = TRANSITION
@@ -276,7 +275,7 @@ def fig_07_transition(quick: bool) -> Drawn:
 
 
 def peaks(curve: Curve) -> tuple[float, float]:
-    """Largest force [N] at positive velocity while it rises, and while it falls."""
+    """Return the largest forces [N] at positive velocity while it rises and while it falls."""
     v, F = curve["v"], curve["F"]
     top = int(np.argmax(v))
     half = slice(top, (v.size - 1) // 2)

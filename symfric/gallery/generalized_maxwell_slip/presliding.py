@@ -19,7 +19,7 @@ from symfric.laws import law_name
 
 
 def elements_again(curve: Curve) -> dict[str, float]:
-    """The elements of `_laws` once more, from the loops of the generic model."""
+    """Return the elements of `laws`, identified again from the loops of the generic model."""
     data = Measured(curve["v"], curve["F"], curve["x"], curve["t"])
     found = fit_elements(data, len(paper.ELEMENTS), viscous=False, offset=False)
     return {
@@ -31,7 +31,7 @@ def elements_again(curve: Curve) -> dict[str, float]:
 
 
 def alternative(numbers: dict[str, float]) -> dict[str, bool]:
-    """Claim that Leuven with the state equation of section 4 misses the inner loop of figure 5."""
+    """Return the claim that Leuven with the equation of section 4 does not close the inner loop."""
     missed: list[float] = []
     for delta in (1.0, 2.0, paper.DELTA_L):
         step = partial(paper.leuven, alternative=True, delta=delta)
@@ -48,16 +48,16 @@ TABLE_1 = (1.05, 0.2, 98e-6, 0.78, 0.16e6, 0.08, 0.61e-6, 7.0, 24.0)
 
 @plate("m", within=3e-11)
 def fig_04_position(quick: bool) -> Drawn:
-    """The position signal of the pre-sliding test.
+    """Position signal of the pre-sliding test.
 
-    The paper gives a curve without numbers: up to 1.5 um in 8 s, with a loop inside a loop. We go
-    through eight turning points, at rest in each.
+    The paper shows a curve without numbers: up to 1.5 um in 8 s, with a loop inside a loop. Our
+    path has eight turning points and is at rest in each.
 
     Compared: the position that the figure `hysteresis` integrates with the cosines in closed form.
 
     Distance: largest difference.
 
-    Undecided: the speed of the signal, which matters in figure 5: 20 times faster ours is half the
+    Undecided: the speed of the signal, which affects figure 5: at 20 times our speed it is half the
     Stribeck velocity of table 1.
     """
     run = hysteresis(paper.laws(count=1)["Dahl"], 1.0, speeds=(1.0,), route=paper.PATH)
@@ -95,7 +95,7 @@ def fig_04_position(quick: bool) -> Drawn:
 
 SPEEDS = (1.0, 5.0, 20.0)
 ORDER = ("generic model", "GMS", "Leuven", "Maxwell slip", "LuGre", "elasto-plastic", "Dahl")
-"""The stiffness of the first four is that of the generic model, of the others sigma_0."""
+"""Laws in the order of stiffness: that of the generic model for the first four, then sigma_0."""
 
 
 @plate("1", within=(4e-3, 2e-3))
@@ -105,19 +105,20 @@ def fig_05_presliding(quick: bool) -> Drawn:
     The path of figure 4 takes 8 s, and a fifth and a twentieth of that. The elements of GMS, Leuven
     and Maxwell slip are fitted to the loops of the generic model, as in the paper.
 
-    Compared: the force along the path with the paper's equations written again by hand.
+    Compared: the force along the path with the paper's equations written by hand.
 
-    Distance: largest difference from them, over the force at break-away.
+    Distance: largest difference, relative to the force at break-away.
 
-    Reproduced: GMS, Maxwell slip and the generic model close their inner loop, LuGre and Dahl miss
-    it by 6 and 10 % of their force, as the paper says; Leuven, with the delta_l = 7 of table 1,
-    misses it by 2 %, and the elasto-plastic law is a spring on this path.
+    Reproduced: GMS, Maxwell slip and the generic model close their inner loop; LuGre and Dahl leave
+    a gap of 6 and 10 % of their force, as the paper states. Leuven, with the delta_l = 7 of table
+    1, leaves a gap of 2 %, and the elasto-plastic law is a spring on this path.
 
     Refuted: that pre-sliding does not depend on the velocity, at 20 times the speed of our path,
-    where it runs at half of V_s. Whatever slips there follows s(v), and GMS breaks away a quarter
-    lower, Leuven a seventh; the generic model hardly does. That the alternative state equation of
-    section 4, dz/dt = v sgn(1 - F_h/s) |1 - F_h/s|^delta_l, is as good: with these elements it
-    misses the inner loop by 15 % or more, for exponents of 1, 2 and 7.
+    which is half of V_s. All slipping elements follow s(v), so the break-away of GMS is a quarter
+    lower and that of Leuven a seventh; that of the generic model hardly changes. That the
+    alternative state equation of section 4, dz/dt = v sgn(1 - F_h/s) |1 - F_h/s|^delta_l, is as
+    good: with these elements it leaves a gap of 15 % or more in the inner loop, for exponents of 1,
+    2 and 7.
     """
     made = paper.laws(count=200 if quick else 2000)
     chosen = {name: made[name] for name in ORDER}
@@ -170,12 +171,12 @@ def fig_05_presliding(quick: bool) -> Drawn:
 
 
 def at_turns(curve: Curve) -> np.ndarray:
-    """Force at the turning points [N]."""
+    """Return the force at the turning points [N]."""
     return curve["F"][:: (curve["F"].size - 1) // (len(paper.PATH) - 1)]
 
 
 def along_path(name: str, curve: Curve, steps: int) -> float:
-    """Largest difference of a curve from the equations by hand [N]."""
+    """Return the largest difference of a curve from the equations by hand [N]."""
     end = float(curve["t"][-1])
     t = np.linspace(0.0, end, steps + 1)
     legs, phase = np.diff(paper.PATH), t / end * (len(paper.PATH) - 1)
@@ -191,7 +192,7 @@ MASS = 1.0  # kg; not in the paper
 
 
 def force(t: ca.SX) -> ca.SX:
-    """Force on the block [N] at time t [s]."""
+    """Return the force on the block [N] at time t [s]."""
     back = PEAK - (PEAK - BASE) * (t - RISE) / FALL
     push = ca.if_else(t < RISE, PEAK * t / RISE, ca.fmax(BASE, back))
     swing = SWING * ca.sin(2 * ca.pi * FREQUENCY * (t - SINCE))
@@ -199,9 +200,10 @@ def force(t: ca.SX) -> ca.SX:
 
 
 def stop_of(level: float) -> float:
-    """Return the time [s] at which a block braked by a constant force `level` [N] stops.
+    """Return the time [s] at which a block stops under a constant braking force `level` [N].
 
-    It moves from where the push reaches the level; its momentum is the area between push and level.
+    The block moves from the time at which the push reaches the level; its momentum is the area
+    between push and level.
     """
     begin = level / PEAK * RISE
     crossing = RISE + FALL * (PEAK - level) / (PEAK - BASE)
@@ -211,9 +213,9 @@ def stop_of(level: float) -> float:
 
 
 def drift_of(stiffness: float, level: Callable[[Array], Array]) -> float:
-    """Way in a period of vibration of a bristle of which `level` [N] is the force in sliding [m].
+    """Return the drift [m] per period of vibration of a bristle with force `level` [N] in sliding.
 
-    v (1 - F sign(v) / level(v)) = (dF/dt) / stiffness with F the applied force: no inertia.
+    v (1 - F sign(v) / level(v)) = (dF/dt) / stiffness, with the applied force F, without inertia.
     """
     turn = 2 * np.pi * FREQUENCY
     t = (np.arange(20_000) + 0.5) / 20_000 / FREQUENCY
@@ -225,14 +227,14 @@ def drift_of(stiffness: float, level: Callable[[Array], Array]) -> float:
 
 
 def in_periods(t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Mean position in each period of the vibration [m]."""
+    """Return the mean position in each period of the vibration [m]."""
     steps = round(1 / (FREQUENCY * (t[1] - t[0])))
     late = x[np.argmax(t >= SINCE) : -1]
     return late[: late.size // steps * steps].reshape(-1, steps).mean(axis=1)
 
 
 def said(numbers: dict[str, float], names: list[str], quick: bool) -> dict[str, bool]:
-    """The claims on the ways and the break-aways."""
+    """Return the claims on drift and break-away."""
     first, last, rate, least = (
         {name: numbers[f"{key}, {name}{end}"] for name in names}
         for key, end in (
@@ -261,21 +263,22 @@ def said(numbers: dict[str, float], names: list[str], quick: bool) -> dict[str, 
 
 @plate("s", within=0.004)
 def fig_08_applied_force(quick: bool) -> Drawn:
-    """The force of the drift test, and how the block comes to rest before it vibrates.
+    """Force of the drift test, and the stop of the block before the vibration begins.
 
     The force breaks the block away, falls below F_c, and vibrates from 4 s on. The paper shows a
-    curve up to 1.2 N and 8 s; its numbers and the mass are not given. We take 1 kg and a push of
-    half a second.
+    curve up to 1.2 N and 8 s; its numbers and the mass are not given. The figure uses 1 kg and a
+    push of half a second.
 
-    Compared: when the block on Dahl's law stops with the time that its momentum needs, by areas.
+    Compared: the time at which the block with Dahl's law stops with the time that follows from its
+    momentum, by areas.
 
-    Distance: of the two times.
+    Distance: difference of the two times.
 
-    Undecided: whether the paper's block rests when the vibration begins. A drift test that begins
-    while it still slides measures sliding. Below F_c by a force D the block needs its momentum over
-    D to stop, whatever its mass: after half a second of push the last, on Dahl's law, rests at 2.6
-    s, and the vibration may begin; with a push of two seconds it would still slide at the end of
-    the test.
+    Undecided: whether the paper's block is at rest when the vibration begins. A drift test that
+    begins while the block still slides measures sliding. Under a force that is lower than F_c by D,
+    the block stops after its momentum over D, for any mass. After a push of half a second the last
+    block, with Dahl's law, is at rest at 2.6 s, before the vibration begins; after a push of two
+    seconds it would still slide at the end of the test.
     """
     figure, (above, below) = panels(2, height=2.0)
     chosen = {name: law for name, law in paper.laws().items() if name != "generic model"}
@@ -311,28 +314,28 @@ def fig_08_applied_force(quick: bool) -> Drawn:
 
 SHOWN, T_END = 8.0, 24.0  # s
 RINGS = 501
-"""Samples of 0.1 ms that the last panel averages over: ringing would hide the way."""
+"""Number of samples of 0.1 ms over which the last panel averages; ringing would hide the drift."""
 RATES = (0.3, 1.0, 3.0, 10.0, 30.0)  # N/s
 
 
 @plate("1", within=0.005)
 def fig_09_drift(quick: bool) -> Drawn:
-    """The drift test: break-away, and whether a vibration below it moves the block on.
+    """Drift test: break-away, and drift of the block under a vibration below break-away.
 
     The block of 1 kg is pushed with the force of figure 8; neither is given in the paper.
 
-    Compared: the way in one period of vibration that LuGre and Dahl make without end, with what
-    their equations give without inertia, where the force on the bristle is the applied one.
+    Compared: the drift per period of vibration, which does not end with LuGre and Dahl, with that
+    of their equations without inertia, in which the force on the bristle is the applied force.
 
-    Distance: of the two, over the way.
+    Distance: difference of the two, relative to the drift.
 
-    Reproduced: LuGre and Dahl drift, GMS, Leuven, Maxwell slip and the generic model stay, the
-    elasto-plastic law stops after a while, as the paper says; and break-away falls with the rate of
-    the force, but for Maxwell slip and Dahl, of which the paper does not claim it, and never below
-    F_c.
+    Reproduced: LuGre and Dahl drift, GMS, Leuven, Maxwell slip and the generic model do not, and
+    the elasto-plastic law stops after some time, as the paper states. Break-away falls with the
+    rate of the force, but never below F_c, except for Maxwell slip and Dahl, for which the paper
+    does not claim it.
 
-    Undecided: how fast the block drifts. Nothing damps it on its spring with table 1, and while it
-    rings the drift of LuGre is more than three times that of the vibration alone.
+    Undecided: the speed of the drift. With table 1 nothing damps the block on its spring, and while
+    it rings the drift of LuGre is more than three times that of the vibration alone.
     """
     chosen = paper.laws(count=1000)
     if quick:
@@ -373,7 +376,7 @@ def fig_09_drift(quick: bool) -> Drawn:
 
 
 def dress(away: Axes, rates: Axes, drift: Axes) -> None:
-    """Say what the panels show."""
+    """Set the titles and labels of the panels."""
     away.set(xlabel="position [µm]", ylabel="friction force [N]", title="break-away")
     rates.set(xlabel="rate of the force [N/s]", ylabel="break-away force [N]", title="its rate")
     drift.set(xlabel="time [s]", ylabel="position from 4 s on [µm]", title="vibration")

@@ -24,19 +24,19 @@ def fig_2_5_contact_area(quick: bool) -> Drawn:
     """Contact area and pressure of a sphere on a plane, over the load.
 
     Equation 2.1, a = [W r/2 (1/E_1 + 1/E_2)]^(1/3), and rough spheres: asperities on the sphere,
-    and asperities on those. Areas, pressures and loads are over those of one load.
+    and asperities on those. Areas, pressures and loads are relative to those at one load.
 
-    Compared: the exponents of the area, by quadrature of Hertz's pressure over the contact, each
-    ring of which loads the asperities of the next size, with 2/3, 8/9 and 26/27.
+    Compared: the exponents of the area with 2/3, 8/9 and 26/27, by quadrature of Hertz's pressure
+    over the contact, each ring of which loads the asperities of the next size.
 
     Distance: largest difference of an exponent.
 
     Reproduced: the area grows faster than the pressure, W^(2/3) and W^(1/3), as W^(8/9) with
     asperities on the sphere, and as W^(26/27) with asperities on those.
 
-    Refuted: the constant of equation 2.1. Hertz has a^3 = 3/4 W r (1 - nu^2) (1/E_1 + 1/E_2) for
-    equal Poisson's ratios nu, so that the radius is 4 ... 14 % larger for any of them from 0.5 to
-    0. The exponents do not depend on it.
+    Refuted: the constant of equation 2.1. Hertz's formula is a^3 = 3/4 W r (1 - nu^2) (1/E_1 +
+    1/E_2) for equal Poisson's ratios nu, so the radius is 4 ... 14 % larger for ratios from 0.5 to
+    0. The exponents do not depend on the constant.
     """
     W = np.geomspace(1e-3, 1.0, 7 if quick else 61)
     areas = [area(W, generation) / area(np.ones(1), generation) for generation in range(3)]
@@ -69,11 +69,11 @@ def fig_2_5_contact_area(quick: bool) -> Drawn:
 
 
 def area(W: Array, generation: int) -> Array:
-    """Area of contact of a sphere with `generation` sizes of asperities on it, up to a factor.
+    """Return the contact area, up to a factor, of a sphere with `generation` sizes of asperities.
 
-    Rings rho = a sqrt(1 - s^2) of equal pressure p = p_0 s, each with asperities of the load p.
+    Rings rho = a sqrt(1 - s^2) have equal pressure p = p_0 s, and asperities of the load p.
     """
-    a = np.cbrt(W)  # over the radius that a load of 1 has
+    a = np.cbrt(W)  # relative to the radius at a load of 1
     if generation == 0:
         return np.pi * a**2
     s = (NODES + 1) / 2
@@ -83,9 +83,9 @@ def area(W: Array, generation: int) -> Array:
 
 
 def sinking() -> float:
-    """Depth of the centre under Hertz's pressure by Boussinesq, over a^2/r; all else is 1.
+    """Return the depth of the centre under Hertz's pressure by Boussinesq, relative to a^2/r.
 
-    u(0) = (1/E) int p(rho)/(pi rho) 2 pi rho d rho, and a^3 = 3 W r / (4 E).
+    u(0) = (1/E) int p(rho)/(pi rho) 2 pi rho d rho, a^3 = 3 W r / (4 E), and W = r = E = 1.
     """
     a = np.cbrt(0.75)
     theta = (NODES + 1) * np.pi / 4
@@ -97,19 +97,19 @@ def sinking() -> float:
 def fig_3_2_stribeck_and_viscous_part(quick: bool) -> Drawn:
     """Steady LuGre friction: the Stribeck part, the viscous part, and their sum.
 
-    The parameters of the figure are not given; these are those of the pilot study.
+    The parameters of the figure are not given; the figure uses those of the pilot study.
 
-    Compared: the force of the dynamic LuGre law after a while at a constant speed, simulated, with
-    equation 3.5.
+    Compared: the force of the dynamic LuGre law after some time at a constant speed, simulated,
+    with equation 3.5.
 
-    Distance: largest difference over the speeds, over F_s.
+    Distance: largest difference for any speed, relative to F_s.
 
     Reproduced: the viscous part raises the level and is the linear tail.
 
-    Refuted: that friction keeps a stable value beyond a plateau, which the thesis sees from 6.5
-    mm/s on. In its law the tail of the pilot study rises from there by a tenth, reaches F_s again,
-    within half a percent, at 500 mm/min, the end of the data, and is above it at the 650 mm/min of
-    the machine.
+    Refuted: that friction keeps a stable value beyond a plateau, which according to the thesis
+    begins at 6.5 mm/s. In its law the tail of the pilot study rises from there by a tenth, reaches
+    F_s again, within half a percent, at 500 mm/min, the end of the data, and is above it at the 650
+    mm/min of the machine.
     """
     law = PRINTED["pilot"]
     v = np.linspace(1e-6, 650 / 60e3, 400)
@@ -144,7 +144,7 @@ def fig_3_2_stribeck_and_viscous_part(quick: bool) -> Drawn:
 
 
 def after_a_while(speed: float) -> float:
-    """Force [N] of the dynamic law with the parameters of the pilot study, slid by 1 mm."""
+    """Return the force [N] of the dynamic law of the pilot study after sliding by 1 mm."""
     sled = Prescribed.preset("laminator_pilot", LuGre(sigma_0=1e5, sigma_1=30.0))
     run = simulate(sled.model(), 1e-3 / speed, u={"v": speed}, samples=2)
     return float(run["friction"][-1])
@@ -157,23 +157,24 @@ SIGMA_2 = (0.0, 60.0, 120.0, 230.0, 400.0)  # N s/m
 def fig_3_3_viscous_friction(quick: bool) -> Drawn:
     """Steady LuGre friction for several viscous coefficients.
 
-    The values of the figure are not given; these lie between those of the two studies.
+    The values of the figure are not given; those used lie between the values of the two studies.
 
-    Compared: the speed of least force, found by the roots of the derivative, with the curves'
-    minima.
+    Compared: the speed of least force, from the roots of the derivative, with the minima of the
+    curves.
 
-    Distance: largest difference, over v_s.
+    Distance: largest difference, relative to v_s.
 
     Reproduced: the viscous friction raises the curve. Without it there is no minimum; the larger
-    sigma_2, the slower and the higher it is. Above a value that follows from the steepest slope of
-    the Stribeck part the force rises throughout: six times that of the pilot study.
+    sigma_2, the higher the minimum and the lower its speed. Above a value that follows from the
+    steepest slope of the Stribeck part, six times that of the pilot study, the force rises
+    throughout.
     """
     pilot = PRINTED["pilot"]
     v_s, fall = float(pilot.v_s), float(pilot.F_S) - float(pilot.F_C)
     v = np.linspace(1e-6, 500 / 60e3, 400 if quick else 40_000)
 
     def slope(speed: float, viscous: float = 0.0) -> float:
-        """Slope of the curve [N s/m]."""
+        """Return the slope of the curve [N s/m]."""
         falling = 2 * fall * speed / v_s**2 * float(np.exp(-((speed / v_s) ** 2)))
         return viscous - falling
 

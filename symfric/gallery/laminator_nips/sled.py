@@ -1,7 +1,7 @@
 """Figure 5.7: the sled of the thesis, pulled by a wire whose end moves at a constant speed V.
 
-Mass m, and stiffness k and damping d of the wire, are not given. With time in sqrt(m/k), force and
-speed depend on Z = sqrt(k m) and on the damping ratio d/(2 Z) alone: a wire here is this pair.
+The mass m and the stiffness k and damping d of the wire are not given. With time in sqrt(m/k),
+force and speed depend only on Z = sqrt(k m) and the damping ratio d/(2 Z); this pair is a "wire".
 """
 
 from collections.abc import Sequence
@@ -23,21 +23,21 @@ from symfric.scenes import Rabinowicz
 
 Array = NDArray[np.float64]
 WIRES = [(Z, ratio) for Z in (10.0, 30.0, 100.0, 300.0) for ratio in (0.0, 0.05, 0.2, 0.5)]
-"""Z [N s/m], such as 0.2 kg on 500 N/m up to 1 kg on 90 kN/m, and damping ratio."""
+"""Z [N s/m], for example from 0.2 kg on 500 N/m to 1 kg on 90 kN/m, and damping ratio."""
 SPAN = 400.0
-"""Time for which a sled that does not stop is followed [sqrt(m/k)]; the second half counts."""
+"""Duration of the motion of a sled that does not stop [sqrt(m/k)]; its second half is used."""
 
 
 @cache
 def cycle(study: str, wire: tuple[float, float], V: float) -> tuple[Array, Array]:
-    """Time [sqrt(m/k)] and force of the wire [N] in one cycle, by hand, with dry friction.
+    """Return time [sqrt(m/k)] and force of the wire [N] in one cycle, by hand, with dry friction.
 
-    Rest until the wire pulls with F_s, and slip until the sled stops, every cycle the same. A slack
-    wire does not push.
+    The sled rests until the wire pulls with F_s, and slips until it stops; all cycles are equal. A
+    slack wire does not push.
     """
     law, (Z, ratio) = PRINTED[study], wire
     d = 2 * ratio * Z
-    begin = float(law.F_S) - d * V  # of the spring
+    begin = float(law.F_S) - d * V  # force of the spring
 
     def rates(_: float, y: Array) -> list[float]:
         pull = max(y[0] + d * (V - y[1]), 0.0)
@@ -47,7 +47,7 @@ def cycle(study: str, wire: tuple[float, float], V: float) -> tuple[Array, Array
         return float(y[1])
 
     stops.terminal, stops.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
-    late = 1e-6  # after break-away, where the sled could rest for ever
+    late = 1e-6  # start after break-away, where the sled could remain at rest
     start = [begin + Z * V * late, V * late**2 / 2]
     run = solve_ivp(rates, (0.0, SPAN), start, method="LSODA", rtol=1e-8, atol=1e-12,
                     events=stops, dense_output=True)  # fmt: skip
@@ -61,20 +61,20 @@ def cycle(study: str, wire: tuple[float, float], V: float) -> tuple[Array, Array
 
 
 def swept(study: str, wire: tuple[float, float], speeds: Array) -> tuple[Array, Array]:
-    """Amplitude and mean of the force of the wire [N] at `speeds` [mm/min]."""
+    """Return amplitude and mean of the force of the wire [N] at `speeds` [mm/min]."""
     runs = [cycle(study, wire, v) for v in (speeds / 60e3).tolist()]
     means = [np.trapezoid(force, t) / np.ptp(t) for t, force in runs]
     return np.array([np.ptp(force) for _, force in runs]), np.array(means)
 
 
 def simulated(law: SteadyStateLuGre | LuGre, wire: tuple[float, float], speed: float) -> float:
-    """Amplitude [N] at `speed` [mm/min] by `Rabinowicz`: the sled seen from the moving wire end.
+    """Return the amplitude [N] at `speed` [mm/min] by `Rabinowicz`, in the frame of the wire end.
 
-    A damper of the wire is viscous friction there, less a constant force: both act on V - w. The
-    levels of `LuGre` are those under 1 N. The sled starts from rest, the wire without tension.
+    In this frame a damper of the wire is viscous friction less a constant force, since both act on
+    V - w. The levels of `LuGre` are those under 1 N. The sled starts at rest without wire tension.
     """
     (Z, ratio), V = wire, speed / 60e3
-    d, k = 2 * ratio * Z, Z**2  # of 1 kg
+    d, k = 2 * ratio * Z, Z**2  # for a mass of 1 kg
     damped = replace(law, sigma_2=float(law.sigma_2) + d)
     soft = 1 / k + (1 / float(law.sigma_0) if isinstance(law, LuGre) else 0.0)
     model = Rabinowicz(damped, m=1.0, k=k, v_belt=V, g=1.0).model()
@@ -83,7 +83,10 @@ def simulated(law: SteadyStateLuGre | LuGre, wire: tuple[float, float], speed: f
 
 
 def distance(wires: Sequence[tuple[float, float]], width: float) -> float:
-    """Largest difference of amplitudes by hand and smooth over `width` [m/s], over F_s - F_c."""
+    """Return the largest difference of the amplitudes by hand and with a smoothing `width` [m/s].
+
+    The difference is relative to F_s - F_c.
+    """
     found = [0.0]
     for (study, law), wire, v in product(PRINTED.items(), wires, (100.0, 200.0)):
         exact = float(swept(study, wire, np.array([v]))[0][0])
@@ -93,7 +96,7 @@ def distance(wires: Sequence[tuple[float, float]], width: float) -> float:
 
 
 def bristles(study: str, stiffness: float) -> LuGre:
-    """The dynamic law with the printed curve and undamped bristles of `stiffness` [N/m]."""
+    """Return the dynamic law with the printed curve and undamped bristles of `stiffness` [N/m]."""
     law = PRINTED[study]
     return LuGre(mu_s=law.F_S, mu_d=law.F_C, v_s=law.v_s, delta=law.delta, sigma_2=law.sigma_2,
                  sigma_0=stiffness, sigma_1=0.0)  # fmt: skip
@@ -102,7 +105,7 @@ def bristles(study: str, stiffness: float) -> LuGre:
 def pilot(
     wires: Sequence[tuple[float, float]], speeds: Array, quick: bool
 ) -> tuple[dict[str, float], dict[str, bool]]:
-    """Numbers and claims of the sled under the pilot study's curve."""
+    """Return numbers and claims of the sled with the curve of the pilot study."""
     shown = curve(PRINTED["pilot"], speeds / 60e3)
     runs = np.array([swept("pilot", wire, speeds) for wire in wires])
     swings, share = runs[:, 0] > 0.1, runs[:, 1] / shown
@@ -136,39 +139,40 @@ def pilot(
 
 
 SHOWN = (30.0, 0.05)
-"""The wire of the picture."""
+"""Wire of the picture."""
 ENDS = np.array([100.0, 200.0])
-"""Speeds [mm/min] on either side of those up to which the thesis saw stick-slip."""
+"""Speeds [mm/min] below and above the limit of stick-slip in the thesis."""
 
 
 @plate("1", within=0.001)
 def fig_5_7_stick_slip(quick: bool) -> Drawn:
     """Stick-slip of the sled over speed; and figures 5.1, 5.2, 5.4, 5.6 and 6.3 to 6.6.
 
-    The sled obeys a printed curve and is pulled by a wire. Sled and wire are not given; what is
-    said holds for 16 of them: Z = sqrt(k m) from 10 to 300 N s/m, damping ratios from 0 to 0.5. The
-    picture shows Z = 30 N s/m with a ratio of 0.05.
+    The sled obeys a printed curve and is pulled by a wire. Sled and wire are not given; the
+    statements hold for 16 of them: Z = sqrt(k m) from 10 to 300 N s/m, damping ratios from 0 to
+    0.5. The picture shows Z = 30 N s/m with a ratio of 0.05.
 
-    Compared: the amplitude of the wire's force by hand, with dry friction, with that of
+    Compared: the amplitude of the force of the wire by hand, with dry friction, with that of
     `Rabinowicz`, simulated with the smooth law, for Z up to 100 N s/m.
 
-    Distance: largest difference over F_s - F_c, at a smoothing velocity of 1 um/s.
+    Distance: largest difference, relative to F_s - F_c, at a smoothing velocity of 1 um/s.
 
-    Reproduced: under the pilot study's curve the sled sticks and slips at low speeds, up to 110 ...
-    180 mm/min (120 or 130 for Z up to 100 N s/m), and slides evenly above; 140 in the thesis
-    (figures 5.6 and 5.7). There the means of the force leave the curve (figure 6.3): by stick-slip
-    alone its error is 4 ... 9 %, 8 % in the thesis.
+    Reproduced: with the curve of the pilot study the sled sticks and slips at low speeds, up to 110
+    ... 180 mm/min (120 or 130 for Z up to 100 N s/m), and slides steadily above; the limit is 140
+    in the thesis (figures 5.6 and 5.7). At these low speeds the mean forces deviate from the curve
+    (figure 6.3): stick-slip alone causes an error of 4 ... 9 %, compared with 8 % in the thesis.
 
     Refuted: that a static law cannot show this; it needs a sled and a wire. That a mean over
     stick-slip is a point of the curve (figures 5.2 and 6.6): it is 0.76 to 1.18 of it. That the
-    main study's curve has stick-slip at 100 mm/min and even sliding from 140 on: it falls up to 530
-    mm/min, so with every wire the sled swings at 200 mm/min as much as at 100, or more; within 4 %
-    so with the dynamic law, bristles 10 or 100 times as stiff as the wire.
+    curve of the main study has stick-slip at 100 mm/min and steady sliding from 140 on: the curve
+    falls up to 530 mm/min, so with every wire the sled oscillates at 200 mm/min as much as at 100,
+    or more. With the dynamic law, whose bristles are 10 or 100 times as stiff as the wire, the same
+    holds within 4 %.
 
     Undecided: the nearly linear fall of the amplitude (figure 5.7), and the spread that grows
-    towards rest (figure 6.5). Under the pilot study's curve the amplitude is the same within a
-    tenth from 10 to 100 mm/min, damping ratio up to 0.2. Points and runs (figures 5.1, 5.4, 6.4)
-    are not given.
+    towards rest (figure 6.5). With the curve of the pilot study the amplitude is the same within a
+    tenth from 10 to 100 mm/min, for damping ratios up to 0.2. Points and runs (figures 5.1, 5.4,
+    6.4) are not given.
     """
     wires = [SHOWN] if quick else WIRES
     speeds = np.array([10.0, 100.0, 200.0]) if quick else np.arange(10.0, 501.0, 10.0)

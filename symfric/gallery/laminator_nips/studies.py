@@ -1,4 +1,4 @@
-"""Figures 5.3, 5.5 and 5.8: points like those of the studies, and their parameters found again."""
+"""Figures 5.3, 5.5 and 5.8: points like those of the studies, and their identified parameters."""
 
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -19,14 +19,14 @@ from symfric.gallery.shared import look, rms
 Array = NDArray[np.float64]
 
 PRINTED = {"pilot": SteadyStateLuGre.pilot(), "main": SteadyStateLuGre.main()}
-"""Tables 5.1 and 5.2."""
+"""Laws with the parameters of tables 5.1 and 5.2."""
 SLOWEST = {"pilot": 10, "main": 100}  # mm/min, in steps of 10 up to 500
 UNSTABLE = 140 / 60e3
-"""Speed up to which the sled moved in stick-slip, says the thesis [m/s]."""
+"""Speed up to which the sled moved in stick-slip according to the thesis [m/s]."""
 SMOOTH, ROUGH = 0.03, 0.14
-"""Scatter of the mean of nine above this speed and below, chosen for the 8 % of the pilot study."""
+"""Scatter of the mean of nine above and below this speed, chosen for the 8 % of the pilot study."""
 NOISES = 60
-"""Over how many noises a statement is checked."""
+"""Number of noise seeds with which a statement is checked."""
 UNITS = {"F_S": "N", "F_C": "N", "v_s": "m/s", "sigma_2": "N s/m", "delta": "1"}
 NAMES = tuple(UNITS)
 LINES: dict[str, tuple[Line, float]] = {
@@ -37,13 +37,13 @@ LINES: dict[str, tuple[Line, float]] = {
 
 
 def curve(law: SteadyStateLuGre, v: Array) -> Array:
-    """Equation 4.1 at speeds `v` > 0 [m/s]: force [N], without `symfric`."""
+    """Return the force [N] of equation 4.1 at speeds `v` > 0 [m/s], without code of `symfric`."""
     F_S, F_C, v_s, sigma_2, delta = (float(getattr(law, name)) for name in NAMES)
     return F_C + (F_S - F_C) * np.exp(-((v / v_s) ** delta)) + sigma_2 * v
 
 
 def measured(study: str, seed: int = 0, stable: bool = False) -> tuple[Array, Array]:
-    """Speeds [m/s] and mean forces [N], the printed curve with noise; stable speeds if wanted."""
+    """Return all or `stable` speeds [m/s], and mean forces [N] of the printed curve with noise."""
     v = np.arange(SLOWEST[study], 501, 10) / 60e3
     scatter = np.where(v <= UNSTABLE, ROUGH, SMOOTH)
     noise = np.random.default_rng(seed).standard_normal(v.size)
@@ -53,7 +53,7 @@ def measured(study: str, seed: int = 0, stable: bool = False) -> tuple[Array, Ar
 
 
 def at_once(v: Array, force: Array) -> tuple[SteadyStateLuGre, Mapping[str, float]]:
-    """The law by least squares of all points, and half the 95 % intervals that are known."""
+    """Return the law by least squares of all points, and half the 95 % intervals, if known."""
     data = Dataset.of(v=v, F=force, units={"v": "m/s", "F": "N"}, points=True, name="means")
     fit = Fit(Points(), SteadyStateLuGre(), data, free=["delta"]).solve(throw=False)
     found = {name: fit.parameters[name] for name in NAMES}
@@ -66,20 +66,20 @@ def at_once(v: Array, force: Array) -> tuple[SteadyStateLuGre, Mapping[str, floa
 
 
 def in_steps(v: Array, force: Array) -> SteadyStateLuGre | None:
-    """The law by the six steps of section 4.2; None where one of them finds no number."""
+    """Return the law by the six steps of section 4.2; None if one of them fails."""
     found = six_steps(v, force, unstable=UNSTABLE)
     return found.law if np.isfinite([*found.values.values()]).all() else None
 
 
 def error(law: SteadyStateLuGre, v: Array, force: Array) -> float:
-    """Root mean square of equation 4.3, over the mean force."""
+    """Return the root mean square of equation 4.3, relative to the mean force."""
     return rms(force - curve(law, v)) / float(force.mean())
 
 
 def draw_curves(
     axis: Axes, v: Array, force: Array, laws: Mapping[str, SteadyStateLuGre], end: float = 0.0
 ) -> None:
-    """Points, and laws through them: the printed one grey, those found again in front."""
+    """Draw points and laws: the printed law in grey, the identified laws in front."""
     fine = np.linspace(v[0], end or v[-1], 400)
     axis.plot(v, force, "o", color="k", markersize=3, label="means with noise")
     for name, law in laws.items():
@@ -90,7 +90,7 @@ def draw_curves(
 
 
 def draw_errors(axes: list[Axes], v: Array, force: Array, law: SteadyStateLuGre) -> None:
-    """Absolute error, and in percent of the measured force."""
+    """Draw the absolute error, and the error in percent of the measured force."""
     left = np.abs(force - curve(law, v))
     for axis, values, label in zip(
         axes, (left, 100 * left / force), ("error [N]", "error [%]"), strict=True
@@ -103,7 +103,7 @@ def draw_errors(axes: list[Axes], v: Array, force: Array, law: SteadyStateLuGre)
 def parameters_of(
     laws: Mapping[str, SteadyStateLuGre], half: Mapping[str, float]
 ) -> dict[str, float]:
-    """Parameters of laws side by side, and half the 95 % intervals."""
+    """Return the parameters of several laws, and half the 95 % intervals."""
     numbers = {
         f"{name} {way} [{unit}]": float(getattr(law, name))
         for name, unit in UNITS.items()
@@ -116,12 +116,12 @@ def parameters_of(
 
 @cache
 def refitted(study: str, stable: bool = False, count: int = NOISES) -> tuple[SteadyStateLuGre, ...]:
-    """The law found at once with each of `count` noises; from stable speeds alone if wanted."""
+    """Return the laws identified at once with `count` noises, with `stable` from stable speeds."""
     return tuple(at_once(*measured(study, seed, stable))[0] for seed in range(count))
 
 
 def shares(laws: Sequence[SteadyStateLuGre], study: str) -> dict[str, Array]:
-    """Each parameter over the printed one, for every law."""
+    """Return each parameter relative to the printed one, for every law."""
     return {
         name: np.array([float(getattr(law, name)) for law in laws])
         / float(getattr(PRINTED[study], name))
@@ -130,7 +130,7 @@ def shares(laws: Sequence[SteadyStateLuGre], study: str) -> dict[str, Array]:
 
 
 def scatter(study: str) -> dict[str, float]:
-    """Spread of each parameter over all noises, by both ways: half the middle 68 % [%]."""
+    """Return the spread of each parameter over all noises, for both ways: half the middle 68 %."""
     by_steps = [in_steps(*measured(study, seed)) for seed in range(NOISES)]
     ways = {
         "all at once": refitted(study),
@@ -167,7 +167,7 @@ def percentiles(what: str, unit: str, values: Sequence[float]) -> dict[str, floa
 
 
 def without_unstable(study: str) -> dict[str, float]:
-    """Lowest and highest F_s over all noises, found from the stable speeds alone [N]."""
+    """Return the lowest and highest F_s [N] over all noises, identified from stable speeds only."""
     levels = [float(law.F_S) for law in refitted(study, stable=True)]
     said = f"of {NOISES} noises, without the unstable speeds [N]"
     return {f"F_S, lowest {said}": min(levels), f"F_S, highest {said}": max(levels)}
@@ -175,23 +175,24 @@ def without_unstable(study: str) -> dict[str, float]:
 
 @plate("1", within=0.04)
 def fig_5_3_pilot_study(quick: bool) -> Drawn:
-    """The pilot study: mean forces, the identified curve, and its errors.
+    """Pilot study: mean forces, the identified curve, and its errors.
 
-    Compared: the curve that is identified from points with noise, all at once and by the six steps
-    of the thesis, with the printed one that made them.
+    Compared: the curve identified from points with noise, all at once and by the six steps of the
+    thesis, with the printed curve from which the points were computed.
 
-    Distance: rms difference of the curve found at once from the printed one, over the mean force.
+    Distance: rms difference between the curve identified at once and the printed curve, relative to
+    the mean force.
 
-    Reproduced: the curve comes back, and its error is of the size of the thesis's 8 %: 6 % in the
-    median of 60 noises like it.
+    Reproduced: the identification gives the printed curve, and its error is similar to the 8 % of
+    the thesis: 6 % in the median of 60 noises of this size.
 
-    Refuted: that its five digits mean anything. Over these noises the parameters scatter by the
-    given shares, 7 to 110 % at once. The six steps, which read two levels off single points,
-    leave 1.3 to 2.4 times the error, 1.7 in the median. F_s and v_s rest on speeds that the thesis
-    itself calls unstable: without them F_s is anything from half its value to any size. And 50
-    speeds of nine tests are 450 tests, not 150.
+    Refuted: that its five digits are significant. Over these noises the parameters scatter by the
+    given percentages, 7 to 110 % at once. The six steps, which read two levels from single points,
+    leave 1.3 to 2.4 times the error, 1.7 in the median. F_s and v_s depend on speeds that the
+    thesis itself calls unstable: without them F_s is anything from half its value to any size. And
+    50 speeds with nine tests each are 450 tests, not 150.
 
-    Undecided: the noise of the points, which are not printed; ours has the size of its errors.
+    Undecided: the noise of the points, which are not printed; our noise has the size of its errors.
     """
     printed = PRINTED["pilot"]
     v, force = measured("pilot")
@@ -237,20 +238,21 @@ MACHINE = 650 / 60e3
 
 @plate("1", within=0.012)
 def fig_5_5_main_study(quick: bool) -> Drawn:
-    """The main study: mean forces and identified curves, and what they say beyond the data.
+    """Main study: mean forces and identified curves, and their extrapolation beyond the data.
 
-    Compared: curves identified from points with noise, 100 to 500 mm/min, with the printed one that
-    made them; thin, the same with other noise of that size.
+    Compared: curves identified from points with noise, 100 to 500 mm/min, with the printed curve
+    from which the points were computed; thin curves have other noise of the same size.
 
-    Distance: rms difference of the first curve from the printed one, over the mean force.
+    Distance: rms difference between the first curve and the printed curve, relative to the mean
+    force.
 
     Reproduced: the curves fit the points.
 
-    Refuted: that the main study tells five parameters. Up to 500 mm/min the force only falls, so
-    the points know neither sigma_2 nor how low F_c is: a bound of statistics, not of the method
-    (standard errors below, for noise of 1 %). At 650 mm/min, where the machine runs, the curves of
-    60 noises lie between 2.3 and 3.7 N. A plateau at 6 mm/s is not in the printed law, either:
-    there it is still falling.
+    Refuted: that the main study determines five parameters. Up to 500 mm/min the force only falls,
+    so the points determine neither sigma_2 nor the lower level F_c: this is a limit of statistics,
+    not of the method (standard errors below, for noise of 1 %). At 650 mm/min, the speed of the
+    machine, the curves of 60 noises lie between 2.3 and 3.7 N. The printed law has no plateau at 6
+    mm/s, either: there it is still falling.
     """
     printed = PRINTED["main"]
     v, force = measured("main")
@@ -301,18 +303,18 @@ def fig_5_5_main_study(quick: bool) -> Drawn:
 
 @plate("1", within=0.012)
 def fig_5_8_stable_region(quick: bool) -> Drawn:
-    """The main study above 140 mm/min: mean forces, the identified curve, and its errors.
+    """Main study above 140 mm/min: mean forces, the identified curve, and its errors.
 
-    Compared: the curve that is identified from the stable speeds alone with the printed one.
+    Compared: the curve identified from the stable speeds alone with the printed curve.
 
-    Distance: rms difference of the two, over the mean force.
+    Distance: rms difference between the two curves, relative to the mean force.
 
     Reproduced: in this region the error is that of the noise, as the thesis shows: 1.7 ... 3.4 %
     with 60 noises.
 
-    Refuted: that the region tells the law. With these noises F_c comes out as nothing in one of
-    six, sigma_2 as nothing in more than half and more than ten times too large in a quarter, and
-    with each of them the curve is the same within 2 %. Small errors of a curve are no evidence for
+    Refuted: that the region determines the law. With these noises the identified F_c is zero in one
+    of six cases, sigma_2 is zero in more than half and more than ten times too large in a quarter,
+    and the curve is the same within 2 % in each case. Small errors of a curve are no evidence for
     its parameters.
     """
     printed = PRINTED["main"]
@@ -337,7 +339,7 @@ def fig_5_8_stable_region(quick: bool) -> Drawn:
 
 
 def over_noises(numbers: dict[str, float]) -> dict[str, bool]:
-    """Claims over all noises; adds their ranges to `numbers`."""
+    """Return claims over all noises; add their ranges to `numbers`."""
     laws, printed = refitted("main", stable=True), PRINTED["main"]
     of = shares(laws, "main")
     errors, off = list[float](), list[float]()

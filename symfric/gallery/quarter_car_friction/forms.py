@@ -17,27 +17,27 @@ from symfric.results.quadrature import integral_between
 
 Array = NDArray[np.float64]
 END, VISCOUS = 10.0, 0.02
-"""Of the curve, in Stribeck velocities, and its slope there, in F_C."""
+"""End of the curve [Stribeck velocities], and its viscous slope [F_C per Stribeck velocity]."""
 
 
 @plate("1", within=1e-6)
 def fig_08_break_points(quick: bool) -> Drawn:
-    """The conventional friction models: Tustin's, and with break points.
+    """Conventional friction models: Tustin's model, and models with break points.
 
     The figure has no numbers. Here a Stribeck curve of 1.5 F_C at rest, with a viscous part of 2 %
-    of F_C per Stribeck velocity, is approximated up to ten of those by Coulomb and viscous
-    friction, which is what the paper calls Tustin's model, and by straight pieces between break
+    of F_C per Stribeck velocity, is approximated up to ten Stribeck velocities by Coulomb and
+    viscous friction, which the paper calls Tustin's model, and by straight pieces between break
     points.
 
     Compared: the largest error of four pieces on a curve of exponent 1 with that of chords of an
     exponential in closed form.
 
-    Distance: of the two, relative.
+    Distance: relative difference of these errors.
 
     Reproduced: the Stribeck effect with one or more break points gives a better approximation at
     low velocities. One break point leaves less than half the error of Tustin's model, two leave
-    less, and each further one less again; so for static levels of 1.2 to 3 F_C and exponents of 1
-    and 2.
+    less, and each further point less again; this holds for static levels of 1.2 to 3 F_C and
+    exponents of 1 and 2.
     """
     v = np.linspace(0.0, END, 20_001 if quick else 200_001)
     figure, (axis,) = panels(1, NARROW, 2.8)
@@ -68,31 +68,31 @@ def fig_08_break_points(quick: bool) -> Drawn:
 
 
 def stribeck(v: Array, level: float, delta: float) -> Array:
-    """Friction over F_C at velocities over that of Stribeck, `level` at rest."""
+    """Return F/F_C at velocities in Stribeck velocities, with the static `level` at rest."""
     return 1 + (level - 1) * np.exp(-(v**delta)) + VISCOUS * v
 
 
 def curvature(v: Array, level: float, delta: float) -> Array:
-    """Second derivative of the curve, for exponents of 1 and 2."""
+    """Return the second derivative of the curve, for exponents of 1 and 2."""
     inner = 4 * v**2 - 2 if delta == 2.0 else 1.0
     return (level - 1) * inner * np.exp(-(v**delta))
 
 
 def knots(v: Array, pieces: int, level: float, delta: float) -> Array:
-    """Ends of pieces with equal shares of int sqrt|F''| dv, which makes their errors equal."""
+    """Return ends of pieces with equal shares of int sqrt|F''| dv, so that errors are equal."""
     density = np.sqrt(np.abs(curvature(v, level, delta)))
     share = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2)])
     return np.interp(np.linspace(0.0, share[-1], pieces + 1), share, v)
 
 
 def error(v: Array, pieces: int, level: float, delta: float) -> float:
-    """Largest distance of straight pieces on the curve from it."""
+    """Return the largest distance of straight pieces from the curve."""
     at, F = knots(v, pieces, level, delta), stribeck(v, level, delta)
     return float(np.abs(np.interp(v, at, stribeck(at, level, delta)) - F).max())
 
 
 def chord(a: float, b: float) -> float:
-    """Largest distance of exp(-v) from its chord between a and b."""
+    """Return the largest distance of exp(-v) from its chord between a and b."""
     slope = (np.exp(-a) - np.exp(-b)) / (b - a)
     v = -np.log(slope)
     return float(np.exp(-a) - slope * (v - a) - np.exp(-v))
@@ -102,14 +102,15 @@ def chord(a: float, b: float) -> float:
 def fig_13_simple_form(quick: bool) -> Drawn:
     """Friction of the simple form, without the Coulomb part, over the velocity of the body.
 
-    Compared: the force along the run with equation 21, its exponent falling.
+    Compared: the force along the run with equation 21 with a decreasing exponential.
 
-    Distance: largest difference beyond 1 mm/s, as the law is smooth over 0.01 mm/s, over C_e.
+    Distance: largest difference beyond 1 mm/s, since the law is smooth over 0.01 mm/s, relative to
+    C_e.
 
-    Reproduced: there is no hysteresis, as the paper says: the law is a curve.
+    Reproduced: there is no hysteresis, as the paper states: the law is a curve.
 
-    Refuted: the sign of its exponent. As printed it grows, beyond all bounds at the speeds of the
-    figure, where the text says that the force quickly dips; it falls for e1 < 0.
+    Refuted: the sign of its exponent. The printed exponential grows without bound at the speeds of
+    the figure, where according to the text the force quickly dips; it decreases for e1 < 0.
     """
     C_e, e_1, sigma_v = (rig.FRICTION[name] for name in ("C_e", "e_1", "sigma_v"))
     law = QuarterCarSimple(C_e=C_e, e_1=e_1, sigma_v=sigma_v, v_eps=1e-5)
@@ -139,21 +140,23 @@ def fig_13_simple_form(quick: bool) -> Drawn:
 
 @plate("1", within=4e-5)
 def fig_14_two_parts(quick: bool) -> Drawn:
-    """Damping and Coulomb friction, apart, over the velocity of the body.
+    """Damping and Coulomb friction, separately, over the velocity of the body.
 
     Compared: the sum of both parts, by equation 12 from the motion alone, with the force of the
     law.
 
-    Distance: largest difference outside the window in which the body sticks, over break-away.
+    Distance: largest difference outside the window in which the body sticks, relative to the
+    break-away force.
 
-    Reproduced: damping is a curve, the Coulomb part makes all of the hysteresis, as the paper says.
+    Reproduced: damping is a curve, and the Coulomb part causes all of the hysteresis, as the paper
+    states.
 
-    Refuted: the sign of the Coulomb part as printed. It has that of the strut's force, not that of
-    the velocity, although the text wants it opposite to the velocity; where both differ it drives
-    the body, here on 7 % of the way with up to a quarter of a watt, and in each of ten readings of
-    the numbers that the paper leaves open, on 1 ... 50 % of the way.
+    Refuted: the printed sign of the Coulomb part. It is that of the force of the strut, not that of
+    the velocity, although according to the text it is opposite to the velocity. Where both signs
+    differ it drives the body, here on 7 % of the path with up to a quarter of a watt, and on 1 ...
+    50 % of the path in each of ten choices of the numbers that the paper does not state.
 
-    Undecided: how far damping dominates. Here it takes ten times the work of the Coulomb part.
+    Undecided: how far damping dominates. Here its work is ten times that of the Coulomb part.
     """
     run = rig.ride(rig.general(), samples=1201 if quick else 6001)
     v = run["v_b"]
@@ -200,7 +203,7 @@ def fig_14_two_parts(quick: bool) -> Drawn:
 
 
 def worked(run: Trajectory) -> float:
-    """Work of damping friction [J]."""
+    """Return the work of damping friction [J]."""
     v = run.model.expression("v_b")
     damping = rig.FRICTION["C_e"] * ca.exp(-ca.fabs(v) / rig.FRICTION["e_1"]) * ca.fabs(v)
     power = damping + rig.FRICTION["sigma_v"] * v**2
@@ -208,6 +211,6 @@ def worked(run: Trajectory) -> float:
 
 
 def below(v: np.ndarray) -> np.ndarray:
-    """Area below the curve of damping friction from 0 to v [N m/s]."""
+    """Return the area below the curve of damping friction from 0 to v [N m/s]."""
     e_1, sigma_v = rig.FRICTION["e_1"], rig.FRICTION["sigma_v"]
     return rig.FRICTION["C_e"] * e_1 * (1 - np.exp(-np.abs(v) / e_1)) + sigma_v * v**2 / 2

@@ -15,18 +15,18 @@ from symfric.gallery.shared import look
 def fig_04_without_friction(quick: bool) -> Drawn:
     """Road, wheel and body without friction: the body oscillates.
 
-    The rig of section 3 on the road of 50 mm.
+    The figure shows the rig of section 3 on the road of 50 mm.
 
     Compared: displacements of wheel and body with the exponential of the matrix of equations 1 and
     2.
 
-    Distance: largest difference of either.
+    Distance: largest difference of a displacement.
 
-    Reproduced: the wheel follows the road and the body oscillates, as the paper says, with the
-    period and the decay that the eigenvalue of its equations has.
+    Reproduced: the wheel follows the road and the body oscillates, as the paper states, with the
+    period and the decay of the eigenvalue of its equations.
 
-    Refuted: that the body follows the wheel with a pure delay. The rig without friction has none:
-    the body lags by its oscillation alone.
+    Refuted: that the body follows the wheel with a pure delay. The rig without friction has no
+    delay: the body lags only because it oscillates.
     """
     run = ride(Viscous(sigma_2=0.0), samples=301 if quick else 2401)
 
@@ -64,38 +64,39 @@ def fig_04_without_friction(quick: bool) -> Drawn:
 
 
 def peaks(t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Times of the maxima between the second ramp and the third [s]."""
+    """Return the times [s] of the maxima between the second and the third ramp."""
     inner = (x[1:-1] > x[:-2]) & (x[1:-1] > x[2:]) & (t[1:-1] > 5.75) & (t[1:-1] < STAGES["C"][0])
     return t[1:-1][inner]
 
 
 @plate("1", within=0.002)
 def fig_11_body(quick: bool) -> Drawn:
-    """The body over time, with friction, and the four places where it rests.
+    """Body over time, with friction, and its four rest positions.
 
-    The general law of the paper, with invented C_e, e1, mu and sigma_v, and without friction behind
-    it.
+    The figure shows the general law of the paper, with invented C_e, e1, mu and sigma_v, and behind
+    it the motion without friction.
 
     Weak: sigma_v of 80 instead of 1500 N s/m, and a decay of 20 instead of 10 mm/s.
 
-    Compared: the run with the paper's equations in small steps, where the body truly sticks.
+    Compared: the run with the paper's equations in small steps, in which the body sticks exactly.
 
-    Distance: largest difference of the body over the amplitude of 50 mm.
+    Distance: largest difference of the body, relative to the amplitude of 50 mm.
 
-    Reproduced: friction removes the oscillation, if it is viscous enough: half the overshoot or
-    less from sigma_v = 1500 N s/m on. The body starts at 0.5 s, as figure 7 of the paper has it,
-    with X_w - X_b = 7 mm, and rests where the paper says within break-away over both springs, 6.9
-    mm; between those it may stick anywhere. These hold for ten readings of the numbers that the
-    paper leaves open.
+    Reproduced: friction removes the oscillation if it is viscous enough: the overshoot is half or
+    less from sigma_v = 1500 N s/m on. The body starts at 0.5 s, as in figure 7 of the paper, with
+    X_w - X_b = 7 mm. It rests at the positions of the paper within the break-away force over both
+    springs, 6.9 mm; in this range it may stick anywhere. These statements hold for ten choices of
+    the numbers that the paper does not state.
 
-    Refuted: table 1 and what is concluded from it. Its residual of X_b, 96 mm, is larger than the
+    Refuted: table 1 and the conclusions from it. Its residual of X_b, 96 mm, is larger than the
     67.5 mm that a constant leaves at most for a body between 0 and 135 mm, so the model does not
-    fit it; and the 0.06 and 0.12 % by which Coulomb friction improves both residuals are no reason
-    for it. Equation 12 as printed: at rest it holds any force, and the body never moves.
+    fit the data; and the 0.06 and 0.12 % by which Coulomb friction improves both residuals are no
+    evidence for it. Equation 12 as printed: at rest it balances any force, and the body never
+    moves.
 
-    Undecided: the numbers of the friction. Weakly viscous it holds the body back and lets it go,
-    and the overshoot is larger than without friction; at 1.5 s X_w - X_b is anything from -4 to 5
-    mm, where the paper has zero or near zero.
+    Undecided: the numbers of the friction. Weakly viscous friction holds the body back and then
+    releases it, and the overshoot is larger than without friction; at 1.5 s X_w - X_b is anything
+    from -4 to 5 mm, where the paper has zero or near zero.
     """
     run = ride(general())
     others = {
@@ -135,7 +136,7 @@ def fig_11_body(quick: bool) -> Drawn:
 
 
 def said(numbers: dict[str, float]) -> dict[str, bool]:
-    """Claims on the run, and on the numbers of the paper by themselves."""
+    """Return claims on the run, and on the consistency of the paper's numbers."""
     over = [value for name, value in numbers.items() if name.startswith("overshoot")]
     return {
         "friction halves the overshoot, weakly viscous friction makes it larger": (
@@ -166,25 +167,27 @@ BREAK_AWAY, DEFLECTION = 193.8, 0.0069  # N, m
 def fig_12_friction_loops(quick: bool) -> Drawn:
     """Friction of the general law over the velocity of the body.
 
-    Roads of 30, 50 and 70 mm; the paper shows 50 mm.
+    The roads are 30, 50 and 70 mm high; the paper shows 50 mm.
 
-    Compared: the force with that of the paper's equations in small steps, where the body truly
-    sticks.
+    Compared: the force with that of the paper's equations in small steps, in which the body sticks
+    exactly.
 
-    Distance: largest difference while the body moves faster than 5 mm/s, over break-away.
+    Distance: largest difference while the body moves faster than 5 mm/s, relative to the break-away
+    force.
 
-    Reproduced: force over velocity makes loops, and the fall of twice the rise a larger one than
-    the rise, for ten readings of the numbers that the paper leaves open. Of the twice that it sees
-    in the fall the speed reaches 1.6, as viscous friction slows the body.
+    Reproduced: force over velocity has loops, and the loop of the fall, which is twice the rise, is
+    larger than that of the rise, for ten choices of the numbers that the paper does not state.
+    According to the paper the speed is twice as large in the fall; here it is 1.6 times, since
+    viscous friction slows the body.
 
-    Refuted: that they are memory of the contact. The law has none; the loops are the Coulomb part,
-    whose load follows the strut, and without it they close (figure 13). The static level: 0.0069 m
-    of the spring are not its 193.8 N, and at the largest displacement there is no velocity to make
-    up.
+    Refuted: that the loops are a memory of the contact. The law has no memory; the loops are due to
+    the Coulomb part, whose load follows the strut, and without it they close (figure 13). The
+    static level: 0.0069 m of the spring are not its 193.8 N, and at the largest displacement there
+    is no velocity that makes up for the difference.
 
-    Undecided: the sizes of the loops. That of the fall is 1.2 ... 2.0 times that of the rise, as
-    the invented numbers are, 1.69 times in the figure; and whether the first loop is the smallest,
-    which it is here.
+    Undecided: the sizes of the loops. That of the fall is 1.2 ... 2.0 times that of the rise,
+    depending on the invented numbers, and 1.69 times in the figure; and whether the first loop is
+    the smallest, as here.
     """
     runs = {mm: ride(general(), mm) for mm in ((50,) if quick else (30, 70, 50))}
     run = runs[50]

@@ -1,8 +1,9 @@
-"""The rig of the paper on a road of 30, 50 or 70 mm, by `simulate`, and once more by hand.
+"""Rig of the paper on a road of 30, 50 or 70 mm, by `simulate` and by hand.
 
-By hand it uses nothing of `symfric`: exactly without friction, else in small steps. The body sticks
-until the strut's force exceeds break-away, and stops where its velocity crosses zero; in between
-its friction is equation 12 with the signs that the text asks for.
+The computation by hand uses no code of `symfric`; it is exact without friction, and takes small
+steps with friction. The body sticks until the force of the strut exceeds the break-away force, and
+stops where its velocity crosses zero; in between, its friction is equation 12 with the signs that
+the text requires.
 """
 
 from collections.abc import Mapping
@@ -19,14 +20,14 @@ from symfric.laws import Law
 from symfric.scenes import QuarterCar
 
 START, FIRST, RAMP, HOLD, T_END = 0.3, 2.4, 1.0, 2.0, 12.0  # s
-"""Times of the road; START and FIRST follow from the text and are those of the preset (figure 11),
-the others are ours."""
+"""Times of the road [s]; START and FIRST follow from the text and are those of the preset (figure
+11), the others are our choice."""
 STAGES = {"A": (START, 0.0), "B": (4.7, 0.085), "C": (7.7, 0.135), "D": (T_END, 0.035)}
-"""End of each rest [s], and where the paper says that the body is then [m]."""
+"""End of each rest [s], and position of the body at this time in the paper [m]."""
 FRICTION = {"C_e": 180.0, "e_1": 0.01, "mu": 0.05, "sigma_v": 1500.0}
 """Friction of the general law [N, m/s, 1, N s/m]; not in the paper."""
 WEAK = {"C_e": 120.0, "e_1": 0.02, "mu": 0.08, "sigma_v": 80.0}
-"""Another reading of the numbers that the paper does not give, weakly viscous."""
+"""Another choice of the numbers that the paper does not state, with weak viscosity."""
 READINGS: tuple[Mapping[str, float], ...] = (
     FRICTION,
     WEAK,
@@ -41,29 +42,29 @@ READINGS: tuple[Mapping[str, float], ...] = (
         for value in values
     ),
 )
-"""Over what the invented numbers may be: what is said of the paper holds for each."""
+"""Choices of the invented numbers; the statements on the paper hold for each of them."""
 RAMPS = {
     name: (begin, end)
     for name, (begin, end) in zip(
         ("first", "second", "third"), pairwise(end for end, _ in STAGES.values()), strict=True
     )
 }
-"""Ramp and the rest behind it: first and last time [s]."""
+"""Ramp and the following rest -> first and last time [s]."""
 
 
 def general(numbers: Mapping[str, float] = FRICTION, form: str = "smooth") -> QuarterCarGeneral:
-    """The general law in narrow windows [m/s, N], since the paper's has none."""
+    """Return the general law with narrow windows [m/s, N], since the paper's law has none."""
     return with_values(QuarterCarGeneral(v_eps=2e-4, F_eps=0.1, form=form), numbers)
 
 
 @cache
 def read(number: int) -> Trajectory:
-    """A run with one of READINGS."""
+    """Return the run with one of `READINGS`."""
     return ride(general(READINGS[number]))
 
 
 def ride(law: Law, millimetres: int = 50, samples: int = 6001) -> Trajectory:
-    """A run of the rig with `law` in its guide."""
+    """Return a run of the rig with `law` in the guide."""
     name = f"al_zughaibi_{millimetres}_mm"
     car = QuarterCar.preset(name, law, t_ramp=RAMP, t_hold=HOLD)
     return simulate(car.model(), T_END, rtol=1e-8, samples=samples)
@@ -74,11 +75,11 @@ Array = NDArray[np.float64]
 M_B, M_W, K_S, B_D, K_T, B_T = 240.0, 40.0, 28900.0, 260.0, 920000.0, 3886.0
 THETA, L_D, BREAK_AWAY = pi / 4, 0.4, 193.8
 CORNERS = np.cumsum([0.0, START, FIRST, HOLD, RAMP, HOLD, RAMP, T_END])
-"""Times at which the road bends [s]."""
+"""Times of the corners of the road [s]."""
 
 
 def heights(millimetres: int) -> Array:
-    """Height of the road at its corners [m]."""
+    """Return the height of the road at its corners [m]."""
     up, down = 0.085 + 1e-3 * millimetres, 0.085 - 1e-3 * millimetres
     return np.array([0.0, 0.0, 0.085, 0.085, up, up, down, down])
 
@@ -97,7 +98,7 @@ def matrix() -> Array:
 
 
 def without_friction(t: Array) -> Array:
-    """X_b, X_w, v_b, v_w [m, m/s] at `t` [s] by the exponential of a matrix, shape (4, n)."""
+    """Return X_b, X_w, v_b, v_w [m, m/s] at `t` [s] by a matrix exponential, shape (4, n)."""
     A, road = matrix(), heights(50)
     y, found = np.zeros(6), np.zeros((4, t.size))
     for k, (begin, end) in enumerate(pairwise(CORNERS)):
@@ -112,7 +113,7 @@ def without_friction(t: Array) -> Array:
 def with_friction(
     h: float, millimetres: int, C_e: float, e_1: float, mu: float, sigma_v: float
 ) -> tuple[Array, Array, Array]:
-    """Times [s], body [m] and friction [N] in steps of `h` [s]."""
+    """Return times [s], body [m] and friction [N] in steps of `h` [s]."""
     t = np.linspace(0.0, T_END, round(T_END / h) + 1)
     road = np.interp(t, CORNERS, heights(millimetres))
     slope = np.gradient(road, h).tolist()
@@ -137,13 +138,13 @@ def with_friction(
 
 
 RESIDUAL = {"x_rel": (0.006362, 0.006366), "X_b": (0.096267, 0.096386)}
-"""Table 1: residuals with Coulomb friction and without [m]."""
+"""Residuals with and without Coulomb friction [m], table 1."""
 RANGE = 0.135
-"""Of the body, section 7.4 [m]."""
+"""Range of the body, section 7.4 [m]."""
 
 
 def residuals(run: Trajectory) -> dict[str, float]:
-    """Table 1, and how large the signals themselves are."""
+    """Return the numbers of table 1, and the sizes of the signals themselves."""
     numbers: dict[str, float] = {}
     for name, (residual, without) in RESIDUAL.items():
         better = 100 * (1 - residual / without)
@@ -156,7 +157,7 @@ def residuals(run: Trajectory) -> dict[str, float]:
 
 
 def start(run: Trajectory) -> dict[str, float]:
-    """Numbers of figure 7 and sections 5 and 7.2 on the first ramp."""
+    """Return the numbers of figure 7 and sections 5 and 7.2 on the first ramp."""
     x = np.interp([0.5, 1.5], run.t, run["x_rel"])
     return {
         "the body starts, 0.5 s in figure 7 [s]": float(run.t[np.argmax(run["X_b"] > 1e-4)]),
@@ -166,16 +167,16 @@ def start(run: Trajectory) -> dict[str, float]:
 
 
 PLAY = BREAK_AWAY * (1 / K_S + 1 / K_T)
-"""Largest distance of the body at rest from its place in the paper [m]."""
+"""Largest distance of the body at rest from its position in the paper [m]."""
 
 
 def overshoot(run: Trajectory) -> float:
-    """Depth to which the body falls below its last place [m]."""
+    """Return the depth [m] to which the body falls below its last position."""
     return 0.035 - float(run["X_b"][run.t > STAGES["C"][0]].min())
 
 
 def bodies(numbers: dict[str, float]) -> dict[str, bool]:
-    """Claims on the body in all readings of the friction; adds the ranges to `numbers`."""
+    """Return claims on the body for all choices of friction; add the ranges to `numbers`."""
     runs = [read(k) for k in range(len(READINGS))]
     rests = [
         abs(float(np.interp(end, run.t, run["X_b"])) - height)
@@ -206,7 +207,7 @@ def bodies(numbers: dict[str, float]) -> dict[str, bool]:
 
 
 def areas_and_speeds(run: Trajectory) -> tuple[list[float], list[float]]:
-    """Area of the loop [N m/s] and largest speed [m/s] of each ramp."""
+    """Return the area of the loop [N m/s] and the largest speed [m/s] of each ramp."""
     areas = [abs(run.area("friction", "v_b", between)) for between in RAMPS.values()]
     speeds = [
         float(np.abs(run["v_b"][(run.t >= a) & (run.t <= b)]).max()) for a, b in RAMPS.values()
@@ -215,7 +216,7 @@ def areas_and_speeds(run: Trajectory) -> tuple[list[float], list[float]]:
 
 
 def loops(numbers: dict[str, float]) -> dict[str, bool]:
-    """Claims on the loops in all readings of the friction; adds the ranges to `numbers`."""
+    """Return claims on the loops for all choices of friction; add the ranges to `numbers`."""
     both = np.array([areas_and_speeds(read(k)) for k in range(len(READINGS))])
     ratios, speeds = (both[:, :, 2] / both[:, :, 1]).T
     numbers |= {
@@ -234,7 +235,7 @@ def loops(numbers: dict[str, float]) -> dict[str, bool]:
 
 
 def as_printed(run: Trajectory, mu: float) -> np.ndarray:
-    """Coulomb friction with the sign of the strut's force [N]."""
+    """Return Coulomb friction [N] with the sign of the force of the strut."""
     x = run["x_rel"]
     strut = K_S * x + B_D * (run["v_w"] - run["v_b"])
     lean = np.arcsin(x * np.sin(THETA) / (L_D - x * np.sin(THETA)))
@@ -242,7 +243,7 @@ def as_printed(run: Trajectory, mu: float) -> np.ndarray:
 
 
 def driven(run: Trajectory, mu: float) -> tuple[float, float]:
-    """Least power of Coulomb friction as printed [W], and the share of the motion it drives."""
+    """Return the least power [W] of Coulomb friction as printed, and the share that it drives."""
     moves = np.abs(run["v_b"]) > 1e-3
     power = (as_printed(run, mu) * run["v_b"])[moves]
     return float(power.min()), float(np.mean(power < 0))

@@ -1,4 +1,4 @@
-"""The block on the belt of figures 2 to 5: the laws with the numbers of tables 2 and 3."""
+"""Block on the belt of figures 2 to 5: the laws with the numbers of tables 2 and 3."""
 
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -20,14 +20,14 @@ M, K, V_BELT, F_S, F_C = 0.8, 2.1, 0.1, 0.15 * 0.8 * 9.81, 0.1 * 0.8 * 9.81
 
 @cache
 def run(name: str, t_end: float = T_END, rtol: float = 1e-7) -> Trajectory:
-    """A law on the belt, seen every ms."""
+    """Return the run of a law on the belt, sampled every ms."""
     model = Rabinowicz.preset("jing_mi_table_3", laws.FORMS[name]).model()
     return simulate(model, t_end, rtol=rtol, t_eval=np.linspace(0, t_end, round(1000 * t_end) + 1))
 
 
 @cache
 def exact(t_end: float = T_END) -> tuple[Belt, dict[str, Array]]:
-    """Exact dry friction in closed form: the belt, and its motion every ms."""
+    """Return the belt with exact dry friction in closed form, and its motion every ms."""
     belt = Belt(M, K, V_BELT, F_S, F_C)
     return belt, belt.motion(np.linspace(0, t_end, round(1000 * t_end) + 1))
 
@@ -43,9 +43,9 @@ def acceleration(one: Signals) -> Array:
 def drawn(
     quick: bool, short: float, signal: Callable[[Signals], Array], label: str, *limits: float
 ) -> tuple[dict[str, Trajectory], dict[str, Array], Figure]:
-    """Return the runs of all forms, exact dry friction, and a panel per law with a signal.
+    """Return the runs of all forms, exact dry friction, and a picture with a panel per law.
 
-    The runs last 20 s, or `short` [s] at reduced size; `limits` are those of the ordinate.
+    The runs last 20 s, or `short` [s] at reduced size; `limits` are the limits of the ordinate.
     """
     t_end = short if quick else T_END
     runs = {name: run(name, t_end) for name in laws.forms(laws.chosen(quick))}
@@ -56,7 +56,7 @@ def drawn(
 
 
 def leaving(one: Trajectory) -> Array:
-    """Instants [s] at which the block falls behind the belt by a tenth of its velocity."""
+    """Return the instants [s] at which the block becomes slower than the belt by a tenth."""
     v = one["v_rel"]
     falls = np.flatnonzero((v[:-1] >= -0.1 * V_BELT) & (v[1:] < -0.1 * V_BELT))
     return one.t[falls]
@@ -66,26 +66,26 @@ def leaving(one: Trajectory) -> Array:
 def fig_02_belt_displacement(quick: bool) -> Drawn:
     """Displacement of the block on the belt, by the law.
 
-    `symfric select rabinowicz --paper` compares tables 4 and 5 with ours, law by law and rank by
-    rank. Four laws are drawn in a smooth form and, dotted, as they were published.
+    `symfric select rabinowicz --paper` compares tables 4 and 5 with our results, by law and by
+    rank. Four laws are drawn in a smooth form and, dotted, in their published form.
 
     Compared: S, the standard deviation of the positions every ms, with the paper's table 4; the
     positions with exact dry friction in closed form.
 
-    Distance: largest deviation of S from table 4, relative.
+    Distance: largest relative deviation of S from table 4.
 
     Reproduced: Coulomb, Threlfall and Dahl do not stick, in either form: their spring never reaches
     the static level.
 
-    Refuted: that S tells the stability of a solution. Every ms it is 14.5 ... 15.0 cm for all laws
-    and forms with a static level, 14.6 cm for exact dry friction: it measures the amplitude. At the
-    steps of our solver it is 10 ... 22 cm for the very same motions. That the laws part by
-    accumulated errors of the iteration: a tolerance a hundred times sharper moves no position by
-    more than 3 um, while the laws are centimetres apart.
+    Refuted: that S shows the stability of a solution. With positions every ms, S is 14.5 ... 15.0
+    cm for all laws and forms with a static level, and 14.6 cm for exact dry friction, so it
+    measures the amplitude. At the steps of our solver, S is 10 ... 22 cm for the same motions. That
+    the laws differ by accumulated errors of the iteration: a tolerance a hundred times tighter
+    changes no position by more than 3 um, while the laws differ by centimetres.
 
-    Undecided: where table 4 takes its positions. The table of the machine says Runge-Kutta with
-    steps of 1 us and the text says ode15s; equal steps of 1 us would give the S of every ms, which
-    is not that of table 4.
+    Undecided: which positions table 4 uses. The table of the machine states Runge-Kutta with steps
+    of 1 us, and the text states ode15s; equal steps of 1 us would give the same S as positions
+    every ms, which is not that of table 4.
     """
     names = laws.chosen(quick)
     label = "displacement of the block [m]"
@@ -130,7 +130,7 @@ def fig_02_belt_displacement(quick: bool) -> Drawn:
 def fig_03_belt_velocity(quick: bool) -> Drawn:
     """Velocity of the block relative to the belt, by the law.
 
-    Four laws are drawn in a smooth form and, dotted, as they were published.
+    Four laws are drawn in a smooth form and, dotted, in their published form.
 
     Compared: the period from one break-away to the next with that of exact dry friction in closed
     form, for the laws with a static level; the greatest slip.
@@ -138,11 +138,11 @@ def fig_03_belt_velocity(quick: bool) -> Drawn:
     Distance: largest deviation of a period, over all laws and forms with a static level.
 
     Reproduced: the differences of the motions grow with time, since the periods differ: by 4 %
-    among the laws with a static level, through the widths of their laws and forms.
+    among the laws with a static level, because of the widths of the laws and forms.
 
-    Refuted: that the kind of law matters little on a slide, as the conclusions have it. The three
-    laws without a static level never stick, in either form, and swing with the period of the free
-    block, 3.9 s instead of 6.1 s.
+    Refuted: that the kind of law has little influence on a slide, as the conclusions state. The
+    three laws without a static level never stick, in either form, and oscillate with the period of
+    the free block, 3.9 s instead of 6.1 s.
     """
     label = "velocity relative to the belt [m/s]"
     runs, dry, figure = drawn(quick, 14.0, lambda one: one["v_rel"], label)
@@ -174,28 +174,28 @@ def fig_03_belt_velocity(quick: bool) -> Drawn:
 
 
 PEAKED = ("Bengisu", "Velocity-based", "Awrejcewicz", "Stick-slip")
-"""Laws that pass their static level again in stopping."""
+"""Laws whose force passes the static level again while the block stops."""
 
 
 @plate("1", within=(0.043, 0.049))
 def fig_04_belt_acceleration(quick: bool) -> Drawn:
     """Acceleration of the block on the belt, by the law.
 
-    Four laws are drawn in a smooth form and, dotted, as they were published.
+    Four laws are drawn in a smooth form and, dotted, in their published form.
 
     Compared: the greatest acceleration in slip with that of exact dry friction in closed form, k/m
     times the amplitude; how fast the block stops on the belt.
 
-    Distance: largest deviation of the greatest acceleration while it slips, relative, over all laws
-    and forms with a static level.
+    Distance: largest relative deviation of the greatest acceleration during slip, over all laws and
+    forms with a static level.
 
-    Reproduced: laws with a static level stick and slip, visibly.
+    Reproduced: laws with a static level visibly stick and slip.
 
-    Refuted: that states make an acceleration accurate. The peaks where the block stops are of the
-    laws, not of the motion: exact dry friction jumps from 0.52 m/s^2 to rest. Laws that pass their
-    static level again in stopping, Stick-slip with states and Bengisu, Velocity-based and
-    Awrejcewicz without, peak at 1.3 ... 1.9 times that for some ms, in both forms; Karnopp without
-    states and the other bristle laws do not.
+    Refuted: that states make an acceleration accurate. The peaks at the end of slip are due to the
+    laws, not to the motion: exact dry friction jumps from 0.52 m/s^2 to rest. Laws whose force
+    passes the static level again while the block stops (Stick-slip, which has states; Bengisu,
+    Velocity-based and Awrejcewicz, which have none) have peaks of 1.3 ... 1.9 times this value for
+    some ms, in both forms; Karnopp, without states, and the other bristle laws have none.
     """
     label = "acceleration of the block [m/s²]"
     runs, dry, figure = drawn(quick, 14.0, acceleration, label, -0.8, 1.6)
@@ -226,28 +226,28 @@ def fig_04_belt_acceleration(quick: bool) -> Drawn:
 
 
 LEVEL = {"Threlfall, original": 0.95}
-"""Share of mu_d N at which a law slides, where it is not all of it."""
+"""Fraction of mu_d N at which a law slides, if it is not 1."""
 
 
 @plate("1", within=0.017)
 def fig_05_belt_friction(quick: bool) -> Drawn:
     """Friction force of the belt on the block, by the law.
 
-    Four laws are drawn in a smooth form and, dotted, as they were published.
+    Four laws are drawn in a smooth form and, dotted, in their published form.
 
-    Compared: the greatest force of each law with the static level mu_s N = 1.177 N that table 3
-    gives, after the first stop on the belt; the force in slip with mu_d N = 0.785 N.
+    Compared: the greatest force of each law after the first stop on the belt with the static level
+    of table 3, mu_s N = 1.177 N; the force in slip with mu_d N = 0.785 N.
 
-    Distance: largest deviation of the greatest force from the static level, relative, over all laws
+    Distance: largest relative deviation of the greatest force from the static level, over all laws
     and forms with a static level.
 
-    Reproduced: Coulomb, Threlfall and Dahl show dynamic friction alone, and alike: mu_d N to 0.1 %,
-    and 0.95 mu_d N for Threlfall as published, which never reaches its level.
+    Reproduced: Coulomb, Threlfall and Dahl show only dynamic friction, with the same force: mu_d N
+    to 0.1 %, and 0.95 mu_d N for Threlfall as published, which never reaches its level.
 
-    Refuted: that these data let one choose a law by its Stribeck effect, as table 5 does: it falls
-    over 1 mm/s on a belt of 100 mm/s, and in slip all laws and forms but that one are at mu_d N
-    to 0.1 %. That laws with states are the smooth ones: the undamped bristles of Dahl and
-    Stick-slip ring.
+    Refuted: that these data allow a choice of law by the Stribeck effect, as in table 5: friction
+    falls over 1 mm/s on a belt of 100 mm/s, and in slip all laws and forms except Threlfall as
+    published are at mu_d N to 0.1 %. That laws with states are the smooth ones: the undamped
+    bristles of Dahl and Stick-slip oscillate.
     """
     label = "friction on the block [N]"
     runs, _, figure = drawn(quick, 14.0, lambda one: -one["friction"], label, -0.15, 1.35)
@@ -284,6 +284,6 @@ def fig_05_belt_friction(quick: bool) -> Drawn:
 
 
 def ringing(one: Trajectory) -> float:
-    """Total variation of the force between 0.3 and 3 s, beyond its fall with the spring [N]."""
+    """Return the total variation of the force from 0.3 to 3 s, less the fall by the spring [N]."""
     force = one["friction"][(one.t > 0.3) & (one.t < 3.0)]
     return float(np.abs(np.diff(force)).sum() - abs(force[-1] - force[0]))

@@ -1,11 +1,12 @@
 """Pendulum and box of figures 6 to 12: the laws with the numbers of tables 6 and 7.
 
-Table 6 has 20 kg on 0.3 m and 1.8 kg m^2, which is m L^2: the inertia about the hinge of a point
-mass, or one about the mass. Neither table has the radius of the hinge, over which its friction
-acts. So the figures draw one machine, and what is said of the paper holds for `MACHINES`, all.
+Table 6 states 20 kg at 0.3 m and 1.8 kg m^2, which is m L^2: either the inertia of a point mass
+about the hinge, or the inertia about the mass. Neither table states the radius of the hinge, at
+which its friction acts. Therefore the figures draw one machine, and statements on the paper hold
+for all `MACHINES`.
 
-`smooth_coulomb` and `at_start` solve equations written by hand with SUNDIALS (IDAS). They use
-nothing but CasADi, so that a mistake of the library cannot stand on both sides.
+`smooth_coulomb` and `at_start` solve equations written by hand with SUNDIALS (IDAS). They use only
+CasADi, so that an error of the library cannot affect both sides of a comparison.
 """
 
 from functools import cache
@@ -22,21 +23,21 @@ from symfric.scenes import PendulumBox
 
 Array = NDArray[np.float64]
 M_BOX, M, L, J, R, G = 6.0, 20.0, 0.3, 1.8, 0.01, 9.81
-"""Table 6; the radius of the hinge, which it does not give, as in the library's preset."""
+"""Numbers of table 6; the radius of the hinge, which it does not state, is that of the preset."""
 FLOOR, HINGE, WIDTH = 0.02, 0.002, 1e-3
 """Dynamic coefficients and velocity [m/s] of the smooth Coulomb law in table 7."""
 
 
 def balance(phi: ca.SX, v: ca.SX, w: ca.SX, unknown: ca.SX) -> ca.SX:
-    """Residuals, shape (4, 1): Newton for the box, moments of the pendulum, two normal forces.
+    """Return residuals (4, 1): forces on the box, moments of the pendulum, two normal forces.
 
-    `unknown` are the accelerations of box [m/s^2] and pendulum [rad/s^2], the force of the floor
-    and that of the hinge [N].
+    The entries of `unknown` are the accelerations of box [m/s^2] and pendulum [rad/s^2], and the
+    forces of floor and hinge [N].
     """
     a, alpha, floor, hinge = ca.vertsplit(unknown)
     s, c = ca.sin(phi), ca.cos(phi)
     ax, az = a + L * (alpha * c - w**2 * s), L * (alpha * s + w**2 * c)  # of the mass
-    hx, hz = M * ax, M * (az + G)  # what the hinge does to it
+    hx, hz = M * ax, M * (az + G)  # force of the hinge on the mass
     return ca.vertcat(
         M_BOX * a + hx + floor * FLOOR * ca.tanh(v / WIDTH),
         J * alpha + hx * L * c + hz * L * s + R * hinge * HINGE * ca.tanh(R * w / WIDTH),
@@ -46,12 +47,12 @@ def balance(phi: ca.SX, v: ca.SX, w: ca.SX, unknown: ca.SX) -> ca.SX:
 
 
 def size(f: ca.SX) -> ca.SX:
-    """Length of a force, smooth at zero as the library has it."""
+    """Return the magnitude of a force, smoothed at zero as in the library."""
     return ca.sqrt(ca.sumsqr(f) + 1e-8) - 1e-4
 
 
 def smooth_coulomb(times: Array) -> dict[str, Array]:
-    """Positions, velocities and accelerations of box and pendulum at `times` [s], to ten digits."""
+    """Return positions, velocities and accelerations at `times` [s], accurate to ten digits."""
     x, phi, v, w = (ca.SX.sym(name) for name in ("x", "phi", "v", "w"))
     unknown = ca.SX.sym("unknown", 4)
     y, rates = ca.vertcat(x, phi, v, w), ca.vertcat(v, w, unknown[:2])
@@ -67,7 +68,7 @@ def smooth_coulomb(times: Array) -> dict[str, Array]:
 
 
 def at_start() -> tuple[float, float]:
-    """Accelerations at the start [m/s^2, rad/s^2], where nothing rubs yet, as a linear system."""
+    """Return the accelerations at the start [m/s^2, rad/s^2], without friction, linear system."""
     s, c = np.sin(np.pi / 6), np.cos(np.pi / 6)
     mass = np.array([[M_BOX + M, M * L * c], [M * L * c, J + M * L**2]])
     a, alpha = np.linalg.solve(mass, [0.0, -M * G * L * s])
@@ -76,29 +77,29 @@ def at_start() -> tuple[float, float]:
 
 Array = NDArray[np.float64]
 Machine = tuple[float, float]
-"""Inertia about the mass [kg m^2], radius of the hinge [m]."""
+"""Inertia about the mass [kg m^2] and radius of the hinge [m]."""
 DRAWN: Machine = (J, R)
 MACHINES: tuple[Machine, ...] = (DRAWN, (J, 0.1), (1e-9, 0.003), (1e-9, 0.1))
-"""Both readings of the inertia, and radii of 3 to 100 mm."""
+"""Both interpretations of the inertia, with radii of 3 to 100 mm."""
 T_END = 15.0
 EXACT = "exact dry friction"
 
 
 @cache
 def run(name: str, t_end: float = T_END, at: Machine = DRAWN, rtol: float = 1e-7) -> Trajectory:
-    """Return a run with a law, or exact dry friction, in floor and hinge, every ms."""
+    """Return a run with a law or exact dry friction in floor and hinge, sampled every ms."""
     law = ExactCoulomb() if name == EXACT else FORMS[name]
     model = PendulumBox.preset("jing_mi_table_7", law, J=at[0], R=at[1]).model()
     times = np.linspace(0, t_end, round(1000 * t_end) + 1)
     try:
         return simulate(model, t_end, rtol=rtol, t_eval=times)
-    except SolveError:  # the law of Awrejcewicz jumps with the applied force; other steps pass
+    except SolveError:  # the law of Awrejcewicz jumps with the applied force; other steps succeed
         return simulate(model, t_end, rtol=rtol / 3, t_eval=times)
 
 
 @cache
 def signal(name: str, what: str, t_end: float, at: Machine = DRAWN) -> Array:
-    """x, x', x'' of the box or phi, phi', phi'' of the pendulum."""
+    """Return x, x', x'' of the box or phi, phi', phi'' of the pendulum."""
     one, joint = run(name, t_end, at), what.rstrip("'")
     ending = what.removeprefix(joint)
     if ending == "''":
@@ -107,39 +108,39 @@ def signal(name: str, what: str, t_end: float, at: Machine = DRAWN) -> Array:
 
 
 def off(name: str, what: str, t_end: float, at: Machine = DRAWN) -> Array:
-    """Difference of a signal from that of exact dry friction."""
+    """Return the difference of a signal from that of exact dry friction."""
     return signal(name, what, t_end, at) - signal(EXACT, what, t_end, at)
 
 
 @cache
 def by_hand(t_end: float) -> dict[str, Array]:
-    """The smooth Coulomb law in both joints, by equations written by hand."""
+    """Return the motion with the smooth Coulomb law in both joints, by equations by hand."""
     return smooth_coulomb(run("Smooth", t_end).t)
 
 
 def distance(what: str, t_end: float) -> float:
-    """Largest difference of a signal of the smooth Coulomb law from that by hand."""
+    """Return the largest difference of a signal of the smooth Coulomb law from that by hand."""
     return largest(signal("Smooth", what, t_end) - by_hand(t_end)[what])
 
 
 def picture(
     what: str, label: str, names: tuple[str, ...], t_end: float, limit: float = np.inf
 ) -> Figure:
-    """A panel per law, exact dry friction behind."""
+    """Return a picture with a panel per law, and exact dry friction behind each law."""
     t = run(EXACT, t_end).t
     curves = {name: (t, signal(name, what, t_end)) for name in forms(names)}
     return small_multiples(curves, (t, signal(EXACT, what, t_end)), label, -limit, limit)
 
 
 def last_swing(name: str, what: str, t_end: float, at: Machine = DRAWN) -> float:
-    """Half the range of a signal in the last two seconds."""
+    """Return half the range of a signal in the last two seconds."""
     return float(np.ptp(signal(name, what, t_end, at)[-2000:])) / 2
 
 
 def end_of_motion(what: str, numbers: dict[str, float], t_end: float) -> dict[str, bool]:
-    """Claims on `signal` in the last two seconds on all machines; adds the ranges to `numbers`.
+    """Return claims on the last two seconds on all machines; add the ranges to `numbers`.
 
-    At reduced size the box still moves, and there is nothing to say of the end.
+    At reduced size the box still moves at the end, and there are no claims.
     """
     if t_end < T_END:
         return {
@@ -183,7 +184,7 @@ def _said_of_the_end(found: dict[str, list[float]]) -> dict[str, bool]:
 
 
 def _fixed_hinge(what: str, numbers: dict[str, float]) -> dict[str, bool]:
-    """Check that with the box held the pendulum of the machine drawn is one on a fixed hinge."""
+    """Return claims that with the box at rest the drawn machine is a pendulum on a fixed hinge."""
     stiffness = M * G * L
     w = float(np.sqrt(stiffness / (J + M * L**2)))
     swings = {one: last_swing(EXACT, one, T_END) for one in (what, "phi")}
@@ -202,7 +203,7 @@ def _fixed_hinge(what: str, numbers: dict[str, float]) -> dict[str, bool]:
 
 
 def departures(what: str, unit: str, names: tuple[str, ...], t_end: float) -> dict[str, float]:
-    """Distances of the laws from dry friction, over the run and over its last two seconds."""
+    """Return distances of the laws from dry friction, over the run and its last two seconds."""
     numbers = {f"swing in the last 2 s, {EXACT} [{unit}]": last_swing(EXACT, what, t_end)}
     for name in forms(names):
         away = off(name, what, t_end)
@@ -213,7 +214,7 @@ def departures(what: str, unit: str, names: tuple[str, ...], t_end: float) -> di
 
 
 def positions(numbers: dict[str, float]) -> dict[str, bool]:
-    """Claims on every form of every law on all machines; adds the ranges to `numbers`."""
+    """Return claims on all forms of all laws on all machines; add the ranges to `numbers`."""
     most: list[float] = []
     ratios: list[float] = []
     factors: list[float] = []

@@ -20,27 +20,27 @@ READINGS = {"point mass": 1e-9, "1.8 kg m^2 about the mass": box.J}
 
 @plate("1", within=1e-12)
 def fig_06_pendulum_box(quick: bool) -> Drawn:
-    """The pendulum on the box, and what its table says.
+    """Pendulum on the box, and the numbers of its table.
 
-    The machine which is simulated, at its start and after the first half swing, and the way of the
-    mass between them. The hinge is 0.4 m above the ground; the width of the box is of the picture
-    only.
+    The picture shows the simulated machine at its start and after the first half swing, and the
+    path of the mass between them. The hinge is 0.4 m above the ground; the width of the box is only
+    for the picture.
 
-    Compared: the accelerations at the start, where nothing rubs yet, with a linear system written
-    by hand; the two readings of table 6 with the standard deviations that table 8 prints.
+    Compared: the accelerations at the start, where there is no friction yet, with a linear system
+    written by hand; the two interpretations of table 6 with the standard deviations of table 8.
 
     Distance: largest relative difference of an acceleration from that by hand.
 
-    Refuted: that the tables describe the machine. They give a moment of the box, 0.1 kg m^2, and a
-    height h, which stand in no equation since the box does not turn, and no radius of the hinge,
-    over which its friction acts.
+    Refuted: that the tables describe the machine. They state a moment of the box, 0.1 kg m^2, and a
+    height h, which appear in no equation since the box does not turn, and no radius of the hinge,
+    at which its friction acts.
 
     Undecided: whether the pendulum is a point mass, as its 1.8 kg m^2 = m L^2 suggests, or has 1.8
-    kg m^2 about the mass. Table 8 has S = 5.9 cm with the smooth Coulomb law. Every ms it is 3.0 cm
-    for the point mass and 5.8 cm for the other; but table 8 does not say where it takes the
-    positions. At the steps of our solver the point mass has 4.7 ... 5.7 cm, the other 5.8 ... 6.2
-    cm, by tolerances of 1e-5 to 1e-7. Figures 7 to 12 draw the second reading, and what they say of
-    the paper holds for both, with radii of 3 to 100 mm.
+    kg m^2 about the mass. Table 8 has S = 5.9 cm with the smooth Coulomb law. With positions every
+    ms, S is 3.0 cm for the point mass and 5.8 cm for the other interpretation, but table 8 does not
+    state which positions it uses. At the steps of our solver S is 4.7 ... 5.7 cm for the point mass
+    and 5.8 ... 6.2 cm for the other, with tolerances of 1e-5 to 1e-7. Figures 7 to 12 draw the
+    second interpretation; their statements on the paper hold for both, with radii of 3 to 100 mm.
     """
     t_end = 1.0 if quick else box.T_END
     table = box.run("Smooth", t_end)
@@ -97,34 +97,34 @@ WEAKER: dict[str, Law] = {
     "Karnopp with a hundredth of its band": Karnopp(mu_s=0.003, mu_d=0.002, D_v=1e-5, form="event"),
     "Karnopp in its smooth form": Karnopp(mu_s=0.003, mu_d=0.002, D_v=1e-3, form="smooth"),
 }
-"""Other laws of the hinge."""
+"""Other laws for the hinge."""
 
 
 @plate("1", within=(0.07, 0.16))
 def fig_07_box_displacement(quick: bool) -> Drawn:
     """Displacement of the box, by the law.
 
-    `symfric select pendulum_box --paper` compares tables 8 and 9 with ours, law by law and rank by
-    rank. Four laws are drawn in a smooth form and, dotted, as they were published.
+    `symfric select pendulum_box --paper` compares tables 8 and 9 with our results, by law and by
+    rank. Four laws are drawn in a smooth form and, dotted, in their published form.
 
     Compared: S, the standard deviation of the positions every ms, with the paper's table 8; the
     positions with exact dry friction.
 
-    Distance: median deviation of S from table 8 over the laws, relative.
+    Distance: median over the laws of the relative deviation of S from table 8.
 
-    Reproduced: the law has little influence on the position of the box: all but Karnopp are within
-    11 mm of exact dry friction, in both forms, for both readings of table 6 and radii of the hinge
-    of 3 to 100 mm.
+    Reproduced: the law has little influence on the position of the box: all laws except Karnopp are
+    within 11 mm of exact dry friction, in both forms, for both interpretations of table 6 and radii
+    of the hinge of 3 to 100 mm.
 
-    Refuted: that S tells the stability of a solution. On each of these machines it is the same
-    every ms for all of them, within 7 % of that of exact dry friction; at the steps of our solver
-    the same motions differ by a factor of 2 or more, with Stick-slip below all others, as in table
-    8.
+    Refuted: that S shows the stability of a solution. With positions every ms, on each of these
+    machines S is the same for all of these laws, within 7 % of that of exact dry friction; at the
+    steps of our solver it differs by a factor of 2 or more for the same motions, with Stick-slip
+    below all others, as in table 8.
 
-    Undecided: how far Karnopp is off, since table 6 has no radius of the hinge: its band of 1 mm/s
-    there stops the pendulum at every turn, at 10 mm below 0.1 rad/s and with a box centimetres off;
-    at 100 mm it is 3 ... 5 mm off. With a hundredth of that band it is where the others are, and so
-    it is in its smooth form, which stops nothing.
+    Undecided: the error of Karnopp, since table 6 has no radius of the hinge. Its band of 1 mm/s in
+    the hinge stops the pendulum at every reversal. With a radius of 10 mm this occurs below 0.1
+    rad/s and the error of the box is centimetres; with 100 mm it is 3 ... 5 mm. With a hundredth of
+    that band Karnopp agrees with the other laws, and so does its smooth form, which stops nothing.
     """
     names, t_end = chosen(quick), 1.0 if quick else box.T_END
     figure = box.picture("x", "displacement of the box [m]", names, t_end)
@@ -154,7 +154,7 @@ def fig_07_box_displacement(quick: bool) -> Drawn:
 
 
 def apart(hinge: Law, t_end: float) -> float:
-    """Largest distance from dry friction, Karnopp under the box and `hinge` in the hinge [m]."""
+    """Return the largest distance [m] from dry friction, with Karnopp under the box and `hinge`."""
     floor = (
         LAWS["Karnopp"] if hinge is WEAKER["Karnopp with a hundredth of its band"] else Karnopp()
     )
@@ -170,20 +170,21 @@ BRISTLY = ("Dahl", "LuGre", "Elasto-plastic")
 def fig_08_box_velocity(quick: bool) -> Drawn:
     """Velocity of the box, by the law.
 
-    Four laws are drawn in a smooth form and, dotted, as they were published.
+    Four laws are drawn in a smooth form and, dotted, in their published form.
 
     Compared: the smooth Coulomb law with the same machine by equations written by hand; all laws
     with exact dry friction.
 
     Distance: largest difference of the velocity from that by hand, smooth Coulomb law.
 
-    Reproduced: the law has little influence on the velocity of the box, but for Karnopp's band in
-    the hinge (figure 7): root mean square 17 mm/s at most, of 0.58 m/s and more, in both forms, for
-    both readings of table 6 and radii of the hinge of 3 to 100 mm. The farthest are those on
-    bristles, Dahl, LuGre and Elasto-plastic, and Threlfall as published, whose level is 5 % lower.
+    Reproduced: the law has little influence on the velocity of the box, except for Karnopp's band
+    in the hinge (figure 7): the root mean square difference is at most 17 mm/s, of 0.58 m/s and
+    more, in both forms, for both interpretations of table 6 and radii of the hinge of 3 to 100 mm.
+    It is largest for the bristle laws Dahl, LuGre and Elasto-plastic, and for Threlfall as
+    published, whose level is 5 % lower.
 
-    Undecided: how far the box still rolls on its bristles at the end, where dry friction holds it:
-    half a millimetre to either side on the machine drawn, 0.55 ... 0.60 mm, and from 4 um up on the
+    Undecided: how far the box still moves on its bristles at the end, where dry friction holds it:
+    half a millimetre to either side on the drawn machine, 0.55 ... 0.60 mm, and 4 um or more on the
     others.
     """
     names, t_end = chosen(quick), 1.0 if quick else box.T_END
@@ -229,7 +230,7 @@ def fig_08_box_velocity(quick: bool) -> Drawn:
 
 
 def without(away: dict[str, float]) -> dict[str, float]:
-    """All but Karnopp."""
+    """Return the distances without Karnopp."""
     return {name: far for name, far in away.items() if name != "Karnopp"}
 
 
@@ -237,20 +238,21 @@ def without(away: dict[str, float]) -> dict[str, float]:
 def fig_09_box_acceleration(quick: bool) -> Drawn:
     """Acceleration of the box, by the law.
 
-    Four laws are drawn in a smooth form and, dotted, as they were published.
+    Four laws are drawn in a smooth form and, dotted, in their published form.
 
     Compared: the smooth Coulomb law with the same machine by equations written by hand; all laws
     with exact dry friction.
 
     Distance: largest difference of the acceleration from that by hand, smooth Coulomb law.
 
-    Reproduced: accelerations differ visibly, by 10 % of the greatest one or more, on all machines
-    of figure 7.
+    Reproduced: accelerations differ visibly, by 10 % of the greatest acceleration or more, on all
+    machines of figure 7.
 
-    Refuted: that the states of a law make the difference. At every turn of the box friction jumps
-    by twice mu_d N, and laws jump there as they are made, for some ms: on every machine
-    Velocity-based, which has no state, is farther off than Gonthier, which has, and Stick-slip,
-    which has states, differs from dry friction as Velocity-based does within a quarter.
+    Refuted: that the states of a law cause the difference. At every reversal of the box friction
+    jumps by twice mu_d N, and each law passes this jump in its own way, for some ms. On every
+    machine Velocity-based, which has no state, differs more from dry friction than Gonthier, which
+    has states; and the difference of Stick-slip, which has states, is within a quarter of that of
+    Velocity-based.
     """
     names, t_end = chosen(quick), 1.0 if quick else box.T_END
     figure = box.picture("x''", "acceleration of the box [m/s²]", names, t_end)
@@ -292,26 +294,27 @@ def fig_09_box_acceleration(quick: bool) -> Drawn:
 
 
 def pendulum(what: str, label: str, quick: bool) -> Drawn:
-    """Draw a signal of the pendulum; what its three figures say.
+    """Draw a signal of the pendulum; the docstring has the common text of its three figures.
 
-    Four laws are drawn in a smooth form and, dotted, as they were published.
+    Four laws are drawn in a smooth form and, dotted, in their published form.
 
     Compared: the smooth Coulomb law with the same machine by equations written by hand; all laws
     with exact dry friction, over the run and over its last two seconds.
 
     Distance: largest difference from that by hand, smooth Coulomb law.
 
-    Reproduced: LuGre and Elasto-plastic err visibly at the end of the motion, by 0.25 ... 0.8 of
-    the swing, for both readings of table 6 and radii of the hinge of 3 to 100 mm. With the box held
+    Reproduced: LuGre and Elasto-plastic have visible errors at the end of the motion, 0.25 ... 0.8
+    of the swing, for both interpretations of table 6 and radii of the hinge of 3 to 100 mm. With
+    the box at rest,
 
-    Refuted: that this is an error of laws with states, which should be avoided where something
-    turns. On all these machines Threlfall as published, without a state, errs by 0.9 ... 1.4 times
-    as much, and Gonthier, with states, by less than 0.65 times. Where dry friction holds the box,
-    Dahl, LuGre and Elasto-plastic let it roll on bristles (figure 8), others let it creep, which
-    takes energy from the pendulum.
+    Refuted: that this is an error of laws with states, which should be avoided for rotations. On
+    all these machines the error of Threlfall as published, without a state, is 0.9 ... 1.4 times as
+    large, and that of Gonthier, with states, less than 0.65 times. Where dry friction holds the
+    box, it moves on bristles with Dahl, LuGre and Elasto-plastic (figure 8) and creeps with other
+    laws, which takes energy from the pendulum.
 
-    Undecided: how far Karnopp errs: by less than LuGre or by more than three times as much, as the
-    radius is that table 6 does not give (figure 7).
+    Undecided: the error of Karnopp, which is less than that of LuGre or more than three times as
+    large, depending on the radius that table 6 does not state (figure 7).
     """
     names, t_end = chosen(quick), 2.5 if quick else box.T_END
     unit = label[label.index("[") + 1 : -1].replace("²", "^2")

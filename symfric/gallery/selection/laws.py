@@ -1,6 +1,6 @@
-"""The eleven laws, in the paper's order and with its names, and what its tables print of them.
+"""Eleven laws of the paper, in its order and with its names, and their printed numbers.
 
-A number that is mistyped here or in a scene makes a figure refuse.
+A figure fails if a number here or in a scene differs from the printed one.
 """
 
 from collections.abc import Mapping
@@ -23,18 +23,18 @@ Array = NDArray[float64]
 
 LAWS: dict[str, Law] = {name: row.law() for name, row in PRINTED.items()}
 LAWS["Karnopp"] = Karnopp(form="event")
-"""With the numbers of the library; a preset gives each those of the paper."""
+"""Laws with the numbers of the library; presets replace them by those of the paper."""
 ORIGINAL: dict[str, Law] = {
     "Threlfall": Threlfall(form="original"),
     "Bengisu": BengisuAkay(form="original"),
     "Velocity-based": VelocityBased(form="original"),
     "Awrejcewicz": Awrejcewicz(form="original"),
 }
-"""The laws that `LAWS` has in a smooth form, in pieces as they were published."""
+"""Published, piecewise forms of laws that are smooth in `LAWS`."""
 BEHIND: dict[str, Any] = {**REFERENCE, "linewidth": 2.4}
 DOTTED: dict[str, Any] = {"color": "k", "linestyle": ":", "linewidth": 0.9}
 QUICK = ("Smooth", "Karnopp", "LuGre")
-"""Laws that represent all at reduced size."""
+"""Laws that represent all laws at reduced size."""
 SLIDING = ("Smooth", "Threlfall", "Dahl")
 """Laws without a static level."""
 BRISTLES = ("LuGre", "Elasto-plastic", "Stick-slip", "Gonthier")
@@ -51,17 +51,17 @@ FORMS = LAWS | {f"{name}, original": law for name, law in ORIGINAL.items()}
 
 
 def law_of(name: str) -> str:
-    """The law whose form `name` is."""
+    """Return the law of which `name` is a form."""
     return name.partition(",")[0]
 
 
 def forms(names: tuple[str, ...]) -> tuple[str, ...]:
-    """These laws, and the original forms of those that have one."""
+    """Return these laws and their original forms, where they exist."""
     return (*names, *(name for name in FORMS if name not in LAWS and law_of(name) in names))
 
 
 def chosen(quick: bool) -> tuple[str, ...]:
-    """The laws of a figure."""
+    """Return the names of the laws of a figure."""
     return QUICK if quick else tuple(LAWS)
 
 
@@ -72,10 +72,10 @@ def small_multiples(
     low: float = -inf,
     high: float = inf,
 ) -> Figure:
-    """A panel per law, exact dry friction behind each; the kinds of laws by colour.
+    """Return a picture with a panel per law, and exact dry friction behind each law.
 
-    Beside its name is the root mean square distance from exact dry friction; the original form of a
-    law that is smooth here is dotted.
+    Colours show the kinds of laws. Next to the name of a law is its root mean square distance from
+    exact dry friction; the original form of a law that is smooth here is dotted.
     """
     unit = label[label.index("[") + 1 : -1]
     dotted = {law_of(name): curve for name, curve in curves.items() if name not in LAWS}
@@ -98,7 +98,7 @@ def small_multiples(
         places[0].set_ylim(low, high)
     for axis in places[len(curves) :]:
         axis.axis("off")
-    for axis in places[len(curves) - columns : len(curves)]:  # nothing stands below these
+    for axis in places[len(curves) - columns : len(curves)]:  # these panels have none below them
         axis.tick_params(labelbottom=True)
     _legend(places[len(curves)], bool(dotted))
     figure.supxlabel("time [s]", fontsize="medium")
@@ -107,7 +107,7 @@ def small_multiples(
 
 
 def kind(name: str) -> int:
-    """0: no static level; 1: static level, no states; 2: static level and states."""
+    """Return 0 without a static level, 1 with static level only, 2 with static level and states."""
     return 0 if name in SLIDING else 2 if name in BRISTLES else 1
 
 
@@ -134,8 +134,8 @@ PRINTED_NUMBERS = {
         _BOX["hinge"], "0.002 0.003 1e-3 1e-3 1e4 2 1e-7 1e-7 0.01 | 1e-3 1e-2 1e-5 1e-6"
     ),
 }  # fmt: skip
-"""Table -> the numbers of the scene, and its rows as printed, in the order of `ROWS`; behind the
-bar those of `OURS`, as presets.toml of the scenes interprets the table."""
+"""Table -> numbers of the scene, and rows as printed, in the order of `ROWS`; after the bar the
+rows of `OURS`, as presets.toml of the scenes interprets the table."""
 ROWS = (
     "Smooth.mu_d", "Stick-slip.mu_s", "Smooth.v_eps", "LuGre.v_s", "LuGre.sigma_0",
     "LuGre.sigma_1", "Elasto-plastic.z_ba", "Stick-slip.D_max", "Gonthier.tau_dw",
@@ -144,7 +144,7 @@ OURS = ("Velocity-based.v_s", "Velocity-based.v_d", "Gonthier.v_s", "Gonthier.v_
 
 
 def agree(*tables: str) -> dict[str, bool]:
-    """Claims that the figures are computed with the numbers of these tables."""
+    """Return claims that the figures are computed with the numbers of these tables."""
     found: dict[str, bool] = {}
     for table in tables:
         if table in PRINTED_S:

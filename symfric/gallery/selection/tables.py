@@ -1,16 +1,16 @@
-"""Jing and Mi, Investigation of Selection Mechanism of Friction Models, tables 4, 5, 8 and 9 again.
+"""Tables 4, 5, 8 and 9 of Jing and Mi, Investigation of Selection Mechanism of Friction Models.
 
 The paper ranks eleven laws by the time T of a run and by a "position stability"
 
     S = sqrt(sum (x_k - mean x)^2 / (n - 1))                            its equation (1)
 
-over the n values of the position that the solver returns. That is the standard deviation of the
-motion: it grows with its amplitude and depends on where the solver puts its steps; it says nothing
-of the stability of a solution. Ranks per need are those of T and of S among the laws that the
-table ranks for it; J, S and Y are the paper's letters for static friction, the Stribeck effect and
+over the n values of the position that the solver returns. S is the standard deviation of the
+motion: it grows with the amplitude and depends on the steps of the solver, but not on the
+stability of a solution. Ranks per need are those of T and of S among the laws that the table ranks
+for this need; J, S and Y are the paper's letters for static friction, the Stribeck effect and
 pre-sliding.
 
-Behind them stand, in eighty columns, what cannot be reproduced, with numbers.
+After the tables, in eighty columns, are the results that cannot be reproduced, with numbers.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -40,21 +40,21 @@ from symfric.scenes import PendulumBox, Rabinowicz, Scene
 
 Array = NDArray[np.float64]
 EQUAL = 1e-4
-"""Error of the integrator at which our times are taken, relative to the law's own motion."""
+"""Error of the integrator at which our times are measured, relative to the motion of the law."""
 SAMPLES = 20001
-"""Equally spaced positions for S."""
+"""Number of equally spaced positions for S."""
 RTOL, ATOL = 1e-3, 1e-8
-"""Of the peer: the text says ode15s with an absolute error of 1e-8, whose default is 1e-3."""
+"""Tolerances of the peer; the text states ode15s (default 1e-3) with an absolute error of 1e-8."""
 WORK = 1_000_000_000
-"""CasADi instructions that a run may take, some three seconds."""
+"""Largest number of CasADi instructions of a run, about three seconds."""
 PATIENCE = 30.0
-"""Processor time [s] that the peer may take."""
+"""Largest processor time [s] of the peer."""
 
 
 @final
 @dataclass(frozen=True)
 class Printed:
-    """A law of the paper: what ours is called, the needs it is ranked for, T [s] and S [m]."""
+    """Law of the paper: name in the catalogue, needs for which it is ranked, T [s] and S [m]."""
 
     name: str
     needs: str
@@ -64,7 +64,7 @@ class Printed:
     S8: float
 
     def law(self) -> Law:
-        """The law of the catalogue."""
+        """Return the law of the catalogue."""
         return ALL_LAWS[self.name]()
 
 
@@ -91,7 +91,7 @@ COLUMNS: dict[str, Callable[[str], bool]] = {
     "J+S": lambda needs: needs == "JS",
     "J+S+Y": lambda needs: needs == "JSY",
 }
-"""Column of tables 5 and 9 -> whether a law has a rank in it; J+S has those without Y."""
+"""Column of tables 5 and 9 -> True if a law has a rank in it; J+S ranks the laws without Y."""
 
 TABLES: dict[str, tuple[type[Scene], str, str, str]] = {
     "rabinowicz": (Rabinowicz, "jing_mi_table_3", "table 4", "table 5"),
@@ -103,17 +103,17 @@ TABLES: dict[str, tuple[type[Scene], str, str, str]] = {
 @final
 @dataclass(frozen=True)
 class PaperRow:
-    """One law with the printed values.
+    """Row of the comparison: a law with the printed and our values.
 
     Attributes:
         T, S: printed time [s] and standard deviation of x [m].
         time_s, attempts, rtol: processor time [s] of our run whose integrator's error is `EQUAL`,
             attempts of a step in it, relative tolerance.
         S_uniform, S_steps: S over equally spaced times, and over the integrator's own steps.
-        S_peer, peer_steps: S over the steps of SciPy's BDF, the relative of ode15s, with the
-            tolerances of the paper; NaN where its equations are not explicit.
-        explicit_step: largest step [s] of an explicit Runge-Kutta method that follows within 5 %.
-        reason: why a number is missing.
+        S_peer, peer_steps: S over the steps of SciPy's BDF, which is related to ode15s, with the
+            tolerances of the paper, and their number; NaN if the equations are not explicit.
+        explicit_step: largest step [s] at which an explicit Runge-Kutta method is within 5 %.
+        reason: reason why a number is missing.
     """
 
     name: str
@@ -133,13 +133,13 @@ class PaperRow:
 @final
 @dataclass(frozen=True)
 class PaperComparison:
-    """The paper's tables with our numbers.
+    """Tables of the paper with our numbers.
 
     Attributes:
-        scene, times, ranks: which machine, and which tables.
-        t_end: length of the motion [s].
-        error: of the integrator at which our times are taken.
-        rows: laws in the paper's order.
+        scene, times, ranks: names of the machine and of the tables.
+        t_end: duration of the motion [s].
+        error: error of the integrator at which our times are measured.
+        rows: laws in the order of the paper.
     """
 
     scene: str
@@ -150,9 +150,9 @@ class PaperComparison:
     rows: tuple[PaperRow, ...]
 
     def orders(self) -> dict[str, dict[str, list[str]]]:
-        """Column -> criterion -> laws, the first the smallest.
+        """Return column -> criterion -> laws in increasing order of the criterion.
 
-        Criteria: printed T, our time, printed S, our S over equal times and over our steps.
+        The criteria are printed T, our time, printed S, and our S over equal times and over steps.
         """
         by: Mapping[str, Callable[[PaperRow], float]] = {
             "printed T": lambda row: row.T,
@@ -170,7 +170,7 @@ class PaperComparison:
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data; numbers that are none are null."""
+        """Return plain data; numbers that are not finite are null."""
         rows = [
             {n: None if isinstance(v, float) and not isfinite(v) else v for n, v in row.items()}
             for row in map(asdict, self.rows)
@@ -179,7 +179,7 @@ class PaperComparison:
                 "orders": self.orders()}  # fmt: skip
 
     def lines(self) -> list[str]:
-        """Tables and evidence for a screen of eighty columns."""
+        """Return the lines of tables and evidence for a screen of eighty columns."""
         lacking = [f"{row.name}: {row.reason}" for row in self.rows if not isfinite(row.time_s)]
         texts = [
             [LEGEND, *lacking],
@@ -195,7 +195,7 @@ class PaperComparison:
 
 
 def _sorted(rows: Iterable[PaperRow], value: Callable[[PaperRow], float]) -> list[str]:
-    """Names by a number; those without one last, with a question mark."""
+    """Return the names in order of a number; names without one are last, with a question mark."""
     known = list(rows)
     last = sorted(known, key=lambda row: (value(row) != value(row), value(row)))
     return [row.name if value(row) == value(row) else f"{row.name}?" for row in last]
@@ -204,7 +204,7 @@ def _sorted(rows: Iterable[PaperRow], value: Callable[[PaperRow], float]) -> lis
 def compare_with_paper(
     scene: str, names: Iterable[str] = PRINTED, progress: Callable[[str, float], None] | None = None
 ) -> PaperComparison:
-    """The paper's laws with the paper's numbers in "rabinowicz" or "pendulum_box".
+    """Return the laws of the paper with its numbers, in "rabinowicz" or "pendulum_box".
 
     Raises:
         ValueError: another scene or law.
@@ -224,7 +224,7 @@ def compare_with_paper(
 
 
 def _row(machine: Machine, name: str, first: bool) -> PaperRow:
-    """One law, as it comes in the preset."""
+    """Return the row of one law in the form of the preset."""
     printed = PRINTED[name]
     T, S = (printed.T4, printed.S4) if first else (printed.T8, printed.S8)
     try:
@@ -250,12 +250,12 @@ def _measured(machine: Machine, name: str, law: Law, T: float, S: float) -> Pape
 
 
 def spread(x: Array) -> float:
-    """The paper's S [m]: the standard deviation of positions."""
+    """Return S [m] of the paper, the standard deviation of positions."""
     return float(np.std(x, ddof=1))
 
 
 def _peer(model: Model, t_end: float) -> tuple[float, int]:
-    """S over the steps of SciPy's BDF, and how many; NaN for equations that are not explicit."""
+    """Return S over the steps of SciPy's BDF, and their number; S is NaN for implicit equations."""
     if model.z or model.events or model.holonomic:
         return nan, 0
     x, ode = model.vector("x"), model.ode

@@ -1,8 +1,7 @@
-"""The paper of a continuously differentiable, self-tuning friction law, doi
+"""Paper on a continuously differentiable, self-tuning friction law, doi
 10.1177/14644193231169325.
 
-Its authors, title, equations and tables are lost in the text that we have; the law is the
-reconstruction of `SelfTuning`, the machines are Haug's examples. Its curves cannot be read from
-text either, so each figure is compared with what the text says about it, and with answers from
-elsewhere.
+The available text lacks authors, title, equations and tables; the law is the reconstruction of
+`SelfTuning`, the machines are Haug's examples. The text has no curves either, so each figure is
+compared with the statements of the text, and with independent computations.
 """

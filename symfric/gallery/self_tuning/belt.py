@@ -1,7 +1,8 @@
-"""Figures 1, 3, 4 and 10: curves of both laws, and both on the belt.
+"""Figures 1, 3, 4 and 10: curves of both laws, and both laws on the belt.
 
-The table of data of the belt is lost. Taken are the numbers of the LuGre paper (1 kg, 2 N/m,
-0.1 m/s, mu_s = 0.15, mu_d = 0.1 under 10 N) and, as the text has it without a unit, v_t = 15 mm/s.
+The table of data of the belt is lost. The figures use the numbers of the LuGre paper (1 kg, 2 N/m,
+0.1 m/s, mu_s = 0.15, mu_d = 0.1 under 10 N) and v_t = 15 mm/s, which the text states without a
+unit.
 """
 
 from functools import cache
@@ -19,24 +20,24 @@ from symfric.gallery.shared import REFERENCE, Belt, largest, legend_below, rms
 from symfric.scenes import Rabinowicz
 
 MU = {"mu_s": 0.15, "mu_d": 0.1}
-V_T = 0.015  # m/s, as the text has it without a unit
+V_T = 0.015  # m/s; the text states it without a unit
 
 
 @plate("1", within=0.1)
 def fig_01_force_profiles(quick: bool) -> Drawn:
     """Friction force against slip velocity: self-tuning law and Brown-McPhee.
 
-    The force on the body under a constant load. The paper's range and load are lost; here are the
-    friction coefficients and the 15 mm/s of its stick-slip test.
+    The force acts on the body under a constant load. The paper's range and load are lost; the
+    figure uses the friction coefficients and the 15 mm/s of its stick-slip test.
 
     Compared: the self-tuning law with Brown-McPhee, at equal velocity of the peak and at equal
     slope at rest.
 
     Distance: the largest difference at equal velocity of the peak, relative to the static level.
 
-    Reproduced: the law behaves like Brown-McPhee, within 10 % of mu_s N, if its peak is where that
-    of Brown-McPhee is. Its peak is mu_s N exactly, which Brown-McPhee never reaches; and it comes
-    down to mu_d N like 1/v, so that at ten times the velocity of the peak it is still 10 % above,
+    Reproduced: the law behaves like Brown-McPhee, within 10 % of mu_s N, if both have the peak at
+    the same velocity. The peak of the law is mu_s N exactly, which Brown-McPhee never reaches. The
+    law decreases to mu_d N like 1/v: at ten times the velocity of the peak it is still 10 % above,
     Brown-McPhee 0.8 %.
 
     Refuted: that the law needs no transition velocity. B is an inverse velocity: half of B at twice
@@ -89,13 +90,13 @@ def fig_01_force_profiles(quick: bool) -> Drawn:
 
 
 def on_curve(law: Law, v: np.ndarray) -> np.ndarray:
-    """F/N of a law without states at the velocities v [m/s]."""
+    """Return F/N of a law without states at the velocities v [m/s]."""
     speed = ca.SX.sym("v")
     return ca.Function("F", [speed], [law.force(speed, 1.0)])(v[None]).full()[0]
 
 
 def tail(law: Law) -> float:
-    """Excess of the force at 10 v_t over its limit, relative to the limit."""
+    """Return the excess of the force at 10 v_t over its limit, relative to the limit."""
     return float(on_curve(law, np.array([10 * V_T]))[0] / MU["mu_d"] - 1)
 
 
@@ -106,17 +107,18 @@ SYMBOLS = {"B": "B", "v_t": "v_t", "mu_s": "\\mu_s", "mu_d": "\\mu_d"}
 def fig_10_sensitivity(quick: bool) -> Drawn:
     """Sensitivity of the friction force to the parameters of the law.
 
-    The symbol in the paper's caption is lost; here are all parameters, of both laws. A curve shows
-    p dF/dp / (mu_s N): by how much the force changes where a parameter changes by its own size.
+    The symbol in the paper's caption is lost; the figure shows all parameters of both laws. A curve
+    shows p dF/dp / (mu_s N), the change of the force for a relative change of a parameter.
 
     Compared: derivatives by CasADi with central differences; the self-tuning law with Brown-McPhee.
 
     Distance: largest difference of the derivatives, relative to mu_s N.
 
-    Refuted: that only Brown-McPhee is sensitive to a parameter of velocity. The law depends on B
-    and v by their product alone, so B dF/dB = v dF/dv, as v_t dF/dv_t = -v dF/dv there. The largest
-    values are 0.47 and 0.41 with mu_d = 2/3 mu_s, and within 40 % of each other for ratios from 0.3
-    to 0.9. mu_d acts through C, whose slope by mu_d / mu_s grows without bound as that tends to 1.
+    Refuted: that only Brown-McPhee is sensitive to a velocity parameter. The law depends only on
+    the product of B and v, so B dF/dB = v dF/dv; for Brown-McPhee v_t dF/dv_t = -v dF/dv. The
+    largest values are 0.47 and 0.41 with mu_d = 2/3 mu_s, and within 40 % of each other for ratios
+    from 0.3 to 0.9. mu_d acts through C, whose derivative with respect to mu_d / mu_s grows without
+    bound as this ratio tends to 1.
     """
     v = np.linspace(-0.1, 0.1, 201 if quick else 2001)
     laws: dict[str, tuple[Law, tuple[str, ...]]] = {
@@ -161,7 +163,7 @@ def fig_10_sensitivity(quick: bool) -> Drawn:
 
 
 def ratio_of_largest(ratio: float) -> float:
-    """The largest v dF/dv of the self-tuning law over that of Brown-McPhee, at mu_d / mu_s."""
+    """Return the largest v dF/dv of the self-tuning law over that of Brown-McPhee."""
     v, mu = np.linspace(-0.1, 0.1, 401), {**MU, "mu_d": ratio * MU["mu_s"]}
     laws = (SelfTuning.from_peak_velocity(V_T, **mu), BrownMcPhee(v_t=V_T, **mu))
     one, other = (largest(by_its_speed(law, v)) for law in laws)
@@ -169,14 +171,14 @@ def ratio_of_largest(ratio: float) -> float:
 
 
 def by_its_speed(law: Law, v: np.ndarray) -> np.ndarray:
-    """The velocity times dF/dv, over mu_s N, at the velocities v [m/s]."""
+    """Return v dF/dv / (mu_s N) at the velocities v [m/s]."""
     speed = ca.SX.sym("v")
     slope = ca.Function("slope", [speed], [ca.jacobian(law.force(speed, 1.0), speed)])
     return v * slope(v[None]).full()[0] / MU["mu_s"]
 
 
 def sensitivity(law: Law, name: str, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """P dF/dp / (mu_s N) by CasADi and by central differences, at the velocities v [m/s]."""
+    """Return p dF/dp / (mu_s N) by CasADi and by central differences, at velocities v [m/s]."""
     value, speed = float(getattr(law, name)), ca.SX.sym("v")
     free, (parameter,) = symbolise(law, name)
     force = free.force(speed, 1.0)
@@ -194,7 +196,7 @@ BLOCK = {"m": 1.0, "k": 2.0, "v_belt": 0.1, "g": 10.0}
 
 
 def law(label: str, v_t: float) -> Law:
-    """One of LAWS with its peak at `v_t` [m/s]."""
+    """Return one of `LAWS` with its peak at `v_t` [m/s]."""
     if label.startswith("self"):
         return SelfTuning.from_peak_velocity(v_t, **MU)
     return BrownMcPhee(v_t=v_t, **MU)
@@ -202,18 +204,18 @@ def law(label: str, v_t: float) -> Law:
 
 @cache
 def run(label: str, v_t: float, t_end: float) -> Trajectory:
-    """One of LAWS on the belt."""
+    """Return the run of one of `LAWS` on the belt."""
     return moved(law(label, v_t), t_end)
 
 
 def moved(law: Law, t_end: float) -> Trajectory:
-    """A law on the belt."""
+    """Return the run of a law on the belt."""
     model = Rabinowicz(law, **BLOCK).model()
     return simulate(model, t_end, rtol=1e-8, t_eval=np.linspace(0, t_end, 6001))
 
 
 def nearest(t_end: float) -> float:
-    """The least rms difference of positions [m] from Brown-McPhee for B from 30 to 300 s/m."""
+    """Return the least rms difference [m] from Brown-McPhee for B from 30 to 300 s/m."""
     brown = run("Brown-McPhee", V_T, t_end)["x"]
     laws = (SelfTuning(B=B, **MU) for B in np.geomspace(30.0, 300.0, 40).tolist())
     return min(rms(moved(law, t_end)["x"] - brown) for law in laws)
@@ -225,20 +227,20 @@ def acceleration(run: Trajectory) -> Array:
 
 
 def period(run: Trajectory) -> float:
-    """Time between the last two crests of the elongation [s]."""
+    """Return the time between the last two crests of the elongation [s]."""
     x = run["x"]
     crests = np.flatnonzero((x[1:-1] > x[:-2]) & (x[1:-1] >= x[2:])) + 1
     return float(np.diff(run.t[crests])[-1]) if crests.size > 1 else 0.0
 
 
 def exact() -> Belt:
-    """Exact dry friction with the same levels."""
+    """Return the belt with exact dry friction of the same levels."""
     N = BLOCK["m"] * BLOCK["g"]
     return Belt(BLOCK["m"], BLOCK["k"], BLOCK["v_belt"], MU["mu_s"] * N, MU["mu_d"] * N)
 
 
 def creeps(one: Law) -> float:
-    """The least sliding velocity at which a law without states is mu_d N [m/s]."""
+    """Return the least sliding velocity [m/s] at which a law without states has mu_d N."""
 
     def above(v: float) -> float:
         return float(one.force(v, 1.0)) - MU["mu_d"]
@@ -247,7 +249,7 @@ def creeps(one: Law) -> float:
 
 
 def creeping(one: Trajectory, v: float) -> bool:
-    """Test for a force of mu_d N wherever the block creeps at the velocity `v` [m/s]."""
+    """Return True if the force is mu_d N wherever the block creeps at the velocity `v` [m/s]."""
     near = np.abs(one["v_rel"] + v) < 0.02 * v
     level = MU["mu_d"] * BLOCK["m"] * BLOCK["g"]
     return bool(near.any()) and np.allclose(-one["friction"][near], level, rtol=0.02)
@@ -267,9 +269,9 @@ def fig_03_stick_slip_motion(quick: bool) -> Drawn:
     0.26 v_t, 3.91 mm/s with v_t = 15 mm/s, and the self-tuning law at 0.31 times the velocity of
     its peak.
 
-    Undecided: whether both curves almost overlap, since the data of the belt are lost. With ours
-    they do not at v_t = 15 mm/s: the periods differ by 3 %, and with no B from 30 to 300 s/m are
-    they nearer than 39 mm; at 1 mm/s they do, within 7 mm.
+    Undecided: whether both curves almost overlap, since the data of the belt are lost. With our
+    data they do not at v_t = 15 mm/s: the periods differ by 3 %, and the distance is at least 39 mm
+    for every B from 30 to 300 s/m. At 1 mm/s they overlap within 7 mm.
     """
     t_end = 18.0 if quick else 30.0
     runs = {name: run(name, V_T, t_end) for name in LAWS}
@@ -335,13 +337,13 @@ def fig_04_stick_slip_force(quick: bool) -> Drawn:
 
     Distance: root mean square difference of the forces of both laws, relative to mu_s N.
 
-    Reproduced: both laws perform alike, as forces: over the slip velocity they lie within 10 % of
+    Reproduced: both laws have similar forces: over the slip velocity they agree within 10 % of
     mu_s N, as in figure 1. Over time they differ by the instants of break-away.
 
-    Refuted: that a law of the velocity alone captures stiction. It does not jump to its static
-    level at rest: its force is that of the spring, with a creep that grows with it.
+    Refuted: that a law of the velocity alone describes stiction. Its force does not jump to the
+    static level at rest: it is that of the spring, with a creep that grows with the force.
 
-    Undecided: the errors of both, since the paper's table of them is lost.
+    Undecided: the errors of both laws, since the table of errors is lost.
     """
     t_end = 18.0 if quick else 30.0
     runs = {name: run(name, V_T, t_end) for name in LAWS}
@@ -383,6 +385,6 @@ def fig_04_stick_slip_force(quick: bool) -> Drawn:
 
 
 def over(slips: np.ndarray, run: Trajectory) -> np.ndarray:
-    """Friction [N] of a law without states at slip velocities [m/s], from a run with it."""
+    """Return friction [N] at slip velocities [m/s], from the run of a law without states."""
     order = np.argsort(run["v_rel"])
     return np.interp(slips, run["v_rel"][order], run["friction"][order])

@@ -1,7 +1,7 @@
-"""The slider-crank of figures 17 to 21: both laws, and the same machine by other means.
+"""Slider-crank of figures 17 to 21: both laws, and the same machine computed in another way.
 
-Haug's example has the counts of the paper, 11 constraints and one degree of freedom; its data are
-taken, since the paper's table is lost: 120 rad/s at the start, friction in the crank's bearing,
+Haug's example has the numbers of the paper, 11 constraints and one degree of freedom. Its data are
+used, since the paper's table is lost: 120 rad/s at the start, friction in the bearing of the crank,
 both laws with their peak at 10 mm/s.
 """
 
@@ -33,7 +33,7 @@ MACHINES = {
 
 @cache
 def run(law: str, t_end: float) -> dict[str, Array]:
-    """Time, crank [rad], slider [m], rates and accelerations, energy [J], constraints' norm."""
+    """Return time, crank [rad], slider [m], rates, accelerations, energy [J], constraint norm."""
     model = SliderCrank(LAWS[law]).model()
     times = np.linspace(0.0, t_end, round(4000 * t_end) + 1)
     found = simulate(model, t_end, rtol=1e-8, t_eval=times)
@@ -46,22 +46,22 @@ def run(law: str, t_end: float) -> dict[str, Array]:
 
 @cache
 def oracle(law: str, t_end: float) -> dict[str, Array]:
-    """The same in the crank's angle, by equations written by hand and SUNDIALS."""
+    """Return the same in the angle of the crank, by equations written by hand and SUNDIALS."""
     return solve(MACHINES[law], run(law, t_end)["t"])
 
 
 def apart(signal: str, t_end: float) -> Array:
-    """Difference of a signal between both laws over time."""
+    """Return the difference of a signal between both laws over time."""
     return run("self-tuning", t_end)[signal] - run("Brown-McPhee", t_end)[signal]
 
 
 def drawn(
     signal: str, unit: str, t_end: float, numbers: dict[str, float], claims: dict[str, bool]
 ) -> Drawn:
-    """Draw both laws on the oracle, and below how far they are apart.
+    """Draw both laws on the oracle, and their difference below.
 
-    Compared: both laws, each with the same machine in the crank's angle, written by hand and solved
-    by SUNDIALS; and with each other.
+    Compared: both laws, each with the same machine in the angle of the crank, written by hand and
+    solved by SUNDIALS; and with each other.
 
     Distance: largest difference from that by hand, both laws.
     """
@@ -86,9 +86,10 @@ def drawn(
 def fig_17_crank_acceleration(quick: bool) -> Drawn:
     """Acceleration of the crank.
 
-    Reproduced: the profiles are smooth, overlap within 0.2 % of the greatest acceleration, and the
-    joints are not violated. That no jitter is seen here follows from figure 13: the bearing slides
-    at 8 m/s and more, eight hundred times the velocity of the peak, where both laws are flat.
+    Reproduced: the profiles are smooth and overlap within 0.2 % of the greatest acceleration, and
+    the joints are not violated. There is no jitter here for the reason given in figure 13: the
+    bearing slides at 8 m/s and more, eight hundred times the velocity of the peak, where both laws
+    are flat.
 
     Undecided: the data of the machine, which are Haug's here.
     """
@@ -113,7 +114,7 @@ def fig_17_crank_acceleration(quick: bool) -> Drawn:
 def fig_18_slider_acceleration(quick: bool) -> Drawn:
     """Acceleration of the slider.
 
-    Reproduced: both laws overlap, as the text says, within 0.2 % of the greatest acceleration.
+    Reproduced: both laws overlap within 0.2 % of the greatest acceleration, as the text states.
     """
     t_end = 0.05 if quick else 0.25
     numbers = {"laws apart [m/s^2]": largest(apart("slider''", t_end))}
@@ -127,10 +128,10 @@ def fig_18_slider_acceleration(quick: bool) -> Drawn:
 def fig_19_slider_velocity(quick: bool) -> Drawn:
     """Velocity of the slider.
 
-    Reproduced: both laws overlap, as the text says, and drift apart after some time, as it
-    observes: the difference grows over the run.
+    Reproduced: both laws overlap and drift apart after some time, as the text states: the
+    difference grows over the run.
 
-    Undecided: the instant at which they do, which is lost.
+    Undecided: the instant at which they drift apart, which is lost.
     """
     t_end = 0.05 if quick else 0.25
     numbers = {"laws apart [m/s]": largest(apart("slider'", t_end))}
@@ -147,8 +148,8 @@ def fig_19_slider_velocity(quick: bool) -> Drawn:
 def fig_20_crank_velocity(quick: bool) -> Drawn:
     """Velocity of the crank.
 
-    Reproduced: both laws overlap. In sliding both are mu_d N but for their tails, so they do at any
-    velocity of the peak; this machine says nothing of the transition to rest.
+    Reproduced: both laws overlap. In sliding both are mu_d N except for their tails, so they
+    overlap for any velocity of the peak; this machine does not show the transition to rest.
     """
     t_end = 0.05 if quick else 0.25
     numbers = {"laws apart [rad/s]": largest(apart("crank'", t_end))}
@@ -172,8 +173,8 @@ def fig_20_crank_velocity(quick: bool) -> Drawn:
 def fig_21_slider_position(quick: bool) -> Drawn:
     """Position of the slider.
 
-    Reproduced: both laws overlap. The position itself checks little: it follows from the crank's
-    angle by the lengths alone, and no law can move it out of its stroke.
+    Reproduced: both laws overlap. The position is a weak check: it follows from the angle of the
+    crank and the lengths alone, and no law can move it out of its stroke.
     """
     t_end = 0.05 if quick else 0.25
     numbers = {"laws apart [m]": largest(apart("slider", t_end))}

@@ -1,4 +1,4 @@
-"""Figures 7, 8, 9 and 12: the factors C, B and E of the law, in mm/s."""
+"""Figures 7, 8, 9 and 12: the factors C, B and E of the law, with velocities in mm/s."""
 
 from collections.abc import Iterable, Mapping
 
@@ -18,16 +18,16 @@ C = 2 - 2 / np.pi * np.arcsin(0.8)
 
 
 def force(v: Array, B: float, C: float, E: float) -> Array:
-    """F / (mu_s N) at the sliding velocity `v` [mm/s]; B [s/mm], C [1], E [1].
+    """Return F / (mu_s N) at the sliding velocity `v` [mm/s]; B [s/mm], C [1], E [1].
 
-    `SelfTuning` is the same for 1 <= C < 2, where C = 2 - (2/pi) asin(mu_d / mu_s), and E < 1.
+    `SelfTuning` is equal for 1 <= C < 2, where C = 2 - (2/pi) asin(mu_d / mu_s), and E < 1.
     """
     y = B * v
     return np.sin(C * np.arctan((1 - E) * y + E * np.arctan(y)))
 
 
 def draw_sweep(curves: Mapping[str, Array], v: Array, title: str, parts: Iterable[float]) -> Figure:
-    """Draw curves over the velocity `v` [mm/s], coloured by where they are in the sweep."""
+    """Draw curves over the velocity `v` [mm/s], coloured by their place in the sweep."""
     figure, (axis,) = panels(1, height=3.6)
     for (label, F), part in zip(curves.items(), parts, strict=True):
         axis.plot(v, -F, label=label, color=shade(part), linewidth=1.8)
@@ -37,7 +37,7 @@ def draw_sweep(curves: Mapping[str, Array], v: Array, title: str, parts: Iterabl
 
 
 def refuted(statements: Mapping[str, bool]) -> tuple[int, dict[str, bool]]:
-    """Number of the paper's statements that do not hold, and the claim that all do."""
+    """Return the number of the paper's statements that do not hold, and the claim that all hold."""
     wrong = len(statements) - sum(statements.values())
     return wrong, {"none of the paper's statements is refuted": wrong == 0}
 
@@ -46,17 +46,17 @@ def refuted(statements: Mapping[str, bool]) -> tuple[int, dict[str, bool]]:
 def fig_07_shape_factor(quick: bool) -> Drawn:
     """Influence of the shape factor C on the friction force.
 
-    F = -mu_s N sin(C atan(B v)) on the body, with B = 1 s/mm and E = 0: the paper gives neither,
-    nor the unit of its velocities; in mm/s its statements about figures 7 and 8 hold.
+    F = -mu_s N sin(C atan(B v)) on the body, with B = 1 s/mm and E = 0. The paper states neither of
+    them, nor the unit of its velocities; its statements about figures 7 and 8 hold in mm/s.
 
-    Compared: curves for C = 0 ... 2 with what the text says of them: flat at C = 0, like -tanh up
-    to C = 1, with a peak above, sharper beyond 1.4. Where a law exists (C from 1), also with
-    `SelfTuning`.
+    Compared: curves for C = 0 ... 2 with the statements of the text: flat at C = 0, like -tanh up
+    to C = 1, with a peak above 1, which is sharper beyond 1.4. Where a law exists (C from 1), the
+    curves are also compared with `SelfTuning`.
 
-    Distance: how many of these statements do not hold.
+    Distance: number of these statements that do not hold.
 
-    Reproduced: all four statements. C is the key to the magnitude as the paper says, and more: it
-    alone is mu_d / mu_s = sin(pi C / 2), so the paper's iterative correction has a closed form.
+    Reproduced: all four statements. C determines the magnitude, as the paper states, and it alone
+    determines mu_d / mu_s = sin(pi C / 2), so the paper's iterative correction has a closed form.
     """
     v = np.linspace(-10.0, 10.0, 201 if quick else 2001)  # mm/s
     curves = {C: force(v, B=1.0, C=C, E=0.0) for C in np.linspace(0.0, 2.0, 11)}
@@ -85,13 +85,13 @@ def fig_07_shape_factor(quick: bool) -> Drawn:
 
 
 def _law(C: float, v: np.ndarray) -> np.ndarray:
-    """The law of the catalogue with that C, in mm/s and in units of mu_s N."""
+    """Return the force of the catalogue's law with this C, in mm/s and in units of mu_s N."""
     law = SelfTuning(mu_s=1.0, mu_d=float(np.sin(np.pi * C / 2)), B=1e3)
     return np.array([float(law.force(one, 1.0)) for one in 1e-3 * v])
 
 
 def _sharpness(C: float) -> float:
-    """Curvature of the curve at its peak, by differences."""
+    """Return the curvature of the curve at its peak, by differences."""
     peak, h = np.tan(np.pi / (2 * C)), 1e-3
     left, middle, right = force(peak + h * np.array([-1.0, 0.0, 1.0]), B=1.0, C=C, E=0.0)
     return float(2 * middle - left - right) / h**2
@@ -101,17 +101,17 @@ def _sharpness(C: float) -> float:
 def fig_08_stiffness_factor(quick: bool) -> Drawn:
     """Influence of the stiffness factor B on the friction force.
 
-    F = -mu_s N sin(C atan(B v)) on the body, with C = 1.41, which belongs to mu_d = 0.8 mu_s, the
-    ratio of the slider-crank, and E = 0. The unit of B is lost; s/mm is the one in which the text
-    holds.
+    F = -mu_s N sin(C atan(B v)) on the body, with C = 1.41, which corresponds to mu_d = 0.8 mu_s,
+    the ratio of the slider-crank, and E = 0. The unit of B is lost; the statements of the text hold
+    in s/mm.
 
-    Compared: curves for B = 0 ... 1 s/mm with what the text says of them: flat at B = 0, next to no
+    Compared: curves for B = 0 ... 1 s/mm with the statements of the text: flat at B = 0, almost no
     curvature at 0.1, the same profile with a growing slope at zero beyond 0.3.
 
-    Distance: how many of these statements do not hold.
+    Distance: number of these statements that do not hold.
 
     Reproduced: all four statements, in s/mm: the peak enters a window of 10 mm/s between B = 0.2
-    and 0.3, where the text sees the profile settle. In s/m it lies at 2 ... 20 m/s.
+    and 0.3, where the profile settles according to the text. In s/m it lies at 2 ... 20 m/s.
 
     Undecided: the unit itself and the window of the figure, which are lost.
     """
@@ -145,22 +145,24 @@ FACTORS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0)
 def fig_09_curvature_factor(quick: bool) -> Drawn:
     """Influence of the curvature factor E on the friction force.
 
-    With y = B v, left with E inside the arctangent, as Pacejka has it and as our law does, right
-    with E outside: sin(C atan(y) - E (y - atan(y))). B = 1 s/mm and C = 1.41; the paper's numbers
-    are lost.
+    With y = B v, the left panel has E inside the arctangent, as in Pacejka's formula and in our
+    law; the right panel has E outside: sin(C atan(y) - E (y - atan(y))). B = 1 s/mm and C = 1.41;
+    the paper's numbers are lost.
 
-    Compared: curves for E = 0 ... 2 in both readings with what the text says of them: as expected
-    below 0.5, sinusoidal above. As expected is: one peak and no change of sign for v > 0.
+    Compared: curves for E = 0 ... 2 in both interpretations with the statements of the text: as
+    expected below 0.5, sinusoidal above. "As expected" means one peak and no change of sign for
+    v > 0.
 
-    Distance: how many of the two statements do not hold for our law.
+    Distance: number of the two statements that do not hold for our law.
 
-    Reproduced: both statements, by E outside the arctangent in a figure that ends at 5 mm/s:
-    friction reverses from E = C atan(y) / (y - atan(y)) on, 0.53 there, 0.24 at 10 mm/s. That form
-    feeds energy in where its sign is wrong, so the law keeps Pacejka's bracket with E < 1, and 0 as
-    default, where both readings are one.
+    Reproduced: both statements, with E outside the arctangent in a figure that ends at 5 mm/s:
+    friction changes its sign from E = C atan(y) / (y - atan(y)) on, which is 0.53 there and 0.24 at
+    10 mm/s. This form adds energy where its sign is wrong; therefore the law has Pacejka's bracket
+    with E < 1 and the default 0, at which both interpretations are equal.
 
-    Undecided: where the paper has its E. Inside the arctangent nothing changes its sign up to E =
-    1, whatever B, C up to 2 and the range of the figure; beyond there is one change of sign.
+    Undecided: the place of E in the paper's formula. Inside the arctangent there is no change of
+    sign up to E = 1, for any B, C up to 2 and any range of the figure; beyond, there is one change
+    of sign.
     """
     v = np.linspace(-5.0, 5.0, 401 if quick else 4001)  # mm/s
     readings = {
@@ -207,12 +209,12 @@ def fig_09_curvature_factor(quick: bool) -> Drawn:
 
 
 def outside(v: np.ndarray, E: float) -> np.ndarray:
-    """F / (mu_s N) with the term of E outside the arctangent; B = 1 s/mm, v in mm/s."""
+    """Return F / (mu_s N) with the term of E outside the arctangent; B = 1 s/mm, v in mm/s."""
     return np.sin(C * np.arctan(v) - E * (v - np.arctan(v)))
 
 
 def crossings(F: np.ndarray) -> int:
-    """Number of changes of sign of a curve."""
+    """Return the number of changes of sign of a curve."""
     return int(np.count_nonzero(np.diff(np.sign(F[np.abs(F) > 1e-12]))))
 
 
@@ -221,21 +223,22 @@ LOADS = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0)  # N
 
 @plate("of 3 statements", within=0)
 def fig_12_stiffness_function(quick: bool) -> Drawn:
-    """The stiffness factor B as a function of load and brittleness.
+    """Stiffness factor B as a function of load and brittleness.
 
-    The paper's function is lost. `BrittleSelfTuning` holds a candidate with the trends that the
-    text gives, in the range of figure 8, 0.1 ... 1 s/mm.
+    The paper's function is lost. `BrittleSelfTuning` contains a candidate with the trends stated in
+    the text, in the range of figure 8, 0.1 ... 1 s/mm.
 
-    Compared: the candidate with what the text says: B grows with mu_s - mu_d, since brittle
-    bristles break faster, and with the normal force; it lies in the range of the sweep, and never
-    is 0.
+    Compared: the candidate with the statements of the text: B grows with mu_s - mu_d, since brittle
+    bristles break faster, and with the normal force; it lies in the range of the sweep, and is
+    never 0.
 
-    Distance: how many of these statements do not hold.
+    Distance: number of these statements that do not hold.
 
-    Refuted: that this removes the velocity that the user has to choose. The levels mu_s N and mu_d
-    N are the same whatever B is, so the function is a scale of velocity, with constants of its own.
+    Refuted: that the user no longer has to choose a velocity. The levels mu_s N and mu_d N do not
+    depend on B, so the function defines a velocity scale, with additional constants.
 
-    Undecided: the function. The candidate has the trends by construction; any growing one would do.
+    Undecided: the function. The candidate has the trends by construction, as has any increasing
+    function.
     """
     difference = np.linspace(0.0, 0.1, 51 if quick else 501)
     v = np.linspace(0.0, 0.02, 51 if quick else 501)

@@ -1,8 +1,8 @@
-"""The four-mass system of figures 13 to 16: both laws, and the same machine by other means.
+"""Four-mass system of figures 13 to 16: both laws, and the same machine computed in another way.
 
-Haug's example has the counts of the paper, 22 constraints and two degrees of freedom; its data are
-taken, since the paper's table is lost. `TUNED` is the law as the paper has it, whose B follows from
-load and mu_s - mu_d, by the function that we reconstructed; `LAWS` have their peak at one velocity.
+Haug's example has the numbers of the paper, 22 constraints and two degrees of freedom. Its data are
+used, since the paper's table is lost. `TUNED` is the law of the paper, whose B depends on load and
+mu_s - mu_d by the reconstructed function; `LAWS` have their peaks at the same velocity.
 """
 
 from functools import cache
@@ -29,13 +29,13 @@ SLIDERS = ("x1", "y2", "z3", "x4")
 LAWS = ("self-tuning", "Brown-McPhee")
 TUNED = "self-tuning, own B"
 B_RANGE = (0.1e3, 0.2e3, 0.3e3, 0.5e3, 0.7e3, 1e3)
-"""Of the sweep of figure 8, in which B [s/m] lies whatever its function is."""
+"""Values of B [s/m] in the sweep of figure 8, whose range contains B for any function."""
 PEAK = float(np.tan(np.pi / 2 / (2 - 2 / np.pi * np.arcsin(MU["mu_d"] / MU["mu_s"]))))
 """B times the velocity of the peak [1]."""
 CONSTRAINTS = {
     "constraint_position": "m", "constraint_velocity": "m/s", "constraint_acceleration": "m/s^2",
 }  # fmt: skip
-"""Norms of what joints and rods violate, with their units."""
+"""Norms of the constraint violations of joints and rods, with their units."""
 COEFFICIENTS = {
     "self-tuning": machines.self_tuning,
     "Brown-McPhee": machines.brown_mcphee,
@@ -44,7 +44,7 @@ COEFFICIENTS = {
 
 
 def law(label: str, v_t: float) -> Law:
-    """One of LAWS with its peak at `v_t` [m/s], or `TUNED`, which has its own."""
+    """Return one of `LAWS` with its peak at `v_t` [m/s], or `TUNED`, which determines its peak."""
     if label == TUNED:
         return BrittleSelfTuning(**MU)
     if label == "self-tuning":
@@ -54,7 +54,7 @@ def law(label: str, v_t: float) -> Law:
 
 @cache
 def run(label: str, v_t: float, t_end: float) -> Signals:
-    """Time, positions x1, rates x1' and accelerations x1'' of the sliders with one of LAWS."""
+    """Return time, positions x1, rates x1' and accelerations x1'' of the sliders with a law."""
     model = FourMass(law(label, v_t)).model()
     times = np.linspace(0.0, t_end, round(1000 * t_end) + 1)
     found = simulate(model, t_end, rtol=1e-8, t_eval=times)
@@ -68,19 +68,19 @@ def run(label: str, v_t: float, t_end: float) -> Signals:
 
 @cache
 def oracle(label: str, v_t: float, t_end: float) -> Signals:
-    """The same by equations in two coordinates, written by hand, and SUNDIALS."""
+    """Return the same by equations in two coordinates, written by hand, and SUNDIALS."""
     machine = machines.four_mass(COEFFICIENTS[label](**MU, v_t=v_t))
     return solve(machine, run(label, v_t, t_end)["t"])
 
 
 @cache
 def stepped(label: str, v_t: float, t_end: float, h: float = 1e-3) -> Signals:
-    """The same by fixed explicit steps of `h` [s]."""
+    """Return the same by fixed explicit steps of `h` [s]."""
     return fixed_steps(machines.four_mass(COEFFICIENTS[label](**MU, v_t=v_t)), h, t_end)
 
 
 def fastest_at(label: str, v_t: float, t_end: float, t: float) -> float:
-    """Largest eigenvalue of the machine by hand where the run is at time `t` [1/s]."""
+    """Return the largest eigenvalue [1/s] of the machine by hand, at the time `t` of the run."""
     at = {name: values[round(1000 * t)] for name, values in run(label, v_t, t_end).items()}
     w = (at["x1"] * at["y2'"] - at["y2"] * at["x1'"]) / 25
     y = np.array([np.arctan2(at["y2"], at["x1"]), at["x4"], w, at["x4'"]])
@@ -88,12 +88,12 @@ def fastest_at(label: str, v_t: float, t_end: float, t: float) -> float:
 
 
 def variation(signal: Array) -> float:
-    """Total variation: what jitter adds to."""
+    """Return the total variation, which jitter increases."""
     return float(np.abs(np.diff(signal)).sum())
 
 
 def distance(ending: str, t_end: float) -> float:
-    """Largest difference of a signal of all sliders from the oracle, over both laws."""
+    """Return the largest difference of a signal from the oracle, over all sliders and laws."""
     names = [slider + ending for slider in SLIDERS]
     return max(
         largest(run(one, V_T, t_end)[n] - oracle(one, V_T, t_end)[n]) for one in LAWS for n in names
@@ -101,13 +101,13 @@ def distance(ending: str, t_end: float) -> float:
 
 
 def apart(ending: str, t_end: float) -> dict[str, float]:
-    """Largest difference between both laws by slider."""
+    """Return the largest difference between both laws for each slider."""
     first, other = (run(one, V_T, t_end) for one in LAWS)
     return {slider: largest(first[slider + ending] - other[slider + ending]) for slider in SLIDERS}
 
 
 def picture(ending: str, label: str, t_end: float) -> Figure:
-    """A panel per slider, both laws on the oracle; below how far the laws are apart."""
+    """Return a picture with a panel per slider: both laws on the oracle, and their difference."""
     figure, axes = grid(3, 2, height=6.4, sharex=True)
     first, other = (run(one, V_T, t_end) for one in LAWS)
     for axis, pair in zip(axes[2], (("x1", "x4"), ("y2", "z3")), strict=True):
@@ -131,32 +131,32 @@ def picture(ending: str, label: str, t_end: float) -> Figure:
 
 
 SMALL, STABLE = 0.001, 2.785
-"""Peak [m/s], and |h L| up to which Runge-Kutta 4 is stable on the negative real axis."""
+"""Velocity of a peak [m/s], and largest stable |h L| of Runge-Kutta 4 for negative real L."""
 
 
 @plate("1", within=(0.15, 0.03))
 def fig_13_jitter(quick: bool) -> Drawn:
     """Acceleration of the first mass with Brown-McPhee at a small transition velocity.
 
-    The self-tuning law has the B that we reconstructed, which grows with load and mu_s - mu_d, in
-    the range of figure 8, 0.1 ... 1 s/mm; its peak lies at 22 ... 2.2 mm/s. The text does not say
-    how the paper stepped.
+    The self-tuning law has the reconstructed B, which grows with load and mu_s - mu_d in the range
+    of figure 8, 0.1 ... 1 s/mm; its peak lies at 22 ... 2.2 mm/s. The text does not state the
+    integration method of the paper.
 
     Compared: fixed explicit steps of 1 ms and steps with error control: Brown-McPhee with its peak
     at 1 mm/s, the self-tuning law with its own B, and the same law with its peak at 1 mm/s.
 
-    Distance: largest difference of the total variation with error control from that of
-    Brown-McPhee, relative.
+    Distance: largest relative difference of the total variation with error control from that of
+    Brown-McPhee.
 
-    Reproduced: in steps of 1 ms Brown-McPhee jitters, to more than five times the total variation
+    Reproduced: in steps of 1 ms Brown-McPhee jitters, with more than five times the total variation
     of the smooth signal, and the self-tuning law does not: 1.1 times with its own B, at most 1.5
     times with any B of figure 8.
 
-    Refuted: that the law makes the difference, and not its width. In steps of 1 ms the self-tuning
+    Refuted: that the law causes the difference, and not its width. In steps of 1 ms the self-tuning
     law with its peak at 1 mm/s jitters as well, and Brown-McPhee with its peak at 10 mm/s does not.
-    With error control neither jitters; with fixed steps h they do where the fastest eigenvalue L of
-    the sticking machine makes h L exceed 2.8, where the method loses its stability: it is 12 and 15
-    for 1 ms and 1 mm/s; steps of 0.1 ms remove the jitter.
+    With error control neither jitters. With fixed steps h both jitter where h L exceeds 2.8, with
+    the fastest eigenvalue L of the sticking machine: there the method becomes unstable. h L is 12
+    and 15 for 1 ms and 1 mm/s; steps of 0.1 ms remove the jitter.
 
     Undecided: B itself, whose function is lost.
     """
@@ -187,7 +187,7 @@ def fig_13_jitter(quick: bool) -> Drawn:
 def jitter(
     rough: dict[str, float], smooth: dict[str, float], numbers: dict[str, float]
 ) -> dict[str, bool]:
-    """Claims on which law jitters in which steps; adds the numbers behind them."""
+    """Return claims on the laws and steps that jitter; add their numbers to `numbers`."""
     any_B = [variation(stepped(LAWS[0], PEAK / B, 4.0)["x1''"]) for B in B_RANGE]
     numbers["the same, any B from 0.1 to 1 s/mm, at most [1]"] = most = max(any_B) / smooth[TUNED]
     wide = variation(stepped(LAWS[1], V_T, 4.0)["x1''"]) / smooth[LAWS[1]]
@@ -220,9 +220,9 @@ def fig_14_four_mass_positions(quick: bool) -> Drawn:
 
     Distance: largest difference of a position from that by hand, both laws.
 
-    Reproduced: both laws move the masses alike, within 18 mm in a system of 7 m. Energy falls
-    monotonically with both, as it must, and the joints are not violated, as the paper has it: the
-    norms of their constraints are those of rounding.
+    Reproduced: the motions of the masses agree within 18 mm in a system of 7 m. Energy falls
+    monotonically with both laws, as it must, and the joints are not violated, as the paper states:
+    the norms of their constraints are those of rounding.
 
     Undecided: the data of the machine, which are Haug's here.
     """
@@ -262,12 +262,12 @@ def fig_15_four_mass_velocities(quick: bool) -> Drawn:
     Reproduced: with Brown-McPhee the motion depends on its transition velocity: between peaks at 10
     and at 1 mm/s the velocities change by 0.06 m/s.
 
-    Refuted: that the self-tuning law depends on no velocity. Its B is one, inverse (figure 1):
-    between the same peaks the velocities change by 0.10 m/s with it. It is chosen by a function of
-    load and friction coefficients instead of by the user.
+    Refuted: that the self-tuning law depends on no velocity. Its B is an inverse velocity (figure
+    1): between the same peaks the velocities change by 0.10 m/s with it. A function of load and
+    friction coefficients determines it instead of the user.
 
-    Undecided: how much that function leaves to choose, since it is lost; over the B of figure 8,
-    0.1 ... 1 s/mm, the velocities change by 0.18 m/s.
+    Undecided: how far that function determines the motion, since it is lost; over the B of figure
+    8, 0.1 ... 1 s/mm, the velocities change by 0.18 m/s.
     """
     t_end = 0.4 if quick else 4.0
     numbers = {f"laws apart, {slider} [m/s]": d for slider, d in apart("'", t_end).items()}
@@ -287,7 +287,7 @@ def fig_15_four_mass_velocities(quick: bool) -> Drawn:
 
 
 def changed(law: str, one: float, other: float, t_end: float) -> float:
-    """Largest change of a velocity from a peak at `one` to a peak at `other` [m/s]."""
+    """Return the largest change [m/s] of a velocity between peaks at `one` and at `other` [m/s]."""
     wide, narrow = run(law, one, t_end), run(law, other, t_end)
     return max(largest(wide[f"{s}'"] - narrow[f"{s}'"]) for s in SLIDERS)
 
@@ -297,16 +297,16 @@ def fig_16_four_mass_accelerations(quick: bool) -> Drawn:
     """Accelerations of the four masses.
 
     Compared: both laws, each with the same machine in two coordinates, written by hand and solved
-    by SUNDIALS; and by their total variation, what jitter adds to, for peaks from 20 to 1 mm/s.
+    by SUNDIALS; and by their total variation, which jitter increases, for peaks from 20 to 1 mm/s.
 
     Distance: largest difference of an acceleration from that by hand, both laws.
 
-    Reproduced: the self-tuning law gives smooth signals, whatever its B from 0.1 to 1 s/mm, its own
-    among them.
+    Reproduced: the self-tuning law gives smooth signals for any B from 0.1 to 1 s/mm, including its
+    own B.
 
-    Refuted: that Brown-McPhee jitters by itself: with error control the total variation of both is
-    the same within 3 %, and between peaks at 20 and 1 mm/s it changes by less than 5 %. Figure 13
-    shows where jitter comes from.
+    Refuted: that Brown-McPhee itself causes jitter: with error control the total variation of both
+    is the same within 3 %, and between peaks at 20 and 1 mm/s it changes by less than 5 %. Figure
+    13 shows the cause of the jitter.
     """
     t_end = 0.4 if quick else 4.0
     numbers = {f"laws apart, {slider} [m/s^2]": d for slider, d in apart("''", t_end).items()}

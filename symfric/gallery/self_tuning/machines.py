@@ -1,7 +1,7 @@
-"""Haug's machines again, in one or two angles, with equations written by hand.
+"""Haug's machines in one or two angles, with equations written by hand.
 
-Nothing but CasADi is used here, so that a mistake of the library cannot stand on both sides. The
-normal forces are unknowns like the accelerations, since friction acts back on them.
+This file uses only CasADi, so that an error of the library cannot affect both sides of a
+comparison. The normal forces are unknowns like the accelerations, since they depend on friction.
 
 `solve` integrates with error control by SUNDIALS (IDAS), `fixed_steps` by explicit steps.
 """
@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 Coefficient = Callable[[ca.SX, ca.SX | float], ca.SX]
-"""F/N at a sliding velocity [m/s] under a normal force [N]."""
+"""Function of sliding velocity [m/s] and normal force [N] that returns F/N."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """y' = rates(y, unknown) with balance(y, unknown) = 0 from y = start; shown are named."""
+    """Equations y' = rates(y, unknown), balance(y, unknown) = 0, y(0) = start; `shown` by name."""
 
     y: ca.SX
     rates: ca.SX
@@ -33,7 +33,7 @@ class Machine:
 
 
 def brown_mcphee(mu_s: float, mu_d: float, v_t: float) -> Coefficient:
-    """Brown and McPhee's coefficient of friction."""
+    """Return Brown and McPhee's coefficient of friction."""
 
     def mu(v: ca.SX, _: ca.SX | float) -> ca.SX:
         x = v / v_t
@@ -43,7 +43,7 @@ def brown_mcphee(mu_s: float, mu_d: float, v_t: float) -> Coefficient:
 
 
 def self_tuning(mu_s: float, mu_d: float, v_t: float) -> Coefficient:
-    """The self-tuning coefficient with E = 0 and its peak at v_t."""
+    """Return the self-tuning coefficient with E = 0 and its peak at v_t."""
     C = 2 - 2 / np.pi * np.arcsin(mu_d / mu_s)
 
     def mu(v: ca.SX, _: ca.SX | float) -> ca.SX:
@@ -53,7 +53,7 @@ def self_tuning(mu_s: float, mu_d: float, v_t: float) -> Coefficient:
 
 
 def own_stiffness(mu_s: float, mu_d: float, **_: float) -> Coefficient:
-    """The self-tuning coefficient whose B [s/m] follows load and mu_s - mu_d, as reconstructed."""
+    """Return the self-tuning coefficient with B [s/m] reconstructed from load and mu_s - mu_d."""
     C = 2 - 2 / np.pi * np.arcsin(mu_d / mu_s)
 
     def mu(v: ca.SX, N: ca.SX | float) -> ca.SX:
@@ -64,7 +64,7 @@ def own_stiffness(mu_s: float, mu_d: float, **_: float) -> Coefficient:
 
 
 def four_mass(mu: Coefficient) -> Machine:
-    """The four sliders; shown are positions [m], velocities and accelerations."""
+    """Return the four sliders; the signals are positions [m], velocities and accelerations."""
     g, th, x4, w, v4, a, l5, l6 = 9.8, *map(ca.SX.sym, ("th", "x4", "w", "v4", "a", "l5", "l6"))
     x1, y2 = 5 * ca.cos(th), 5 * ca.sin(th)
     z3 = ca.sqrt(49 - y2**2)
@@ -88,7 +88,7 @@ def four_mass(mu: Coefficient) -> Machine:
 
 
 def slider_crank(mu: Coefficient, R: float = 0.1, a: float = 0.1) -> Machine:
-    """Crank and slider; shown are angle [rad], position [m] and their rates."""
+    """Return crank and slider; the signals are angle [rad], position [m] and their rates."""
     m_crank, m_slider, J, r, length, g = 0.5, 5.0, 0.2, 0.08, 0.3, 9.8
     th, w, alpha, rod, N = map(ca.SX.sym, ("th", "w", "alpha", "rod", "N"))
     c, s = ca.cos(th), ca.sin(th)
@@ -96,9 +96,9 @@ def slider_crank(mu: Coefficient, R: float = 0.1, a: float = 0.1) -> Machine:
     x = ca.sqrt(length**2 - py**2 - pz**2)
     v = ca.jacobian(x, th) * w
     acc = ca.jacobian(x, th) * alpha + ca.jacobian(v, th) * w
-    f = rod * ca.vertcat(-x, py, pz)  # on the pin of the crank
+    f = rod * ca.vertcat(-x, py, pz)  # force on the pin of the crank
     moment = ca.cross(ca.vertcat(0, -r * s, r * c), f)
-    F, T = -f - ca.vertcat(0, 0, -m_crank * g), -moment  # what the bearing takes
+    F, T = -f - ca.vertcat(0, 0, -m_crank * g), -moment  # load of the bearing
     along, across = ca.vertcat(0, -s, c), ca.vertcat(0, -c, -s)
     f2 = ca.vertcat(-ca.dot(across, T) / a, ca.dot(along, T) / a)
     f1 = ca.vertcat(-ca.dot(along, F), -ca.dot(across, F)) - f2
@@ -114,7 +114,7 @@ def slider_crank(mu: Coefficient, R: float = 0.1, a: float = 0.1) -> Machine:
 
 
 def size(f: ca.SX | float) -> ca.SX:
-    """Length of a force, smooth at zero as in the reference data."""
+    """Return the magnitude of a force, smoothed at zero as in the reference data."""
     return ca.sqrt(ca.sumsqr(f) + 1e-8) - 1e-4
 
 
@@ -122,7 +122,7 @@ Array = NDArray[np.float64]
 
 
 def solve(machine: Machine, times: Array) -> dict[str, Array]:
-    """Signals of the machine at `times` [s], to ten digits."""
+    """Return the signals of the machine at `times` [s], accurate to ten digits."""
     dae = {"x": machine.y, "z": machine.unknown, "ode": machine.rates, "alg": machine.balance}
     options = {"reltol": 1e-10, "abstol": 1e-11, "max_num_steps": 200_000}
     run = ca.integrator("run", "idas", dae, float(times[0]), list(times), options)
@@ -131,7 +131,7 @@ def solve(machine: Machine, times: Array) -> dict[str, Array]:
 
 
 def fixed_steps(machine: Machine, h: float, t_end: float) -> dict[str, Array]:
-    """Signals of the machine every `h` [s], by the classical method of Runge and Kutta, order 4."""
+    """Return signals every `h` [s], by the classical Runge-Kutta method of order 4."""
     unknown, ode = (
         _unknown(machine),
         ca.Function("f", [machine.y, machine.unknown], [machine.rates]),
@@ -154,7 +154,7 @@ def fixed_steps(machine: Machine, h: float, t_end: float) -> dict[str, Array]:
 
 
 def _unknown(machine: Machine) -> ca.Function:
-    """(y, guess) -> unknowns, by Newton's method."""
+    """Return the Function (y, guess) -> unknowns, by Newton's method."""
     problem = {"x": machine.unknown, "p": machine.y, "g": machine.balance}
     newton = ca.rootfinder("newton", "newton", problem, {"abstol": 1e-9})
     y, guess = ca.MX.sym("y", machine.y.numel()), ca.MX.sym("z", machine.unknown.numel())
@@ -167,7 +167,7 @@ def _shown(machine: Machine, y: ca.DM, unknown: ca.DM) -> dict[str, Array]:
 
 
 def fastest(machine: Machine, y: Array) -> float:
-    """Largest magnitude of the eigenvalues of the machine's equations at the state `y` [1/s]."""
+    """Return the largest magnitude [1/s] of the eigenvalues of a machine at the state `y`."""
     names = ("y", "unknown", "rates", "balance")
     at, z, rates, balance = (getattr(machine, name) for name in names)
     inner = ca.solve(ca.jacobian(balance, z), ca.jacobian(balance, at))

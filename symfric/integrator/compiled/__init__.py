@@ -1,1 +1,1 @@
-"""C from CasADi Functions: compiled once, cached, applied to columns of numbers."""
+"""C code of CasADi Functions: compiled once, cached, and applied to columns of numbers."""

@@ -1,9 +1,9 @@
 """Compilation of libraries in the background.
 
-One compiler runs at a time, at low priority, and is polled whenever compiled code is requested: no
-thread waits for it. Results never depend on when it finishes, since both engines give the same
-bits. At exit a running compiler is stopped, and leaves no file. A forked process leaves the one
-of its parent alone and starts none, since it may end without these exit handlers.
+One compiler runs at a time, at low priority. No thread waits for it; it is polled whenever compiled
+code is requested. Results do not depend on the time at which it finishes, since both engines give
+the same bits. A compiler that runs at exit is stopped, and its file is deleted. A forked process
+does not touch the compiler of its parent and starts none, since its exit handlers may not run.
 """
 
 import atexit
@@ -40,7 +40,7 @@ NICENESS = 10
 """Niceness of a background compiler."""
 _OWNER = os.getpid()
 _queue: list["Prospect"] = []
-"""Libraries to compile; the first one is being compiled."""
+"""Libraries to compile; the first one is in progress."""
 
 
 def possible() -> bool:
@@ -49,7 +49,7 @@ def possible() -> bool:
 
 
 def _advance() -> None:
-    """Poll the first library of the queue, and the next one if it is done."""
+    """Poll the first library of the queue; if it is done, continue with the next one."""
     while _queue and os.getpid() == _OWNER:
         if not _queue[0].finished():
             return
@@ -57,7 +57,7 @@ def _advance() -> None:
 
 
 def wait() -> None:
-    """Wait until the queue is empty: for measurements and tests."""
+    """Wait until the queue is empty; used by measurements and tests."""
     while _queue and os.getpid() == _OWNER:
         _advance()
         sleep(1e-3)
@@ -80,14 +80,14 @@ def processors() -> int:
 @final
 @dataclass(eq=False)
 class Prospect:
-    """Library that is compiled when that pays; mutable in its progress only.
+    """Library that is compiled when this is expected to save time; only its progress is mutable.
 
     Attributes:
-        write: () -> source.
-        names: that the library defines.
-        instructions: of the Function, to estimate its cost.
-        source: written for a library that is compiled or about to be loaded.
-        hopeless: True if no compiler or cache can be used, or the compiler rejected it.
+        write: function that returns the source.
+        names: names that the library defines.
+        instructions: number of instructions of the Function, from which costs are estimated.
+        source: source of a library that is being compiled or about to be loaded.
+        hopeless: True if no compiler or cache can be used, or if the compiler rejected the source.
     """
 
     write: Callable[[], str]
@@ -102,11 +102,10 @@ class Prospect:
     _limit: float = 0.0
 
     def pays(self, expected: float) -> bool:
-        """Return True if the library is to be loaded now.
+        """Return True if the library should be loaded now.
 
-        The cache is searched if that is expected to save time, and the library is compiled if that
-        is, in the background if possible; loading runs the compiler only where no background
-        compiler can run.
+        The method searches the cache and starts a background compiler if these steps are expected
+        to save time. Loading runs the compiler only where no background compiler can run.
 
         Args:
             expected: time [s] that compiled code is expected to save.
@@ -135,12 +134,12 @@ class Prospect:
         return False
 
     def written(self) -> str:
-        """Return the source, for loading, and release it."""
+        """Return the source for loading, and release it."""
         source, self.source = self.source or self.write(), ""
         return source
 
     def finished(self) -> bool:
-        """Start the compiler, or store its result; return True if that is done or has failed."""
+        """Start or poll the compiler; return True once its result is stored or it has failed."""
         try:
             if self._process is None or self._file is None:
                 self._start()
@@ -163,7 +162,7 @@ class Prospect:
         """Start the compiler at low priority, in the first cache that can be written.
 
         Raises:
-            ProgramError: no compiler, no writable cache, or it does not start.
+            ProgramError: no compiler, no writable cache, or a compiler that does not start.
         """
         compiler = needed_compiler()
         key = key_of(self.source, compiler, FLAGS)
@@ -183,7 +182,7 @@ class Prospect:
         raise CompileError("compile: expected a folder for compiled code, found none")
 
     def stop(self) -> None:
-        """Stop the compiler if it still runs, and delete its output unless that was stored."""
+        """Stop the compiler if it still runs, and delete its output unless it has been stored."""
         if self._process is not None:
             end(self._process)
         if self._file is not None:

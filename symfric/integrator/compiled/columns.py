@@ -1,4 +1,4 @@
-"""Function applied to many columns, or step after step, without Python in between.
+"""Application of a Function to many columns, or step after step, without a loop in Python.
 
 The compiled loop reads the rows of arrays in place, without copies.
 """
@@ -23,7 +23,7 @@ from symfric.integrator.compiled.compiler import load
 
 Array = NDArray[np.float64]
 Row = Array | tuple[Array, NDArray[np.intp]]
-"""Arguments, one per row; or a table and the row number for each of them."""
+"""Arguments, one per row; or a table and the row number in it for each argument."""
 NAME = "symfric_rows"
 CHAINED, SIDE_BY_SIDE = 16, 32
 """Columns per call of the virtual machine; the last call repeats its last column."""
@@ -36,14 +36,14 @@ PER_INSTRUCTION = 3e-9
 class Columns:
     """Function of columns, applied to the rows of arrays.
 
-    It runs in the virtual machine until compiling is expected to save time. Mutable in its caches
-    only.
+    The function runs in the virtual machine until compiling it is expected to save time. Only the
+    caches are mutable.
 
     Attributes:
-        function: of dense columns.
-        chained: the first result of a column is the first argument of the next one.
-        spent: time [s] in the virtual machine.
-        source: C of the function and the loop over rows, if it is not `rows_source`.
+        function: Function of dense columns.
+        chained: True if the first result of a column is the first argument of the next one.
+        spent: time [s] spent in the virtual machine.
+        source: returns the C of the function and the loop over rows; by default `rows_source`.
     """
 
     function: ca.Function
@@ -53,7 +53,7 @@ class Columns:
 
     @property
     def size(self) -> int:
-        """Columns per call."""
+        """Number of columns per call."""
         return CHAINED if self.chained else SIDE_BY_SIDE
 
     @cached_property
@@ -73,14 +73,14 @@ class Columns:
 
     @cached_property
     def _loop(self) -> Callable[..., None]:
-        """Compiled loop; raises CompileError without a working compiler."""
+        """Compiled loop; raises `CompileError` without a working compiler."""
         loop = load(self._prospect.written(), NAME).symfric_rows
         loop.restype = None
         loop.argtypes = [ctypes.c_longlong, ctypes.c_int, *[ctypes.c_void_p] * 2]
         return loop
 
     def _compiled(self, backend: str, count: int) -> bool:
-        """Return True to run compiled code; "auto" compiles if that is expected to save time."""
+        """Return True if compiled code should run; "auto" compiles if it expects to save time."""
         if backend != "auto" or "_loop" in self.__dict__:
             return backend != "vm"
         if self._prospect.pays(self.spent + PER_INSTRUCTION * self._prospect.instructions * count):
@@ -96,7 +96,7 @@ class Columns:
         """Return the results of all rows, each of shape (count, size), matrices column by column.
 
         Args:
-            rows: an array (count, ...) for every argument, without the first one if `chained`; or a
+            rows: for each argument, except the first one if `chained`, an array (count, ...), or a
                 table and the numbers of its rows, shape (count,).
             first: if `chained`, the first argument of the first row.
             backend: "vm", "compiled" or "auto".
@@ -143,7 +143,7 @@ class Columns:
             arrays.insert(0, np.ascontiguousarray(first, dtype=float).reshape(1, -1))
             numbers.insert(0, None)
         results = [np.empty((count, function.numel_out(i))) for i in range(function.n_out())]
-        # address of the first row, distance of rows, address of the row numbers
+        # address of the first row, distance between rows, address of the row numbers
         of = [0 if a is None else _address(a) for a in (*numbers, *(None for _ in results))]
         every = zip((*arrays, *results), of, strict=True)
         places = np.array([(_address(a), a.strides[0], numbers) for a, numbers in every])
@@ -153,15 +153,15 @@ class Columns:
 
 
 def _address(array: NDArray[Any]) -> int:
-    """Return the address of an array; faster than its `ctypes`."""
+    """Return the address of an array; faster than its attribute `ctypes`."""
     return array.__array_interface__["data"][0]
 
 
 def _in_rows(array: Array, size: int) -> Array:
-    """Return an array whose rows are `size` contiguous numbers; itself if they are already.
+    """Return an array whose rows are `size` contiguous numbers, without a copy if possible.
 
     Raises:
-        ValueError: rows of another size, beyond whose end the loop in C would read.
+        ValueError: rows of another size; the loop in C would read beyond their end.
     """
     flat = array if array.ndim == 2 else array.reshape(array.shape[0], size)
     if flat.shape[1] != size:
@@ -173,7 +173,7 @@ def _in_rows(array: Array, size: int) -> Array:
 
 
 def rows_source(function: ca.Function) -> str:
-    """Return the CasADi C of `function`, with the loop over rows."""
+    """Return the C of `function`, generated by CasADi, with the loop over rows."""
     generator = ca.CodeGenerator("symfric_rows.c", {"static_aux": True})
     generator.add(function)
     numbers = {"arguments": function.n_in(), "results": function.n_out()}
@@ -184,7 +184,7 @@ def rows_source(function: ca.Function) -> str:
 def filled(template: Path, *called: ca.Function, **values: object) -> str:
     """Return the C of a template file with `values` substituted.
 
-    `arg`, `res`, `iw` and `w` are the work sizes of the Functions that it calls.
+    `arg`, `res`, `iw` and `w` are set to the work sizes of the Functions that the template calls.
     """
     for name in ("arg", "res", "iw", "w") if called else ():
         values[name] = max(1, *(getattr(function, f"sz_{name}")() for function in called))
@@ -192,7 +192,7 @@ def filled(template: Path, *called: ca.Function, **values: object) -> str:
 
 
 def densified(function: ca.Function) -> ca.Function:
-    """Return `function` with dense results, as buffers need them."""
+    """Return `function` with dense results, which buffers require."""
     if all(function.sparsity_out(i).is_dense() for i in range(function.n_out())):
         return function
     arguments = function.mx_in()

@@ -1,9 +1,9 @@
 """C libraries: compiled with fixed flags, and cached on disk.
 
-A library is loaded into the process, so no other user may be able to write it. The folder belongs
-to the user (or root) and only its owner may write it, and the same holds for each file in it;
-links, pipes and devices are ignored. The name of a file ends with a hash of its content: a
-truncated or damaged file does not match its name, and is compiled again.
+A library is loaded into the process, so no other user may be able to write it. The folder and each
+file in it belong to the user (or root), and only their owner may write them; links, pipes and
+devices are ignored. The name of a file ends with a hash of its content, so a truncated or damaged
+file does not match its name and is compiled again.
 """
 
 import ctypes
@@ -40,7 +40,7 @@ STALE = 86400.0
 def caches() -> Iterator["Cache"]:
     """Yield the caches of compiled code: `$SYMFRIC_CACHE` only, or the user's and a temporary one.
 
-    The temporary folder of the user is for the case that the user's cache folder is not writable.
+    The temporary folder is used if the user's cache folder is not writable.
     """
     chosen = os.environ.get("SYMFRIC_CACHE")
     if chosen:
@@ -73,7 +73,7 @@ class Cache:
     folder: Path
 
     def find(self, key: str) -> Path | None:
-        """Return the file of `key`, complete and trusted; None if not found."""
+        """Return the complete and trusted file of `key`, or None if there is none."""
         try:
             if not trusted(self.folder.stat()):
                 return None
@@ -99,13 +99,13 @@ class Cache:
         return Path(name)
 
     def keep(self, key: str, temporary: Path) -> None:
-        """Keep a temporary file under `key`."""
+        """Rename a temporary file to the final name for `key`."""
         content = temporary.read_bytes()
         temporary.chmod(0o700)
         temporary.replace(self.folder / f"{key}-{_digest(content)}.so")
 
     def evict(self) -> None:
-        """Remove the least recently used files until the others fit, and stale unfinished ones."""
+        """Delete stale unfinished files, and the least recently used ones until the others fit."""
         found: list[tuple[float, int, Path]] = []
         for path in self.folder.glob("*.so"):
             with suppress(OSError):
@@ -125,7 +125,7 @@ class Cache:
 def _whole(path: Path) -> bool:
     """Return True if the regular file at `path` is trusted and matches the hash in its name.
 
-    The file is marked as used now.
+    The modification time of the file is set to the current time, to mark its use.
     """
     try:
         found = path.lstat()
@@ -147,21 +147,21 @@ FLAGS = (
     "-O2", "-march=native", "-fno-math-errno", "-ffp-contract=off",
     "-fno-tree-pre", "-fno-code-hoisting", "-fno-gcse", "-fPIC", "-shared",
 )  # fmt: skip
-"""No flag lets the compiler round differently from CasADi's virtual machine, so results do not
-depend on the engine: no fused multiply-add, no reciprocals (repeated divisions are taken out of the
-graph instead), no reordering. Common subexpressions have been removed already; searching for them
-would take a third of the compile time.
+"""Compiler flags with the rounding of CasADi's virtual machine, so that results do not depend on
+the engine: no fused multiply-add, no reciprocals (the graph shares repeated divisions instead), no
+reordering. Common subexpressions have been removed already; searching for them would take a third
+of the compile time.
 """
 
 OF_GCC = ("-fno-tree-pre", "-fno-code-hoisting", "-fno-gcse")
-"""Flags of gcc only; clang rejects them."""
+"""Flags for gcc only; clang rejects them."""
 _close: Callable[[int], None] | None = getattr(sys.modules["_ctypes"], "dlclose", None)
 
 
 def key_of(source: str, compiler: Compiler, flags: tuple[str, ...]) -> str:
     """Return a hash of the source, the compiler (path, size, time), its flags and the machine.
 
-    Other code is never loaded, and a shared home does not mix processors.
+    Code from another source, or for another processor that shares the home folder, has another key.
     """
     binary = Path(compiler.command[0]).stat()
     made_by = (compiler.command, flags, binary.st_size, binary.st_mtime_ns)
@@ -180,7 +180,7 @@ def processor() -> str:
 
 
 def compiled_before(source: str) -> Path | None:
-    """Return the library of `source` if a cache has it; None if it has to be compiled."""
+    """Return the cached library of `source`, or None if it has to be compiled."""
     compiler = find_compiler()
     if compiler is None:
         return None
@@ -194,13 +194,13 @@ def load(source: str, *names: str) -> ctypes.CDLL:
 
 
 def library(source: str, *names: str, flags: tuple[str, ...] = FLAGS) -> Path:
-    """Return the shared library of `source`, which defines `names`, compiled if not cached.
+    """Return the shared library of `source`, which defines `names`; compile it if not cached.
 
-    Several processes may do this at once: a file appears under its final name only when complete.
+    Several processes may call this at once: a file gets its final name only when it is complete.
 
     Raises:
-        CompileError: no compiler, no writable cache, or an error in the source; its first error is
-            quoted.
+        CompileError: no compiler, no writable cache, or an error in the source; the message quotes
+            the first error.
     """
     compiler = needed_compiler()
     key, problems = key_of(source, compiler, flags), list[str]()
@@ -239,7 +239,7 @@ def call_of(
 ) -> tuple[tuple[str, ...], dict[str, str]]:
     """Return arguments and environment variables to compile standard input to the file `path`.
 
-    Temporary files of the compiler are in the folder of that file.
+    The compiler writes its temporary files to the folder of that file.
     """
     if is_clang(compiler):
         flags = tuple(flag for flag in flags if flag not in OF_GCC)
@@ -248,17 +248,17 @@ def call_of(
 
 
 def opened(path: Path, names: tuple[str, ...]) -> ctypes.CDLL:
-    """Load the library at `path`; it is unloaded when unreferenced.
+    """Load the library at `path`; unload it when it is no longer referenced.
 
-    A process can map only some 10,000 libraries.
+    Unloading is needed because a process can map only some 10,000 libraries.
 
     Raises:
-        OSError: it is not a library, or loading is not allowed there.
-        CompileError: one of `names` is missing.
+        OSError: the file is not a library, or must not be loaded from its folder.
+        CompileError: the library does not define one of `names`.
     """
     found = ctypes.CDLL(str(path))
     if _close is not None:
-        # at exit a thread may still be inside
+        # do not unload at exit: a thread may still run the code
         weakref.finalize(found, _close, found._handle).atexit = False
     missing = [name for name in names if not hasattr(found, name)]
     if missing:

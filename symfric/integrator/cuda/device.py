@@ -1,4 +1,4 @@
-"""Graphics processor: what a run needs of CuPy."""
+"""Graphics processor: the functions of CuPy that a run needs."""
 
 from dataclasses import dataclass
 from importlib import import_module
@@ -9,18 +9,18 @@ import numpy as np
 from symfric.integrator.cuda.kernel import AFTER, BEFORE, NAME, Kernel
 
 BLOCK = 64
-"""Threads of a block: few, since each holds hundreds of numbers."""
+"""Number of threads of a block; small, since each thread holds hundreds of numbers."""
 OPTIONS = ("--fmad=false",)
-"""Compiler options: as on the CPU every operation is rounded separately, so tests on the CPU cover
-the device up to the last digits of exp, sin, pow and the like.
+"""Compiler options. Every operation is rounded separately, as on the CPU, so tests on the CPU are
+valid for the device up to the last digits of exp, sin, pow and similar functions.
 """
 WARP, GRAIN = 32, 256
-"""Threads of a warp; registers are allocated to a warp in multiples of this."""
+"""Number of threads of a warp, and the unit in which registers are allocated to a warp."""
 MEANWHILE = "use backend='auto' meanwhile"
 
 
 class DeviceError(RuntimeError):
-    """Missing or unusable graphics processor, or an error of the device."""
+    """Error for a missing or unusable graphics processor, or for a failure of the device."""
 
 
 @final
@@ -29,9 +29,9 @@ class Device:
     """Current device of CuPy.
 
     Attributes:
-        cupy: the module.
-        name: of the device.
-        properties: as returned by `cudaGetDeviceProperties`.
+        cupy: module `cupy`.
+        name: name of the device.
+        properties: properties as returned by `cudaGetDeviceProperties`.
     """
 
     cupy: Any
@@ -75,7 +75,7 @@ class Device:
         """Compile a kernel, or load it from CuPy's cache.
 
         Raises:
-            DeviceError: NVRTC is missing or rejects it.
+            DeviceError: NVRTC is missing or rejects the kernel.
         """
         code = f"{BEFORE}{kernel.text}{AFTER}"
         module = self.cupy.RawModule(code=code, options=OPTIONS, backend="nvrtc")
@@ -90,7 +90,7 @@ class Device:
         return Loaded(self.cupy, function, self.threads(int(function.num_regs)))
 
     def threads(self, registers: int) -> int:
-        """Return the number of threads that run at once with this number of registers."""
+        """Return the number of threads that run at once if each uses this number of registers."""
         p = self.properties
         of_warp = -(-max(1, registers) * WARP // GRAIN) * GRAIN
         warps = int(p["regsPerMultiprocessor"]) // of_warp
@@ -104,9 +104,9 @@ class Loaded:
     """Kernel on the device.
 
     Attributes:
-        cupy: the module.
-        function: its `RawKernel`.
-        threads: number that run at once.
+        cupy: module `cupy`.
+        function: the kernel, a `RawKernel` of CuPy.
+        threads: number of threads that run at once.
     """
 
     cupy: Any
@@ -117,8 +117,8 @@ class Loaded:
         """Run up to `threads` threads on the data of the struct `many`, and wait for them.
 
         Raises:
-            DeviceError: the device failed, for example by a time limit on one that also drives a
-            screen.
+            DeviceError: the device failed, for example by the time limit of a device that also
+                drives a screen.
         """
         held = self.cupy.asarray(np.frombuffer(many, dtype=np.uint8))
         try:

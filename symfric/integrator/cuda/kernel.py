@@ -1,7 +1,7 @@
 """Source of the kernel: one member per thread, valid as C and as CUDA C++.
 
-A graphics processor and a host compiler need only different lines before and after it, so the
-arithmetic is tested without a graphics processor.
+For a graphics processor and for a host compiler only the lines before and after the source differ,
+so the arithmetic is tested without a graphics processor.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from symfric.integrator.step.pieces import in_c, macros
 
 NAME = "symfric_launch"
 DONE_IN_SINGLE = 1e-5
-"""Value of `blocks.DONE` in single precision: beyond it is rounding."""
+"""Value of `blocks.DONE` in single precision; smaller changes are rounding errors."""
 
 BEFORE = """#define HUGE_VAL __longlong_as_double(0x7ff0000000000000LL)
 #define HUGE_VALF __int_as_float(0x7f800000)
@@ -26,7 +26,7 @@ BEFORE = """#define HUGE_VAL __longlong_as_double(0x7ff0000000000000LL)
 #define BESIDE __device__ __noinline__
 #define TICKET(count) atomicAdd(count, 1)
 """
-"""Lines for NVRTC before the text. It has no header; functions of math.h are built in."""
+"""Lines for NVRTC before the source; NVRTC has no headers, functions of math.h are built in."""
 
 AFTER = f"""
 extern "C" __global__ void {NAME}(const Many *all)
@@ -34,23 +34,24 @@ extern "C" __global__ void {NAME}(const Many *all)
     symfric_thread(all);
 }}
 """
-"""Launch without `__launch_bounds__`: with it, the assembler left a six-joint arm 32 registers of
-255."""
+"""Launch, without `__launch_bounds__`: with it, the assembler assigned only 32 of 255 registers to
+a six-joint arm.
+"""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """Kernel and the sizes of its data.
+    """Source of a kernel and the sizes of its data.
 
     Attributes:
-        text: of functions and loop, without the machine-dependent part.
-        real: floating point type of all but times.
-        rows: of S.
-        given: rows of R.
+        text: source of functions and loop, without the machine-dependent part.
+        real: floating point type of all data except times.
+        rows: number of rows of S.
+        given: number of rows of R.
         states: number of states whose least and greatest values are kept.
-        signals: of a result.
-        operations: of an attempt.
+        signals: number of signals of a result.
+        operations: number of operations of an attempt.
     """
 
     text: str
@@ -63,15 +64,15 @@ class Kernel:
 
 
 def kernel_of(integrator: Integrator, between: bool = True, real: Real = DOUBLE) -> Kernel:
-    """Return the kernel of an integrator's attempt, written once and cached with it.
+    """Return the kernel of an integrator's attempt; written once, then cached in the integrator.
 
     Args:
-        integrator: of a model without events.
+        integrator: integrator of a model without events.
         between: True if there are results between the ends of steps.
         real: floating point type.
 
     Raises:
-        ValueError: an operation that C does not have.
+        ValueError: an operation that does not exist in C.
     """
     known: dict[tuple[bool, str], Kernel] = integrator.memory.setdefault("kernels", {})
     key = between, real.name

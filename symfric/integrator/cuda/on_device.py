@@ -1,4 +1,4 @@
-"""Members of an ensemble on a graphics processor: the task of their chunks, and their launches."""
+"""Members of an ensemble on a graphics processor: the task of the chunks, and the launches."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -25,17 +25,17 @@ WHERE = "simulate_many: backend='cuda'"
 FRESH = 8
 """Reason of a member that was not started (`members.h`)."""
 FIRST, LAUNCH = 32, 0.25
-"""Attempts in the first launch of a thread, and intended duration [s] of later ones: far below the
-seconds after which a system resets a graphics processor, and short enough for interrupts.
+"""Attempts of a thread in the first launch, and intended duration [s] of later launches: far below
+the seconds after which a system resets a graphics processor, and short enough for interrupts.
 """
 FASTER = 4.0
-"""Largest ratio of the budget of a launch to the one before."""
+"""Largest ratio of the budget of a launch to that of the previous launch."""
 SHARE = 0.8
 """Fraction of the free memory of a device that members may take."""
 OPERATIONS, BYTES = 2**30, 2**30
-"""Limits on the operations of one attempt of all members of a chunk, and on their results and data
-[bytes]: small members fill all threads of the largest devices several times, and chunks of large
-ones are small enough to keep results after an interrupt.
+"""Limits of a chunk: operations of one attempt of all members, and size of their results and data
+[bytes]. Small members then fill all threads of the largest devices several times, and chunks of
+large members are small enough to keep results after an interrupt.
 """
 LOOSEST = 1e-5
 """Smallest relative tolerance that single precision meets."""
@@ -50,7 +50,8 @@ def check(model: Model, executor: object, workers: object, rtol: float, real: st
     """Check that a device supports the arguments.
 
     Raises:
-        ValueError: a model with events, an executor, too tight a tolerance for single precision.
+        ValueError: a model with events, an executor or a number of workers, or a tolerance that is
+            too tight for single precision.
     """
     if model.events:
         names = ", ".join(event.name for event in model.events)
@@ -71,13 +72,13 @@ def check(model: Model, executor: object, workers: object, rtol: float, real: st
 @final
 @dataclass(eq=False)
 class OnDevice:
-    """Task on a device, and runner of its members, one per thread; mutable in its progress.
+    """Task on a device that runs one member per thread; only its progress is mutable.
 
     Attributes:
         job: data shared by all chunks.
-        kernel: source and sizes.
-        device, loaded: that runs the members, and the kernel on it.
-        tell: called between launches with the number of finished members of this call.
+        kernel: source and sizes of the kernel.
+        device, loaded: device that runs the members, and the kernel loaded on it.
+        tell: function called between launches with the number of finished members of a chunk.
         budget: attempts of a thread in the next launch.
     """
 
@@ -92,11 +93,11 @@ class OnDevice:
     def of(
         cls, integrator: Integrator, breaks: Array, times: Array, max_steps: int, real: str
     ) -> "OnDevice":
-        """Build from an integrator; `times` are those of the results [s], as in `Job`.
+        """Return the task of an integrator; `times` are the times of the results [s] as in `Job`.
 
         Raises:
             DeviceError: there is no device, or it rejects the kernel.
-            ValueError: an operation that C does not have.
+            ValueError: an operation that does not exist in C.
         """
         device = Device.found()
         between = not np.isin(times, breaks).all()
@@ -107,7 +108,7 @@ class OnDevice:
 
     @property
     def program(self) -> Program:
-        """Equations that the results depend on."""
+        """Equations that determine the results."""
         return self.job.program
 
     def solve(self, chunk: Chunk) -> Solved:
@@ -115,8 +116,9 @@ class OnDevice:
         return self.job.solve(chunk, self)
 
     def chunk(self, given: MemberData) -> int:
-        """Return the number of members of a chunk; equal on all devices, so that stored results are
-        found again.
+        """Return the number of members of a chunk.
+
+        The number is equal on all devices, so that stored results are found again.
         """
         kernel, own = self.kernel, given.inputs.values.size if given.own else 0
         numbers = kernel.rows + kernel.given + max(1, self.job.times.size) * kernel.signals + own
@@ -130,14 +132,14 @@ class OnDevice:
         def tell(now: int) -> None:
             nonlocal most
             fraction = min(1.0, (done() + now) / of)
-            if fraction > most:  # progress never goes back when members are run again
+            if fraction > most:  # members may run again, but progress must not decrease
                 most = fraction
                 progress(fraction)
 
         self.tell = tell
 
     def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
-        """Advance members over a stretch, as many at once as fit in the device memory.
+        """Advance members over a stretch, in groups that fit in the device memory.
 
         Raises:
             DeviceError: an error of the device.
@@ -157,7 +159,7 @@ class OnDevice:
             except MemoryError:
                 if most == 1:
                     raise
-                most = (most + 1) // 2  # another process took some memory
+                most = (most + 1) // 2  # another process has taken some memory
                 continue
             first = pick.stop
         return found, reason, reach
@@ -166,10 +168,10 @@ class OnDevice:
         self, columns: tuple[Array, Array, Counts, Array], stretch: Stretch, found: Array,
         reason: Counts,
     ) -> None:  # fmt: skip
-        """Run members that are on the device together; overwrites all but the run data R.
+        """Run a group of members on the device, and overwrite all arguments but the run data R.
 
         Raises:
-            MemoryError: the members do not fit; nothing has changed then.
+            MemoryError: the members do not fit; the arguments are then unchanged.
         """
         (S, R, made, reach), cupy, states = columns, self.device.cupy, self.kernel.states
         real: DTypeLike = np.float32 if self.kernel.real.size < 8 else np.float64
@@ -194,9 +196,9 @@ class OnDevice:
         found[:], reason[:] = held["out"].get(), held["reason"].get()
 
     def _launch(self, held: dict[str, Any], numbers: dict[str, int]) -> None:
-        """Launch until all members are finished.
+        """Launch the kernel until all members are finished.
 
-        Unfinished members are regrouped: a warp with one member left would run for it alone.
+        Unfinished members are regrouped, so that no warp runs for a single remaining member.
         """
         cupy, todo = self.device.cupy, np.arange(numbers["members"], dtype=np.int32)
         while todo.size:
@@ -213,7 +215,7 @@ class OnDevice:
                 self.tell(numbers["members"] - todo.size)
 
     def launched(self, spent: float) -> None:
-        """Set the budget of the launch after one that took `spent` seconds."""
+        """Set the budget of the next launch; the previous one took `spent` seconds."""
         factor = LAUNCH / max(spent, LAUNCH / FASTER)
         self.budget = max(1, int(self.budget * min(factor, FASTER)))
 

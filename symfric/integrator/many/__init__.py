@@ -1,1 +1,1 @@
-"""Ensembles of runs of one model: members, chunks, workers, stores."""
+"""Ensembles of runs of one model: members, chunks, programs of workers, stored results."""

@@ -1,4 +1,4 @@
-"""Chunk of an ensemble: its data, and its solution by the members of a program or one by one."""
+"""Chunk of an ensemble: its data, and its solution for all members together or one by one."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -75,14 +75,12 @@ class Solved:
 
     @property
     def size(self) -> Array:
-        """Largest magnitudes of the states, shape (members, nx); 0 for members that did not
-        start.
-        """
+        """Largest magnitudes of the states, shape (members, nx); 0 if a member did not start."""
         return np.nan_to_num(np.abs(self.reach).max(axis=1))
 
 
 def digest(*parts: Any) -> str:
-    """Return a hash of plain data, Functions and data classes; arrays count with every digit."""
+    """Return a hash of plain data, Functions and data classes, with all digits of arrays."""
     total = sha256()
     for part in parts:
         if isinstance(part, np.ndarray):
@@ -108,8 +106,8 @@ class Job:
     Attributes:
         program: the equations.
         breaks: ends of the input intervals [s].
-        times: times of the results [s]; empty for the end of each member only.
-        max_steps: attempts allowed for a member.
+        times: times of the results [s]; if empty, each member has one result at its end.
+        max_steps: largest number of attempts of a member.
     """
 
     program: Program
@@ -118,9 +116,11 @@ class Job:
     max_steps: int
 
     def solve(self, chunk: Chunk, members: Members | None = None) -> Solved:
-        """Integrate the members of a chunk; repeat those with tiny motion on their own scale.
+        """Integrate the members of a chunk; repeat those with tiny motion at a smaller scale.
 
-        The members run in `members`, by default in those of the program.
+        Args:
+            chunk: data of the members.
+            members: runner of the members; by default that of the program.
         """
         members, nominal = members or self.program.members, self.program.nominal
         found = self._solved(chunk, members)
@@ -146,9 +146,9 @@ class Job:
     def _solved(self, chunk: Chunk, members: Members) -> Solved:
         """Integrate the members of a chunk once.
 
-        They run through all their input intervals; if algebraic unknowns need a full search at the
-        start of one, they stop there and continue afterwards. In mechanisms with the fast update,
-        algebraic unknowns are also updated with it at the start.
+        Each member runs through its input intervals. It stops at the start of an interval if the
+        algebraic unknowns need a full search there, and continues after the search. Mechanisms
+        with the fast update of algebraic unknowns also use it at the start of the run.
         """
         S, (count, nx) = chunk.S.copy(), (chunk.S.shape[0], self.program.nx)
         signals = np.full((count, max(1, self.times.size), self.program.n_signals), np.nan)
@@ -186,7 +186,7 @@ class Job:
     def _consistent(
         self, chunk: Chunk, S: Array, members: Indices, interval: int, failed: dict[int, str]
     ) -> Indices:
-        """Update algebraic unknowns to the data of an interval; return the successful members."""
+        """Make algebraic unknowns consistent at an interval; return the successful members."""
         equations, together = self.program.equations, self.program.constraints
         if equations is None or together is None:
             return members
@@ -198,7 +198,7 @@ class Job:
         return np.delete(members, list(refused))
 
     def _stretch(self, chunk: Chunk, first: int, follow: bool) -> tuple[Stretch, Indices]:
-        """Return all input intervals from `first` on, and the result times in them."""
+        """Return all input intervals from `first` on, and the indices of result times in them."""
         breaks, h_min = self.breaks[first:], smallest_step(chunk.ends - self.breaks[0])
         times = self.times[None] if self.times.size else chunk.ends[:, None]
         inside = np.flatnonzero((times >= breaks[0]).any(axis=0))
@@ -207,7 +207,7 @@ class Job:
 
 
 def _data(chunk: Chunk, members: Indices, interval: int, nx: int) -> Array:
-    """Return the run data of members on an input interval."""
+    """Return the run data of members in an input interval."""
     d = chunk.R[members, Given.d(nx)]
     data = chunk[members].data[:, :, interval]
     d[:, d.shape[1] - data.shape[1] :] = data
@@ -215,11 +215,11 @@ def _data(chunk: Chunk, members: Indices, interval: int, nx: int) -> Array:
 
 
 def suited(integrator: Integrator, points: Points, inputs: InputData) -> Integrator:
-    """Return the integrator with pivots that are stable where members start, at (y, d) each."""
+    """Return the integrator with pivots that are stable at `points`, start points (y, d)."""
     begin, end = inputs.span
     known = list[tuple[Array, Array]]()
     for y, d in points:
-        with suppress(ValueError):  # no consistent start: the run of that member reports it
+        with suppress(ValueError):  # the run of a member reports that it has no consistent start
             known.append((integrator.start(y, d), d))
             integrator = integrator.suited(known, end - begin)
     return integrator
@@ -228,15 +228,16 @@ def suited(integrator: Integrator, points: Points, inputs: InputData) -> Integra
 @final
 @dataclass(frozen=True, eq=False)
 class EventJob:
-    """Task of a model with events, whose members run one by one like `simulate`; picklable.
+    """Task of a model with events, whose members run one by one as in `simulate`; picklable.
 
-    Another process builds its own integrator, with the same pivots.
+    Each process builds its own integrator, with the same pivots.
 
     Attributes:
-        model, inputs, method: of the integrator; the inputs of a member differ in their data only.
-        points: see `suited`.
-        tolerances, backend: see `integrate`.
-        times: of the results [s]; empty for the end of each member only.
+        model, inputs, method: arguments of the integrator; the inputs of the members differ only
+            in their data.
+        points: start points (y, d), see `suited`.
+        tolerances, backend: arguments of `integrate`.
+        times: times of the results [s]; if empty, each member has one result at its end.
     """
 
     model: Model
@@ -252,13 +253,13 @@ class EventJob:
 
     @cached_property
     def integrator(self) -> Integrator:
-        """Integrator, built once in a process."""
+        """Integrator, built once per process."""
         plain, _ = built(self.model, self.inputs, self.method)
         return suited(plain, self.points, self.inputs)
 
     @property
     def program(self) -> Program:
-        """Equations that the results depend on."""
+        """Equations that determine the results."""
         return program(self.integrator, False)
 
     def solve(self, chunk: Chunk) -> Solved:
@@ -295,7 +296,7 @@ class EventJob:
         return Solved(signals, attempts, reached, failed, reach)
 
     def _inputs(self, data: Array, end: float) -> InputData:
-        """Return the inputs of one member: its own data (n_data, intervals), up to its end."""
+        """Return the inputs of one member from its data (n_data, intervals), up to its end [s]."""
         last = int(np.searchsorted(self.inputs.breaks, end))
         breaks = np.append(self.inputs.breaks[:last], end)
         return replace(self.inputs, breaks=breaks, values=np.ascontiguousarray(data[:, :last]))

@@ -1,4 +1,4 @@
-"""Data of the members of an ensemble: start values, parameters, inputs and end."""
+"""Data of the members of an ensemble: start values, parameters, inputs and end times."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,19 +23,19 @@ WHERE = "simulate_many"
 @final
 @dataclass(frozen=True, eq=False)
 class MemberData:
-    """All members of an ensemble and their data.
+    """Data of all members of an ensemble.
 
     Attributes:
-        model: their equations.
+        model: equations of the members.
         count: number of members.
         x0, p: start values and parameters by name, shape (count,).
-        inputs: the inputs of all; those that differ are in `own`.
-        own: input -> signals of the members, shape (count, n).
+        inputs: inputs common to all members; where members differ, those of one member.
+        own: input that differs between members -> its signals, shape (count, n).
         sampled: ends of the intervals between samples [s].
-        ends: end of each member [s], shape (count,).
-        varied: values given as arrays, by name: a parameter, "x0.v", "u.force", "t_end"; shape
-            (count,). Samples of an input are not included.
-        fixed: values given as one number for all, likewise.
+        ends: end time of each member [s], shape (count,).
+        varied: values given as arrays, shape (count,), by name: a parameter, "x0.v", "u.force" or
+            "t_end". Samples of an input are not included.
+        fixed: values given as one number for all members, by the same names.
     """
 
     model: Model
@@ -50,8 +50,9 @@ class MemberData:
     fixed: dict[str, float]
 
     def starts(self, system: System, pick: slice) -> tuple[Array, Array]:
-        """Return start values of the unknowns (members, n), algebraic ones guessed, and
-        parameters.
+        """Return start values of the unknowns (members, n) and the parameters.
+
+        The values of algebraic unknowns are guesses.
         """
         x, values = self.model.initial_states(
             {name: v[pick] for name, v in self.x0.items()},
@@ -62,7 +63,7 @@ class MemberData:
         return first_guess(system, self.model, x, begin), values
 
     def data(self, pick: slice) -> Array:
-        """Return input data (members, n_data, intervals); one row if they are common to all."""
+        """Return input data (members, n_data, intervals), or one row if common to all members."""
         common = self.inputs.values[None]
         if not self.own:
             return common
@@ -85,15 +86,16 @@ def member_data(
     u: Mapping[str, MemberInput] | None,
     p: Mapping[str, ArrayLike] | None,
 ) -> MemberData:
-    """Collect the members of an ensemble.
+    """Return the checked data of the members of an ensemble.
 
     Args:
-        model: their equations.
-        span: start, and end of all or of each [s].
-        x0, u, p: start values, inputs and parameters by name, numbers or an entry for each member.
+        model: equations of the members.
+        span: start time, and end time of all members or of each [s].
+        x0, u, p: start values, inputs and parameters by name; numbers, or arrays with one entry per
+            member.
 
     Raises:
-        ValueError: unknown names, not numbers, arrays of different lengths.
+        ValueError: unknown names, values that are not numbers, or arrays of different lengths.
     """
     t_start, ends = span[0], np.asarray(span[1], dtype=float)
     last = float(ends.max())
@@ -140,7 +142,7 @@ def _count(lengths: Mapping[str, tuple[int, ...]]) -> int:
     """Return the number of members from the shapes of the given arrays.
 
     Raises:
-        ValueError: no members, or different lengths.
+        ValueError: no members, or arrays of different lengths.
     """
     matrix = any(len(s) > 1 for name, s in lengths.items() if not name.startswith("u."))
     if matrix or len({shape[0] for shape in lengths.values()}) > 1:
@@ -160,20 +162,20 @@ def _signal(name: str, value: Any, t_start: float) -> Any:
 
 
 def _one(signal: Sampled, t_start: float, t_end: float) -> Sampled:
-    """Return the signal of one member as representative, one that changes if any does."""
+    """Return the signal of one representative member, with a nonzero slope if any has one."""
     rises = signal.coefficients(_between([np.asarray(signal.t)], t_start, t_end))[1]
     row = int(np.argmax(rises.any(axis=-1)))
     return type(signal)(signal.t, np.asarray(signal.values)[row])
 
 
 def _between(times: list[Array], t_start: float, t_end: float) -> Array:
-    """Return start and end, and the times between them."""
+    """Return start, end and the times between them [s], sorted."""
     every = np.unique(np.concatenate([[t_start, t_end], *times]))
     return every[(every >= t_start) & (every <= t_end)]
 
 
 def ends_of(t_end: float | ArrayLike) -> float | Array:
-    """Return the end of all members, or of each one [s]."""
+    """Return the checked end time of all members, or of each member [s]."""
     number = checks.as_number(t_end)
     if number is not None or isinstance(t_end, str | type):
         return checks.number(f"{WHERE}: t_end", t_end, unit="s")

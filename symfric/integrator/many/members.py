@@ -1,6 +1,6 @@
-"""Run many members to common times, in compiled code or in CasADi's virtual machine.
+"""Runs of many members of an ensemble, in compiled code or in CasADi's virtual machine.
 
-Both advance the members' columns S in place and return their signals; no steps are kept.
+Both engines advance the columns S of the members in place and return signals; no steps are kept.
 """
 
 import ctypes
@@ -35,13 +35,13 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 ROWS, ATTEMPTS = 2048, 2000
 PAIRED = 2500
-"""Steps with fewer instructions run in two groups of lanes at once; larger ones use the processor
-fully with one.
+"""Number of instructions below which a step runs in two groups of lanes at once; with more, one
+group uses the processor fully.
 """
 LEAST_PLANTS = 8
-"""Least number of plants for which lanes are faster."""
+"""Smallest number of plants for which lanes are faster."""
 MOST_INSTRUCTIONS = 10_000
-"""Steps with more instructions take compilers too long as vectors."""
+"""Number of instructions above which compiling a step for vectors takes too long."""
 
 
 Advanced = tuple[Array, Counts, Array]
@@ -50,16 +50,16 @@ Advanced = tuple[Array, Counts, Array]
 @final
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Intervals and times of a run of members; an array of one row is common to all of them.
+    """Intervals and times of a run of members; an array with one row is common to all members.
 
     Attributes:
         breaks: ends of input intervals [s], shape (k + 1,).
-        data: input data on them, shape (members or 1, n_data, k).
-        ends: end of each member [s], from breaks[0] to breaks[-1], shape (members,).
+        data: input data in these intervals, shape (members or 1, n_data, k).
+        ends: end time of each member [s], from breaks[0] to breaks[-1], shape (members,).
         h_min: smallest step of each member [s], shape (members,).
-        times: times of the results [s], shape (members or 1, n); NaN is returned after the end.
-        max_steps: attempts allowed, counting earlier ones.
-        follow: True if algebraic unknowns have to follow the data at the start, too.
+        times: times of the results [s], shape (members or 1, n); results after the end are NaN.
+        max_steps: largest number of attempts of a member, including those of earlier runs.
+        follow: True if algebraic unknowns have to be updated to the data at the start, too.
     """
 
     breaks: Array
@@ -77,7 +77,7 @@ class Stretch:
 
     @property
     def numbers(self) -> dict[str, int]:
-        """Numbers of the struct `Many` in C; a step of 0 is common data."""
+        """Numbers of the struct `Many` in C; a step of 0 denotes data common to all members."""
         data, times = self.data, self.times
         return {
             "intervals": data.shape[2], "n_data": data.shape[1],
@@ -88,21 +88,21 @@ class Stretch:
 
 
 class Members(Protocol):
-    """Runner of members."""
+    """Engine that runs members."""
 
     def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
         """Advance members over a stretch.
 
         Args:
-            S: start columns S, one per row, advanced in place.
-            R: run data R, one per row.
-            made: attempts of each member, updated in place.
+            S: columns of the members, one per row, advanced in place.
+            R: run data of the members, one per row.
+            made: number of attempts of each member, updated in place.
             stretch: intervals and times.
 
         Returns:
             Signals (members, times, signals), NaN after a member stopped; reasons to stop
-            (members,); least and greatest unknowns at the start and the ends of steps (members, 2,
-            n).
+            (members,); least and greatest unknowns over the start and the ends of steps (members,
+            2, n).
         """
         ...
 
@@ -110,7 +110,7 @@ class Members(Protocol):
 @final
 @dataclass(frozen=True, eq=False)
 class VmMembers:
-    """Members in CasADi's virtual machine, by the engine of single runs; needs no compiler."""
+    """Members in CasADi's virtual machine, with the engine of single runs; needs no compiler."""
 
     engine: VmEngine
     signals: Columns
@@ -140,7 +140,7 @@ class VmMembers:
         return found, reason, reach
 
     def _advance(self, work: Work, stretch: Stretch, made: int, reach: Array) -> tuple[int, Stop]:
-        """Advance a member; return attempts made and the reason to stop."""
+        """Advance a member; return its number of attempts and the reason to stop."""
         stop = Stop.SEARCH if stretch.follow else Stop.FULL
         while stop in (Stop.SEARCH, Stop.FULL) or (
             stop is Stop.ATTEMPTS and made < stretch.max_steps
@@ -167,7 +167,9 @@ class VmMembers:
 
 
 def struct(names: str) -> type[ctypes.Structure]:
-    """Return a struct of C with fields of these names: `NUMBERS`, and addresses."""
+    """Return a C struct with fields of these names; those in `NUMBERS` are integers, others
+    addresses.
+    """
     kinds = [(n, ctypes.c_longlong if n in NUMBERS else ctypes.c_void_p) for n in names.split()]
     return type("Many", (ctypes.Structure,), {"_fields_": kinds})
 
@@ -186,14 +188,14 @@ _Many = struct(
 @final
 @dataclass(frozen=True, eq=False)
 class CompiledMembers:
-    """Members in the lanes of compiled vector code; releases the GIL."""
+    """Members in the lanes of compiled vector code, which runs without the GIL."""
 
     library: ctypes.CDLL
     signals: int
 
     @classmethod
     def of(cls, source: str, signals: int) -> "CompiledMembers":
-        """Build from the C of `many_source`; compiles, or loads from the cache."""
+        """Return the members for the C of `many_source`, compiled or loaded from the cache."""
         library = load(source, "symfric_many", "symfric_lanes")
         library.symfric_many.argtypes = [ctypes.c_void_p]
         return cls(library, signals)
@@ -207,7 +209,7 @@ class CompiledMembers:
         """Advance members over a stretch.
 
         Raises:
-            MemoryError: about a megabyte is missing.
+            MemoryError: about a megabyte of work memory is not available.
         """
         found = np.empty((S.shape[0], stretch.times.shape[1], self.signals))
         starts, reason = np.ascontiguousarray(S), np.zeros(S.shape[0], dtype=np.int64)
@@ -239,10 +241,11 @@ def many_source(
     """Return the C of the step and of the signals on vectors, with the loop over members.
 
     Args:
-        step, signals: of an `Integrator`.
+        step, signals: Functions of an `Integrator`.
         follows: True if there are algebraic unknowns, which follow jumps of inputs.
-        follow: update of these unknowns; without it members stop at each jump.
-        lanes: of the vectors; by default as many as the processor supports. The bits are the same.
+        follow: update of these unknowns; without it, members stop at each jump.
+        lanes: number of lanes of a vector; by default as many as the processor supports. It does
+            not affect the bits of the results.
     """
     n = step.numel_in(0) - State.MEMORY
     step = step if step.is_a("SXFunction") else step.expand()
@@ -272,9 +275,9 @@ def pays(integrator: Integrator, plants: Plants) -> bool:
 def side_by_side(integrator: Integrator, plants: Plants) -> Advance:
     """Return the loop for plants in the lanes of vectors, from sample to sample.
 
-    A lane repeats `symfric.integrator.running.plants`, except that functions like exp differ by a
-    few units of the last place (`lanes.h`). The bits of a plant depend neither on the number of
-    lanes nor on the other plants.
+    A lane computes the same as `symfric.integrator.running.plants`, except that functions like exp
+    differ by a few units in the last place (`lanes.h`). The bits of a plant depend neither on the
+    number of lanes nor on the other plants.
 
     Raises:
         CompileError: no compiler was found, or it failed.
@@ -283,9 +286,7 @@ def side_by_side(integrator: Integrator, plants: Plants) -> Advance:
 
 
 def plants_source(integrator: Integrator) -> str:
-    """Return the C of the step on vectors, of the update after a jump, and of the loop around
-    them.
-    """
+    """Return the C of the step on vectors, of the update after a jump, and of the loop."""
     s = integrator.system
     nothing = ca.Function("nothing", [ca.SX.sym("t"), s.y, s.d], [ca.SX(0, 1)])
     every = many_source(integrator.step, nothing, integrator.follows, integrator.follow)

@@ -1,4 +1,4 @@
-"""Equations of an ensemble for workers without the model, and projection of start values."""
+"""Equations of an ensemble for workers without the model, and the projection of start values."""
 
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -22,9 +22,9 @@ _LOCK = Lock()
 
 
 class Assembly:
-    """Projection of start values onto the constraints of a mechanism with `nx` states, for rows.
+    """Projection of rows of start values on the constraints of a mechanism with `nx` states.
 
-    It corresponds to the first part of `symfric.integrator.equations.initial.consistent`.
+    The projection equals the first part of `symfric.integrator.equations.initial.consistent`.
     """
 
     def __init__(self, manifold: Manifold, nx: int) -> None:
@@ -34,10 +34,10 @@ class Assembly:
         )
 
     def __call__(self, y: Array, d: Array) -> tuple[Array, NDArray[np.bool_]]:
-        """Project positions and velocities in rows of y (members, n); return y and a mask of
-        successes.
+        """Return projected rows of y (members, n), and True for each row that succeeded.
 
-        With charts, each row gets an orthonormal basis of its tangent space.
+        Positions and velocities are projected. With charts, each row also gets an orthonormal
+        basis of its tangent space.
         """
         y, closed = y.copy(), np.full(y.shape[0], self.manifold.m == 0)
         todo = np.flatnonzero(~closed)
@@ -57,7 +57,7 @@ class Assembly:
         return y, closed
 
     def _bases(self, y: Array, d: Array) -> Array:
-        """Return bases of the tangent spaces, columns below each other."""
+        """Return the basis of the tangent space for each row, stacked column by column."""
         n, m = self.manifold.n, self.manifold.m
         (entries,) = self.slope([y, d], backend="auto")
         rows, columns = self.manifold.slope.size_out(0)
@@ -73,9 +73,9 @@ class Program:
     """Equations of an integrator; picklable, without its caches.
 
     Attributes:
-        where: for messages.
-        code: C of steps, signals and their loop; or the step, for the virtual machine.
-        signals: as `Integrator.signals`.
+        where: name of the caller in messages.
+        code: C of steps, signals and their loop; or the step for the virtual machine.
+        signals: signals, as in `Integrator.signals`.
         equations: the algebraic equations; None if there are none.
         nominal: typical magnitudes of the differential states.
         follows: True if there are algebraic unknowns, which follow jumps of inputs.
@@ -105,7 +105,7 @@ class Program:
 
     @cached_property
     def members(self) -> Members:
-        """Runner of the members; raises CompileError without a working compiler."""
+        """Engine of the members; raises `CompileError` without a working compiler."""
         if isinstance(self.code, str):
             return CompiledMembers.of(self.code, self.n_signals)
         engine = VmEngine(self.code, follows=self.follows)
@@ -113,19 +113,19 @@ class Program:
 
     @cached_property
     def constraints(self) -> Columns | None:
-        """Algebraic equations for many columns."""
+        """Algebraic equations, evaluated for many columns."""
         return None if self.equations is None else Columns(self.equations.constraints)
 
     @cached_property
     def assembly(self) -> Assembly | None:
-        """Projection of a mechanism with a fast update of algebraic unknowns, else None."""
+        """Projection for a mechanism with a fast update of algebraic unknowns; otherwise None."""
         if self.equations is None or self.equations.manifold is None or self.follow is None:
             return None
         return Assembly(self.equations.manifold, self.nx)
 
 
 def program(integrator: Integrator, compiled: bool) -> Program:
-    """Return the program of an integrator, written once and cached with it."""
+    """Return the program of an integrator; written once, then cached in the integrator."""
     with _LOCK:
         known: dict[bool, Program] = integrator.memory.setdefault("programs", {})
         if compiled not in known:

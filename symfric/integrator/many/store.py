@@ -28,18 +28,17 @@ BLOCK = 2**20
 class Store:
     """Signals of all members and the outcome of their runs.
 
-    In a folder every signal is an array file, memory-mapped for reading, and a small file with a
-    checksum marks every complete chunk; a later call continues from there. Chunks that are missing,
+    In a folder, every signal is an array file, memory-mapped for reading, and a small file with a
+    checksum marks every complete chunk, so that a later call can continue. Chunks that are missing,
     truncated, damaged or changed by another program are computed again. The name of the subfolder
-    is a hash of everything that the results depend on, so results of other arguments are never
-    used.
+    is a hash of all data that determine the results, so results of other arguments are never used.
 
     Attributes:
         signals: name -> values (members, times).
-        attempts, reached: attempts of each member, and the time [s] it reached.
+        attempts, reached: number of attempts of each member, and the time [s] that it reached.
         reach: least and greatest value of each state over the steps, shape (members, 2, nx).
-        failed: number of a member -> message.
-        damaged: first members of chunks whose stored results have changed.
+        failed: number of a failed member -> message.
+        damaged: first members of the chunks whose stored results have changed.
 
     Raises:
         ValueError: the folder is not writable or too small for all results.
@@ -68,7 +67,7 @@ class Store:
         return None if self._folder is None else self._folder / f"chunk-{first}.npz"
 
     def left(self, firsts: Collection[int]) -> list[int]:
-        """Return those of the chunks starting at `firsts` that are not complete.
+        """Return the first members of the incomplete chunks among those that start at `firsts`.
 
         Warns:
             UserWarning: stored results of some chunks have changed.
@@ -85,9 +84,7 @@ class Store:
         return found
 
     def has(self, first: int) -> bool:
-        """Return True if the chunk that starts at `first` is complete, after loading its
-        results.
-        """
+        """Return True if the chunk that starts at `first` is complete, and load its results."""
         mark = self._mark(first)
         if mark is None or not mark.exists():
             return False
@@ -108,7 +105,7 @@ class Store:
         """Store the results of the chunk that starts at `first`.
 
         Raises:
-            ValueError: they cannot be written; complete chunks stay.
+            ValueError: the results cannot be written; complete chunks are kept.
         """
         size, mark = result.attempts.size, self._mark(first)
         self._note(first, result.attempts, result.reached, result.reach, result.failed)
@@ -137,7 +134,7 @@ class Store:
             ) from None
 
     def _checksum(self, first: int, size: int) -> str:
-        """Return the hash of the results of members, as they are read back."""
+        """Return a hash of the results of `size` members, as read from the files."""
         total = sha256()
         for values in self.signals.values():
             total.update(np.ascontiguousarray(values[first : first + size]).tobytes())
@@ -154,16 +151,16 @@ class Store:
 
 
 def _reason(error: OSError | ValueError) -> str:
-    """Return the reason why a file cannot be written, in the words of the system."""
+    """Return the message of the operating system about a file that cannot be written."""
     cause = error if isinstance(error, OSError) else error.__cause__
     return cause.strerror if isinstance(cause, OSError) and cause.strerror else str(error)
 
 
 def _claim(temporary: Path, path: Path) -> None:
-    """Rename a temporary file to `path`, unless that exists.
+    """Link a temporary file to `path`, unless `path` exists.
 
     Raises:
-        FileExistsError: it exists.
+        FileExistsError: `path` exists.
     """
     try:
         os.link(temporary, path)
@@ -176,18 +173,18 @@ def _claim(temporary: Path, path: Path) -> None:
 @final
 @dataclass(frozen=True, eq=False)
 class _ArrayFile:
-    """Array file (`numpy.save`), written by rows and read by a memory map.
+    """Array file (`numpy.save`), written by rows and read through a memory map.
 
-    Writing through the map would kill the process by a signal if the disk is full.
+    It is not written through the map, because a signal would then end the process on a full disk.
     """
 
     path: Path
     shape: tuple[int, int]
 
     def make(self) -> None:
-        """Create a file of NaN, with its disk space allocated, unless a valid one exists.
+        """Create a file of NaN, so that its disk space is allocated, unless a valid one exists.
 
-        If another call creates it at the same time, both use the file of one of them.
+        If two calls create the file at the same time, both use the file of one of them.
         """
         missing = not os.path.lexists(self.path)
         if not missing and self._is_whole():
@@ -232,7 +229,7 @@ class _ArrayFile:
         return np.lib.format.open_memmap(self.path, mode="r")
 
     def write(self, first: int, rows: Array) -> None:
-        """Write `rows` over those from `first` on."""
+        """Overwrite the rows from `first` on with `rows`."""
         end = self.path.stat().st_size
         with self.path.open("r+b") as file:
             file.seek(end - 8 * prod(self.shape) + 8 * first * self.shape[1])

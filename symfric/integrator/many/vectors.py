@@ -1,6 +1,6 @@
 """CasADi Functions as C on vectors: members of an ensemble in parallel, one per lane.
 
-The operations are those of the Function, in its order; `lanes.h` defines functions like exp.
+The C has the operations of the Function in the same order; `lanes.h` defines functions like exp.
 """
 
 from collections import deque
@@ -14,8 +14,8 @@ import casadi as ca
 from symfric.foundation.graph import LEAVES, SELECT, Graph, Node, graph
 
 PART = 1000
-"""Operations of one C function; compilers take more than twice as long for twice as many, and keep
-fewer values in registers.
+"""Number of operations of one C function. For twice as many, compilers take more than twice as long
+and keep fewer values in registers.
 """
 
 MASKS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
@@ -37,25 +37,23 @@ CALLS = {
 
 
 def c_text(name: str) -> str:
-    """Return a C file of this folder."""
+    """Return the text of a C file of this folder."""
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
 def lanes_header(lanes: int = 0) -> str:
-    """Return the vector types and functions, for `lanes` lanes or as many as the processor
-    supports.
-    """
+    """Return the C of vectors with `lanes` lanes, by default as many as the processor supports."""
     text = c_text("lanes.h")
     return f"#define LANES {lanes}\n{text}" if lanes else text
 
 
 def vector_source(name: str, function: ca.Function, groups: int = 1) -> tuple[str, int]:
-    """Return the C called `name` of a Function of dense columns on vectors, and its work size.
+    """Return the C function `name` for a Function of dense columns on vectors, and its work size.
 
-    It is `static void name(const V *const *arg, V *const *res, V *w)` with a pointer for every
-    argument and every result, and w for the returned number of vectors; results must not overlap
-    arguments. With several groups each has its own three parameters: while operations of one group
-    wait for their operands, those of another are executed.
+    Its declaration is `static void name(const V *const *arg, V *const *res, V *w)`, with a pointer
+    for every argument and result, and w for the returned number of vectors; results must not
+    overlap arguments. With several groups, each group has three such parameters: while operations
+    of one group wait for their operands, those of another group are executed.
     """
     whole = graph(function if function.is_a("SXFunction") else function.expand())
     parts = _Parts(whole, name, range(groups))
@@ -73,7 +71,7 @@ def _head(name: str, groups: range) -> str:
 
 @final
 class _Parts:
-    """Graph divided into C functions; values needed by a later one are stored in slots of w."""
+    """Graph divided into C functions; slots of w hold values that later functions need."""
 
     def __init__(self, whole: Graph, name: str, groups: range) -> None:
         self.whole, self.name, self.groups = whole, name, groups
@@ -119,9 +117,7 @@ class _Parts:
 
 @final
 class _Body:
-    """Lines of one C function. Values are vectors v or, for comparisons, masks m; @ is the
-    group.
-    """
+    """Lines of one C function; values are vectors v, comparisons are masks m, @ is the group."""
 
     def __init__(self, nodes: tuple[Node, ...], slot: dict[int, int], own: set[int]) -> None:
         self.nodes, self.slot, self.own = nodes, dict(slot), own
@@ -147,7 +143,7 @@ class _Body:
         return f"v{i}_@"
 
     def mask(self, i: int) -> str:
-        """Return the node i as a mask, true if nonzero."""
+        """Return the node i as a mask, true where the node is nonzero."""
         if i in self.own and _is_mask(self.nodes[i]):
             return f"m{i}_@"
         return f"as_mask({self.number(i)})"
@@ -185,7 +181,7 @@ class _Body:
         return f"v_{CALLS[node.op]}({', '.join(operands)})"
 
     def angle(self, j: int) -> None:
-        """Add sine and cosine of the node j, computed together once."""
+        """Add the sine and cosine of the node j, computed together and only once."""
         if j not in self.angles:
             self.angles.add(j)
             self.lines.append(f"V c{j}_@;")

@@ -1,1 +1,1 @@
-"""Independent laws, scenes and solver: NumPy, SciPy and the standard library only."""
+"""Independent laws, scenes and solver, using only NumPy, SciPy and the standard library."""

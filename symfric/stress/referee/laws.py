@@ -1,7 +1,7 @@
 """Ten friction laws as in their papers and in the manual, in plain Python.
 
-A law is created from its numbers `p` and its forms. It returns F [N] and the rates of its states
-for a sliding velocity v [m/s], a normal force N [N] and states z:
+A law is created from its numbers `p` and its forms. It returns the force F [N] and the rates of its
+states for a sliding velocity v [m/s], a normal force N [N] and states z:
 
     force, rates = law(p, forms)(v, N, z)
 """
@@ -27,7 +27,7 @@ def clip(x: float, low: float, high: float) -> float:
 
 
 def decay(x: float) -> float:
-    """Return exp(-x) for x >= 0, zero below the smallest double."""
+    """Return exp(-x) for x >= 0, or zero if it is below the smallest double."""
     return exp(-min(x, 800.0))
 
 
@@ -89,7 +89,7 @@ def brown_mcphee(p: Numbers, _: Forms) -> Rub:
 
 
 def specker(p: Numbers, _: Forms) -> Rub:
-    """Specker's friction.
+    """Specker friction.
 
     F_p = N [mu_s - mu_d tanh(v_sp/v_t)] - sigma_2 v_sp,   r = v/v_sp,
 
@@ -127,7 +127,7 @@ def bristle(
     damping: Callable[[float], float],
     share: Callable[[float, float, float], float] = lambda v, z, z_ss: 1.0,
 ) -> Rub:
-    """A bristle.
+    """Bristle friction.
 
     g = N [mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)],   dz/dt = v - alpha sigma_0 |v| z / g,
 
@@ -152,12 +152,12 @@ def lugre(p: Numbers, _: Forms) -> Rub:
 
 
 def lugre_passive(p: Numbers, _: Forms) -> Rub:
-    """`bristle` whose damping sigma_1 exp(-(v/v_d)^2) fades."""
+    """`bristle` with velocity-dependent damping sigma_1 exp(-(v/v_d)^2)."""
     return bristle(p, lambda v: p["sigma_1"] * decay((v / p["v_d"]) ** 2))
 
 
 def elasto_plastic(p: Numbers, _: Forms) -> Rub:
-    """`bristle` with alpha a step of (z sign(v) - z_ba)/(z_ss - z_ba)."""
+    """`bristle` with alpha a smooth step over (z sign(v) - z_ba)/(z_ss - z_ba)."""
     z_ba, v_eps = p["z_ba"], p["v_eps"]
 
     def alpha(v: float, z: float, z_ss: float) -> float:
@@ -172,7 +172,7 @@ def elasto_plastic(p: Numbers, _: Forms) -> Rub:
 def bouc_wen(p: Numbers, _: Forms) -> Rub:
     """dz/dt = v/x_0 [A - |z|^n (beta sign(v z) + gamma)],   x_0 = mu_d N / sigma_0,   F = mu_d N z.
 
-    With sign(v), sign(z) and |z| smoothed: |v| (beta sign(z) + gamma sign(v)) |z|^n is subtracted.
+    The subtracted term is |v| (beta sign(z) + gamma sign(v)) |z|^n with smoothed sign and |z|.
     """
     mu_d, sigma_0, A, beta, gamma, n = (
         p[k] for k in ("mu_d", "sigma_0", "A", "beta", "gamma", "n")
@@ -189,7 +189,7 @@ def bouc_wen(p: Numbers, _: Forms) -> Rub:
 def exact_coulomb(p: Numbers, forms: Forms) -> Rub:
     """F = mu N mode + sigma_2 v in sliding; the scene determines the force at rest.
 
-    mu = mu_d or, form "stribeck", mu_d + (mu_s - mu_d) exp(-(v/v_s)^2); `z` is the mode.
+    mu = mu_d or, with the form "stribeck", mu_d + (mu_s - mu_d) exp(-(v/v_s)^2); `z` is the mode.
     """
     mu_s, mu_d, v_s, sigma_2 = p["mu_s"], p["mu_d"], p["v_s"], p["sigma_2"]
     falls = forms.get("form", "jump") == "stribeck"

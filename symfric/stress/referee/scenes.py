@@ -1,9 +1,9 @@
 """Six machines with friction as in textbooks, in plain Python.
 
-A scene is created from its numbers `p`, its force over time and a time within the piece between two
-kinks for which it is valid. It returns the rates of its own states y at t. Each contact calls
-`rub(i, v, N, F_e)` for its friction force, with the sliding velocity v, the normal force N and the
-force F_e that it would carry at rest.
+A scene is created from its numbers `p`, its force over time, and a time between the two kinks for
+which it is valid. It returns the rates at t of its states y, without those of laws. Each contact
+calls `rub(i, v, N, F_e)` for its friction force, with the sliding velocity v, the normal force N
+and the force F_e that it would carry at rest.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,19 +17,19 @@ Motion = Callable[[float, Sequence[float], Friction], Sequence[float]]
 
 ROUNDING, CLOSE, LOOPS = 4e-16, 1e-11, 60
 WIDTH = 1e-4
-"""Smoothing [N] of the length of the force of a bearing."""
+"""Smoothing [N] of the magnitude of the force of a bearing."""
 
 
 class UnsolvableError(ArithmeticError):
-    """The search for consistent accelerations and normal forces failed."""
+    """Error if the search for consistent accelerations and normal forces fails."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Machine: its equations, and for each contact the state that slides and its value at rest.
+    """Equations of a machine and the sliding velocities of its contacts.
 
     Attributes:
-        states: number of its own states.
+        states: number of states of the machine, without those of laws.
         motion: equations.
         slides: for each contact, (number of a velocity state, its value at rest).
         breaks: times at which the equations have a kink [s].
@@ -69,7 +69,7 @@ def drive(p: Numbers, force: Force, _: float) -> Scene:
 
 
 def two_blocks(p: Numbers, _: Force, __: float) -> Scene:
-    """Two blocks on a belt, a spring between them.
+    """Two blocks on a belt, connected by a spring.
 
     m_i v_i' = -k_i x_i +- k_c (x_2 - x_1) - F(v_i - v_belt, m_i g).
     """
@@ -119,12 +119,12 @@ def quarter_car(p: Numbers, _: Force, within: float) -> Scene:
 
 
 def length(*forces: float) -> float:
-    """Return the length of a force [N], smoothed at zero."""
+    """Return the magnitude of a force [N], smoothed at zero."""
     return hypot(*forces, WIDTH) - WIDTH
 
 
 def pendulum(p: Numbers, _: Force, __: float) -> Scene:
-    """(J + m L^2) phi'' = -m g L sin(phi) - R F(R phi', N), N the size of the bearing's force."""
+    """(J + m L^2) phi'' = -m g L sin(phi) - R F(R phi', N), with N the force of the bearing."""
     m, L, R, g = p["m"], p["L"], p["R"], p["g"]
     inertia, guess = p["J"] + m * L**2, [m * g]
 
@@ -143,11 +143,11 @@ def pendulum(p: Numbers, _: Force, __: float) -> Scene:
 
 
 def pendulum_box(p: Numbers, _: Force, __: float) -> Scene:
-    """Box (x) on rough ground and a pendulum (phi) hinged to it, friction in both places.
+    """Box (x) on rough ground with a hinged pendulum (phi), and friction at ground and hinge.
 
     (m_b + m) x'' + m L (phi'' cos(phi) - phi'^2 sin(phi)) = -F(x', N_1),
     m L x'' cos(phi) + (J + m L^2) phi'' + m g L sin(phi) = -R F(R phi', N_2),
-    N_1 the size of the ground's force, N_2 that of the hinge's.
+    with N_1 the magnitude of the force of the ground and N_2 that of the hinge.
     """
     m, L, R, g, both = p["m"], p["L"], p["R"], p["g"], p["m_box"] + p["m"]
     inertia, guess = p["J"] + m * L**2, [both * g, m * g]
@@ -172,17 +172,17 @@ def pendulum_box(p: Numbers, _: Force, __: float) -> Scene:
 def settled(
     accelerated: Callable[[list[float]], tuple[list[float], list[float]]], N: list[float]
 ) -> list[float]:
-    """Return accelerations under the normal forces N that follow from them, by Broyden's method.
+    """Return accelerations consistent with the normal forces N, computed by Broyden's method.
 
-    N is the first guess, and is overwritten with the result.
+    N contains the initial guess and is overwritten with the result.
     """
     n, last = range(len(N)), inf
     a, found = accelerated(N)
     gap = [found[i] - N[i] for i in n]
-    inverse = [[-float(i == j) for j in n] for i in n]  # inverse slope of the gap
+    inverse = [[-float(i == j) for j in n] for i in n]  # inverse Jacobian of the gap
     for _ in range(LOOPS):
         size = max(abs(gap[i]) / (1 + found[i]) for i in n)
-        if size <= ROUNDING or last / 2 < size < CLOSE:  # only rounding is left
+        if size <= ROUNDING or last / 2 < size < CLOSE:  # the rest is rounding
             return a
         step = [max(-sum(inverse[i][j] * gap[j] for j in n), -0.9 * N[i]) for i in n]
         N[:] = [N[i] + step[i] for i in n]

@@ -1,8 +1,8 @@
-"""Motion of the machines of `scenes` with the laws of `laws`, by SciPy.
+"""Motion of the machines of `scenes` with the laws of `laws`, computed by SciPy.
 
-Smooth laws are solved by LSODA between the kinks of the force and of the machine. Exact Coulomb
-friction is solved from event to event: each contact slides forward, slides back or rests until its
-slip passes through zero or its load passes mu_s N.
+LSODA integrates smooth laws between the kinks of the force and of the machine. Exact Coulomb
+friction is integrated from event to event: each contact slides forward, slides back or rests until
+its sliding velocity passes through zero or its load exceeds mu_s N.
 """
 
 import warnings
@@ -22,15 +22,15 @@ Array = NDArray[np.float64]
 EVALUATIONS = 150_000
 """Largest number of calls of the equations in a solve."""
 PIECES = 200
-"""Least number of steps of a solve; SciPy may overlook events in longer steps."""
+"""Smallest number of steps of a solve; SciPy may miss events in longer steps."""
 EVENTS = 10_000
 CLOSE = 1e-14
 UNKNOWN = {("exact_coulomb", "pendulum_box")}
-"""Rest of two contacts that load each other, for which there are no equations here."""
+"""Combinations in which two contacts at rest load each other; they have no equations here."""
 
 
 class GaveUpError(ArithmeticError):
-    """SciPy did not reach the end."""
+    """Error if SciPy does not reach the end."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Signal:
     Attributes:
         kind: constant (c), hold and linear (values at t), sine (amplitude, rate [rad/s], offset)
             or pulse (height, start [s], width [s]).
-        values: numbers in parentheses above.
+        values: numbers in the parentheses of `kind`.
         t: sample times [s] of hold and linear.
     """
 
@@ -50,13 +50,13 @@ class Signal:
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Times [s] at which it jumps, bends, or changes fastest."""
+        """Times [s] at which the force jumps, has a kink, or changes fastest."""
         if self.kind == "pulse":
             return self.values[1], self.values[1] + self.values[2]
         return self.t
 
     def between(self, a: float, b: float) -> Force:
-        """Return the force for times from a to b, between which there is no kink."""
+        """Return the force between the times a and b; there must be no kink between them."""
         if self.kind == "constant":
             return lambda t: self.values[0]
         if self.kind == "sine":
@@ -80,13 +80,13 @@ NO_FORCE, SINE = Signal("constant", (0.0,)), Signal("sine", (2.0, pi, 0.0))
 
 @dataclass(frozen=True)
 class Question:
-    """Case as data.
+    """Data of a case for the referee.
 
     Attributes:
         law, scene, forms, p: names, options, and all numbers of law and scene.
         y: start values, states of the machine before those of the laws.
-        scale: typical sizes of the states.
-        times: times of the results, from the start to the end [s].
+        scale: typical magnitudes of the states.
+        times: times of the results, from start to end [s].
         signal: force of a drive.
     """
 
@@ -101,7 +101,7 @@ class Question:
 
 
 def knows(law: str, scene: str) -> bool:
-    """Return True if there are equations for this law in this scene."""
+    """Return True if the referee has equations for this law in this scene."""
     return law in LAWS and scene in SCENES and (law, scene) not in UNKNOWN
 
 
@@ -135,11 +135,11 @@ class Motion:
         return [*own, *(rate for of_contact in rates for rate in of_contact)]
 
     def mode(self, i: int) -> int:
-        """Return the number of the state that is the mode of contact `i`."""
+        """Return the index of the state that is the mode of contact `i`."""
         return self.scene.states + i
 
     def held(self, t: float, y: Array, i: int, mu_s: float) -> Array:
-        """Return states with contact `i` at rest if it carries the load, else starting to slide."""
+        """Return states with contact `i` at rest, or starting to slide if its load is too large."""
         velocity, rest = self.scene.slides[i]
         y[velocity], y[self.mode(i)] = rest, 0.0
         self(t, y.tolist())
@@ -148,7 +148,7 @@ class Motion:
         return y
 
     def changed(self, t: float, y: Array, i: int, mu_s: float) -> Array:
-        """Return states after the mode of contact `i` has ended."""
+        """Return the states after the end of the mode of contact `i`."""
         if y[self.mode(i)]:
             return self.held(t, y, i, mu_s)
         self(t, y.tolist())
@@ -160,7 +160,7 @@ def solve(asked: Question, rtol: float = 1e-10) -> Array:
     """Return states at the requested times, shape (nx, times).
 
     Raises:
-        ArithmeticError, ValueError: SciPy gave up, or a number left the range of the equations.
+        ArithmeticError, ValueError: SciPy failed, or a number left the range of the equations.
     """
     begin, end = float(asked.times[0]), float(asked.times[-1])
     kinks = {*asked.signal.kinks, *SCENES[asked.scene](asked.p, abs, begin).breaks}
@@ -180,14 +180,14 @@ def solve(asked: Question, rtol: float = 1e-10) -> Array:
 def by_lsoda(
     motion: Motion, y: Array, times: Array, span: tuple[float, float], rtol: float, asked: Question
 ) -> tuple[Array, Array]:
-    """Return states at `times`, and at the end."""
+    """Return states at `times` and at the end, integrated by LSODA."""
     from scipy.integrate import odeint  # noqa: PLC0415  (a third of a second)
 
     at = np.unique([*span, *times])  # LSODA needs times that differ by more than rounding
     at = at[np.append(True, np.diff(at) > CLOSE * np.abs(at).max())]
     longest = (asked.times[-1] - asked.times[0]) / PIECES
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the message repeats it
+        warnings.simplefilter("ignore")  # the error message repeats the warning
         states, info = odeint(
             motion, y, at, rtol=rtol, atol=1e-3 * rtol * asked.scale, tcrit=[span[1]],
             tfirst=True, mxstep=10 * EVALUATIONS, hmax=longest, full_output=True,
@@ -201,7 +201,7 @@ def by_lsoda(
 def by_events(
     motion: Motion, y: Array, times: Array, span: tuple[float, float], rtol: float, asked: Question
 ) -> tuple[Array, Array]:
-    """Return states at `times`, and at the end, integrated from event to event."""
+    """Return states at `times` and at the end, integrated from event to event."""
     from scipy.integrate import solve_ivp  # noqa: PLC0415
 
     contacts, mu_s, (t, end) = range(len(motion.scene.slides)), asked.p["mu_s"], span
