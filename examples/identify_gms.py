@@ -5,9 +5,9 @@ up to five times the Stribeck velocity; the force has 1 % of noise. The elements
 problem (which springs and sliders explain the force along the path), levels and Stribeck velocity
 from bins of the fast record; then both records are fitted together under the measured velocity,
 with all stiffnesses and shares free. Shares count by their ratios alone, so one of them is held.
-Elements begin to slip between samples: the residuals have kinks, at which a descent may stop a
-little short of the minimum, which the status of the fit then says.
-Judged by another path: how far the fitted law is from the true one, in units of the noise.
+Elements begin to slip between samples. The residuals therefore have kinks, where a descent can
+stop short of the minimum; the fit uses eight starts, and its status reports such a stop.
+The last line compares the fitted with the true law on another path, in units of the noise.
 
     python examples/identify_gms.py [OUT]
 
@@ -79,7 +79,7 @@ def main(out: Path) -> None:
     shares = [f"alpha_{i}" for i in range(1, COUNT)]
     free = ["delta", "C", *(f"k_{i}" for i in range(1, COUNT + 1)), *shares]
     fixed = {"sigma_2": 0.0, f"alpha_{COUNT}": 1 / COUNT}
-    fit = Fit(Points(), ten, data, free=free, fixed=fixed, starts=3, evaluations=120).solve(
+    fit = Fit(Points(), ten, data, free=free, fixed=fixed, starts=8, evaluations=120).solve(
         throw=False
     )
     fit.plot(out / "gms.png")

@@ -161,12 +161,8 @@ LONG = (
     "identify_excitation",
     "identify_franka",
     "identify_gms",
-    "identify_laminator",
     "identify_pendulum",
     "identify_raw_files",
-    "mpc_drive",
-    "optimal_move",
-    "out_and_back",
     "quarter_car_profile",
     "robot_feed_forward",
     "swing_up",
@@ -191,6 +187,10 @@ SAYS = dict.fromkeys(LONG, motion_is_verified) | {
     "rabinowicz": period_is_between_those_of_two_laws,
     "opti_lugre": opti_lands_within_a_micrometre,
 }
+
+
+def test_every_check_belongs_to_an_example() -> None:
+    assert SAYS.keys() <= {path.stem for path in EXAMPLES}
 
 
 RUN = [

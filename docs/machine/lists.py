@@ -218,8 +218,8 @@ def example_pages() -> dict[str, str]:
         rows.append([f"[{path.stem}]({path.stem}.md)", plain(first_line(about))])
     index = (
         f"# Examples\n\n{len(EXAMPLES)} programs of at most a hundred lines in the folder "
-        "`examples`. Each runs in the tests, and writes pictures into the folder given as "
-        "its argument.\n\n"
+        "`examples`. Each writes pictures into the folder given as its argument. The tests run the "
+        "short ones, `make stress` runs all.\n\n"
     )
     return found | {"index": index + table(["example", "subject"], rows) + contents(found)}
 
