@@ -43,7 +43,7 @@ SHOCK = 1e-3
 Its inverse is the factor by which friction multiplies a load on a bearing. As the pivot approaches
 0, that load stops the sliding within microseconds, while the pivot falls exponentially with the
 sliding velocity: without this limit the tolerance would decide which runs pass. Moving machines
-stay above 0.4, machines near jamming above 0.02 (`tests/symfric/stress/test_jamming.py`).
+stay above 0.4, machines near jamming above 0.02 (`tests/symfric/stress/test_mechanisms.py`).
 """
 ITERATIONS, NEARBY = (4, 3), (2, 2)
 """Numbers of Newton iterations with frozen derivatives, on positions and on velocities.
