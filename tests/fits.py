@@ -19,7 +19,6 @@ from identification.solving.task import task
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
-from identification.verdict.covariance import covariance
 from identification.verdict.judge import judge
 from symfric.laws import Law, Stribeck
 
@@ -112,8 +111,8 @@ def make(
     point = problem.at(best.w)
     if isinstance(point, str):
         raise ValueError(point)
-    verdict = judge(problem, point)
-    live = Live(kind, what, data, problem, point, covariance(problem, point))
+    live = Live(kind, what, data, problem, point, None)
+    verdict = judge(live.minimum)
     status = verdict.status(best.status)
     return fitted(live, tried, verdict, findings, status=status, seconds=0.1, call=call)
 

@@ -17,7 +17,8 @@ from identification.solving.many_starts import best_of, many_starts
 from identification.solving.task import Point, Task
 from identification.unknowns.subject import Closed, Subject
 from identification.unknowns.unknowns import unknowns_of
-from identification.verdict.covariance import Covariance
+from identification.verdict.covariance import Covariance, Levels, covariance
+from identification.verdict.minimum import Minimum, minimum
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]
@@ -28,7 +29,6 @@ class Kind(Protocol):
 
     def prepare(self, subject: Subject, data: Dataset, start: Mapping[str, float]) -> Residuals:
         """Return the residuals of `subject` on `data`; start values are estimated near `start`."""
-        ...
 
 
 class Question(Protocol):
@@ -36,7 +36,6 @@ class Question(Protocol):
 
     def live(self, noise: dict[str, float], w: Array) -> "Live":
         """Return the problem with its end at the coordinates `w`."""
-        ...
 
 
 @final
@@ -69,7 +68,7 @@ class Live:
         kind, subject, data: arguments of the fit.
         task: least-squares problem with the noise levels at the end.
         point: the minimum.
-        covariance: covariance of the values at the minimum.
+        levels: friction levels of the law; None if the load is not known.
     """
 
     kind: Kind
@@ -77,7 +76,17 @@ class Live:
     data: Dataset
     task: Task
     point: Point
-    covariance: Covariance
+    levels: Levels | None
+
+    @cached_property
+    def minimum(self) -> Minimum:
+        """Arrays of the minimum."""
+        return minimum(self.task, self.point)
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        """Covariance of the values at the minimum."""
+        return covariance(self.minimum, self.levels)
 
     @cached_property
     def closed(self) -> Closed:
