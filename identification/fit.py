@@ -15,12 +15,11 @@ from time import perf_counter
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.differentiate import differentiate
 from identification.data.findings import Findings
-from identification.residuals.evaluation import Residuals
+from identification.residuals.evaluation import Array, Residuals
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
 from identification.result.build import fitted, levels_of, written
@@ -39,7 +38,6 @@ from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law
 from symfric.scenes import Drive
 
-Array = NDArray[np.float64]
 MOST_STARTS = 10_000
 QUICK = 40
 """Largest number of evaluations of a fit that only selects a setting."""

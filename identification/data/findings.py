@@ -17,10 +17,9 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import Record
+from identification.data.record import Array, Record
 from symfric.foundation import checks
 
-Array = NDArray[np.float64]
 Severity = Literal["error", "warning"]
 ROLES = ("x", "v", "a", "force")
 

@@ -8,11 +8,10 @@ from typing import Literal, TypeVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import Record
+from identification.data.record import Array, Record
 from identification.data.units import CHANNELS, KINDS, by_channel, is_common, unit
 from symfric.foundation import checks
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 Missing = Literal["refuse", "drop"]
 

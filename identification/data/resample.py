@@ -8,14 +8,11 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.check_signals import spike_samples
-from identification.data.record import GAP, Record
+from identification.data.record import GAP, Array, Record
 from identification.data.units import unit
 from symfric.foundation import checks
-
-Array = NDArray[np.float64]
 
 SHORTEST = 10
 """Smallest number of samples in a piece between two gaps that is kept."""

@@ -6,9 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from identification.data.dataset import Dataset
 from identification.result.live import Live
 from identification.result.outcome import Outcome, sentences
@@ -26,8 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from identification.result.page import Ranking
-
-Array = NDArray[np.float64]
 
 
 @final

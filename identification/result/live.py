@@ -6,11 +6,8 @@ from functools import cached_property
 from math import nan
 from typing import Protocol, final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from identification.data.dataset import Dataset
-from identification.residuals.evaluation import Residuals
+from identification.residuals.evaluation import Array, Residuals
 from identification.residuals.inverse import InverseDynamics, InverseRows
 from identification.result.series import Errors, error
 from identification.solving.many_starts import best_of, many_starts
@@ -20,8 +17,6 @@ from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.covariance import Covariance, Levels, covariance
 from identification.verdict.minimum import Minimum, minimum
 from symfric.foundation import checks
-
-Array = NDArray[np.float64]
 
 
 class Kind(Protocol):

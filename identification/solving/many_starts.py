@@ -19,15 +19,13 @@ from functools import lru_cache, partial
 from threading import get_ident
 
 import numpy as np
-from numpy.typing import NDArray
 
+from identification.residuals.evaluation import Array
 from identification.solving.descent import Start, descend, descend_easier_first
 from identification.solving.task import Point, Task, square
 from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns
 from symfric.foundation.status import SolveError, Status
-
-Array = NDArray[np.float64]
 
 REACH = 5.0
 """Largest factor by which a positive value is changed."""

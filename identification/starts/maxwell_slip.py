@@ -16,10 +16,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.starts.measured import DEAD, Measured, turning_points
+from identification.starts.measured import DEAD, Array, Measured, turning_points
 from symfric.foundation import checks
-
-Array = NDArray[np.float64]
 
 CANDIDATES = 60
 """Number of radii of the dense set, in geometric progression."""

@@ -6,18 +6,15 @@ from math import isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.starts.maxwell_slip import Elements, fit_elements
-from identification.starts.measured import Hysteresis, Measured, hysteresis, travelled
+from identification.starts.measured import Array, Hysteresis, Measured, hysteresis, travelled
 from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve, fit_law
 from identification.unknowns.roles import orders, parts, velocity
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, parameters
 from symfric.laws.base.law import Law
 from symfric.scenes.blocks import Drive
-
-Array = NDArray[np.float64]
 
 STEADY = ("level", "viscous", "velocity scale", "")
 """Roles of parameters that the steady curve of a law determines."""
