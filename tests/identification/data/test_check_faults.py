@@ -122,8 +122,6 @@ def test_repairs_undo_what_was_found(stage_data: Dataset) -> None:
     newtons = volts.scaled({"u": 5.0}, units={"u": "N"}).renamed({"u": "force"})[0]
     np.testing.assert_allclose(newtons["force"], record["force"])
     assert newtons.unit("force") == "N"
-    with pytest.raises(ValueError, match="expected a factor other than 0"):
-        volts.scaled({"u": 0.0})
 
 
 @pytest.mark.parametrize(
@@ -149,8 +147,6 @@ def test_roles_name_signals_that_are_called_otherwise(stage_data: Dataset) -> No
     assert not data.check().errors
     (error,) = data.check(x="theta_2", force="tau_2").errors
     assert (error.kind, error.signal) == ("sign", "tau_2")
-    with pytest.raises(ValueError, match="expected one of x, v, a, force, got y"):
-        data.check(y="theta_2")
 
 
 def test_a_slide_with_a_torque_is_refused() -> None:

@@ -46,8 +46,6 @@ def test_forces_of_a_sensor_are_means_of_commands() -> None:
     )
     np.testing.assert_array_equal(sensor[1:], (command[1:] + command[:-1]) / 2)
     assert sensor[0] == command[0]
-    with pytest.raises(ValueError, match="expected one of sensor, command, got mean"):
-        synthetic_drive_data(force="mean")  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize("law", ["stribeck", "lugre"])

@@ -14,7 +14,7 @@ from identification.solving.descent import descend
 from identification.solving.task import task
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
-from symfric import Coulomb, LuGre, Stribeck, Sum, Viscous
+from symfric import Coulomb, Stribeck, Sum, Viscous
 from symfric.scenes import Drive
 
 N, STEP = 1500, 1e-3
@@ -152,31 +152,6 @@ def test_residuals_go_to_other_processes(rows: LoopRows) -> None:
     at = of(TRUE, rows.names)
     one, two = (evaluated(r, at) for r in (rows, pickle.loads(pickle.dumps(rows))))
     np.testing.assert_array_equal(one.J, two.J)
-
-
-def test_a_law_with_states_is_refused(data: Dataset) -> None:
-    machine = subject(Drive(LuGre(), m=95.0, N=1.0))
-    with pytest.raises(ValueError, match="a friction law without states"):
-        ClosedLoop().prepare(machine, data)
-
-
-def test_a_record_without_controller_is_refused(data: Dataset, drive: Subject) -> None:
-    bare = Dataset((replace(data[0], loop=None),), "bare")
-    with pytest.raises(ValueError, match="expected a known controller, got none"):
-        ClosedLoop().prepare(drive, bare)
-
-
-def test_a_controller_of_another_shape_is_refused() -> None:
-    s, x, r = ca.SX.sym("s", 2), ca.SX.sym("x", 3), ca.SX.sym("r")
-    step = ca.Function("three", [s, x, r], [s, r])
-    with pytest.raises(ValueError, match="measured of 1 or 2"):
-        Controller(step)
-    x = ca.SX.sym("x")
-    step = ca.Function("one", [s, x, r], [s, r])
-    with pytest.raises(ValueError, match="a Function of"):
-        Controller(step, start=ca.Function("start", [x], [ca.vertcat(x, x)]))
-    with pytest.raises(ValueError, match="signals"):
-        ClosedLoop(signals=("x", "a"))
 
 
 def test_a_motion_that_is_not_finite_is_said(data: Dataset) -> None:

@@ -82,11 +82,6 @@ def test_the_step_is_of_second_order_in_the_sample_time() -> None:
     assert (np.log2(errors[:-1] / errors[1:]) > 1.8).all()
 
 
-def test_laws_that_only_a_simulation_follows_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"are coupled; use Shooting\(\)"):
-        error(law_from_text("leuven"))
-
-
 def test_compiled_code_and_virtual_machine_give_the_same_bits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -172,17 +172,6 @@ def test_a_motion_that_often_turns_round_is_thinned_less() -> None:
     assert rows.channels[0].t.size >= ENOUGH
 
 
-def test_missing_channels_are_named() -> None:
-    data = Dataset.of(t=T, x=np.sin(T), units={"x": "m"})
-    with pytest.raises(ValueError, match="expected channels force for the inverse dynamics"):
-        InverseDynamics().prepare(subject(DRIVE), data)
-
-
-def test_records_too_short_for_the_filter_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"equations of (force|all signals) after the filter"):
-        InverseDynamics(filter=Filter(60.0, 300)).prepare(subject(DRIVE), moved(DRIVE))
-
-
 def test_every_record_has_its_dead_time() -> None:
     rows = InverseDynamics(filter=PLAIN, dead_time=(0.0, 0.02)).prepare(
         subject(DRIVE, free=["m"], fixed="others"), moved(DRIVE) + moved(DRIVE)

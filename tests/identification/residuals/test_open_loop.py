@@ -1,6 +1,5 @@
 """The sampled engine against closed forms, differences and adaptive simulations."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import casadi as ca
@@ -12,20 +11,16 @@ from identification.data.dataset import Dataset
 from identification.residuals import stepper
 from identification.residuals.shooting import Shooting
 from identification.residuals.shots import means, sampled_motion
-from identification.residuals.stepper import why_not_sampled
 from identification.unknowns.subject import Subject, subject
 from symfric import (
     Coulomb,
-    Dahl,
     Linear,
-    LuGre,
     Stribeck,
     Sum,
     Viscous,
     drive,
     law_from_text,
     parameters,
-    rabinowicz,
     simulate,
     with_values,
 )
@@ -163,20 +158,6 @@ def test_a_pendulum_is_one_mass_too() -> None:
     assert np.abs(motion.states[:, 0] - exact["phi"]).max() < 1e-5
 
 
-@pytest.mark.parametrize(
-    ("model", "why"),
-    [
-        (lambda: drive(LuGre()), "friction law without states"),
-        (lambda: rabinowicz(Coulomb()), "friction at the velocity v alone"),
-        (lambda: replace(drive(Coulomb()), name="other", ode=ca.SX.zeros(2)), "x' = 0"),
-    ],
-)
-def test_other_models_are_refused(model: Callable[[], Model], why: str) -> None:
-    assert why in why_not_sampled(model())
-    with pytest.raises(ValueError, match="sampled motion of"):
-        sampled_motion(model(), np.arange(3.0), np.zeros(3), np.zeros(0), np.zeros(2))
-
-
 def test_a_motion_that_runs_away_is_said() -> None:
     model = drive(Viscous(1.0), m=1.0, free=["sigma_2"])
     t = np.arange(400.0)
@@ -244,9 +225,6 @@ def test_auto_takes_it_for_static_laws_alone(machine: Subject, data: Dataset) ->
     noisy = data.each(lambda r: replace(r, signals={**r.signals, "x": r["x"] + NOISE}))
     assert Shooting().prepare(machine, noisy, {}).substeps > 1
     assert Shooting(engine="simulate").prepare(machine, data, {}).substeps == 0
-    bristle = subject(Drive(Dahl(sigma_0=1e4, mu_d=2.0), m=1.5, N=1.0))
-    with pytest.raises(ValueError, match="a friction law without states"):
-        Shooting(engine="sampled").prepare(bristle, data, {})
 
 
 def test_coarse_samples_are_left_to_simulate(data: Dataset) -> None:

@@ -7,7 +7,7 @@ from fits import check_slopes, evaluated
 from identification.data.dataset import Dataset
 from identification.residuals.points import Points
 from identification.unknowns.subject import subject
-from symfric import Asymmetric, LuGre, Stribeck, law_from_text
+from symfric import Asymmetric, Stribeck, law_from_text
 from symfric.foundation.parameters import parameters
 from symfric.laws import Law
 from symfric.laws.composed.populations import steady_force
@@ -88,14 +88,6 @@ def test_channels_and_pickle() -> None:
     np.testing.assert_array_equal(evaluated(again, values).r, evaluated(rows, values).r)
 
 
-def test_what_the_data_do_not_hold_is_refused() -> None:
-    one = subject(LuGre(), points=True)
-    with pytest.raises(ValueError, match="expected records over time"):
-        Points(states="imposed").prepare(one, points(np.zeros(V.size)))
-    with pytest.raises(ValueError, match="expected a signal 'force'"):
-        Points(F="force").prepare(one, points(np.zeros(V.size)))
-
-
 def test_offset_is_an_unknown_of_its_own() -> None:
     law = Stribeck()
     F = steady_force(law, V, 1.0) - 0.3
@@ -105,11 +97,6 @@ def test_offset_is_an_unknown_of_its_own() -> None:
     values = np.append(start(law, found.names), -0.3)
     assert np.allclose(evaluated(rows, values).r, 0.0, atol=1e-12)
     check_slopes(rows, values)
-
-
-def test_offset_of_one_way_motion_is_refused() -> None:
-    with pytest.raises(ValueError, match="motion in both directions"):
-        Points(offset=True).prepare(subject("stribeck", points=True), points(V, np.abs(V)))
 
 
 def test_break_away_of_each_direction_has_its_own_level() -> None:
