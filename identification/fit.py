@@ -376,4 +376,6 @@ def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) 
     if whole is not None and seen is not None:
         with suppress(ValueError):  # without motion in the data, keep the values of the law
             found = start_values(whole, seen, free=[*values])
-    return values | {n: x for n, x in found.items() if n not in subject.started} | dict(given)
+    return (
+        values | {n: x for n, x in found.items() if n not in subject.requests.started} | dict(given)
+    )

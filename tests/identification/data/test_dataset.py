@@ -49,7 +49,6 @@ def test_records_cannot_be_changed() -> None:
 
 def test_the_controller_follows_the_samples(stage_data: Dataset) -> None:
     loop, cut = stage_data[0].loop, stage_data.between(1.0, 2.0)[0].loop
-    assert loop is not None and cut is not None
     np.testing.assert_array_equal(cut.reference, loop.reference[1000:2001])
     assert stage_data.thinned(2)[0].loop is None
     assert stage_data.resampled(0.002)[0].loop is None

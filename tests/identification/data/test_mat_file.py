@@ -92,7 +92,6 @@ def test_numpy_files(tmp_path: Path) -> None:
 
 def test_emps_files_bring_their_controller(emps_files: Dataset) -> None:
     plain, pulses = emps_files
-    assert plain.loop is not None and pulses.loop is not None
     assert (plain.size, plain.unit("x"), plain.unit("force")) == (24841, "m", "N")
     assert (plain.loop.kp, plain.loop.kv, plain.loop.limit) == (160.18, 243.45, 10.0)
     assert not plain.loop.disturbance.any() and pulses.loop.disturbance.any()

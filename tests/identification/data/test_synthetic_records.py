@@ -17,7 +17,6 @@ def test_reference_returns_and_reaches_its_speeds() -> None:
 
 def test_drive_follows_its_reference() -> None:
     record = synthetic_drive_data(speeds=(0.02, 0.05))[0]
-    assert record.loop is not None
     error = record["x"] - record.loop.reference
     assert np.abs(error).max() < 0.2 * np.ptp(record["x"])
 
@@ -70,7 +69,6 @@ def test_controller_sees_the_motion() -> None:
         speeds=(0.05,), force="command", position_noise=0.0, force_noise=0.0
     )[0]
     loop, x = record.loop, record["x"]
-    assert loop is not None
     mean = (x + np.append(0.0, x[:-1])) / 2
     rate = np.diff(mean, prepend=0.0) / record.step
     command = loop.kp * loop.kv * (loop.reference - x) - loop.kv * rate

@@ -21,7 +21,6 @@ from identification.data.units import by_channel, is_common, unit
 ])  # fmt: skip
 def test_unit_becomes_si(text: str, si: str, factor: float) -> None:
     found = unit(text)
-    assert found is not None
     assert found.si == si
     assert found.factor == pytest.approx(factor, rel=1e-14)
 

@@ -41,7 +41,6 @@ def _no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
 def run(model: Model, force: np.ndarray, p: list[float], start: list[float], **how: object):
     t = np.arange(force.size) * how.pop("step", STEP)  # type: ignore[operator]
     motion = sampled_motion(model, t, force, np.array(p), np.array(start), **how)  # type: ignore[arg-type]
-    assert not isinstance(motion, str), motion
     return motion
 
 
@@ -153,7 +152,6 @@ def test_a_pendulum_is_one_mass_too() -> None:
     model = Model("pendulum", x=(x, v), p=(wave,), ode=ode)
     t = np.linspace(0.0, 3.0, 3001)
     motion = sampled_motion(model, t, np.zeros((t.size, 0)), np.array([9.0]), np.array([1.0, 0.0]))
-    assert not isinstance(motion, str)
     exact = simulate(model, 3.0, x0={"phi": 1.0}, p={"w": 9.0}, t_eval=t, rtol=1e-10)
     assert np.abs(motion.states[:, 0] - exact["phi"]).max() < 1e-5
 

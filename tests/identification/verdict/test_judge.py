@@ -97,8 +97,6 @@ def test_profile_agrees_with_its_linear_interval_where_the_model_is_linear() -> 
     found = profile(task, point, linear, "b")
     i = linear.names.index("b")
     width = (linear.high - linear.low)[i]
-    assert found.low is not None
-    assert found.high is not None
     assert found.high - found.low == pytest.approx(width, rel=0.15)
     assert found.sentences == ()
     assert found.plot().axes
@@ -111,7 +109,6 @@ def test_profile_is_crooked_where_the_model_is() -> None:
     linear = covariance(minimum(task, point))
     found = profile(task, point, linear, "tau")
     assert found.high is None
-    assert found.low is not None
     assert "tau is open above" in found.sentences[0]
     rise = found.rise[found.values > found.best]
     assert (np.diff(rise) > -1e-6).all()
