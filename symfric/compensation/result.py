@@ -136,7 +136,10 @@ class Loop:
     ended: str = ""
     status: int = 0
 
-    __repr__ = brief
+    def __repr__(self) -> str:
+        ended = f", {self.ended}" if self.ended else ""
+        numbers = f"RMS error {self.rms:.3g}, peak {self.peak:.3g}"
+        return f"<Loop '{self.name}': {self.force.size} samples, {numbers}{ended}>"
 
     @property
     def t(self) -> Array:
