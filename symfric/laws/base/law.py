@@ -100,6 +100,10 @@ class State:
     doc: str = ""
     whole: bool = False
 
+    def __post_init__(self) -> None:
+        hint = "parameters are symbols in fits and generated code, so give a number for all values"
+        checks.number(f"state '{self.name}': nominal", self.nominal, above=0.0, hint=hint)
+
 
 @dataclass(frozen=True)
 class Input:

@@ -25,6 +25,7 @@ from symfric.laws import (
     MaxwellSlip,
     RateAndState,
     Slider,
+    State,
     StickSlip,
     Sum,
     Viscous,
@@ -230,3 +231,8 @@ def test_stick_slip_law_holds_loads_and_slips_at_its_velocity_law() -> None:
         assert np.abs(run["v"]).max() < 3e-4
     run = simulate(drive(law), 0.5, u={"force": 1.05 * level})
     assert run.final["v"] > 0.1
+
+
+def test_nominal_value_of_a_state_is_a_number() -> None:
+    with pytest.raises(ValueError, match="state 'w': nominal: expected a number > 0.*symbols in"):
+        State("w", "m/s", ca.SX.sym("v_s"))  # pyright: ignore[reportArgumentType]
