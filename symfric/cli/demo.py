@@ -25,8 +25,9 @@ PARTS = {
         "laws lugre --compare brown_mcphee --plot {out}/rabinowicz/laws.png",
     ),
     "Identification of a positioning drive": (
-        "identify {record} --validate {validation} --law {laws} --json {out}/identification/fit.json"
-        " --html {out}/identification/fit.html --plot {out}/identification/fit.png",
+        "identify {record} --validate {validation} --law {laws} "
+        "--json {out}/identification/fit.json --html {out}/identification/fit.html "
+        "--plot {out}/identification/fit.png",
     ),
     "Optimal moves of the identified drive": (
         "ocp {out}/optimal_move/moves.py:fastest --intervals {intervals} --csv "
