@@ -11,11 +11,9 @@ from symfric import (
     Coulomb,
     ExactCoulomb,
     LuGre,
-    Model,
     Recommendation,
     SolveError,
     Status,
-    Viscous,
     parameters,
     rabinowicz,
     recommended,
@@ -113,44 +111,8 @@ def test_what_the_integrator_adds_is_told_apart() -> None:
         recommended(LAW, SliderCrank(LAW, omega=1.0), 1e-7, t_end=0.5, rtol=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("law", "scene", "error", "options", "message"),
-    [
-        ("lugre", Rabinowicz, 0.1, {}, "law: expected a law such as LuGre()"),
-        (LAW, "rabinowicz", 0.1, {}, "scene: expected a scene such as Rabinowicz"),
-        (LAW, rabinowicz, 0.1, {}, "t_end: expected the end of the motion"),
-        (LAW, Rabinowicz, 0.0, {}, "error: expected a number > 0"),
-        (LAW, Rabinowicz, 2.0, {}, "error: expected a number > 0"),
-        (LAW, Rabinowicz, 0.1, {"rtol": 1.0}, "rtol: expected"),
-        (LAW, Rabinowicz, 0.1, {"exact": "coulomb"}, "exact: expected a law"),
-        (LAW, Rabinowicz, 0.1, {"of": 3}, "of: expected a sequence of names"),
-        (LAW, Rabinowicz, 0.1, {"parameter": "mu_x"}, "parameter: expected one of"),
-        (Viscous(), Rabinowicz, 0.1, {}, "is it dry already"),
-    ],
-)
-def test_bad_input_is_refused(
-    law: Law, scene: object, error: float, options: dict[str, object], message: str
-) -> None:
-    with pytest.raises(ValueError, match="recommended: ") as refused:
-        recommended(law, scene, error, **options)  # type: ignore[arg-type]
-    assert message in str(refused.value)
-
-
-def test_signals_that_are_not_there_are_named() -> None:
-    with pytest.raises(ValueError, match=r"expected one of x, v, .* got y"):
-        recommended(LAW, Rabinowicz, 0.1, of=["y"])
-
-
 def test_numbers_that_never_come_are_no_curve(monkeypatch: pytest.MonkeyPatch) -> None:
     """A block that only sticks has no cycle."""
     monkeypatch.setattr(import_module("symfric.figures.recommended"), "DRIEST", 3)
     with pytest.raises(SolveError, match="has not settled"):
         recommended(LAW, Rabinowicz(LAW), 0.1, t_end=0.5, of=last_cycle)
-
-
-def test_a_model_of_the_user_that_fails_says_so() -> None:
-    def broken(law: Law) -> Model:
-        raise ValueError(f"no model for {type(law).__name__}")
-
-    with pytest.raises(ValueError, match="no model for BrownMcPhee"):
-        recommended(LAW, broken, 0.1, t_end=1.0)

@@ -13,14 +13,11 @@ from symfric import (
     Coulomb,
     DuanSingh,
     ElastoPlastic,
-    ExactCoulomb,
     LuGre,
     MaxwellSlip,
     Specker,
-    Viscous,
     parameters,
     rabinowicz,
-    symbolise,
 )
 from symfric.figures.regularisation import distance, machine_of, regularisation, sample
 from symfric.laws import Law
@@ -66,25 +63,6 @@ def test_every_law_either_says_or_asks() -> None:
             assert any(text in str(error) for text in said)
 
 
-@pytest.mark.parametrize(
-    ("law", "parameter", "message"),
-    [
-        (ExactCoulomb(), None, "got ExactCoulomb, which rests exactly"),
-        (Viscous(), None, "expected a law with a width or a stiffness, got Viscous"),
-        (DuanSingh(), None, "smooth, one of c, sigma, got none"),
-        (BrownMcPhee(), "v_s", "expected one of mu_s, mu_d, v_t, mu_v, N_t, got v_s"),
-        (BrownMcPhee(), (), "expected the names of one or more"),
-        (symbolise(BrownMcPhee(), "v_t")[0], None, "v_t: expected a number > 0"),
-        (Coulomb(v_eps=0.0), "v_eps", "v_eps: expected a number > 0"),
-        ("lugre", None, "law: expected a law such as LuGre"),
-    ],
-)
-def test_what_cannot_be_scaled_is_refused(law: Law, parameter: str | None, message: str) -> None:
-    with pytest.raises(ValueError, match="here: ") as error:
-        regularisation("here", law, parameter)
-    assert message in str(error.value)
-
-
 def test_a_machine_is_a_scene_its_class_or_a_function() -> None:
     law = BrownMcPhee()
     for scene, t_end in ((Rabinowicz(law), None), (Rabinowicz, None), (rabinowicz, 20.0)):
@@ -92,25 +70,6 @@ def test_a_machine_is_a_scene_its_class_or_a_function() -> None:
         assert machine.model(law).name == "rabinowicz"
         assert machine.t_end == 20.0
     assert machine_of("here", Rabinowicz(law, m=2.0), 3.0, None, None, law).t_end == 3.0
-
-
-@pytest.mark.parametrize(
-    ("scene", "t_end", "message"),
-    [
-        (rabinowicz, None, "t_end: expected the end of the motion [s], got none"),
-        ("rabinowicz", 1.0, "scene: expected a scene such as Rabinowicz"),
-        (Rabinowicz, -1.0, "t_end: expected a number > 0"),
-    ],
-)
-def test_what_is_no_machine_is_refused(scene: object, t_end: float | None, message: str) -> None:
-    with pytest.raises(ValueError, match="here: ") as error:
-        machine_of("here", scene, t_end, None, None, BrownMcPhee())
-    assert message in str(error.value)
-
-
-def test_a_function_that_gives_no_model_is_refused() -> None:
-    with pytest.raises(ValueError, match="Model"):
-        machine_of("here", lambda law: law, 1.0, None, None, BrownMcPhee())
 
 
 def test_motions_are_compared_by_positions_relative_to_how_far_they_go() -> None:

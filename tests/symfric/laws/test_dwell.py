@@ -48,13 +48,6 @@ def test_break_away_grows_with_the_rest() -> None:
     assert peaks[-1] < N * 0.15
 
 
-def test_spring_holds_below_its_level() -> None:
-    pull = {"force": lambda t: ca.fmin(0.2 * t, 0.4)}
-    run = simulate(drive(Armstrong(), N=N), 5.0, u=pull, rtol=1e-8)
-    assert run.final["friction"] == pytest.approx(0.4, abs=5e-3)
-    assert abs(run.final["x"]) < 1e-5
-
-
 ROCK = {"mu_0": 0.6, "a": 0.005, "b": 0.01, "v_0": 1e-6, "D_c": 1e-5}
 
 

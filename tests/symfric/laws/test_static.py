@@ -1,21 +1,19 @@
 """Closed forms of static laws: values, peaks, slopes, limits to each other, refusals."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from math import atanh, e, exp, expm1, inf, pi, sin, sqrt, tanh
+from math import e, exp, expm1, inf, pi, sin, sqrt, tanh
 
 import casadi as ca
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from symfric import BrownMcPhee, Coulomb, Law, LuGre, SelfTuning, Stribeck, Sum, Viscous
+from symfric import BrownMcPhee, Coulomb, Law, LuGre, SelfTuning, Stribeck, Viscous
 from symfric.laws import (
     Ambrosio,
     Andersson,
     BengisuAkay,
     Benson,
-    Berger,
     Capstan,
     DuanSingh,
     Exudyn,
@@ -25,7 +23,6 @@ from symfric.laws import (
     ModifiedThrelfall,
     PoppStelter,
     PowerLawViscous,
-    QuarterCarSimple,
     RuiWang,
     SimscapeBreakaway,
     Specker,
@@ -42,50 +39,15 @@ V = np.concatenate([np.linspace(-0.1, 0.1, 41), np.geomspace(1e-7, 1.0, 60)])
 LEVELS = {"mu_s": 0.3, "mu_d": 0.2}
 BOTH = {"mu_s": 1.5, "mu_d": 1.0}
 TUNED = SelfTuning(**LEVELS, B=500.0, E=-0.4)
+STRIBECK = Stribeck(**LEVELS, v_s=2e-3, delta=1.0, v_eps=2e-4, sigma_2=0.4)
 SAME: list[tuple[Law, Law, float]] = [
-    (
-        Tustin(**LEVELS, v_s=2e-3, sigma_2=0.4),
-        Stribeck(**LEVELS, v_s=2e-3, delta=1.0, sigma_2=0.4),
-        1e-11,
-    ),
-    (Benson(**LEVELS, d_c=500.0), Tustin(**LEVELS, v_s=2e-3), 1e-11),
-    (Berger(**LEVELS, v_s=2e-3, v_t=3e-4), Tustin(**LEVELS, v_s=2e-3, v_eps=3e-4), 1e-11),
-    (
-        Andersson(**LEVELS, v_s=2e-3, p=1.5, k_t=5e3, sigma_2=0.4),
-        Stribeck(**LEVELS, v_s=2e-3, delta=1.5, v_eps=2e-4, sigma_2=0.4),
-        1e-11,
-    ),
-    (
-        DuanSingh(**LEVELS, c=500.0, sigma=5e3),
-        Andersson(**LEVELS, v_s=2e-3, p=1.0, k_t=5e3),
-        1e-11,
-    ),
-    (
-        SteadyStateLuGre(F_S=1.5, F_C=1.0, v_s=2e-3, sigma_2=0.4, delta=0.78),
-        Stribeck(**LEVELS, v_s=2e-3, delta=0.78, v_eps=1e-5, sigma_2=0.4),
-        1e-11,
-    ),
-    (
-        QuarterCarSimple(C_e=1.5, e_1=0.02, sigma_v=30.0, v_eps=1e-3),
-        Tustin(mu_s=0.3, mu_d=0.0, v_s=0.02, v_eps=1e-3, sigma_2=30.0),
-        1e-13,
-    ),
+    (Tustin(**LEVELS, v_s=2e-3, v_eps=2e-4, sigma_2=0.4), STRIBECK, 1e-11),
+    (Andersson(**LEVELS, v_s=2e-3, p=1.0, k_t=5e3, sigma_2=0.4), STRIBECK, 1e-11),
     (DuanSingh(mu_s=0.2, mu_d=0.2, sigma=1e3), Coulomb(0.2, v_eps=1e-3), 1e-14),
     (BrownMcPhee(mu_s=0.2, mu_d=0.2, v_t=4e-3), Coulomb(0.2, v_eps=1e-3), 1e-14),
-    (Threlfall(0.2, v_r=3e-3), Coulomb(0.2, v_eps=1e-3), 1e-13),
-    (ModifiedThrelfall(0.2, v_r=3e-3), Coulomb(0.2, v_eps=1e-3), 1e-13),
-    (
-        Ambrosio(0.3, v_0=0.0, v_1=2e-3, form="original"),
-        Coulomb(0.3, v_eps=2e-3, shape="saturation"),
-        1e-14,
-    ),
+    (Ambrosio(0.3, 0.0, 2e-3, "original"), Coulomb(0.3, 2e-3, "saturation"), 1e-14),
     (PowerLawViscous(0.4, d=1.0), Viscous(0.4), 0.0),
     (RuiWang(D=1.5, C=TUNED.C, B=500.0, E=-0.4), TUNED, 1e-13),
-    (
-        Stribeck(mu_s=0.2, mu_d=0.2, delta=0.3, v_eps=1e-3, sigma_2=0.4),
-        Sum((Coulomb(0.2, v_eps=1e-3), Viscous(0.4))),
-        1e-14,
-    ),
     (Capstan(0.3, beta=1e-6), Coulomb(0.3e-6), 1e-6),
 ]
 """A law, the law that it is with these numbers, and the relative rounding."""
@@ -104,61 +66,31 @@ def test_laws_are_the_limits_of_each_other() -> None:
         assert steady.force(v, 0.0) == pytest.approx(force)
 
 
-SHARP = {"v_eps": 0.0}
 VALUES: list[tuple[Law, float, float, float, float]] = [
-    *((Coulomb(0.2, v_eps=1e-3), 1e-3 * atanh(s), N, s, 1e-14) for s in (0.1, 0.5, 0.9)),
     *((Viscous(sigma_2=3.0), -0.5, load, -1.5, 0.0) for load in (0.0, 1.0, 1e3)),
     (Lorentzian(mu_s=0.3, mu_d=0.1, v_s=2e-3, v_eps=0.0), -2e-3, N, -1.0, 1e-14),
-    (Lorentzian(mu_s=0.3, mu_d=0.1, v_s=1e-3), 0.1, 1.0, 0.1 + 0.2 / 10001, 1e-14),
-    (PoppStelter(mu_s=0.3, eta=0.4, d=1e6, v_eps=0.0), 1e-12, N, 1.5, 1e-5),
     (PoppStelter(mu_s=0.3, eta=0.4, d=1e6, v_eps=0.0), 1e3, N, 0.6, 1e-8),
-    (PoppStelter(mu_s=0.3, eta=1.0, v_eps=0.0), 0.5, N, 1.5, 1e-15),
     (BrownMcPhee(**BOTH, v_t=0.02), 0.02, 1.0, 1.5 - 6.7e-4, 2e-6),
-    (BrownMcPhee(mu_s=0.3, mu_d=0.05, v_t=0.02), 0.02, 1.0, 0.3 - 6.7e-4 * 0.05, 1e-6),
     (BrownMcPhee(**BOTH, v_t=1e-3), 0.1, 1.0, 1.0 + 8e-6, 1e-8),
-    (BrownMcPhee(**BOTH, v_t=1e-3), 1.0, 1.0, 1.0 + 8e-9, 1e-11),
     (BrownMcPhee(**BOTH, v_t=1e-3, mu_v=0.4, N_t=2.0), 10.0, 0.5, 0.5 + 4 * tanh(1.0), 1e-9),
-    (BrownMcPhee(mu_v=0.4), 0.3, 0.0, 0.0, 0.0),
     (SimscapeBreakaway(**BOTH), 1e-2, 1.0, 1.0, 1e-15),
-    (Specker(**BOTH, v_sp=1e-3, v_t=5e-4), 1e-3, 2.0, 3.0, 1e-15),
     (Specker(**BOTH, v_sp=1e-3, v_t=5e-4, sigma_2=100.0), 1e-3, 2.0, 3.0, 1e-15),
     (MakkarDixon(gamma_4=2.0, gamma_6=0.3), 10.0, 1.0, 5.0, 1e-15),
     *((RuiWang(D=2.0, C=C), 1e9, 1.0, 2.0 * sin(C * pi / 2), 1e-9) for C in (0.5, 1.0, 1.7)),
-    (Threlfall(1.0, form="original"), 1e-3, 1.0, 1 - exp(-3), 1e-13),
     (Threlfall(1.0, form="original"), 1.000001e-3, 1.0, 0.95, 0.0),
-    (Threlfall(1.0, form="original"), 1e3, 1.0, 0.95, 0.0),
-    (ModifiedThrelfall(1.0, form="original"), 1e-3, 1.0, 1.0, 1e-13),
-    (ModifiedThrelfall(1.0, form="original"), -5.0, 1.0, -1.0, 1e-13),
-    *((BengisuAkay(**BOTH, form=f), 1e-3, 2.0, 3.0, 0.0) for f in ("smooth", "original")),
-    *((BengisuAkay(**BOTH, form=f), 0.02, 2.0, 2.0, 1e-7) for f in ("smooth", "original")),
-    *(
-        (VelocityBased(**BOTH, v_s=1e-3, v_d=4e-3, form=form), v, 2.0, F, 1e-14)
-        for form in ("smooth", "original")
-        for v, F in ((1e-3, 3.0), (4e-3, 2.0), (1.0, 2.0), (1e3, 2.0), (2.5e-3, 2.5))
-    ),
-    *(
-        (Ambrosio(0.3, v_0=1e-3, v_1=2e-3, form=form), v, N, F, 1e-13)
-        for form in ("smooth", "original")
-        for v, F in ((-1e-3, 0.0), (2e-4, 0.0), (1.5e-3, 0.75), (-2e-3, -1.5))
-    ),
     *((Hollars(**BOTH, u_eps=u), 1e-2, 2.0, 3 - 0.5625 * u, 1e-14) for u in (0.0, 0.1, 0.4)),
-    (Hollars(**BOTH, v_t=1e-3), 0.1, 1.0, 1.0001, 1e-7),
-    (Exudyn(**BOTH, mu_v=0.2, u_eps=0.0), 0.5, 2.0, 2.0 + 0.4 * 0.499, 1e-12),
     *(
         (Exudyn(**BOTH, u_eps=u), 1e-3, 2.0, (2 + exp(-0.1875 * u)) * (1 - 0.1875 * u), 1e-14)
         for u in (0.1, 0.4)
     ),
-    *((Step5(**BOTH, v_t=1e-3), v, 2.0, F, 1e-15) for v, F in ((1e-3, 3), (3e-3, 2), (0.5, 2))),
-    (Step5(**BOTH, v_t=1e-3, mu_v=0.2), 0.5, 2.0, 2.2, 1e-14),
     *(
         (Capstan(0.3, beta=2 * pi, v_eps=0.0), s, 50.0, 50.0 * expm1(s * 0.6 * pi), 1e-13)
         for s in (1.0, -1.0)
     ),
-    (Capstan(0.3, 1e-6, 0.0), 1.0, 1.0, expm1(3e-7), 1e-14),
     *(
         (PowerLawViscous(0.4, d=d, v_eps=1e-4), v, 1.0,
          0.4 * np.copysign(abs(v) ** d, v) * (1 + (d - 1) / 2 * (1e-4 / v) ** 2), 1e-8)
-        for d in (0.5, 1.5, 2.0, 3.0) for v in (-0.1, 1e-2)
+        for d in (0.5, 1.5, 3.0) for v in (-0.1, 1e-2)
     ),
 ]  # fmt: skip
 """Law, velocity [m/s], load [N], force [N], relative rounding."""
@@ -167,12 +99,6 @@ VALUES: list[tuple[Law, float, float, float, float]] = [
 def test_forces_at_marked_velocities_are_the_closed_forms() -> None:
     for law, v, load, F, rounding in VALUES:
         assert law.force(v, load) == pytest.approx(F, rel=rounding, abs=1e-300), (law, v)
-    v = np.array([2e-3, 3e-3, 1.1e-2])
-    fall = Benson(**BOTH, d_c=1e3, v_eps=0.0).force(v - 1e-3, 2.0)
-    assert Exudyn(**BOTH, u_eps=0.0).force(v, 2.0) == pytest.approx(fall, rel=1e-13)
-    rise = [PoppStelter(kappa=0.3).force(V, x) - PoppStelter().force(V, x) for x in (1.0, 70.0)]
-    assert rise[1] == pytest.approx(70.0 * rise[0], abs=1e-11)
-    assert abs(PoppStelter(kappa=0.3, v_eps=0.0).force(2.0, N)) > N * 0.3 * 4.0
 
 
 PEAKS: list[tuple[Law, float, float, float, float]] = [
@@ -281,33 +207,3 @@ def test_table_is_the_monotone_cubic_of_its_points_and_constant_beyond() -> None
     for knot in SPEEDS[1:]:
         sides = [slope(Table(SPEEDS, MU), knot * (1 + s)) for s in (-1e-9, 0.0, 1e-9)]
         assert sides == pytest.approx([sides[1]] * 3, abs=1e-4)
-
-
-REFUSED: list[tuple[Callable[[], Law], str]] = [
-    (lambda: Coulomb(shape="cubic"), r"Coulomb: shape: expected one of tanh, atan, .* 'cubic'"),
-    (lambda: SteadyStateLuGre(F_C=5.0), "expected F_C <= F_S, got F_C = 5 and F_S = 4.4861"),
-    (lambda: Specker(v_t=1e-3), "v_t < v_sp, got v_t = 0.001 and v_sp = 0.001"),
-    (lambda: MakkarDixon(gamma_2=10.0), "gamma_3 < gamma_2, got gamma_3 = 1000 and gamma_2 = 10"),
-    (lambda: VelocityBased(v_s=1e-3, v_d=1e-3), "v_s < v_d, got v_s = 0.001 and v_d = 0.001"),
-    (lambda: VelocityBased(v_s=1e-3, v_d=5e-4), "v_s < v_d, got v_s = 0.001 and v_d = 0.0005"),
-    (lambda: Ambrosio(v_0=2e-3), "v_0 < v_1, got v_0 = 0.002 and v_1 = 0.001"),
-    (lambda: Table((0.0, 1.0), (0.1,)), "got 2 speeds and 1 coefficients"),
-    (lambda: Table((0.0,), (0.1,)), "two or more, got 1 speeds"),
-    (
-        lambda: Table((0.0, 0.0), (0.1, 0.1)),
-        r"speeds: expected 0 <= rising numbers, got \(0.0, 0.0\)",
-    ),
-    (lambda: Table((-1.0, 1.0), (0.1, 0.1)), "speeds: expected 0 <= rising"),
-    (lambda: Table((0.0, 1.0), (0.1, -0.1)), "coefficients: expected numbers >= 0"),
-    (
-        lambda: Table((0.0, 1.0), (0.1, float("nan"))),
-        "coefficients: expected finite numbers, got nan at 1",
-    ),
-    (lambda: QuarterCarSimple(e_1=-0.01), "QuarterCarSimple: e_1: expected .* got -0.01"),
-]
-
-
-def test_numbers_that_make_no_law_are_refused() -> None:
-    for make, message in REFUSED:
-        with pytest.raises(ValueError, match=message):
-            make()

@@ -8,7 +8,7 @@ import pytest
 from oracles import StickSlip, rabinowicz_coulomb, rabinowicz_karnopp, rabinowicz_motion
 from rigs import prescribed_motion, through
 
-from symfric import Coulomb, Law, Stribeck, Sum, Viscous, drive, rabinowicz, simulate
+from symfric import Coulomb, Law, Sum, Viscous, drive, rabinowicz, simulate
 from symfric.foundation.numeric import Scalar
 from symfric.integrator import Linear
 from symfric.laws import ExactCoulomb, HaessigFriedland, Karnopp, LeineSwitch
@@ -96,22 +96,6 @@ def test_contact_without_load_or_friction_slides_from_the_start() -> None:
         assert run.final["v"] == pytest.approx((1 - np.cos(3)) / 2.4, rel=1e-7)
 
 
-def test_ramp_breaks_away_at_the_static_level() -> None:
-    run = simulate(BLOCK_MODEL, 3.0, u={"force": lambda t: 0.5 * t}, rtol=1e-9)
-    ((t, name),) = run.happened
-    assert name == "slip"
-    assert t == pytest.approx(0.15 * LOAD / 0.5, abs=1e-8)
-    rest = 3.0 - t
-    gained = ((0.15 - 0.1) * LOAD * rest + 0.25 * rest**2) / 0.8
-    assert run.final["v"] == pytest.approx(gained, rel=1e-7)
-
-
-def test_load_beyond_the_static_level_moves_from_the_start() -> None:
-    for side in (1.0, -1.0):
-        run = simulate(BLOCK_MODEL, 1.0, u={"force": side * 2.0}, rtol=1e-9)
-        assert run.final["v"] == pytest.approx(side * (2.0 - 0.1 * LOAD) / 0.8, rel=1e-8)
-
-
 def test_strong_load_turns_the_motion_around_without_stick() -> None:
     run = simulate(BLOCK_MODEL, 2.0, x0={"v": -1.0}, u={"force": 2.0}, rtol=1e-9)
     stop = 0.8 * 1.0 / (2.0 + 0.1 * LOAD)
@@ -141,13 +125,6 @@ def test_regularised_coulomb_tends_to_it() -> None:
     ]
     short = [e.max() for e in errors]
     assert short[0] > 8 * short[1] > 64 * short[2]
-
-
-def test_regularised_stiction_tends_to_its_break_away() -> None:
-    exact = simulate(rabinowicz(ExactCoulomb()), 4.0, rtol=1e-10)["x"].max()
-    narrow = (Stribeck(v_s=w, v_eps=w / 10) for w in (1e-3, 1e-4))
-    errors = [abs(simulate(rabinowicz(law), 4.0, rtol=1e-8)["x"].max() - exact) for law in narrow]
-    assert errors[0] > errors[1]
 
 
 def test_sum_with_viscous_friction_keeps_its_switches() -> None:

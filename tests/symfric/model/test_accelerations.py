@@ -8,7 +8,7 @@ from symfric.foundation.parameters import Variable
 from symfric.integrator import simulate
 from symfric.laws import Armstrong, BrownMcPhee, LuGre
 from symfric.model import Model, Output
-from symfric.scenes import ALL_SCENES, Drive, FourBar, rabinowicz
+from symfric.scenes import ALL_SCENES, FourBar, rabinowicz
 
 
 def test_scenes_have_the_accelerations_of_their_positions() -> None:
@@ -47,11 +47,6 @@ def test_a_velocity_that_a_law_keeps_has_no_acceleration() -> None:
     model = rabinowicz(Armstrong())
     assert [v.unit for v in model.x if v.name == "w"] == ["m/s"]
     assert [*model.further] == ["x_acc"]
-
-
-def test_a_turning_drive_has_an_angular_acceleration() -> None:
-    run = simulate(Drive(BrownMcPhee(), turning=True).model(), 0.1, samples=3)
-    assert run.unit("x_acc") == "rad/s^2"
 
 
 def test_accelerations_cost_nothing_until_they_are_asked_for() -> None:

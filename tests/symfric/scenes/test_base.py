@@ -1,20 +1,24 @@
 """Scenes take any law, free parameters by name, and refuse what they cannot use."""
 
+from itertools import product
 from math import inf
+from pathlib import Path
 
 import casadi as ca
-import numpy as np
 import pytest
 from law_cases import CASES
+from refusing import not_refused
 
+import symfric
+import symfric.laws
+import symfric.scenes
 from symfric import (
     ALL_LAWS,
-    BrownMcPhee,
     Coulomb,
     Law,
     LuGre,
-    Stribeck,
-    Sum,
+    LuGreNormalised,
+    Variable,
     Viscous,
     drive,
     parameters,
@@ -27,9 +31,6 @@ from symfric.scenes.rigs import ANY
 
 SINGLE = {name: kind for name, kind in ALL_SCENES.items() if name not in MECHANISMS}
 """Scenes that write their own equations; mechanisms are tested in test_mechanism.py."""
-
-each_scene = pytest.mark.parametrize("kind", SINGLE.values(), ids=SINGLE.keys())
-
 
 STATES = {
     "rabinowicz": 2,
@@ -68,56 +69,31 @@ def test_every_law_gives_a_model_of_its_size_that_starts_or_is_refused(scene: st
     assert refused
 
 
-@each_scene
-def test_every_parameter_can_be_free(kind: type[Scene]) -> None:
-    scene = kind(Sum((LuGre(), Viscous())))
-    names = list(parameters(scene))
-    model = scene.model(names)
-    assert [p.name for p in model.p] == names
-    assert {p.name: p.start for p in model.p} == {n: q.value for n, q in parameters(scene).items()}
+@pytest.mark.parametrize("kind", ALL_SCENES.values(), ids=[*ALL_SCENES])
+def test_every_parameter_can_be_free_and_costs_less_as_a_constant(kind: type[Scene]) -> None:
+    scene = kind(LuGreNormalised())
+    known = parameters(scene)
+    free, fixed = scene.model(known), scene.model()
+    assert {p.name: p.start for p in free.p} == {n: q.value for n, q in known.items()}
+    assert [p.name for p in free.p] == [*known]
+    assert free.initial_state() == pytest.approx(fixed.initial_state(), abs=1e-12)
+    costs = [model.function("signals").n_instructions() for model in (fixed, free)]
+    assert costs[0] < costs[1]
+    for law, got in ((LuGre, "the class LuGre"), ("lugre", "'lugre'"), (None, "None")):
+        with pytest.raises(ValueError, match=rf"{kind.__name__}: expected a law .* got {got}"):
+            kind(law)  # type: ignore[arg-type]
 
 
-@each_scene
-def test_constant_parameters_cost_less_than_free_ones(kind: type[Scene]) -> None:
-    scene = kind(Stribeck())
-    models = scene.model(), scene.model(parameters(scene))
-    fixed, free = (model.function("signals").n_instructions() for model in models)
-    assert fixed < free
+def test_bad_arguments_are_refused() -> None:
+    table, names = Path(__file__).with_name("refusals.toml"), {"v": Variable("v", "m/s")}
+    assert not_refused(table, symfric, symfric.laws, symfric.scenes, **names) == []
 
 
-@each_scene
-@pytest.mark.parametrize(
-    ("law", "got"), [(LuGre, "got the class LuGre"), ("lugre", "got 'lugre'"), (None, "got None")]
-)
-def test_what_is_not_a_law_is_refused(kind: type[Scene], law: object, got: str) -> None:
-    with pytest.raises(ValueError, match=rf"{kind.__name__}: expected a law such as .* {got}"):
-        kind(law)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: rabinowicz(LuGre(), mass=3.0), "got mass"),
-        (lambda: rabinowicz(LuGre(), m=-1.0), "m: expected 1e-12 <= m <= inf .kg., got -1"),
-        (lambda: rabinowicz(LuGre(), free=["mu"]), "got mu; did you mean mu_"),
-        (lambda: rabinowicz(LuGre(), free=["m", "m"]), "every name once, got m, m"),
-        (lambda: drive(Coulomb(), sigma_2=1.0), "Drive: .*got sigma_2"),
-        (lambda: drive(Coulomb(), N=float("nan")), "N: expected a finite number .N. .* got nan"),
-    ],
-)
-def test_bad_parameters_are_refused_by_name(call: object, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        call()  # type: ignore[operator]
-
-
-@each_scene
-@pytest.mark.parametrize(("law", "scale"), [(Coulomb(v_eps=2e-3), [2e-3]), (Viscous(), [])])
-def test_error_control_watches_the_sliding_velocity_on_the_scale_of_the_law(
-    kind: type[Scene], law: Coulomb | Viscous, scale: list[float]
-) -> None:
-    model = kind(law).model()  # a quarter car watches the reach of its strut, too
-    found = [m.nominal for m in model.monitors if m.nominal != ANY]
-    assert found == scale * len(model.contacts)
+def test_error_control_watches_the_sliding_velocity_on_the_scale_of_the_law() -> None:
+    for kind, law in product(SINGLE.values(), (Coulomb(v_eps=2e-3), Viscous())):
+        model = kind(law).model()  # a quarter car watches the reach of its strut, too
+        found = [m.nominal for m in model.monitors if m.nominal != ANY]
+        assert found == [2e-3] * isinstance(law, Coulomb) * len(model.contacts)
 
 
 def test_scale_of_a_free_parameter_follows_it() -> None:
@@ -133,9 +109,6 @@ def test_bristle_starts_loaded_for_the_given_start_velocity() -> None:
     assert model.initial_state()[2] == 0.0
     assert model.initial_state({"v": 0.3})[2] == pytest.approx(0.1 * 0.8 * 9.81 / 1e5)
     assert model.initial_state({"v": 0.3, "z": 2e-6})[2] == 2e-6
-
-
-def test_original_kink_starts_at_rest_too() -> None:
     assert drive(LuGre(v_eps=0.0)).initial_state() == pytest.approx([0.0, 0.0, 0.0])
 
 
@@ -145,15 +118,6 @@ def test_every_scene_owns_the_time_and_the_input_that_show_it() -> None:
         assert 0 < kind.t_end < inf, kind
     assert set(Drive.inputs) == {u.name for u in drive(Viscous()).u}
     assert float(ca.DM(ca.SX(Drive.inputs["force"].function(ca.SX(0.5))))) == 2.0
-
-
-def test_arrays_are_no_parameters_of_one_machine() -> None:
-    """They ended in `ode: expected 2 rows, got 3` or in errors of CasADi."""
-    for value in (np.array([0.2]), np.array([0.2, 0.3]), ca.MX.sym("mu"), ca.SX.sym("mu", 2)):
-        with pytest.raises(ValueError, match=r"Rabinowicz: .* one number or SX symbol .* mu_s"):
-            rabinowicz(BrownMcPhee(mu_s=value))
-        with pytest.raises(ValueError, match=r"Rabinowicz: .* for m; simulate_many"):
-            rabinowicz(BrownMcPhee(), m=value)
 
 
 def test_no_load_runs_or_is_refused_where_the_law_divides_by_it() -> None:

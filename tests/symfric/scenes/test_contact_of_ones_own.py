@@ -13,7 +13,6 @@ from symfric import (
     Model,
     Output,
     Variable,
-    Wojewoda,
     contact,
     rabinowicz,
     simulate,
@@ -65,25 +64,6 @@ def test_a_contact_that_turns_has_its_units() -> None:
     hub = contact("hub", LuGre(mu_s=1.4, mu_d=0.9), w.symbol, 1.0, rest={"w": 0.0}, turning=True)
     model = Model("hub", x=(w,), ode=-hub.force / 0.01, contacts=(hub,))
     assert [state.unit for state in model.x] == ["rad/s", "rad"]
-    with pytest.raises(ValueError, match="contact 'hub': turning: expected"):
-        contact("hub", LuGre(), w.symbol, 1.0, turning=1)  # type: ignore[arg-type]
-
-
-def test_mistakes_are_told_with_what_to_write() -> None:
-    v = Variable("v", "m/s")
-    with pytest.raises(ValueError, match=r"the class LuGre; write LuGre\(\) with parentheses"):
-        contact("a", LuGre, v.symbol, 1.0)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=r"got 'lugre'; use law_from_text\('lugre'\)"):
-        contact("a", "lugre", v.symbol, 1.0)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=r"contact 'a': v: expected an SX .* got 'v'"):
-        contact("a", LuGre(), "v", 1.0)
-    slow = Variable("w", "mm/s")
-    with pytest.raises(
-        ValueError, match=r"contact 'a': v: .* got variable 'w' \[mm/s\]; write 0.0"
-    ):
-        contact("a", LuGre(), slow, 1.0)
-    with pytest.raises(ValueError, match=r"needs dv .*as in contact\(\.\.\., dv=acc"):
-        contact("a", Wojewoda(), v.symbol, 1.0)
 
 
 def test_the_front_door_names_all_that_it_hands_out() -> None:
@@ -96,12 +76,3 @@ def test_the_front_door_names_all_that_it_hands_out() -> None:
     with pytest.raises(AttributeError) as error:
         symfric.Lugre  # noqa: B018  # pyright: ignore
     assert (error.value.name, error.value.obj) == ("Lugre", symfric)  # Python offers LuGre by these
-
-
-def test_misspelt_parameters_are_told_with_the_nearest() -> None:
-    with pytest.raises(ValueError, match=r"LuGre: expected one of mu_s, .*got mu; did you mean"):
-        LuGre(mu=0.2)  # type: ignore[call-arg]
-    with pytest.raises(ValueError, match=r"expected 1 row \(one a state\), got none"):
-        Model("a", x=(Variable("x", "m"),))
-    with pytest.raises(ValueError, match=r"write casadi.vertcat"):
-        Model("a", x=(Variable("x", "m"),), ode=[1.0])  # type: ignore[arg-type]

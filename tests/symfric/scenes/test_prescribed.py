@@ -10,12 +10,9 @@ from symfric import (
     ALL_LAWS,
     BrownMcPhee,
     Dahl,
-    ExactCoulomb,
-    Hold,
     Linear,
     LuGre,
     SteadyStateLuGre,
-    parameters,
     rate_of,
     simulate,
 )
@@ -92,27 +89,6 @@ def test_laws_of_the_laminator_give_the_printed_forces() -> None:
             assert run["friction"][-1] == pytest.approx(force, abs=2e-3), (study, law)
 
 
-@pytest.mark.parametrize(
-    ("study", "printed"),
-    [("pilot", (4.4861, 2.5498, 0.0012, 230.0, 2.0)), ("main", (4.2672, 2.6063, 0.0049, 5.0, 3.2))],
-)
-def test_numbers_of_the_laminator(study: str, printed: tuple[float, ...]) -> None:
-    """As forces in the thesis's own law, as coefficients in others."""
-    own = parameters(Prescribed.preset(f"laminator_{study}", SteadyStateLuGre()))
-    assert [own[n].value for n in ("F_S", "F_C", "v_s", "sigma_2", "delta")] == [*printed]
-    other = parameters(Prescribed.preset(f"laminator_{study}", LuGre()))
-    assert [other[n].value for n in ("mu_s", "mu_d", "v_s", "sigma_2", "delta", "N")] == [
-        *printed, 1.0,
-    ]  # fmt: skip
-
-
-def test_levels_of_lampaert() -> None:
-    found = parameters(Prescribed.preset("lampaert_table_1", ALL_LAWS["gms"]()))
-    assert [found[n].value for n in ("mu_s", "mu_d", "v_s", "delta", "C")] == [
-        1.05, 0.2, 98e-6, 0.78, 24.0,
-    ]  # fmt: skip
-
-
 def test_positions_of_a_file_become_the_motion(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -128,10 +104,3 @@ def test_positions_of_a_file_become_the_motion(
     assert "expected x or its rate v, got both" in capsys.readouterr().err
     assert main(["run", "prescribed", "--law", "exact_coulomb"]) == 2
     assert "a `Drive` does" in capsys.readouterr().err
-
-
-def test_jumps_have_no_rate() -> None:
-    with pytest.raises(ValueError, match="expected a signal without jumps, got Hold"):
-        rate_of(Hold([0.0, 1.0], [0.0, 1.0]))
-    with pytest.raises(ValueError, match="ExactCoulomb, which needs the force"):
-        Prescribed(ExactCoulomb()).model()

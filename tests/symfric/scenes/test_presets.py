@@ -105,13 +105,13 @@ def test_what_is_given_beside_a_preset_comes_after_it() -> None:
     assert (scene.hinge.mu_d, scene.m, scene.m_box) == (0.002, 30.0, 6.0)
 
 
-@pytest.mark.parametrize("amplitude", [30, 50, 70])
-def test_roads_of_the_rig(amplitude: int) -> None:
-    scene = QuarterCar.preset(f"al_zughaibi_{amplitude}_mm", ALL_LAWS["quarter_car_general"]())
-    assert [float(scene.road(t)) for t in (0.0, 3.0, 6.0, 9.0)] == pytest.approx(
-        [0.0, 0.085, 0.085 + amplitude / 1000, 0.085 - amplitude / 1000]
-    )
-    assert scene.law.static_level(0.0) == 193.8
+def test_roads_of_the_rig() -> None:
+    for amplitude in (30, 50, 70):
+        law = ALL_LAWS["quarter_car_general"]()
+        scene = QuarterCar.preset(f"al_zughaibi_{amplitude}_mm", law)
+        heights = [0.0, 0.085, 0.085 + amplitude / 1000, 0.085 - amplitude / 1000]
+        assert [float(scene.road(t)) for t in (0.0, 3.0, 6.0, 9.0)] == pytest.approx(heights)
+        assert scene.law.static_level(0.0) == 193.8
 
 
 def test_the_first_ramp_of_the_rig_is_what_the_text_says_of_it() -> None:
@@ -159,20 +159,6 @@ def test_the_period_of_stick_slip_is_that_of_dry_friction() -> None:
     period = 2 * A / v + 2 / w * (pi - atan(A * w / v))
     slides = run.t[1:][(run["v_rel"][1:] < -1e-6) & (run["v_rel"][:-1] >= -1e-6)]
     assert slides[-1] - slides[-2] == pytest.approx(period, abs=0.011)  # between two samples
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: Rabinowicz.preset("jing", LuGre()), "did you mean jing_mi_table_3"),
-        (lambda: Rabinowicz.preset("jing_mi_table_3", LuGre), "expected a law such as"),  # type: ignore[arg-type]
-        (lambda: Rabinowicz.preset(3, LuGre()), "Rabinowicz: preset: expected the name"),  # type: ignore[arg-type]
-        (lambda: PendulumBox(LuGre(), hinge="lugre"), "PendulumBox: hinge: expected a law"),  # type: ignore[arg-type]
-    ],
-)
-def test_mistakes_are_refused(call: object, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        call()  # type: ignore[operator]
 
 
 def test_command_line_takes_presets_and_laws_of_places(capsys: pytest.CaptureFixture[str]) -> None:

@@ -147,12 +147,6 @@ def test_body_rests_at_the_published_stages_as_friction_and_springs_balance(
     assert abs(at["X_b"] - stage) <= 193.8 * (1 / K_S + 1 / K_T)
 
 
-def test_without_friction_body_and_wheel_end_on_the_road() -> None:
-    scene = QuarterCar(Viscous(sigma_2=2000.0), amplitude=0.03)
-    last = simulate(scene.model(), 20.0, rtol=1e-8).final
-    assert [last["X_b"], last["X_w"]] == pytest.approx([0.055] * 2, abs=1e-9)
-
-
 @pytest.mark.parametrize("law", [QuarterCarGeneral(), LuGre(sigma_0=1e3, sigma_1=10.0)])
 def test_work_of_the_road_goes_into_springs_dampers_and_friction(law: Law) -> None:
     run = simulate(QuarterCar(law).model(), 10.0, rtol=1e-9, samples=100001)
@@ -243,11 +237,3 @@ def test_friction_lessens_the_overshoot_of_the_body() -> None:
     assert free == pytest.approx(9.5e-3, abs=1e-4)
     for law in (QuarterCarGeneral(), QuarterCarSimple()):
         assert overshoot(law) < 0.5 * free
-
-
-def test_the_first_ramp_may_be_gentler_and_the_others_come_later() -> None:
-    rig = QuarterCar(QuarterCarSimple(), t_first=2.4)
-    corners = (0.5, 2.9, 4.9, 5.9, 7.9, 8.9)
-    heights = (0.0, 0.085, 0.085, 0.135, 0.135, 0.035)
-    assert np.allclose([float(rig.road(t)) for t in corners], heights, atol=1e-12)
-    assert abs(float(rig.road(1.7)) - 0.0425) < 1e-12
