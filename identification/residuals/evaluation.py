@@ -59,17 +59,21 @@ class Residuals(Protocol):
 
         Free parameters of the model precede the own unknowns (start values, dead times).
         """
+        ...
 
     @property
     def own(self) -> tuple[Unknown, ...]:
         """Unknowns of the data set, such as the start values of each record."""
+        ...
 
     @property
     def channels(self) -> Sequence[Channel]:
         """Channels that together cover all rows."""
+        ...
 
     def at(self, values: Array) -> Evaluation | str:
         """Return the residuals at `values`, or a message if they cannot be evaluated."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +103,7 @@ class Blocks:
             p: values of the parameters.
             own: values of the own unknowns.
         """
+        ...
 
     def at(self, values: Array) -> Evaluation | str:
         """Return residuals and derivatives, or a message if they cannot be evaluated."""

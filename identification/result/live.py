@@ -24,6 +24,7 @@ class Kind(Protocol):
 
     def prepare(self, subject: Subject, data: Dataset, start: Mapping[str, float]) -> Residuals:
         """Return the residuals of `subject` on `data`; start values are estimated near `start`."""
+        ...
 
 
 class Question(Protocol):
@@ -31,6 +32,7 @@ class Question(Protocol):
 
     def live(self, noise: dict[str, float], w: Array) -> "Live":
         """Return the problem with its end at the coordinates `w`."""
+        ...
 
 
 @final

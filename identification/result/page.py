@@ -120,6 +120,7 @@ class Ranking(Protocol):
 
     def to_dict(self) -> dict[str, Any]:
         """Return a dictionary with "rows", a list with a dictionary of results for each law."""
+        ...
 
 
 def page_of(fit: Outcome, ranking: Ranking | None = None) -> str:

@@ -32,6 +32,7 @@ class Motion(Protocol):
 
     def __getitem__(self, name: str, /) -> Any:
         """Return all values of a signal over time."""
+        ...
 
 
 def informative(
