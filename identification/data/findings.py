@@ -183,9 +183,9 @@ class View:
         names = {"signal": signal, "x": self.name("x"), "force": self.name("force")}
         values |= {"unit": self.record.units.get(signal, ""), "at": self.at(samples[0])}
         sentence = texts()["sentences"][case or kind].format(**names, **values)
-        ends = map(float, samples if self.record.t is None else self.record.t[[*samples]])
+        start, stop = samples if self.record.t is None else self.record.t[[*samples]]
         severity = "error" if serious else "warning"
-        return Finding(kind, self.number, signal, sentence, *ends, severity)
+        return Finding(kind, self.number, signal, sentence, float(start), float(stop), severity)
 
     error = partialmethod(finding, True)
     warning = partialmethod(finding, False)

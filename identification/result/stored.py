@@ -199,14 +199,14 @@ def read(kind: type[Outcome], path: str | Path, own: Mapping[str, type[Parametri
 
 def _made(kind: type[Outcome], data: dict[str, Any], own: Mapping[str, type[Parametric]] | None):
     hints = storable.hints_of(kind)
-    values = {
+    values: dict[str, Any] = {
         f.name: revived(hints[f.name], data[f.name]) for f in fields(kind) if f.name not in APART
     }
-    parts = {name: data[key] for name, key in (("law", "law_data"), ("machine", "machine"))}
-    laws = {
-        n: from_data(part, own) if known(part, own or {}) else None for n, part in parts.items()
-    }
-    made = kind(**values, **laws)
+    law, machine = (
+        from_data(data[key], own) if known(data[key], own or {}) else None
+        for key in ("law_data", "machine")
+    )
+    made = kind(**values, law=law, machine=machine)
     for name, value in values.items():
         if not storable.fits(value, hints[name]):
             raise ValueError(f"{name} of another type")
