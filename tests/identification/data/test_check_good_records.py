@@ -51,11 +51,9 @@ def test_pendulum_of_others(shared_data: Path) -> None:
     silent(data, "irregular", "excitation", "clipping", "delay")
 
 
-@pytest.mark.parametrize(
-    "law", ["coulomb+viscous", "asymmetric(coulomb+viscous)", "viscous", "makkar_dixon"]
-)
+@pytest.mark.parametrize("law", ["asymmetric(coulomb+viscous)", "viscous", "makkar_dixon"])
 def test_laws(law: str) -> None:
-    silent(synthetic_drive_data(law_from_text(law), normal_force=20.0, speeds=(0.004, 0.02, 0.08)))
+    silent(synthetic_drive_data(law_from_text(law), normal_force=20.0, speeds=(0.01, 0.08)))
 
 
 @pytest.mark.slow
