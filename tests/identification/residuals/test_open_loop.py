@@ -46,9 +46,8 @@ def run(model: Model, force: np.ndarray, p: list[float], start: list[float], **h
 
 
 LAW = Sum((Stribeck(mu_s=3.0, mu_d=2.0, v_s=0.05, v_eps=1e-5), Viscous(1.0)))
-FORCE = 5 * np.sin(2 * np.pi * STEP * np.arange(2001)) + 2 * np.sin(
-    4.6 * np.pi * STEP * np.arange(2001)
-)
+TIMES = STEP * np.arange(2001)
+FORCE = 5 * np.sin(2 * np.pi * TIMES) + 2 * np.sin(4.6 * np.pi * TIMES)
 """A drive that slides both ways, stops, is held and breaks away; two seconds."""
 
 
