@@ -9,7 +9,7 @@ Source: Burman, Chow and Nolan, Biometrika 81(2), 1994 (blocks with gaps).
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
@@ -52,9 +52,7 @@ class Left:
     __repr__ = brief
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class CrossValidation:
+class CrossValidation(NamedTuple):
     """Prediction errors on the data that were left out of the fits.
 
     Attributes:

@@ -15,8 +15,7 @@ Source: A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, se
 Olsson, Control Systems with Friction, PhD thesis, Lund 1996.
 """
 
-from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,9 +34,7 @@ LEAST = 4
 """Least number of speeds in one direction for a curve."""
 
 
-@final
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """Step of the procedure with number, meaning, number of points used, and values."""
 
     number: int
@@ -50,9 +47,7 @@ class Step:
         return f"{self.number}  {self.what:<44} {self.points:4d} points   {shown}"
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class SixSteps:
+class SixSteps(NamedTuple):
     """Result of the six-step procedure.
 
     Attributes:
