@@ -38,13 +38,6 @@ def test_acceleration_falls_short_by_a_twelfth_of_the_square() -> None:
     assert 1 - size == pytest.approx(0.2**2 / 12, rel=0.1)
 
 
-def test_measured_velocity_is_used() -> None:
-    x: NDArray[np.float64] = WAVE["x"] + 1e-3 * np.random.default_rng(0).standard_normal(T.size)
-    found = differentiate(record(x=x, v=W * np.cos(W * T), force=WAVE["force"]), Filter(100.0, 5))
-    np.testing.assert_allclose(found.v, W * np.cos(W * found.t), atol=1e-3)
-    np.testing.assert_allclose(found.a, -(W**2) * np.sin(W * found.t), atol=1e-2)
-
-
 def test_equations_that_touch_slow_samples_are_left_out() -> None:
     kept = differentiate(WAVE, Filter(100.0, 5, v_min=0.5))
     every = differentiate(WAVE, Filter(100.0, 5, v_min=0.0))

@@ -52,12 +52,12 @@ def test_decimation_removes_what_would_alias() -> None:
     assert np.abs(D(np.sin(2 * np.pi * 20.3 * t))).max() == pytest.approx(1.0, abs=2e-2)
 
 
-@pytest.mark.parametrize(("samples", "factor"), [(500, 7), (400, 1), (100, 10)])
-def test_decimation_of_columns_is_that_of_each(samples: int, factor: int) -> None:
-    D = Decimation(samples, factor)
-    signals = np.random.default_rng(1).standard_normal((samples, 3))
-    expected = np.column_stack([D(column) for column in signals.T])
-    np.testing.assert_allclose(D.columns(signals), expected, atol=1e-14)
+def test_decimation_of_columns_is_that_of_each() -> None:
+    for samples, factor in ((500, 7), (400, 1), (100, 10)):
+        D = Decimation(samples, factor)
+        signals = np.random.default_rng(1).standard_normal((samples, 3))
+        expected = np.column_stack([D(column) for column in signals.T])
+        np.testing.assert_allclose(D.columns(signals), expected, atol=1e-14)
 
 
 def test_rows_that_touch_a_sample_are_those_it_changes() -> None:

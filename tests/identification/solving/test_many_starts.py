@@ -257,12 +257,10 @@ def test_a_worker_that_dies_is_said() -> None:
 
 
 def test_white_residuals_end_the_starts_and_wrong_models_go_on() -> None:
-    at = problem(decay())
-    assert len(many_starts(at, starts(at))) == 1
-    wrong = decay()
-    wrong.y += 0.1 * np.sin(wrong.t)
-    at = problem(wrong)
-    assert len(many_starts(at, starts(at))) == 3
+    for wave, count in ((0.0, 1), (0.1, 3)):
+        data = decay()
+        data.y += wave * np.sin(data.t)
+        assert len(many_starts(problem(data), starts(problem(data)))) == count
 
 
 def test_residuals_that_exist_only_at_the_start_end_there(recwarn: pytest.WarningsRecorder) -> None:
@@ -303,10 +301,7 @@ def test_a_value_that_drifts_off_ends_at_a_number_one_can_read() -> None:
 
 def test_noise_levels_count_what_the_fit_has_taken() -> None:
     """Nine samples and three unknowns: without it the mean variance would be two thirds."""
-    found = list[float]()
-    for seed in range(40):
-        at = problem(decay(seed, n=9))
-        found.append(down(at).noise["y"])
+    found = [down(problem(decay(seed, n=9))).noise["y"] for seed in range(60)]
     assert np.mean(np.square(found)) == pytest.approx(1e-4, rel=0.15)
 
 

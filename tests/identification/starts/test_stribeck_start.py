@@ -25,8 +25,9 @@ def mm_min(first: int) -> np.ndarray:
 def test_curve_is_recovered_from_its_own_points() -> None:
     v = mm_min(10)
     found = fit_curve(binned(v, PILOT.force(v)))
-    got = (found.F_S, found.F_C, found.v_s, found.delta, found.sigma_2)
-    assert np.allclose(got, (4.4861, 2.5498, 0.0012, 2.0, 230.0), rtol=1e-4)
+    assert found[:5] == pytest.approx(PILOT[:5], rel=1e-4)
+    rising = fit_curve(binned(v, 2.0 + 100 * v))
+    assert rising.F_S >= rising.F_C > 0 and rising.sigma_2 == pytest.approx(100, abs=1)
 
 
 def test_spikes_and_direction_do_not_move_the_levels() -> None:
@@ -38,13 +39,6 @@ def test_spikes_and_direction_do_not_move_the_levels() -> None:
     assert abs(found.offset - 0.3) < 0.01
     assert abs(found.F_C / PILOT.F_C - 1) < 0.02
     assert abs(found.v_s / PILOT.v_s - 1) < 0.05
-
-
-def test_levels_are_ordered_even_where_the_curve_rises() -> None:
-    v = mm_min(10)
-    found = fit_curve(binned(v, 2.0 + 100 * v))
-    assert found.F_S >= found.F_C > 0
-    assert abs(found.sigma_2 - 100) < 1
 
 
 def study(curve: StribeckCurve, first: int) -> SixSteps:
