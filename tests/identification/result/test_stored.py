@@ -161,6 +161,6 @@ def test_arrays_models_and_functions_are_written_in_short() -> None:
     kind = Shooting(inputs={"force": sf.Linear(np.arange(50.0), np.zeros(50))})
     assert written(kind) == "Shooting(inputs={'force': Linear(..., ...)})"
     whole = written(Fit(InverseDynamics(), sf.rabinowicz(LuGre()), DATA))
-    assert whole.startswith("Fit(InverseDynamics(), sf.rabinowicz, data")
+    assert whole.startswith("Fit(InverseDynamics(), rabinowicz, data")
     assert "tied(<lambda>)" in written({"m": tied(lambda p: p["a"])})
     assert eval(written(LuGre(sigma_0=3e4)), {"LuGre": LuGre}).sigma_0 == 3e4
