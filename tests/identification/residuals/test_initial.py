@@ -29,7 +29,7 @@ def test_a_cubic_is_met_exactly(k: int) -> None:
 def test_errors_are_as_large_as_they_say(k: int) -> None:
     noise, rng = 1e-3, np.random.default_rng(0)
     errors = list[float]()
-    for _ in range(100):
+    for _ in range(200):
         y = np.sin(2 * T) + noise * rng.standard_normal(T.size)
         found = local(T, y, k, noise)
         errors.append((found.rate - 2 * np.cos(2 * T[k])) / found.rate_error)
