@@ -126,10 +126,6 @@ class Commands(TyperGroup):
         known: dict[str, Any] = dict.fromkeys(COMMANDS)
         self.commands = known
 
-    def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of the commands in the order of the help."""
-        return [*COMMANDS]
-
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of this name, or None if there is none."""
         if cmd_name not in COMMANDS:

@@ -12,7 +12,7 @@ import typer
 from symfric import Law, any_from_text, law_from_text, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
-from symfric.cli.machines import formed, forms, kind_of
+from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
     Block,
@@ -283,22 +283,20 @@ def machine_of(
     Raises:
         ValueError: coefficients that are forces in a scene with a load, or unknown names.
     """
-    own = kind is Drive and chosen.drive is not None
-    if own and chosen.drive is not None:
-        machine: Scene = chosen.drive
-    else:  # `law_from_text` refuses a population
-        machine = kind(chosen.law if isinstance(chosen.law, Law) else law_from_text(chosen.text))
-    machine = formed(machine, texts)
-    check_names(f"--set of {scene}", texts, [*parameters(machine), *forms(machine)])
-    values = opt.numbers("--set", {n: t for n, t in texts.items() if n not in forms(machine)})
-    if chosen.forces and not own and values.get("N") != 1.0:
+    own = chosen.drive if kind is Drive else None
+    # `law_from_text` refuses a population
+    law = chosen.law if isinstance(chosen.law, Law) else law_from_text(chosen.text)
+    machine = own or kind(law)
+    check_names(f"--set of {scene}", texts, settable(machine, texts))
+    machine = with_set(machine, texts)
+    if chosen.forces and own is None and float(texts.get("N", 0)) != 1.0:
         names = ", ".join(chosen.forces)
         hint = "--set N=1" if "N" in parameters(machine) else "fit it with --normal-force"
         raise ValueError(
             f"codegen: --scene {scene}: expected coefficients of friction, got forces {names}, "
             f"fitted under a load of 1 N; {hint}"
         )
-    return with_values(machine, values)
+    return machine
 
 
 def compensated(law: AnyLaw, drive: Drive | None, texts: Sequence[str], **how: Any) -> Block:

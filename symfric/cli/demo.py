@@ -83,10 +83,10 @@ def records(folder: Path, data: Path | None) -> dict[str, str]:
     """Return the files for identification and validation, and the laws to identify from them."""
     stage = data or (STAGE if STAGE.is_dir() else None)
     if stage is not None:
-        output.note(f"identification from the measured EMPS stage in {stage}")
         laws = "coulomb+viscous,asymmetric(coulomb+viscous)"
         files = stage / "DATA_EMPS.mat", stage / "DATA_EMPS_PULSES.mat"
         files[0].stat()  # a missing folder is an error now, not after the first part
+        output.note(f"identification from the measured EMPS stage in {stage}")
     else:
         output.note("no measured record found (--data DIR for the EMPS benchmark), simulating one")
         laws, files = "stribeck", (folder / "record.csv", folder / "validation.csv")
