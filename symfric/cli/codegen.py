@@ -12,6 +12,7 @@ import typer
 from symfric import Law, any_from_text, law_from_text, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
+from symfric.cli.app import TEXTS
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
@@ -43,18 +44,7 @@ COMPENSATION = [item.name for item in fields(Compensation)]
 LAW, FUNCTION, POPULATION = "a law", "a law without states", "a population"
 PLANT, INVERSE, COMPENSATOR = "--scene", "--inverse-dynamics", "--compensator"
 
-APPLIES = {
-    "--step-size": (LAW, POPULATION, PLANT, INVERSE, COMPENSATOR),
-    "--method": (PLANT,),
-    "--free": (LAW, FUNCTION, PLANT),
-    "--fold": (LAW, FUNCTION, PLANT, INVERSE, COMPENSATOR),
-    "--turning": (LAW, FUNCTION, COMPENSATOR),
-    "--payload": (INVERSE,),
-    "--tunable-gravity": (INVERSE,),
-    "--compensation": (COMPENSATOR,),
-    "--preset": (PLANT,),
-    "--law-of": (PLANT,),
-}
+APPLIES: dict[str, list[str]] = TEXTS["applies"]
 """Option that applies only to some subjects -> these subjects."""
 
 WHY = {
@@ -78,11 +68,6 @@ class Chosen(NamedTuple):
     law: AnyLaw
     drive: Drive | None = None
     forces: tuple[str, ...] = ()
-
-    @property
-    def turning(self) -> bool:
-        """True if the law was fitted to a rotating axis."""
-        return self.drive is not None and self.drive.turning
 
 
 def codegen(
@@ -160,7 +145,7 @@ def codegen(
             made = compensated(made, chosen.drive, compensation or (), turning=turning, **own)
         else:
             options = own
-            if turning or chosen.turning:
+            if turning or (chosen.drive is not None and chosen.drive.turning):
                 options["turning"] = True
     generated = generate(made, out, real=REALS[kind], guards=guards, kit=kit, **options)
     verification = verify(generated, compiler=compiler, adjustable=adjustable)

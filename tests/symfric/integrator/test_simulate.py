@@ -88,7 +88,8 @@ def test_no_step_is_longer_than_allowed_and_one_ends_at_each_time(backend: str) 
 DRIVEN: dict[str, tuple[Any, list[tuple[float, float, float]]]] = {
     "number": (3.0, [(0.0, 3.0, 0.0)]),
     "held": (
-        Hold([0.0, 0.3, 1.1], [1.0, -2.0, 4.0]), [(0.0, 1.0, 0.0), (0.3, -2.0, 0.0), (1.1, 4.0, 0.0)]
+        Hold([0.0, 0.3, 1.1], [1.0, -2.0, 4.0]),
+        [(0.0, 1.0, 0.0), (0.3, -2.0, 0.0), (1.1, 4.0, 0.0)],
     ),
     "linear": (
         Linear([0.0, 0.5, 1.0], [0.0, 2.0, -1.0]),
