@@ -2,7 +2,6 @@
 
 import casadi as ca
 import numpy as np
-import pytest
 
 from symfric.foundation.parameters import Variable
 from symfric.integrator import simulate
@@ -70,14 +69,3 @@ def test_only_rates_that_are_states_have_accelerations_and_names_are_not_taken_t
     assert implicit.further == {}
     volts = Model("volts", x=(w, x), ode=ca.vertcat(x.symbol, w.symbol))
     assert {n: o.unit for n, o in volts.further.items()} == {"w_acc": "m/s", "x_acc": "V/s"}
-
-
-@pytest.mark.slow
-def test_accelerations_of_a_loop_are_known_in_absolute_coordinates() -> None:
-    model = FourBar(BrownMcPhee()).mechanism().build(formulation="absolute")
-    run = simulate(model, 0.02, rtol=1e-9, samples=5)
-    name = "crank_rod_x_acc"
-    t, h = np.linspace(0.004, 0.016, 7), 1e-6
-    rate = name.replace("_acc", "_rate")
-    slope = (run.at(t + h)[rate] - run.at(t - h)[rate]) / (2 * h)
-    np.testing.assert_allclose(run.of(model.expression(name), t), slope, rtol=1e-4)

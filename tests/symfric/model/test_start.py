@@ -42,21 +42,6 @@ def test_a_fault_without_mass_comes_to_creep_where_the_rock_is_stiff() -> None:
     assert end["load"] == pytest.approx(mu * STRESS, rel=1e-3)
 
 
-def test_a_bristle_starts_by_the_start_value_of_an_algebraic_load() -> None:
-    v, N = Variable("v", "m/s", start=1.0), Variable("N", "N", start=12.0)
-    shoe = contact("shoe", LuGre(mu_s=0.5, mu_d=0.4), v.symbol, N.symbol, least=1.0)
-    brake = Model(
-        "brake",
-        x=(v,),
-        z=(N,),
-        ode=-shoe.force,
-        alg=N.symbol - (10.0 + 0.1 * ca.tanh(v.symbol)),
-        contacts=(shoe,),
-    )
-    law = LuGre(mu_s=0.5, mu_d=0.4)
-    assert brake.initial_state()[1] == pytest.approx(law.steady_state(1.0, 12.0).item())
-
-
 def under_varying_load(law: LuGre) -> Model:
     x, v, t = Variable("x", "m"), Variable("v", "m/s", start=0.3), ca.SX.sym("t")
     floor = contact("floor", law, v, 5 + ca.sin(t))
