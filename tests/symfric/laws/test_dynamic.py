@@ -27,6 +27,7 @@ from symfric.laws import (
     MaxwellSlip,
     RateAndState,
     Slider,
+    State,
     StickSlip,
 )
 from symfric.scenes import FourMass, Pendulum, PendulumBox
@@ -185,14 +186,18 @@ def test_stick_slip_law_holds_loads_and_slips_at_its_velocity_law() -> None:
     assert run.final["v"] > 0.1
 
 
+def test_nominal_value_of_a_state_is_a_number() -> None:
+    with pytest.raises(
+        ValueError, match="expected a number > 0, got the expression v_s; parameters are symbols"
+    ):
+        State("w", "m/s", ca.SX.sym("v_s"))  # pyright: ignore[reportArgumentType]
+
+
 LOAD = 8.0
 
 
 def test_dwell_follows_its_closed_form() -> None:
-    model, t = (
-        prescribed_motion(Armstrong(), LOAD, lambda t: ca.SX(0.0)),
-        np.array([0.05, 0.2, 1.0]),
-    )
+    model, t = prescribed_motion(Armstrong(), N, lambda t: ca.SX(0.0)), np.array([0.05, 0.2, 1.0])
     run = simulate(model, 1.0, x0={"q": 0.0}, rtol=1e-10, t_eval=t)
     assert run["q"] == pytest.approx(t / (t + 0.2), rel=1e-7)
 

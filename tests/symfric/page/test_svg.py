@@ -16,6 +16,7 @@ from symfric.page.svg import (
     Axis,
     Band,
     Dots,
+    Frame,
     Level,
     Path,
     Stems,
@@ -52,7 +53,7 @@ def test_points_stand_where_their_numbers_say() -> None:
 def test_a_missing_number_parts_a_line() -> None:
     y = np.array([0.0, 1.0, np.nan, 1.0, 0.0, np.nan, np.nan])
     line = Path("line", np.arange(7.0), y)
-    drawn = line.draw(Axis("x", "", 0.0, 6.0), Axis("y", "", 0.0, 1.0), 60.0, 10.0)
+    drawn = line.draw(Frame(Axis("x", "", 0.0, 6.0), Axis("y", "", 0.0, 1.0), 60.0, 10.0))
     assert findall(r'points="([^"]*)"', drawn) == ["0,10 10,0", "30,0 40,10"]
 
 
@@ -116,8 +117,8 @@ def test_every_chart_is_xml_with_a_title_and_a_description() -> None:
 
 def test_points_that_fall_together_are_left_out() -> None:
     x = np.linspace(0, 1, 100_000)
-    line = Path("a", x, np.zeros(x.size)).draw(Axis("x", "", 0, 1), Axis("y", "", -1, 1), 600, 200)
-    dots = Dots("a", x, np.zeros(x.size)).draw(Axis("x", "", 0, 1), Axis("y", "", -1, 1), 600, 200)
+    frame = Frame(Axis("x", "", 0, 1), Axis("y", "", -1, 1), 600, 200)
+    line, dots = (kind("a", x, np.zeros(x.size)).draw(frame) for kind in (Path, Dots))
     assert len(line) < 80_000
     assert dots.count("M") <= 6001
 
