@@ -34,7 +34,7 @@ def needed(where: str, given: object) -> tuple[str, ...]:
     words: dict[str, str] = {}
     for text in checks.names(where, given):
         plain = text.strip().lower().replace("_", "-").replace(" ", "-")
-        words[text] = of_code.get(text.strip(), WORDS["aliases"].get(plain, plain))
+        words[text] = of_code.get(text.strip()) or str(WORDS["aliases"].get(plain, plain))
     if unknown := [text for text, word in words.items() if word not in NEEDS]:
         raise ValueError(f"{where}: expected some of {', '.join(NEEDS)}, got {', '.join(unknown)}")
     return tuple(word for word in NEEDS if word in words.values())

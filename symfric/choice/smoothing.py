@@ -35,7 +35,7 @@ NEGLIGIBLE = 1e-7
 """Limit below which a width of a static law only rounds an absolute value."""
 RELATIVE = ("u_eps",)
 """Widths that are relative to another width."""
-LEVEL_LIKE = {LeineSwitch: ("delta", "c"), RateAndState: ("v_0",)}
+LEVEL_LIKE: dict[type[Law], tuple[str, ...]] = {LeineSwitch: ("delta", "c"), RateAndState: ("v_0",)}
 """Parameters that determine the level of friction and are not widths, by law."""
 OF_BRISTLES = 0.45, 0.5
 """Powers p of the velocities of laws with states, in the order in which they are tried."""

@@ -94,7 +94,9 @@ def law_name(law: AnyLaw) -> str:
         check_law("law_name", law)
     if isinstance(law, Sum):
         return "+".join(law_name(term) for term in law.laws)
-    known = {kind: name for name, kind in (ALL_LAWS | POPULATIONS | WRAPPERS).items()}
+    known: dict[type, str] = {
+        kind: name for name, kind in (ALL_LAWS | POPULATIONS | WRAPPERS).items()
+    }
     name = known.get(type(law), type(law).__name__)
     return f"{name}({law_name(law.inner)})" if isinstance(law, Wrapping) else name
 

@@ -137,7 +137,8 @@ class System:
         t: float = 0.0,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
         """Return the derivatives of `initial_state` by p (nx, n_p) and by values in `given`."""
-        return evaluate_all(self._start_slopes, *self._start_arguments(given, p, t))
+        by_p, by_start = evaluate_all(self._start_slopes, *self._start_arguments(given, p, t))
+        return by_p, by_start
 
     def _start_arguments(
         self, given: Mapping[str, float] | None, p: Mapping[str, float] | None, t: float

@@ -10,7 +10,7 @@ from symfric.scenes.base import Scene
 if TYPE_CHECKING:
     from symfric.scenes.linkages import MechanismScene
 
-S = TypeVar("S", bound=Scene, covariant=True)
+S = TypeVar("S", bound=Scene)
 
 
 @final
