@@ -305,7 +305,7 @@ def test_a_step_that_is_too_long_is_found_with_a_shorter_one(compiler, tmp_path)
     for below in (4e-3, 0.02, 0.01):
         assert longest_step(decay(), np.zeros((200, 0)), below) == 2e-3
     growing = plant_block(Model("grow", x=(X,), ode=2e3 * X.symbol))
-    for block, steps in ((growing, 5000), (decay(1e-3), 200)):
+    for block, steps in ((growing, 20_000), (decay(1e-3), 200)):
         assert longest_step(block, np.zeros((steps, 0)), 1e-3) is None
     made = generate(decay(4e-3), tmp_path, real="double", kit=False)
     found = verify(made, adjustable=decay)
