@@ -10,22 +10,7 @@ from differentiable import pendulum
 from numpy.typing import NDArray
 from stored import stored
 
-from symfric import (
-    GMS,
-    BrownMcPhee,
-    ExactCoulomb,
-    Hold,
-    Karnopp,
-    LeineSwitch,
-    Linear,
-    MaxwellSlip,
-    Model,
-    Trajectory,
-    Variable,
-    drive,
-    rabinowicz,
-    simulate,
-)
+import symfric as sf
 from symfric.integrator.derivatives import saltation as module
 from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.path import seeds
@@ -38,12 +23,14 @@ from symfric.scenes import PendulumBox
 Array = NDArray[np.float64]
 
 
-def ball() -> Model:
+def ball() -> sf.Model:
     """Dropped from height h; it bounces with the restitution e."""
-    h, v = Variable("h", "m", start=1.0), Variable("v", "m/s")
-    g, e = Variable("g", "m/s^2", start=9.81), Variable("e", "1", start=0.8)
+    h, v = sf.Variable("h", "m", start=1.0), sf.Variable("v", "m/s")
+    g, e = sf.Variable("g", "m/s^2", start=9.81), sf.Variable("e", "1", start=0.8)
     bounce = Event("bounce", h.symbol, direction=-1, reset={"v": -e.symbol * v.symbol})
-    return Model("ball", x=(h, v), p=(g, e), ode=ca.vertcat(v.symbol, -g.symbol), events=(bounce,))
+    return sf.Model(
+        "ball", x=(h, v), p=(g, e), ode=ca.vertcat(v.symbol, -g.symbol), events=(bounce,)
+    )
 
 
 def bounced(t: Array, h: complex, g: complex, e: complex) -> tuple[Array, Array, Array]:
@@ -66,7 +53,7 @@ def test_bouncing_ball_meets_its_closed_form(backend: str) -> None:
     """Before and behind each bounce, states and times of events, forwards and backwards."""
     at = {"x0.h": 1.0, "g": 9.81, "e": 0.8}
     times = np.array([0.0, 0.2, 0.4515, 0.4516, 0.7, 1.0, 1.1739, 1.174, 1.5])
-    run = simulate(ball(), 1.5, t_eval=times, backend=backend, sensitivities=[*at])
+    run = sf.simulate(ball(), 1.5, t_eval=times, backend=backend, sensitivities=[*at])
     assert [name for _, name in run.happened] == ["bounce"] * 2
     weights = {"h": np.arange(9.0), "v": np.ones(9)}
     gradient = run.gradient(weights)
@@ -87,8 +74,8 @@ def test_stick_and_slip_on_a_belt_meet_their_closed_form() -> None:
     """
     at = {"mu_s": 0.15, "mu_d": 0.1, "k": 2.1, "x0.v": 0.1}
     times = np.array([5.0, 5.59, 5.7, 6.3])
-    run = simulate(
-        rabinowicz(ExactCoulomb(), free=["mu_s", "mu_d", "k"]), 6.5, x0={"v": 0.1, "mode": 0.0},
+    run = sf.simulate(
+        sf.rabinowicz(sf.ExactCoulomb(), free=["mu_s", "mu_d", "k"]), 6.5, x0={"v": 0.1, "mode": 0.0},
         t_eval=times, sensitivities=[*at],
     )  # fmt: skip
     weight, m = 0.8 * 9.81, 0.8
@@ -106,21 +93,21 @@ def test_stick_and_slip_on_a_belt_meet_their_closed_form() -> None:
 GRID = np.linspace(0.0, 4.0, 41)
 WAVE = 2.2 * np.sin(np.pi * GRID)
 CASES = {
-    "exact_box": (PendulumBox(ExactCoulomb()).model(["mu_d"]), 2.0, None),
-    "karnopp_belt": (rabinowicz(Karnopp(form="event"), free=["mu_d", "m"]), 20.0, None),
-    "leine_belt": (rabinowicz(LeineSwitch(form="event"), free=["mu_s", "k"]), 20.0, None),
-    "exact_drive": (drive(ExactCoulomb(), free=["m", "N"]), 4.0, Linear(GRID, WAVE)),
-    "gms_drive": (drive(GMS(form="event"), free=["m", "N"]), 4.0, lambda t: 2 * ca.sin(ca.pi * t)),
-    "maxwell_drive": (drive(MaxwellSlip(form="event"), free=["m", "N"]), 4.0, Hold(GRID, WAVE)),
+    "exact_box": (PendulumBox(sf.ExactCoulomb()).model(["mu_d"]), 2.0, None),
+    "karnopp_belt": (sf.rabinowicz(sf.Karnopp(form="event"), free=["mu_d", "m"]), 20.0, None),
+    "leine_belt": (sf.rabinowicz(sf.LeineSwitch(form="event"), free=["mu_s", "k"]), 20.0, None),
+    "exact_drive": (sf.drive(sf.ExactCoulomb(), free=["m", "N"]), 4.0, sf.Linear(GRID, WAVE)),
+    "gms_drive": (sf.drive(sf.GMS(form="event"), free=["m", "N"]), 4.0, lambda t: 2 * ca.sin(ca.pi * t)),
+    "maxwell_drive": (sf.drive(sf.MaxwellSlip(form="event"), free=["m", "N"]), 4.0, sf.Hold(GRID, WAVE)),
 }  # fmt: skip
 
 
-def run_of(case: str, p: Mapping[str, float], **how: object) -> Trajectory:
+def run_of(case: str, p: Mapping[str, float], **how: object) -> sf.Trajectory:
     model, t_end, force = CASES[case]
     u = None if force is None else {"force": force}
     x0 = {"v": 0.02} if case.endswith("belt") else None
     at = np.linspace(0.0, t_end, 15)[1:]
-    return simulate(model, t_end, x0=x0, u=u, p=p, t_eval=at, **how)  # pyright: ignore[reportArgumentType]
+    return sf.simulate(model, t_end, x0=x0, u=u, p=p, t_eval=at, **how)  # pyright: ignore[reportArgumentType]
 
 
 def signals(case: str) -> list[str]:
@@ -169,7 +156,7 @@ def test_many_events_at_once_are_those_one_by_one(monkeypatch: pytest.MonkeyPatc
         )
 
 
-def struck() -> Model:
+def struck() -> sf.Model:
     """A point on a circle, whose rate an event halves; its tension follows."""
     model = pendulum()
     x, _, vx, vy = (v.symbol for v in model.x)
@@ -180,8 +167,8 @@ def struck() -> Model:
 def test_mechanism_stays_on_its_constraints_behind_an_event() -> None:
     """By the radius, which moves the start, the event and all behind it; by differences."""
 
-    def at(radius: float, **how: object) -> Trajectory:
-        return simulate(
+    def at(radius: float, **how: object) -> sf.Trajectory:
+        return sf.simulate(
             struck(), 1.0, p={"l": radius}, t_eval=[0.2, 0.6, 1.0], event_tolerance=1e-13,
             rtol=1e-10, **how,  # pyright: ignore[reportArgumentType]
         )  # fmt: skip
@@ -202,7 +189,7 @@ def test_mechanism_stays_on_its_constraints_behind_an_event() -> None:
 
 def test_sweeps_cost_what_they_are_written_for() -> None:
     """Instructions of a step of Rabinowicz: itself, by four parameters, backwards, with jumps."""
-    model = rabinowicz(BrownMcPhee(), free=["mu_s", "mu_d", "k", "m"])
+    model = sf.rabinowicz(sf.BrownMcPhee(), free=["mu_s", "mu_d", "k", "m"])
     integrator, _ = built(model, input_data(model, None, 0.0, 1.0), METHODS["rodas5p"])
     made = derivatives(integrator)
     which = seeds(model, ["mu_s", "mu_d", "k", "m"], None, None)
@@ -215,18 +202,20 @@ def test_sweeps_cost_what_they_are_written_for() -> None:
     assert all(f <= m for f, m in zip(found, most, strict=True)), found
 
 
-def counter(events: tuple[Event, ...], x: Variable, *others: Variable) -> Model:
+def counter(events: tuple[Event, ...], x: sf.Variable, *others: sf.Variable) -> sf.Model:
     """x' = p, all others at rest."""
-    p = Variable("p", "1/s", start=2.0)
+    p = sf.Variable("p", "1/s", start=2.0)
     still = ca.SX.zeros(len(others))
-    return Model("counter", x=(x, *others), p=(p,), ode=ca.vertcat(p.symbol, still), events=events)
+    return sf.Model(
+        "counter", x=(x, *others), p=(p,), ode=ca.vertcat(p.symbol, still), events=events
+    )
 
 
 def test_end_of_a_run_that_an_event_ends_has_a_derivative() -> None:
     """x = p t reaches 1 at 1/p."""
-    x = Variable("x", "1")
+    x = sf.Variable("x", "1")
     model = counter((Event("full", x.symbol - 1, terminal=True),), x)
-    run = simulate(model, 3.0, samples=4, sensitivities=["p", "x0.x"])
+    run = sf.simulate(model, 3.0, samples=4, sensitivities=["p", "x0.x"])
     assert run.event_sensitivities["p"] == pytest.approx([-0.25])
     assert run.event_sensitivities["x0.x"] == pytest.approx([-0.5])
     assert run.sensitivities["p"]["x"] == pytest.approx(run.t)
@@ -234,16 +223,16 @@ def test_end_of_a_run_that_an_event_ends_has_a_derivative() -> None:
 
 def test_event_in_the_very_step_that_another_one_began() -> None:
     """x = p t reaches 1, and 2e-8 s later another mark; at both y' = y jumps by p x."""
-    x, y = Variable("x", "1"), Variable("y", "1")
-    p = Variable("p", "1/s", start=2.0)
+    x, y = sf.Variable("x", "1"), sf.Variable("y", "1")
+    p = sf.Variable("p", "1/s", start=2.0)
     gap = 4e-8
     events = tuple(
         Event(name, x.symbol - mark, reset={"y": y.symbol + x.symbol * p.symbol})
         for name, mark in (("first", 1.0), ("second", 1.0 + gap))
     )
-    model = Model("marks", x=(x, y), p=(p,), ode=ca.vertcat(p.symbol, y.symbol), events=events)
+    model = sf.Model("marks", x=(x, y), p=(p,), ode=ca.vertcat(p.symbol, y.symbol), events=events)
     times = np.array([0.25, 0.5 + 1e-8, 0.75])
-    run = simulate(model, 1.0, t_eval=times, rtol=1e-9, sensitivities=["p", "x0.x"])
+    run = sf.simulate(model, 1.0, t_eval=times, rtol=1e-9, sensitivities=["p", "x0.x"])
     assert run.event_sensitivities["p"] == pytest.approx([-0.25, -0.25], rel=1e-6)
     assert run.event_sensitivities["x0.x"] == pytest.approx([-0.5, -0.5], rel=1e-6)
     assert run.sensitivities["p"]["x"] == pytest.approx(times)
@@ -259,14 +248,16 @@ def test_event_in_the_very_step_that_another_one_began() -> None:
 def test_event_that_another_one_brings_about_moves_along() -> None:
     """x = 1 lets y jump over zero, which lets z take the value of t: z = 1/p."""
     t = ca.SX.sym("t")
-    x, y, z = Variable("x", "1"), Variable("y", "1", start=-1.0), Variable("z", "1")
-    p = Variable("p", "1/s", start=2.0)
+    x, y, z = sf.Variable("x", "1"), sf.Variable("y", "1", start=-1.0), sf.Variable("z", "1")
+    p = sf.Variable("p", "1/s", start=2.0)
     events = (
         Event("first", x.symbol - 1, reset={"y": 3 * p.symbol}),
         Event("second", y.symbol, reset={"z": t * y.symbol}),
     )
-    model = Model("chain", x=(x, y, z), p=(p,), ode=ca.vertcat(p.symbol, 0, 0), events=events, t=t)
-    run = simulate(model, 1.0, t_eval=[0.4, 0.6], sensitivities=["p"])
+    model = sf.Model(
+        "chain", x=(x, y, z), p=(p,), ode=ca.vertcat(p.symbol, 0, 0), events=events, t=t
+    )
+    run = sf.simulate(model, 1.0, t_eval=[0.4, 0.6], sensitivities=["p"])
     assert run.event_sensitivities["p"] == pytest.approx([-0.25, -0.25])
     assert run["z"] == pytest.approx([0.0, 3.0])
     assert run.sensitivities["p"]["y"] == pytest.approx([0.0, 3.0])
@@ -275,12 +266,12 @@ def test_event_that_another_one_brings_about_moves_along() -> None:
 
 def test_events_of_time_alone_do_not_move_even_with_jumps_of_the_inputs() -> None:
     """v' = u/m, and v is halved at t = 1, when u jumps."""
-    t, v, m = ca.SX.sym("t"), Variable("v", "m/s"), Variable("m", "kg", start=2.0)
-    u = Variable("u", "N")
+    t, v, m = ca.SX.sym("t"), sf.Variable("v", "m/s"), sf.Variable("m", "kg", start=2.0)
+    u = sf.Variable("u", "N")
     half = Event("half", t - 1, direction=1, reset={"v": v.symbol / 2})
-    model = Model("pushed", x=(v,), u=(u,), p=(m,), ode=u.symbol / m.symbol, events=(half,), t=t)
-    run = simulate(
-        model, 2.0, u={"u": Hold([0.0, 1.0], [1.0, -3.0])}, t_eval=[0.9, 1.1, 2.0],
+    model = sf.Model("pushed", x=(v,), u=(u,), p=(m,), ode=u.symbol / m.symbol, events=(half,), t=t)
+    run = sf.simulate(
+        model, 2.0, u={"u": sf.Hold([0.0, 1.0], [1.0, -3.0])}, t_eval=[0.9, 1.1, 2.0],
         sensitivities=["m"],
     )  # fmt: skip
     assert run["v"] == pytest.approx([0.45, 0.1, -1.25])
@@ -288,20 +279,22 @@ def test_events_of_time_alone_do_not_move_even_with_jumps_of_the_inputs() -> Non
     assert run.event_sensitivities["m"] == [0.0]
 
 
-def twins(mixing: float) -> Model:
+def twins(mixing: float) -> sf.Model:
     """Two points that reach their walls at one time; each rebounds with a part of the other."""
-    x, y = Variable("x", "m", start=1.0), Variable("y", "m", start=2.0)
-    v, w = Variable("v", "m/s", start=-1.0), Variable("w", "m/s", start=-2.0)
+    x, y = sf.Variable("x", "m", start=1.0), sf.Variable("y", "m", start=2.0)
+    v, w = sf.Variable("v", "m/s", start=-1.0), sf.Variable("w", "m/s", start=-2.0)
     events = (
         Event("wall x", x.symbol, -1, reset={"v": -v.symbol + mixing * w.symbol}),
         Event("wall y", y.symbol, -1, reset={"w": -w.symbol + mixing * v.symbol}),
     )
-    return Model("twins", x=(x, y, v, w), ode=ca.vertcat(v.symbol, w.symbol, 0, 0), events=events)
+    return sf.Model(
+        "twins", x=(x, y, v, w), ode=ca.vertcat(v.symbol, w.symbol, 0, 0), events=events
+    )
 
 
 def test_events_at_one_time_that_do_not_disturb_each_other_are_taken_one_by_one() -> None:
     times = [0.5, 1.5, 2.0]
-    run = simulate(twins(0.0), 2.0, t_eval=times, sensitivities=["x0.x", "x0.w"])
+    run = sf.simulate(twins(0.0), 2.0, t_eval=times, sensitivities=["x0.x", "x0.w"])
     assert run.statistics.events == 2
     assert run.sensitivities["x0.x"]["x"] == pytest.approx([1.0, -1.0, -1.0])
     assert run.sensitivities["x0.x"]["y"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
@@ -310,16 +303,16 @@ def test_events_at_one_time_that_do_not_disturb_each_other_are_taken_one_by_one(
     assert run.gradient(weights) == pytest.approx({"x0.x": -1.0, "x0.w": -2.0})
 
 
-def cubed() -> Model:
-    x = Variable("x", "1")
+def cubed() -> sf.Model:
+    x = sf.Variable("x", "1")
     return counter((Event("touch", (x.symbol - 1) ** 3),), x)
 
 
-def at_a_jump() -> Model:
+def at_a_jump() -> sf.Model:
     """x = t reaches 1 when u jumps."""
-    x, u = Variable("x", "m"), Variable("u", "m/s")
+    x, u = sf.Variable("x", "m"), sf.Variable("u", "m/s")
     done = Event("done", x.symbol - 1.0 + 1e-12, direction=1)
-    return Model("pushed", x=(x,), u=(u,), ode=u.symbol, events=(done,))
+    return sf.Model("pushed", x=(x,), u=(u,), ode=u.symbol, events=(done,))
 
 
 @pytest.mark.parametrize(
@@ -335,10 +328,10 @@ def at_a_jump() -> Model:
     ],
 )
 def test_motion_without_a_derivative_is_named_with_event_and_time(
-    model: Model, seed: str, message: str
+    model: sf.Model, seed: str, message: str
 ) -> None:
-    u = {"u": Hold([0.0, 1.0], [1.0, 2.0])} if model.u else None
-    run = simulate(model, 2.0, u=u, samples=3, sensitivities=[seed])
+    u = {"u": sf.Hold([0.0, 1.0], [1.0, 2.0])} if model.u else None
+    run = sf.simulate(model, 2.0, u=u, samples=3, sensitivities=[seed])
     with pytest.raises(ValueError, match=message):
         _ = run.sensitivities
     with pytest.raises(ValueError, match=message):

@@ -9,29 +9,14 @@ from differentiable import oscillator, pendulum, root, switched
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from symfric import (
-    BrownMcPhee,
-    Hold,
-    Law,
-    Linear,
-    LuGre,
-    Model,
-    SolveError,
-    Status,
-    Trajectory,
-    Variable,
-    Viscous,
-    drive,
-    rabinowicz,
-    simulate,
-)
+import symfric as sf
 from symfric.integrator.by_peer import peer
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.running.run import Tolerances
 
 Array = NDArray[np.float64]
-LAWS: dict[str, Law] = {"brown_mcphee": BrownMcPhee(), "lugre": LuGre()}
+LAWS: dict[str, sf.Law] = {"brown_mcphee": sf.BrownMcPhee(), "lugre": sf.LuGre()}
 FREE = ("mu_s", "mu_d", "k")
 T_END = 20.0
 
@@ -39,7 +24,7 @@ each_law = pytest.mark.parametrize("law", LAWS)
 each_engine = pytest.mark.parametrize("backend", ["vm", "compiled"])
 
 
-def derivative(run: Trajectory, name: str, signal: str) -> Array:
+def derivative(run: sf.Trajectory, name: str, signal: str) -> Array:
     return run.sensitivities[name][signal]
 
 
@@ -55,7 +40,9 @@ def exact(t: float, start: tuple[float, float] = (1.0, 0.5)) -> tuple[Array, Arr
 def test_linear_system_meets_the_matrix_exponential_between_the_steps(backend: str) -> None:
     times = np.sort(np.random.default_rng(3).uniform(0.0, 5.0, 40))
     names = ["k", "x0.x", "x0.v"]
-    run = simulate(oscillator(), 5.0, t_eval=times, rtol=1e-9, backend=backend, sensitivities=names)
+    run = sf.simulate(
+        oscillator(), 5.0, t_eval=times, rtol=1e-9, backend=backend, sensitivities=names
+    )
     assert run.statistics.steps > 40  # so that most times lie inside a step
     solution, by_k, by_start = (np.array(part) for part in zip(*map(exact, times), strict=True))
     near = {"rel": 0.0, "abs": 2e-7}
@@ -73,15 +60,17 @@ def test_linear_system_meets_the_matrix_exponential_between_the_steps(backend: s
     ("law", "name"), [("brown_mcphee", "mu_s"), ("brown_mcphee", "x0.v"), ("lugre", "k")]
 )
 def test_difference_quotients_agree_over_a_scan_of_widths(law: str, name: str) -> None:
-    model = rabinowicz(LAWS[law], free=FREE)
+    model = sf.rabinowicz(LAWS[law], free=FREE)
     at = 0.02 if name == "x0.v" else {v.name: float(v.start) for v in model.p}[name]
 
     def x_end(value: float) -> float:
         p = {} if name == "x0.v" else {name: value}
         x0 = {"v": value} if name == "x0.v" else {"v": 0.02}
-        return simulate(model, T_END, x0=x0, p=p, rtol=1e-13, t_eval=[T_END])["x"][0]
+        return sf.simulate(model, T_END, x0=x0, p=p, rtol=1e-13, t_eval=[T_END])["x"][0]
 
-    run = simulate(model, T_END, x0={"v": 0.02}, rtol=1e-12, t_eval=[T_END], sensitivities=[name])
+    run = sf.simulate(
+        model, T_END, x0={"v": 0.02}, rtol=1e-12, t_eval=[T_END], sensitivities=[name]
+    )
     ours = derivative(run, name, "x")[0]
     widths = at * 10.0 ** -np.array([1, 5, 6, 7])
     quotients = np.array([(x_end(at + h) - x_end(at - h)) / (2 * h) for h in widths])
@@ -90,7 +79,7 @@ def test_difference_quotients_agree_over_a_scan_of_widths(law: str, name: str) -
     assert wrong.max() > 1e-4, "differences are no reference at every width, so scan them"
 
 
-def peer_slopes(model: Model, x0: Array, times: Array, plugin: str) -> tuple[Array, Array]:
+def peer_slopes(model: sf.Model, x0: Array, times: Array, plugin: str) -> tuple[Array, Array]:
     """States and their derivatives by p at times, by an integrator of CasADi and its own AD."""
     inputs = input_data(model, None, 0.0, float(times[-1]))
     whole = system(model, inputs)
@@ -106,10 +95,10 @@ def peer_slopes(model: Model, x0: Array, times: Array, plugin: str) -> tuple[Arr
 
 @each_law
 def test_casadis_rosenbrock_has_the_same_derivatives(law: str) -> None:
-    model, times = rabinowicz(LAWS[law], free=FREE), np.array([3.0, 9.0])
+    model, times = sf.rabinowicz(LAWS[law], free=FREE), np.array([3.0, 9.0])
     x0 = model.initial_state({"v": 0.02})
     start = dict(zip([v.name for v in model.x], x0, strict=True))  # all, so that none follows p
-    run = simulate(model, 9.0, x0=start, rtol=1e-12, t_eval=times, sensitivities=FREE)
+    run = sf.simulate(model, 9.0, x0=start, rtol=1e-12, t_eval=times, sensitivities=FREE)
     states, slopes = peer_slopes(model, x0, times, "rosenbrock")
     for i, state in enumerate(("x", "v")):
         assert run[state] == pytest.approx(states[i], rel=1e-6)
@@ -119,9 +108,9 @@ def test_casadis_rosenbrock_has_the_same_derivatives(law: str) -> None:
 
 def test_bristle_in_steady_sliding_follows_parameters_and_start_velocity() -> None:
     """At t = 0 the bristle is z = g(v) sgn(v)/sigma_0 with g by mu_s: its derivatives by hand."""
-    model = rabinowicz(LuGre(), free=["mu_s"])
+    model = sf.rabinowicz(sf.LuGre(), free=["mu_s"])
     names = ["mu_s", "x0.v", "x0.z"]
-    run = simulate(model, 1.0, t_eval=[0.0, 1.0], x0={"v": 0.099}, sensitivities=names)
+    run = sf.simulate(model, 1.0, t_eval=[0.0, 1.0], x0={"v": 0.099}, sensitivities=names)
     v, v_s, mu_s, mu_d, load, sigma_0 = -1e-3, 1e-3, 0.15, 0.1, 0.8 * 9.81, 1e5
     stribeck = np.exp(-((v / v_s) ** 2))
     by_mu = -load * stribeck / sigma_0
@@ -133,14 +122,16 @@ def test_bristle_in_steady_sliding_follows_parameters_and_start_velocity() -> No
 
 
 def test_bristle_start_that_is_given_does_not_follow() -> None:
-    model = rabinowicz(LuGre(), free=["mu_s"])
-    run = simulate(model, 1.0, t_eval=[0.0, 1.0], x0={"z": 1e-5}, sensitivities=["mu_s", "x0.v"])
+    model = sf.rabinowicz(sf.LuGre(), free=["mu_s"])
+    run = sf.simulate(model, 1.0, t_eval=[0.0, 1.0], x0={"z": 1e-5}, sensitivities=["mu_s", "x0.v"])
     assert derivative(run, "mu_s", "z")[0] == derivative(run, "x0.v", "z")[0] == 0.0
 
 
 @each_engine
 def test_algebraic_variables_follow_from_the_start_on(backend: str) -> None:
-    run = simulate(root(), 1.0, samples=33, rtol=1e-9, backend=backend, sensitivities=["p", "x0.x"])
+    run = sf.simulate(
+        root(), 1.0, samples=33, rtol=1e-9, backend=backend, sensitivities=["p", "x0.x"]
+    )
     q, t = 0.7 ** (1 / 3), run.t
     root_x = np.sqrt(1 - 2 / 3 * q * t)
     by_q, q_by_p = -t * root_x, q / (3 * 0.7)
@@ -153,8 +144,8 @@ def test_algebraic_variables_follow_from_the_start_on(backend: str) -> None:
 
 def test_algebraic_variables_follow_jumps_of_the_inputs() -> None:
     times = np.array([0.0, 0.3, 0.5, 0.50001, 0.9, 1.2, 1.5])
-    u = Hold([0.0, 0.5, 1.2], [1.0, -2.0, 3.0])
-    run = simulate(
+    u = sf.Hold([0.0, 0.5, 1.2], [1.0, -2.0, 3.0])
+    run = sf.simulate(
         switched(), 1.5, u={"u": u}, t_eval=times, rtol=1e-9, sensitivities=["p", "x0.x"]
     )
     level = np.array([1.0, 1.0, -2.0, -2.0, -2.0, 3.0, 3.0])
@@ -170,9 +161,9 @@ def test_algebraic_variables_follow_jumps_of_the_inputs() -> None:
 @each_engine
 def test_sampled_inputs_are_part_of_the_steps(backend: str) -> None:
     """v' = u/m - c v/m with u = 3 - t from samples; by m from the closed form of a ramp."""
-    u = Linear([0.0, 0.4, 1.1, 2.0], [3.0, 2.6, 1.9, 1.0])
-    model = drive(Viscous(sigma_2=2.0), free=["m"])
-    run = simulate(
+    u = sf.Linear([0.0, 0.4, 1.1, 2.0], [3.0, 2.6, 1.9, 1.0])
+    model = sf.drive(sf.Viscous(sigma_2=2.0), free=["m"])
+    run = sf.simulate(
         model, 2.0, u={"force": u}, p={"m": 0.8}, x0={"v": 0.2}, rtol=1e-10, samples=9,
         backend=backend, sensitivities=["m", "x0.v"],
     )  # fmt: skip
@@ -190,26 +181,26 @@ def test_sampled_inputs_are_part_of_the_steps(backend: str) -> None:
 
 def test_explicit_time_is_no_parameter() -> None:
     """x' = p cos(t) from t = 1: dx/dp = sin(t) - sin(1)."""
-    x, p, t = Variable("x", "m", start=0.0), Variable("p", "m/s", start=2.0), ca.SX.sym("t")
-    model = Model("swing", x=(x,), p=(p,), ode=p.symbol * ca.cos(t), t=t)
-    run = simulate(model, 3.0, t_start=1.0, rtol=1e-9, samples=7, sensitivities=["p"])
+    x, p, t = sf.Variable("x", "m", start=0.0), sf.Variable("p", "m/s", start=2.0), ca.SX.sym("t")
+    model = sf.Model("swing", x=(x,), p=(p,), ode=p.symbol * ca.cos(t), t=t)
+    run = sf.simulate(model, 3.0, t_start=1.0, rtol=1e-9, samples=7, sensitivities=["p"])
     assert derivative(run, "p", "x") == pytest.approx(np.sin(run.t) - np.sin(1.0), abs=1e-7)
 
 
 def test_model_without_parameters_and_inputs_has_start_values() -> None:
-    x = Variable("x", "m", start=2.0)
-    model = Model("decay", x=(x,), ode=-x.symbol)
-    run = simulate(model, 1.0, samples=5, rtol=1e-9, sensitivities=["x0.x"])
+    x = sf.Variable("x", "m", start=2.0)
+    model = sf.Model("decay", x=(x,), ode=-x.symbol)
+    run = sf.simulate(model, 1.0, samples=5, rtol=1e-9, sensitivities=["x0.x"])
     assert derivative(run, "x0.x", "x") == pytest.approx(np.exp(-run.t), rel=1e-7)
     assert run.gradient({"x": [0, 0, 0, 0, 1.0]}) == pytest.approx({"x0.x": np.exp(-1.0)})
 
 
 def test_implicit_model_with_a_matrix_that_is_not_constant() -> None:
     """(1 + r^2) r = -p x (1 + r^2) has the solution r = x' = -p x."""
-    x, p, r = Variable("x", "m", start=1.0), Variable("p", "1/s", start=0.5), ca.SX.sym("r")
+    x, p, r = sf.Variable("x", "m", start=1.0), sf.Variable("p", "1/s", start=0.5), ca.SX.sym("r")
     residual = (1 + r**2) * (r + p.symbol * x.symbol)
-    model = Model("implicit", x=(x,), p=(p,), xdot=r, residual=residual)
-    run = simulate(model, 2.0, samples=5, rtol=1e-9, sensitivities=["p"])
+    model = sf.Model("implicit", x=(x,), p=(p,), xdot=r, residual=residual)
+    run = sf.simulate(model, 2.0, samples=5, rtol=1e-9, sensitivities=["p"])
     by_p = -run.t * np.exp(-0.5 * run.t)
     assert derivative(run, "p", "x") == pytest.approx(by_p, rel=1e-6, abs=1e-7)
 
@@ -217,17 +208,17 @@ def test_implicit_model_with_a_matrix_that_is_not_constant() -> None:
 def test_mechanism_starts_and_stays_on_its_constraints_with_its_derivatives() -> None:
     """The start (0.6, -0.8) l moves along the radius with l, and along the circle with x0."""
     names = ["l", "x0.x"]
-    run = simulate(pendulum(), 1.0, samples=3, rtol=1e-10, sensitivities=names)
+    run = sf.simulate(pendulum(), 1.0, samples=3, rtol=1e-10, sensitivities=names)
     start = [[derivative(run, name, signal)[0] for signal in ("x", "y")] for name in names]
     assert start == [pytest.approx([0.6, -0.8]), pytest.approx([0.64, 0.48])]
     for name, by_radius in (("l", 1.0), ("x0.x", 0.0)):
         along = run["x"] * derivative(run, name, "x") + run["y"] * derivative(run, name, "y")
         assert along == pytest.approx(np.full(3, by_radius), abs=1e-9)
 
-        def at(h: float, name: str = name) -> Trajectory:
+        def at(h: float, name: str = name) -> sf.Trajectory:
             p = {"l": 1.0 + h} if name == "l" else {}
             x0 = {} if name == "l" else {"x": 0.6 + h}
-            return simulate(pendulum(), 1.0, samples=3, rtol=1e-12, p=p, x0=x0)
+            return sf.simulate(pendulum(), 1.0, samples=3, rtol=1e-12, p=p, x0=x0)
 
         ahead, behind = at(1e-5), at(-1e-5)
         for signal in ("x", "vy", "lam"):
@@ -236,16 +227,16 @@ def test_mechanism_starts_and_stays_on_its_constraints_with_its_derivatives() ->
 
 
 def test_derivatives_reach_as_far_as_an_interrupted_run() -> None:
-    model = rabinowicz(LuGre(), free=["mu_s"])
+    model = sf.rabinowicz(sf.LuGre(), free=["mu_s"])
 
     def interrupt(fraction: float) -> None:
         if fraction > 0:
             raise KeyboardInterrupt
 
-    run = simulate(
+    run = sf.simulate(
         model, 200.0, backend="vm", progress=interrupt, sensitivities=["mu_s"], rtol=1e-8
     )
-    assert run.status is Status.INTERRUPTED
+    assert run.status is sf.Status.INTERRUPTED
     slopes = derivative(run, "mu_s", "x")
     assert slopes.shape == run.t.shape
     assert 0 < run.t.size < 2001
@@ -253,14 +244,14 @@ def test_derivatives_reach_as_far_as_an_interrupted_run() -> None:
 
 
 def test_run_that_failed_at_once_has_no_derivatives() -> None:
-    x, p = Variable("x", "m", start=1.0), Variable("p", "1", start=-1.0)
-    model = Model("broken", x=(x,), p=(p,), ode=ca.sqrt(p.symbol) * x.symbol)
-    run = simulate(model, 1.0, sensitivities=["p"], throw=False)
+    x, p = sf.Variable("x", "m", start=1.0), sf.Variable("p", "1", start=-1.0)
+    model = sf.Model("broken", x=(x,), p=(p,), ode=ca.sqrt(p.symbol) * x.symbol)
+    run = sf.simulate(model, 1.0, sensitivities=["p"], throw=False)
     assert not run.status.ok
     with pytest.raises(ValueError, match="expected sensitivities, got none"):
         _ = run.sensitivities
-    with pytest.raises(SolveError):
-        simulate(model, 1.0, sensitivities=["p"])
+    with pytest.raises(sf.SolveError):
+        sf.simulate(model, 1.0, sensitivities=["p"])
 
 
 @pytest.mark.parametrize(
@@ -269,19 +260,19 @@ def test_run_that_failed_at_once_has_no_derivatives() -> None:
         (oscillator, {"sensitivities": ["kk"]}, r"expected one of k, c, x0\.x, x0\.v, got kk"),
         (oscillator, {"sensitivities": ["x0.w"]}, r"got x0\.w; did you mean x0\."),
         (
-            lambda: rabinowicz(LuGre(), free=["k"]),
+            lambda: sf.rabinowicz(sf.LuGre(), free=["k"]),
             {"sensitivities": ["mu_s"]},
             r"'rabinowicz' \(parameters must be free\): expected one of k, .* got mu_s",
         ),
     ],
 )
 def test_bad_requests_are_refused_saying_what_is_possible(
-    make: Callable[[], Model], arguments: dict[str, object], message: str
+    make: Callable[[], sf.Model], arguments: dict[str, object], message: str
 ) -> None:
     with pytest.raises(ValueError, match=message):
-        simulate(make(), 1.0, **arguments)  # pyright: ignore[reportArgumentType]
+        sf.simulate(make(), 1.0, **arguments)  # pyright: ignore[reportArgumentType]
 
 
 def test_derivatives_that_were_not_asked_for_are_missed_by_name() -> None:
     with pytest.raises(ValueError, match=r"got none; request them by\s+simulate\(\.\.\., sens"):
-        _ = simulate(oscillator(), 1.0).sensitivities
+        _ = sf.simulate(oscillator(), 1.0).sensitivities

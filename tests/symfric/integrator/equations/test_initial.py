@@ -6,17 +6,7 @@ import pytest
 from closed_forms import assemble, smooth_dae
 from numpy.typing import NDArray
 
-from symfric import (
-    BrownMcPhee,
-    Law,
-    LuGre,
-    Model,
-    Status,
-    Variable,
-    rabinowicz,
-    simulate,
-    simulate_many,
-)
+import symfric as sf
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.blocks import following
@@ -31,20 +21,20 @@ from symfric.scenes import SliderCrank
 
 Array = NDArray[np.float64]
 
-x = Variable("x", "m", start=1.0)
+x = sf.Variable("x", "m", start=1.0)
 
 
-def root(start: float, rhs: ca.SX) -> Model:
+def root(start: float, rhs: ca.SX) -> sf.Model:
     """0 = z^2 - rhs, with two solutions or none."""
-    z = Variable("z", "1", start=start)
-    return Model("root", x=(x,), z=(z,), ode=-x.symbol, alg=z.symbol**2 - rhs)
+    z = sf.Variable("z", "1", start=start)
+    return sf.Model("root", x=(x,), z=(z,), ode=-x.symbol, alg=z.symbol**2 - rhs)
 
 
 @pytest.mark.parametrize(("guess", "solution"), [(0.5, 2.0), (10.0, 2.0), (-0.1, -2.0)])
 def test_start_value_of_an_algebraic_variable_chooses_the_branch(
     guess: float, solution: float
 ) -> None:
-    run = simulate(root(guess, 4 * x.symbol), 1.0, rtol=1e-8)
+    run = sf.simulate(root(guess, 4 * x.symbol), 1.0, rtol=1e-8)
     assert run["z"][0] == pytest.approx(solution, rel=1e-12)
     assert run["z"] == pytest.approx(solution * np.exp(-run.t / 2), rel=1e-6)
 
@@ -53,21 +43,21 @@ def test_inconsistent_start_is_refused_naming_the_variable() -> None:
     with pytest.raises(
         ValueError, match=r"model 'root': expected consistent start .* equations for z near"
     ):
-        simulate(root(1.0, -1 - 0 * x.symbol), 1.0)
+        sf.simulate(root(1.0, -1 - 0 * x.symbol), 1.0)
 
 
 def test_undetermined_algebraic_variable_is_refused_naming_it() -> None:
     """The second equation does not hold it at all."""
-    z = Variable("z", "1")
-    model = Model("loose", x=(x,), z=(z,), ode=-z.symbol, alg=x.symbol - 1)
+    z = sf.Variable("z", "1")
+    model = sf.Model("loose", x=(x,), z=(z,), ode=-z.symbol, alg=x.symbol - 1)
     with pytest.raises(ValueError, match="algebraic"):
-        simulate(model, 1.0)
+        sf.simulate(model, 1.0)
 
 
 def test_several_algebraic_variables_are_solved_together() -> None:
-    y, z = Variable("y", "1", start=1.0), Variable("z", "1", start=0.5)
+    y, z = sf.Variable("y", "1", start=1.0), sf.Variable("z", "1", start=0.5)
     equations = ca.vertcat(y.symbol**2 + z.symbol**2 - 4 * x.symbol, y.symbol - z.symbol)
-    model = Model("circle", x=(x,), z=(y, z), ode=-x.symbol, alg=equations)
+    model = sf.Model("circle", x=(x,), z=(y, z), ode=-x.symbol, alg=equations)
     found = consistent(assemble(model), "here", np.array([1.0, 1.0, 0.5]), np.zeros(0))
     assert found == pytest.approx([1.0, np.sqrt(2), np.sqrt(2)], rel=1e-12)
 
@@ -75,17 +65,19 @@ def test_several_algebraic_variables_are_solved_together() -> None:
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize("weight", [1e-12, 1.0, 1e12])
 def test_neither_units_of_unknowns_nor_of_equations_matter(scale: float, weight: float) -> None:
-    z = Variable("z", "1", start=3 * scale)
+    z = sf.Variable("z", "1", start=3 * scale)
     s = z.symbol / scale
-    model = Model("scaled", x=(x,), z=(z,), ode=-x.symbol, alg=weight * (s**3 + s - 10 * x.symbol))
+    model = sf.Model(
+        "scaled", x=(x,), z=(z,), ode=-x.symbol, alg=weight * (s**3 + s - 10 * x.symbol)
+    )
     found = consistent(assemble(model), "here", np.array([1.0, 30 * scale]), np.zeros(0))
     assert found[1] == pytest.approx(2 * scale, rel=1e-14)
 
 
 @pytest.mark.parametrize("guess", [0.0, 0.5, -3.0])
 def test_solution_at_zero_is_found(guess: float) -> None:
-    z = Variable("z", "1")
-    model = Model("zero", x=(x,), z=(z,), ode=-x.symbol, alg=z.symbol + z.symbol**3)
+    z = sf.Variable("z", "1")
+    model = sf.Model("zero", x=(x,), z=(z,), ode=-x.symbol, alg=z.symbol + z.symbol**3)
     found = consistent(assemble(model), "here", np.array([1.0, guess]), np.zeros(0))
     assert found[1] == pytest.approx(0.0, abs=1e-12)
 
@@ -118,8 +110,8 @@ def test_many_start_as_each_one_alone() -> None:
 
 def test_members_whose_residual_would_grow_take_the_same_branch_as_alone() -> None:
     """z^3 = z from 0.45: full steps overshoot and end at -1, where damped ones find the near 0."""
-    z = Variable("z", "1")
-    model = Model("cubic", x=(x,), z=(z,), ode=-x.symbol, alg=z.symbol**3 - z.symbol)
+    z = sf.Variable("z", "1")
+    model = sf.Model("cubic", x=(x,), z=(z,), ode=-x.symbol, alg=z.symbol**3 - z.symbol)
     system, guesses = assemble(model), np.array([0.45, 0.46, 0.9])
     y, none = np.column_stack([np.ones(3), guesses]), np.zeros((3, 0))
     found, failed = consistent_many(system, Columns(system.constraints), "here", y, none)
@@ -131,7 +123,7 @@ def test_members_whose_residual_would_grow_take_the_same_branch_as_alone() -> No
 
 def test_bristle_starts_in_steady_sliding() -> None:
     """At -0.1 m/s far above the Stribeck velocity: z = -mu_d N / sigma_0."""
-    run = simulate(rabinowicz(LuGre()), 1e-3)
+    run = sf.simulate(sf.rabinowicz(sf.LuGre()), 1e-3)
     assert run["z"][0] == pytest.approx(-0.1 * 0.8 * 9.81 / 1e5, rel=1e-9)
     assert run["z"] == pytest.approx(run["z"][0], rel=1e-6)
 
@@ -139,34 +131,34 @@ def test_bristle_starts_in_steady_sliding() -> None:
 @pytest.mark.parametrize("rate", [1e-3, 1.0, 1e3, 1e6, 1e9])
 def test_first_step_resolve_transients_of_any_speed(rate: float) -> None:
     """A second passes; the fast part lasts 1 / rate."""
-    model = Model("fast", x=(x,), ode=-rate * (x.symbol - 0.25))
-    run = simulate(model, 1.0, rtol=1e-8, t_eval=np.append(0.0, np.logspace(-12, 0, 60)))
+    model = sf.Model("fast", x=(x,), ode=-rate * (x.symbol - 0.25))
+    run = sf.simulate(model, 1.0, rtol=1e-8, t_eval=np.append(0.0, np.logspace(-12, 0, 60)))
     assert run["x"] == pytest.approx(0.25 + 0.75 * np.exp(-rate * run.t), abs=2e-8)
 
 
 @pytest.mark.parametrize("span", [1e-9, 1.0, 1e9])
 def test_span_of_any_length_is_started_and_ended(span: float) -> None:
-    model = Model("slow", x=(x,), ode=-x.symbol / span)
-    run = simulate(model, span, rtol=1e-8)
+    model = sf.Model("slow", x=(x,), ode=-x.symbol / span)
+    run = sf.simulate(model, span, rtol=1e-8)
     assert run.final["x"] == pytest.approx(np.exp(-1), rel=1e-7)
     assert run.statistics.steps < 60
 
 
-@pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()])
-def test_a_run_of_ages_does_not_begin_with_a_leap(law: Law) -> None:
+@pytest.mark.parametrize("law", [sf.BrownMcPhee(), sf.LuGre()])
+def test_a_run_of_ages_does_not_begin_with_a_leap(law: sf.Law) -> None:
     """Over 1e20 s the first step took 1e12 s, to steady sliding that is unstable, with SUCCESS."""
-    run = simulate(rabinowicz(law), 1e20, max_steps=1000, backend="vm", throw=False)
-    assert run.status is Status.MAX_STEPS
-    begun = simulate(rabinowicz(law), 20.0, max_steps=1000, backend="vm")
+    run = sf.simulate(sf.rabinowicz(law), 1e20, max_steps=1000, backend="vm", throw=False)
+    assert run.status is sf.Status.MAX_STEPS
+    begun = sf.simulate(sf.rabinowicz(law), 20.0, max_steps=1000, backend="vm")
     at = np.linspace(0.0, min(20.0, run.step_times[-1]), 50)
     assert run.at(at)["x"] == pytest.approx(begun.at(at)["x"], abs=1e-5)
 
 
 def test_start_at_rest_in_all_derivatives_is_left() -> None:
     """x' = 5 t^4 from zero: nothing moves at first."""
-    t, start = ca.SX.sym("t"), Variable("x", "m")
-    model = Model("late", x=(start,), ode=5 * t**4 + 0 * start.symbol, t=t)
-    run = simulate(model, 2.0, rtol=1e-8)
+    t, start = ca.SX.sym("t"), sf.Variable("x", "m")
+    model = sf.Model("late", x=(start,), ode=5 * t**4 + 0 * start.symbol, t=t)
+    run = sf.simulate(model, 2.0, rtol=1e-8)
     assert run["x"] == pytest.approx(run.t**5, abs=1e-6)
 
 
@@ -178,13 +170,13 @@ def test_smallest_step_follows_time_instead_of_its_end(backend: str) -> None:
     """
     if backend == "compiled" and find_compiler() is None:
         pytest.skip("no C compiler")
-    a, b = Variable("a", "1", start=1.0, nominal=1e-8), Variable("b", "1", nominal=1e-13)
-    c = Variable("c", "1")
+    a, b = sf.Variable("a", "1", start=1.0, nominal=1e-8), sf.Variable("b", "1", nominal=1e-13)
+    c = sf.Variable("c", "1")
     slow = -0.04 * a.symbol + 1e4 * b.symbol * c.symbol
     fast = 3e7 * b.symbol**2
-    model = Model("long", x=(a, b, c), ode=ca.vertcat(slow, -slow - fast, fast))
-    run = simulate(model, 1e11, rtol=1e-8, backend=backend, samples=2)
-    many = simulate_many(
+    model = sf.Model("long", x=(a, b, c), ode=ca.vertcat(slow, -slow - fast, fast))
+    run = sf.simulate(model, 1e11, rtol=1e-8, backend=backend, samples=2)
+    many = sf.simulate_many(
         model, 1e11, x0={"a": [1.0, 1.0]}, rtol=1e-8, backend=backend, executor="serial"
     )
     assert run.statistics.smallest_step < 1e-4
@@ -194,15 +186,15 @@ def test_smallest_step_follows_time_instead_of_its_end(backend: str) -> None:
 
 def test_late_start_begins_with_a_step_that_time_can_resolve() -> None:
     """A second after 1e9 s, where the last digit of t is a tenth of a microsecond."""
-    model = Model("late", x=(x,), ode=-x.symbol)
-    run = simulate(model, 1e9 + 1, t_start=1e9, rtol=1e-8)
+    model = sf.Model("late", x=(x,), ode=-x.symbol)
+    run = sf.simulate(model, 1e9 + 1, t_start=1e9, rtol=1e-8)
     assert run.final["x"] == pytest.approx(np.exp(-1), rel=1e-7)
 
 
 def test_many_do_not_leap_to_a_far_solution() -> None:
     """A full step from 1.9 goes uphill on sin z = 0, and on from there to 4 pi; damped, to pi."""
-    z = Variable("z", "1")
-    system = assemble(Model("waves", x=(x,), z=(z,), ode=-x.symbol, alg=ca.sin(z.symbol)))
+    z = sf.Variable("z", "1")
+    system = assemble(sf.Model("waves", x=(x,), z=(z,), ode=-x.symbol, alg=ca.sin(z.symbol)))
     y, none = np.array([[1.0, 1.9], [1.0, 3.0], [1.0, 0.3]]), np.zeros((3, 0))
     found, failed = consistent_many(system, Columns(system.constraints), "here", y, none)
     assert not failed
@@ -211,7 +203,7 @@ def test_many_do_not_leap_to_a_far_solution() -> None:
 
 def test_a_quick_way_is_taken_where_it_leads_there() -> None:
     """The guess is put onto the constraints before; where it gives up, the search goes on."""
-    model = SliderCrank(BrownMcPhee()).model()
+    model = SliderCrank(sf.BrownMcPhee()).model()
     system, none = assemble(model), np.zeros(0)
     follow = following(system)
     guess = first_guess(system, model, model.initial_state())

@@ -9,17 +9,7 @@ from closed_forms import assemble, observed_order, smooth_dae, smooth_ode
 from numpy.typing import NDArray
 from scipy.integrate import RK45
 
-from symfric import (
-    BrownMcPhee,
-    Law,
-    LuGre,
-    Model,
-    Variable,
-    Viscous,
-    rabinowicz,
-    simulate,
-    simulate_many,
-)
+import symfric as sf
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
@@ -45,22 +35,22 @@ from symfric.integrator.step.attempt import (
 )
 from symfric.scenes import DoublePendulum, FourBar, MechanismScene, SliderCrank
 
-x = Variable("x", "1", start=1.0)
+x = sf.Variable("x", "1", start=1.0)
 
 
 @pytest.mark.parametrize("h", [0.01, 1.0, 100.0])
 def test_step_solves_its_equation(h: float) -> None:
     """x_1 + h x_1^2 = x_0."""
-    step = build_fixed(assemble(Model("square", x=(x,), ode=-(x.symbol**2))), BACKWARD_EULER)
+    step = build_fixed(assemble(sf.Model("square", x=(x,), ode=-(x.symbol**2))), BACKWARD_EULER)
     enough = replace(BACKWARD_EULER, iterations=12)
-    exactly = build_fixed(assemble(Model("square", x=(x,), ode=-(x.symbol**2))), enough)
+    exactly = build_fixed(assemble(sf.Model("square", x=(x,), ode=-(x.symbol**2))), enough)
     root = (np.sqrt(1 + 4 * h) - 1) / (2 * h)
     assert float(exactly(1.0, h, [])) == pytest.approx(root, rel=1e-14)
     assert float(step(1.0, h, [])) == pytest.approx(root, rel=1e-14 if h < 0.1 else 0.1)
 
 
 def test_newton_converges_quadratically() -> None:
-    model, errors = Model("square", x=(x,), ode=-(x.symbol**2)), []
+    model, errors = sf.Model("square", x=(x,), ode=-(x.symbol**2)), []
     for k in (1, 2, 3):
         step = build_fixed(assemble(model), replace(BACKWARD_EULER, iterations=k))
         errors.append(abs(float(step(1.0, 0.5, [])) - (np.sqrt(3.0) - 1)))
@@ -80,7 +70,7 @@ def test_algebraic_unknowns_end_on_their_equations() -> None:
 @pytest.mark.parametrize("v_t", [1e-3, 1e-5])
 @pytest.mark.parametrize("h", [0.1, 0.01, 0.001])
 def test_it_stays_bounded_where_the_step_resolves_nothing(h: float, v_t: float) -> None:
-    model = rabinowicz(BrownMcPhee(v_t=v_t))
+    model = sf.rabinowicz(sf.BrownMcPhee(v_t=v_t))
     step = build_fixed(assemble(model), BACKWARD_EULER).mapaccum(2000)
     x = step(model.initial_state(), h, []).full()[0]
     assert np.abs(x).max() < 2.0  # the spring balances static friction at 0.57 m
@@ -118,7 +108,7 @@ def test_dense_output_is_that_of_scipy() -> None:
 
 def test_bristles_cost_it_many_times_the_steps_of_an_implicit_method() -> None:
     explicit, implicit = (
-        simulate(rabinowicz(LuGre()), 10.0, method=method).statistics
+        sf.simulate(sf.rabinowicz(sf.LuGre()), 10.0, method=method).statistics
         for method in ("dopri5", "rodas5p")
     )
     assert explicit.steps > 20 * implicit.steps
@@ -160,17 +150,17 @@ def test_slopes_at_zero_are_those_of_the_series() -> None:
 @pytest.mark.parametrize("rate", [1e-6, 1.0, 1e3, 1e9])
 def test_equation_linear_in_its_unknown_is_solved_exactly(rate: float) -> None:
     """x' = 1 - rate x from 2."""
-    v = Variable("x", "1", start=2.0)
-    step = build_fixed(assemble(Model("affine", x=(v,), ode=1 - rate * v.symbol)), EXPONENTIAL)
+    v = sf.Variable("x", "1", start=2.0)
+    step = build_fixed(assemble(sf.Model("affine", x=(v,), ode=1 - rate * v.symbol)), EXPONENTIAL)
     exact = 2 * np.exp(-rate) - np.expm1(-rate) / rate
     assert float(step(2.0, 1.0, [])) == pytest.approx(exact, rel=1e-13)
 
 
 def test_bristles_stay_within_their_travel_at_any_step() -> None:
     """|z| <= g/sigma_0 at the friction's peak, though sigma_0 |v| h / g is a thousand."""
-    model = rabinowicz(LuGre())
+    model = sf.rabinowicz(sf.LuGre())
     step = build_fixed(assemble(model), EXPONENTIAL)
-    limit = 0.8 * 9.81 * LuGre().mu_s / LuGre().sigma_0
+    limit = 0.8 * 9.81 * sf.LuGre().mu_s / sf.LuGre().sigma_0
     for v in (-3.0, -0.1, 0.3, 3.0):
         z = float(step([0.0, v, 0.0], 0.1, [])[2])
         assert abs(z) <= limit * (1 + 1e-12)
@@ -178,8 +168,8 @@ def test_bristles_stay_within_their_travel_at_any_step() -> None:
 
 
 def test_only_unknowns_with_their_own_slope_cost_an_exponential() -> None:
-    point, v = Variable("x", "m"), Variable("v", "m/s")
-    model = Model("fall", x=(point, v), ode=ca.vertcat(v.symbol, 9.81 - 0.1 * v.symbol))
+    point, v = sf.Variable("x", "m"), sf.Variable("v", "m/s")
+    model = sf.Model("fall", x=(point, v), ode=ca.vertcat(v.symbol, 9.81 - 0.1 * v.symbol))
     step = build_fixed(assemble(model), EXPONENTIAL)
     codes = [step.instruction_id(k) for k in range(step.n_instructions())]
     assert codes.count(ca.OP_EXPM1) == 1
@@ -187,24 +177,24 @@ def test_only_unknowns_with_their_own_slope_cost_an_exponential() -> None:
 
 @pytest.mark.parametrize(("name", "stages"), [("rodas5p", 8), ("rodas4p", 6), ("rodas3", 4)])
 def test_work_of_a_step_is_its_stages_and_one_factorisation(name: str, stages: int) -> None:
-    system = assemble(rabinowicz(LuGre()))
+    system = assemble(sf.rabinowicz(sf.LuGre()))
     assert METHODS[name].work(system) == (stages, 1, 1)
 
 
 @pytest.mark.parametrize(
     ("law", "attempt", "step", "divisions"),
-    [(BrownMcPhee(), 1002, 451, 46), (LuGre(), 1273, 645, 49)],
+    [(sf.BrownMcPhee(), 1002, 451, 46), (sf.LuGre(), 1273, 645, 49)],
     ids=["bm", "lugre"],
 )
 def test_attempt_costs_no_more_instructions_than_it_did(
-    law: Law, attempt: int, step: int, divisions: int
+    law: sf.Law, attempt: int, step: int, divisions: int
 ) -> None:
     """The other methods, and whatever comes, must not make the default one dearer.
 
     A division takes the time of ten others; there were 45 and 57, of which 28 and 31 stayed. Of
     those here 9 tangents take 18, and 241 instructions: libm's took more time, in branches.
     """
-    system = assemble(rabinowicz(law))
+    system = assemble(sf.rabinowicz(law))
     whole = build_step(system, RODAS5P)
     operations = [whole.instruction_id(k) for k in range(whole.n_instructions())]
     assert len(operations) <= attempt
@@ -254,7 +244,7 @@ def test_cubic_goes_through_the_increments() -> None:
 def test_linear_equations_need_one_iteration() -> None:
     """exp(-z) is then Pade's (1 + 2z/5 + z^2/20) / (1 - 3z/5 + 3z^2/20 - z^3/60) at -z."""
     once = replace(RADAU5, iterations=1)
-    step = build_fixed(assemble(Model("decay", x=(x,), ode=-x.symbol)), once)
+    step = build_fixed(assemble(sf.Model("decay", x=(x,), ode=-x.symbol)), once)
     z = -0.7
     pade = (1 + 2 * z / 5 + z**2 / 20) / (1 - 3 * z / 5 + 3 * z**2 / 20 - z**3 / 60)
     assert float(step(1.0, 0.7, [])) == pytest.approx(pade, rel=1e-14)
@@ -296,7 +286,7 @@ def test_newton_is_done_when_what_is_to_come_is_small(
 @pytest.mark.parametrize("kind", [ca.SX, ca.MX], ids=["flat", "blocks"])
 def test_failed_iteration_is_rejected_and_the_step_halved(kind: type) -> None:
     """x' = -1000 (x - 1)^3 from 2: a Jacobian at the start says little about the end."""
-    model = Model("cubic", x=(x,), ode=-1000 * (x.symbol - 1) ** 3)
+    model = sf.Model("cubic", x=(x,), ode=-1000 * (x.symbol - 1) ** 3)
     step = build_step(assemble(model), RADAU5, kind)
     R = Given.of(1.0, 0.05, 1.0, [0.05], [])  # an error of this size would be allowed
     after = step(State.at(0.0, 0.01, [2.0]), R)[0].full().ravel()
@@ -304,40 +294,40 @@ def test_failed_iteration_is_rejected_and_the_step_halved(kind: type) -> None:
     assert after[State.H] == pytest.approx(0.005)
 
 
-@pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=["brown_mcphee", "lugre"])
-def test_no_slip_is_lost_at_loose_tolerance(law: BrownMcPhee | LuGre) -> None:
+@pytest.mark.parametrize("law", [sf.BrownMcPhee(), sf.LuGre()], ids=["brown_mcphee", "lugre"])
+def test_no_slip_is_lost_at_loose_tolerance(law: sf.BrownMcPhee | sf.LuGre) -> None:
     """At rtol = 1e-3 Rodas5P is off by several parts in a thousand, Radau by less than 3e-4."""
-    model, t = rabinowicz(law), np.linspace(0.1, 20.0, 200)
+    model, t = sf.rabinowicz(law), np.linspace(0.1, 20.0, 200)
     start = {"v": np.linspace(-0.1, 0.1, 40)}
-    exact = simulate_many(model, 20.0, x0=start, rtol=1e-10, t_eval=t)["x"]
+    exact = sf.simulate_many(model, 20.0, x0=start, rtol=1e-10, t_eval=t)["x"]
     with pytest.warns(UserWarning, match="stick phases"):
-        found = simulate_many(model, 20.0, x0=start, rtol=1e-3, t_eval=t)["x"]
+        found = sf.simulate_many(model, 20.0, x0=start, rtol=1e-3, t_eval=t)["x"]
     assert np.abs(found - exact).max() < 5e-4 * np.abs(exact).max()
 
 
 def test_multipliers_that_a_projection_leaves_over_are_no_error_of_the_next_step() -> None:
     """A fast crank in absolute coordinates: the step once shrank to nothing after 2 ms."""
-    law = BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01)
+    law = sf.BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01)
     model = SliderCrank(law).mechanism().build(formulation="absolute")
-    run = simulate(model, 0.01, rtol=1e-5, method="radau5")
-    exact = simulate(SliderCrank(law).model(), 0.01, rtol=1e-10)
+    run = sf.simulate(model, 0.01, rtol=1e-5, method="radau5")
+    exact = sf.simulate(SliderCrank(law).model(), 0.01, rtol=1e-10)
     assert run["energy"] == pytest.approx(exact["energy"], rel=1e-4)
     assert run.statistics.steps < 200
 
 
-def bare(scene: MechanismScene) -> Model:
+def bare(scene: MechanismScene) -> sf.Model:
     """The scene with nothing that rubs."""
     mechanism = scene.mechanism()
     mechanism.joints = [replace(joint, friction=None) for joint in mechanism.joints]
     return mechanism.build()
 
 
-TREE, LOOP = bare(DoublePendulum(Viscous())), bare(FourBar(Viscous()))
+TREE, LOOP = bare(DoublePendulum(sf.Viscous())), bare(FourBar(sf.Viscous()))
 each = pytest.mark.parametrize("model", [TREE, LOOP], ids=["tree", "loop"])
 
 
 @each
-def test_order_five(model: Model) -> None:
+def test_order_five(model: sf.Model) -> None:
     """Of positions and velocities, accelerations and multipliers alike."""
     whole = system(model, input_data(model, None, 0.0, 1.0))
     start = consistent(
@@ -356,8 +346,8 @@ def test_order_five(model: Model) -> None:
 
 
 @each
-def test_same_motion_and_reactions_as_by_the_implicit_method(model: Model) -> None:
-    runs = [simulate(model, 0.5, rtol=1e-9, method=m, samples=51) for m in ("dopri5", "rodas5p")]
+def test_same_motion_and_reactions_as_by_the_implicit_method(model: sf.Model) -> None:
+    runs = [sf.simulate(model, 0.5, rtol=1e-9, method=m, samples=51) for m in ("dopri5", "rodas5p")]
     explicit, implicit = runs
     for name in model.signals:
         size = 1 + np.abs(implicit[name]).max()
@@ -368,9 +358,9 @@ def test_same_motion_and_reactions_as_by_the_implicit_method(model: Model) -> No
 
 
 def test_friction_from_reactions_is_refused() -> None:
-    model = FourBar(BrownMcPhee()).model()
+    model = FourBar(sf.BrownMcPhee()).model()
     assert eliminated(system(model, input_data(model, None, 0.0, 1.0))) is None
     with pytest.raises(
         ValueError, match=r"DOPRI5: expected an ODE .* with friction from reactions"
     ):
-        simulate(model, 0.1, method="dopri5")
+        sf.simulate(model, 0.1, method="dopri5")

@@ -5,29 +5,20 @@ import numpy as np
 import pytest
 from backends import each_backend
 
-from symfric import (
-    BrownMcPhee,
-    ExactCoulomb,
-    Karnopp,
-    Model,
-    SolveError,
-    Status,
-    Trajectory,
-    Variable,
-    rabinowicz,
-    simulate,
-)
+import symfric as sf
 from symfric.integrator.running.diagnosis import chattering
 
 t = ca.SX.sym("t")
-x, y = Variable("x", "m"), Variable("y", "m", start=1.0)
+x, y = sf.Variable("x", "m"), sf.Variable("y", "m", start=1.0)
 X, Y = x.symbol, y.symbol
 
 
-def failure(model: Model, t_end: float = 2.0, **options: object) -> tuple[Status, str, Trajectory]:
+def failure(
+    model: sf.Model, t_end: float = 2.0, **options: object
+) -> tuple[sf.Status, str, sf.Trajectory]:
     """How a simulation fails."""
-    with pytest.raises(SolveError) as caught:
-        simulate(model, t_end, **options)  # type: ignore[arg-type]
+    with pytest.raises(sf.SolveError) as caught:
+        sf.simulate(model, t_end, **options)  # type: ignore[arg-type]
     error = caught.value
     assert error.status is error.partial.status
     assert str(error) == error.partial.message
@@ -35,9 +26,9 @@ def failure(model: Model, t_end: float = 2.0, **options: object) -> tuple[Status
     return error.status, str(error), error.partial
 
 
-def advancing(second: ca.SX) -> Model:
+def advancing(second: ca.SX) -> sf.Model:
     """x = t, and an equation for y that fails somewhere."""
-    return Model("edge", x=(x, y), ode=ca.vertcat(1, second), t=t)
+    return sf.Model("edge", x=(x, y), ode=ca.vertcat(1, second), t=t)
 
 
 NOT_FINITE = {
@@ -53,7 +44,7 @@ NOT_FINITE = {
 def test_equation_that_turns_nan_is_named_with_its_time(case: str, backend: str) -> None:
     expression, end = NOT_FINITE[case]
     status, message, partial = failure(advancing(expression), backend=backend)
-    assert status is Status.NOT_FINITE
+    assert status is sf.Status.NOT_FINITE
     assert message.startswith(f"simulate 'edge': stopped at t = {end:g} s: the ")
     assert "equation of y" in message
     assert "equation of x" not in message
@@ -67,18 +58,18 @@ def test_equation_that_turns_nan_is_named_with_its_time(case: str, backend: str)
 def test_equations_that_are_not_finite_at_the_start_are_named(
     first: ca.SX, second: ca.SX, names: str
 ) -> None:
-    model = Model("edge", x=(x, y), ode=ca.vertcat(first, second))
+    model = sf.Model("edge", x=(x, y), ode=ca.vertcat(first, second))
     status, message, partial = failure(model)
-    assert status is Status.NOT_FINITE
+    assert status is sf.Status.NOT_FINITE
     assert f"stopped at t = 0 s: the equation of {names} returned NaN or infinity" in message
     assert (partial.t.tolist(), partial.final["y"]) == ([0.0], 1.0)
 
 
 def test_infinite_derivative_is_named_with_both_names() -> None:
     """The root of y: fine itself, vertical where the tank runs empty."""
-    model = Model("tank", x=(x, y), ode=ca.vertcat(1, -ca.sqrt(Y)))
+    model = sf.Model("tank", x=(x, y), ode=ca.vertcat(1, -ca.sqrt(Y)))
     status, message, partial = failure(model, 3.0)
-    assert status is Status.NOT_FINITE
+    assert status is sf.Status.NOT_FINITE
     assert "equation of y" in message
     assert partial.step_times[-1] == pytest.approx(2.0, abs=1e-4)
 
@@ -87,9 +78,9 @@ def test_infinite_derivative_is_named_with_both_names() -> None:
 @pytest.mark.parametrize("power", [2, 3])
 def test_unbounded_growth_is_said_with_the_state(power: int, backend: str) -> None:
     """y' = y^n from 1 is infinite at t = 1 / (n - 1)."""
-    model = Model("grow", x=(x, y), ode=ca.vertcat(-X, Y**power))
+    model = sf.Model("grow", x=(x, y), ode=ca.vertcat(-X, Y**power))
     status, message, partial = failure(model, backend=backend)
-    assert status is Status.STEP_TOO_SMALL
+    assert status is sf.Status.STEP_TOO_SMALL
     assert "y = " in message
     assert "grows without bound; check signs and parameters" in message
     assert "x = " not in message
@@ -97,10 +88,10 @@ def test_unbounded_growth_is_said_with_the_state(power: int, backend: str) -> No
 
 
 def test_algebraic_equation_that_loses_its_solution_is_named() -> None:
-    z = Variable("z", "1", start=1.0)
-    model = Model("jam", x=(x,), z=(z,), ode=-z.symbol, alg=z.symbol**2 - (1 - t), t=t)
+    z = sf.Variable("z", "1", start=1.0)
+    model = sf.Model("jam", x=(x,), z=(z,), ode=-z.symbol, alg=z.symbol**2 - (1 - t), t=t)
     status, message, partial = failure(model)
-    assert status is Status.SINGULAR
+    assert status is sf.Status.SINGULAR
     assert "stopped at t = 1" in message
     assert "algebraic equations for z have no solution near their last one" in message
     early = partial.t < 0.99
@@ -109,26 +100,26 @@ def test_algebraic_equation_that_loses_its_solution_is_named() -> None:
 
 def test_algebraic_unknown_that_turns_nan_is_named() -> None:
     """Though no state depends on it."""
-    z = Variable("z", "1")
-    model = Model("loose", x=(x,), z=(z,), ode=-X, alg=z.symbol - ca.log(1 - t), t=t)
+    z = sf.Variable("z", "1")
+    model = sf.Model("loose", x=(x,), z=(z,), ode=-X, alg=z.symbol - ca.log(1 - t), t=t)
     status, message, _ = failure(model)
-    assert status is Status.NOT_FINITE
+    assert status is sf.Status.NOT_FINITE
     assert "equation of z" in message
 
 
 def test_redundant_constraints_are_refused_at_the_start_by_name() -> None:
-    a, b = Variable("a", "N"), Variable("b", "N")
+    a, b = sf.Variable("a", "N"), sf.Variable("b", "N")
     same = a.symbol + b.symbol - X
-    model = Model("redundant", x=(x,), z=(a, b), ode=-a.symbol, alg=ca.vertcat(same, 2 * same))
+    model = sf.Model("redundant", x=(x,), z=(a, b), ode=-a.symbol, alg=ca.vertcat(same, 2 * same))
     with pytest.raises(ValueError, match="equations for a, b"):
-        simulate(model, 1.0, x0={"x": 1.0})
+        sf.simulate(model, 1.0, x0={"x": 1.0})
 
 
 def test_discontinuity_that_stops_the_step_is_called_one() -> None:
     """Sliding on a switch a trillion times faster than the approach to it."""
-    model = Model("switch", x=(x,), ode=ca.if_else(X < 0.5, 1, -1e12))
+    model = sf.Model("switch", x=(x,), ode=ca.if_else(X < 0.5, 1, -1e12))
     status, message, partial = failure(model)
-    assert status is Status.STEP_TOO_SMALL
+    assert status is sf.Status.STEP_TOO_SMALL
     assert "fastest equation x; a discontinuity is near" in message
     assert "smooth form or the model an event" in message
     assert "begin nearer" not in message
@@ -138,9 +129,9 @@ def test_discontinuity_that_stops_the_step_is_called_one() -> None:
 
 @each_backend
 def test_number_of_attempts_is_limited(backend: str) -> None:
-    model = rabinowicz(BrownMcPhee())
+    model = sf.rabinowicz(sf.BrownMcPhee())
     status, message, partial = failure(model, 1000.0, max_steps=300, backend=backend)
-    assert status is Status.MAX_STEPS
+    assert status is sf.Status.MAX_STEPS
     assert "maximum number of steps was used up" in message
     assert f"Stopped at t = {partial.step_times[-1]:g} s" in message
     attempts = partial.statistics.steps + partial.statistics.rejections
@@ -149,8 +140,8 @@ def test_number_of_attempts_is_limited(backend: str) -> None:
 
 
 def test_partial_result_equals_the_start_of_a_whole_one() -> None:
-    model = rabinowicz(BrownMcPhee())
-    whole = simulate(model, 20.0)
+    model = sf.rabinowicz(sf.BrownMcPhee())
+    whole = sf.simulate(model, 20.0)
     _, _, partial = failure(model, 20.0, max_steps=150, backend="vm")
     early = partial.t
     assert early.size > 10
@@ -158,19 +149,19 @@ def test_partial_result_equals_the_start_of_a_whole_one() -> None:
 
 
 def test_failure_is_returned_where_nothing_is_to_be_thrown() -> None:
-    run = simulate(advancing(ca.sqrt(1 - X)), 2.0, throw=False)
-    assert run.status is Status.NOT_FINITE
+    run = sf.simulate(advancing(ca.sqrt(1 - X)), 2.0, throw=False)
+    assert run.status is sf.Status.NOT_FINITE
     assert not run.status.ok
     assert run.t[-1] <= run.step_times[-1] < 2.0
 
 
 def test_a_sign_of_ones_own_is_told_from_a_law() -> None:
-    v = Variable("v", "m/s", start=1.0)
-    chatters = Model("slide", x=(v,), ode=-ca.sign(v))
-    with pytest.raises(SolveError, match=r"contain sign\(\.\.\.\): use contact") as e:
-        simulate(chatters, 5.0, max_steps=300, backend="vm")
-    assert e.value.status is Status.MAX_STEPS
+    v = sf.Variable("v", "m/s", start=1.0)
+    chatters = sf.Model("slide", x=(v,), ode=-ca.sign(v))
+    with pytest.raises(sf.SolveError, match=r"contain sign\(\.\.\.\): use contact") as e:
+        sf.simulate(chatters, 5.0, max_steps=300, backend="vm")
+    assert e.value.status is sf.Status.MAX_STEPS
     assert chattering(chatters)
-    assert not chattering(Model("smooth", x=(v,), ode=-v.symbol))
-    for law in (ExactCoulomb(), Karnopp()):  # of which one holds a sign of its own
-        assert not chattering(rabinowicz(law))
+    assert not chattering(sf.Model("smooth", x=(v,), ode=-v.symbol))
+    for law in (sf.ExactCoulomb(), sf.Karnopp()):  # of which one holds a sign of its own
+        assert not chattering(sf.rabinowicz(law))

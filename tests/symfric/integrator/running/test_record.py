@@ -11,19 +11,8 @@ import pytest
 from backends import needs_compiler
 from numpy.typing import NDArray
 
+import symfric as sf
 import symfric.integrator.running.run as module
-from symfric import (
-    BrownMcPhee,
-    ExactCoulomb,
-    Hold,
-    Linear,
-    LuGre,
-    Model,
-    Trajectory,
-    drive,
-    rabinowicz,
-    simulate,
-)
 from symfric.integrator.running.crossings import cutting
 from symfric.integrator.running.record import Dense, Record, Run, hermite
 from symfric.scenes import PendulumBox
@@ -108,9 +97,9 @@ def test_records_are_taken_apart(count: int, rows: int) -> None:
 
 @pytest.mark.parametrize("method", ["rodas5p", "rodas4p", "rodas3"])
 def test_dense_output_is_as_accurate_as_the_steps(method: str) -> None:
-    model = rabinowicz(LuGre())
-    run = simulate(model, 8.0, method=method, rtol=1e-6)
-    reference = simulate(model, 8.0, rtol=1e-11)
+    model = sf.rabinowicz(sf.LuGre())
+    run = sf.simulate(model, 8.0, method=method, rtol=1e-6)
+    reference = sf.simulate(model, 8.0, rtol=1e-11)
     at_steps = np.abs(run.at(run.step_times)["x"] - reference.at(run.step_times)["x"]).max()
     between = np.abs(run["x"] - reference["x"]).max()
     assert between < 3 * at_steps + 1e-6
@@ -121,25 +110,25 @@ each_engine = pytest.mark.parametrize(
 )
 TIMES = [0.0, 0.1, 0.3, 0.30001, 0.4, 0.9, 1.7, 2.0]
 """Some of them at jumps of the inputs."""
-FORCE = Hold([0.0, 0.3, 0.4, 0.9], [0.0, 15.0, -15.0, 20.0])
-RAMP = Linear([0.0, 0.3, 0.9], [0.0, 15.0, -25.0])
-LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
+FORCE = sf.Hold([0.0, 0.3, 0.4, 0.9], [0.0, 15.0, -15.0, 20.0])
+RAMP = sf.Linear([0.0, 0.3, 0.9], [0.0, 15.0, -25.0])
+LAW = sf.BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 
-Case = tuple[Callable[[], Model], dict[str, Any]]
+Case = tuple[Callable[[], sf.Model], dict[str, Any]]
 CASES: dict[str, Case] = {
-    "one interval": (lambda: rabinowicz(BrownMcPhee()), {}),
-    "held": (lambda: drive(LuGre()), {"u": {"force": FORCE}}),
-    "sampled": (lambda: drive(BrownMcPhee()), {"u": {"force": RAMP}, "times": [0.1, 1.5]}),
-    "events": (lambda: drive(ExactCoulomb()), {"u": {"force": lambda t: 12 * ca.sin(9 * t)}}),
-    "held events": (lambda: drive(ExactCoulomb()), {"u": {"force": FORCE}}),
+    "one interval": (lambda: sf.rabinowicz(sf.BrownMcPhee()), {}),
+    "held": (lambda: sf.drive(sf.LuGre()), {"u": {"force": FORCE}}),
+    "sampled": (lambda: sf.drive(sf.BrownMcPhee()), {"u": {"force": RAMP}, "times": [0.1, 1.5]}),
+    "events": (lambda: sf.drive(sf.ExactCoulomb()), {"u": {"force": lambda t: 12 * ca.sin(9 * t)}}),
+    "held events": (lambda: sf.drive(sf.ExactCoulomb()), {"u": {"force": FORCE}}),
     "algebraic": (lambda: PendulumBox(LAW).model(), {}),
-    "few steps": (lambda: rabinowicz(LuGre()), {"max_steps": 70, "throw": False}),
+    "few steps": (lambda: sf.rabinowicz(sf.LuGre()), {"max_steps": 70, "throw": False}),
 }
 
 
-def run_of(case: str, backend: str, **further: Any) -> Trajectory:
+def run_of(case: str, backend: str, **further: Any) -> sf.Trajectory:
     make, arguments = CASES[case]
-    return simulate(make(), 2.0, t_eval=TIMES, backend=backend, **(arguments | further))
+    return sf.simulate(make(), 2.0, t_eval=TIMES, backend=backend, **(arguments | further))
 
 
 @each_engine
@@ -186,10 +175,10 @@ def test_a_long_run_keeps_no_steps_and_gives_the_same(
 
 def test_tiny_motions_are_found_without_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """The size of a motion is known when its steps are not kept."""
-    model, start = drive(LuGre()), {"v": 1e-7}
-    whole = simulate(model, 0.1, x0=start, samples=11)
+    model, start = sf.drive(sf.LuGre()), {"v": 1e-7}
+    whole = sf.simulate(model, 0.1, x0=start, samples=11)
     monkeypatch.setattr(module, "MOST_BYTES", 2000)
-    bounded = simulate(model, 0.1, x0=start, samples=11)
+    bounded = sf.simulate(model, 0.1, x0=start, samples=11)
     assert bounded["v"].tobytes() == whole["v"].tobytes()
     assert bounded.statistics.steps == whole.statistics.steps
 
@@ -197,10 +186,10 @@ def test_tiny_motions_are_found_without_steps(monkeypatch: pytest.MonkeyPatch) -
 @each_engine
 def test_a_callback_may_run_another_simulation(backend: str) -> None:
     """Buffers belong to one run at a time."""
-    model = rabinowicz(LuGre())
+    model = sf.rabinowicz(sf.LuGre())
 
     def positions(x: float, progress: Callable[[float], None] | None = None) -> Array:
-        return simulate(
+        return sf.simulate(
             model, 20.0, x0={"x": x}, samples=21, backend=backend, progress=progress
         )["x"]  # fmt: skip
 
