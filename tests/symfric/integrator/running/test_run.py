@@ -149,10 +149,8 @@ def test_measured_error_does_not_share_the_mistakes_of_the_run() -> None:
 
 
 def test_a_run_without_a_step_has_its_start_at_any_time() -> None:
-    run = sf.simulate(
-        sf.Model(name="no way", x=(x,), ode=1 / (x.symbol - 1)), 2.0, t_start=1.0, t_eval=[1.0, 2.0],
-        throw=False,
-    )  # fmt: skip
+    model = sf.Model(name="no way", x=(x,), ode=1 / (x.symbol - 1))
+    run = sf.simulate(model, 2.0, t_start=1.0, t_eval=[1.0, 2.0], throw=False)
     assert not run.status.ok
     assert run["x"] == pytest.approx([1.0])
 
