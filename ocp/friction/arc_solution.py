@@ -13,14 +13,13 @@ from ocp.checking.interval_errors import zoh_losses
 from ocp.formulation.phase import Row, Span
 from ocp.formulation.problem import Problem
 from ocp.friction.arcs import CAUGHT, FIRST, PULLED, STOPPED, Rules, breaks_away, in_arcs
-from ocp.friction.mode_models import KINDS
-from ocp.friction.sequence import Leg, Legs, flat, placed, shown, tracks_of
+from ocp.friction.sequence import Leg, Legs, flat, modes_of, placed, shown, tracks_of
 from ocp.friction.transfer import Known, points_in
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import motions_of
 from ocp.solving.one_solve import Solved
 from ocp.solving.prepared import Clock, Option
-from ocp.solving.solution import Mode, Solution
+from ocp.solving.solution import Solution
 from ocp.transcription.program import Iterate, Report, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
@@ -241,10 +240,7 @@ def reassemble(
         meshes=tuple(meshes),
         points=points,
         iterate=Iterate.cold(np.zeros(0), 0),  # multipliers do not apply to the user's problem
-        modes={
-            contact: tuple(Mode(KINDS[run.mode], run.begin, run.end) for run in runs)
-            for contact, runs in tracks_of(solved.legs).items()
-        },
+        modes={contact: modes_of(runs) for contact, runs in tracks_of(solved.legs).items()},
         cause=outcome.cause,
     )
 
