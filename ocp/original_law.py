@@ -19,11 +19,12 @@ from typing import final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ocp.checking.interval_errors import cut_meshes, local_errors
 from ocp.checking.resimulate import arcs_of
 from ocp.checking.verify import verified
+from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solved
@@ -35,7 +36,6 @@ from ocp.transcription.schemes import Shooting
 from ocp.transcription.transcribe import Discretisation, Transcription, discretise
 from symfric.foundation.status import Status
 
-Array = NDArray[np.float64]
 STEPS = 20
 """Default number of steps of an interval."""
 PASSES = 6

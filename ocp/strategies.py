@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from math import isfinite, nan
 from typing import Literal, NamedTuple, final
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.checking.verify import verified, verify
+from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import verify_exactly
 from ocp.friction.homotopy import FINE, LAST, Sharp, sharpened
@@ -27,7 +27,6 @@ from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
-Array = NDArray[np.float64]
 Friction = Literal["auto", "smooth", "sharpen", "modes"]
 INTERVALS = 50
 EARLY = 0.04

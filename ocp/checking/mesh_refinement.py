@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ocp.checking.interval_errors import local_errors, zoh_losses
 from ocp.checking.resimulate import Arc, arcs_of
 from ocp.checking.verify import TOLERANCE, left_between, restarted
+from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solved, Solver
@@ -26,7 +27,6 @@ from ocp.transcription.schemes import Radau, Scheme, Shooting
 from ocp.transcription.transcribe import Discretisation, Skeleton, discretise
 from symfric.foundation.status import Status
 
-Array = NDArray[np.float64]
 GROWTH = 3.0
 """Largest growth of the number of intervals in one pass, as errors are only estimates."""
 LEAST_PARTS = 0.5

@@ -11,16 +11,14 @@ from typing import final
 import casadi as ca
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
-from ocp.formulation.phase import Span, clipped
+from ocp.formulation.phase import Array, Span, clipped
 from ocp.formulation.problem import Problem
 from ocp.transcription.unknowns import Points
 from symfric.foundation.variable import stacked
 from symfric.integrator import Hold, simulate
 from symfric.results.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 REST = 1e-3
 """Magnitude of a state, in multiples of its nominal value, that counts as zero."""
 RTOL = 1e-9

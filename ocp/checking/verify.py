@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import local_errors
 from ocp.checking.resimulate import RTOL, Arc, Run, arcs_of, resimulated, run_from
-from ocp.formulation.phase import FREE, Box, fixed, size_of
+from ocp.formulation.phase import FREE, Array, Box, fixed, size_of
 from ocp.formulation.problem import Problem
 from ocp.solving.solution import Solution
 from ocp.solving.verification import Miss, Verification
@@ -23,7 +23,6 @@ from symfric.foundation import checks
 from symfric.foundation.status import Status
 from symfric.foundation.variable import stacked
 
-Array = NDArray[np.float64]
 CLOSER, PARTS = 2, 16
 """Number of refinements of the worst time, and of parts of its neighbourhood in each."""
 TOLERANCE = 1e-3

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import zoh_losses
-from ocp.formulation.phase import Row, Span
+from ocp.formulation.phase import Array, Row, Span
 from ocp.formulation.problem import Problem
 from ocp.friction.arcs import CAUGHT, FIRST, PULLED, STOPPED, Rules, breaks_away, in_arcs
 from ocp.friction.sequence import Leg, Legs, flat, modes_of, placed, shown, tracks_of
@@ -27,7 +27,6 @@ from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
 
-Array = NDArray[np.float64]
 LEAST = 3
 """Smallest number of intervals of an arc."""
 NEAR = 1.5
@@ -118,6 +117,10 @@ def _at_starts(span: Span, points: SpanPoints, expressions: Sequence[ca.SX]) -> 
     return rows(np.zeros((1, n)), points.nodes[:, :-1], z, points.u, p).full()
 
 
+class StoppedError(Exception):
+    """Exception after a solve that the user or the time limit has stopped."""
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class ModeSolver:
@@ -128,6 +131,7 @@ class ModeSolver:
         solver, scheme, progress: as in `optimise_modes`.
         kick: smallest length of the interval in which a contact breaks away or is stopped [s].
         clock: time limit.
+        tried: results of all solves. A stopped solve is added before `StoppedError` is raised.
     """
 
     rules: Rules
@@ -136,6 +140,7 @@ class ModeSolver:
     kick: float
     progress: Report | None
     clock: Clock = field(default_factory=Clock)
+    tried: list[SolvedSequence] = field(default_factory=list[SolvedSequence])
 
     def solve(self, legs: Legs, known: Known, intervals: int, barrier: float) -> SolvedSequence:
         """Optimise the durations and the motion of a sequence.
@@ -166,10 +171,19 @@ class ModeSolver:
             peaks[number] = [row for row in rows if ca.depends_on(row.expression, u)]
         return discretise(problem, self.scheme, peaks)
 
+    @property
+    def stopped(self) -> bool:
+        """True if the user or the time limit has stopped the last solve."""
+        return self.tried[-1].outcome.status.stopped
+
+    def with_margin(self, margin: float) -> "ModeSolver":
+        """Return the solver with another friction margin."""
+        return replace(self, rules=self.rules._replace(margin=margin))
+
     def again(self, solved: SolvedSequence) -> SolvedSequence:
         """Solve a sequence again with the margin of `rules`, from its motion and on its meshes."""
-        made = self._discretised(solved.legs)
-        return self.on(solved.legs, made, solved.transcription.meshes, solved.known, 1e-4)
+        made, meshes = self._discretised(solved.legs), solved.transcription.meshes
+        return self.on(solved.legs, made, meshes, solved.known, 1e-4)
 
     def on(
         self,
@@ -180,7 +194,11 @@ class ModeSolver:
         barrier: float,
         options: Mapping[str, Option] = FINER,
     ) -> SolvedSequence:
-        """Solve a discretised sequence on given meshes from the motion `known`."""
+        """Solve a discretised sequence on given meshes from the motion `known`.
+
+        Raises:
+            StoppedError: the user or the time limit has stopped the solver.
+        """
         spans, arcs = discretisation.problem.spans, flat(legs)
         meshes = [
             _with_kick(mesh, self.kick / arc.duration) if breaks_away(span) else mesh
@@ -192,7 +210,11 @@ class ModeSolver:
         stage = f"modes {shown(legs)}"
         outcome = self.clock.run(made, prepared, start, self.progress, stage)
         durations = [span.T for span in made.unpack(outcome.iterate.w).spans]
-        return SolvedSequence(made, outcome, placed(legs, durations), discretisation)
+        solved = SolvedSequence(made, outcome, placed(legs, durations), discretisation)
+        self.tried.append(solved)
+        if outcome.status.stopped:
+            raise StoppedError
+        return solved
 
 
 def _with_kick(mesh: Array, kick: float) -> Array:

@@ -20,9 +20,9 @@ from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.formulation.expressions import arguments
+from ocp.formulation.phase import Array
 from ocp.formulation.statement import further_states, rebuilt
 from ocp.friction.mode_models import SIDES, loops_of, mode_model, nominal_load, slip_change
 from ocp.friction.sequence import KINDS
@@ -32,7 +32,6 @@ from symfric.foundation.status import SolveError, Status
 from symfric.foundation.variable import at_start, stacked
 from symfric.model import Event, Model
 
-Array = NDArray[np.float64]
 Modes = dict[str, int]
 OVERLOAD = 1e-9
 """Excess of a reaction over its static level at break-away, relative to the level at the start."""

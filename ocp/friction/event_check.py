@@ -13,9 +13,8 @@ further cases: any law, by its sliding force and static level; normal forces tha
 unknowns of the friction, for which `symfric.model.forces` refuses the applied force; release of the
 most overloaded contact first; and an error if no motion or more than one is consistent.
 
-Limits: the simulation raises `SolveError` for several consistent motions, for none (jamming), and
-for reactions without a solution, which includes contacts of a loop with several degrees of freedom.
-Contacts in ball joints keep their laws.
+Limits: `SolveError` for several consistent motions, for none (jamming), and for reactions without a
+solution, as of a loop with several degrees of freedom. Contacts in ball joints keep their laws.
 """
 
 from __future__ import annotations
@@ -27,10 +26,11 @@ from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ocp.checking.resimulate import Arc, Run, arcs_of, resimulated
 from ocp.checking.verify import cost_of, misses_of
+from ocp.formulation.phase import Array
 from ocp.friction import sequence
 from ocp.friction.contact_modes import Instant, Machine, Modes
 from ocp.solving.solution import Mode, Solution
@@ -44,7 +44,6 @@ from symfric.integrator.equations.inputs import Input, input_data
 from symfric.model import Model
 from symfric.model.model import check_model
 
-Array = NDArray[np.float64]
 LATER = 1e-13
 """Relative time difference by which times just after a jump are found."""
 MOST = 10_000
@@ -55,8 +54,6 @@ CREEP = 1e4
 """Sliding velocity, in zero thresholds, above which a loop moves although one contact stops."""
 APART = 1e-6
 """Relative difference of an unknown above which two solvers have found different solutions."""
-TOLERANCE = 1e-4
-RTOL = 1e-9
 
 
 class Piece(NamedTuple):
@@ -359,14 +356,11 @@ def _unknowns(run: Trajectory, model: Model, t: float) -> dict[str, float]:
     return dict(zip((v.name for v in model.z), values, strict=True))
 
 
-def verify_exactly(
-    solution: Solution, tolerance: float = TOLERANCE, rtol: float = RTOL
-) -> Verification:
+def verify_exactly(solution: Solution, tolerance: float = 1e-4, rtol: float = 1e-9) -> Verification:
     """Verify `solution` with exact friction in place of its laws.
 
-    The function checks start, via points, end, joints, periodicity, bounds, path conditions and
-    cost. An expression that contains a law, such as an output "friction", is evaluated with this
-    law. `Verification.trajectories` are the exact motions.
+    All conditions and the cost are checked. An expression that contains a law, such as an output
+    "friction", is evaluated with this law. `Verification.trajectories` are the exact motions.
 
     Args:
         solution: solution of a problem whose models have contacts.

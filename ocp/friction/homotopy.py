@@ -25,11 +25,10 @@ from math import sqrt
 from typing import NamedTuple, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import cut_meshes, local_errors
 from ocp.checking.resimulate import arcs_of
-from ocp.formulation.phase import initial
+from ocp.formulation.phase import Array, initial
 from ocp.formulation.problem import Problem
 from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
@@ -44,7 +43,6 @@ from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
 from ocp.transcription.unknowns import Points
 
-Array = NDArray[np.float64]
 FINALISTS = 3
 """Number of coarse solutions that are solved again on the finer mesh."""
 ALIKE = 1e-3
@@ -113,21 +111,15 @@ class Step(Solved):
         """True if the user or the time limit has stopped the solver."""
         return self.outcome.status.stopped
 
-    def better_than(self, other: "Step") -> bool:
-        """Return True if only this step is solved, or if it has a lower cost or violation."""
-        if self.ok != other.ok:
-            return self.ok
-        if self.ok:
-            return self.outcome.cost < other.outcome.cost
-        return self.outcome.violation < other.outcome.violation
-
 
 def least(steps: Sequence[Step]) -> Step:
-    """Return the best of several steps, or the step that was stopped."""
-    best = steps[0]
-    for step in steps[1:]:
-        best = step if step.ended or (not best.ended and step.better_than(best)) else best
-    return best
+    """Return the stopped step, or the cheapest one, or the least violated if none is solved."""
+
+    def rank(step: Step) -> tuple[bool, bool, float]:
+        outcome = step.outcome
+        return not step.ended, not step.ok, outcome.cost if step.ok else outcome.violation
+
+    return min(steps, key=rank)
 
 
 def finalists(steps: Sequence[Step]) -> list[Step]:

@@ -11,11 +11,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ocp.formulation.phase import Array
 from ocp.solving.solution import Mode
 
-Array = NDArray[np.float64]
 SAME_INSTANT = 1e-9
 """Time difference, relative to the duration, below which two times coincide."""
 

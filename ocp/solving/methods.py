@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.phase import Array
 from ocp.solving.prepared import OVERDETERMINED, Built, Option, Prepared, made
 from ocp.solving.watch import GradientHook, IterationHook, Shaped
 from ocp.transcription.program import Program
@@ -76,7 +77,6 @@ def both(program: Program) -> ca.Function:
     return ca.Function("nlp_jac_fg", [x, p], outputs, POINT, names)
 
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FLOOR = 1e-8

@@ -11,9 +11,8 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ocp.formulation.phase import Box, Free, Span, clipped, limits
+from ocp.formulation.phase import Array, Box, Free, Span, clipped, limits
 from ocp.solving.methods import Fatrop, Ipopt, Sqp
 from ocp.solving.motion import motions_of
 from ocp.solving.solution import Solution
@@ -27,7 +26,6 @@ from symfric.foundation.status import Status
 from symfric.foundation.variable import Variable
 from symfric.model.contact import Contact
 
-Array = NDArray[np.float64]
 Solver = Ipopt | Fatrop | Sqp
 WAVES = 4
 """Number of half waves in a perturbation."""

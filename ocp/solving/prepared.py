@@ -8,8 +8,8 @@ from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ocp.formulation.phase import Array
 from ocp.solving.watch import (
     FAR,
     At,
@@ -33,7 +33,6 @@ from ocp.transcription.program import (
 from ocp.transcription.transcribe import Transcription
 from symfric.foundation.status import Status
 
-Array = NDArray[np.float64]
 Option = str | float | int
 LEAST = 1e-3
 """Smallest time limit of a solver [s], with which it stops at once."""

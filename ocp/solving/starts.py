@@ -7,9 +7,9 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ocp.formulation.phase import Box, Free, Link, Span, clipped, initial, limits
+from ocp.formulation.phase import Array, Box, Free, Link, Span, clipped, initial, limits
 from ocp.formulation.problem import Problem
 from ocp.solving.motion import SpanMotion, along, span_motions, structure_of
 from ocp.solving.solution import Solution
@@ -18,8 +18,6 @@ from ocp.transcription.transcribe import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks
 from symfric.model import Model
-
-Array = NDArray[np.float64]
 
 Guess = float | ArrayLike | Callable[[Array], ArrayLike]
 """A constant, equally spaced samples from 0 to the end, or a function of the times [s]."""

@@ -28,7 +28,7 @@ from ocp.friction.sequence import (
     with_rests,
 )
 from ocp.friction.smooth_models import smoothed, widths
-from ocp.friction.transfer import Known, sizes_of
+from ocp.friction.transfer import Known, Reader
 from ocp.problems import cart_pendulum, load_through_spring, out_and_back
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import starts_around
@@ -81,7 +81,7 @@ def test_legs_are_cut_where_any_contact_changes() -> None:
     legs = tuple(cut([first, second], (k, 0), k, k + 1.0) for k in range(2))
     assert shown(legs) == "(+0)(++) | (++)(-+)"
     assert [arc.duration for arc in flat(legs)] == pytest.approx([0.5, 0.5, 0.2, 0.8])
-    assert tracks_of(legs) == {"one": first.runs, "two": second.runs}
+    assert tracks_of(legs) == {"one": [*first.runs], "two": [*second.runs]}
 
 
 def test_vanished_arcs_are_pruned_and_modes_inserted() -> None:
@@ -143,14 +143,14 @@ def known() -> Known:
 
 def modes_solver() -> ModeSolver:
     problem = out_and_back()
-    rules = Rules(problem, sizes_of(problem, known()), ("guide",), SHORTEST * 2)
+    rules = Rules(problem, Reader(problem, known()).sizes(), ("guide",), SHORTEST * 2)
     return ModeSolver(rules, Ipopt(max_iter=100), Radau(3), KICK * 2, None)
 
 
 def found_for(legs: tuple[Leg, ...]) -> SolvedSequence:
     first = modes_solver().solve(legs, known(), 30, 1e-2)
     assert first.ok
-    return settled(modes_solver(), first, lambda solved: solved)
+    return settled(modes_solver(), first)
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_neighbouring_sequences_are_tried_and_the_better_one_is_kept() -> None:
     legs = two((1, 0, 1), (-1, 1, 2))
     assert [shown(other) for other in neighbours(legs, 0.01)] == ["+- | -", "+ | +-"]
     found = found_for(legs)
-    kept = better(modes_solver(), found, 0.01, lambda solved: solved)
+    kept = better(modes_solver(), found, 0.01)
     assert shown(kept.legs) == "+ | -"
     assert kept.outcome.cost <= found.outcome.cost
     forces = [points.u[0, 0] for points in found.points.spans]

@@ -11,7 +11,6 @@ from math import pi, tanh
 from typing import Any
 
 import casadi as ca
-import numpy as np
 import pytest
 from phases import unit_move
 from rubbing import KINDS, Machine, machine
