@@ -17,7 +17,7 @@ from ocp.friction.sequence import Leg, Legs, flat, modes_of, placed, shown, trac
 from ocp.friction.transfer import Known, points_in
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import motions_of
-from ocp.solving.one_solve import Solved
+from ocp.solving.one_solve import Solved, along_points
 from ocp.solving.prepared import Clock, Option
 from ocp.solving.solution import Solution
 from ocp.transcription.program import Iterate, Report, SolverStatistics
@@ -75,21 +75,18 @@ class SolvedSequence(Solved):
     @cached_property
     def overloaded(self) -> list[NDArray[np.bool_]]:
         """Masks of intervals at whose start stiction exceeds its static level."""
-        return [
-            np.any(_at_starts(span, points, _margins(span)) < 0.0, axis=0)
-            for span, points in self._arcs()
-        ]
+        return [np.any(_margins(span, points) < 0.0, axis=0) for span, points in self._arcs()]
 
     def pressed(self, margin: float) -> bool:
         """Return True if stiction, or a start or end of stick, is near the limit of the margin."""
         for span, points in self._arcs():
-            kept = _at_starts(span, points, _margins(span))
+            kept = _margins(span, points)
             changes = [
                 ca.SX(o.expression) + (0 if PULLED in name else margin)
                 for name, o in span.model.outputs.items()
                 if name.endswith((PULLED, CAUGHT, STOPPED))
             ]
-            first = _at_starts(span, points, changes)[:, :1]
+            first = along_points(span, points, stacked(changes), starts=True)[:, :1]
             if min(kept.min(initial=np.inf), first.min(initial=np.inf)) < NEAR * margin:
                 return True
         return False
@@ -104,17 +101,10 @@ class SolvedSequence(Solved):
         return sum(mesh.size - 1 for mesh in self.transcription.meshes)
 
 
-def _margins(span: Span) -> list[ca.SX]:
-    """Return the expressions of the friction margins at starts of intervals."""
-    return [ca.SX(o.expression) for name, o in span.model.outputs.items() if FIRST in name]
-
-
-def _at_starts(span: Span, points: SpanPoints, expressions: Sequence[ca.SX]) -> Array:
-    """Return the values of expressions at the starts of all intervals of a phase, (rows, N)."""
-    n = points.u.shape[1]
-    rows = ca.Function("rows", span.symbols, [stacked(expressions)]).map(n)
-    z, p = points.z[:, :: points.z.shape[1] // n], np.tile(span.p[:, None], (1, n))
-    return rows(np.zeros((1, n)), points.nodes[:, :-1], z, points.u, p).full()
+def _margins(span: Span, points: SpanPoints) -> Array:
+    """Return the friction margins at the starts of all intervals of an arc, (rows, N)."""
+    margins = (o.expression for name, o in span.model.outputs.items() if FIRST in name)
+    return along_points(span, points, stacked(margins), starts=True)
 
 
 class StoppedError(Exception):

@@ -34,10 +34,10 @@ from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
-from ocp.solving.one_solve import Solved, Solver, starts_around
+from ocp.solving.one_solve import Solved, Solver
 from ocp.solving.prepared import Clock, Option, Prepared
 from ocp.solving.solution import Solution
-from ocp.solving.starts import STARTS, Start, resample, start_of
+from ocp.solving.starts import STARTS, Start, resample, start_of, starts_around
 from ocp.transcription.program import Iterate, Report, SolverStatistics
 from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise

@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.phase import Array
-from ocp.solving.prepared import OVERDETERMINED, Built, Option, Prepared, made
+from ocp.solving.prepared import (
+    LEAN,
+    OVERDETERMINED,
+    Built,
+    Option,
+    Prepared,
+    reason_of,
+    refused_options,
+)
 from ocp.solving.watch import GradientHook, IterationHook, Shaped
 from ocp.transcription.program import Program
 from symfric.foundation import checks
@@ -257,8 +265,16 @@ class _Method(ABC):
     def _build(self, program: Program, warm: bool) -> Built:
         """Return the CasADi solver; `warm` is True for a start with multipliers."""
 
-    def _made(self, program: Program, **common: Any) -> Any:
-        return made(type(self).__name__, self.plugin, program, self.options, common)
+    def _made(self, program: Program, **common: Any) -> ca.Function:
+        """Return the CasADi solver of `program`; the user's options override `common`."""
+        prefix = "" if self.plugin == "sqpmethod" else f"{self.plugin}."
+        own = {f"{prefix}{name}": value for name, value in self.options.items()}
+        try:
+            return ca.nlpsol("solver", self.plugin, program.nlp, LEAN | common | own)
+        except (RuntimeError, NotImplementedError) as error:
+            if not self.options:
+                raise
+            raise refused_options(type(self).__name__, self.options, reason_of(error)) from None
 
     def _read(self, stats: Mapping[str, Any]) -> tuple[str, Status]:
         """Return the return code of the solver and its status."""

@@ -71,29 +71,7 @@ class Built(NamedTuple):
     kept: tuple[ca.Callback, ...] = ()
 
 
-def made(
-    solver: str,
-    plugin: str,
-    program: Program,
-    options: Mapping[str, Option],
-    common: Mapping[str, Any],
-) -> ca.Function:
-    """Return the CasADi solver of `program`; the user's `options` override `common`.
-
-    Raises:
-        ValueError: the solver refuses options.
-    """
-    prefix = "" if plugin == "sqpmethod" else f"{plugin}."
-    own = {f"{prefix}{name}": value for name, value in options.items()}
-    try:
-        return ca.nlpsol("solver", plugin, program.nlp, LEAN | dict(common) | own)
-    except (RuntimeError, NotImplementedError) as error:
-        if not options:
-            raise
-        raise refused_options(solver, options, _reason_of(error)) from None
-
-
-def _reason_of(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
     """Return the last line of an error of CasADi without its source location."""
     lines = [line for line in str(error).strip().splitlines() if line.strip()]
     return re.sub(r"^\S*:\d+: ", "", lines[-1]).strip()
@@ -205,7 +183,7 @@ class Prepared:
             with interrupts(watch):
                 result = solver.function(**arguments)
         except RuntimeError as error:  # some solvers check options and structure only here
-            reason = _reason_of(error)
+            reason = reason_of(error)
             if "option" in reason.lower():
                 raise refused_options(self.solver, self.options, reason) from None
             return None, reason, Status.SOLVER_FAILED
