@@ -18,9 +18,9 @@ from ocp.friction.transfer import Known, points_in
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import motions_of
 from ocp.solving.one_solve import Solved, along_points
-from ocp.solving.prepared import Clock, Option
+from ocp.solving.prepared import Option, Supervisor
 from ocp.solving.solution import Solution
-from ocp.transcription.program import Iterate, Report, SolverStatistics
+from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.unknowns import Points, SpanPoints
@@ -118,9 +118,8 @@ class ModeSolver:
 
     Attributes:
         rules: rules by which arcs become phases.
-        solver, scheme, progress: as in `optimise_modes`.
+        solver, scheme, supervisor: as in `optimise_modes`.
         kick: smallest length of the interval in which a contact breaks away or is stopped [s].
-        clock: time limit.
         tried: results of all solves. A stopped solve is added before `StoppedError` is raised.
     """
 
@@ -128,8 +127,7 @@ class ModeSolver:
     solver: Ipopt
     scheme: Scheme
     kick: float
-    progress: Report | None
-    clock: Clock = field(default_factory=Clock)
+    supervisor: Supervisor = field(default_factory=Supervisor)
     tried: list[SolvedSequence] = field(default_factory=list[SolvedSequence])
 
     def solve(self, legs: Legs, known: Known, intervals: int, barrier: float) -> SolvedSequence:
@@ -197,8 +195,7 @@ class ModeSolver:
         made = discretisation.on(meshes)
         prepared = self.solver.with_options(mu_init=barrier, **options).prepared(made.program)
         start = Iterate.cold(made.pack(points_in(made, arcs, known)), made.program.g.numel())
-        stage = f"modes {shown(legs)}"
-        outcome = self.clock.run(made, prepared, start, self.progress, stage)
+        outcome = self.supervisor.run(made, prepared, start, f"modes {shown(legs)}")
         durations = [span.T for span in made.unpack(outcome.iterate.w).spans]
         solved = SolvedSequence(made, outcome, placed(legs, durations), discretisation)
         self.tried.append(solved)

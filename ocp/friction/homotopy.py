@@ -35,10 +35,10 @@ from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
 from ocp.solving.one_solve import Solved, Solver
-from ocp.solving.prepared import Clock, Option, Prepared
+from ocp.solving.prepared import Option, Prepared, Supervisor
 from ocp.solving.solution import Solution
 from ocp.solving.starts import STARTS, Start, resample, start_of, starts_around
-from ocp.transcription.program import Iterate, Report, SolverStatistics
+from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
 from ocp.transcription.unknowns import Points
@@ -160,8 +160,7 @@ def sharpened(
     intervals: int = FINE,
     starts: int = STARTS,
     last: float = LAST,
-    clock: Clock | None = None,
-    progress: Report | None = None,
+    supervisor: Supervisor | None = None,
 ) -> Iterator[Sharp]:
     """Yield solutions with decreasing smoothing widths, one solve at a time.
 
@@ -175,10 +174,9 @@ def sharpened(
         intervals: total number of intervals before refinement.
         starts: number of coarse solves from different starts; the best one is continued.
         last: final smoothing width, in multiples of the speeds.
-        clock: time limit.
-        progress: function called with a `Progress` after each iteration.
+        supervisor: time limit and progress.
     """
-    path = _Path(problem, scheme, solver, clock or Clock(), progress)
+    path = _Path(problem, scheme, solver, supervisor or Supervisor())
     step = path.first(guess, starts, intervals)
     factor, steady = FACTOR, True
     yield path.sharp(step, steady)
@@ -205,10 +203,9 @@ class _Path:
     """Problem with smooth models, scales and prepared solvers, shared by all steps."""
 
     def __init__(
-        self, user: Problem, scheme: Scheme, solver: Solver, clock: Clock, progress: Report | None
+        self, user: Problem, scheme: Scheme, solver: Solver, supervisor: Supervisor
     ) -> None:
-        self.user, self.scheme, self.solver = user, scheme, solver
-        self.clock, self.progress = clock, progress
+        self.user, self.scheme, self.solver, self.supervisor = user, scheme, solver, supervisor
         self.problem = smooth_models.smoothed(user)
         self.discretisation = discretise(self.problem, scheme)
         self.scales: Scales = {}
@@ -324,9 +321,7 @@ class _Path:
                 solver = Ipopt(max_time=solver.max_time, **(dict(options) | dict(solver.options)))
             self.prepared[key] = solver.prepared(transcription.program)
         start = Iterate.cold(transcription.pack(points), transcription.program.g.numel())
-        outcome = self.clock.run(
-            transcription, self.prepared[key], start, self.progress, stage, values
-        )
+        outcome = self.supervisor.run(transcription, self.prepared[key], start, stage, values)
         self.solves.append(outcome.statistics)
         return Step(transcription, outcome, values, level)
 

@@ -35,9 +35,8 @@ from ocp.friction.mode_models import restless
 from ocp.friction.sequence import Legs, flat, inserted, neighbours, pruned, shown
 from ocp.friction.transfer import Known, Reader
 from ocp.solving.methods import Ipopt
-from ocp.solving.prepared import Clock
+from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
-from ocp.transcription.program import Report
 from ocp.transcription.schemes import Radau, Scheme
 
 TOUCH = 1e-5
@@ -113,9 +112,8 @@ def optimise_modes(
     *,
     solver: Ipopt | None = None,
     scheme: Scheme | None = None,
-    progress: Report | None = None,
     margin: float = MARGIN,
-    clock: Clock | None = None,
+    supervisor: Supervisor | None = None,
 ) -> Iterator[tuple[Solution, float]]:
     """Yield motions with exact friction near a sharpened one, with their friction margins.
 
@@ -128,9 +126,9 @@ def optimise_modes(
             speeds; it need not be verified.
         problem: the user's problem.
         widths: contact -> sliding velocity [m/s] over which its friction is smoothed in `smooth`.
-        solver, scheme, progress: as in `ocp.solve`.
+        solver, scheme: as in `ocp.solve`.
         margin: margin between stiction and its static level, as a share of this level.
-        clock: time limit.
+        supervisor: time limit and progress.
 
     Yields:
         A solution with `modes` for exact Coulomb friction with stiction, without verification, and
@@ -161,8 +159,7 @@ def optimise_modes(
         solver=solver.with_options(max_iter=limits[0]),
         scheme=scheme or Radau(3),
         kick=KICK * whole,
-        progress=progress,
-        clock=clock or Clock(),
+        supervisor=supervisor or Supervisor(),
     )
     best: SolvedSequence | None = None
     with suppress(StoppedError):

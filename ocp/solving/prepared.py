@@ -254,22 +254,24 @@ class Prepared:
 
 @final
 @dataclass(frozen=True)
-class Clock:
-    """Total time limit of several solves, which starts at construction.
+class Supervisor:
+    """Total time limit and progress of several solves; the time starts at construction.
 
     Attributes:
-        allowed: total wall time [s], or None for no limit.
+        max_time: total wall time [s], or None for no limit.
+        progress: function called with a `Progress` after each iteration.
     """
 
-    allowed: float | None = None
+    max_time: float | None = None
+    progress: Report | None = None
     started: float = field(default_factory=perf_counter)
 
     @property
     def left(self) -> float | None:
         """Remaining time [s]; None without a limit."""
-        if self.allowed is None:
+        if self.max_time is None:
             return None
-        return max(LEAST, self.allowed - (perf_counter() - self.started))
+        return max(LEAST, self.max_time - (perf_counter() - self.started))
 
     @property
     def over(self) -> bool:
@@ -277,22 +279,15 @@ class Clock:
         return self.left == LEAST
 
     def run(
-        self,
-        transcription: Transcription,
-        prepared: Prepared,
-        start: Iterate,
-        progress: Report | None,
-        stage: str,
-        values: Array | None = None,
-        warm: bool = False,
-        begin: float | None = None,
-    ) -> Outcome:
+        self, transcription: Transcription, prepared: Prepared, start: Iterate, stage: str,
+        values: Array | None = None, warm: bool = False, begin: float | None = None,
+    ) -> Outcome:  # fmt: skip
         """Run `prepared` within the remaining time, and report progress under the name `stage`."""
         left = self.left
         if left is not None and (prepared.max_time is None or prepared.max_time > left):
-            prepared = replace(prepared, max_time=left, told_time=self.allowed)
-        report = in_stage(progress, stage)
+            prepared = replace(prepared, max_time=left, told_time=self.max_time)
         values = transcription.program.values if values is None else values
+        report = in_stage(self.progress, stage)
         return prepared.run(start, values, report, warm, transcription.when, begin)
 
 

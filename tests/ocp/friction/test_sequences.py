@@ -143,7 +143,7 @@ def known() -> Known:
 def modes_solver() -> ModeSolver:
     problem = out_and_back()
     rules = Rules(problem, Reader(problem, known()).sizes(), ("guide",), SHORTEST * 2)
-    return ModeSolver(rules, Ipopt(max_iter=100), Radau(3), KICK * 2, None)
+    return ModeSolver(rules, Ipopt(max_iter=100), Radau(3), KICK * 2)
 
 
 def found_for(legs: tuple[Leg, ...]) -> SolvedSequence:
