@@ -6,7 +6,7 @@ An `Arc` contains the data of one optimised phase that the simulation requires.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -93,9 +93,7 @@ def arcs_of(problem: Problem, meshes: Sequence[Array], points: Points) -> tuple[
     return tuple(arcs)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Run:
+class Run(NamedTuple):
     """Simulated motion of an arc, or of a part of an arc.
 
     Attributes:

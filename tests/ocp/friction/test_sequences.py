@@ -10,7 +10,7 @@ from phases import solve_once
 
 from ocp.formulation.problem import Problem
 from ocp.friction.arc_solution import ModeSolver, SolvedSequence
-from ocp.friction.arcs import STOPPED, Rules, arc_model, in_arcs
+from ocp.friction.arcs import STOPPED, Rules, in_arcs
 from ocp.friction.mode_optimisation import KICK, SHORTEST, better, settled
 from ocp.friction.sequence import (
     Leg,
@@ -46,9 +46,12 @@ def one(*runs: tuple[int, float, float]) -> tuple[Leg]:
     return (cut([Track("guide", tuple(Run(*run) for run in runs))], (0, 0), 0.0, runs[-1][2]),)
 
 
-def two(*runs: tuple[int, float, float]) -> tuple[Leg, Leg]:
-    """Two legs of 1 s of the contact "guide"."""
-    track = Track("guide", tuple(Run(*run) for run in runs))
+SPRING = Rules(load_through_spring(), {"load": 6.0}, (), 1e-4)
+
+
+def two(*runs: tuple[int, float, float], contact: str = "guide") -> tuple[Leg, Leg]:
+    """Two legs of 1 s of a contact."""
+    track = Track(contact, tuple(Run(*run) for run in runs))
     return cut([track], (0, 0), 0.0, 1.0), cut([track], (1, 0), 1.0, 2.0)
 
 
@@ -111,9 +114,8 @@ def test_stops_keep_a_distance_from_the_sliding_force(
     side: int, stretch: float, left: float
 ) -> None:
     """200 N/m hold a load that slides against 4 N: 5 % less than that is allowed at a stop."""
-    model = load_through_spring().chain[0].model
-    made = arc_model(model, {"load": 0}, (), {}, {}, {"load": side}, {"load": 6.0}, (0.01, 0.002))
-    symbols = [made.vector("x"), made.vector("z"), made.vector("u"), made.vector("p")]
+    made = in_arcs(SPRING, two((side, 0, 1), (0, 1, 2), contact="load")).chain[1].model
+    symbols = [made.vector(letter) for letter in "xzup"]
     room = ca.Function("room", symbols, [made.expression(f"load{STOPPED}")])
     p = made.values("p", {})
     assert float(room([stretch, 0, 0, 0], 0, 0, p)) * 6.0 == pytest.approx(left, abs=1e-5)
@@ -121,8 +123,7 @@ def test_stops_keep_a_distance_from_the_sliding_force(
 
 @pytest.mark.parametrize(("left", "margin"), [(1.0, 0.01), (0.002, 0.01 * np.tanh(1.0)), (0, 0)])
 def test_margin_fades_before_break_away(left: float, margin: float) -> None:
-    model = load_through_spring().chain[0].model
-    made = arc_model(model, {"load": 0}, (), {"load": 1}, {}, {}, {"load": 6.0}, (0.01, 0.002))
+    made = in_arcs(SPRING, two((0, 0, 0.5), (1, 0.5, 2), contact="load")).chain[0].model
     symbols = [made.vector(letter) for letter in "xzup"]
     up, down = (ca.Function("f", symbols, [made.expression(f"load_{n}")]) for n in ("up", "down"))
     at = [0, 0, 0, 0, left], 0, 0, made.values("p", {})
