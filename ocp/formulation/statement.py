@@ -31,6 +31,7 @@ from symfric.foundation.variable import symbols_of
 from symfric.model import Model
 
 T = TypeVar("T")
+Request = TypeVar("Request", bound=Mapping[str, Any] | Sequence[str])
 
 Duration = tuple[Sequence[int], float | Free]
 """(indices of phases, sum of their durations [s])."""
@@ -203,11 +204,11 @@ def rebuilt(model: Model, again: Callable[[Model], Model] | None = None, **chang
     return replace(model, **changes)
 
 
-def _cached(change: Callable[[Model, T], Model]) -> Callable[[Model, T], Model]:
+def _cached(change: Callable[[Model, Request], Model]) -> Callable[[Model, Request], Model]:
     """Return `change` with its results cached in the model; an empty request changes nothing."""
 
     @wraps(change)
-    def changed(model: Model, request: T) -> Model:
+    def changed(model: Model, request: Request) -> Model:
         key = tuple(request.items() if isinstance(request, Mapping) else request)
         kept = model.memory.setdefault(f"ocp {change.__name__}", {(): model})
         if key not in kept:

@@ -91,14 +91,14 @@ def starts_of(problem: Problem, count: int, scale: float) -> Iterator[dict[str, 
         at, nodes, held = list[Array](), list[Array](), list[Array]()
         parts = zip(problem.spans, into.meshes, initial_points(into).spans, strict=True)
         for span, mesh, old in parts:
-            x, u, T = old.nodes, old.u, old.T
+            x, u, time = old.nodes, old.u, old.T
             if seed >= first:
                 x = x + _waves(random, scale, span, model.x, x)(mesh)
                 u = u + _waves(random, scale, span, model.u, u)((mesh[1:] + mesh[:-1]) / 2)
-                T *= float(np.exp(0.5 * scale * random.standard_normal()))
-            T = clipped(T, limits(span.T))
-            at.append(begins[-1] + T * mesh)
-            begins.append(begins[-1] + T)
+                time *= float(np.exp(0.5 * scale * random.standard_normal()))
+            time = clipped(time, limits(span.T))
+            at.append(begins[-1] + time * mesh)
+            begins.append(begins[-1] + time)
             nodes.append(x)
             held.append(np.hstack([u, u[:, -1:]]))
         times = np.linspace(0.0, begins[-1], 201)
