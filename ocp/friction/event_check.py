@@ -46,10 +46,8 @@ from symfric.model.model import check_model
 
 LATER = 1e-13
 """Relative time difference by which times just after a jump are found."""
-MOST = 10_000
-"""Largest number of mode changes in a run."""
-PILED = 40
-"""Largest number of consecutive mode changes without time between them."""
+MOST, PILED = 10_000, 40
+"""Largest number of mode changes in a run, and of consecutive ones without time between them."""
 CREEP = 1e4
 """Sliding velocity, in zero thresholds, above which a loop moves although one contact stops."""
 APART = 1e-6
@@ -68,10 +66,10 @@ class Piece(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class SetValued:
-    """Motion with exact Coulomb friction, up to its end or a failure.
+    """Motion with exact Coulomb friction, up to its end or a failure; see `trajectory`.
 
-    `motion["v"]` is a signal at the times `motion.t`; see `trajectory` for plots and files. Signals
-    are those of the model except law states, and the friction forces "<contact>_F".
+    `motion["v"]` is a signal at the times `motion.t`. Signals are those of the model except law
+    states, and the friction forces "<contact>_F".
 
     Attributes:
         model: the user's model.

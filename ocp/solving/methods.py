@@ -26,14 +26,13 @@ from ocp.transcription.program import Program
 from symfric.foundation import checks
 from symfric.foundation.status import Status
 
-POINT = ["x", "p"]
 MULTIPLIERS = ["x", "p", "lam_f", "lam_g"]
 
 
 def symmetric(triangle: ca.MX) -> ca.MX:
     """Return the symmetric matrix of an upper triangle.
 
-    Each nonzero of the result is a nonzero of the triangle, so no arithmetic is necessary.
+    Each nonzero of the result is a nonzero of the triangle; no arithmetic is necessary.
     """
     sparsity = triangle.sparsity()
     numbered = ca.DM(sparsity, np.arange(1.0, sparsity.nnz() + 1))
@@ -63,10 +62,7 @@ def lagrangian(program: Program) -> ca.Function:
 
 
 def gradients(program: Program) -> ca.Function:
-    """Return (x, p, lam_f, lam_g) -> f, g, gradients of lam_f f + lam_g' g in x and in p.
-
-    The gradient in p is zero, because CasADi requires it but does not use it.
-    """
+    """Return (x, p, lam_f, lam_g) -> f, g, gradients of lam_f f + lam_g' g in x and in p (zero)."""
     x, p, lam_f, lam_g = _symbols(program)
     f, slope = program.gradient(x, p)
     g, jacobian = program.jacobian(x, p)
@@ -82,7 +78,7 @@ def both(program: Program) -> ca.Function:
     outputs = [*program.gradient(x, p), *program.jacobian(x, p)]
     outputs[1] = ca.densify(outputs[1])
     names = ["f", "grad_f_x", "g", "jac_g_x"]
-    return ca.Function("nlp_jac_fg", [x, p], outputs, POINT, names)
+    return ca.Function("nlp_jac_fg", [x, p], outputs, MULTIPLIERS[:2], names)
 
 
 Indices = NDArray[np.int64]
