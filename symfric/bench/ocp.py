@@ -143,7 +143,7 @@ def _case(ready: Ready, quick: bool) -> Iterator[Found]:
         found = [opti(smooth, INTERVALS, guess) for guess in near[:3]]
         yield row(f"Opti {width:g}", "near", found)
         if has_rockit():
-            yield row(f"rockit {width:g}", "default", [rockit(smooth, INTERVALS)])
+            yield row(f"rockit {width:g}", "default", [rockit(smooth, INTERVALS, near[0])])
 
 
 def _ours(problem: Problem, guess: Start) -> Attempt:
