@@ -9,7 +9,7 @@ from mechanics import pendulum_period
 
 from symfric import SolveError, Status, simulate
 from symfric.bench.ivp import correct_digits
-from symfric.bench.ivp_mechanisms import ABSOLUTE, JOINT
+from symfric.bench.ivp_problems import ABSOLUTE, JOINT
 from symfric.multibody import Mechanism
 
 
