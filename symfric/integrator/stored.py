@@ -159,7 +159,11 @@ class Stored:
             self.model, integrator, self.inputs, run, self.p, lambda: self.statistics, self.backend,
             dict(zip(self.model.signals, self.signals, strict=True)),
         )  # fmt: skip
-        return replace(made, keep=lambda _: self, **self._derivatives(integrator, made.t))
+
+        def keep(_: Trajectory) -> Stored:
+            return self
+
+        return replace(made, keep=keep, **self._derivatives(integrator, made.t))
 
     def _derivatives(self, integrator: Callable[[], Integrator], t: Array) -> dict[str, Any]:
         """Return the derivative functions: values at `t` are stored, others use the steps."""

@@ -106,7 +106,7 @@ class Store:
             ValueError: the results cannot be written; complete chunks are kept.
         """
         size, mark = result.attempts.size, self._mark(first)
-        outcome: dict[str, NDArray[Any]] = {
+        outcome: dict[str, Any] = {
             name: getattr(result, name) for name in ("attempts", "reached", "reach")
         }
         outcome["failed"] = np.array(list(result.failed), dtype=np.int64)
