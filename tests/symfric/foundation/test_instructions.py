@@ -37,10 +37,13 @@ def test_a_stored_list_is_the_list_of_what_was_made_of_it() -> None:
         np.testing.assert_array_equal(getattr(stored, name), getattr(again, name))
 
 
-def test_shared_parts_are_stored_once() -> None:
+def test_shared_parts_are_stored_once_and_calls_of_functions_refused() -> None:
     part = ca.sin(X) * Y
     stored = Instructions.of([part, part + 1, ca.exp(part)])
     assert (stored.code[:, 0] == stored.operations.index("sin")).sum() == 1
+    inner = ca.Function("inner", [X], [X * X], {"never_inline": True})
+    with pytest.raises(ValueError, match="expected elementary operations, got"):
+        Instructions.of([inner(Y)])
 
 
 def test_shapes_sparsities_and_bits_of_constants_come_back() -> None:
@@ -55,15 +58,7 @@ def test_shapes_sparsities_and_bits_of_constants_come_back() -> None:
             assert same(one, other)
 
 
-def test_calls_of_functions_are_refused() -> None:
-    inner = ca.Function("inner", [X], [X * X], {"never_inline": True})
-    with pytest.raises(ValueError, match="expected elementary operations, got"):
-        Instructions.of([inner(Y)])
-
-
 GOOD = Instructions.of([ca.sin(X) * Y + 2.0, ca.SX.eye(2) * X])
-N = GOOD.code.shape[0] + 3
-"""Numbers of symbols, constants and operations together."""
 
 
 def at(name: str, place: Any, value: int) -> Instructions:
@@ -73,28 +68,28 @@ def at(name: str, place: Any, value: int) -> Instructions:
     return replace(GOOD, **{name: array})
 
 
-BAD = {
-    "operand of itself": at("code", (0, 1), 3),
-    "operand that follows": at("code", (0, 2), N),
-    "negative operand": at("code", (1, 1), -1),
-    "operation": at("code", (0, 0), 9),
-    "result": at("entries", (0, 3), N),
-    "row": at("entries", (0, 1), 1),
-    "column": at("entries", (1, 2), 7),
-    "expression": at("entries", (2, 0), 2),
-    "entry twice": replace(GOOD, entries=GOOD.entries[[0, 0, 1]]),
-    "order of entries": replace(GOOD, entries=GOOD.entries[[0, 2, 1]]),
-    "size": at("shapes", (1, 0), 2**62),
-    "unknown name": replace(GOOD, operations=("call", *GOOD.operations[1:])),
-    "symbol twice": replace(GOOD, names=(GOOD.names[0],) * 2),
-    "label too many": replace(GOOD, labels=(*GOOD.labels, "z")),
-    "code of two columns": replace(GOOD, code=GOOD.code[:, :2]),
-    "flat shapes": replace(GOOD, shapes=GOOD.shapes[0]),
-}
+BAD = [
+    at("code", (0, 1), 3),  # operand of itself
+    at("code", (0, 2), 3 + len(GOOD.code)),  # operand that follows
+    at("code", (1, 1), -1),  # negative operand
+    at("code", (0, 0), 9),  # operation
+    at("entries", (0, 3), 3 + len(GOOD.code)),  # result
+    at("entries", (0, 1), 1),  # row
+    at("entries", (1, 2), 7),  # column
+    at("entries", (2, 0), 2),  # expression
+    replace(GOOD, entries=GOOD.entries[[0, 0, 1]]),  # entry twice
+    replace(GOOD, entries=GOOD.entries[[0, 2, 1]]),  # order of entries
+    at("shapes", (1, 0), 2**62),  # size
+    replace(GOOD, operations=("call", *GOOD.operations[1:])),  # unknown name
+    replace(GOOD, names=(GOOD.names[0],) * 2),  # symbol twice
+    replace(GOOD, labels=(*GOOD.labels, "z")),  # label too many
+    replace(GOOD, code=GOOD.code[:, :2]),  # code of two columns
+    replace(GOOD, shapes=GOOD.shapes[0]),  # flat shapes
+]
 
 
 def test_lists_that_are_not_sound_are_refused_before_anything_is_made() -> None:
-    for wrong in BAD.values():
+    for wrong in BAD:
         with pytest.raises((ValueError, IndexError)):
             wrong.expressions()
 

@@ -1,5 +1,6 @@
 """Elementary functions keep the type they are given."""
 
+from collections.abc import Hashable
 from math import e, pi
 
 import casadi as ca
@@ -7,24 +8,18 @@ import numpy as np
 import pytest
 
 from symfric.foundation import numeric
+from symfric.foundation.memory import remember
 
-FUNCTIONS = {
-    "exp": (numeric.exp, 1.0, e),
-    "log": (numeric.log, e, 1.0),
-    "sqrt": (numeric.sqrt, 9.0, 3.0),
-    "sin": (numeric.sin, pi / 6, 0.5),
-    "cos": (numeric.cos, pi / 3, 0.5),
-    "tan": (numeric.tan, pi / 4, 1.0),
-    "atan": (numeric.atan, 1.0, pi / 4),
-    "asin": (numeric.asin, 0.5, pi / 6),
-    "tanh": (numeric.tanh, 0.5, (e - 1) / (e + 1)),
-    "erf": (numeric.erf, 0.5, 0.5204998778130465),
-    "expm1": (numeric.expm1, 1e-20, 1e-20),
-}
+FUNCTIONS = (
+    (numeric.exp, 1.0, e), (numeric.log, e, 1.0), (numeric.sqrt, 9.0, 3.0),
+    (numeric.sin, pi / 6, 0.5), (numeric.cos, pi / 3, 0.5), (numeric.tan, pi / 4, 1.0),
+    (numeric.atan, 1.0, pi / 4), (numeric.asin, 0.5, pi / 6), (numeric.expm1, 1e-20, 1e-20),
+    (numeric.tanh, 0.5, (e - 1) / (e + 1)), (numeric.erf, 0.5, 0.5204998778130465),
+)  # fmt: skip
 
 
 def test_functions_of_every_type() -> None:
-    for function, x, expected in FUNCTIONS.values():
+    for function, x, expected in FUNCTIONS:
         assert function(x) == pytest.approx(expected, rel=1e-14)
         many = function(np.full((2, 3), x))
         assert isinstance(many, np.ndarray)
@@ -43,11 +38,14 @@ def test_plain_numbers_and_symbols_are_told_apart() -> None:
     assert [numeric.is_symbolic(x) for x in (*others, *symbols)] == [False] * 6 + [True] * 2
 
 
-def test_column_stacks_floats_arrays_and_matrices() -> None:
+def test_columns_of_floats_arrays_and_matrices() -> None:
     assert numeric.column(1.0, 2.0).tolist() == [1.0, 2.0]
     assert numeric.column(1.0, np.array([2.0, 3.0])).tolist() == [[1.0, 1.0], [2.0, 3.0]]
     assert numeric.column(ca.SX.sym("x"), 1.0).shape == (2, 1)
-    assert numeric.column().shape == (0,)
+    assert numeric.column().shape == numeric.empty(1.0).shape == (0,)
+    assert numeric.empty(np.ones(4)).shape == (0, 4)
+    for kind in (ca.SX, ca.MX):  # joins without a trace
+        assert ca.vertcat(kind.sym("x"), numeric.empty(kind(1.0))).shape == (1, 1)
 
 
 def test_smallest_of_floats_arrays_and_symbols() -> None:
@@ -58,8 +56,9 @@ def test_smallest_of_floats_arrays_and_symbols() -> None:
     assert [float(least(x)) for x in (1.0, 3.0)] == [1.0, 2.0]
 
 
-def test_empty_has_no_rows_and_joins_without_a_trace() -> None:
-    assert numeric.empty(1.0).shape == (0,)
-    assert numeric.empty(np.ones(4)).shape == (0, 4)
-    assert ca.vertcat(ca.SX.sym("x"), numeric.empty(ca.SX(1.0))).shape == (1, 1)
-    assert ca.vertcat(ca.MX.sym("x"), numeric.empty(ca.MX(1.0))).shape == (1, 1)
+def test_the_first_remembered_stays_and_the_oldest_goes() -> None:
+    known: dict[Hashable, str] = {}
+    for key, made, kept in ((1, "a", "a"), (1, "b", "a"), (2, "c", "c"), (2, "d", "c")):
+        assert remember(known, key, made, 2) == kept
+    assert remember(known, 3, "e", 2) == "e"
+    assert known == {2: "c", 3: "e"}

@@ -22,29 +22,19 @@ def test_units_become_si_and_other_columns_are_left_out(tmp_path: Path) -> None:
     assert table(tmp_path, "F,t [s]\n3,1\n") == {"t": [1.0], "F": [3.0]}
     assert table(tmp_path, "F,t [s]\n3,1,\n") == {"t": [1.0], "F": [3.0]}  # a comma at the end
     assert table(tmp_path, "F [MN],t [ns]\n3,1\n") == {"t": [1e-9], "F": [3e6]}
-
-
-def test_recorders_of_years_and_of_decimal_commas(tmp_path: Path) -> None:
+    # recorders of years and of decimal commas
     text = "t [a];F [kN]\n0;1,5\n0,5;2.5\n"
     assert table(tmp_path, text) == {"t": [0.0, 15778800.0], "F": [1500.0, 2500.0]}
 
 
-@pytest.mark.parametrize(
-    ("unit", "text", "factor"),
-    [
-        ("m/s", "mm/a", 1e-3 / 31557600),
-        ("m/s", "m/min", 1 / 60),
-        ("rad/s", "°/s", np.pi / 180),
-        ("rad/s", "rev/min", np.pi / 30),
-        ("rad/s", "rpm", np.pi / 30),
-    ],
-)
-def test_a_rate_is_a_length_over_a_time(
-    tmp_path: Path, unit: str, text: str, factor: float
-) -> None:
-    (tmp_path / "a.csv").write_text(f"v [{text}]\n2\n", encoding="utf-8")
-    found = read_columns(tmp_path / "a.csv", {"v": (("v",), unit)})
-    assert found["v"][0] == pytest.approx(2 * factor, rel=1e-15)
+def test_a_rate_is_a_length_over_a_time(tmp_path: Path) -> None:
+    for unit, text, factor in (
+        ("m/s", "mm/a", 1e-3 / 31557600), ("m/s", "m/min", 1 / 60), ("rad/s", "°/s", np.pi / 180),
+        ("rad/s", "rev/min", np.pi / 30), ("rad/s", "rpm", np.pi / 30),
+    ):  # fmt: skip
+        (tmp_path / "a.csv").write_text(f"v [{text}]\n2\n", encoding="utf-8")
+        found = read_columns(tmp_path / "a.csv", {"v": (("v",), unit)})
+        assert found["v"][0] == pytest.approx(2 * factor, rel=1e-15)
 
 
 @pytest.mark.parametrize(

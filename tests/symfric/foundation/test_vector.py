@@ -47,23 +47,16 @@ EVEN = {
 }
 
 
-@pytest.mark.parametrize("name", ODD)
 @given(x=sizes, y=sizes, signs=st.tuples(*2 * [st.sampled_from([1.0, -1.0])]))
-def test_odd_expressions_of_one_line_are_those_of_numbers_along_it(
-    name: str, x: float, y: float, signs: tuple[float, float]
+def test_expressions_of_one_line_are_those_of_numbers_along_it(
+    x: float, y: float, signs: tuple[float, float]
 ) -> None:
     x, y = x * signs[0], y * signs[1]
-    expected = ODD[name](x, y) * E
-    assert parts(ODD[name](vector(x), vector(y))) == pytest.approx(expected, rel=1e-9, abs=1e-9)
-
-
-@pytest.mark.parametrize("name", EVEN)
-@given(x=sizes, y=sizes, signs=st.tuples(*2 * [st.sampled_from([1.0, -1.0])]))
-def test_even_expressions_of_one_line_are_those_of_numbers(
-    name: str, x: float, y: float, signs: tuple[float, float]
-) -> None:
-    x, y = x * signs[0], y * signs[1]
-    assert EVEN[name](vector(x), vector(y)) == pytest.approx(EVEN[name](x, y), rel=1e-9, abs=1e-9)
+    close = {"rel": 1e-9, "abs": 1e-9}
+    for name, f in ODD.items():
+        assert parts(f(vector(x), vector(y))) == pytest.approx(f(x, y) * E, **close), name
+    for name, f in EVEN.items():
+        assert f(vector(x), vector(y)) == pytest.approx(f(x, y), **close), name
 
 
 a, b = vector(1.0), Vector([0.3, 2.0], 1e-9)

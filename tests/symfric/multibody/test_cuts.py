@@ -40,20 +40,13 @@ def some(n: int, seed: int = 0) -> np.ndarray:
     return np.abs(np.random.default_rng(seed).normal(0.3, 0.1, n))
 
 
-def test_cut_keeps_numbers_and_symbols() -> None:
+def test_cut_keeps_numbers_and_symbols_and_knows_what_is_used() -> None:
     cuts, x = Cuts(), ca.SX.sym("x", 2)
     kept = cuts(3, ca.vertcat(1.5, x[0], ca.sin(x[1]), ca.SX(1, 1)))
-    assert cuts.links == [3]
-    assert str(cuts.values) == "sin(x_1)"
+    assert (cuts.links, str(cuts.values)) == ([3], "sin(x_1)")
     assert (kept.nnz(), ca.depends_on(kept, x[1])) == (3, False)
-
-
-def test_only_what_is_used_is_needed() -> None:
-    cuts, x = Cuts(), ca.SX.sym("x")
-    a = cuts(0, ca.sin(x))
-    unused = cuts(0, ca.cos(x))
-    b = cuts(1, a * x)
-    assert cuts.needed(b + 1) == [0, 2]
+    unused, last = cuts(0, ca.cos(x[0])), cuts(1, kept[2] * x[0])
+    assert cuts.needed(last + 1) == [0, 2]
     assert cuts.needed(unused * 2) == [1]
 
 
@@ -94,19 +87,13 @@ def instructions(links: int, law: Law | None) -> int:
 
 
 @pytest.mark.slow
-def test_cost_of_a_step_grows_with_the_links_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(prepare, "LONG_WITH_FRICTION", 2)
-    small, large = (instructions(n, BrownMcPhee()) for n in (12, 24))
-    assert np.log2(large / small) < 1.15
-
-
-@pytest.mark.slow
 @each_law
 def test_cuts_are_made_where_they_pay(law: Law | None, monkeypatch: pytest.MonkeyPatch) -> None:
-    longest = prepare.LONG if law is None else prepare.LONG_WITH_FRICTION
-    monkeypatch.setattr(prepare, "LONG", 2)
-    monkeypatch.setattr(prepare, "LONG_WITH_FRICTION", 2)
-    cut = instructions(longest, law)
-    monkeypatch.setattr(prepare, "LONG", 1000)
-    monkeypatch.setattr(prepare, "LONG_WITH_FRICTION", 1000)
-    assert cut < 1.05 * instructions(longest, law)
+    """At the length from which they are made; beyond it the cost grows with the links alone."""
+    name = "LONG" if law is None else "LONG_WITH_FRICTION"
+    longest, found = getattr(prepare, name), list[int]()
+    for first, links in ((2, longest), (2, 2 * longest), (1000, longest)):
+        monkeypatch.setattr(prepare, name, first)
+        found.append(instructions(links, law))
+    assert found[0] < 1.05 * found[2]
+    assert np.log2(found[1] / found[0]) < 1.15

@@ -8,15 +8,12 @@ import pytest
 from chains import TREE, at_start, chain, rod, solve, state
 
 from symfric import BrownMcPhee
-from symfric.multibody import (
-    JointFriction,
-    JointSpringDamper,
-    SpringDamper,
-    UserForce,
-)
+from symfric.multibody import JointFriction, JointSpringDamper, SpringDamper, UserForce
 from symfric.multibody.dynamics import kinetic_energy
 from symfric.multibody.prepare import Prepared
 from symfric.scenes import MECHANISMS
+
+both_ways = pytest.mark.parametrize("reverse", [False, True])
 
 
 @cache
@@ -24,35 +21,65 @@ def prepared(reverse: bool) -> Prepared:
     return chain(reverse).prepare()
 
 
-@pytest.mark.parametrize("reverse", [False, True])
+def accelerations(made: Prepared, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Random accelerations that keep Euler parameters of length one, and what they may not move."""
+    a, free = np.random.default_rng(4).normal(size=made.eq.n), np.eye(made.eq.n)
+    for link in made.eq.kin.topology.links:
+        if link.joint.quaternion is not None:
+            first = link.first + link.joint.quaternion
+            rows = slice(first, first + 4)
+            a[rows] -= q[rows] * (q[rows] @ a[rows] + qd[rows] @ qd[rows])
+            free[rows, rows] -= np.outer(q[rows], q[rows])
+    return a, free
+
+
+@both_ways
 def test_newton_euler_gives_lagranges_equations(reverse: bool) -> None:
     made = prepared(reverse)
     eq, kin = made.eq, made.eq.kin
     T, V = kinetic_energy(kin), eq.potential
     p = ca.gradient(T, eq.qd)
     lagrange = ca.jtimes(p, eq.qd, eq.a) + ca.jtimes(p, eq.q, eq.qd) - ca.gradient(T - V, eq.q)
-    values = ca.Function("both", [eq.q, eq.qd, eq.a, eq.lam], [eq.balance, lagrange])
+    values = ca.Function("both", [eq.q, eq.qd, eq.a, eq.lam],
+                         [eq.balance, lagrange, ca.densify(eq.mass)])  # fmt: skip
     q, qd = state(made)
-    a = np.random.default_rng(4).normal(size=eq.n)
-    P: list[tuple[slice, np.ndarray]] = []
-    for link in kin.topology.links:
-        if link.joint.quaternion is not None:
-            rows = slice(link.first + link.joint.quaternion, link.first + link.joint.quaternion + 4)
-            a[rows] -= q[rows] * (q[rows] @ a[rows] + qd[rows] @ qd[rows])
-            free = np.eye(4) - np.outer(q[rows], q[rows])
-            P.append((rows, free))
-    ours, expected = (m.full().ravel() for m in values.call([q, qd, a, np.zeros(eq.m)]))
-    for rows, free in P:  # along the Euler parameters themselves there is no motion
-        ours[rows], expected[rows] = free @ ours[rows], free @ expected[rows]
-    assert ours == pytest.approx(expected, rel=1e-11, abs=1e-10)
-
-
-@pytest.mark.parametrize("reverse", [False, True])
-def test_mass_matrix_is_symmetric_and_positive(reverse: bool) -> None:
-    made = prepared(reverse)
-    M = ca.Function("M", [made.eq.q], [ca.densify(made.eq.mass)])(state(made)[0]).full()
+    a, free = accelerations(made, q, qd)
+    ours, expected, M = (m.full() for m in values.call([q, qd, a, np.zeros(eq.m)]))
+    # along the Euler parameters themselves there is no motion
+    assert free @ ours == pytest.approx(free @ expected, rel=1e-11, abs=1e-10)
     assert pytest.approx(M.T, rel=1e-12, abs=1e-12) == M
     assert np.linalg.eigvalsh(M).min() > 0
+
+
+@both_ways
+def test_velocities_and_accelerations_are_derivatives_of_positions(reverse: bool) -> None:
+    made = prepared(reverse)
+    kin, a = made.eq.kin, made.eq.a
+
+    def derivative(expression: ca.SX) -> ca.SX:
+        return ca.jtimes(expression, kin.q, kin.qd) + ca.jtimes(expression, kin.qd, a)
+
+    pairs = []
+    for name, m in kin.motion.items():
+        skewed = derivative(ca.densify(m.R)) @ m.R.T
+        pairs += [
+            (derivative(ca.densify(m.p)), m.v),
+            (ca.vertcat(skewed[2, 1], skewed[0, 2], skewed[1, 0]), m.w),
+            (m.R.T @ m.R, ca.SX.eye(3)),
+        ]
+        if name != "ground":
+            pairs += [
+                (derivative(ca.densify(m.v)), m.R @ m.dv_B - kin.motion["ground"].dv_B),
+                (derivative(ca.densify(m.w)), m.R @ m.dw_B),
+            ]
+    q, qd = state(made)
+    values = ca.Function("m", [kin.q, kin.qd, a], [ca.densify(x) for pair in pairs for x in pair])
+    found = [x.full() for x in values.call([q, qd, accelerations(made, q, qd)[0]])]
+    for ours, expected in zip(found[::2], found[1::2], strict=True):
+        assert ours == pytest.approx(expected, abs=1e-12)
+    point, velocity = kin.point("ground.out")
+    assert ca.DM(point).full().ravel() == pytest.approx([0.1, 0.2, 0.3])
+    assert velocity.is_zero()
 
 
 @cache

@@ -26,9 +26,7 @@ def test_inverse_dynamics_undoes_the_model_with_friction() -> None:
     model, f = scene.model(), functions(scene.mechanism())
     x = model.initial_state()
     x[6:12] = np.linspace(0.5, -0.5, 6)
-    u = np.linspace(3.0, -1.0, 6)
-    z = np.full(6, 30.0)
-    a = model.function("ode")(0, x, z, u, []).full()[6:12]
+    u, z = np.linspace(3.0, -1.0, 6), np.full(6, 30.0)
     # the normal forces the accelerations lead to, for which these are right
     for _ in range(60):
         a = model.function("ode")(0, x, z, u, []).full()[6:12]

@@ -5,20 +5,11 @@ from collections.abc import Callable
 import iftomm
 import numpy as np
 import pytest
-from mechanics import pendulum_period
 
 from symfric import SolveError, Status, simulate
 from symfric.bench.ivp import correct_digits
 from symfric.bench.ivp_mechanisms import ABSOLUTE, JOINT
 from symfric.multibody import Mechanism
-
-
-def test_simple_pendulum_returns_after_its_period() -> None:
-    period = pendulum_period(np.sqrt(iftomm.G), np.pi / 2)
-    run = simulate(iftomm.pendulum().build(), 5 * period, rtol=1e-9, backend="vm")
-    assert run.final["phi"] == pytest.approx(np.pi, abs=1e-6)
-    assert run.final["phi_rate"] == pytest.approx(0.0, abs=1e-5)
-    assert np.ptp(run["energy"]) < 1e-6
 
 
 def time_to_lie_down(n: int) -> float:

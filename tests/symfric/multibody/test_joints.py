@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 
 from symfric.model.sketch import Symbol
-from symfric.multibody import ALL_JOINTS, Joint, Mechanism
+from symfric.multibody import (
+    ALL_JOINTS,
+    Cylindrical,
+    Distance,
+    Floating,
+    Joint,
+    Mechanism,
+    Revolute,
+    Spherical,
+)  # fmt: skip
 from symfric.multibody.joint import COMPONENTS, Pair, unit
 from symfric.multibody.spatial import rotation_y, rotation_z, skew
 from symfric.results.kinds import kinds
@@ -29,35 +38,25 @@ def coordinates(kind: type[Joint], seed: int = 0) -> np.ndarray:
 
 
 @each_moving
-def test_motion_subspace_is_the_derivative_of_the_pose(kind: type[Joint]) -> None:
+def test_pose_motion_subspace_and_constraints_fit_each_other(kind: type[Joint]) -> None:
+    """The subspace is the derivative of the pose; constraints vanish, and do no work in it."""
     n = len(kind.coordinates)
     q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
     R, p = joint(kind).pose(q)
     H_w, H_v = joint(kind).subspace(q)
     R_dot = ca.reshape(ca.jtimes(ca.vec(ca.densify(R)), q, qd), 3, 3)
     p_dot = ca.jtimes(ca.densify(p), q, qd)
-    both = ca.Function("both", [q, qd], [R_dot - R @ skew(H_w @ qd), p_dot - H_v @ qd])
-    rates = np.random.default_rng(1).normal(size=n)
+    zero = R_dot - R @ skew(H_w @ qd), p_dot - H_v @ qd, joint(kind).constraints(R, p)
+    values = ca.Function("v", [q, qd], [ca.densify(x) for x in (*zero, R, p, H_v, R @ H_w)])
+    at, rates = coordinates(kind), np.random.default_rng(1).normal(size=n)
     if kind.quaternion is not None:
-        unit = coordinates(kind)[kind.quaternion :]
+        unit = at[kind.quaternion :]
         rates[kind.quaternion :] -= unit * (unit @ rates[kind.quaternion :])
-    for left in both.call([coordinates(kind), rates]):
-        assert left.full() == pytest.approx(np.zeros(left.shape), abs=1e-14)
-
-
-@each_moving
-def test_constraints_vanish_wherever_the_joint_goes(kind: type[Joint]) -> None:
-    q = ca.SX.sym("q", len(kind.coordinates))
-    phi = ca.densify(joint(kind).constraints(*joint(kind).pose(q)))
-    value = ca.Function("phi", [q], [phi])(coordinates(kind)).full()
-    assert value == pytest.approx(np.zeros((kind.constrains, 1)), abs=1e-15)
-
-
-@each_moving
-def test_constraints_and_freedoms_make_six(kind: type[Joint]) -> None:
-    q = ca.SX.sym("q", len(kind.coordinates))
-    H = ca.Function("H", [q], [ca.densify(ca.vertcat(*joint(kind).subspace(q)))])
-    freedoms = np.linalg.matrix_rank(H(coordinates(kind)).full()) if kind.coordinates else 0
+    *zero, R, p, v, w = (m.full() for m in values.call([at, rates]))
+    zero.append(twist_derivatives(kind, R, p) @ np.vstack([v, w]))
+    for left in zero:
+        assert left == pytest.approx(np.zeros(left.shape), abs=1e-14)
+    freedoms = np.linalg.matrix_rank(np.vstack([v, w])) if n else 0
     assert freedoms + kind.constrains == 6
 
 
@@ -71,32 +70,15 @@ def twist_derivatives(kind: type[Joint], R: np.ndarray, p: np.ndarray) -> np.nda
 
 
 @each_joint
-def test_constraints_are_independent(kind: type[Joint]) -> None:
+def test_constraints_are_independent_and_hold_what_the_joint_transmits(kind: type[Joint]) -> None:
     apart = np.array([0.0, 0.0, 1.0]) if kind.closes else np.zeros(3)
     C = twist_derivatives(kind, np.eye(3), apart)
-    assert C.shape[0] == kind.constrains
-    assert np.linalg.matrix_rank(C) == kind.constrains
-
-
-@each_moving
-def test_motion_subspace_does_no_work_against_the_constraints(kind: type[Joint]) -> None:
-    q = ca.SX.sym("q", len(kind.coordinates))
-    R, p = joint(kind).pose(q)
-    H_w, H_v = joint(kind).subspace(q)
-    made = ca.Function("m", [q], [ca.densify(x) for x in (R, p, H_v, R @ H_w)])
-    R0, p0, v, w = (m.full() for m in made.call([coordinates(kind)]))
-    work = twist_derivatives(kind, R0, p0) @ np.vstack([v, w])
-    assert work == pytest.approx(np.zeros(work.shape), abs=1e-14)
-
-
-@each_joint
-def test_what_a_joint_transmits_is_what_its_constraints_hold(kind: type[Joint]) -> None:
+    assert C.shape[0] == np.linalg.matrix_rank(C) == kind.constrains
     q = ca.SX.sym("q", len(kind.coordinates))
     if kind.closes:
         R, p = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0], np.ones(3)
         if kind.plane is not None:
-            R = {1: rotation_y, 2: rotation_z}[kind.plane](ca.SX(0.3))
-            R = ca.DM(R).full()
+            R = ca.DM({1: rotation_y, 2: rotation_z}[kind.plane](ca.SX(0.3))).full()
     else:
         pose = ca.Function("pose", [q], [ca.densify(x) for x in joint(kind).pose(q)])
         R, p = (m.full() for m in pose.call([coordinates(kind)]))
@@ -140,24 +122,14 @@ def test_a_new_joint_is_a_class_and_nothing_else() -> None:
 
 
 def test_distance_measures_from_point_to_point() -> None:
-    (rod,) = (k for k in ALL_JOINTS if k.__name__ == "Distance")
-    made = rod("rod", "a", "b", length=5.0)  # type: ignore[call-arg]
-    assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, 0.0])))) == 0.0
-    assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, 1.0])))) == 0.5
+    made = Distance("rod", "a", "b", length=5.0)
+    for z, expected in ((0.0, 0.0), (1.0, 0.5)):
+        assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, z])))) == expected
 
 
-@pytest.mark.parametrize(
-    ("kind", "start", "expected"),
-    [
-        ("Revolute", 0.3, (0.3,)),
-        ("Revolute", None, (0.0,)),
-        ("Cylindrical", (1.0, 2.0), (1.0, 2.0)),
-        ("Spherical", None, (1.0, 0.0, 0.0, 0.0)),
-        ("Floating", None, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)),
-    ],
-)
-def test_a_joint_starts_where_it_is_told_or_without_displacement(
-    kind: str, start: object, expected: tuple[float, ...]
-) -> None:
-    (made,) = (k for k in ALL_JOINTS if k.__name__ == kind)
-    assert made("j", "a", "b", start=start).starts == expected
+def test_a_joint_starts_where_it_is_told_or_without_displacement() -> None:
+    for kind, start, expected in (
+        (Revolute, 0.3, (0.3,)), (Revolute, None, (0.0,)), (Cylindrical, (1.0, 2.0), (1.0, 2.0)),
+        (Spherical, None, (1.0, 0.0, 0.0, 0.0)), (Floating, None, (0.0, 0.0, 0.0, 1.0, 0, 0, 0)),
+    ):  # fmt: skip
+        assert kind("j", "a", "b", start=start).starts == expected

@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from chains import X, Z, attach
 
 from symfric import BrownMcPhee, LuGre, Variable, simulate
 from symfric.multibody import JointFriction, Mechanism, Prismatic, Spherical
@@ -32,9 +33,7 @@ def test_width_of_the_normal_force_is_a_parameter_when_asked_for() -> None:
     rows = free.function("alg")
     fixed = model.function("alg")(0.0, x, z, [], []).full()
     np.testing.assert_allclose(rows(0.0, x, z, [], [1e-4, 1e-4]).full(), fixed, rtol=1e-14)
-    wide = JointFriction(LEVELS, eps=5.0)
     assert not np.allclose(rows(0.0, x, z, [], [5.0, 5.0]).full(), fixed)
-    assert wide.eps == 5.0
     assert model.with_forces(forces).p == ()
 
 
@@ -55,34 +54,24 @@ def test_a_slider_that_is_held_stands_on_the_force_that_its_drive_needs() -> Non
     np.testing.assert_allclose(run["held"], -10.0 * stretch, atol=1e-9)
 
 
-def test_contacts_say_where_what_and_under_which_load() -> None:
-    model = FourMass(LuGre()).model()
-    assert [c.name for c in model.contacts] == ["x1", "y2", "z3", "x4"]
-    N = [str(c.N) for c in model.contacts]
-    assert N[:3] == ["x1_N", "y2_N", "z3_N"]
-    assert [v.name for c in model.contacts for v in c.states] == ["x1_z", "y2_z", "z3_z", "x4_z"]
-    assert [v.name for v in model.open.x] == [v.name for v in model.x[:8]]
-
-
 def test_a_ball_keeps_its_law_in_the_open_model() -> None:
     """Its slip is a vector: there are no two sides of rest."""
     m = Mechanism("ball")
-    m.body("bob", 1.0, (0.01, 0.01, 0.01))
-    m.frame("bob.top", at=(0.0, 0.0, 0.5))
-    friction = JointFriction(LuGre(), radius=0.01)
-    m.joint(Spherical("ball", "ground", "bob.top", friction=friction))
+    attach(m, Spherical, "ball", "bob", J=0.01, to=(0.0, 0.0, 0.5),
+           friction=JointFriction(LuGre(), radius=0.01))  # fmt: skip
     model = m.build()
     assert model.contacts == ()
     assert [v.name for v in model.open.x] == [v.name for v in model.x]
+    other = FourMass(LuGre()).model()
+    assert [v.name for v in other.x[8:]] == ["x1_z", "y2_z", "z3_z", "x4_z"]
+    assert [v.name for v in other.open.x] == [v.name for v in other.x[:8]]
+    assert [str(c.N) for c in other.contacts[:3]] == ["x1_N", "y2_N", "z3_N"]
 
 
 @pytest.mark.parametrize("formulation", ["joint", "absolute"])
 def test_open_in_both_formulations(formulation: str) -> None:
     m = Mechanism("slide")
-    m.body("box", 2.0, (0.1, 0.1, 0.1))
-    for place in ("ground.rail", "box.rail"):
-        m.frame(place, z=(1.0, 0.0, 0.0), x=(0.0, 0.0, 1.0))
-    m.joint(Prismatic("x", "ground.rail", "box.rail", rate=1.0, friction=JointFriction(LEVELS)))
+    attach(m, Prismatic, "x", "box", mass=2.0, z=X, x=Z, rate=1.0, friction=JointFriction(LEVELS))
     model = m.build(formulation=formulation)
     run = simulate(model.open, 0.5, u={"x_F": 1.0})
     assert run["x_slip"][-1] == pytest.approx(0.75, rel=1e-6)

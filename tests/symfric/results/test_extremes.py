@@ -8,17 +8,7 @@ import pytest
 from hybrid import ball
 from matplotlib.lines import Line2D
 
-from symfric import (
-    BrownMcPhee,
-    Model,
-    SolveError,
-    Trajectory,
-    Variable,
-    drive,
-    rabinowicz,
-    simulate,
-)
-from symfric.cli import main
+from symfric import BrownMcPhee, Model, SolveError, Trajectory, Variable, drive, simulate
 from symfric.results.pictures import plot_trajectories
 from symfric.results.quadrature import extremes, looks
 
@@ -31,10 +21,13 @@ def hit() -> Trajectory:
     return simulate(drive(BrownMcPhee()), 10.0, u=force, samples=101, backend="vm")
 
 
-def test_a_pulse_between_the_samples_is_the_greatest_value() -> None:
+def test_a_pulse_between_the_samples_is_the_greatest_value_and_in_the_picture() -> None:
     run = hit()
     assert run["force"].max() < 1e-3
     assert run.extremes["force"] == pytest.approx((0.0, 1 / (WIDTH * sqrt(pi))), rel=1e-4)
+    figure = plot_trajectories({"hit": run}, ["force"])
+    (line,) = (artist for artist in figure.axes[0].get_children() if isinstance(artist, Line2D))
+    assert np.max(line.get_ydata()) > 500
 
 
 def test_extremes_between_steps_are_refined() -> None:
@@ -69,16 +62,3 @@ def test_what_was_reached_has_extremes_too() -> None:
     least, greatest = failed.value.partial.extremes["x"]
     assert least == 1.0
     assert greatest > 1e3
-
-
-def test_pictures_show_every_step() -> None:
-    figure = plot_trajectories({"hit": hit()}, ["force"])
-    (line,) = (artist for artist in figure.axes[0].get_children() if isinstance(artist, Line2D))
-    assert np.max(line.get_ydata()) > 500
-
-
-def test_the_table_has_the_extremes(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "rabinowicz", "--law", "brown_mcphee", "--samples", "2"]) == 0
-    run = simulate(rabinowicz(BrownMcPhee()), 20.0)
-    row = next(r for r in capsys.readouterr().out.splitlines() if r.split()[:1] == ["x"])
-    assert float(row.split()[3]) == pytest.approx(run["x"].max(), rel=1e-3)

@@ -29,6 +29,8 @@ def test_the_area_of_a_loop_is_that_of_the_circle() -> None:
     assert run.area("v", "x") == pytest.approx(2 * np.pi, rel=1e-9)
     assert run.area("x", "v") == pytest.approx(-2 * np.pi, rel=1e-9)
     assert run.area("v", "x", (0.0, np.pi / 2)) == pytest.approx(np.pi / 4, rel=1e-9)
+    times = [0.0, 1e-3, 6.9]
+    assert run.integral("x", times) == pytest.approx(np.sin(times), abs=1e-8)
 
 
 def test_the_area_below_a_curve_takes_the_rate_by_time_too() -> None:
@@ -57,11 +59,11 @@ def test_the_work_of_friction_is_its_power_integrated() -> None:
 
 def test_what_has_no_area_and_times_that_are_none_are_refused() -> None:
     run = simulate(Prescribed(Viscous()).model(), 1.0, u={"v": Hold([0.0], [0.5])}, t_eval=[1.0])
-    with pytest.raises(ValueError, match="area: expected an x of the states and time"):
-        run.area("friction", "v")
-    with pytest.raises(ValueError, match="between: expected a first and a later time"):
-        run.work("friction", "v", (1.0, 0.5))
-    with pytest.raises(ValueError, match=r"expected times in \[0, 1\] s"):
-        run.work("friction", "v", (0.0, 1.5))
-    with pytest.raises(ValueError, match="did you mean friction"):
-        run.work("frictio", "v")
+    for call, message in (
+        (lambda: run.area("friction", "v"), "area: expected an x of the states and time"),
+        (lambda: run.work("friction", "v", (1.0, 0.5)), "between: expected a first and a later"),
+        (lambda: run.work("friction", "v", (0.0, 1.5)), r"expected times in \[0, 1\] s"),
+        (lambda: run.work("frictio", "v"), "did you mean friction"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call()

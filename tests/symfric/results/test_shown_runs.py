@@ -59,12 +59,6 @@ def test_showing_a_long_run_looks_at_its_times_only() -> None:
     assert looked == [51]
 
 
-def test_a_run_that_got_nowhere_shows_itself() -> None:
-    failed = simulate(rabinowicz(LuGre()), 6.0, max_steps=3, throw=False)
-    assert "MAX_STEPS" in repr(failed)
-    assert on_a_screen(repr(failed))
-
-
 def test_an_ensemble_says_who_failed() -> None:
     model = rabinowicz(BrownMcPhee(), free=["m"])
     runs = simulate_many(model, 1.0, p={"m": [0.5, 1.0]}, t_eval=[0.5, 1.0], max_steps=5)
@@ -75,6 +69,8 @@ def test_an_ensemble_says_who_failed() -> None:
     row = next(line.split() for line in repr(fine).splitlines() if line.startswith("  x"))
     assert row == ["x", "m", f"{x.min():.6g}", f"{np.median(x):.6g}", f"{x.max():.6g}"]
     assert len(shown(fine).pictures) == 1
+    nowhere = simulate(model, 6.0, max_steps=3, throw=False)
+    assert "MAX_STEPS" in repr(nowhere) and on_a_screen(repr(nowhere))
 
 
 def test_mechanisms_show_bodies_joints_and_what_rubs() -> None:

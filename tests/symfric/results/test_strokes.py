@@ -38,19 +38,20 @@ def arm(normal: int, length: float = 2.0, lift: float = 0.0) -> tuple[Sketch, Po
     return Sketch(ca.SX(12, 4), parts, marks), poses
 
 
-@pytest.mark.parametrize(("normal", "right", "up"), [(0, "y", "z"), (1, "x", "z"), (2, "x", "y")])
-def test_planar_motion_is_seen_along_its_normal(normal: int, right: str, up: str) -> None:
-    view = look(*arm(normal))
-    assert view.planar
-    assert view.right == pytest.approx(np.eye(3)["xyz".index(right)])
-    assert view.up == pytest.approx(np.eye(3)["xyz".index(up)])
-    assert np.cross(view.right, view.up) == pytest.approx(view.eye)
-
-
-def test_motion_out_of_a_plane_is_spatial() -> None:
-    view = look(*arm(1, lift=1e-3))
-    assert not view.planar
-    assert np.linalg.norm(view.eye) == pytest.approx(1.0)
+def test_planar_motion_is_seen_along_its_normal_and_holds_all_places() -> None:
+    for normal, right, up in ((0, "y", "z"), (1, "x", "z"), (2, "x", "y")):
+        sketch, poses = arm(normal)
+        view = look(sketch, poses)
+        assert view.planar
+        assert view.right == pytest.approx(np.eye(3)["xyz".index(right)])
+        assert view.up == pytest.approx(np.eye(3)["xyz".index(up)])
+        assert np.cross(view.right, view.up) == pytest.approx(view.eye)
+        assert (view.low < poses.at.min(axis=(0, 2))).all()
+        assert (view.high > poses.paths.max(axis=(0, 2))).all()
+        assert view.size == pytest.approx(0.02 * np.ptp(poses.at, axis=(0, 2)).max())
+    spatial = look(*arm(1, lift=1e-3))
+    assert not spatial.planar
+    assert np.linalg.norm(spatial.eye) == pytest.approx(1.0)
 
 
 def test_a_mechanism_at_rest_is_seen_along_its_hinges() -> None:
@@ -60,14 +61,6 @@ def test_a_mechanism_at_rest_is_seen_along_its_hinges() -> None:
     view = look(sketch, still)
     assert view.planar
     assert abs(view.eye[1]) == pytest.approx(1.0)
-
-
-def test_the_picture_holds_all_places_and_paths_with_a_margin() -> None:
-    sketch, poses = arm(1)
-    view = look(sketch, poses)
-    assert (view.low < poses.at.min(axis=(0, 2))).all()
-    assert (view.high > poses.paths.max(axis=(0, 2))).all()
-    assert view.size == pytest.approx(0.02 * np.ptp(poses.at, axis=(0, 2)).max())
 
 
 def drawn(symbol: Symbol, a: Array, b: Array, **more: object) -> dict[str, Stroke]:
@@ -92,11 +85,8 @@ def test_a_spring_runs_from_end_to_end_and_swings_in_the_picture() -> None:
     off = points - np.outer(along, B / 5)
     assert np.abs(off[:, 1]).max() == pytest.approx(0.0, abs=1e-12)
     assert np.linalg.norm(off, axis=1).max() == pytest.approx(0.1)
-
-
-def test_a_spring_towards_the_eye_is_drawn_too() -> None:
-    points = drawn(SPRING, A, np.array([0.0, 2.0, 0.0]))["spring"].points
-    assert np.isfinite(points).all()
+    towards_the_eye = drawn(SPRING, A, np.array([0.0, 2.0, 0.0]))["spring"].points
+    assert np.isfinite(towards_the_eye).all()
 
 
 def test_a_block_has_the_twelve_edges_of_a_cube() -> None:
@@ -121,18 +111,13 @@ def test_a_slot_reaches_from_its_body_to_beyond_the_pin() -> None:
     assert not PinInSlot.symbol.turnable  # the slot stays that of its body
 
 
-def test_what_hangs_on_the_ground_shows_it() -> None:
-    assert drawn(Revolute.symbol, A, A, grounded=True)["anchor"].points[0, :, 0] == pytest.approx(A)
-    assert "anchor" not in drawn(Revolute.symbol, A, A)
-
-
-def test_joints_carry_what_their_contacts_do() -> None:
+def test_joints_show_the_ground_what_their_contacts_do_and_rods_a_line() -> None:
+    bare = drawn(Revolute.symbol, A, A)
+    assert "anchor" not in bare and bare["joint"].sticks is None
+    anchor = drawn(Revolute.symbol, A, A, grounded=True)["anchor"]
+    assert anchor.points[0, :, 0] == pytest.approx(A)
     joint = drawn(Revolute.symbol, A, A, slips=(("it_slip", 0.1),))["joint"]
     assert joint.sticks is not None and joint.sticks.all()
-    assert drawn(Revolute.symbol, A, A)["joint"].sticks is None
-
-
-def test_a_rod_is_a_line() -> None:
-    found = drawn(Distance.symbol, A, B)
-    assert found["rod"].points[:, :, 0] == pytest.approx(np.stack([A, B]))
-    assert "joint" not in found
+    rod = drawn(Distance.symbol, A, B)
+    assert rod["rod"].points[:, :, 0] == pytest.approx(np.stack([A, B]))
+    assert "joint" not in rod
