@@ -164,7 +164,9 @@ def equations(
     rows += along @ (every[phi.numel() - norms.numel() :, 0])
     pushed = along.T @ a + ca.jtimes(along.T @ qd, q, qd)
     rows += along @ (inertia * pushed)
-    reactions |= {loop.joint.name: loop.on_child(wrench) for loop, wrench in of_loops}
+    reactions |= {
+        loop.joint.name: (loop.relative.R.T @ F, loop.relative.R.T @ T) for loop, (F, T) in of_loops
+    }
     reactions = {name: reactions[name] for name in topology.joints}
     pressing = {loop.joint.name: wrench for loop, wrench in of_loops if loop.joint.closes}
     pressing = reactions | pressing

@@ -13,7 +13,7 @@ from symfric.laws.base import smooth
 from symfric.laws.base.families import FINEST, rests
 from symfric.laws.base.law import FORCE
 from symfric.model import Event, Variables, kinds
-from symfric.multibody.applied import Rest, applied_forces, capacity_of, forward, switches_at
+from symfric.multibody.applied import Rest, capacity_of, forward, switches_at
 from symfric.multibody.equations import Equations
 from symfric.multibody.joint import Contact
 
@@ -89,7 +89,10 @@ def slips(
         pressing.append(normal)
     levels = [capacity_of(c.law, N) if groups else N
               for c, N in zip(eq.contacts, pressing, strict=True)]  # fmt: skip
-    applied = applied_forces(groups, levels)
+    applied: dict[int, ca.SX] = {}
+    for rest in groups:
+        shares = rest.shares([levels[i] for i in rest.members])
+        applied |= zip(rest.members, shares, strict=True)
     slides = [c.slip for c in eq.contacts]
     for rest in groups:
         for i, g in zip(rest.members, rest.along, strict=True) if rest.direction else ():
