@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from symfric.multibody import (
@@ -24,6 +25,10 @@ from symfric.multibody.prepare import Prepared
 
 Array = NDArray[np.float64]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+in_both = pytest.mark.parametrize("formulation", ["joint", "absolute"])
+in_joint_coordinates_first = pytest.mark.parametrize(
+    "formulation", ["joint", pytest.param("absolute", marks=pytest.mark.slow)]
+)
 TREE = (Revolute, Prismatic, Cylindrical, Universal, Planar, Spherical, Fixed, Floating)
 
 

@@ -96,8 +96,8 @@ PLAIN = 10.0
 
 @cache
 def runs() -> dict[str, Trajectory]:
-    laws = {"Brown-McPhee": BrownMcPhee(), "LuGre": LuGre(), "another name, rather long": LuGre()}
-    return {name: simulate(rabinowicz(law), 1.0) for name, law in laws.items()}
+    one, other = (simulate(rabinowicz(law), 0.1) for law in (BrownMcPhee(), LuGre()))
+    return {"Brown-McPhee": one, "LuGre": other, "another name, rather long": other}
 
 
 @pytest.fixture(name="figure")

@@ -338,7 +338,7 @@ class Crooked(StaticLaw):
 
 
 def test_expressions_without_vectors_are_refused_by_what_they_do() -> None:
-    assert anisotropy(Crooked()) == "it adds a number to what has a direction"
+    assert anisotropy(Crooked()) == "it adds a number to a vector"
     with pytest.raises(ValueError, match="PlanarSlip: expected a law such as"):
         PlanarSlip(Viscous)  # type: ignore[arg-type]
 

@@ -6,7 +6,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
-from chains import X, Z, attach
+from chains import X, Z, attach, in_both
 
 from symfric import BrownMcPhee, LuGre, Model, Variable, simulate
 from symfric.bench.multibody import chain
@@ -64,7 +64,7 @@ def test_operations_grow_with_what_is_asked_for() -> None:
     assert none < constant < every
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+@in_both
 def test_explicit_accelerations_satisfy_the_implicit_equations(formulation: str) -> None:
     """Closed-form inverse and factors of the mass matrix, against the balance of forces."""
     model = VARIANTS["all"].build(formulation=formulation)
@@ -170,7 +170,7 @@ def test_a_ball_keeps_its_law_in_the_open_model() -> None:
     assert [str(c.N) for c in other.contacts[:3]] == ["x1_N", "y2_N", "z3_N"]
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+@in_both
 def test_open_in_both_formulations(formulation: str) -> None:
     m = Mechanism("slide")
     attach(m, Prismatic, "x", "box", mass=2.0, z=X, x=Z, rate=1.0, friction=JointFriction(LEVELS))

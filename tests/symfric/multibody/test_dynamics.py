@@ -5,7 +5,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
-from chains import TREE, at_start, chain, rod, solve, state
+from chains import TREE, at_start, chain, in_both, rod, solve, state
 
 from symfric import BrownMcPhee, LuGre
 from symfric.foundation.parameters import Variable
@@ -104,7 +104,7 @@ def loaded(formulation: str) -> Prepared:
     return m.prepare(formulation=formulation)
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+@in_both
 def test_kinetic_energy_changes_by_the_power_of_all_forces(formulation: str) -> None:
     made = loaded(formulation)
     eq = made.eq

@@ -6,7 +6,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from chains import attach, chain, solve
+from chains import attach, chain, in_joint_coordinates_first, solve
 
 from symfric import (
     Asymmetric,
@@ -27,7 +27,6 @@ from symfric.scenes import SliderCrank
 
 pytestmark = pytest.mark.heavy
 
-in_both = pytest.mark.parametrize("formulation", ["joint", "absolute"])
 
 LAW = BrownMcPhee()
 F, T = ca.SX([3.0, -4.0, 5.0]), ca.SX([0.6, -0.8, 0.2])
@@ -96,7 +95,7 @@ def rotor(formulation: str, law: Law = KINETIC) -> Trajectory:
     return simulate(ball(law).build(formulation=formulation), 2.0, rtol=1e-7, samples=101)
 
 
-@in_both
+@in_joint_coordinates_first
 def test_a_spinning_ball_slows_down_linearly(formulation: str) -> None:
     """J w' = -R mu N: from 9 rad/s with 1.6 rad/s^2."""
     run = rotor(formulation)
@@ -136,7 +135,7 @@ def test_a_ball_that_sticks_stays_where_it_is() -> None:
     assert run["ball_friction"][-1] == pytest.approx(20.0 * np.sin(0.1), rel=1e-2)
 
 
-@in_both
+@in_joint_coordinates_first
 def test_a_shaft_on_a_cross_slows_down_linearly(formulation: str) -> None:
     """It turns about the horizontal x; both of its bearings carry 20 N across their axes."""
     m = Mechanism("cross", gravity=(0.0, 0.0, -10.0))
@@ -180,7 +179,7 @@ def test_friction_in_all_joints_is_the_same_in_both_formulations(reverse: bool) 
         assert motion == pytest.approx(whole.bodies[body], rel=1e-10, abs=1e-10), body
 
 
-@pytest.mark.parametrize("formulation", ["joint", pytest.param("absolute", marks=pytest.mark.slow)])
+@in_joint_coordinates_first
 def test_friction_in_balls_and_crosses_takes_energy(formulation: str) -> None:
     """A double pendulum in space: what is missing is what friction took."""
     m = Mechanism("double")
@@ -213,7 +212,7 @@ def brake(formulation: str = "joint") -> Mechanism:
     return m
 
 
-@in_both
+@in_joint_coordinates_first
 def test_a_brake_that_pulls_is_an_error_at_its_time(formulation: str) -> None:
     """The clamp falls through zero at 2 s; friction would drive the disc from then on."""
     model = brake().build(formulation=formulation)

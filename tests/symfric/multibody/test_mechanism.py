@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from chains import X, Y, Z, attach, rod
+from chains import X, Y, Z, attach, in_both, rod
 
 from symfric import BrownMcPhee, LuGre, SolveError, Viscous, simulate
 from symfric.foundation.numeric import Scalar
@@ -55,7 +55,7 @@ def test_wrong_masses_loose_bodies_and_open_loops_come_at_once() -> None:
     assert (x, z) == pytest.approx(np.array([0.9, 0.6]) / np.hypot(0.9, 0.6), abs=1e-12)
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+@in_both
 def test_a_rod_that_holds_what_is_held_already_is_redundant(formulation: str) -> None:
     m = rod()
     m.frame("ground.beside", at=(0.0, 1.0, 0.0))
@@ -173,7 +173,7 @@ def test_inputs_and_parameters_enter_forces_and_bodies() -> None:
     assert run["x"][-1] == pytest.approx(0.5 * 2.0 * 4.0)
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+@in_both
 def test_a_free_body_spins_as_it_must(formulation: str) -> None:
     """Momentum and energy of a tumbling body without forces."""
     m = Mechanism("m", gravity=(0.0, 0.0, 0.0))
@@ -311,13 +311,12 @@ MISTAKES: list[tuple[Change, str]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
-def test_mistakes_are_described_with_their_path(formulation: str) -> None:
+def test_mistakes_are_described_with_their_path() -> None:
     for change, message in MISTAKES:
         m = rod()
         with pytest.raises(ValueError) as caught:
             change(m)
-            m.build(formulation=formulation)
+            m.build()
         assert message in str(caught.value)
         assert "mechanism 'rod' > " in str(caught.value) or not message.startswith(">")
 

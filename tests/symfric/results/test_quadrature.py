@@ -7,7 +7,7 @@ from math import pi, sqrt
 import casadi as ca
 import numpy as np
 import pytest
-from chains import X, attach
+from chains import X, attach, in_joint_coordinates_first
 from hybrid import ball
 from matplotlib.lines import Line2D
 
@@ -199,7 +199,7 @@ def test_motor_that_moves_its_spring_counts_with_its_whole_power() -> None:
     assert balance.relative < 1e-8
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+@in_joint_coordinates_first
 def test_drive_lifts_and_pays_for_friction(formulation: str) -> None:
     """A rod swung by a drive: angle 0.8 sin(2 t), friction in its hinge."""
     m = Pendulum(LAW).mechanism()
@@ -235,7 +235,7 @@ def test_a_wrong_friction_power_shows() -> None:
     off = dict(model.further)
     off[name] = replace(off[name], expression=(1 + 1e-4) * off[name].expression)
     right, wrong = (
-        simulate(m, 4.0, rtol=1e-8).energy_balance()
+        simulate(m, 1.5, rtol=1e-8).energy_balance()
         for m in (model, replace(model, details=lambda: off))
     )
     assert wrong.relative > 1e3 * right.relative
@@ -270,7 +270,7 @@ def test_nothing_moves_and_nothing_is_missing() -> None:
     books = EnergyBalance(np.arange(3.0), zero - 4.9, {}, zero + 1e-48, 1e-48)
     assert books.relative == 0.0  # it rests but for rounding
     assert replace(books, defect=zero + 1e-9, scale=1e-3).relative == 1e-6
-    with pytest.raises(ValueError, match="'rabinowicz': expected a mechanism, got a model that"):
+    with pytest.raises(ValueError, match="'rabinowicz': expected a mechanism, got a model w"):
         simulate(rabinowicz(LAW), 0.1).energy_balance()
 
 
