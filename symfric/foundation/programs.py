@@ -89,15 +89,12 @@ def started(
     Raises:
         ProgramError: the program cannot be started.
     """
+    env = {**os.environ, "LC_ALL": "C", **(variables or {})}
     try:
         return subprocess.Popen(
-            list(command),
-            stdin=stdin,
-            stdout=stdout,
-            stderr=stderr,
-            env={**os.environ, "LC_ALL": "C", **(variables or {})},
+            list(command), stdin=stdin, stdout=stdout, stderr=stderr, env=env,
             start_new_session=True,
-        )
+        )  # fmt: skip
     except OSError as error:
         raise ProgramError(f"{name or called(command)} does not start: {error.strerror}") from None
 
@@ -162,13 +159,10 @@ class Compiler:
             CompileError: the compiler cannot be started, rejects the code, or exceeds the time
                 limit.
         """
+        command = (*self.command, *arguments)
         try:
             done = finished(
-                (*self.command, *arguments),
-                code.encode(),
-                limit=patience(code),
-                variables=variables,
-                name=str(self),
+                command, code.encode(), limit=patience(code), variables=variables, name=str(self)
             )
         except ProgramError as error:
             raise CompileError(str(error)) from None

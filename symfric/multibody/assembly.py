@@ -119,16 +119,10 @@ def _contact(s: Slip) -> Contact:
     # a normal force that contains reactions is no expression of the model's symbols
     known = s.N is not s.normal or depends_on_load(contact.friction.law)
     return Contact(
-        contact.name,
-        contact.slip,
-        s.N if known else ca.SX(np.nan),
-        contact.friction.law,
-        given=s.inputs,
-        states=s.states,
-        force=contact.F,
-        turning=contact.friction.turning,
+        contact.name, contact.slip, s.N if known else ca.SX(np.nan), contact.friction.law,
+        given=s.inputs, states=s.states, force=contact.F, turning=contact.friction.turning,
         widths={"eps": width} if s.N is not s.normal else {},
-    )
+    )  # fmt: skip
 
 
 def _opened(

@@ -160,8 +160,7 @@ class UserConstraint(Constraint):
         # poses as symbols, by which the expression is differentiated
         motion = {GROUND: kin.motion[GROUND]}
         for name in (n for n in kin.motion if n != GROUND):
-            R, (p, w, v, dw, dv) = ca.SX.sym("R", 3, 3), (ca.SX.sym(x, 3) for x in "pwvab")
-            motion[name] = Motion(R, p, w, v, dw, dv)
+            motion[name] = Motion(ca.SX.sym("R", 3, 3), *(ca.SX.sym(x, 3) for x in "pwvab"))
         probe = replace(kin, motion=motion)
         given: Any = self.expression(probe)
         try:

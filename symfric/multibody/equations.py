@@ -172,30 +172,14 @@ def equations(
     pressing = reactions | pressing
     phi = phi[independent, 0]
     phi_dot = ca.jtimes(phi, q, qd) + ca.jacobian(phi, t)
+    phi_ddot = ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t)
+    normals = tuple(_normal(kin, c, pressing) for c in contacts)
+    potential = sum((f.energy(kin) for f in forces), ca.SX(0))
     return Equations(
-        kin,
-        tuple(forces),
-        loops,
-        held,
-        tuple(turns.values()),
-        norms.numel(),
-        q,
-        qd,
-        a,
-        lam,
-        stacked(c.F for c in contacts),
-        ca.densify(phi),
-        phi_dot,
-        ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t),
-        ca.densify(rows),
-        contacts,
-        tuple(_normal(kin, c, pressing) for c in contacts),
-        kinetic_energy(kin),
-        sum((f.energy(kin) for f in forces), ca.SX(0)),
-        power,
-        reactions,
-        pressing,
-    )
+        kin, tuple(forces), loops, held, tuple(turns.values()), norms.numel(), q, qd, a, lam,
+        stacked(c.F for c in contacts), ca.densify(phi), phi_dot, phi_ddot, ca.densify(rows),
+        contacts, normals, kinetic_energy(kin), potential, power, reactions, pressing,
+    )  # fmt: skip
 
 
 def normals_with(eq: Equations, eps: Mapping[str, Scalar]) -> tuple[ca.SX, ...]:

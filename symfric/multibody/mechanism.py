@@ -280,16 +280,12 @@ class Mechanism(packed.Portable, Showing):
             near = made.q0
         _, J, phi_t = at(near)
         rates = following(J, made.qd0, phi_t)
-        links = made.eq.kin.topology.link_of
-        placed = copy(self)
-        placed.joints = [
-            replace(
-                joint,
-                start=tuple(near[links[joint.name].rows].tolist()),
-                rate=tuple(rates[links[joint.name].rows].tolist()),
-            )
-            if joint.name in links
-            else joint
-            for joint in self.joints
-        ]
+        placed, links = copy(self), made.eq.kin.topology.link_of
+        placed.joints = []
+        for joint in self.joints:
+            if (link := links.get(joint.name)) is not None:
+                start, rate = (tuple(x[link.rows].tolist()) for x in (near, rates))
+                placed.joints.append(replace(joint, start=start, rate=rate))
+            else:
+                placed.joints.append(joint)
         return placed

@@ -312,17 +312,12 @@ def without_friction(made: Prepared) -> tuple[Array, Array, Array]:
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
     turned = ca.densify(starts_of(turn.angle for turn in eq.turns))
+    symbols = [eq.angles, eq.F, symbols_of(made.u), eq.kin.t]
     zero = [turned, ca.SX.zeros(eq.F.numel()), ca.SX(starts_of(made.u)), ca.SX(0)]
-    rows, normals = ca.substitute(
-        [ca.vertcat(eq.balance, eq.phi_ddot), stacked(eq.normals)],
-        [eq.angles, eq.F, symbols_of(made.u), eq.kin.t],
-        zero,
-    )
-    solve = ca.Function(
-        "start",
-        [unknowns, eq.q, eq.qd, symbols_of(made.p)],
-        [rows, ca.jacobian(rows, unknowns), normals],
-    )
+    expressions = [ca.vertcat(eq.balance, eq.phi_ddot), stacked(eq.normals)]
+    rows, normals = ca.substitute(expressions, symbols, zero)
+    arguments = [unknowns, eq.q, eq.qd, symbols_of(made.p)]
+    solve = ca.Function("start", arguments, [rows, ca.jacobian(rows, unknowns), normals])
     at = made.q0, made.qd0, ca.DM(starts_of(made.p))
     right, matrix, _ = solve(0, *at)
     x = -np.linalg.lstsq(matrix.full(), right.full()[:, 0], rcond=None)[0]

@@ -69,7 +69,12 @@ def plot_trajectories(
     tall = max((len(g.names) for g in groups), default=1) > 1
     figure, axes = empty_panels(len(groups), width=8.5 if tall else 7.0, height=2.0)
     alone = all(len(g.names) == 1 for g in groups)
-    _check_log(log, groups, trajectories)
+    checks.check_names("plot: log", log, [name for group in groups for name in group.names])
+    for name in log:
+        top = max(float(run.at_looks(name).max()) for run in trajectories.values())
+        if not top > 0:
+            what = f"expected signals above zero somewhere, got {name}, at most {top:g}"
+            raise ValueError(f"plot: log: {what}")
     by_t, unit_t = clock([end for run in trajectories.values() for end in run.span])
     for axis, group in zip(axes, groups, strict=True):
         _panel(axis, group, trajectories, alone, by_t, not set(log).isdisjoint(group.names))
@@ -108,19 +113,6 @@ def split(groups: Sequence[Group]) -> list[Group]:
         for name in (list(group.names)[-1:] if group.title == ENERGY else group.names)
     ]
     return single if len(single) <= APART else list(groups)
-
-
-def _check_log(
-    log: Sequence[str], groups: Sequence[Group], trajectories: Mapping[str, Signals]
-) -> None:
-    """Check that signals with a logarithmic axis are plotted and positive at some time."""
-    checks.check_names("plot: log", log, [name for group in groups for name in group.names])
-    for name in log:
-        top = max(float(run.at_looks(name).max()) for run in trajectories.values())
-        if not top > 0:
-            raise ValueError(
-                f"plot: log: expected signals above zero somewhere, got {name}, at most {top:g}"
-            )
 
 
 def _panel(

@@ -313,9 +313,7 @@ class Trajectory(packed.Portable, Signals):
     def to_dict(self) -> dict[str, Any]:
         """Return scene, status, statistics, units, times and signals as built-in types."""
         return {
-            "scene": self.scene,
-            "status": self.status.name,
-            "message": self.message,
+            **self._about,
             "statistics": self.statistics.to_dict(),
             "units": {"t": "s", **self.units},
             "t": self.t.tolist(),

@@ -36,10 +36,7 @@ from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, Prescribed, 
 def circle() -> Trajectory:
     """x = cos t, v = -sin t over two turns, with signals of them and of time."""
     x, v, t = Variable("x", "m", start=1.0), Variable("v", "m/s"), ca.SX.sym("t")
-    outputs = {
-        "size": Output(ca.fabs(v.symbol), "m/s"),
-        "late": Output(t * x.symbol, "m s"),
-    }
+    outputs = {"size": Output(ca.fabs(v.symbol), "m/s"), "late": Output(t * x.symbol, "m s")}
     ode = ca.vertcat(v.symbol, -x.symbol)
     model = Model("circle", x=(x, v), t=t, ode=ode, outputs=outputs)
     return simulate(model, 4 * np.pi, rtol=1e-10, t_eval=[0.0, 4 * np.pi])
