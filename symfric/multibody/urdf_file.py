@@ -304,14 +304,16 @@ def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
         ends.append("" if end is None else end.get("link", ""))
         if not ends[-1]:
             notes.problems.append(f"{where} > {key}: expected the name of a link, found none")
-    pose, leader = notes.pose(where, tag), None
+    (parent, child), (R, p), (damping, friction) = ends, notes.pose(where, tag), levels
+    leader = None
     if mimic is not None:
         numbers = (("multiplier", "1"), ("offset", "0"))
         ratio, offset = (notes.number(f"{where} > mimic", mimic, *number) for number in numbers)
         leader = Mimic(mimic.get("joint", ""), ratio, offset)
     given = {} if limit is None else limit.attrib
     limits = {k: notes.number(f"{where} > limit", limit, k) for k in LIMITS if k in given}
-    return UrdfJoint(name, kind, *ends, *pose, axis / (length or 1.0), *levels, limits, leader)
+    axis = axis / (length or 1.0)
+    return UrdfJoint(name, kind, parent, child, R, p, axis, damping, friction, limits, leader)
 
 
 def _check_names(robot: ET.Element, notes: Notes) -> None:
