@@ -22,7 +22,7 @@ from typing import Any
 
 from docs.machine import items, lists, measure
 from docs.machine.items import cards
-from docs.machine.markdown import block, contents, directive, plain, table
+from docs.machine.markdown import block, contents, directive, opening, plain, table
 from docs.machine.pages import DOCS, ROOT, blocks, made_pictures, written_pages
 from symfric.gallery import scripts
 from symfric.gallery.rendering import read, render
@@ -229,12 +229,7 @@ def gallery_pages() -> dict[str, str]:
     papers: dict[str, list[Mapping[str, Any]]] = {}
     for record in records.values():
         papers.setdefault(record["paper"], []).append(record)
-    text = (
-        "# Figures of the papers\n\nFigures of the papers that the laws come from, recomputed. "
-        "Each page states the compared quantities, their distance, and three kinds of verdicts: "
-        "an observation of the paper is reproduced, an explanation is refuted, or the text does "
-        "not decide. `symfric gallery` computes them on your machine.\n\n"
-    )
+    text = opening("gallery")
     if mode("quick"):
         text += directive("note", "", "These figures are computed at reduced size.")
     for paper, own in papers.items():

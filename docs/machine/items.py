@@ -9,7 +9,7 @@ from typing import Any
 
 from docs.machine.docstrings import first_line
 from docs.machine.formula import name as symbol
-from docs.machine.markdown import block, code, contents, directive, plain, table
+from docs.machine.markdown import TEXTS, block, code, contents, directive, opening, plain, table
 from symfric import ALL_LAWS, POPULATIONS, BrownMcPhee, law_name, parameters
 from symfric.cli.laws import costs
 from symfric.figures.data import phenomena
@@ -37,15 +37,7 @@ LAW_PAGES: Mapping[str, type[Any]] = ALL_LAWS | POPULATIONS | MADE_OF_LAWS
 """Name of the page -> class."""
 
 WITH_DATA = "Made of laws and data"
-FAMILIES = {
-    "Maps of the velocity": "The force follows from velocity and load alone. These laws are smooth "
-    "at rest and creep under a load.",
-    "With the applied force": "These laws hold the applied force at rest and need it as an input.",
-    "With states": "Bristles, lag, ageing and modes: friction with memory.",
-    "With non-local memory": "Nested closed loops: pre-sliding hysteresis as measured.",
-    "Populations of contacts": "Many contacts that form and break at random: for figures only.",
-    WITH_DATA: "These laws wrap other laws, or take a table.",
-}
+FAMILIES = TEXTS["families"]
 
 
 def family(law: AnyLaw) -> str:
@@ -74,14 +66,7 @@ def law_pages() -> dict[str, str]:
 
 def law_index(laws: Mapping[str, AnyLaw]) -> str:
     """Return all laws by family, and the meaning of the codes."""
-    text = (
-        f"# Laws\n\n{len(laws)} laws with default parameters, each with its equation, a picture "
-        f"and a table; and {len(MADE_OF_LAWS)} that are made of laws or data. Names are those of "
-        "`symfric laws NAME` and of `symfric run SCENE --law NAME`. The codes under *shows* are "
-        "explained at the end of the page; *instructions* are those of CasADi for force and rate, "
-        "and for their derivatives; *formula* states the reference of the formula, *unverified* "
-        "if there is none.\n\n"
-    )
+    text = opening("laws", count=len(laws), made=len(MADE_OF_LAWS))
     for title, about in FAMILIES.items():
         text += f"## {title}\n\n{about}\n\n"
         if title == WITH_DATA:
@@ -198,10 +183,7 @@ RUBS = BrownMcPhee
 
 def scene_pages() -> dict[str, str]:
     """Return the text of each page, by its name relative to `scenes`."""
-    text = (
-        "# Scenes\n\nPredefined machines: each takes any friction law and returns a `Model`. Names "
-        "are those of `symfric run SCENE --law NAME`.\n\n"
-    )
+    text = opening("scenes")
     rows = [
         [f"[{name}]({name}.md)", first_line(kind.__doc__), len(kind(RUBS()).model().x),
          ", ".join(map(code, kind.presets))]

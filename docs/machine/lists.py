@@ -14,7 +14,7 @@ from typer.cli import get_docs_for_click
 
 from docs.machine.docstrings import first_line
 from docs.machine.items import LAW_PAGES
-from docs.machine.markdown import block, code, contents, directive, plain, table
+from docs.machine.markdown import TEXTS, block, code, contents, directive, opening, plain, table
 from docs.machine.pages import ROOT
 from symfric import ALL_LAWS, POPULATIONS, __version__
 from symfric.cli.app import COMMANDS, app
@@ -23,25 +23,7 @@ from symfric.gallery.plate import about_paper
 from symfric.scenes import ALL_SCENES
 
 PACKAGES = ("symfric", "ocp", "identification")
-MODULES = {
-    "symfric": "Laws, models, simulation and figures: what most programs import.",
-    "ocp": "Optimal control, verified by simulation.",
-    "ocp.mpc": "Model predictive controllers.",
-    "identification": "Friction from measured data.",
-    "symfric.laws": "Base classes and parts of laws.",
-    "symfric.model": "The interface between equations and solvers.",
-    "symfric.multibody": "Mechanisms: bodies, joints, loads.",
-    "symfric.scenes": "Predefined machines; each has its page in the gallery of scenes.",
-    "symfric.figures": "Behaviour of laws as data and pictures.",
-    "symfric.integrator": "Simulation, its settings and results.",
-    "symfric.choice": "Choice of a law for a machine.",
-    "symfric.codegen": "C of laws, plants and robots.",
-    "symfric.compensation": "Friction compensators and observers, in Python and in C.",
-    "symfric.fmu": "Functional Mock-up Units.",
-    "symfric.gallery": "Figures of the papers.",
-    "symfric.results.pictures": "Pictures of runs.",
-    "symfric.results.animation": "Animations of machines.",
-}
+MODULES = TEXTS["modules"]
 """Public modules with their subjects; a name is documented in the first that exports it."""
 
 
@@ -216,11 +198,7 @@ def example_pages() -> dict[str, str]:
         text += f"## {path.relative_to(ROOT)}\n\n" + block(program, "python")
         found[path.stem] = text
         rows.append([f"[{path.stem}]({path.stem}.md)", plain(first_line(about))])
-    index = (
-        f"# Examples\n\n{len(EXAMPLES)} programs of at most a hundred lines in the folder "
-        "`examples`. Each writes pictures into the folder given as its argument. The tests run the "
-        "short ones, `make stress` runs all.\n\n"
-    )
+    index = opening("examples", count=len(EXAMPLES))
     return found | {"index": index + table(["example", "subject"], rows) + contents(found)}
 
 
@@ -253,19 +231,11 @@ SOURCES = re.compile(
 YEAR = re.compile(r"\b1[6-9]\d\d\b|\b20\d\d\b")
 ELSEWHERE = ("laws", "gallery", "bench", "stress", "cli")
 """Packages of symfric whose sources are listed elsewhere, or belong to tables."""
-CITE = f"""@software{{symfric,
-  title   = {{symfric: friction laws as {{CasADi}} expressions}},
-  author  = {{{{The symfric authors}}}},
-  version = {{{__version__}}},
-  license = {{MIT}}
-}}"""
 
 
 def literature_page() -> str:
     """Return the citation of symfric, and the sources of laws, figures and methods."""
-    text = "# Literature, and how to cite\n\n## How to cite\n\n"
-    text += "Name the version, and the paper of the law that you use.\n\n" + block(CITE, "bibtex")
-    text += "## Laws\n\nThe source of each formula; its page states how it was verified.\n\n"
+    text = opening("literature", version=__version__)
     rows = [
         [plain(source), ", ".join(f"[{name}](../laws/{name}.md)" for name in names)]
         for source, names in laws().items()

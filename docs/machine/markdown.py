@@ -1,7 +1,19 @@
-"""Pieces of MyST Markdown."""
+"""Pieces of MyST Markdown, and texts of generated pages."""
 
 import re
+import tomllib
 from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+TEXTS: dict[str, dict[str, str]] = tomllib.loads(
+    Path(__file__).with_name("texts.toml").read_text("utf-8")
+)
+
+
+def opening(page: str, **values: Any) -> str:
+    """Return the first section of a page."""
+    return TEXTS["pages"][page].format(**values)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]], kind: str = "") -> str:

@@ -19,7 +19,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from docs.machine.markdown import plain, table
+from docs.machine.markdown import opening, plain, table
 from docs.machine.pages import DOCS, ROOT
 from symfric import bench
 from symfric.bench import SUBJECTS
@@ -124,15 +124,7 @@ def stored() -> dict[str, dict[str, Any]]:
 
 def page() -> str:
     """Return all measurements, each with command, machine, load, date and commit."""
-    text = (
-        "# Benchmarks\n\nMeasured numbers, stored with command, machine, load, date and commit. "
-        "Times are processor times of whole calls from Python unless a table states otherwise. "
-        "`symfric bench SUBJECT` measures on your machine; `python -m docs.machine.measure "
-        "SUBJECT` stores the result for this page.\n\n*Load* is the mean number of processes that "
-        "waited for a processor before and after the measurement, on a machine with two. Above "
-        "two, times are too long and their ratios are uncertain; counts and errors are not "
-        "affected.\n\n"
-    )
+    text = opening("benchmarks")
     for name, found in stored().items():
         text += f"## {found['title']}\n\n" + f"{found['about']}\n\n" * bool(found["about"])
         if short := found.get("short"):

@@ -1,8 +1,36 @@
 /* RADAU5 for Rabinowicz's stick-slip with Brown-McPhee friction: one equation of two states, by hand.
-   Hairer and Wanner, Solving Ordinary Differential Equations II, IV.8. `contenders.ByHand` defines the
-   numbers P_... of scene and method in front of it. */
+   Hairer and Wanner, Solving Ordinary Differential Equations II, IV.8. `contenders.by_hand` defines the
+   numbers P_... of the scene in front of it. */
 #include <complex.h>
 #include <math.h>
+/* Eigenvalues gamma and alpha +- i beta of the inverse of A, which T makes block diagonal, TI = T^-1;
+   nodes c and weights e of the error estimate. */
+#define P_gamma 3.637834252744496
+#define P_alpha 2.681082873627754
+#define P_beta 3.0504301992474123
+#define P_T00 0.09123239487089305
+#define P_T01 0.12845806217830086
+#define P_T02 0.0273086547513214
+#define P_T10 0.2417179327071072
+#define P_T11 -0.18563595103095715
+#define P_T12 -0.3482489043965752
+#define P_T20 0.9660481826150927
+#define P_T21 -0.909403517646862
+#define P_T22 -0.0
+#define P_TI00 4.325579890063157
+#define P_TI01 0.3391992518158091
+#define P_TI02 0.5417705399358743
+#define P_TI10 4.59501036719607
+#define P_TI11 0.36032719733585505
+#define P_TI12 -0.5241056860367596
+#define P_TI20 0.5529697490581569
+#define P_TI21 -2.8281471315512685
+#define P_TI22 0.6554177471960013
+#define P_c1 0.15505102572168222
+#define P_c2 0.6449489742783178
+#define P_e1 -10.048809399827414
+#define P_e2 1.382142733160748
+#define P_e3 -0.3333333333333333
 static const double m = P_m, k = P_k, N = P_m * P_g, v_belt = P_v_belt, v_t = P_v_t;
 static const double mu_s = P_mu_s, mu_d = P_mu_d;
 static double acceleration(double x, double v)

@@ -290,7 +290,7 @@ def by_hand(model: Model, times: Array, watched: Watched, rtol: float) -> Conten
     del model, watched
     scene, law = Rabinowicz(BrownMcPhee()), BrownMcPhee()
     numbers = {name: getattr(law, name) for name in ("mu_s", "mu_d", "v_t")}
-    numbers |= {name: getattr(scene, name) for name in ("m", "k", "v_belt", "g")} | collocation()
+    numbers |= {name: getattr(scene, name) for name in ("m", "k", "v_belt", "g")}
     defined = "".join(f"#define P_{n} {float(x)!r}\n" for n, x in numbers.items())
     source = defined + Path(__file__).with_name("by_hand.c").read_text("utf-8")
     run = ctypes.CDLL(str(library(source, "by_hand", flags=FASTEST))).by_hand
@@ -308,30 +308,3 @@ def by_hand(model: Model, times: Array, watched: Watched, rtol: float) -> Conten
         return found[:1].copy(), lambda: int(steps[0])
 
     return Contender(solve)
-
-
-def collocation() -> dict[str, float]:
-    """Return the constants of the three-stage Radau method, with T^-1 A^-1 T block diagonal.
-
-    Source: Hairer and Wanner, IV.8.
-    """
-    r = np.sqrt(6.0)
-    A = np.array(
-        [
-            [(88 - 7 * r) / 360, (296 - 169 * r) / 1800, (-2 + 3 * r) / 225],
-            [(296 + 169 * r) / 1800, (88 + 7 * r) / 360, (-2 - 3 * r) / 225],
-            [(16 - r) / 36, (16 + r) / 36, 1 / 9],
-        ]
-    )
-    values, vectors = np.linalg.eig(np.linalg.inv(A))
-    real, pair = int(np.argmin(np.abs(np.imag(values)))), int(np.argmax(np.imag(values)))
-    # (a + ib)(w2 + i w3) in the plane spanned by Re and -Im of the eigenvector of a + ib
-    plane = vectors[:, pair]
-    T = np.column_stack([np.real(vectors[:, real]), np.real(plane), -np.imag(plane)])
-    found = {"gamma": np.real(values[real]), "alpha": np.real(values[pair])}
-    found |= {"beta": np.imag(values[pair])}
-    for name, matrix in (("T", T), ("TI", np.linalg.inv(T))):
-        found |= {f"{name}{i}{j}": matrix[i, j] for i in range(3) for j in range(3)}
-    found |= {"c1": (4 - r) / 10, "c2": (4 + r) / 10}
-    found |= {"e1": -(13 + 7 * r) / 3, "e2": (-13 + 7 * r) / 3, "e3": -1 / 3}
-    return {name: float(value) for name, value in found.items()}

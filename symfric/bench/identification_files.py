@@ -10,9 +10,11 @@ mass of 99.9 kg and an offset of -1.7 N without a warning; 1.2 is reported). Fit
 right for the numbers in them.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
+from pathlib import Path
 from typing import Any, Literal, final
 
 import numpy as np
@@ -26,6 +28,10 @@ Truth = Literal["good", "bad", "hidden"]
 HEADER = "t [s],x [m],force [N]"
 NAMES = ["t", "x", "force"]
 UNITS = "m, N"
+CHANGES: dict[str, dict[str, str]] = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text("utf-8")
+)
+"""Changes of the record by the truth of their files."""
 
 
 @final
@@ -66,10 +72,12 @@ def campaign(seed: int = 3) -> Iterator[File]:
     yield from _stores(a)
     yield from _damaged(a)
     yield from _incomplete(a)
-    for name, spoil in _harmless(rng).items():
-        yield File(name, "good", table(spoil(a.copy())))
-    for name, spoil in {**_sensors(rng), **_physics(rng), **_disturbed(rng)}.items():
-        yield File(name, "bad", table(spoil(a.copy())))
+    known: dict[str, Any] = {"normal": rng.standard_normal}
+    for name, change in CHANGES["good"].items():
+        yield File(name, "good", table(altered(a, change, known)))
+    known["few"] = rng.integers(50, 8000, 20)
+    for name, change in CHANGES["bad"].items():
+        yield File(name, "bad", table(altered(a, change, known)))
     v = np.gradient(a[:, 1], a[:, 0])
     for name, factor in (("velocity flipped", -1.0), ("mm/s taken for m/s", 1e3)):
         yield File(name, "bad", table(np.column_stack([a, factor * v]), HEADER + ",v [m/s]"))
@@ -185,152 +193,22 @@ def _incomplete(a: Array) -> Iterator[File]:
     yield File("column twice", "bad", table(a[:, [0, 1, 2, 2]], HEADER + ",force [N]"))
 
 
-Spoil = Callable[[Array], Array]
-Column = Callable[[Array, Array, Array], Any]
-"""Function that returns new values of a column from t, x and F."""
-T, X, F = 0, 1, 2
+def altered(a: Array, change: str, known: dict[str, Any]) -> Array:
+    """Return the record after a `change` of the data file; `known` are further names in it."""
+    target, _, formula = change.partition(" = ")
+    column, _, rows = target.removesuffix("]").partition("[")
+    names = {"np": np, "n": len(a), "a": a, "backlash": backlash, **known}
+    if column == "a":
+        return eval(formula, names | dict(zip("txF", a.T, strict=True)))
+    made, chosen = a.copy(), eval(f"np.s_[{rows or ':'}]", names)
+    t, x, F = a[chosen].T
+    made[chosen, "txF".index(column)] = eval(formula, names | {"t": t, "x": x, "F": F})
+    return made
 
 
-def put(column: int, new: Column, rows: Any = slice(None)) -> Spoil:
-    """Return a function that changes `rows` of a column."""
-
-    def spoil(a: Array) -> Array:
-        a[rows, column] = new(*a[rows].T)
-        return a
-
-    return spoil
-
-
-def _harmless(rng: np.random.Generator) -> dict[str, Spoil]:
-    """Return harmless changes that a fit has to tolerate."""
-
-    def noisy(column: int, size: float) -> Spoil:
-        return lambda a: a + size * rng.standard_normal(a.shape) * (np.arange(3) == column)
-
-    return {
-        "encoder of 1 um": put(X, lambda t, x, F: 1e-6 * np.rint(x / 1e-6)),
-        "force in steps of 1 N": put(F, lambda t, x, F: np.rint(F)),
-        "force noise of 5 N": noisy(F, 5.0),
-        "jitter of .5 %": noisy(T, 5e-6 / 3),
-        "offset of the position": put(X, lambda t, x, F: x + 3.0),
-        "begins late": put(T, lambda t, x, F: t + 5e3),
-    }
-
-
-def _sensors(rng: np.random.Generator) -> dict[str, Spoil]:
-    few = rng.integers(50, 8000, 20)
-    sparse = few[0] + 100 * np.arange(1, 10)
-
-    def clipped(low: float, high: float = 1e9) -> Spoil:
-        return put(F, lambda t, x, F: np.clip(F, low, high))
-
-    def altered(column: int, new: Callable[[Array], Any], rows: Any = slice(None)) -> Spoil:
-        return put(column, lambda t, x, F: new((t, x, F)[column]), rows)
-
-    def rounded(column: int, step: float) -> Spoil:
-        return altered(column, lambda a: step * np.rint(a / step))
-
-    def frozen(column: int, end: int | None) -> Spoil:
-        return altered(column, lambda a: a[0], slice(3400, end))
-
-    def held(column: int, count: int) -> Spoil:
-        return altered(column, lambda a: np.repeat(a[::count], count)[: a.size])
-
-    def late(count: int) -> Spoil:
-        return lambda a: np.column_stack([a[count:, :2], a[:-count, 2]])
-
-    return {
-        "force clipped at 60 N": clipped(-60, 60),
-        "force clipped at 40 N": clipped(-40, 40),
-        "force clipped at 25 N": clipped(-25, 25),
-        "force clipped on one side": clipped(-1e9, 40),
-        "clipped before its noise": put(
-            F, lambda t, x, F: np.clip(F, -40, 40) + 0.05 * rng.standard_normal(F.size)
-        ),
-        "20 spikes of 10 kN": put(F, lambda t, x, F: 1e4, few),
-        "20 spikes of 150 N": put(F, lambda t, x, F: 150.0, few),
-        "3 glitches of 50 mm": put(X, lambda t, x, F: x + 0.05, few[:3]),
-        "3 glitches of 1 mm": put(X, lambda t, x, F: x + 1e-3, few[:3]),
-        "20 drop-outs to zero": put(X, lambda t, x, F: 0.0, few),
-        "counts lost": put(X, lambda t, x, F: x + 3e-3, slice(3000, None)),
-        "encoder frozen for .4 s": frozen(X, 3800),
-        "encoder frozen for 40 ms": frozen(X, 3440),
-        "force frozen for .4 s": frozen(F, 3800),
-        "force frozen to the end": frozen(F, None),
-        "encoder of 50 um": rounded(X, 5e-5),
-        "encoder of 1 mm": rounded(X, 1e-3),
-        "force in steps of 20 N": rounded(F, 20),
-        "position held for 10 samples": held(X, 10),
-        "force held for 10 samples": held(F, 10),
-        "position modulo 20 mm": put(X, lambda t, x, F: x % 0.02),
-        "force drifts by 30 N": put(F, lambda t, x, F: F + 30 * t / t[-1]),
-        "zero of the force steps by 20 N": put(F, lambda t, x, F: F + 20 * (t > 4)),
-        "hum of 20 N": put(F, lambda t, x, F: F + 20 * np.sin(2 * np.pi * 50 * t)),
-        "force 5 ms late": late(5),
-        "force 20 ms late": late(20),
-        "jitter of 20 %": put(
-            T, lambda t, x, F: np.sort(t + 2e-4 * rng.standard_normal(t.size))
-        ),
-        "gap of .5 s": lambda a: np.delete(a, slice(2000, 2500), axis=0),
-        "one row missing": lambda a: np.delete(a, 2000, axis=0),
-        "one row in a hundred missing": lambda a: np.delete(a, sparse, 0),
-    }  # fmt: skip
-
-
-def _physics(rng: np.random.Generator) -> dict[str, Spoil]:
-    def white(t: Array, size: float) -> Array:
-        return np.column_stack([t, size * rng.standard_normal(t.size), rng.standard_normal(t.size)])
-
-    return {
-        "force flipped": lambda a: a * [1, 1, -1],
-        "position flipped": lambda a: a * [1, -1, 1],
-        "columns exchanged": lambda a: a[:, [0, 2, 1]],
-        "standstill": lambda a: white(a[:, 0], 1e-7),
-        "noise": lambda a: white(a[:, 0], 1),
-        "force of noise": put(F, lambda t, x, F: 10 * rng.standard_normal(t.size)),
-        "constant force": put(F, lambda t, x, F: 3.0),
-        "one way only": lambda a: a[:850],
-        "60 samples": lambda a: a[:60],
-        "velocity for position": put(X, lambda t, x, F: np.gradient(x, 1e-3)),
-        "force without its sign": put(F, lambda t, x, F: np.abs(F)),
-        "force of another run": put(F, lambda t, x, F: np.roll(F, F.size // 3)),
-        "um taken for m": lambda a: a * [1, 1e6, 1],
-        "ms taken for s": lambda a: a * [1e3, 1, 1],
-        "all too large": lambda a: a * [1, 1e9, 1e9],
-        "all too small": lambda a: a * [1, 1e-9, 1e-9],
-        "force sensor squares": put(F, lambda t, x, F: np.sign(F) * F**2 / 50),
-        "spring parallel to the drive": put(F, lambda t, x, F: F + 2e3 * x),
-        "friction grows on the way": put(F, lambda t, x, F: F * (1 + 10 * np.abs(x))),
-    }
-
-
-def _disturbed(rng: np.random.Generator) -> dict[str, Spoil]:
-    """Return disturbances that act on the drive, or between the drive and its sensors."""
-
-    def fading(t: Array, x: Array, F: Array) -> Array:
-        return F - 0.3 * t / t[-1] * 22 * np.tanh(np.gradient(x, 1e-3) / 1e-3)
-
-    def backlash(t: Array, x: Array, F: Array) -> Array:
-        stage, seen = x[0], np.empty(x.size)
-        for k, motor in enumerate(x.tolist()):
-            stage = min(max(stage, motor - 2.5e-4), motor + 2.5e-4)
-            seen[k] = stage
-        return seen + 1e-7 * rng.standard_normal(x.size)
-
-    def low_pass(t: Array, x: Array, F: Array) -> Array:
-        return np.convolve(x, np.exp(-np.arange(60) / 5) / 5.516655)[: x.size]
-
-    return {
-        "friction falls by 30 %": put(F, fading),
-        "cogging of 5 N": put(F, lambda t, x, F: F + 5 * np.sin(2 * np.pi * x / 5e-3)),
-        "gravity by an angle": put(F, lambda t, x, F: F + 30 * np.cos(20 * x)),
-        "slow hum of 10 N": put(F, lambda t, x, F: F + 10 * np.sin(2 * np.pi * 0.3 * t)),
-        "force stays away for 1 s": put(F, lambda t, x, F: 0.0, slice(3000, 4000)),
-        "force gain of 1.3 one way": put(F, lambda t, x, F: F * np.where(F > 0, 1.3, 1.0)),
-        "sign turned half way": put(F, lambda t, x, F: -F, slice(4400, None)),
-        "dead band of 10 N": put(
-            F, lambda t, x, F: np.sign(F) * np.maximum(np.abs(F) - 10, 0)
-        ),
-        "backlash of .5 mm": put(X, backlash),
-        "position through a filter of 5 ms": put(X, low_pass),
-    }  # fmt: skip
+def backlash(motor: Array, half: float) -> Array:
+    """Return the position behind a play of `half` [m] to both sides."""
+    stage, seen = motor[0], np.empty(motor.size)
+    for k, x in enumerate(motor.tolist()):
+        seen[k] = stage = min(max(stage, x - half), x + half)
+    return seen

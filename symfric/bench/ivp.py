@@ -6,8 +6,7 @@ from math import nan
 
 import numpy as np
 
-from symfric.bench.ivp_mechanisms import PROBLEMS
-from symfric.bench.ivp_problems import TEST_SET, Problem
+from symfric.bench.ivp_problems import PROBLEMS, TEST_SET, Problem
 from symfric.bench.report import Found, Progress, Report, backend, best_time, curves
 from symfric.integrator.simulate import simulate
 from symfric.model import Model

@@ -59,13 +59,13 @@ Guesses = Mapping[str, Array]
 """State -> equally spaced samples from 0 to the end of the problem."""
 
 
-def opti(problem: Problem, intervals: int, guess: Guesses | None = None) -> Attempt:
+def opti(problem: Problem, intervals: int, guess: Guesses) -> Attempt:
     """Return the solution by Radau collocation, written as a Python loop with CasADi's Opti.
 
     Args:
         problem: problem of one scenario, without chosen parameters and periodic states.
         intervals: total number of intervals.
-        guess: initial guess of the states; missing states start from straight lines.
+        guess: initial guess of the states.
     """
     if problem.periodic or problem.choose or problem.scenarios:
         raise ValueError("opti: expected one motion with given ends and parameters")
@@ -79,7 +79,7 @@ def opti(problem: Problem, intervals: int, guess: Guesses | None = None) -> Atte
         if isinstance(span.T, Free):
             o.subject_to(o.bounded(span.T.lower, T, span.T.upper))
             o.set_initial(T, span.T.start)
-        start = start_of(problem, span, guess)
+        start = states_of(problem, span, guess)
         share, end, inputs = _collocated(o, span, T, each, clock, before, start)
         cost, before, clock = cost + share, end, clock + T
         parts.append((span, T, inputs))
@@ -107,46 +107,15 @@ def _named(span: Span, rows: Array) -> dict[str, Array]:
     return {v.name: rows[:, i] for i, v in enumerate(span.model.u)}
 
 
-def straight(span: Span) -> Callable[[float], Array]:
-    """Return straight lines through the conditions on each state; rates are their slopes."""
-    duration = span.T.start if isinstance(span.T, Free) else span.T
-    names = [v.name for v in span.model.x]
-    points = {
-        name: [(s, sum(box) / 2) for s in sorted(span.nodes)
-               if np.isfinite(box := span.nodes[s][name]).all()] or [(0.0, 0.0)]
-        for name in names
-    }  # fmt: skip
-    coordinates = {"v": "x", "v1": "x1"} | {f"{name}_rate": name for name in names}
-
-    def line(name: str, s: float) -> float:
-        return float(np.interp(s, *np.transpose(points[name])))
-
-    def at_fraction(s: float) -> Array:
-        low, high = max(s - 1e-3, 0.0), min(s + 1e-3, 1.0)
-        return np.array([
-            (line(q, high) - line(q, low)) / (high - low) / duration
-            if (q := coordinates.get(n)) in points else line(n, s)
-            for n in names
-        ])  # fmt: skip
-
-    return at_fraction
-
-
-def start_of(problem: Problem, span: Span, guess: Guesses | None) -> Callable[[float], Array]:
+def states_of(problem: Problem, span: Span, guess: Guesses) -> Callable[[float], Array]:
     """Return the guess of the states as a function of the fraction of a phase."""
-    lines = straight(span)
-    if not guess:
-        return lines
     lengths = [s.T.start if isinstance(s.T, Free) else s.T for s in problem.spans]
     begin, whole = sum(lengths[: span.phase]), sum(lengths)
 
     def at(s: float) -> Array:
         f = (begin + s * lengths[span.phase]) / whole
-        return np.array([
-            np.interp(f, np.linspace(0, 1, guess[v.name].size), guess[v.name])
-            if v.name in guess else x
-            for v, x in zip(span.model.x, lines(s), strict=True)
-        ])  # fmt: skip
+        known = (guess[v.name] for v in span.model.x)
+        return np.array([np.interp(f, np.linspace(0, 1, row.size), row) for row in known])
 
     return at
 
@@ -235,8 +204,8 @@ def has_rockit() -> bool:
     return find_spec("rockit") is not None
 
 
-def rockit(problem: Problem, intervals: int) -> Attempt:
-    """Return the solution by collocation with rockit.
+def rockit(problem: Problem, intervals: int, guess: Guesses) -> Attempt:
+    """Return the solution by collocation with rockit, with arguments as those of `opti`.
 
     Limits: explicit models without algebraic variables, bounds on states and inputs, and phases of
     given durations.
@@ -262,8 +231,8 @@ def rockit(problem: Problem, intervals: int) -> Attempt:
             low, high = span.boxes[v.name]
             if isfinite(low) and isfinite(high):
                 stage.subject_to(low <= (symbol <= high))
-        guess, at = straight(span), np.linspace(0, 1, each + 1)
-        samples = np.array([guess(s) for s in at.tolist()])
+        at = np.linspace(0, 1, each + 1)
+        samples = np.array([*map(states_of(problem, span, guess), at.tolist())])
         line = ca.interpolant("line", "linear", [clock + span.T * at], samples.ravel())
         stage.set_initial(x, line(stage.t))
         stage.method(other.DirectCollocation(N=each))

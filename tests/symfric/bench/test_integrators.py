@@ -9,7 +9,7 @@ from fake_cupy import FakeCupy
 
 from symfric import BrownMcPhee, Model, simulate
 from symfric.bench import calls, ensemble, integrator, multibody
-from symfric.bench.contenders import MECHANISMS, by_hand, casadi, collocation, compiled, scipy
+from symfric.bench.contenders import MECHANISMS, by_hand, casadi, compiled, scipy
 from symfric.bench.integrator import ERRORS, RUNS
 from symfric.bench.multibody import CASES
 from symfric.bench.report import RATIOS, Report, Row, ratios, time_at
@@ -72,15 +72,6 @@ def test_radau5_by_hand_has_order_five() -> None:
     assert errors[0] < 1e-3
     assert errors[2] < 1e-7
     assert steps[0] < steps[1] < steps[2] < steps[0] * 1e4**0.25
-
-
-def test_constants_of_radau5_are_those_of_the_literature() -> None:
-    """Hairer and Wanner, IV.8: gamma = (6 + 81^(1/3) - 9^(1/3)) / 30 inverted, and its pair."""
-    a, b = 81 ** (1 / 3), 9 ** (1 / 3)
-    alpha, beta = (12 - a + b) / 60, (a + b) * 3**0.5 / 60
-    expected = [30 / (6 + a - b), alpha / (alpha**2 + beta**2), beta / (alpha**2 + beta**2)]
-    found = collocation()
-    assert [found[n] for n in ("gamma", "alpha", "beta")] == pytest.approx(expected, rel=1e-13)
 
 
 def run(name: str, error: float, time_ms: float) -> Row:

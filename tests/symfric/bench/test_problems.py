@@ -8,8 +8,7 @@ import pytest
 from symfric import BrownMcPhee, ExactCoulomb, Model, Variable, parameters, simulate
 from symfric.bench import ivp, multibody, regularisation
 from symfric.bench.ivp import DIGITS, DRIFT, correct_digits
-from symfric.bench.ivp_mechanisms import ANDREWS, JOINT, PROBLEMS
-from symfric.bench.ivp_problems import Problem, hires
+from symfric.bench.ivp_problems import ANDREWS, JOINT, PROBLEMS, Problem
 from symfric.bench.multibody import CHAINS, chain, chains, count, exponent
 from symfric.bench.regularisation import CASES, last_cycle, peak
 from symfric.bench.report import Row
@@ -69,6 +68,7 @@ def test_drift_of_constraints_shrinks_with_the_tolerance() -> None:
 
 
 def test_digits_are_those_of_the_worst_signal() -> None:
+    hires = PROBLEMS[0].model
     run = simulate(hires(), 1.0, backend="vm", samples=2)
     end = run.final
     other = Problem("off", hires, 1.0, {"y1": end["y1"], "y2": end["y2"] * (1 + 1e-4)})

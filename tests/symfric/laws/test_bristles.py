@@ -14,11 +14,7 @@ from symfric import (
     Dahl,
     Law,
     LuGre,
-    Model,
     OverloadWarning,
-    Trajectory,
-    Variable,
-    contact,
     drive,
     rabinowicz,
     simulate,
@@ -129,12 +125,6 @@ def test_cycles_take_the_published_work_and_that_of_coulomb_in_the_limit() -> No
     assert work(LuGre(), 5e-3) == pytest.approx(2e-2 * LEVEL, rel=5e-3)
 
 
-def test_original_dahl_with_exponent_has_no_smoothing() -> None:
-    law = Dahl(n=2.0, v_eps=0.0)
-    assert law.rate(1e-15, N, np.array([0.0]))[0] == pytest.approx(1e-15, rel=1e-9)
-    assert law.steady_state(-1e-15, N)[0] == pytest.approx(-REACH)
-
-
 def test_no_step_leaps_over_a_reversal_at_the_level() -> None:
     """A block that slides, is stopped and driven back: its bristle ends at the other level."""
     for n, rtol in product((0.0, 0.1), (1e-5, 1e-6)):
@@ -142,32 +132,6 @@ def test_no_step_leaps_over_a_reversal_at_the_level() -> None:
         run = simulate(model, 0.6, x0={"v": 1.0}, u={"force": -20.0}, rtol=rtol, method="rodas5p")
         assert run.final["v"] < 0
         assert run.final["z"] == pytest.approx(-run["z"].max(), rel=10 * rtol)
-
-
-def break_away(rate: float) -> Trajectory:
-    """The block of the Rabinowicz scene, pulled from rest with a force rising at `rate` [N/s]."""
-    force = {"force": lambda t: rate * t}
-    return simulate(drive(LuGre()), 2.4 / rate, u=force, rtol=1e-8, samples=20_001)
-
-
-def test_break_away_force_has_published_values_and_falls_with_the_rate() -> None:
-    peaks = {0.1: 1.166, 1.0: 1.125, 10.0: 0.961}
-    below = {100.0: 0.636, 1000.0: 0.445}  # up to twice the Stribeck velocity, by another Radau
-    for rate in (*peaks, *below):
-        run = break_away(rate)
-        friction = run["friction"]
-        if rate in peaks:
-            assert friction.max() == pytest.approx(peaks[rate], abs=5.1e-4)
-        else:
-            early = friction[: np.argmax(run["v"] > 2e-3) + 1].max()
-            assert early == pytest.approx(below[rate], abs=1e-3)
-
-
-def test_stiction_loads_the_bristle_like_a_spring() -> None:
-    run = simulate(drive(LuGre()), 5.0, u={"force": 0.5}, rtol=1e-8)
-    assert run.final["z"] == pytest.approx(0.5 / 1e5, rel=1e-6)
-    assert run.final["friction"] == pytest.approx(0.5, rel=1e-6)
-    assert abs(run.final["v"]) < 1e-9
 
 
 def test_passive_form_fades_the_damping() -> None:
@@ -227,27 +191,6 @@ def test_elasto_plastic_bristle_is_elastic_below_break_away_and_lugre_beyond() -
     assert ElastoPlastic(z_ba=7e-6).rate(0.1, N, np.array([0.0]))[0] == 0.1
     for z in (0.1, 0.5, 1.0):  # and so is an element of Bouc and Wen with equal shares
         assert BoucWen().rate(-0.02, N, np.array([z]))[0] * REACH == pytest.approx(-0.02, rel=1e-12)
-
-
-def drift(law: Law) -> float:
-    """Return the way of a block shaken at 10 Hz below break-away, in three seconds.
-
-    It is pulled beyond break-away first, then let go to half the dynamic level.
-    """
-    x, v, t = Variable("x", "m", nominal=1e-5), Variable("v", "m/s", nominal=1e-3), ca.SX.sym("t")
-    held, shaken = 0.5 * LEVEL, 0.3 * LEVEL * ca.sin(20 * ca.pi * t)
-    late = ca.if_else(t < 2, held, held + shaken)
-    pull = ca.if_else(t < 1.05, 1.05 * STATIC * ca.fmin(t, 1.0), late)
-    slip = contact("guide", law, v, N)
-    rates = ca.vertcat(v.symbol, (pull - slip.force) / 0.8)
-    model = Model("shaken", x=(x, v), ode=rates, contacts=(slip,), t=t)
-    positions = simulate(model, 5.0, t_eval=[2.0, 5.0], rtol=1e-8)["x"]
-    return float(positions[1] - positions[0])
-
-
-def test_vibration_below_break_away_does_not_drift_where_lugre_does() -> None:
-    assert abs(drift(ElastoPlastic(z_ba=0.7 * LEVEL / 1e5))) < 3e-7
-    assert drift(LuGre()) == pytest.approx(1.2e-4, rel=0.05)
 
 
 def test_gonthier_slides_at_its_level_and_remembers_rests() -> None:

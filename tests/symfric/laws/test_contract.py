@@ -7,6 +7,7 @@ from functools import cache
 from inspect import getdoc
 from itertools import product
 from math import isfinite
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -22,8 +23,10 @@ from law_cases import (
     state_symbols,
     symbolic,
 )
+from refusing import not_refused
 
 import symfric
+import symfric.laws
 from docs.machine.items import MADE_OF_LAWS
 from symfric import (
     ALL_LAWS,
@@ -334,6 +337,10 @@ def test_every_parameter_carries_unit_text_bounds_and_refuses_values_beyond_them
     for kind in (Stribeck, BrownMcPhee, SelfTuning, LuGre):
         with pytest.raises(ValueError, match=r"mu_d <= mu_s, got mu_d = 0.3 and mu_s = 0.2"):
             kind(mu_s=0.2, mu_d=0.3)
+
+
+def test_wrong_parameters_states_and_texts_are_refused() -> None:
+    assert not_refused(Path(__file__).with_name("refusals.toml"), symfric.laws) == []
 
 
 def test_every_parameter_of_every_law_and_scene_says_what_it_is_for() -> None:

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from itertools import product
-from math import degrees, exp, inf, pi, radians, sin
+from math import degrees, exp, pi, radians, sin
 
 import casadi as ca
 import numpy as np
@@ -14,7 +14,6 @@ from symfric.laws import (
     BAM,
     Awrejcewicz,
     Bittencourt,
-    HaessigFriedland,
     Karnopp,
     LeineSwitch,
     QuarterCarGeneral,
@@ -87,36 +86,6 @@ def test_friction_in_a_band_of_rest_drives_as_far_as_it_says() -> None:
         assert least * 0.15 * load * width <= lowest < 0 < highest
 
 
-def test_reset_integrator_gives_back_no_more_than_it_stored() -> None:
-    """By Euler steps of a fiftieth of the stretch; in the event form with its switches by hand."""
-    limit, h = 0.1 * N / 1e5, 1e-8
-    bound = 0.15 * 0.1 * N**2 / (2 * 1e5)
-    rng = np.random.default_rng(4)
-    v = np.repeat(rng.choice([-1.0, 1.0], 20), rng.integers(20, 2000, 20))
-    for form in ("smooth", "event"):
-        law = HaessigFriedland(form=form, sigma_1=0.0)
-        z, now = ca.SX.sym("z", len(law.states)), ca.SX.sym("v")
-        new = z + h * law.rate(now, N, z)
-        if form == "event":
-            turned = ca.SX.sym("turned")
-            slip = ca.if_else(turned, 0.0, z[1])
-            begin = ca.vertcat(z[0], slip)
-            moved = z[0] + h * now * (1 - slip)
-            slips = now * moved >= limit
-            new = ca.vertcat(ca.if_else(slips, now * limit, moved), ca.if_else(slips, 1.0, slip))
-            step = ca.Function(
-                "step", [z, ca.vertcat(now, turned)], [new, law.force(now, N, begin)]
-            )
-            given = np.vstack([v, np.diff(v, prepend=0.0) != 0])
-        else:
-            step = ca.Function("step", [z, now], [new, law.force(now, N, z)])
-            given = v[None, :]
-        forces = step.mapaccum(v.size)(np.zeros(len(law.states)), given)[1].full().ravel()
-        path = np.append(0.0, np.cumsum(forces * v * h))
-        given_back = (np.maximum.accumulate(path) - path).max()
-        assert 0.5 * bound < given_back <= 1.01 * bound
-
-
 def settled(run: Trajectory, since: float) -> tuple[float, float]:
     """Return period and largest position."""
     late, x = run.t > since, run["x"] - 0.5
@@ -140,8 +109,6 @@ def test_wojewoda_is_coulomb_without_acceleration_and_opposes_the_motion() -> No
     assert Wojewoda(**LEVELS).force(V, N, dv=0.0) == pytest.approx(expected, rel=1e-14, abs=1e-300)
     v, dv = np.meshgrid(np.geomspace(1e-6, 1.0, 20), np.linspace(-100.0, 100.0, 41))
     assert (np.asarray(Wojewoda(mu_s=0.2, mu_d=0.1).force(v, N, dv=dv)) >= 0).all()
-    with pytest.raises(ValueError, match=r"mu_s <= 2 mu_d = 0.2, got 0.25; otherwise friction"):
-        Wojewoda(mu_s=0.25, mu_d=0.1)
 
 
 def test_bittencourt_is_two_stribeck_curves_and_depends_on_temperature() -> None:
@@ -160,8 +127,6 @@ def test_bittencourt_is_two_stribeck_curves_and_depends_on_temperature() -> None
     slope = ca.Function("slope", [T], [ca.gradient(Bittencourt(T=T).force(50.0, 1.0), T)])
     step = (Bittencourt(T=31.0).force(50.0, 1.0) - Bittencourt(T=29.0).force(50.0, 1.0)) / 2
     assert float(slope(30.0)) == pytest.approx(step, rel=1e-3)
-    with pytest.raises(ValueError, match=r"v_s0 \+ v_sT T > 0, got -5 rad/s at T = 20"):
-        Bittencourt(T=20.0)
 
 
 def test_terms_of_bam_act_as_switched_on() -> None:
@@ -213,10 +178,3 @@ def test_quarter_car_holds_at_rest_and_drives_as_printed_only() -> None:
     v = np.linspace(-3e-3, 3e-3, 2001)
     inside = np.asarray(law.force(v, N, x_rel=np.linspace(-0.02, 0.02, 41)[:, None])) * v
     assert -0.274 * 193.8 * 1e-3 <= inside.min() < 0
-
-
-def test_forms_without_modes_have_no_switches() -> None:
-    for law in (Karnopp(), Karnopp(form="original"), LeineSwitch(), LeineSwitch(form="original")):
-        assert law.states == ()
-        assert law.switches(0.1, 5.0, F_e=0.3) == ()
-    assert Karnopp(form="event").velocity_scale == LeineSwitch(form="event").velocity_scale == inf

@@ -1,12 +1,13 @@
 """Every static law computes the equation that it prints, and the digits of a catalogue.
 
-The catalogue has levels of 1 N and 1.5 N and a characteristic velocity of 1e-3 m/s; it prints nine
-digits after the point, computed by a third program.
+The catalogue printed.toml has levels of 1 N and 1.5 N and a characteristic velocity of 1e-3 m/s.
 """
 
+import tomllib
 from dataclasses import replace
 from itertools import product
 from math import isfinite
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -14,28 +15,14 @@ import printed_laws
 import pytest
 from printed_laws import PRINTED
 
-from symfric import ALL_LAWS, BrownMcPhee, Coulomb, Law, LuGre, Stribeck, parameters, with_values
+import symfric.laws
+from symfric import ALL_LAWS, Law, LuGre, Stribeck, parameters, with_values
 from symfric.laws import (
     BAM,
-    Ambrosio,
-    Andersson,
     Awrejcewicz,
-    BengisuAkay,
-    Benson,
-    Exudyn,
-    Hollars,
     Karnopp,
-    LeineSwitch,
-    MakkarDixon,
-    ModifiedThrelfall,
-    PoppStelter,
     QuarterCarGeneral,
-    SimscapeBreakaway,
-    Specker,
     SteadyStateLuGre,
-    Step5,
-    Threlfall,
-    VelocityBased,
     Wojewoda,
     law_name,
 )
@@ -43,48 +30,10 @@ from symfric.laws import (
 BOTH = {"mu_s": 1.5, "mu_d": 1.0}
 V = (1e-4, 5e-4, 1e-3, 2e-3, 1e-2)
 """Velocities of the catalogue [m/s]."""
-CATALOGUE: list[tuple[Law, tuple[float, ...]]] = [
-    (Coulomb(1.0), (0.099667995, 0.462117157, 0.761594156, 0.964027580, 0.999999996)),
-    (Coulomb(1.0, shape="atan"), (0.063451035, 0.295167235, 0.5, 0.704832765, 0.936548965)),
-    (Coulomb(1.0, shape="erf"), (0.112462916, 0.520499878, 0.842700793, 0.995322265, 1.0)),
-    (Coulomb(1.0, shape="sqrt"), (0.099503719, 0.447213595, 0.707106781, 0.894427191, 0.995037190)),
-    (Coulomb(1.0, shape="saturation"), (0.1, 0.5, 1.0, 1.0, 1.0)),
-    (Coulomb(1.0, shape="quadratic"), (0.19, 0.75, 1.0, 1.0, 1.0)),
-    (Threlfall(1.0, form="original"), (0.259181779, 0.776869840, 0.950212932, 0.95, 0.95)),
-    (ModifiedThrelfall(1.0, form="original"), (0.272761789, 0.817574476, 1.0, 1.0, 1.0)),
-    (Ambrosio(1.0, form="original"), (0.0, 0.375, 1.0, 1.0, 1.0)),
-    (BengisuAkay(**BOTH, form="original"), (0.285, 1.125, 1.5, 1.183939721, 1.000061705)),
-    (VelocityBased(**BOTH, form="original"), (0.22425, 1.03125, 1.5, 1.0, 1.0)),
-    (Benson(**BOTH, v_eps=0.0), (1.452418709, 1.30326533, 1.183939721, 1.067667642, 1.0000227)),
-    (Andersson(**BOTH), (1.13860224, 1.38927424, 1.183939716, 1.009157819, 1.0)),
-    (Hollars(**BOTH, v_t=1e-3, u_eps=0.0), (0.199009901, 0.9, 1.5, 1.2, 1.00990099)),
-    (Exudyn(**BOTH, u_eps=0.0), (0.15, 0.75, 1.5, 1.183939721, 1.000061705)),
-    (Step5(**BOTH), (0.01284, 0.75, 1.5, 1.25, 1.0)),
-    (BrownMcPhee(**BOTH), (0.468248208, 1.342725805, 1.4993293, 1.326530387, 1.007540767)),
-    (SimscapeBreakaway(**BOTH), (0.843619068, 1.363657058, 1.499999996, 1.22313016, 1.0)),
-    (Specker(**BOTH), (0.843619069, 1.363657061, 1.5, 1.223130162, 1.0)),
-    (MakkarDixon(), (1.092557237, 1.268805228, 1.119202916, 1.01798621, 1.000000002)),
-    (
-        LeineSwitch(1.5, form="original"),
-        (1.499550135, 1.49775337, 1.49551346, 1.491053678, 1.45631068),
-    ),
-    (
-        LeineSwitch(1.5, v_eps=1e-6),
-        (1.49000402, 1.495846374, 1.494561387, 1.490579061, 1.456217968),
-    ),
-    (
-        PoppStelter(1.5, d=1.0, kappa=0.1, v_eps=0.0),
-        (1.499925008, 1.499625212, 1.499250849, 1.498503394, 1.492584257),
-    ),
-    *(
-        (Stribeck(**BOTH, delta=delta, v_eps=0.0), row)
-        for delta, row in {
-            0.78: (1.423540613, 1.279287385, 1.183939721, 1.089790325, 1.001208056),
-            1.0: (1.452418709, 1.303265330, 1.183939721, 1.067667642, 1.000022700),
-            2.0: (1.495024917, 1.389400392, 1.183939721, 1.009157819, 1.000000000),
-            3.2: (1.499684621, 1.448446451, 1.183939721, 1.000051049, 1.000000000),
-        }.items()
-    ),
+LAWS = {name: getattr(symfric.laws, name) for name in symfric.laws.__all__} | {"BOTH": BOTH}
+CATALOGUE = [
+    (eval(law, LAWS), row)
+    for law, row in tomllib.loads(Path(__file__).with_name("printed.toml").read_text()).items()
 ]
 MM_PER_MIN = np.array([100, 140, 210, 294, 390, 500]) / 60000
 PUBLISHED = {

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from itertools import product
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -9,7 +10,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from symfric import ExactCoulomb, Karnopp, Law, LuGre, Model, Variable, contact, simulate
-from symfric.model import Contact
 
 COULOMB = ExactCoulomb(mu_s=0.3, mu_d=0.2)
 
@@ -69,11 +69,6 @@ def test_sliding_ends_at_a_velocity_of_exactly_zero() -> None:
         (value,) = c.rest.values()
         got = ca.Function("rest", [model.t, model.vector("x")], [value])(0.0, x)
         assert float(got) == pytest.approx(slip_of, rel=1e-15)
-
-
-def test_contacts_of_one_model_have_their_own_states() -> None:
-    assert [v.name for v in stack(COULOMB).x[6:]] == ["c0_mode", "c1_mode", "c2_mode"]
-    assert [v.name for v in sled(COULOMB).x[2:]] == ["mode"]
 
 
 LEVELS = 0.2 * 9.81 * np.array([5.0, 2.0])
@@ -163,61 +158,26 @@ def switching(i: int, modes: tuple[int, ...]) -> Callable[[float, np.ndarray], f
 X, V, U = Variable("x", "m"), Variable("v", "m/s"), Variable("u", "N")
 
 
-def own(slip: Contact, rate: ca.SX, **parts: object) -> Model:
-    ode = {} if "residual" in parts else {"ode": ca.vertcat(V.symbol, rate)}
-    return Model("own", x=(X, V), u=(U,), contacts=(slip,), **ode, **parts)  # pyright: ignore[reportArgumentType]
+FLOOR, MOVED = (contact("floor", COULOMB, slip, 1.0) for slip in (V, V - U))
+ONE, TWO = (contact(name, Karnopp(), V, 1.0) for name in ("one", "two"))
+A, RATES = Variable("a", "m/s^2"), ca.SX.sym("rates", 3)
+UNDETERMINED: dict[str, dict[str, Any]] = {
+    "accelerations and normal forces affine in the friction forces": {"ode": -(FLOOR.force**2)},
+    "equations in which the friction force acts on the slip": {"ode": U.symbol},
+    "a sliding velocity without inputs": {"contacts": (MOVED,), "ode": -MOVED.force},
+    "no other contact on it whose law needs F_e":
+        {"contacts": (ONE, TWO), "ode": U - ONE.force - TWO.force},
+    "equations without algebraic variables that depend on friction":
+        {"ode": A.symbol, "z": (A,), "alg": 2 * A + FLOOR.force - U},
+    "explicit equations":
+        {"xdot": RATES, "residual": RATES + ca.vertcat(-V, RATES[1] + FLOOR.force, 0)},
+}  # fmt: skip
+"""What is expected -> the parts of a model that does not determine its applied force."""
 
 
-def of_a_squared_force() -> Model:
-    slip = contact("floor", COULOMB, V, 1.0)
-    return own(slip, -(slip.force**2))
-
-
-def of_an_input() -> Model:
-    slip = contact("floor", COULOMB, V - U, 1.0)
-    return own(slip, -slip.force)
-
-
-def of_algebraic_variables() -> Model:
-    slip, a = contact("floor", COULOMB, V, 1.0), Variable("a", "m/s^2")
-    return own(slip, a.symbol, z=(a,), alg=2 * a + slip.force - U)
-
-
-def of_implicit_equations() -> Model:
-    slip, rates = contact("floor", COULOMB, V, 1.0), ca.SX.sym("rates", 3)
-    rows = ca.vertcat(rates[0] - V, 2 * rates[1] + slip.force, rates[2])
-    return own(slip, ca.SX(0), xdot=rates, residual=rows)
-
-
-def of_another_body() -> Model:
-    slip = contact("floor", COULOMB, V, 1.0)
-    return own(slip, U.symbol)
-
-
-def of_two_laws_without_modes() -> Model:
-    one, two = (contact(name, Karnopp(), V, 1.0) for name in ("one", "two"))
-    ode = ca.vertcat(V.symbol, U - one.force - two.force)
-    return Model("own", x=(X, V), u=(U,), contacts=(one, two), ode=ode)
-
-
-@pytest.mark.parametrize(
-    ("make", "expected"),
-    [
-        (of_a_squared_force, "accelerations and normal forces affine in the friction forces"),
-        (of_an_input, "a sliding velocity without inputs"),
-        (of_algebraic_variables, "equations without algebraic variables that depend on friction"),
-        (of_implicit_equations, "explicit equations"),
-        (of_another_body, "equations in which the friction force acts on the slip"),
-        (of_two_laws_without_modes, "no other contact on it whose law needs F_e"),
-    ],
-)
-def test_forces_that_the_equations_do_not_determine_are_refused(
-    make: Callable[[], Model], expected: str
-) -> None:
-    with pytest.raises(ValueError, match=f"F_e: expected {expected}.*contact.*F_e=pull"):
-        make()
-
-
-def test_a_contact_alone_has_no_applied_force() -> None:
-    with pytest.raises(ValueError, match="pass the contact to Model"):
-        _ = contact("floor", COULOMB, V, 1.0).friction
+def test_forces_that_the_equations_do_not_determine_are_refused() -> None:
+    for expected, parts in UNDETERMINED.items():
+        if "ode" in parts:
+            parts = parts | {"ode": ca.vertcat(V, parts["ode"])}
+        with pytest.raises(ValueError, match=f"F_e: expected {expected}.*contact.*F_e=pull"):
+            Model("own", x=(X, V), u=(U,), **{"contacts": (FLOOR,)} | parts)

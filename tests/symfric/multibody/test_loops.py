@@ -11,7 +11,7 @@ from chains import X, Y, Z, attach, in_both
 
 from symfric import BrownMcPhee, SolveError, Status, simulate
 from symfric.bench.ivp import correct_digits
-from symfric.bench.ivp_mechanisms import ABSOLUTE, JOINT
+from symfric.bench.ivp_problems import ABSOLUTE, JOINT
 from symfric.multibody import (
     Cylindrical,
     JointFriction,

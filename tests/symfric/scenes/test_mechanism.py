@@ -23,17 +23,14 @@ from symfric import (
     SelfTuning,
     Trajectory,
     Viscous,
-    parameters,
     simulate,
 )
 from symfric.laws import LuGreNormalised
 from symfric.scenes import (
-    MECHANISMS,
     Arm,
     DoublePendulum,
     FourBar,
     FourMass,
-    MechanismScene,
     Pendulum,
     PendulumBox,
     SliderCrank,
@@ -43,7 +40,6 @@ pytestmark = pytest.mark.heavy
 
 SMOOTH = Viscous(sigma_2=0.0)
 """No friction at all: a float zero leaves no term."""
-each_scene = pytest.mark.parametrize("kind", MECHANISMS.values(), ids=MECHANISMS.keys())
 
 
 def reference(name: str, rates: Rates, y0: list[float], times: np.ndarray) -> np.ndarray:
@@ -67,14 +63,13 @@ def constraints(run: Trajectory) -> tuple[float, float, float]:
     )  # type: ignore[return-value]
 
 
-@pytest.mark.parametrize("amplitude", [0.1, 1.0, 3.0])
-def test_pendulum_swings_with_the_elliptic_period(amplitude: float) -> None:
-    inertia = 1 / 12 + 0.25
-    period = pendulum_period(np.sqrt(9.81 * 0.5 / inertia), amplitude)
-    model = Pendulum(SMOOTH, phi_0=amplitude).model()
-    run = simulate(model, 2 * period, rtol=1e-10, t_eval=[period, 2 * period])
-    assert run["phi"] == pytest.approx([amplitude, amplitude], abs=1e-8)
-    assert run["phi_rate"] == pytest.approx([0.0, 0.0], abs=1e-7)
+def test_pendulum_swings_with_the_elliptic_period() -> None:
+    for amplitude in (0.1, 1.0, 3.0):
+        period = pendulum_period(np.sqrt(9.81 * 0.5 / (1 / 12 + 0.25)), amplitude)
+        model = Pendulum(SMOOTH, phi_0=amplitude).model()
+        run = simulate(model, 2 * period, rtol=1e-10, t_eval=[period, 2 * period])
+        assert run["phi"] == pytest.approx([amplitude, amplitude], abs=1e-8)
+        assert run["phi_rate"] == pytest.approx([0.0, 0.0], abs=1e-7)
 
 
 def test_double_pendulum_agrees_with_the_textbook() -> None:
@@ -88,8 +83,8 @@ def test_double_pendulum_agrees_with_the_textbook() -> None:
     assert np.ptp(run["energy"]) < 1e-7
 
 
-@pytest.mark.parametrize("law", [BrownMcPhee(mu_s=0.03, mu_d=0.02, v_t=0.02)])
-def test_pendulum_on_a_box_agrees_with_newtons_laws(law: BrownMcPhee) -> None:
+def test_pendulum_on_a_box_agrees_with_newtons_laws() -> None:
+    law = BrownMcPhee(mu_s=0.03, mu_d=0.02, v_t=0.02)
     times = np.linspace(0.1, 5.0, 25)
 
     def mu(v: float) -> float:
@@ -100,13 +95,6 @@ def test_pendulum_on_a_box_agrees_with_newtons_laws(law: BrownMcPhee) -> None:
     run = simulate(PendulumBox(law, R=0.05).model(), 5.0, rtol=1e-9, t_eval=times)
     for name, values in zip(("x", "phi", "x_rate", "phi_rate"), expected, strict=True):
         assert run[name] == pytest.approx(values, abs=1e-6), name
-
-
-def test_box_and_hinge_may_have_different_laws() -> None:
-    scene = PendulumBox(BrownMcPhee(), hinge=BrownMcPhee(mu_s=0.003, mu_d=0.002))
-    names = parameters(scene)
-    assert (names["mu_s_1"].value, names["mu_s_2"].value) == (0.15, 0.003)
-    assert simulate(scene.model(), 1.0)["energy"][-1] < 27.6
 
 
 def four_mass_model(law: Law | None) -> Model:
@@ -206,22 +194,6 @@ def test_four_bar_closes_as_freudenstein_says() -> None:
     assert (np.diff(run["energy"]) < 1e-9).all()
 
 
-def test_links_that_do_not_reach_are_refused_in_a_sentence() -> None:
-    """They gave NaN starts, and NumPy's warning before."""
-    for scene, message in (
-        (FourBar(SMOOTH, crank=2.0), "FourBar: expected coupler and rocker that meet"),
-        (FourBar(SMOOTH, crank=0.4, base=0.4, angle=0.0), "FourBar: expected a crank whose end"),
-        (SliderCrank(SMOOTH, l=0.1), r"SliderCrank: expected l\^2 > b\^2"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            scene.model()
-
-
-def test_four_bar_without_friction_keeps_its_energy() -> None:
-    run = simulate(FourBar(SMOOTH).model(), 3.0, rtol=1e-10)
-    assert np.ptp(run["energy"]) < 1e-6 * run["kinetic"].max()
-
-
 def test_arm_loses_what_friction_takes() -> None:
     model = Arm(LuGreNormalised()).model()
     assert (len(model.x), len(model.z)) == (18, 6)
@@ -230,23 +202,6 @@ def test_arm_loses_what_friction_takes() -> None:
     work = np.trapezoid(dissipated, run.t)
     assert run["energy"][0] - run["energy"][-1] == pytest.approx(work, rel=1e-5)
     assert min(run[f"q{i}_N"].min() for i in range(1, 7)) > 0
-
-
-@each_scene
-def test_every_parameter_can_be_free(kind: type[MechanismScene]) -> None:
-    scene = kind(LuGreNormalised())
-    names = list(parameters(scene))
-    free, fixed = scene.model(names), scene.model()
-    assert [p.name for p in free.p] == names
-    assert free.initial_state() == pytest.approx(fixed.initial_state(), abs=1e-12)
-    assert free.function("ode").n_instructions() >= fixed.function("ode").n_instructions()
-
-
-@each_scene
-def test_what_is_not_a_law_is_refused(kind: type[MechanismScene]) -> None:
-    for law in (LuGreNormalised, "lugre", None):
-        with pytest.raises(ValueError, match=rf"{kind.__name__}: expected a law"):
-            kind(law)  # type: ignore[arg-type]
 
 
 def test_another_parameter_closes_the_loop_again() -> None:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from symfric import Model, Variable
 from symfric.integrator.methods.families import Explicit, Radau, Rosenbrock
 from symfric.integrator.methods.method import Method
-from symfric.integrator.methods.tableaux import ADAPTIVE, DOPRI5, METHODS
+from symfric.integrator.methods.tableaux import ADAPTIVE, DOPRI5, METHODS, shampine
 from symfric.integrator.step.attempt import build_fixed
 
 Array = NDArray[np.floating[Any]]
@@ -228,6 +228,16 @@ def test_order_of_the_dense_output_is_observed(name: str, case: Callable[[], Clo
     errors = [between_fixed_steps(case(), method, count) for count in counts]
     claimed = method.dense_dae if case is smooth_dae else method.dense
     assert observed_order(counts, errors) == pytest.approx(claimed, abs=0.25)
+
+
+def test_a_pair_without_free_term_has_the_cubic_of_hermite() -> None:
+    """The pair of Bogacki and Shampine, order 3."""
+    A = np.array([[0, 0, 0, 0], [1 / 2, 0, 0, 0], [0, 3 / 4, 0, 0], [2 / 9, 1 / 3, 4 / 9, 0]])
+    H, E = shampine(A[-1], np.zeros(4)), np.array([-5 / 72, 1 / 12, 1 / 9, -1 / 8])
+    pair = Explicit(name="BS3", A=A, E=E, H=H, order=3, embedded=2, dense=3, source="1989")
+    counts = [16, 32, 64]
+    errors = [between_fixed_steps(smooth_ode(), pair, count) for count in counts]
+    assert observed_order(counts, errors) == pytest.approx(3, abs=0.25)
 
 
 @each_adaptive_case
