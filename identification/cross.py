@@ -12,17 +12,14 @@ from math import isfinite, nan
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.record import Record
+from identification.data.record import Array, Record
 from identification.fit import Fit
 from identification.result.fitted import Fitted
 from symfric.foundation import checks
 from symfric.foundation.shown import brief
 from symfric.foundation.status import SolveError
-
-Array = NDArray[np.float64]
 
 GAP = 0.05
 """Gap between a block and the samples used for fitting, relative to the length of the block."""
@@ -80,8 +77,7 @@ class CrossValidation:
     @property
     def rms(self) -> dict[str, float]:
         """Root mean square error of each signal [SI]."""
-        signals = dict.fromkeys(part.signal for part in self.left)
-        return {s: _rms([p.r for p in self.left if p.signal == s]) for s in signals}
+        return {signal: _rms(some) for signal, some in by_signal(self.left).items()}
 
     def __str__(self) -> str:
         each = ", ".join(f"{s} {value:.3g}" for s, value in self.rms.items())
@@ -131,15 +127,19 @@ def left_of(fit: Fitted, data: Dataset) -> list[Left]:
     return left
 
 
+def by_signal(left: Sequence[Left]) -> dict[str, list[Left]]:
+    """Return signal -> its residuals of all records."""
+    signals = dict.fromkeys(part.signal for part in left)
+    return {s: [part for part in left if part.signal == s] for s in signals}
+
+
 def relative(left: Sequence[Left]) -> float:
     """Return the rms error relative to the spread [%], averaged over signals; NaN if empty."""
-    signals = dict.fromkeys(part.signal for part in left)
     each = list[float]()
-    for s in signals:
-        some = [part for part in left if part.signal == s]
+    for some in by_signal(left).values():
         rows = [part.r.size for part in some]
         spread = np.sqrt(np.average([part.spread**2 for part in some], weights=rows))
-        each.append(_rms([part.r for part in some]) / float(spread))
+        each.append(_rms(some) / float(spread))
     return 100 * float(np.sqrt(np.mean(np.square(each)))) if each else nan
 
 
@@ -165,8 +165,8 @@ def shared(many: Sequence[Sequence[Left]]) -> list[list[Left]]:
     return [[at_common(part) for part in left] for left in many]
 
 
-def _rms(parts: Sequence[Array]) -> float:
-    r = np.concatenate(parts)
+def _rms(some: Sequence[Left]) -> float:
+    r = np.concatenate([part.r for part in some])
     return float(np.sqrt(np.mean(r**2))) if r.size else nan
 
 

@@ -15,12 +15,11 @@ from time import perf_counter
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.differentiate import differentiate
 from identification.data.findings import Findings
-from identification.residuals.evaluation import Residuals
+from identification.residuals.evaluation import Array, Residuals
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
 from identification.result.build import fitted, levels_of, written
@@ -33,14 +32,12 @@ from identification.starts.measured import Measured
 from identification.starts.start import start_values
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
-from identification.verdict.covariance import covariance
 from identification.verdict.judge import Verdict, judge
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law
 from symfric.scenes import Drive
 
-Array = NDArray[np.float64]
 MOST_STARTS = 10_000
 QUICK = 40
 """Largest number of evaluations of a fit that only selects a setting."""
@@ -128,11 +125,12 @@ class Fit:
         if isinstance(point, str):
             message = f"Fit: {asked.subject.name}: no start has residuals: {point}"
             raise SolveError(message, Status.NOT_FINITE)
-        verdict = judge(made, point, asked.findings)
+        live = self._live(asked, made, point)
+        verdict = judge(live.minimum, asked.findings)
         gain = remaining(made, point) / max(point.cost, 1e-300)
         status, message = _status(asked, end, verdict, gain)
         result = fitted(
-            self._live(asked, made, point), starts, verdict, tuple(asked.findings),
+            live, starts, verdict, tuple(asked.findings),
             status=status, message=message, seconds=perf_counter() - begun,
             call=f"{written(self)}.solve()",
             asked=Asked(replace(self, kind=asked.kind), dict(made.noise), point.w),
@@ -190,14 +188,15 @@ class Fit:
         return self._live(asked, made, point)
 
     def _live(self, asked: "Prepared", made: Task, point: Point) -> Live:
-        """Return the problem with its minimum and the covariance of the parameters."""
-        found = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
+        """Return the problem with its minimum and the friction levels of the law."""
         drive = asked.subject.drive
-        mass = None if drive is None else float(found.get("m", drive.m))
+        names = made.residuals.names
+        mass = None if drive is None else float(drive.m)
+        if drive is not None and "m" in names:
+            mass = float(point.values[names.index("m")])
         largest = strongest(asked.kind, self.data, asked.seen, mass)
         levels = levels_of(asked.subject, largest, self.data.rotary)
-        certain = covariance(made, point, levels)
-        return Live(asked.kind, asked.subject, self.data, made, point, certain)
+        return Live(asked.kind, asked.subject, self.data, made, point, levels)
 
     def _quickly(self, kind: Kind, data: Dataset) -> dict[str, float] | None:
         """Fit other data from one start without a verdict; return the values, None if it fails."""
@@ -377,4 +376,6 @@ def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) 
     if whole is not None and seen is not None:
         with suppress(ValueError):  # without motion in the data, keep the values of the law
             found = start_values(whole, seen, free=[*values])
-    return values | {n: x for n, x in found.items() if n not in subject.started} | dict(given)
+    return (
+        values | {n: x for n, x in found.items() if n not in subject.requests.started} | dict(given)
+    )

@@ -19,7 +19,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 
-from identification.cross import DIVERGED, Left, cross_validate, left_of, percent, relative, shared
+from identification.cross import (
+    DIVERGED,
+    Left,
+    by_signal,
+    cross_validate,
+    left_of,
+    percent,
+    relative,
+    shared,
+)  # fmt: skip
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
@@ -82,7 +91,8 @@ class Row:
     def cells(self) -> tuple[str, ...]:
         """Cells of the row as text, in the order of `HEADER`."""
         numbers = (
-            *map(percent, (self.validation, self.fitted)), *map(_number, (self.aicc, self.bic)),
+            *map(percent, (self.validation, self.fitted)),
+            *(f"{x:.1f}" if isfinite(x) else "-" for x in (self.aicc, self.bic)),
             str(self.parameters), "-" if self.operations is None else str(self.operations),
         )  # fmt: skip
         if self.fit is None:
@@ -198,46 +208,48 @@ def select(
     folds = checks.count("select: folds", folds, least=0)
     checks.check_names("select", fit, [f.name for f in fields(Fit) if f.name not in OWN])
     residuals: Any = InverseDynamics() if kind is None else kind
-    tried = list[_Tried]()
+    tried, stopped = list[_Tried | Row](), False
     for number, (name, what) in enumerate(named.items()):
+        if stopped:
+            tried.append(Row(name, sentence=INTERRUPTED))
+            continue
         if progress is not None:
             progress(name, number / len(named))
         one = Fit(residuals, what, data, **fit)
         try:
-            tried.append(_try(name, one, validate, folds, executor))
+            tried.append(last := _try(name, one, validate, folds, executor))
+            stopped = isinstance(last, _Tried) and last.fit.status is Status.INTERRUPTED
         except KeyboardInterrupt:  # rank the laws fitted so far
             if not tried:
                 raise
-            tried.append(_Tried(name, INTERRUPTED))
-        if tried[-1].ended:
-            tried += [_Tried(left, INTERRUPTED) for left in [*named][number + 1 :]]
-            break
+            tried.append(Row(name, sentence=INTERRUPTED))
+            stopped = True
     if progress is not None:
         progress("ranked", 1.0)
-    by = next((t.by for t in tried if t.by), "")
+    good = [t for t in tried if isinstance(t, _Tried)]
+    by = next((t.by for t in good if t.by), "")
     how = f"validation by {folds} folds ({by})" if by else "no validation"
     if validate is not None:
         how = f"validation on {validate.name}"
     elif not by and folds > 1:
         how = f"no validation, although {folds} folds were requested"
-    return _ranked(tried, data.name, how)
+    rows, n = _ranked(good)
+    return Ranking((*rows, *(t for t in tried if isinstance(t, Row))), data.name, how, n)
 
 
 class _Tried(NamedTuple):
-    """Outcome of one law: residuals on the fitted and on other data, and the kind of folds."""
+    """Fitted law: residuals on the fitted and on other data, and the kind of folds.
+
+    Its `parameters` are the number of fitted parameters that are not nuisance parameters.
+    """
 
     name: str
-    why: str = ""
-    fit: Fitted | None = None
-    inside: Sequence[Left] = ()
+    fit: Fitted
+    parameters: int
+    inside: Sequence[Left]
     outside: Sequence[Left] = ()
     by: str = ""
-
-    @property
-    def ended(self) -> bool:
-        """True if the user interrupted the fit."""
-        stopped = self.fit is not None and self.fit.status is Status.INTERRUPTED
-        return stopped or self.why == INTERRUPTED
+    why: str = ""
 
 
 def _named(laws: Iterable[Any] | Mapping[str, Any]) -> dict[str, Any]:
@@ -256,37 +268,37 @@ def _named(laws: Iterable[Any] | Mapping[str, Any]) -> dict[str, Any]:
 
 def _try(
     name: str, asked: Fit, validate: Dataset | None, folds: int, executor: Executor | None
-) -> _Tried:
-    """Fit and validate one law; return failures as messages."""
+) -> _Tried | Row:
+    """Fit and validate one law; return a row with the reason if it cannot be fitted."""
     try:
         found = asked.solve(executor=executor, throw=False)
+        live = found.alive("select")
     except (ValueError, SolveError) as error:
-        return _Tried(name, str(error))
-    live = found.live
-    if live is None:
-        return _Tried(name, "the result has no residuals")
-    inside, outside = left_of(found, asked.data), list[Left]()
-    why = by = ""
+        return Row(name, sentence=str(error))
+    count = sum(not u.nuisance for u in live.task.unknowns.unknowns)
+    tried = _Tried(name, found, count, left_of(found, asked.data))
     try:
         if validate is not None:
-            outside = left_of(found, validate)
+            tried = tried._replace(outside=left_of(found, validate))
         elif folds and found.status is not Status.INTERRUPTED:
             start = {n: v for n, v in live.values.items() if n in live.subject.names}
             crossed = cross_validate(asked, folds, start)
-            outside, by, why = [*crossed.left], crossed.by, " ".join(crossed.failed)
+            tried = tried._replace(
+                outside=crossed.left, by=crossed.by, why=" ".join(crossed.failed)
+            )
     except ValueError as error:
-        why = str(error)
-    return _Tried(name, why, found, inside, outside, by)
+        tried = tried._replace(why=str(error))
+    return tried
 
 
-def _ranked(tried: Sequence[_Tried], data: str, how: str) -> Ranking:
-    good = [t for t in tried if t.fit is not None]
+def _ranked(good: Sequence[_Tried]) -> tuple[list[Row], float]:
+    """Return the rows of the fitted laws in order, and the effective number of samples."""
     inside, outside = shared([t.inside for t in good]), shared([t.outside for t in good])
     effective = _effective(good, inside)
     n = sum(effective.values())
     aicc, bic = list[float](), list[float]()
     for t, left in zip(good, inside, strict=True):
-        k = _count(t)
+        k = t.parameters
         fits = sum(effective[s] * np.log(max(ms, 1e-300)) for s, ms in _mean_squares(left).items())
         aicc.append(float(fits) + (2 * k * n / (n - k - 1) if n > k + 1 else inf))
         bic.append(float(fits) + k * float(np.log(n)))
@@ -296,36 +308,24 @@ def _ranked(tried: Sequence[_Tried], data: str, how: str) -> Ranking:
     errors = ([relative(left) for left in some] for some in (outside, inside))
     rows = [_row(t, *numbers) for t, *numbers in zip(good, *errors, *over, strict=True)]
     rows.sort(key=lambda row: (row.validation if isfinite(row.validation) else inf, row.bic))
-    lost = [Row(t.name, sentence=t.why) for t in tried if t.fit is None]
-    return Ranking((*rows, *lost), data, how, n)
+    return rows, n
 
 
 def _row(t: _Tried, validation: float, fitted: float, aicc: float, bic: float) -> Row:
-    fit = t.fit
-    if fit is None:
-        raise ValueError(f"select: {t.name}: {t.why}")
+    fit, away = t.fit, validation > DIVERGED
     operations = cost(fit.law).value if isinstance(fit.law, Law) else None
-    away = validation > DIVERGED
     far = f"On data that were not fitted its error exceeds {DIVERGED:g} %." if away else ""
     sentence = " ".join(s for s in (*fit.verdict.sentences[:1], far, t.why) if s)
-    error = inf if away else validation
     return Row(
-        t.name, fit.status.name, error, fitted, aicc, bic, _count(t), operations, fit.seconds,
-        sentence, fit,
+        t.name, fit.status.name, inf if away else validation, fitted, aicc, bic, t.parameters,
+        operations, fit.seconds, sentence, fit,
     )  # fmt: skip
 
 
-def _count(t: _Tried) -> int:
-    """Return the number of fitted parameters that are not nuisance parameters."""
-    live = None if t.fit is None else t.fit.live
-    return 0 if live is None else sum(not u.nuisance for u in live.task.unknowns.unknowns)
-
-
 def _mean_squares(left: Sequence[Left]) -> dict[str, float]:
-    signals = dict.fromkeys(part.signal for part in left)
     return {
-        s: float(np.mean(np.concatenate([p.r for p in left if p.signal == s]) ** 2))
-        for s in signals
+        signal: float(np.mean(np.concatenate([part.r for part in some]) ** 2))
+        for signal, some in by_signal(left).items()
     }
 
 
@@ -334,14 +334,10 @@ def _effective(good: Sequence[_Tried], inside: Sequence[Sequence[Left]]) -> dict
     found: dict[str, tuple[float, float]] = {}
     for t, left in zip(good, inside, strict=True):
         counts: dict[str, float] = {}
-        for label, n in () if t.fit is None else t.fit.verdict.effective.items():
+        for label, n in t.fit.verdict.effective.items():
             signal = label.split("[")[0]
             counts[signal] = counts.get(signal, 0.0) + n
         for signal, ms in _mean_squares(left).items():
             if ms < found.get(signal, (inf, 0.0))[0]:
                 found[signal] = (ms, counts.get(signal, 1.0))
     return {signal: n for signal, (_, n) in found.items()}
-
-
-def _number(value: float) -> str:
-    return f"{value:.1f}" if isfinite(value) else "-"

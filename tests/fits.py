@@ -19,7 +19,6 @@ from identification.solving.task import task
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
-from identification.verdict.covariance import covariance
 from identification.verdict.judge import judge
 from symfric.laws import Law, Stribeck
 
@@ -112,8 +111,8 @@ def make(
     point = problem.at(best.w)
     if isinstance(point, str):
         raise ValueError(point)
-    verdict = judge(problem, point)
-    live = Live(kind, what, data, problem, point, covariance(problem, point))
+    live = Live(kind, what, data, problem, point, None)
+    verdict = judge(live.minimum)
     status = verdict.status(best.status)
     return fitted(live, tried, verdict, findings, status=status, seconds=0.1, call=call)
 
@@ -134,5 +133,7 @@ def check_slopes(
         d = 1e-5 * max(abs(float(x)), least) * np.eye(values.size)[k]
         change = evaluated(rows, values + d).r - evaluated(rows, values - d).r
         slope = change / (2 * d[k])
-        size = max(float(np.abs(slope).max()), 1e-3)
-        np.testing.assert_allclose(J[:, k], slope, atol=rtol * size, err_msg=rows.names[k])
+        for c in rows.channels:
+            size = max(float(np.abs(slope[c.rows]).max()), 1e-3)
+            got, expected = J[c.rows, k], slope[c.rows]
+            np.testing.assert_allclose(got, expected, atol=rtol * size, err_msg=rows.names[k])

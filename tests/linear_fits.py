@@ -1,6 +1,6 @@
 """Made-up residuals: noise of known colour, a linear fit of it, and a decay that is fitted."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import final
 
@@ -47,6 +47,7 @@ def fitted(
     unknowns: tuple[Unknown, ...] | None = None,
     regressors: Mapping[str, Array] | None = None,
     noise: Mapping[str, float] | None = None,
+    change: Callable[[Array], float] | None = None,
 ) -> Minimum:
     """The minimum of a linear fit J p = measured."""
     n, k = J.shape
@@ -59,6 +60,7 @@ def fitted(
     names, free = tuple(u.name for u in unknowns), np.zeros(k, dtype=bool)
     return Minimum(
         (channel,), unknowns, names, p, np.eye(k), free, r, J, np.ones(n), r, noise or {},
+        change or (lambda _: 0.0),
     )  # fmt: skip
 
 

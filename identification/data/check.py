@@ -13,7 +13,7 @@ from identification.data.check_signals import (
     of_spikes,
     of_velocity,
 )
-from identification.data.findings import Finding, Findings, Rough, View, rough_model
+from identification.data.findings import Finding, Findings, Rough, View, rough_model, texts
 from identification.data.record import GAP, JITTER, Record
 
 FEWEST, FEW = 20, 50
@@ -26,8 +26,7 @@ def of_times(view: View) -> Iterator[Finding]:
     """Find gaps, irregular intervals, too few samples, and times that may be in another unit."""
     record, t = view.record, view.record.time
     if record.size < FEW:
-        severity = "error" if record.size < FEWEST else "warning"
-        yield view.finding(severity, "short", "t", size=record.size)
+        yield view.finding(record.size < FEWEST, "short", "t", size=record.size)
     if record.size < 3:
         return
     intervals = np.diff(t)
@@ -72,16 +71,6 @@ def of_points(view: View) -> Iterator[Finding]:
         yield view.warning("one-way", "v", "points_one_way")
 
 
-LIMITS = {
-    "m": (1e-9, 50.0, 1e5),
-    "rad": (1e-9, 1e5, 1e9),
-    "N": (1e-9, 1e6, 1e10),
-    "N m": (1e-12, 1e6, 1e10),
-    "m/s": (1e-9, 100.0, 1e5),
-    "rad/s": (1e-9, 1e4, 1e8),
-}
-"""Limits of signal ranges by unit: error below the first or above the last, warning above the
-second."""
 FASTEST = {"m": (50.0, 1e5), "rad": (1e4, 1e8)}
 """Speeds of a position above which a warning and an error are given."""
 TOGETHER = (("m", "N"), ("rad", "N m"))
@@ -95,17 +84,15 @@ def of_units(view: View, model: Rough | None) -> Iterator[Finding]:
         of_x, of_force = mixed
         yield view.error("units", view.name("force"), "apart", of_x=of_x, of_force=of_force)
     for signal in view.roles.values():
-        low, doubt, high = LIMITS.get(record.units[signal], (0.0, np.inf, np.inf))
+        low, doubt, high = texts()["ranges"].get(record.units[signal], (0.0, np.inf, np.inf))
         range_ = float(np.ptp(record.signals[signal]))
         if 0 < range_ < low or range_ > doubt:
-            severity = "error" if range_ < low or range_ > high else "warning"
-            yield view.finding(severity, "units", signal, "range", range=range_)
+            yield view.finding(not low <= range_ <= high, "units", signal, "range", range=range_)
     if model is not None and model.clean:
         fastest = float(np.quantile(np.abs(model.v), 0.99))
         doubt, high = FASTEST.get(view.unit("x"), (np.inf, np.inf))
         if fastest > doubt:
-            severity = "error" if fastest > high else "warning"
-            yield view.finding(severity, "units", view.name("x"), "speed", fastest=fastest)
+            yield view.finding(fastest > high, "units", view.name("x"), "speed", fastest=fastest)
 
 
 SURE = 5.0
@@ -143,8 +130,7 @@ def _against(view: View, model: Rough, force: str) -> Iterator[Finding]:
     elif model.clean and model.explained < NOTHING and model.force.size / model.every > 100:
         signal = view.signal("force")
         white = signal is not None and abs(np.corrcoef(signal[1:], signal[:-1])[0, 1]) < 0.2
-        severity = "error" if white else "warning"
-        yield view.finding(severity, "unrelated", force, share=max(model.explained, 0.0))
+        yield view.finding(white, "unrelated", force, share=max(model.explained, 0.0))
     if model.sure(0) < -SURE and put_in > 0 and model.explained > LITTLE:
         mass, error = model.values[0], model.errors[0]
         yield view.warning("sign", force, "negative_mass", mass=mass, error=error)

@@ -9,12 +9,12 @@ from identification.data.findings import (
     Array,
     Finding,
     Rough,
-    Severity,
     View,
     constant_runs,
     count_of,
     rough_model,
     smoothed,
+    texts,
     white_part,
 )
 
@@ -40,10 +40,9 @@ def of_spikes(view: View) -> Iterator[Finding]:
         k = int(far[np.argmax(off[far])])
         weight = float((off[far] ** 2).sum() / (((y - np.median(y)) ** 2).sum() + 1e-300))
         heavy = weight > HEAVY and signal in view.roles.values()
-        kind = "glitch" if position else "spikes"
-        severity = "error" if position or heavy else "warning"
+        kind, ends = "glitch" if position else "spikes", (int(far[0]), int(far[-1]))
         values = {"count": far.size, "worst": view.at(k), "off": off[k]}
-        yield view.finding(severity, kind, signal, "spikes", int(far[0]), int(far[-1]), **values)
+        yield view.finding(position or heavy, kind, signal, "spikes", *ends, **values)
 
 
 def spike_samples(y: Array, *, position: bool) -> tuple[NDArray[np.intp], Array]:
@@ -98,31 +97,29 @@ def of_clipping(view: View) -> Iterator[Finding]:
             continue
         k = int(np.argmax(np.where(at_ends, length, 0)))
         where = " and ".join(f"its {side} value {top:.4g} {unit}" for side, top in tops.items())
-        severity, why = _limited(view, signal, [*tops.values()])
+        sensor = _limited_sensor(view, signal, [*tops.values()])
+        why = sensor or "the amplifier or the sensor was at its limit there"
         values = {"where": where, "share": samples / y.size, "why": why}
-        begin = int(first[k])
-        end = begin + int(length[k]) - 1
-        yield view.finding(severity, "clipping", signal, "clipping", begin, end, **values)
+        ends = int(first[k]), int(first[k] + length[k]) - 1
+        yield view.finding(bool(sensor), "clipping", signal, "clipping", *ends, **values)
 
 
-def _limited(view: View, signal: str, tops: list[float]) -> tuple[Severity, str]:
-    """Return severity and reason: an error if only the measurement was limited."""
-    unsure = "the amplifier or the sensor was at its limit there"
+def _limited_sensor(view: View, signal: str, tops: list[float]) -> str:
+    """Return the reason why only the measurement was limited; "" if this is not certain."""
     model = rough_model(view, curve=True) if signal == view.name("force") else None
     if model is None or view.steady is None:
-        return "warning", unsure
+        return ""
     force = np.interp(model.t, view.steady.time, view.steady[signal])
     clipped = np.isin(force, tops)
-    free, top = ~clipped, float(np.abs(tops).max())
-    if clipped.sum() < 5 or free.sum() < 50:
-        return "warning", unsure
-    values, *_ = np.linalg.lstsq(model.columns[free], model.force[free], rcond=1e-10)
+    if clipped.sum() < 5 or (~clipped).sum() < 50:
+        return ""
+    values, *_ = np.linalg.lstsq(model.columns[~clipped], model.force[~clipped], rcond=1e-10)
     passed = (model.columns[clipped] @ values - model.force[clipped]) * np.sign(force[clipped])
-    most = float(np.quantile(passed, 0.9))
+    most, top = float(np.quantile(passed, 0.9)), float(np.abs(tops).max())
     if not (passed.mean() > MEAN * top and most > MOST * top):
-        return "warning", unsure
-    why = f"the motion needs up to {most:.3g} {view.unit('force')} more, so its sensor was at its "
-    return "error", f"{why}limit, not the drive"
+        return ""
+    needed = f"the motion needs up to {most:.3g} {view.unit('force')} more"
+    return f"{needed}, so its sensor was at its limit, not the drive"
 
 
 FROZEN = 8
@@ -157,9 +154,9 @@ def of_frozen(view: View) -> Iterator[Finding]:
         then = f", then jumps by {after[k]:.3g} {unit}" if jumped else ""
         then += ", although it never repeats elsewhere" if noisy else ""
         lost = length[k] > LOST * y.size and noisy and signal in view.roles.values()
-        severity = "error" if (jumped and position) or lost else "warning"
         values = {"value": y[begin], "length": length[k], "then": then}
-        yield view.finding(severity, "frozen", signal, "frozen", begin, end, **values)
+        serious = (jumped and position) or bool(lost)
+        yield view.finding(serious, "frozen", signal, "frozen", begin, end, **values)
 
 
 JUMPED = 15.0
@@ -201,21 +198,15 @@ def of_jumps(view: View) -> Iterator[Finding]:
     if alike and period > 0.8 * np.ptp(x):
         yield view.error("wrap", name, "wrap", begin, end, count=far.size, period=period)
         return
-    pushed = _force_jumps(view, k)
+    pushed, force = False, view.signal("force")
+    if force is not None:  # in a true slip, the force jumps, too
+        steps = np.abs(np.diff(force))
+        near = steps[max(k - 1, 0) : k + 2]
+        pushed = bool(near.max() > FORCED * (np.quantile(steps, 0.9) + 1e-300))
     why = "a motion too fast for the sample rate" if pushed else "a sensor that lost its reference"
-    severity = "warning" if pushed or far.size >= OFTEN else "error"
     values = {"count": far.size, "size": size[k], "worst": view.at(k), "why": why}
-    yield view.finding(severity, "jump", name, "jump", begin, end, **values)
-
-
-def _force_jumps(view: View, k: int) -> bool:
-    """Return True if the force jumps together with the position, as in a true slip."""
-    force = view.signal("force")
-    if force is None:
-        return False
-    steps = np.abs(np.diff(force))
-    near = steps[max(k - 1, 0) : k + 2]
-    return bool(near.max() > FORCED * (np.quantile(steps, 0.9) + 1e-300))
+    serious = not pushed and far.size < OFTEN
+    yield view.finding(serious, "jump", name, "jump", begin, end, **values)
 
 
 def _period(x: Array, far: NDArray[np.intp]) -> float:
@@ -258,19 +249,6 @@ RELATED = 0.7
 """Least correlation of the given and the derived signal."""
 OFF = 0.2
 """Relative error of the scale above which it is reported."""
-KNOWN = {
-    57.2958: "deg/s taken as rad/s",
-    0.0174533: "rad/s taken as deg/s",
-    9.5493: "rpm taken as rad/s",
-    0.10472: "rad/s taken as rpm",
-    6.28319: "rad/s taken as rev/s",
-    0.159155: "rev/s taken as rad/s",
-    1000.0: "mm/s taken as m/s",
-    0.001: "m/s taken as mm/s",
-    1e6: "um/s taken as m/s",
-    100.0: "cm/s taken as m/s",
-    60.0: "per minute taken as per second",
-}
 
 
 def of_velocity(view: View) -> Iterator[Finding]:
@@ -297,10 +275,11 @@ def of_velocity(view: View) -> Iterator[Finding]:
         elif alike < RELATED:
             yield view.warning("velocity", name, **values)
         elif abs(scale - 1) > OFF:
-            near = [text for known, text in KNOWN.items() if abs(scale / known - 1) < 0.1]
+            scales = texts()["scales"].items()
+            near = [text for text, known in scales if abs(scale / known - 1) < 0.1]
             why = near[0] if near else "a wrong unit or scale"
-            severity = "warning" if not near and 0.2 <= scale <= 5 else "error"
-            yield view.finding(severity, "units", name, "scale", why=why, **values)
+            serious = bool(near) or not 0.2 <= scale <= 5
+            yield view.finding(serious, "units", name, "scale", why=why, **values)
 
 
 MOVED = 6.0
@@ -317,8 +296,8 @@ def of_motion(view: View) -> Iterator[Finding]:
     if x is not None and x.size >= 20:
         yield from _still(view, x)
     if force is not None and force.size >= 20 and np.ptp(force) == 0:
-        severity, case = ("error", "constant") if force[0] else ("warning", "undriven")
-        yield view.finding(severity, "constant", view.name("force"), case, value=force[0])
+        case = "constant" if force[0] else "undriven"
+        yield view.finding(bool(force[0]), "constant", view.name("force"), case, value=force[0])
 
 
 def _still(view: View, x: Array) -> Iterator[Finding]:

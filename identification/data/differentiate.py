@@ -23,11 +23,10 @@ from identification.data.filters import (
     choose_filter,
     lowpass,
 )  # fmt: skip
-from identification.data.record import Record, runs
+from identification.data.record import Array, Record, runs
 from symfric.foundation import checks
 from symfric.foundation.shown import brief
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 CERTAIN = 4.0

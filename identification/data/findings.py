@@ -17,10 +17,9 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import Record
+from identification.data.record import Array, Record
 from symfric.foundation import checks
 
-Array = NDArray[np.float64]
 Severity = Literal["error", "warning"]
 ROLES = ("x", "v", "a", "force")
 
@@ -100,8 +99,8 @@ class Findings:
 
 
 @cache
-def sentences() -> dict[str, str]:
-    """Return the sentences of findings by kind or case."""
+def texts() -> dict[str, dict[str, Any]]:
+    """Return the sentences of findings by kind or case, ranges by unit, and known scales."""
     return tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 
 
@@ -167,13 +166,14 @@ class View:
         return Record(piece.name, grid, signals, piece.units, first_row=piece.first_row)
 
     def finding(
-        self, severity: Severity, kind: str, signal: str, case: str = "",
+        self, serious: bool, kind: str, signal: str, case: str = "",
         begin: int | None = None, end: int | None = None, /, **values: object,
     ) -> Finding:  # fmt: skip
         """Return a finding at the samples `begin` to `end`; by default for the whole record.
 
         Args:
-            severity, kind, signal: see `Finding`.
+            serious: True for an error.
+            kind, signal: see `Finding`.
             case: key of the sentence in `findings.toml`, if it differs from `kind`.
             begin, end: first and last sample.
             values: values of the fields in the sentence.
@@ -182,12 +182,13 @@ class View:
         samples = (begin or 0, last if end is None else end)
         names = {"signal": signal, "x": self.name("x"), "force": self.name("force")}
         values |= {"unit": self.record.units.get(signal, ""), "at": self.at(samples[0])}
-        sentence = sentences()[case or kind].format(**names, **values)
-        first, last = samples if self.record.t is None else self.record.t[[*samples]]
-        return Finding(kind, self.number, signal, sentence, float(first), float(last), severity)
+        sentence = texts()["sentences"][case or kind].format(**names, **values)
+        start, stop = samples if self.record.t is None else self.record.t[[*samples]]
+        severity = "error" if serious else "warning"
+        return Finding(kind, self.number, signal, sentence, float(start), float(stop), severity)
 
-    error = partialmethod(finding, "error")
-    warning = partialmethod(finding, "warning")
+    error = partialmethod(finding, True)
+    warning = partialmethod(finding, False)
 
     def at(self, sample: int) -> str:
         """Return the location of a sample as text, with time and row."""

@@ -13,11 +13,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import GAP, Record, runs
+from identification.data.record import GAP, Array, Record, runs
 from identification.data.resample import SHORTEST, hermite, interpolated
 from symfric.foundation import checks
-
-Array = NDArray[np.float64]
 
 ALIKE = 0.8
 """Least correlation of two recordings of one quantity."""

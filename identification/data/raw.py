@@ -8,29 +8,18 @@ from typing import Literal, TypeVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import Record
-from identification.data.units import EXAMPLES, KINDS, by_channel, is_common, unit
+from identification.data.record import Array, Record
+from identification.data.units import CHANNELS, KINDS, by_channel, is_common, unit
 from symfric.foundation import checks
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 Missing = Literal["refuse", "drop"]
 
-ALIASES: Mapping[str, tuple[str, ...]] = {
-    "t": ("t", "time", "timestamp"),
-    "x": ("x", "q", "qm", "pos", "position", "displacement", "angle", "theta", "phi"),
-    "v": ("v", "qd", "dq", "vel", "velocity", "speed", "omega"),
-    "a": ("a", "qdd", "ddq", "acc", "acceleration"),
-    "force": ("force", "F", "f", "torque", "tau"),
-}
-"""Aliases of columns by canonical channel; aliases of several letters are case-insensitive."""
-POINTS: Mapping[str, tuple[str, ...]] = {
-    "v": ALIASES["v"],
-    "F": ("F", "f", "force", "friction", "torque", "tau"),
-    "N": ("N", "normal", "normal_force"),
-    "t": ALIASES["t"],
-}
-"""Aliases of columns of points."""
+ALIASES, POINTS = (
+    {name: CHANNELS[name]["aliases"] for name in names}
+    for names in (("t", "x", "v", "a", "force"), ("v", "F", "N", "t"))
+)
+"""Channel -> aliases of its column in records over time, and in points."""
 SKIPPED = ("", "-", "_")
 """Entries of `columns` that mark columns to ignore."""
 
@@ -292,8 +281,8 @@ def _scale(key: str, column: Column, given: str, wanted: Wanted) -> tuple[float,
     meant = unit(text) if text else None
     kinds = KINDS.get(key, ()) if not wanted.points or key in ("v", "F", "N") else ()
     if kinds and (meant is None or meant.si not in kinds):
-        such = EXAMPLES[key]
-        raise ValueError(f"column '{column}': expected a unit of {such}, got {text or 'none'}")
+        such = f"a unit of {CHANNELS[key]['examples']}"
+        raise ValueError(f"column '{column}': expected {such}, got {text or 'none'}")
     return (1.0, text) if meant is None else (meant.factor, meant.si)
 
 

@@ -14,11 +14,11 @@ import numpy as np
 from identification.data.mat_file import read_variables
 from identification.data.raw import Array, Column, Raw, Wanted, gathered, label, record
 from identification.data.record import Record
-from identification.data.units import is_common, unit
+from identification.data.units import KINDS, is_common, unit
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
 
-ASSUMED = {"t": "s", "x": "m", "v": "m/s", "a": "m/s^2", "force": "N", "F": "N", "N": "N"}
+ASSUMED = {name: kinds[0] for name, kinds in KINDS.items()}
 """Default units of arrays; numbers in Python are in SI units."""
 
 

@@ -8,14 +8,11 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.check_signals import spike_samples
-from identification.data.record import GAP, Record
+from identification.data.record import GAP, Array, Record
 from identification.data.units import unit
 from symfric.foundation import checks
-
-Array = NDArray[np.float64]
 
 SHORTEST = 10
 """Smallest number of samples in a piece between two gaps that is kept."""
@@ -66,7 +63,13 @@ def resampled(
     if gap == "refuse":
         _check_no_gap(record, where)
     parts = [record.at(part) for part in record.pieces if part.stop - part.start >= SHORTEST]
-    kept = [_at_step(part, step) for part in parts if part.time[-1] - part.time[0] >= 9 * step]
+    kept = list[Record]()
+    for part in parts:
+        t, span = part.time, part.time[-1] - part.time[0]
+        if span >= 9 * step:
+            new = t[0] + step * np.arange(int(span / step * (1 + 1e-12)) + 1)
+            signals = {key: interpolated(part, key, new) for key in part.signals}
+            kept.append(replace(part, t=new, signals=signals, loop=None, first_row=0))
     if not kept:
         raise ValueError(
             f"{where}: expected a piece of at least {SHORTEST} samples without a gap, got none at "
@@ -75,13 +78,6 @@ def resampled(
     if len(kept) == 1:
         return kept
     return [replace(p, name=f"{record.name} ({p.time[0]:.4g} s ...)") for p in kept]
-
-
-def _at_step(record: Record, step: float) -> Record:
-    t = record.time
-    new = t[0] + step * np.arange(int((t[-1] - t[0]) / step * (1 + 1e-12)) + 1)
-    signals = {key: interpolated(record, key, new) for key in record.signals}
-    return replace(record, t=new, signals=signals, loop=None, first_row=0)
 
 
 def interpolated(record: Record, signal: str, at: Array) -> Array:
@@ -122,14 +118,9 @@ def delayed(record: Record, delays: Mapping[str, float]) -> Record:
 
 def hermite(at: Array, t: Array, y: Array) -> Array:
     """Interpolate by cubic Hermite with second-order slopes; third order on uneven samples."""
-    if t.size < 3:
-        return np.interp(at, t, y)
-    slope = np.gradient(y, t)
-    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
-    h = t[k + 1] - t[k]
-    s = (at - t[k]) / h
-    ends = y[k] * (1 + 2 * s) * (1 - s) ** 2 + y[k + 1] * s**2 * (3 - 2 * s)
-    return ends + h * s * (1 - s) * (slope[k] * (1 - s) - slope[k + 1] * s)
+    from scipy.interpolate import CubicHermiteSpline  # noqa: PLC0415 (slow to import)
+
+    return CubicHermiteSpline(t, y, np.gradient(y, t))(at)
 
 
 def without_spikes(record: Record) -> Record:

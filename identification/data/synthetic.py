@@ -4,17 +4,14 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.record import PositionLoop, Record
+from identification.data.record import Array, PositionLoop, Record
 from symfric.foundation import checks
 from symfric.integrator.stepper import stepper
 from symfric.laws import Law, Stribeck
 from symfric.model import Model
 from symfric.scenes import Drive
-
-Array = NDArray[np.float64]
 
 DRIVE = Drive(
     Stribeck(mu_s=28.0, mu_d=20.0, v_s=0.01, v_eps=1e-4, sigma_2=200.0), m=95.0, N=1.0, offset=-3.0

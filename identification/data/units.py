@@ -4,10 +4,13 @@ The grammar is that of `symfric.foundation.units`. In addition, recorders use wo
 `newton`), letters of either case, and speeds as `1/min`.
 """
 
+import tomllib
 from collections.abc import Mapping
 from functools import cache
 from math import isfinite
+from pathlib import Path
 from re import findall
+from typing import Any
 
 from symfric.foundation.units import WORDS, Unit, nearest, parsed, per_second, written
 
@@ -22,27 +25,12 @@ COMMON = {
 }  # fmt: skip
 """Symbols that denote units in a header even without brackets, as in `x_mm` but not in `tau_d`."""
 
-KINDS: Mapping[str, tuple[str, ...]] = {
-    "t": ("s",),
-    "x": ("m", "rad"),
-    "v": ("m/s", "rad/s"),
-    "a": ("m/s^2", "rad/s^2"),
-    "force": ("N", "N m"),
-    "F": ("N", "N m"),
-    "N": ("N",),
-}
+CHANNELS: Mapping[str, Mapping[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("channels.toml").read_text("utf-8")
+)
+"""Channel -> SI units, aliases and examples of units."""
+KINDS: Mapping[str, tuple[str, ...]] = {n: tuple(c["units"]) for n, c in CHANNELS.items()}
 """SI units of the canonical channels; the first one is for linear drives."""
-
-EXAMPLES: Mapping[str, str] = {
-    "t": "s, ms, us, min",
-    "x": "m, cm, mm, um, rad, mrad, deg, rev",
-    "v": "m/s, mm/s, rad/s, deg/s, rpm",
-    "a": "m/s^2, mm/s^2, rad/s^2, deg/s^2",
-    "force": "N, mN, kN, N m, N mm, mN m",
-    "F": "N, mN, kN, N m, N mm, mN m",
-    "N": "N, mN, kN",
-}
-"""Examples of accepted units, for messages."""
 
 
 @cache

@@ -18,18 +18,16 @@ from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.record import PositionLoop, Record
-from identification.residuals.evaluation import Blocks, Channel
+from identification.residuals.evaluation import Array, Blocks, Channel
 from identification.residuals.initial import local, noise_of
 from identification.residuals.stepper import Chain, Feedback, Mass, Tangent, why_no_motion
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
 
-Array = NDArray[np.float64]
 SIGNALS = ("x", "force")
 WHERE = "ClosedLoop"
 

@@ -13,11 +13,9 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from identification.residuals.evaluation import Array
 from symfric.model import Model
-
-Array = NDArray[np.float64]
 
 FEWEST = 8
 """Smallest number of samples of a window that determines its start values."""

@@ -13,14 +13,12 @@ from identification.data.differentiate import derivatives, uncertain
 from identification.data.filters import Decimation, Filter, Velocity, choose_filter
 from identification.data.record import Record
 from identification.residuals.balance import Balance, Coordinate, Mask, Row, balance, coordinates
-from identification.residuals.evaluation import Blocks, Channel
+from identification.residuals.evaluation import Array, Blocks, Channel
 from identification.residuals.sampled import Sampled, moving_start
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
 from symfric.model import Model
-
-Array = NDArray[np.float64]
 
 WHERE = "InverseDynamics"
 FEWEST, ENOUGH = 10, 100

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.record import Record
-from identification.residuals.evaluation import Blocks, Channel
+from identification.residuals.evaluation import Array, Blocks, Channel
 from identification.residuals.sampled import Sampled, imposed_step, moving_start
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
@@ -19,8 +19,6 @@ from symfric.foundation.parameters import symbolise
 from symfric.foundation.variable import symbols_of
 from symfric.laws import Law
 from symfric.laws.base.law import FORCE, chosen
-
-Array = NDArray[np.float64]
 
 MODES = ("auto", "steady", "imposed")
 

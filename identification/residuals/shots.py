@@ -19,9 +19,8 @@ from typing import Any, Literal, NamedTuple, cast, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from identification.residuals.evaluation import Blocks, Evaluation
+from identification.residuals.evaluation import Array, Blocks, Evaluation
 from identification.residuals.stepper import Chain, Mass, Motion, given_inputs, why_no_motion
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
@@ -29,7 +28,6 @@ from symfric.foundation.variable import stacked
 from symfric.integrator import Hold, Input, Linear, simulate
 from symfric.model import Model, Output
 
-Array = NDArray[np.float64]
 DEAD_TIME = "dead_time"
 """Name of the unknown, and of the parameter of a delayed model."""
 RATE = "_rate"

@@ -27,13 +27,11 @@ from typing import Any, NamedTuple, cast, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from identification.residuals.evaluation import Array
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.compiled.columns import Columns
 from symfric.model import Model
-
-Array = NDArray[np.float64]
 
 SEARCH, POLISH = 9, 5
 """Law evaluations to find vb, and to find v1 from it; two or three are usually sufficient."""

@@ -161,11 +161,14 @@ def _estimates(live: Live) -> dict[str, Estimate]:
             others = ", ".join(n for n in group if n != name)
             notes[name] = f"not separable from {others}" if others else "without influence"
     columns = (made.standard_errors, made.low, made.high, made.white_errors)
+    whole, unit_load = subject.scene or subject.law, load_of(subject) == 1.0
+    known = {} if whole is None else parameters(whole)
     estimates: dict[str, Estimate] = {}
     for name in dict.fromkeys([*subject.variables, *task.residuals.names]):
         unknown = own.get(name)
         unit = unknown.unit if unknown else subject.variables[name].unit
-        unit = _in_forces(subject, name, unit, live.data.rotary)
+        if unit_load and name in known and is_coefficient(known[name]):  # a force under 1 N
+            unit = turned("N") if live.data.rotary else "N"
         if name not in found:
             held, note = float(subject.held[name]), subject.reasons.get(name, "")
             estimates[name] = Estimate(held, unit, fixed=True, note=note)
@@ -178,15 +181,6 @@ def _estimates(live: Live) -> dict[str, Estimate]:
         value = found[name]
         estimates[name] = Estimate(value, unit, error, low, high, white, False, note, nuisance)
     return estimates
-
-
-def _in_forces(subject: Subject, name: str, unit: str, turning: bool) -> str:
-    """Return the unit of a coefficient, which is a force under a load of 1 N."""
-    whole = subject.scene or subject.law
-    known = {} if whole is None else parameters(whole)
-    if load_of(subject) != 1.0 or name not in known or not is_coefficient(known[name]):
-        return unit
-    return turned("N") if turning else "N"
 
 
 def levels_of(subject: Subject, largest: float | None, turning: bool) -> Levels | None:

@@ -6,9 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from identification.data.dataset import Dataset
 from identification.result.live import Live
 from identification.result.outcome import Outcome, sentences
@@ -26,8 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from identification.result.page import Ranking
-
-Array = NDArray[np.float64]
 
 
 @final
@@ -89,7 +84,10 @@ class Fitted(packed.Portable, Outcome):
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]
         """Return the notebook view with verdict, fitted values and figures."""
         named = [(n, e) for n, e in self.parameters.items() if not (e.fixed or e.nuisance)]
-        rows = tuple((n, *map(_six_digits, (e.value, e.low, e.high)), e.unit) for n, e in named)
+        rows = tuple(
+            (n, *("–" if x is None else f"{x:.6g}" for x in (e.value, e.low, e.high)), e.unit)
+            for n, e in named
+        )
         table = Table(("parameter", "value", "95 % from", "to", "unit"), rows, (1, 2, 3))
         title = f"{self.name} fitted by {self.kind}: {self.status.name}"
         return Shown(title, tuple(sentences(self)), table).html(self.plot())
@@ -220,8 +218,3 @@ def load_fit(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) ->
             unknown classes.
     """
     return FIT.load(path, own)
-
-
-def _six_digits(value: float | None) -> str:
-    """Return a number with six digits; a dash for None."""
-    return "–" if value is None else f"{value:.6g}"

@@ -6,21 +6,17 @@ from functools import cached_property
 from math import nan
 from typing import Protocol, final
 
-import numpy as np
-from numpy.typing import NDArray
-
 from identification.data.dataset import Dataset
-from identification.residuals.evaluation import Residuals
+from identification.residuals.evaluation import Array, Residuals
 from identification.residuals.inverse import InverseDynamics, InverseRows
 from identification.result.series import Errors, error
 from identification.solving.many_starts import best_of, many_starts
 from identification.solving.task import Point, Task
 from identification.unknowns.subject import Closed, Subject
 from identification.unknowns.unknowns import unknowns_of
-from identification.verdict.covariance import Covariance
+from identification.verdict.covariance import Covariance, Levels, covariance
+from identification.verdict.minimum import Minimum, minimum
 from symfric.foundation import checks
-
-Array = NDArray[np.float64]
 
 
 class Kind(Protocol):
@@ -69,7 +65,7 @@ class Live:
         kind, subject, data: arguments of the fit.
         task: least-squares problem with the noise levels at the end.
         point: the minimum.
-        covariance: covariance of the values at the minimum.
+        levels: friction levels of the law; None if the load is not known.
     """
 
     kind: Kind
@@ -77,7 +73,17 @@ class Live:
     data: Dataset
     task: Task
     point: Point
-    covariance: Covariance
+    levels: Levels | None
+
+    @cached_property
+    def minimum(self) -> Minimum:
+        """Arrays of the minimum."""
+        return minimum(self.task, self.point)
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        """Covariance of the values at the minimum."""
+        return covariance(self.minimum, self.levels)
 
     @cached_property
     def closed(self) -> Closed:

@@ -6,10 +6,8 @@ from itertools import zip_longest
 from math import floor, isfinite, log10
 from textwrap import wrap
 
-import numpy as np
-from numpy.typing import NDArray
-
 from identification.data.findings import Finding
+from identification.residuals.evaluation import Array
 from identification.result.live import Asked, Live
 from identification.result.series import Curve, Errors, Estimate, Series, Tried
 from identification.verdict.judge import Verdict
@@ -18,8 +16,6 @@ from symfric.foundation.status import Status
 from symfric.foundation.storable import agree
 from symfric.laws import Law
 from symfric.scenes import Drive
-
-Array = NDArray[np.float64]
 
 WIDTH = 80
 CLOSE = 0.9

@@ -35,43 +35,29 @@ FLOOR = 1e-3
 """Smallest difference shown in the chart of the starts."""
 
 
-def _across(one: Series) -> Axis:
+def signal_charts(one: Series) -> str:
+    """Return the chart of the measured and fitted signal, and that of the residuals."""
+    shape = Path if one.ordered else Dots
     name, _, unit = one.abscissa.rstrip("]").partition(" [")
     low, high = float(one.residual.t.min()), float(one.residual.t.max())
+    x = around(name, unit, [one.residual.t])
     if low < high and one.ordered:
-        return Axis(name, unit, low, high)
-    return around(name, unit, [one.residual.t])
-
-
-def _windows(one: Series) -> list[Mark]:
-    """Return marks at the starts of windows; none if there are too many to distinguish."""
-    if one.breaks.size > WINDOWS:
-        return []
-    return [Level("window", float(t), upright=True) for t in one.breaks]
-
-
-def data_and_fit(one: Series) -> str:
-    """Return the chart of the measured and fitted signal."""
-    shape = Path if one.ordered else Dots
-    y = around(one.signal, one.unit, [one.measured.y, one.predicted.y])
-    marks = [
-        *_windows(one),
+        x = Axis(name, unit, low, high)
+    starts = one.breaks if one.breaks.size <= WINDOWS else np.zeros(0)
+    windows = [Level("window", float(t), upright=True) for t in starts]
+    both = [
         shape("measured", one.measured.t, one.measured.y, "measured"),
         shape("predicted", one.predicted.t, one.predicted.y, "fitted"),
     ]
+    y = around(one.signal, one.unit, [one.measured.y, one.predicted.y])
     says = f"{one.signal} of {one.record} over {one.abscissa}, measured and fitted"
-    return chart(f"{one.record}: {one.signal}", _across(one), y, marks, says=says)
-
-
-def left(one: Series) -> str:
-    """Return the chart of the residuals."""
-    shape = Path if one.ordered else Dots
+    above = chart(f"{one.record}: {one.signal}", x, y, [*windows, *both], says=says)
     y = around("difference", one.unit, [one.residual.y, np.zeros(1)])
-    marks = [*_windows(one), Level("zero", 0.0), shape("residual", one.residual.t, one.residual.y)]
+    marks = [*windows, Level("zero", 0.0), shape("residual", one.residual.t, one.residual.y)]
     size = float(np.abs(one.residual.y).max(initial=0.0))
     says = f"fitted minus measured {one.signal}, at most {number(size, 3)} {one.unit}"
     title = f"{one.record}: residuals of {one.signal}"
-    return chart(title, _across(one), y, marks, height=170.0, says=says)
+    return above + chart(title, x, y, marks, height=170.0, says=says)
 
 
 def lags(one: Series) -> str:
@@ -129,19 +115,6 @@ def waterfall(fit: Outcome) -> str:
     return chart("Waterfall of the starts", x, y, marks, height=210.0, says=says)
 
 
-CONTENTS = (
-    ("parameters", "Parameters"),
-    ("data", "Data and fit"),
-    ("friction", "Friction"),
-    ("residuals", "Residuals"),
-    ("starts", "Starts"),
-    ("ranking", "Ranking"),
-    ("findings", "Data warnings"),
-    ("made", "How it was made"),
-)
-WORDS = {"good": "Good", "doubtful": "Doubtful", "bad": "No result"}
-
-
 class Ranking(Protocol):
     """Result of `select`, restricted to what the page shows."""
 
@@ -152,36 +125,30 @@ class Ranking(Protocol):
 
 def page_of(fit: Outcome, ranking: Ranking | None = None) -> str:
     """Return the page as HTML text."""
-    parts = {
-        "parameters": html.section("parameters", "Parameters", *_parameters(fit)),
-        "data": html.section("data", "Data and fit", *_data(fit)),
-        "friction": html.section("friction", "Force against velocity", *_friction(fit)),
-        "residuals": html.section("residuals", "Residuals", *_residuals(fit)),
-        "starts": html.section("starts", "Starts", *_starts(fit)),
-        "ranking": html.section("ranking", "Ranking of laws", *_ranking(ranking)),
-        "findings": html.section("findings", "Data warnings", *_findings(fit)),
-        "made": html.section("made", "How it was made", *_made(fit)),
-    }
-    kind = kind_of(fit)
+    sections = [
+        ("parameters", "Parameters", "Parameters", _parameters(fit)),
+        ("data", "Data and fit", "Data and fit", _data(fit)),
+        ("friction", "Friction", "Force against velocity", _friction(fit)),
+        ("residuals", "Residuals", "Residuals", _residuals(fit)),
+        ("starts", "Starts", "Starts", _starts(fit)),
+        ("ranking", "Ranking", "Ranking of laws", _ranking(ranking)),
+        ("findings", "Data warnings", "Data warnings", _findings(fit)),
+        ("made", "How it was made", "How it was made", _made(fit)),
+    ]
+    if any(f.severity == "error" for f in fit.findings):
+        sections.sort(key=lambda section: section[0] != "findings")
+    parts = [(at, name, html.section(at, head, *body)) for at, name, head, body in sections]
+    verdict = ("good", "Good") if fit.status.name == "SOLVED" else ("doubtful", "Doubtful")
+    verdict = verdict if fit.status.ok else ("bad", "No result")
     top = [
         f"<header>{html.title(fit.name)}",
         html.paragraph(f"fitted to {', '.join(fit.records)} by {fit.kind}", "soft"),
-        html.verdict(kind, WORDS[kind], sentences(fit)),
-        html.contents([(a, name) for a, name in CONTENTS if parts[a]]),
+        html.verdict(*verdict, sentences(fit)),
+        html.contents([(at, name) for at, name, part in parts if part]),
         "</header>",
     ]
-    order = [name for name, _ in CONTENTS]
-    if any(f.severity == "error" for f in fit.findings):
-        order = ["findings", *(name for name in order if name != "findings")]
-    body = "\n".join([*top, *(parts[name] for name in order if parts[name])])
+    body = "\n".join([*top, *(part for *_, part in parts if part)])
     return html.page(f"{fit.name}: fit", "en", body)
-
-
-def kind_of(fit: Outcome) -> str:
-    """Return the style of the verdict box: "good", "doubtful" or "bad"."""
-    if not fit.status.ok:
-        return "bad"
-    return "good" if fit.status.name == "SOLVED" else "doubtful"
 
 
 def _parameters(fit: Outcome) -> Iterator[str]:
@@ -238,7 +205,7 @@ def _data(fit: Outcome) -> Iterator[str]:
     yield _errors("Residuals of each signal", fit.errors, fit.records)
     yield _errors("The same parameters on other data", fit.validation or {}, ())
     for one in fit.series:
-        yield html.figure(data_and_fit(one) + left(one))
+        yield html.figure(signal_charts(one))
 
 
 def _friction(fit: Outcome) -> Iterator[str]:
@@ -269,19 +236,18 @@ def _residuals(fit: Outcome) -> Iterator[str]:
 
 
 def _tests(caption: str, tests: Sequence[Test]) -> str:
+    words = {
+        (True, True): "passed", (True, False): "too small to count",
+        (False, True): "failed", (False, False): "no, allowed for",
+    }  # fmt: skip
     rows = [
-        (t.channel, t.name, number(t.statistic, 3), f"{t.p:.2g}", f"{t.limit:.2g}", _outcome(t))
+        (t.channel, t.name, number(t.statistic, 3), f"{t.p:.2g}", f"{t.limit:.2g}",
+         words[t.passed, t.p >= t.limit if t.passed else t.decides])
         for t in tests
-    ]
+    ]  # fmt: skip
     kinds = ["good" if t.passed else "doubtful" * t.decides for t in tests]
     header = ("channel", "test", "statistic", "p", "limit", "result")
     return html.table(caption, header, rows, (2, 3, 4), kinds)
-
-
-def _outcome(test: Test) -> str:
-    if test.passed:
-        return "passed" if test.p >= test.limit else "too small to count"
-    return "failed" if test.decides else "no, allowed for"
 
 
 def _starts(fit: Outcome) -> Iterator[str]:

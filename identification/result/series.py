@@ -7,11 +7,10 @@ from math import inf, nan
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.differentiate import differentiate
 from identification.data.record import Record
-from identification.residuals.evaluation import Channel
+from identification.residuals.evaluation import Array, Channel
 from identification.verdict.colour import Whiteness
 from symfric.foundation.shown import brief
 from symfric.foundation.status import Status
@@ -107,8 +106,6 @@ class Tried:
 Errors = dict[tuple[str, str], Error]
 """Errors of each signal of each record, (record, signal) -> error."""
 
-
-Array = NDArray[np.float64]
 
 MOST = 2000
 """Largest number of points of a line, about two for each column of pixels."""

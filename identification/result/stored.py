@@ -12,15 +12,14 @@ from dataclasses import fields, is_dataclass
 from enum import Enum
 from math import inf, isnan, nan
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
 
 import numpy as np
 
 from identification.result.outcome import Outcome
 from symfric.foundation import checks, storable
 from symfric.foundation.files import read_json
-from symfric.foundation.numeric import is_symbolic
 from symfric.foundation.parameters import Parametric
 from symfric.laws import ALL_LAWS, Asymmetric, Element, Law, Slider, Sum, Table, law_name
 from symfric.laws.catalogue import WRAPPERS
@@ -29,10 +28,17 @@ from symfric.scenes import Drive
 INFINITE = {"inf": inf, "-inf": -inf}
 DIGITS = 6
 """Significant digits of arrays, which are used only for drawing."""
+KINDS: dict[str, type[Parametric]] = {
+    **ALL_LAWS, **WRAPPERS, "sum": Sum, "asymmetric": Asymmetric, "table": Table,
+    "element": Element, "slider": Slider, "drive": Drive,
+}  # fmt: skip
+"""Name -> class that can be restored from a file."""
 
 
 def plain(value: Any) -> Any:
     """Return `value` as JSON-compatible data.
+
+    A user-defined law is represented by the name of its class.
 
     Raises:
         TypeError: the value is neither a number, a text, a collection nor a dataclass.
@@ -48,23 +54,23 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind == "f":
         return [plain(float(f"{x:.{DIGITS}g}")) for x in value.tolist()]
     if isinstance(value, Mapping):
-        return _mapping(value)  # pyright: ignore[reportUnknownArgumentType]
+        found: dict[str, Any] = {}
+        for key, one in value.items():  # pyright: ignore[reportUnknownVariableType]
+            first, *second = map(str, key if isinstance(key, tuple) else (key,))  # pyright: ignore[reportUnknownArgumentType, reportUnknownVariableType]
+            if second:
+                found.setdefault(first, {})[second[0]] = plain(one)
+            else:
+                found[first] = plain(one)
+        return found
     if isinstance(value, list | tuple | np.ndarray):
         return [plain(one) for one in value]  # pyright: ignore[reportUnknownVariableType]
-    if is_dataclass(value):
-        return {item.name: plain(getattr(value, item.name)) for item in fields(value)}
-    raise TypeError(f"expected plain data, got {type(value).__name__}")
-
-
-def _mapping(value: Mapping[Any, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for key, one in value.items():
-        if isinstance(key, tuple):
-            first, second = map(str, key)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-            found.setdefault(first, {})[second] = plain(one)
-        else:
-            found[str(key)] = plain(one)
-    return found
+    if not is_dataclass(value):
+        raise TypeError(f"expected plain data, got {type(value).__name__}")
+    given = {item.name: plain(getattr(value, item.name)) for item in fields(value) if item.init}
+    if not isinstance(value, Parametric):
+        return given
+    name = next((n for n, kind in KINDS.items() if kind is type(value)), type(value).__name__)
+    return {"kind": name, **given}
 
 
 def revived(kind: Any, data: Any) -> Any:
@@ -77,40 +83,23 @@ def revived(kind: Any, data: Any) -> Any:
     meant = getattr(origin or kind, "__value__", None)  # NDArray is an alias since NumPy 2.5
     if meant is not None:
         return revived(meant, data)
-    if kind is Any or origin is Literal:
-        return data
-    if origin in (Union, UnionType):
-        return _one_of(inner, data)
+    if origin in (Union, UnionType):  # a type or None
+        return None if data is None else revived(inner[0], data)
     if origin is tuple:
-        if len(inner) == 2 and inner[1] is Ellipsis:
-            return tuple(revived(inner[0], one) for one in data)
-        return tuple(revived(t, one) for t, one in zip(inner, data, strict=True))
-    if origin is list:
-        return [revived(inner[0], one) for one in data]
-    if origin is not None and isinstance(origin, type) and issubclass(origin, Mapping):
-        if get_origin(inner[0]) is tuple:
-            return {
-                (a, b): revived(inner[1], v) for a, part in data.items() for b, v in part.items()
-            }
+        return tuple(revived(inner[0], one) for one in data)
+    if origin is dict and get_origin(inner[0]) is tuple:
+        return {(a, b): revived(inner[1], v) for a, part in data.items() for b, v in part.items()}
+    if origin is dict:
         return {name: revived(inner[1], one) for name, one in data.items()}
-    if kind is np.ndarray or origin is np.ndarray:
+    if origin is np.ndarray:
         return np.array(_real(data))
     if isinstance(kind, type) and issubclass(kind, Enum):
         return kind[data]
     if is_dataclass(kind):
-        hints = get_type_hints(kind)
-        wanted = {item.name for item in fields(kind) if item.init}
-        given = {name: revived(hints[name], one) for name, one in data.items() if name in wanted}
-        return kind(**given)  # pyright: ignore[reportCallIssue]
+        hints = storable.hints_of(kind)
+        wanted = data.keys() & {item.name for item in fields(kind)}
+        return kind(**{name: revived(hints[name], data[name]) for name in wanted})  # pyright: ignore[reportCallIssue]
     return float(_real(data)) if kind is float else data
-
-
-def _one_of(kinds: tuple[Any, ...], data: Any) -> Any:
-    if data is None and NoneType in kinds:
-        return None
-    others = [kind for kind in kinds if kind is not NoneType]
-    matching = [kind for kind in others if isinstance(kind, type) and isinstance(data, kind)]
-    return revived((matching or others)[0], data)
 
 
 def _real(value: Any) -> Any:
@@ -118,41 +107,6 @@ def _real(value: Any) -> Any:
     if isinstance(value, list):
         return [_real(one) for one in value]  # pyright: ignore[reportUnknownVariableType]
     return nan if value is None else INFINITE[value] if isinstance(value, str) else value
-
-
-KINDS: dict[str, type[Parametric]] = {
-    **ALL_LAWS, **WRAPPERS, "sum": Sum, "asymmetric": Asymmetric, "table": Table,
-    "element": Element, "slider": Slider, "drive": Drive,
-}  # fmt: skip
-"""Name -> class that can be restored from a file."""
-
-
-def to_data(held: Parametric) -> dict[str, Any]:
-    """Return a law or a drive with numbers as a dictionary for JSON.
-
-    A user-defined class is represented by its name.
-
-    Raises:
-        ValueError: a parameter is a symbol.
-    """
-    name = next((name for name, kind in KINDS.items() if kind is type(held)), type(held).__name__)
-    return {"kind": name} | {
-        item.name: _plain(f"{name}: {item.name}", getattr(held, item.name))
-        for item in fields(held)
-        if item.init
-    }
-
-
-def _plain(where: str, value: Any) -> Any:
-    if isinstance(value, Parametric):
-        return to_data(value)
-    if isinstance(value, tuple | list):
-        return [_plain(where, one) for one in value]  # pyright: ignore[reportUnknownVariableType]
-    if is_symbolic(value):
-        raise checks.refused(where, "a number", value, "a fitted law holds no symbols")
-    if isinstance(value, str | bool):
-        return value
-    return checks.number(where, value)
 
 
 def source_of(law: Law) -> str:
@@ -165,38 +119,34 @@ def source_of(law: Law) -> str:
 
 
 def known(data: Any, own: Mapping[str, type[Parametric]]) -> bool:
-    """Return True if all classes in the output of `to_data` are in `KINDS` or in `own`."""
+    """Return True if all classes in the output of `plain` are in `KINDS` or in `own`."""
     if isinstance(data, Mapping):
         named = data.get("kind") in KINDS or data.get("kind") in own  # pyright: ignore
         return named and all(known(one, own) for one in data.values())  # pyright: ignore
     return not isinstance(data, list) or all(known(one, own) for one in data)  # pyright: ignore
 
 
-def from_data(data: Any, own: Mapping[str, type[Parametric]] | None = None) -> Parametric:
-    """Return the law or drive from the output of `to_data`.
+def from_data(data: Any, own: Mapping[str, type[Parametric]] | None = None) -> Any:
+    """Return the law or drive, or a part of it, from the output of `plain`.
 
     Args:
-        data: output of `to_data`.
+        data: output of `plain`.
         own: further classes by name.
 
     Raises:
         ValueError: an unknown class or field, or refused numbers.
     """
+    if isinstance(data, list):
+        return tuple(from_data(one, own) for one in data)  # pyright: ignore[reportUnknownVariableType]
+    if not isinstance(data, Mapping):
+        return data
     known = {**KINDS, **(own or {})}
     given = checks.named("law from data", data)
     name = given.pop("kind", None)
     kind = known[checks.choice("law from data: kind", name, known)]
     names = [item.name for item in fields(kind) if item.init]
     checks.check_names(f"law from data: {name}", given, names)
-    return kind(**{field: _made_of(value, known) for field, value in given.items()})
-
-
-def _made_of(value: Any, known: Mapping[str, type[Parametric]]) -> Any:
-    if isinstance(value, Mapping):
-        return from_data(value, known)  # pyright: ignore[reportUnknownArgumentType]
-    if isinstance(value, list):
-        return tuple(_made_of(one, known) for one in value)  # pyright: ignore[reportUnknownVariableType]
-    return value
+    return kind(**{field: from_data(value, own) for field, value in given.items()})
 
 
 FILE = "symfric fit"
@@ -215,16 +165,16 @@ def to_dict(fit: Outcome) -> dict[str, Any]:
         "format": FORMAT,
         **data,
         "law": None if fit.law is None else law_name(fit.law),
-        "law_data": _data(fit.law),
-        "machine": _data(fit.drive),
+        "law_data": _plain_or_none(fit.law),
+        "machine": _plain_or_none(fit.drive),
     }
 
 
-def _data(held: Parametric | None) -> dict[str, Any] | None:
+def _plain_or_none(held: Parametric | None) -> dict[str, Any] | None:
     """Return a law or a drive as data; None for a user-defined class with more than numbers."""
     try:
-        return None if held is None else to_data(held)
-    except ValueError:
+        return plain(held)
+    except TypeError:
         return None
 
 
@@ -248,19 +198,17 @@ def read(kind: type[Outcome], path: str | Path, own: Mapping[str, type[Parametri
 
 
 def _made(kind: type[Outcome], data: dict[str, Any], own: Mapping[str, type[Parametric]] | None):
-    hints = get_type_hints(kind)
-    plain_ones = {
+    hints = storable.hints_of(kind)
+    values: dict[str, Any] = {
         f.name: revived(hints[f.name], data[f.name]) for f in fields(kind) if f.name not in APART
     }
-    law, machine = data["law_data"], data["machine"]
-    made = kind(**plain_ones, law=_known(law, own), machine=_known(machine, own))
-    for name, value in plain_ones.items():
+    law, machine = (
+        from_data(data[key], own) if known(data[key], own or {}) else None
+        for key in ("law_data", "machine")
+    )
+    made = kind(**values, law=law, machine=machine)
+    for name, value in values.items():
         if not storable.fits(value, hints[name]):
             raise ValueError(f"{name} of another type")
     made.check_fields()
     return made
-
-
-def _known(data: Any, own: Mapping[str, type[Parametric]] | None) -> Any:
-    """Return the law or machine; None if its class or the class of a part is unknown."""
-    return None if data is None or not known(data, own or {}) else from_data(data, own)

@@ -23,12 +23,10 @@ from importlib import import_module
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from identification.residuals.evaluation import Array
 from identification.solving.task import NOISELESS, Point, Task, change, levels, objective
 from symfric.foundation.status import Status
-
-Array = NDArray[np.float64]
 
 Tell = Callable[[int], None]
 

@@ -19,15 +19,13 @@ from functools import lru_cache, partial
 from threading import get_ident
 
 import numpy as np
-from numpy.typing import NDArray
 
+from identification.residuals.evaluation import Array
 from identification.solving.descent import Start, descend, descend_easier_first
 from identification.solving.task import Point, Task, square
 from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns
 from symfric.foundation.status import SolveError, Status
-
-Array = NDArray[np.float64]
 
 REACH = 5.0
 """Largest factor by which a positive value is changed."""
@@ -123,10 +121,14 @@ def many_starts(
         _mark_interrupted(done, f"interrupted by the user after {len(done)} starts")
     finally:
         found.close()
-    if all(start.status is not Status.INTERRUPTED for start in done):
-        _go_on(task, done, evaluations)
-    best = best_of(done) if done else None
-    if best is None or not np.isfinite(best.objective):
+    best = best_of(done)
+    interrupted = any(start.status is Status.INTERRUPTED for start in done)
+    if best.status is Status.MAX_ITERATIONS and not interrupted:
+        more = descend(task, best.w, best.number, evaluations)
+        if more.objective <= best.objective:
+            spent = best.evaluations + more.evaluations
+            done[done.index(best)] = best = replace(more, evaluations=spent)
+    if not np.isfinite(best.objective):
         return tuple(done)
     return tuple(replace(s, cost=best.cost + s.objective - best.objective) for s in done)
 
@@ -137,17 +139,6 @@ def _mark_interrupted(done: list[Start], why: str) -> None:
     if not best.status.ok:
         message = f"{why}; best result so far"
         done[done.index(best)] = replace(best, status=Status.INTERRUPTED, message=message)
-
-
-def _go_on(task: Task, done: list[Start], evaluations: int) -> None:
-    """Continue the best start in `done` if it has used up its evaluations."""
-    best = best_of(done)
-    if best.status is not Status.MAX_ITERATIONS:
-        return  # at a minimum, or failed
-    more = descend(task, best.w, best.number, evaluations)
-    if more.objective <= best.objective:
-        spent = best.evaluations + more.evaluations
-        done[done.index(best)] = replace(more, evaluations=spent)
 
 
 def best_of(starts: Sequence[Start]) -> Start:
@@ -163,10 +154,10 @@ def _in_turn(
     evaluations: int,
 ) -> Generator[Start]:
     """Yield the ends in the order of the start numbers."""
-    for number, w in enumerate(starts if executor is None else ()):
-        tell = None if progress is None else partial(_tell, progress, number, len(starts))
-        yield descend_easier_first(task, w, number, evaluations, tell)
     if executor is None:
+        for number, w in enumerate(starts):
+            tell = None if progress is None else partial(_tell, progress, number, len(starts))
+            yield descend_easier_first(task, w, number, evaluations, tell)
         return
     packed = pickle.dumps(task)
     waiting: list[Future[Start]] = [

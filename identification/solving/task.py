@@ -26,13 +26,10 @@ from math import log
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identification.residuals.evaluation import Channel, Evaluation, Residuals
+from identification.residuals.evaluation import Array, Channel, Evaluation, Residuals
 from identification.unknowns.unknowns import Unknowns
 from symfric.foundation import checks
-
-Array = NDArray[np.float64]
 
 THRESHOLD = {"squares": np.inf, "huber": 1.345, "soft_l1": 1.0, "cauchy": 2.385, "arctan": 3.0}
 """Loss -> C. huber and cauchy have 95 % efficiency for normal noise."""

@@ -16,10 +16,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.starts.measured import DEAD, Measured, turning_points
+from identification.starts.measured import DEAD, Array, Measured, turning_points
 from symfric.foundation import checks
-
-Array = NDArray[np.float64]
 
 CANDIDATES = 60
 """Number of radii of the dense set, in geometric progression."""
@@ -31,8 +29,8 @@ SPARE = 4
 """Number of additional elements, which are merged with their neighbours later."""
 LEAST_EXPLAINED = 0.1
 """Least share of the force that elements must explain."""
-STEPS, QUICK = 40, 8
-"""Largest number of evaluations to refine the radii, and the same for start values only."""
+STEPS = 40
+"""Largest number of evaluations to refine the radii."""
 
 
 @final
@@ -96,7 +94,6 @@ def fit_elements(
     viscous: bool = True,
     offset: bool = True,
     most: int = MOST,
-    thorough: bool = True,
 ) -> Elements:
     """Fit `count` elements, or fewer if they explain the data equally well, by least squares.
 
@@ -107,7 +104,6 @@ def fit_elements(
         viscous: also fit sigma_2 >= 0.
         offset: also fit a constant force.
         most: number of samples to use; of more samples, every n-th and all turning points.
-        thorough: start from two sets of radii and refine both to convergence.
 
     Raises:
         ValueError: no path, no motion, or friction that does not follow the path.
@@ -134,16 +130,14 @@ def fit_elements(
             "the sliding velocity"
         )
 
-    def improved(start: Array, steps: int = STEPS) -> Elements:
-        return _improved(used, others, start, (viscous, offset, loaded), steps)
+    def improved(start: Array) -> Elements:
+        return _improved(used, others, start, (viscous, offset, loaded))
 
-    few = _quantiles(radii, k, count)
-    if not thorough:
-        return improved(few, QUICK)
     more = improved(_quantiles(radii, k, count + SPARE))
     if more.k.size <= count:
         return more
-    return min(improved(_merged(more, count)), improved(few), key=lambda found: found.rms)
+    both = _merged(more, count), _quantiles(radii, k, count)
+    return min(map(improved, both), key=lambda found: found.rms)
 
 
 def _dense(measured: Measured, others: Array, radii: Array, loaded: int) -> tuple[Array, float]:
@@ -208,7 +202,7 @@ def _merged(elements: Elements, count: int) -> Array:
 
 
 def _improved(
-    measured: Measured, others: Array, radii: Array, kinds: tuple[bool, bool, int], steps: int
+    measured: Measured, others: Array, radii: Array, kinds: tuple[bool, bool, int]
 ) -> Elements:
     """Refine stiffnesses, log radii and the other coefficients by a trust-region method."""
     from scipy.optimize import least_squares  # noqa: PLC0415 (slow to import)
@@ -232,12 +226,12 @@ def _improved(
         return np.hstack([by_radius, e / r * size, others]) / size
 
     start = np.concatenate([np.log(radii), k * radii / size, rest])
-    low = np.concatenate([np.log(radii) - 3, np.zeros(n), np.zeros(rest.size)])
+    low = np.concatenate([np.log(radii) - 3, np.zeros(n + rest.size)])
     high = np.concatenate([np.log(radii) + 3, np.full(n + rest.size, np.inf)])
     found = least_squares(
         residuals, np.clip(start, low + 1e-9, high - 1e-9),
         jac=slopes,  # pyright: ignore[reportArgumentType]
-        bounds=(low, high), x_scale="jac", max_nfev=steps,
+        bounds=(low, high), x_scale="jac", max_nfev=STEPS,
     )  # fmt: skip
     radii = np.sort(np.exp(found.x[:n]))
     w, left = _dense(measured, others, radii, loaded)

@@ -159,28 +159,25 @@ class BreakAways:
         )
 
 
-def break_away(measured: Measured, *, rest: float = REST, offset: float = 0.0) -> BreakAways:
+def break_away(measured: Measured) -> BreakAways:
     """Find the break-away forces of all ramps in a record.
 
-    A rest is an interval of at least 5 samples below `rest` times the largest speed that ends in
+    A rest is an interval of at least 5 samples below 2 % of the largest speed that ends in
     motion. The break-away force is the largest force in the direction of that motion during the
     rest. The samples must resolve the rise of the force; otherwise the maximum is missed.
 
     Args:
         measured: samples with times; the force excludes inertia, or the ramps are slow.
-        rest: share of the largest speed.
-        offset: constant force [N] in addition to friction.
 
     Raises:
         ValueError: no times, or no rest that ends in motion.
     """
-    rest = checks.number("break_away: rest", rest, above=0.0, upper=0.9)
     if measured.t is None:
         raise ValueError("break_away: expected a record with times, got points; pass t=")
-    events = tuple(e for r in measured.records for e in _events(measured, r, rest, offset))
+    events = tuple(e for r in measured.records for e in _events(measured, r))
     if not events:
         raise ValueError(
-            f"break_away: expected a rest of at least {SHORTEST} samples below {rest:g} of the "
+            f"break_away: expected a rest of at least {SHORTEST} samples below {REST:g} of the "
             "largest speed that ends in motion, got none"
         )
     forces = np.array([event.force for event in events])
@@ -196,11 +193,9 @@ def break_away(measured: Measured, *, rest: float = REST, offset: float = 0.0) -
     return BreakAways(events, level, scatter, float(w[1]), error)
 
 
-def _events(measured: Measured, record: slice, rest: float, offset: float) -> Iterator[BreakAway]:
-    t, v = np.asarray(measured.t)[record], measured.v[record]
-    F = measured.F[record] - offset
-    still = np.abs(v) < rest * measured.fastest
-    for begin, end in runs(still):
+def _events(measured: Measured, record: slice) -> Iterator[BreakAway]:
+    t, v, F = np.asarray(measured.t)[record], measured.v[record], measured.F[record]
+    for begin, end in runs(np.abs(v) < REST * measured.fastest):
         if end - begin < SHORTEST or end >= v.size:
             continue
         side = int(np.sign(v[end]))
@@ -325,19 +320,17 @@ def hysteresis(measured: Measured, *, offset: float = 0.0, dead: float = DEAD) -
     """
     if measured.x is None:
         return None
-    branches = list[Branch]()
-    for record in measured.records:
-        x, F, v = measured.x[record], measured.F[record] - offset, measured.v[record]
-        branches += _branches(x, F, v, dead, record.start)
+    branches = tuple(
+        b for r in measured.records
+        for b in _branches(measured.x[r], measured.F[r] - offset, measured.v[r], dead, r.start)
+    )  # fmt: skip
     if not branches:
         return None
-    halves = np.array([b.half for b in branches])
-    half = float(np.median(halves))
-    level, damping = (
-        float(np.median([getattr(b, n) for b in branches])) for n in ("level", "damping")
+    half, level, damping = (
+        float(np.median([getattr(b, n) for b in branches])) for n in ("half", "level", "damping")
     )
-    scatter = float(np.median(np.abs(halves - half))) / half
-    return Hysteresis(tuple(branches), half, level, damping, scatter)
+    scatter = float(np.median([abs(b.half - half) for b in branches])) / half
+    return Hysteresis(branches, half, level, damping, scatter)
 
 
 def _branches(x: Array, F: Array, v: Array, dead: float, shift: int) -> Iterator[Branch]:

@@ -19,13 +19,10 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from identification.starts.stribeck import Curve, StribeckCurve, binned, samples
+from identification.starts.stribeck import Array, Curve, StribeckCurve, binned, samples
 from symfric.foundation import checks
 from symfric.laws.static.exponential import SteadyStateLuGre
-
-Array = NDArray[np.float64]
 
 NAMES = ("F_S", "F_C", "v_s", "sigma_2", "delta")
 SHARE = (0.02, 0.98)

@@ -6,18 +6,15 @@ from math import isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.starts.maxwell_slip import Elements, fit_elements
-from identification.starts.measured import Hysteresis, Measured, hysteresis, travelled
+from identification.starts.measured import Array, Hysteresis, Measured, hysteresis, travelled
 from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve, fit_law
 from identification.unknowns.roles import orders, parts, velocity
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, parameters
 from symfric.laws.base.law import Law
 from symfric.scenes.blocks import Drive
-
-Array = NDArray[np.float64]
 
 STEADY = ("level", "viscous", "velocity scale", "")
 """Roles of parameters that the steady curve of a law determines."""
@@ -165,7 +162,8 @@ def _guess(parameter: Parameter, facts: Facts, law: Law) -> float:
             return velocity(parameter, facts.stribeck.v_s)
         case "stiffness" if (stiffness := _stiffness(facts, law)) > 0:
             per = facts.N if unit == "1/m" else 1.0
-            share = value / scaled(parameters(law), parameter.field, parted) if parted > 1 else 1.0
+            same = [float(p.value) for p in parameters(law).values() if p.field == parameter.field]
+            share = value / (sum(same) * parted / len(same)) if parted > 1 else 1.0
             return stiffness / per * share
         case "damping" if (stiffness := _stiffness(facts, law)) > 0:
             return _damping(facts, stiffness) / (facts.N if unit == "s/m" else 1.0)
@@ -353,9 +351,3 @@ def shared(parameter: Parameter, law: Law) -> int:
     if parameter.field not in FIELDS:
         return 1
     return max(len(getattr(part, "elements", "1")) for part in parts(law))
-
-
-def scaled(values: Mapping[str, Parameter], field: str, count: int) -> float:
-    """Return `count` times the mean value of the parameters of one field."""
-    same = [float(p.value) for p in values.values() if p.field == field]
-    return sum(same) * count / len(same)

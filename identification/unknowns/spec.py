@@ -288,8 +288,11 @@ def drafted(
     """Return name -> unknown of the `free` parameters, including tied ones for their start.
 
     Raises:
-        ValueError: bounds, starts and orders that contradict each other, in one error.
+        ValueError: no free parameters; or bounds, starts and orders that contradict each other, in
+            one error.
     """
+    if not free:
+        raise ValueError("Fit: expected at least one free parameter, got all fixed")
     problems: list[str] = []
     specs = requests.free
     found = {d.unknown.name: _first(d, specs.get(d.unknown.name, Range()), problems) for d in free}

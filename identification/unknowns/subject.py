@@ -9,7 +9,6 @@ import casadi as ca
 
 from identification.unknowns import roles
 from identification.unknowns.spec import (
-    Draft,
     Requests,
     Tied,
     Unknown,
@@ -44,34 +43,46 @@ class Subject:
 
     Attributes:
         name: name of the law or the model.
-        names: free parameters including tied ones; all are among the symbols `model.p`.
+        free: free parameters including tied ones, starting at the values of the law; all are among
+            the symbols `model.p`.
+        requests: arguments of the user.
         model: equations with the free parameters as symbols `p`. For a law fitted to points, the
             inputs are v, N and the further inputs of the law, and the output is F. Held parameters
             of a model are symbols, too; their start is their value.
         law: law with numbers; None for a model that does not have exactly one law.
         scene: machine with numbers; None for a law alone or a model.
-        unknowns: free parameters that have a coordinate, starting at the values of the law.
-        ties: free parameters computed from others.
         reasons: held parameter -> reason.
         held: held parameter -> value.
         variables: parameter -> name, unit, bounds and doc, for all parameters.
         guard: function from free values by name to the law or machine with numbers; raises
             ValueError if a law refuses them.
-        started: parameters with a start value given by the user.
     """
 
     name: str
-    names: tuple[str, ...]
+    free: dict[str, Unknown]
+    requests: Requests
     model: Model
     law: Law | None
     scene: Scene | None
-    unknowns: tuple[Unknown, ...]
-    ties: dict[str, Tied]
     reasons: dict[str, str]
     held: dict[str, float]
     variables: dict[str, Variable]
     guard: Callable[[Mapping[str, float]], Law | Scene | None]
-    started: frozenset[str]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the free parameters, including tied ones."""
+        return tuple(self.free)
+
+    @property
+    def ties(self) -> dict[str, Tied]:
+        """Free parameters computed from others."""
+        return self.requests.ties
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Free parameters that have a coordinate."""
+        return tuple(u for n, u in self.free.items() if n not in self.ties)
 
     @property
     def drive(self) -> Drive | None:
@@ -174,39 +185,14 @@ def _of_parts(
     given = requests.fixed
     held = {n: given.get(n, roles.held_value(known[n], speeds)) for n in reasons}
     drafts = [of_parameter(p, units[n], speeds) for n, p in known.items() if n not in reasons]
-    free = _unknowns(drafts, requests, held, roles.orders(whole))
+    free = drafted(drafts, requests, held, roles.orders(whole))
     whole = with_values(whole, held | {n: u.start for n, u in free.items()})
     symbolic, p = symbolise(whole, *free)
     law, scene = (whole, None) if isinstance(whole, Law) else (whole.law, whole)
     model = points_model(symbolic, load, p) if isinstance(symbolic, Law) else symbolic.equations(p)
     guard = partial(with_values, whole)
-    return _subject(
-        law_name(law), requests, free, reasons, held, variables, model, law, scene, guard
-    )
-
-
-def _unknowns(
-    drafts: Sequence[Draft], requests: Requests, held: Mapping[str, float],
-    orders: Iterable[tuple[str, str, bool]],
-) -> dict[str, Unknown]:  # fmt: skip
-    """Return the unknowns of the free parameters; raise ValueError if there are none."""
-    if not drafts:
-        raise ValueError("Fit: expected at least one free parameter, got all fixed")
-    return drafted(drafts, requests, held, orders)
-
-
-def _subject(
-    name: str, requests: Requests, free: Mapping[str, Unknown], reasons: Mapping[str, str],
-    held: dict[str, float], variables: dict[str, Variable], model: Model, law: Law | None,
-    scene: Scene | None, guard: Callable[[Mapping[str, float]], Law | Scene | None],
-) -> Subject:  # fmt: skip
-    ties = requests.ties
-    return Subject(
-        name, tuple(free), model, law, scene,
-        tuple(u for n, u in free.items() if n not in ties), ties,
-        {n: reasons[n] for n in variables if n in reasons}, held, variables, guard,
-        requests.started,
-    )  # fmt: skip
+    why = {n: reasons[n] for n in variables if n in reasons}
+    return Subject(law_name(law), free, requests, model, law, scene, why, held, variables, guard)
 
 
 def _reasons(whole: Scene | Law, requests: Requests, load: float, moving: bool) -> dict[str, str]:
@@ -252,14 +238,12 @@ def _of_model(model: Model, requests: Requests) -> Subject:
     laws = [c.law for c in model.contacts if isinstance(c.law, Law)]
     orders = [pair for law in laws for pair in roles.symbols_in_order(law)]
     drafts = [of_variable(v) for n, v in variables.items() if n not in reasons]
-    free = _unknowns(drafts, requests, held, orders)
+    free = drafted(drafts, requests, held, orders)
     starts = held | {n: u.start for n, u in free.items()}
     p = tuple(replace(v, start=starts[v.name]) for v in model.p)
     guard = Laws.of(laws, p)
-    model = replace(model, p=p)
-    return _subject(
-        model.name, requests, free, reasons, held, variables, model, guard({}), None, guard
-    )
+    model, why = replace(model, p=p), {n: reasons[n] for n in variables if n in reasons}
+    return Subject(model.name, free, requests, model, guard({}), None, why, held, variables, guard)
 
 
 @final

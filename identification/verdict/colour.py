@@ -20,10 +20,12 @@ from importlib import import_module
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.residuals.evaluation import Array
-from identification.verdict.minimum import Count
 from symfric.foundation.shown import brief
+
+Count = NDArray[np.int64]
 
 MOST = 30
 """Largest order of an autoregressive model."""

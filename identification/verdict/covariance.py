@@ -12,95 +12,15 @@ interval.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple, final
+from functools import partial
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.residuals.evaluation import Array
-from identification.solving.task import Point, Task
-from identification.verdict.colour import Colour, colour
-from identification.verdict.minimum import Minimum, Shift, groups, minimum, places, positions, shift
+from identification.verdict.minimum import Minimum, groups
 from symfric.foundation.shown import brief
-
-RANK = 1e-7
-"""Smallest nonzero singular value of the scaled sensitivities, relative to the largest."""
-
-
-class Sandwich(NamedTuple):
-    """Linearised uncertainty of k values that depend on n coordinates.
-
-    Directions that the residuals do not determine are listed in `null` and do not contribute.
-
-    Attributes:
-        coloured: covariance of the values with the autocorrelation of each channel, shape (k, k).
-        white: the same for white residuals with the variance of each channel.
-        freedom: effective degrees of freedom of the variances on the diagonal (Satterthwaite,
-            including the uncertainty of the estimated autocorrelation), shape (k,).
-        null: directions of the coordinates along which the residuals do not change, (n, nullity).
-        colours: autoregressive models of the channels.
-    """
-
-    coloured: Array
-    white: Array
-    freedom: Array
-    null: Array
-    colours: tuple[Colour, ...]
-
-
-def sandwich(found: Minimum) -> Sandwich:
-    """Compute the uncertainty of a least-squares fit with independent noise in the channels."""
-    free = ~found.held
-    size = np.linalg.norm(found.J * free, axis=0)
-    size = np.where(size > 0, size, 1.0)
-    scaled = found.J / size * free
-    _, s, Vt = np.linalg.svd(scaled * np.sqrt(found.gain)[:, None], full_matrices=False)
-    kept = s > RANK * max(float(s[0]) if s.size else 0.0, 1e-300)
-    inverse = (Vt[kept].T / s[kept] ** 2) @ Vt[kept]
-    bread = scaled @ (inverse @ (found.slope / size).T)  # (rows, k)
-    reach = np.abs(bread).max(axis=0, initial=0.0)
-    reach = np.where(reach > 0, reach, 1.0)  # scaling; variances of variances would overflow
-    bread = bread / reach
-    sensitivity = scaled * found.gain[:, None]
-    k = len(found.names)
-    coloured, white, spread = np.zeros((k, k)), np.zeros((k, k)), np.zeros(k)
-    colours = list[Colour]()
-    for channel in found.channels:
-        B = bread[channel.rows]
-        there = positions(channel, across_windows=True)
-        seen = colour(found.r[channel.rows], sensitivity[channel.rows], there)
-        C, wide = _meat(seen, B, places(channel))
-        coloured, white, spread = coloured + C, white + seen.white * B.T @ B, spread + wide
-        colours.append(seen)
-    total = np.diag(coloured) ** 2
-    freedom = 2 * np.divide(total, spread, where=spread > 0, out=np.ones(k))
-    inside = Vt[kept][:, free]  # free directions orthogonal to `inside` are null
-    null = np.zeros((free.size, inside.shape[1] - inside.shape[0]))
-    null[free] = np.linalg.svd(inside, full_matrices=True)[2][inside.shape[0] :].T
-    back = np.outer(reach, reach)
-    coloured, white = back * coloured, back * white
-    freedom = np.maximum(freedom, 1.0)
-    return Sandwich(coloured, white, freedom, null / size[:, None], tuple(colours))
-
-
-def _meat(found: Colour, bread: Array, place: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Return B' Sigma B of one channel, and the variances of its estimated diagonal.
-
-    var c_ii = 2 c_ii^2 / freedom + (dc_ii/dphi)' cov(phi) (dc_ii/dphi)
-    """
-    if not found.order:
-        flat = found.variance * bread.T @ bread
-        return flat, 2 * np.diag(flat) ** 2 / found.freedom
-    on_grid = np.zeros((int(place.max()) + 1, bread.shape[1]))
-    np.add.at(on_grid, place, bread)
-    points = 1 << (2 * on_grid.shape[0]).bit_length()
-    waves = np.fft.fft(on_grid, points, axis=0)
-    S, slopes = found.spectrum(points)
-    C = np.real(waves.conj().T @ (S[:, None] * waves)) / points
-    slope = slopes @ np.abs(waves) ** 2 / points  # (p, k)
-    spread = np.einsum("pi,pq,qi->i", slope, found.doubt, slope)
-    return C, 2 * np.diag(C) ** 2 / found.freedom + spread
-
 
 FAR = 3.0
 """Ratio of a level's force to the largest friction force above which it is not identifiable."""
@@ -210,13 +130,7 @@ def correlation(matrix: Array) -> Array:
     return np.divide(matrix, both, out=np.full_like(both, np.nan), where=both > 0)
 
 
-def covariance(task: Task, point: Point, levels: Levels | None = None) -> Covariance:
-    """Compute the uncertainty of the values of a solved task; see `covariance_of`."""
-    found = minimum(task, point)
-    return covariance_of(found, shift(task, found), levels)
-
-
-def covariance_of(found: Minimum, change: Shift, levels: Levels | None = None) -> Covariance:
+def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     """Compute the uncertainty of the values at a minimum.
 
     Limits: linear in the values, or in the logarithms of logarithmic unknowns; see `profile` for
@@ -225,10 +139,9 @@ def covariance_of(found: Minimum, change: Shift, levels: Levels | None = None) -
 
     Args:
         found: the minimum.
-        change: norm of the change of the weighted residuals at other values, for the messages.
         levels: friction levels among the values; levels far above every force have no interval.
     """
-    inside = sandwich(found)
+    inside = found.sandwich
     names, values = found.names, found.values
     moved = found.slope @ inside.null  # values along directions that leave the residuals unchanged
     own = [names.index(u.name) for u in found.unknowns]
@@ -238,15 +151,9 @@ def covariance_of(found: Minimum, change: Shift, levels: Levels | None = None) -
     fixed = ~np.any((size_of > ROUNDING * size_of.max(axis=1, keepdims=True)) & ~found.held, axis=1)
     matrix, white = (_without(C, wanders | fixed) for C in (inside.coloured, inside.white))
     low, high = _intervals(found, np.sqrt(np.diag(matrix)), inside.freedom)
-    lost = list(
-        groups(
-            tuple(names[i] for i in own),
-            values[own],
-            moved[own],
-            size[own],
-            lambda some: change(_spread(found, own, some)),
-        )
-    )
+    mine = tuple(names[i] for i in own)
+    change = partial(_change, found, own)
+    lost = [*groups(mine, values[own], moved[own], size[own], change)]
     far = {} if levels is None else dict(levels.beyond(dict(zip(names, values, strict=True))))
     gone = dict(_unlimited(found, low, high))
     labels = [found.label(c) for c in found.channels]
@@ -299,12 +206,12 @@ def _sensitivity(found: Minimum, own: list[int]) -> Array:
     return size
 
 
-def _spread(found: Minimum, own: list[int], some: Array) -> Array:
-    """Return all values for given values of the unknowns; tied values follow to first order."""
+def _change(found: Minimum, own: list[int], some: Array) -> float:
+    """Return the change of the residuals; tied values follow the unknowns to first order."""
     w = _inverse(found.slope[own]) @ (some - found.values[own])
     there = found.values + found.slope @ w
     there[own] = some
-    return there
+    return found.change(there)
 
 
 def _inverse(slope: Array) -> Array:

@@ -77,8 +77,8 @@ def informative(
     zero = [v.name for v in p if checks.as_number(v.start) in (None, 0.0)]
     if zero:
         raise checks.refused("informative: free", "start values that are not zero", zero[0])
-    scale = ca.diag(ca.vertcat(*(v.symbol for v in p)))
     symbols, x = ca.vertcat(*(v.symbol for v in p)), model.vector("x")
+    scale = ca.diag(symbols)
 
     S = [[_sensitivity(state, v) for v in p] for state in model.x]
     sensitivity = ca.vertcat(*(ca.horzcat(*(v.symbol for v in row)) for row in S))
@@ -89,11 +89,16 @@ def informative(
     growth = Y.T @ ca.diag(1 / ca.DM(levels) ** 2) @ Y / step
 
     lower = [(i, j) for i in range(len(p)) for j in range(i + 1)]
-    entries = [_information(names[i], names[j], known * (i == j), most) for i, j in lower]
+    entries = [
+        Variable(_name(names[i], names[j]), "1", start=known * (i == j), nominal=most,
+                 doc="Fisher information")
+        for i, j in lower
+    ]  # fmt: skip
     information = ca.SX(len(p), len(p))
     for (i, j), entry in zip(lower, entries, strict=True):
         information[i, j] = information[j, i] = entry.symbol
-    output = Output(_log_det(information) / len(p), "1", "log det of the information per parameter")
+    log_det = 2 * ca.sum1(ca.log(ca.diag(ca.chol(information))))
+    output = Output(log_det / len(p), "1", "log det of the information per parameter")
     flat = [(r, c) for r in range(len(model.x)) for c in range(len(p))]
     return replace(
         model,
@@ -127,22 +132,5 @@ def _sensitivity(state: Variable, p: Variable) -> Variable:
     return Variable(f"S_{state.name}_{p.name}", state.unit, nominal=state.nominal, doc=doc)
 
 
-def _information(a: str, b: str, start: float, nominal: float) -> Variable:
-    return Variable(_name(a, b), "1", start=start, nominal=nominal, doc="Fisher information")
-
-
 def _name(a: str, b: str) -> str:
     return f"I_{a}_{b}"
-
-
-def _log_det(A: ca.SX) -> ca.SX:
-    """Return log det A of a symmetric positive matrix by its Cholesky factor."""
-    n = A.shape[0]
-    L, total = ca.SX(n, n), ca.SX(0)
-    for j in range(n):
-        pivot = A[j, j] - sum(L[j, k] ** 2 for k in range(j))
-        L[j, j] = ca.sqrt(pivot)
-        total += ca.log(pivot)
-        for i in range(j + 1, n):
-            L[i, j] = (A[i, j] - sum(L[i, k] * L[j, k] for k in range(j))) / L[j, j]
-    return total

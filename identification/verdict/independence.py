@@ -30,9 +30,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from identification.residuals.evaluation import Array, Channel
-from identification.verdict.colour import Colour, span, whitened
+from identification.verdict.colour import Colour, Count, span, whitened
 from identification.verdict.colour import colour as autoregressive
-from identification.verdict.minimum import Count, Minimum, lagged, positions
+from identification.verdict.minimum import Minimum, lagged, positions
 
 Kind = Literal["position", "velocity", "acceleration", ""]
 

@@ -29,11 +29,9 @@ import numpy as np
 from identification.data.findings import Findings
 from identification.residuals.evaluation import Array, Channel
 from identification.residuals.sampled import moving_start
-from identification.solving.task import Point, Task
 from identification.verdict.colour import Colour, Whiteness, whiteness
-from identification.verdict.covariance import sandwich
 from identification.verdict.independence import Dependence, Family, dependences, inputs_of
-from identification.verdict.minimum import Minimum, minimum, positions
+from identification.verdict.minimum import Minimum, positions
 from symfric.foundation.status import Status
 
 ROUNDING = 1e-6
@@ -182,18 +180,12 @@ class Verdict:
         return Status.IMPLAUSIBLE if self.nonsense else Status.DOUBTFUL
 
 
-def judge(task: Task, point: Point, findings: Findings | None = None) -> Verdict:
-    """Assess a solved task; errors in its data make the result implausible."""
-    return judged(minimum(task, point), findings)
-
-
-def judged(found: Minimum, findings: Findings | None = None) -> Verdict:
-    """Assess a minimum."""
-    inside = sandwich(found)
+def judge(found: Minimum, findings: Findings | None = None) -> Verdict:
+    """Assess a minimum; errors in its data make the result implausible."""
     white = dict[str, Whiteness]()
     tests, effective = list[Test](), dict[str, float]()
     each = list[tuple[Channel, list[tuple[Family, Dependence]]]]()
-    for channel, colour in zip(found.channels, inside.colours, strict=True):
+    for channel, colour in zip(found.channels, found.sandwich.colours, strict=True):
         name = found.label(channel)
         effective[name] = colour.effective
         position = positions(channel)

@@ -7,7 +7,8 @@ descriptions fit at one point, the residuals are evaluated a small distance away
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import final
+from functools import cached_property
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,10 @@ from numpy.typing import NDArray
 from identification.residuals.evaluation import Array, Channel
 from identification.solving.task import Point, Task, influence
 from identification.unknowns.spec import Unknown
+from identification.verdict.colour import Colour, Count, colour
 
-Count = NDArray[np.int64]
+Shift = Callable[[Array], float]
+"""Function from values to the norm of the change of the residuals."""
 
 JITTER = 0.5
 """Relative deviation from the usual step above which consecutive rows are not neighbours."""
@@ -70,6 +73,50 @@ def _step(t: Array) -> float:
     return float(np.median(steps)) if steps.size else 1.0
 
 
+RANK = 1e-7
+"""Smallest nonzero singular value of the scaled sensitivities, relative to the largest."""
+
+
+class Sandwich(NamedTuple):
+    """Linearised uncertainty of k values that depend on n coordinates.
+
+    Directions that the residuals do not determine are listed in `null` and do not contribute.
+
+    Attributes:
+        coloured: covariance of the values with the autocorrelation of each channel, shape (k, k).
+        white: the same for white residuals with the variance of each channel.
+        freedom: effective degrees of freedom of the variances on the diagonal (Satterthwaite,
+            including the uncertainty of the estimated autocorrelation), shape (k,).
+        null: directions of the coordinates along which the residuals do not change, (n, nullity).
+        colours: autoregressive models of the channels.
+    """
+
+    coloured: Array
+    white: Array
+    freedom: Array
+    null: Array
+    colours: tuple[Colour, ...]
+
+
+def _meat(found: Colour, bread: Array, place: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return B' Sigma B of one channel, and the variances of its estimated diagonal.
+
+    var c_ii = 2 c_ii^2 / freedom + (dc_ii/dphi)' cov(phi) (dc_ii/dphi)
+    """
+    if not found.order:
+        flat = found.variance * bread.T @ bread
+        return flat, 2 * np.diag(flat) ** 2 / found.freedom
+    on_grid = np.zeros((int(place.max()) + 1, bread.shape[1]))
+    np.add.at(on_grid, place, bread)
+    points = 1 << (2 * on_grid.shape[0]).bit_length()
+    waves = np.fft.fft(on_grid, points, axis=0)
+    S, slopes = found.spectrum(points)
+    C = np.real(waves.conj().T @ (S[:, None] * waves)) / points
+    slope = slopes @ np.abs(waves) ** 2 / points  # (p, k)
+    spread = np.einsum("pi,pq,qi->i", slope, found.doubt, slope)
+    return C, 2 * np.diag(C) ** 2 / found.freedom + spread
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Minimum:
@@ -86,6 +133,7 @@ class Minimum:
         gain: derivative of the influence function; one for squares, shape (rows,).
         raw: predicted - measured in SI units, shape (rows,).
         noise: signal -> standard deviation of its noise, if given.
+        change: norm of the change of the weighted residuals, a function of the values.
     """
 
     channels: Sequence[Channel]
@@ -99,11 +147,47 @@ class Minimum:
     gain: Array
     raw: Array
     noise: Mapping[str, float]
+    change: Shift
 
     def label(self, channel: Channel) -> str:
         """Return the name of a channel for messages."""
         records = {c.record for c in self.channels}
         return channel.signal if len(records) == 1 else f"{channel.signal}[{channel.record}]"
+
+    @cached_property
+    def sandwich(self) -> Sandwich:
+        """Linearised uncertainty of the values, with independent noise in the channels."""
+        free = ~self.held
+        size = np.linalg.norm(self.J * free, axis=0)
+        size = np.where(size > 0, size, 1.0)
+        scaled = self.J / size * free
+        _, s, Vt = np.linalg.svd(scaled * np.sqrt(self.gain)[:, None], full_matrices=False)
+        kept = s > RANK * max(float(s[0]) if s.size else 0.0, 1e-300)
+        inverse = (Vt[kept].T / s[kept] ** 2) @ Vt[kept]
+        bread = scaled @ (inverse @ (self.slope / size).T)  # (rows, k)
+        reach = np.abs(bread).max(axis=0, initial=0.0)
+        reach = np.where(reach > 0, reach, 1.0)  # scaling; variances of variances would overflow
+        bread = bread / reach
+        sensitivity = scaled * self.gain[:, None]
+        k = len(self.names)
+        coloured, white, spread = np.zeros((k, k)), np.zeros((k, k)), np.zeros(k)
+        colours = list[Colour]()
+        for channel in self.channels:
+            B = bread[channel.rows]
+            there = positions(channel, across_windows=True)
+            seen = colour(self.r[channel.rows], sensitivity[channel.rows], there)
+            C, wide = _meat(seen, B, places(channel))
+            coloured, white, spread = coloured + C, white + seen.white * B.T @ B, spread + wide
+            colours.append(seen)
+        total = np.diag(coloured) ** 2
+        freedom = 2 * np.divide(total, spread, where=spread > 0, out=np.ones(k))
+        inside = Vt[kept][:, free]  # free directions orthogonal to `inside` are null
+        null = np.zeros((free.size, inside.shape[1] - inside.shape[0]))
+        null[free] = np.linalg.svd(inside, full_matrices=True)[2][inside.shape[0] :].T
+        back = np.outer(reach, reach)
+        coloured, white = back * coloured, back * white
+        freedom = np.maximum(freedom, 1.0)
+        return Sandwich(coloured, white, freedom, null / size[:, None], tuple(colours))
 
 
 def minimum(task: Task, point: Point) -> Minimum:
@@ -120,25 +204,18 @@ def minimum(task: Task, point: Point) -> Minimum:
             rows = channel.rows
             gain[rows] = max(float(np.mean(above[rows] - below[rows])) / (2 * h), 0.05)
     known, box = {s: x for s, x in task.noise.items() if s not in task.estimated}, task.unknowns
-    return Minimum(
-        task.channels, box.unknowns, box.names, point.values, point.slope, box.at_bound(point.w),
-        point.weights * point.r, point.J, gain, point.evaluation.r, known,
-    )  # fmt: skip
-
-
-def shift(task: Task, found: Minimum) -> Callable[[Array], float]:
-    """Return a function of the values: the norm of the change of the weighted residuals."""
+    raw = point.evaluation.r
 
     def change(values: Array) -> float:
         there = task.residuals.at(values)
         failed = isinstance(there, str)
-        return np.inf if failed else float(np.linalg.norm((there.r - found.raw) / task.sigma))
+        return np.inf if failed else float(np.linalg.norm((there.r - raw) / task.sigma))
 
-    return change
+    return Minimum(
+        task.channels, box.unknowns, box.names, point.values, point.slope, box.at_bound(point.w),
+        point.weights * point.r, point.J, gain, raw, known, change,
+    )  # fmt: skip
 
-
-Shift = Callable[[Array], float]
-"""Function from values to the norm of the change of the residuals."""
 
 SHARE = 1e-4
 """Component of a direction below which a value does not take part in it."""

@@ -106,7 +106,7 @@ def _lanes(case: Case, members: int) -> Iterator[Found]:
     integrator, _ = built(model, input_data(model, None, 0.0, end), ADAPTIVE["rodas5p"])
     yield LANES, {
         "case": case.name, "members": members,
-        "lanes": int(getattr(program(integrator, True).members, "lanes", 1)),
+        "lanes": program(integrator).members.lanes,
         "time per member [us]": 1e6 * best["together"] / members,
         "one by one [us]": 1e6 * best["alone"] / members,
         "ratio to the ensemble": best["alone"] / best["together"],

@@ -118,7 +118,7 @@ def codegen(
     example without a compiler; the files are written in any case. The law of a fit has the fitted
     parameters; with `--scene drive` the drive also has them.
 
-    Example: symfric codegen --law lugre --out build --step-size 0.001
+    Example: symfric codegen lugre --out build --step-size 0.001
 
     Example: symfric codegen robot.urdf --inverse-dynamics --payload tool0 --out build
 
@@ -129,6 +129,8 @@ def codegen(
     opt.check_outputs(json)
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
+    if fit and not law and fit.suffix.lower() not in (".json", ".urdf") and not fit.is_file():
+        fit, law = None, str(fit)
     chosen = None if inverse_dynamics else chosen_law(fit, law)
     subject = subject_of(chosen, scene, compensator)
     kind = ("double" if subject == PLANT else "both") if real is None else real
@@ -248,7 +250,7 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
     """
     if (fit is None) == (law is None):
         got = "neither" if fit is None else "both"
-        raise ValueError(f"codegen: expected --law NAME or the file of a fit, got {got}")
+        raise ValueError(f"codegen: expected the name of a law or the file of a fit, got {got}")
     if fit is None:
         text = str(law)
         return Chosen(text, any_from_text(text))

@@ -18,6 +18,7 @@ from symfric.cli.machines import Driven, driven, scenes_with
 from symfric.cli.options import Strings
 from symfric.foundation import checks
 from symfric.integrator import simulate_by_peer
+from symfric.integrator.methods.tableaux import ADAPTIVE as ADAPTIVE  # for options.toml
 from symfric.model import Model
 from symfric.results.kinds import is_mechanism, kinds, norms
 from symfric.scenes import ALL_SCENES as ALL_SCENES  # for options.toml

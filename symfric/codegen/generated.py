@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from importlib.metadata import version
@@ -21,7 +22,7 @@ from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable
-from symfric.foundation.programs import CompileError, find_compiler
+from symfric.foundation.programs import CompileError, needed_compiler
 from symfric.laws import AnyLaw, Population
 
 
@@ -118,24 +119,18 @@ def generate(
     for c in several:
         for value in block.constants.values():
             c.real.literal(value)  # raises an error if rounded to 0 or infinity
-    for c in several:
         texts |= {f"{c.name}.h": header(c), f"{c.name}.c": source(c)}
     texts |= kit_files(several) if kit else {}
     for file, text in texts.items():
         write_text(folder / file, text)
     content = manifest(several, texts)
-    compiler = find_compiler() if kit else None
-    for c in several:
-        if compiler is None:
-            break
-        try:
+    with suppress(CompileError):  # no sizes without a working compiler; `verify` reports why
+        compiler = needed_compiler()
+        for c in several if kit else ():
             sizes = footprint(c, folder, compiler)
-        except CompileError:  # no sizes without a working compiler; `verify` reports why
-            continue
-        content["real"][c.real.name]["measured"] = {"compiler": str(compiler), **sizes}
-    last = f"{block.name}_manifest.json"
-    write_text(folder / last, json.dumps(content, indent=2) + "\n")
-    files = tuple(folder / file for file in (*texts, last))
+            content["real"][c.real.name]["measured"] = {"compiler": str(compiler), **sizes}
+    files = tuple(folder / file for file in (*texts, f"{block.name}_manifest.json"))
+    write_text(files[-1], json.dumps(content, indent=2) + "\n")
     return Generated(block, folder, reals, files, content, guards)
 
 
@@ -176,7 +171,6 @@ def manifest(several: Sequence[CBlock], texts: Mapping[str, str]) -> dict[str, A
     block, guards = several[0].block, several[0].guards
     parameters = [(v, parameter_range(v) if guards else None) for v in block.parameters]
     inputs = [(v, range_of(v) if guards else None) for v in block.inputs]
-    data = {name: text.encode() for name, text in texts.items()}
     return {
         "name": block.name,
         "model": block.fingerprint,
@@ -201,8 +195,8 @@ def manifest(several: Sequence[CBlock], texts: Mapping[str, str]) -> dict[str, A
         "status": {str(s.name): {"bit": int(s), "meaning": MEANING[s]} for s in Status if guards},
         "real": {c.real.name: _described(c) for c in several},
         "files": {
-            name: {"bytes": len(content), "sha256": sha256(content).hexdigest()}
-            for name, content in data.items()
+            name: {"bytes": len(data := text.encode()), "sha256": sha256(data).hexdigest()}
+            for name, text in texts.items()
         },
     }
 

@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from symfric.codegen.blocks.texts import SHEET
 from symfric.codegen.layout import TEMPLATES, CBlock, filled
 from symfric.foundation.parameters import Variable
 
@@ -49,13 +50,7 @@ class Status(IntFlag):
     OUTPUT = 16
 
 
-MEANING = {
-    Status.CLAMPED: "an input was outside its range and has been clamped",
-    Status.NOT_FINITE: "an input was not finite and has been replaced, see above",
-    Status.STATE: "a state was not finite or absurd; all have restarted",
-    Status.PARAMETER: "step size clamped, or the default parameters used",
-    Status.OUTPUT: "a result was not finite; outputs are 0, states have restarted",
-}
+MEANING = {Status[name]: text for name, text in SHEET["status"].items()}
 
 
 class Range(NamedTuple):
@@ -185,7 +180,8 @@ def mended(c: CBlock, variable: Variable, group: str) -> list[str]:
     """
     within = range_of(variable) if group == "in" else parameter_range(variable)
     kinds = (Status.CLAMPED, Status.NOT_FINITE) if group == "in" else (Status.PARAMETER,) * 2
-    arguments = [*map(c.real.literal, within), *(bit(c, kind) for kind in kinds), _pointer(c)]
+    arguments = [*map(c.real.literal, within), *(bit(c, kind) for kind in kinds)]
+    arguments.append("status" if c.block.is_function else "&status")
     local = variable.name
     return [
         f"if ({_outside(c, local, within.low, within.high)}) {{",
@@ -194,38 +190,28 @@ def mended(c: CBlock, variable: Variable, group: str) -> list[str]:
     ]
 
 
-def _pointer(c: CBlock) -> str:
-    """Return the pointer to the status, which is an argument only in functions of scalars."""
-    return "status" if c.block.is_function else "&status"
-
-
-def _set(c: CBlock, kind: Status) -> str:
-    """Return the statement that sets a bit of the status."""
-    return f"    {'*' * c.block.is_function}status |= {bit(c, kind)};"
+def _if(
+    c: CBlock, condition: str, kind: Status, *statements: str, then: Sequence[str] = ()
+) -> list[str]:
+    """Return a branch with `statements`, one that sets a bit of the status, and those of `then`."""
+    set_bit = f"{'*' * c.block.is_function}status |= {bit(c, kind)};"
+    inside = (*statements, set_bit, *then)
+    return [f"if ({condition}) {{", *(f"    {line}" for line in inside), "}"]
 
 
 def fit_parameters(c: CBlock) -> list[str]:
     """Return statements that use the default parameters if one is out of range."""
     if all(v.name == STEP_SIZE for v in c.block.parameters):
         return []
-    return [
-        f"if (param != &{c.name}_default && {c.name}_unfit(param)) {{",
-        f"    param = &{c.name}_default;",
-        _set(c, Status.PARAMETER),
-        "}",
-    ]
+    unfit = f"param != &{c.name}_default && {c.name}_unfit(param)"
+    return _if(c, unfit, Status.PARAMETER, f"param = &{c.name}_default;")
 
 
 def found_states(c: CBlock) -> list[str]:
     """Return statements that restart all states if one of them is invalid."""
     if not c.block.states:
         return []
-    return [
-        f"if ({c.name}_lost(state)) {{",
-        f"    *state = {c.name}_start;",
-        _set(c, Status.STATE),
-        "}",
-    ]
+    return _if(c, f"{c.name}_lost(state)", Status.STATE, f"*state = {c.name}_start;")
 
 
 def finite_outputs(c: CBlock) -> list[str]:
@@ -233,15 +219,12 @@ def finite_outputs(c: CBlock) -> list[str]:
     zero, most = c.real.literal(0.0), c.real.literal(float(np.finfo(c.real.kind).max))
     if c.block.is_function:
         (shown,) = c.block.outputs
-        bad = f"if ({c.name}_beyond({shown}, {most})) {{"
-        return [bad, _set(c, Status.OUTPUT), f"    return {zero};", "}", f"return {shown};"]
+        bad = _if(c, f"{c.name}_beyond({shown}, {most})", Status.OUTPUT, then=[f"return {zero};"])
+        return [*bad, f"return {shown};"]
     places = c.block.places("out")
     if not places:
         return []
-    return [
-        f"if ({' || '.join(f'{c.name}_beyond(out->{place}, {most})' for place in places)}) {{",
-        *(f"    out->{place} = {zero};" for place in places),
-        *[f"    *state = {c.name}_start;"] * bool(c.block.states),
-        _set(c, Status.OUTPUT),
-        "}",
-    ]
+    bad = " || ".join(f"{c.name}_beyond(out->{place}, {most})" for place in places)
+    repaired = [f"out->{place} = {zero};" for place in places]
+    repaired += [f"*state = {c.name}_start;"] * bool(c.block.states)
+    return _if(c, bad, Status.OUTPUT, *repaired)

@@ -9,9 +9,9 @@ import csv
 import io
 import math
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import GROUPS
 from symfric.codegen.layout import (
@@ -149,30 +149,31 @@ def braces(values: Iterable[float], real: Real) -> str:
 
 def vector_header(found: Vectors) -> str:
     """Return the text of NAME_vectors.h: the rows as constant arrays."""
-    c, block, real = found.c, found.c.block, found.c.real
-    states = len(block.states)
-    sizes = {"next": states, "out": len(block.outputs), "reset": states * len(block.resets)}
-    ends = np.cumsum([0, *sizes.values()])
-    before = {"state": states, "in": len(block.inputs)}
-    members = [f"{real.name} {what}[{size}];" for what, size in before.items() if size]
+    c, block, real, steps = found.c, found.c.block, found.c.real, found.steps
+    columns: list[tuple[str, list[str]]] = []  # declaration of each member, and its rows
+
+    def add(name: str, rows: NDArray[np.float64]) -> None:
+        if rows.shape[1]:
+            declared = f"{real.name} {name}[{rows.shape[1]}];"
+            columns.append((declared, [braces(row, real) for row in rows]))
+
+    add("state", steps.states)
+    add("in", steps.inputs)
     if block.parameters:
-        members += [f"{real.name} value; /* of the parameter that is changed */"]
-        members += ["int changed; /* number of that parameter, -1 for none */"]
-    members += [f"{real.name} {what}[{size}];" for what, size in sizes.items() if size]
-    members += ["unsigned int status;"] * c.guards
-    tolerances = [
-        folded(f"static const {real.name} {c.name}_{what}_tolerance[{end - begin}] = "
-               f"{braces(found.tolerance[begin:end], real)};", "")
-        for what, (begin, end) in zip(sizes, pairwise(ends), strict=True)
-        if end > begin
-    ]  # fmt: skip
-    rows: list[str] = []
-    for k, (state, inputs, changed, value) in enumerate(zip(*found.steps, strict=True)):
-        parts = [braces(x, real) for x in (state, inputs) if x.size]
-        parts += [number(float(value), real), str(changed)] if block.parameters else []
-        parts += [braces(found.results[k, a:b], real) for a, b in pairwise(ends) if b > a]
-        parts += [f"{found.status[k]}u"] * c.guards
-        rows.append(folded("{" + ", ".join(parts) + "},", "    "))
+        values = [number(float(value), real) for value in steps.values]
+        columns.append((f"{real.name} value; /* of the parameter that is changed */", values))
+        about = "int changed; /* number of that parameter, -1 for none */"
+        columns.append((about, [*map(str, steps.changed)]))
+    ends, tolerances = np.cumsum([len(block.states), len(block.outputs)]), list[str]()
+    parts = zip(np.split(found.results, ends, axis=1), np.split(found.tolerance, ends), strict=True)
+    for name, (rows, tolerance) in zip(("next", "out", "reset"), parts, strict=True):
+        add(name, rows)
+        array = f"{real.name} {c.name}_{name}_tolerance[{tolerance.size}]"
+        line = folded(f"static const {array} = {braces(tolerance, real)};", "")
+        tolerances += [line] * bool(tolerance.size)
+    columns += [("unsigned int status;", [f"{bits}u" for bits in found.status])] * c.guards
+    members, texts = zip(*columns, strict=True)
+    lines = [folded(f"{{{', '.join(row)}}},", "    ") for row in zip(*texts, strict=True)]
     return filled(
         TEMPLATES / "vectors.h",
         head=head(block, f"{c.name}_vectors.h"),
@@ -182,10 +183,10 @@ def vector_header(found: Vectors) -> str:
         roundings=f"{ROUNDINGS:g}",
         name=c.name,
         macro=c.name.upper(),
-        count=len(rows),
+        count=len(lines),
         members=indented(members),
         tolerances="\n".join(tolerances),
-        rows="\n".join(rows),
+        rows="\n".join(lines),
     )
 
 

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from symfric.codegen.guards import STEP_SIZE, Range, Status, parameter_range, range_of, state_limit
 from symfric.codegen.layout import TEMPLATES, CBlock, filled
-from symfric.emitter.c99 import FUNCTIONS
 from symfric.foundation.files import write_text
 from symfric.foundation.graph import SELECT, graph
 from symfric.foundation.instructions import CODES
@@ -79,15 +78,11 @@ def footprint(c: CBlock, folder: Path, compiler: Compiler) -> dict[str, Any]:
             compiler.run("-fstack-usage", *command)
         except CompileError:  # some compilers, such as clang before 11, lack the option
             compiler.run(*command)
-        said, (text, data) = target.with_suffix(".su"), _sizes(compiler, target)
-        stack = _stack(said.read_text(encoding="utf-8")) if said.is_file() else {}
+        listed, (text, data) = target.with_suffix(".su"), _sizes(compiler, target)
+        lines = listed.read_text(encoding="utf-8").splitlines() if listed.is_file() else []
+        rows = (line.split("\t") for line in lines)  # file:line:column:function, bytes, kind
+        stack = {row[0].rpartition(":")[2]: int(row[1]) for row in rows if len(row) > 2}
         return {"text": text, "data": data, "stack": stack}
-
-
-def _stack(text: str) -> dict[str, int]:
-    """Return the frames listed by -fstack-usage as "file:line:column:function", bytes, kind."""
-    rows = [line.split("\t") for line in text.splitlines() if line.count("\t") >= 2]
-    return {row[0].rpartition(":")[2]: int(row[1]) for row in rows}
 
 
 def _sizes(compiler: Compiler, target: Path) -> tuple[int | None, int | None]:
@@ -264,32 +259,28 @@ class GuardModel:
         return low, high, np.array([v.name == STEP_SIZE for v in self.c.block.parameters], bool)
 
 
-def _remainder(x: float, y: float) -> float:
+def _remainder(x: float, y: float) -> float:  # that of NumPy is another function
     return remainder(x, y) if y and isfinite(x) else nan
 
 
-NUMPY = {"pow": "power"} | {
-    f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan", "tan2", "sinh", "cosh", "tanh")
-}
-"""Functions whose names differ in NumPy and C99."""
+NUMPY = {
+    "sub": "subtract", "mul": "multiply", "div": "divide", "neg": "negative", "sq": "square",
+    "inv": "reciprocal", "lt": "less", "le": "less_equal", "eq": "equal", "ne": "not_equal",
+    "not": "logical_not", "and": "logical_and", "or": "logical_or", "pow": "power",
+    "constpow": "power", "asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2",
+    "asinh": "arcsinh", "acosh": "arccosh", "atanh": "arctanh",
+}  # fmt: skip
+"""Functions whose names differ in NumPy and CasADi."""
 
 OPERATIONS: dict[int, Callable[..., Any]] = {
-    CODES[name]: getattr(np, other)
-    for name, other in (
-        ("add", "add"), ("sub", "subtract"), ("mul", "multiply"), ("div", "divide"),
-        ("neg", "negative"), ("sq", "square"), ("inv", "reciprocal"), ("sign", "sign"),
-        ("lt", "less"), ("le", "less_equal"), ("eq", "equal"), ("ne", "not_equal"),
-        ("not", "logical_not"), ("and", "logical_and"), ("or", "logical_or"), ("fmin", "fmin"),
-        ("fmax", "fmax"),
-    )
+    code: getattr(np, NUMPY.get(name, name))
+    for name, code in CODES.items()
+    if hasattr(np, NUMPY.get(name, name))
 } | {
-    op: getattr(np, NUMPY.get(name, name))
-    for op, name in FUNCTIONS.items()
-    if name not in ("erf", "remainder")  # NumPy lacks erf, and its remainder is another function
-} | {
-    ca.OP_TWICE: partial(np.multiply, 2), CODES["erf"]: erf,
-    CODES["remainder"]: np.vectorize(_remainder, otypes=[float]),
-}  # fmt: skip
+    ca.OP_TWICE: partial(np.multiply, 2),
+    ca.OP_ERF: erf,
+    ca.OP_REMAINDER: np.vectorize(_remainder, otypes=[float]),
+}
 """Functions of arrays, by the numbers of CasADi's operations."""
 
 

@@ -1,6 +1,6 @@
 """C functions of a block, its source file and its header file with the data sheet."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from math import isfinite
 from textwrap import wrap
@@ -10,6 +10,7 @@ from typing import NamedTuple
 import casadi as ca
 
 from symfric.codegen.blocks.block import GROUPS, Block, Member
+from symfric.codegen.blocks.texts import SHEET
 from symfric.codegen.guards import (
     STEP_SIZE,
     constants,
@@ -196,14 +197,6 @@ def _constant(c: CBlock, group: str, name: str) -> str:
     return f"const {c.name}_{group}_t {c.name}_{name} = {{\n{joined}\n}};\n\n"
 
 
-MEANING = {
-    "state": "States, kept between steps; one struct for each contact or joint.",
-    "param": "Parameters, which may be changed between steps.",
-    "in": "Inputs of a step.",
-    "out": "Outputs of a step.",
-}
-"""Comment of each struct."""
-
 NARROW = 30
 """Smallest width of a comment next to a member [columns]."""
 
@@ -237,7 +230,7 @@ def _struct(c: CBlock, group: str, rows: Sequence[Member]) -> str:
         start = f"    {c.real.name} {row.declared + ';':<{width}} /* "
         columns = max(WIDTH - len(start) - 3, NARROW)
         lines += start + ("\n" + " " * len(start)).join(_wrapped(comment(text), columns)) + " */\n"
-    return f"/* {MEANING[group]} */\ntypedef struct {{\n{lines}}} {c.name}_{group}_t;\n\n"
+    return f"/* {SHEET['structs'][group]} */\ntypedef struct {{\n{lines}}} {c.name}_{group}_t;\n\n"
 
 
 def _numbers(group: str, variables: Sequence[Variable], guards: bool) -> Iterator[str]:
@@ -252,23 +245,23 @@ def _numbers(group: str, variables: Sequence[Variable], guards: bool) -> Iterato
 
 def sheet(c: CBlock) -> Iterator[str]:
     """Yield the data sheet, line by line."""
-    block = c.block
+    block, texts = c.block, SHEET["sample_time"]
+    said = texts["constant" if "h" in block.constants else "parameter"]
+    h = block.sample_time
     yield from ["", *(line for text in block.doc.splitlines() for line in _wrapped(text))]
-    yield from _section("Equations", block.equations.splitlines())
-    yield from _section("Discretisation", _lines(block.discretisation))
-    yield from _section("Sample time", _lines(_sample_time(block)))
-    yield from _section("Use", _list(block.use))
-    yield from _section("Inputs", _inputs(c) if block.is_function else ())
-    yield from _section("Not valid, and limits", _list(block.limits))
-    yield from _section("Guards", _list(_guards(block)) if c.guards else ())
-    yield from _section("Constants of this code", _constants(block))
-    yield from _section("Sources", _list(block.sources))
-
-
-def _section(title: str, lines: Iterable[str]) -> Iterator[str]:
-    found = [f"    {line}".rstrip() for line in lines]
-    if found:
-        yield from ["", f"{title}:", *found]
+    for title, lines in {
+        "Equations": block.equations.splitlines(),
+        "Discretisation": _lines(block.discretisation),
+        "Sample time": () if h is None else _wrapped(said.format(h=h), WIDTH - 7),
+        "Use": _list(block.use),
+        "Inputs": _inputs(c) if block.is_function else (),
+        "Not valid, and limits": _list(block.limits),
+        "Guards": _list(_guards(block)) if c.guards else (),
+        "Constants of this code": _constants(block),
+        "Sources": _list(block.sources),
+    }.items():
+        found = [f"    {line}".rstrip() for line in lines]
+        yield from ["", f"{title}:", *found] if found else ()
 
 
 def _wrapped(text: str, columns: int = WIDTH - 3) -> list[str]:
@@ -287,34 +280,18 @@ def _list(texts: Sequence[str]) -> Iterator[str]:
         yield from [f"- {first}", *(f"  {line}" for line in rest)]
 
 
-def _sample_time(block: Block) -> str:
-    """Return the text about the step size and how to set it."""
-    h = block.sample_time
-    if h is None:
-        return ""
-    if "h" in block.constants:
-        return f"h = {h:g} s, a constant of this code: call it at exactly this interval."
-    return (
-        f"h, a parameter, {h:g} s by default: set it to the interval at which the code is called. "
-        "It may change from step to step."
-    )
-
-
 def _guards(block: Block) -> list[str]:
     """Return sentences about the repair of invalid numbers and about the status."""
     safe = ", ".join(f"{v.name} = {range_of(v).safe:g}" for v in block.inputs)
-    sizes, found = [v.name == STEP_SIZE for v in block.parameters], list[str]()
-    if safe:
-        replaced = f"not finite ones are replaced: {safe}."
-        found.append(f"Inputs outside their range are clamped to it; {replaced}")
-    if block.states:
-        found.append("If a state is not finite or absurdly large, all restart at their start.")
-    if not all(sizes):
-        found.append("If a parameter is outside its range, the default set is used for this step.")
-    if any(sizes):
-        found.append("A step size outside its range is clamped to it.")
-    found.append("Every change by a guard sets a bit of the status; valid numbers are not changed.")
-    return found
+    sizes = [v.name == STEP_SIZE for v in block.parameters]
+    shown = {
+        "inputs": bool(safe),
+        "states": bool(block.states),
+        "parameters": not all(sizes),
+        "step": any(sizes),
+        "status": True,
+    }
+    return [SHEET["guards"][name].format(safe=safe) for name, there in shown.items() if there]
 
 
 def _constants(block: Block) -> Iterator[str]:

@@ -7,8 +7,8 @@ change each parameter where the change has the largest effect; with guards, bad 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import NamedTuple, final
+from dataclasses import replace
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -62,9 +62,7 @@ class Steps(NamedTuple):
         return Steps(self.states[rows], self.inputs[rows], self.changed[rows], self.values[rows])
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Vectors:
+class Vectors(NamedTuple):
     """Steps and their results.
 
     Attributes:

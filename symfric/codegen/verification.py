@@ -248,6 +248,10 @@ def _check(generated: Generated, c: CBlock, compiler: Compiler, sequences: Seque
             expected = run_vm(c, inputs, states, parameters)
             runs.append(Run(c, inputs, parameters, rows, expected))
         needed = needed_symbols(target)
+    called = {call for routine in routines(c) for call in routine.calls}
+    called |= {"sincos"} if {"sin", "cos"} <= called else set()
+    allowed = {f"{function}{c.real.letter}" for function in called}
+    allowed |= {"_GLOBAL_OFFSET_TABLE_", "memcpy"}  # memcpy copies structs
     worst = max(runs, key=lambda run: run.error)
     return Check(
         real=c.real.name,
@@ -255,21 +259,12 @@ def _check(generated: Generated, c: CBlock, compiler: Compiler, sequences: Seque
         warnings=tuple(warnings),
         ulp=None if is_float else max(ulp(run.rows, run.expected) for run in runs),
         error=worst.error,
-        foreign=None if needed is None else tuple(sorted(needed - _allowed(c))),
+        foreign=None if needed is None else tuple(sorted(needed - allowed)),
         runs_away=runs_away(c, runs[0].expected),
         worst=worst.worst,
         rounding=worst.rounding if is_float and worst.error > TOLERANCE else None,
         ties=sum(int(run.tied.any(axis=1).sum()) for run in runs),
     )
-
-
-def _allowed(c: CBlock) -> set[str]:
-    """Return the allowed names: functions of math.h, and memcpy, which copies structs."""
-    functions = {call for routine in routines(c) for call in routine.calls}
-    if {"sin", "cos"} <= functions:
-        functions.add("sincos")
-    own = {f"{function}{c.real.letter}" for function in functions}
-    return own | {"_GLOBAL_OFFSET_TABLE_", "memcpy"}
 
 
 SHORTER = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 5e-3, 2e-3, 1e-3)

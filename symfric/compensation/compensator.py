@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import inf
 from typing import Any
 
 import casadi as ca
@@ -11,7 +10,7 @@ import casadi as ca
 from symfric.codegen import Block, law_block
 from symfric.codegen.blocks.from_law import in_turning
 from symfric.codegen.blocks.variables import arranged, step_size
-from symfric.compensation.force import INPUTS, TERMS, Parts, Terms, finished, terms
+from symfric.compensation.force import TABLES, Parts, Terms, finished, terms
 from symfric.compensation.settings import Compensation, chosen_settings, formula
 from symfric.foundation import checks
 from symfric.foundation.variable import starts_of, symbols_of
@@ -79,23 +78,26 @@ def compensator(
     where = "compensator"
     s = chosen_settings(where, settings, chosen)
     if isinstance(law, Drive):
-        s, law, turning = _of_drive(where, law, s), law.law, law.turning or turning
+        load = checks.number(f"{where}: N of the drive", law.N, unit="N", lower=0.0)
+        offset = checks.number(f"{where}: offset of the drive", law.offset, unit="N")
+        s = replace(
+            s,
+            N=load if s.N is None else s.N,
+            offset=offset or None if s.offset is None else s.offset,
+        )
+        law, turning = law.law, law.turning or turning
     check_law(where, law)
     where = f"compensator '{law_name(law)}'"
     inner = law_block(law, h=h if law.states else None)
     if len(inner.inputs) > 2:
         names = ", ".join(v.name for v in inner.inputs[2:])
         raise ValueError(f"{where}: expected a law of v and N only, got one with {names}")
-    found, size = terms(law, inner), step_size(where, h)
-    if h is None and law.states:
-        size = size._replace(parameters=tuple(v for v in inner.parameters if v.name == "h"))
-        size = size._replace(h=size.parameters[0].symbol)
-    parts = Parts(inner)
+    found, size, parts = terms(law, inner), step_size(where, h, inner), Parts(inner)
     wanted, moved = _velocity(parts, s)
     if isinstance(s.N, str):
         normal = parts.given("N")
     else:
-        normal = parts.parameter("N", 1.0 if s.N is None else s.N, "N", "normal force")
+        normal = parts.parameter("N", 1.0 if s.N is None else s.N)
     old, new = ca.vertcat(found.v, found.N), ca.vertcat(moved, normal)
     parts.next = ca.vertsplit(ca.substitute(inner.next, old, new)) if inner.states else []
     if s.build_up is not None:
@@ -109,7 +111,7 @@ def compensator(
     force = ca.substitute(_scaled(parts, found, s, where), old, new)
     force = _added(parts, force, s, wanted, size.h, where)
     more = _held(parts, s)
-    parts.inputs.sort(key=lambda v: [*INPUTS].index(v.name))
+    parts.inputs.sort(key=lambda v: [*TABLES["inputs"]].index(v.name))
     used = [p for p in size.parameters if ca.depends_on(ca.vertcat(force, *parts.next), p.symbol)]
     block = Block(
         "friction_compensator" if name is None else name,
@@ -135,24 +137,18 @@ def _velocity(parts: Parts, s: Compensation) -> tuple[ca.SX, ca.SX]:
         wanted = parts.given("v_ref")
     if s.delay is not None and s.velocity != "measured":
         a = parts.given("a_ref")
-        delay = parts.parameter("t_ahead", s.delay, "s", "look-ahead of the reference")
-        wanted = wanted + delay * a
+        wanted = wanted + parts.parameter("t_ahead", s.delay) * a
     if s.error_gain is not None:
         e = parts.given("e")
-        gain = parts.parameter("k_error", s.error_gain, "1/s", "set velocity over error")
-        wanted = wanted + gain * e
+        wanted = wanted + parts.parameter("k_error", s.error_gain) * e
     if s.velocity != "reference" or s.stick is not None:
         v = parts.given("v")
     moved = wanted if s.velocity == "reference" else v
     if s.velocity == "blend":
-        width = parts.parameter(
-            "v_blend", s.v_blend, "m/s",
-            "up to here the desired velocity, beyond twice it the measured", lower=1e-12,
-        )  # fmt: skip
-        share = smooth.step5(ca.fabs(v) / width - 1)
+        share = smooth.step5(ca.fabs(v) / parts.parameter("v_blend", s.v_blend) - 1)
         moved = share * v + (1 - share) * wanted  # exactly one of them at each end
     if s.dead_zone is not None:
-        width = parts.parameter("v_dead", s.dead_zone, "m/s", "velocities up to here count as rest")
+        width = parts.parameter("v_dead", s.dead_zone)
         moved = moved - smooth.clip(moved, -width, width)
     return wanted, ca.SX(moved)
 
@@ -181,17 +177,6 @@ def without_end(discretisation: str) -> str:
     return "\n".join(line for line in discretisation.splitlines() if "F_end" not in line)
 
 
-def _of_drive(where: str, drive: Drive, s: Compensation) -> Compensation:
-    """Return the settings with missing numbers taken from a drive."""
-    load = checks.number(f"{where}: N of the drive", drive.N, unit="N", lower=0.0)
-    offset = checks.number(f"{where}: offset of the drive", drive.offset, unit="N")
-    return replace(
-        s,
-        N=load if s.N is None else s.N,
-        offset=offset or None if s.offset is None else s.offset,
-    )
-
-
 def built_up(
     parts: Parts, v: ca.SX, h: ca.SX | float, distance: float, table: Sequence[tuple[float, float]]
 ) -> ca.SX:
@@ -200,10 +185,7 @@ def built_up(
     b+ = b + 2 v h / distance, within [-1, 1]: linear in the travel since the reversal, or shaped
     by the table. A shorter travel back leaves the remaining share, as in a Maxwell element.
     """
-    way = parts.parameter(
-        "d_build", distance, "m", "way after a reversal until friction has built up", lower=1e-15
-    )
-    x = parts.state("built", "1", "share of friction that has built up, -1 to 1")
+    way, x = parts.parameter("d_build", distance), parts.state("built")
     end = ca.SX(smooth.clip(x + 2 * v * h / way, -1.0, 1.0))
     mean = (x + end) / 2
     if table:
@@ -229,7 +211,7 @@ def _scaled(parts: Parts, found: Terms, s: Compensation, where: str) -> ca.SX:
         raise ValueError(f"{where}: expected terms in scales or in without, got both for {twice}")
     scales: dict[str, ca.SX | float] = dict.fromkeys(s.without, 0.0)
     for term, start in scaled.items():
-        scales[term] = parts.parameter(f"scale_{term}", start, "1", f"scale: {TERMS[term]}")
+        scales[term] = parts.parameter(f"scale_{term}", start)
     return found.scaled(scales)
 
 
@@ -238,30 +220,26 @@ def _held(parts: Parts, s: Compensation) -> dict[str, Output]:
     if s.hold is None:
         return {}
     v_ref, e, v = map(parts.given, ("v_ref", "e", "v"))
-    band = parts.parameter("e_hold", s.hold[0], "m", "error that is small enough to rest")
-    slow = parts.parameter("v_hold", s.hold[1], "m/s", "slower than this is rest")
+    band, slow = map(parts.parameter, ("e_hold", "v_hold"), s.hold)
     small = (ca.fabs(e) <= band, ca.fabs(v_ref) <= slow, ca.fabs(v) <= slow)
     rests = ca.if_else(ca.logic_and(ca.logic_and(*small[:2]), small[2]), 1, 0)
     return {"hold": Output(rests, "1", "1: stop the integrator of the controller")}
 
 
 def freed(
-    parts: Parts, wanted: ca.SX, v: ca.SX, h: ca.SX | float, force: float, time: float, rest: float
+    parts: Parts, wanted: ca.SX, v: ca.SX, h: ca.SX | float, numbers: tuple[float, float, float]
 ) -> ca.SX:
     """Return an additional force that grows while the desired velocity moves and the axis does not.
 
     Its share q in [-1, 1] moves at the rate 1/t_stick towards sign(v_ref) while |v| is below
     v_stick and |v_ref| above 2 v_stick, and towards 0 if |v| is above 2 v_stick or |v_ref| below
     v_stick; the goal is linear in between.
+
+    Args:
+        numbers: start values of F_stick [N], t_stick [s] and v_stick [m/s].
     """
-    most = parts.parameter("F_stick", force, "N", "further force while the axis sticks")
-    pace = parts.parameter(
-        "t_stick", time, "s", "time over which that force comes and goes", lower=1e-9
-    )
-    slow = parts.parameter(
-        "v_stick", rest, "m/s", "slower than this is rest, twice as fast is motion", lower=1e-12
-    )
-    q = parts.state("stuck", "1", "share of the further force, -1 to 1")
+    most, pace, slow = map(parts.parameter, ("F_stick", "t_stick", "v_stick"), numbers)
+    q = parts.state("stuck")
     rests = smooth.clip(2 - ca.fabs(v) / slow, 0.0, 1.0)
     moves = smooth.clip(ca.fabs(wanted) / slow - 1, 0.0, 1.0)
     goal = ca.sign(wanted) * moves * rests
@@ -275,23 +253,20 @@ def _added(
 ) -> ca.SX:
     """Return the force of the law plus all additional forces, within its limits."""
     if s.offset is not None:
-        force = force + parts.parameter("offset", s.offset, "N", "constant force", lower=-inf)
+        force = force + parts.parameter("offset", s.offset)
     if s.inertia is not None:
         a = parts.given("a_ref")
-        force = force + parts.parameter("inertia", s.inertia, "kg", "mass that a_ref is times") * a
+        force = force + parts.parameter("inertia", s.inertia) * a
     if s.stick is not None:
-        force = force + freed(parts, wanted, parts.given("v"), h, *s.stick)
+        force = force + freed(parts, wanted, parts.given("v"), h, s.stick)
     if s.dither is not None:
-        amplitude = parts.parameter("F_dither", s.dither[0], "N", "amplitude of the dither")
-        pace = parts.parameter("f_dither", s.dither[1], "Hz", "frequency of the dither")
-        phase = parts.state("phase", "1", "turns of the dither, 0 to 1")
-        end = ca.SX(smooth.fraction(phase + pace * h))
+        amplitude, pace = map(parts.parameter, ("F_dither", "f_dither"), s.dither)
+        end = ca.SX(smooth.fraction(parts.state("phase") + pace * h))
         parts.next.append(end)
         force = force + amplitude * ca.sin(2 * ca.pi * end)
     force = finished(parts, force, s.ramp, s.limit, h, where)
     if s.slew is not None:
-        rate = parts.parameter("F_rate", s.slew, "N/s", "fastest change of the force")
-        last = parts.state("F_last", "N", "force of the step before")
+        rate, last = parts.parameter("F_rate", s.slew), parts.state("F_last")
         force = ca.SX(last + smooth.clip(force - last, -rate * h, rate * h))
         parts.next.append(force)
     return force

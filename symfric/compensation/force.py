@@ -4,9 +4,10 @@ A stage adds its states, inputs and parameters to the `Parts` of the block, and 
 modified force or velocity; the C contains only the chosen stages.
 """
 
+import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, final
+from pathlib import Path
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -22,23 +23,19 @@ from symfric.laws.composed.wrap import Wrapper
 from symfric.laws.dynamic.lugre import Bristle
 from symfric.model import Variables
 
-TERMS = {
-    "coulomb": "dry friction; of a law with a Stribeck effect its level in fast sliding",
-    "stribeck": "by how much dry friction is larger in slow sliding than in fast",
-    "viscous": "what the viscous coefficients make",
-    "bristle": "what the states make beyond steady sliding: 0 is the steady curve",
-    "force": "the whole force, of a law whose terms cannot be separated",
-}
-"""Terms of friction that can be scaled separately."""
+TABLES: dict[str, dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("variables.toml").read_text(encoding="utf-8")
+)
+"""Terms, variables and settings of compensators and observers."""
 
+TERMS: dict[str, str] = TABLES["terms"]
+"""Terms of friction that can be scaled separately."""
 
 LEAST = 1e-9
 """Smallest load [N] of laws with states, which divide by the load."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Terms:
+class Terms(NamedTuple):
     """Friction force of the block of a law, divided into terms.
 
         F = dry(coulomb, stribeck, bristle) + viscous
@@ -116,7 +113,7 @@ class Terms:
         dry = built * (one if _same(one, other) else ca.if_else(built < 0, other, one))
         dry = _without_viscous(self.law, dry)
         force = dry if self.viscous is None else dry + self.viscous
-        return replace(self, dry=dry, force=force)
+        return self._replace(dry=dry, force=force)
 
     def _with_levels(
         self, expression: ca.SX, coulomb: ca.SX | float, stribeck: ca.SX | float
@@ -204,19 +201,9 @@ def _made_of(dry: ca.SX, levels: Variables, block: Block) -> bool:
     return all(float(look(point)) == 0.0 for point in points)
 
 
-INPUTS: dict[str, dict[str, Any]] = {
-    "u": {
-        "unit": "N",
-        "doc": "force that acted since the last call, less that of a compensator in parallel",
-    },
-    "v_ref": {"unit": "m/s", "doc": "reference velocity", "nominal": 0.1},
-    "a_ref": {"unit": "m/s^2", "doc": "reference acceleration"},
-    "e": {"unit": "m", "doc": "position error, reference less measured", "nominal": 1e-5},
-    "v": {"unit": "m/s", "doc": "measured velocity", "nominal": 0.1},
-    "N": {"unit": "N", "doc": "normal force", "nominal": 10.0, "lower": 0.0},
-    "enable": {"unit": "1", "doc": "above 0.5: on", "lower": 0.0, "upper": 1.0},
+PARAMETERS: dict[str, Any] = TABLES["parameters"] | {
+    f"scale_{term}": {"unit": "1", "doc": f"scale: {doc}"} for term, doc in TERMS.items()
 }
-"""Possible inputs of compensators and observers, in the order of the block."""
 
 
 @final
@@ -234,24 +221,26 @@ class Parts:
         self.parameters = [p for p in inner.parameters if p.name != "h"] if inner else []
         self.inputs, self.next = [v] if v else [], list[ca.SX]()
 
-    def state(self, name: str, unit: str, doc: str, nominal: float = 1.0) -> ca.SX:
+    def state(self, name: str) -> ca.SX:
         """Add a state and return its symbol; the caller appends its next value to `next`."""
-        variable = Variable(self._free(name), unit, nominal=nominal, doc=doc)
-        self.states.append(variable)
-        return variable.symbol
+        return self._added(self.states, Variable(self._free(name), **TABLES["states"][name]))
 
     def given(self, name: str) -> ca.SX:
-        """Return the symbol of an input of `INPUTS`; add the input at its first use."""
-        if name not in [v.name for v in self.inputs]:
-            self.inputs.append(Variable(name, **INPUTS[name]))
-        return next(v.symbol for v in self.inputs if v.name == name)
-
-    def parameter(self, name: str, start: float, unit: str, doc: str, lower: float = 0.0) -> ca.SX:
-        """Add a parameter and return its symbol; a number is appended to a name in use."""
-        variable = Variable(
-            self._free(name), unit, start=start, nominal=abs(start) or 1.0, lower=lower, doc=doc
+        """Return the symbol of an input; add the input at its first use."""
+        found = [v.symbol for v in self.inputs if v.name == name]
+        return (
+            found[0]
+            if found
+            else self._added(self.inputs, Variable(name, **TABLES["inputs"][name]))
         )
-        self.parameters.append(variable)
+
+    def parameter(self, name: str, start: float) -> ca.SX:
+        """Add a parameter and return its symbol; a number is appended to a name in use."""
+        row = {"lower": 0.0, "nominal": abs(start) or 1.0} | PARAMETERS[name]
+        return self._added(self.parameters, Variable(self._free(name), start=start, **row))
+
+    def _added(self, group: list[Variable], variable: Variable) -> ca.SX:
+        group.append(variable)
         return variable.symbol
 
     def _free(self, name: str) -> str:
@@ -286,13 +275,12 @@ def finished(
     if ramp is not None:
         checks.number(f"{where}: ramp", ramp, unit="s", above=0.0)
         on = parts.given("enable")
-        duration = parts.parameter("t_ramp", ramp, "s", "time of fading in or out", lower=1e-9)
-        e = parts.state("faded_in", "1", "0: off, 1: on")
+        duration, e = parts.parameter("t_ramp", ramp), parts.state("faded_in")
         end = ca.SX(smooth.clip(e + ca.if_else(on > 0.5, h, -h) / duration, 0.0, 1.0))
         parts.next.append(end)
         force = force * smooth.step3(end)
     if limit is not None:
         checks.number(f"{where}: limit", limit, unit="N", lower=0.0)
-        most = parts.parameter("F_max", limit, "N", "largest force that is added")
+        most = parts.parameter("F_max", limit)
         force = ca.SX(smooth.clip(force, -most, most))
     return force

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from symfric.codegen import Block, generate
 from symfric.codegen.layout import TEMPLATES, CBlock, filled
 from symfric.codegen.runner import FLAGS
+from symfric.compensation.force import TABLES
 from symfric.compensation.result import WITHOUT, Comparison, Loop, Reference
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
@@ -57,40 +58,34 @@ class Cascade(Parametric):
 
     def block(self) -> Block:
         """Return the block (x, r, v_ref, a_ref, hold) -> u and the signals x_m, v_m, e, v_s."""
-        x, r, v_ref, a_ref, hold = inputs = (
-            Variable("x", "m", nominal=0.1, doc="position"),
-            Variable("r", "m", nominal=0.1, doc="reference position"),
-            Variable("v_ref", "m/s", nominal=0.1, doc="reference velocity"),
-            Variable("a_ref", "m/s^2", nominal=1.0, doc="reference acceleration"),
-            Variable("hold", "1", lower=0.0, upper=1.0, doc="above 0.5: no integration"),
+        rows = TABLES["cascade"]
+        inputs, states = (
+            tuple(Variable(name, **row) for name, row in rows[group].items())
+            for group in ("inputs", "states")
         )
-        before, v_before, integral = states = (
-            Variable("before", "m", doc="position before"),
-            Variable("v_before", "m/s", doc="velocity before"),
-            Variable("integral", "N", doc="integral force"),
-        )
-        x_m = self.count * ca.floor(x.symbol / self.count + 0.5)
-        v_m = v_before.symbol + self.share * ((x_m - before.symbol) / self.h - v_before.symbol)
-        e = r.symbol - x_m
-        v_s = v_ref.symbol + self.kp * e
-        wanted = self.kv * (v_s - v_m) + integral.symbol + self.inertia * a_ref.symbol
+        x, r, v_ref, a_ref, hold = (v.symbol for v in inputs)
+        before, v_before, integral = (v.symbol for v in states)
+        x_m = self.count * ca.floor(x / self.count + 0.5)
+        v_m = v_before + self.share * ((x_m - before) / self.h - v_before)
+        e = r - x_m
+        v_s = v_ref + self.kp * e
+        wanted = self.kv * (v_s - v_m) + integral + self.inertia * a_ref
         u = smooth.clip(wanted, -self.limit, self.limit)
-        more = integral.symbol + self.ki * self.kv * self.h * (v_s - v_m)
+        more = integral + self.ki * self.kv * self.h * (v_s - v_m)
         more = smooth.clip(more, -self.limit, self.limit)
         free = ca.logic_or(wanted == u, (v_s - v_m) * u < 0)
-        free = ca.logic_and(free, hold.symbol <= 0.5)
+        free = ca.logic_and(free, hold <= 0.5)
         return Block(
             "cascade",
             doc="Position controller: P in position, PI in velocity.",
             states=states,
             inputs=inputs,
-            next=ca.vertcat(x_m, v_m, ca.if_else(free, more, integral.symbol)),
+            next=ca.vertcat(x_m, v_m, ca.if_else(free, more, integral)),
             outputs={
-                "u": Output(u, "N", "commanded force"),
-                "x_m": Output(x_m, "m", "measured position"),
-                "v_m": Output(v_m, "m/s", "measured velocity"),
-                "e": Output(e, "m", "position error"),
-                "v_s": Output(v_s, "m/s", "set velocity"),
+                name: Output(value, **row)
+                for (name, row), value in zip(
+                    rows["outputs"].items(), (u, x_m, v_m, e, v_s), strict=True
+                )
             },
         )
 
@@ -118,10 +113,10 @@ class Members:
         real: str = "double",
         compiler: Compiler | None = None,
     ) -> None:
-        """Begin at the start values, with the parameters `values` of each member.
+        """Begin at the start values, with the parameters among `values` of each member.
 
         Raises:
-            ValueError: unknown parameters.
+            ValueError: values that are not numbers.
             CompileError: the compiler rejects the C, or the library does not load.
         """
         self.block, count = block, len(values)
@@ -139,8 +134,8 @@ class Members:
         self.outputs = {name: self.output[:, i] for i, name in enumerate(block.outputs)}
         names = [v.name for v in block.parameters]
         for row, own in zip(self.param, values, strict=True):
-            for name, value in checks.named(f"block '{block.name}'", own, names).items():
-                row[names.index(name)] = checks.number(f"block '{block.name}': {name}", value)
+            for name in own.keys() & {*names}:
+                row[names.index(name)] = checks.number(f"block '{block.name}': {name}", own[name])
         self.step = self._in_c(real, compiler) if compiler else self._in_vm()
 
     def _in_c(self, real: str, compiler: Compiler) -> Any:
@@ -184,21 +179,6 @@ class Members:
 KNOWN = ("v_ref", "a_ref", "v", "e", "u", "N", "enable")
 """Signals of the loop that can be inputs of a block."""
 WHERE = "close_loop"
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Setup:
-    """Settings shared by all runs of a comparison, see `close_loop`."""
-
-    controller: Cascade
-    delay: int
-    noise: float
-    seed: int
-    real: str
-    compiler: Compiler | None
-    measured: tuple[str, str]
-    load: float
 
 
 def close_loop(
@@ -268,17 +248,20 @@ def close_loop(
     if backend == "c":
         compiler = needed_compiler()
     wanted = {"compensated": {}} if cases is None else checks.named(f"{WHERE}: cases", cases)
-    measured = (position, velocity)
-    setup = Setup(controller, delay, noise, seed, real, compiler, measured, load)
+    run = partial(
+        _run, reference=reference, controller=controller, delay=delay, noise=noise, seed=seed,
+        real=real, compiler=compiler, measured=(position, velocity), load=load,
+    )  # fmt: skip
 
     def going(count: int) -> Plant:
         start, own = ({n: np.full(count, v) for n, v in (of or {}).items()} for of in (x0, p))
         return stepper(plant, controller.h, batch=count, x0=start or None, p=own or None)
 
-    values = [_own(given, name, case) for name, case in wanted.items()]
-    runs = _run(going(1), reference, (), [[]], (WITHOUT,), setup)
-    if wanted:
-        runs |= _run(going(len(values)), reference, given, values, tuple(wanted), setup)
+    known = sorted({v.name for block in given for v in block.parameters})
+    cases = {n: checks.named(f"{WHERE}: case '{n}'", case, known) for n, case in wanted.items()}
+    runs = run(going(1), (), {WITHOUT: {}})
+    if cases:
+        runs |= run(going(len(cases)), given, cases)
     engine = "CasADi's VM" if compiler is None else f"C in {real}, {compiler}"
     units = plant.signals[position], plant.signals[plant.u[0].name]
     return Comparison(plant.name, reference, runs, controller.count, engine, units)
@@ -312,48 +295,43 @@ def _check(
             )
 
 
-def _own(blocks: Sequence[Block], name: str, case: Mapping[str, float]) -> list[dict[str, float]]:
-    """Return the parameters of a case for each block."""
-    where = f"{WHERE}: case '{name}'"
-    known = [{v.name for v in block.parameters} for block in blocks]
-    found = checks.named(where, case, sorted(set().union(*known)))
-    return [{n: v for n, v in found.items() if n in names} for names in known]
-
-
 def _run(
     plant: Plant,
-    reference: Reference,
     blocks: Sequence[Block],
-    values: Sequence[Sequence[Mapping[str, float]]],
-    names: Sequence[str],
-    setup: Setup,
+    cases: Mapping[str, Mapping[str, float]],
+    *,
+    reference: Reference,
+    controller: Cascade,
+    delay: int,
+    noise: float,
+    seed: int,
+    real: str,
+    compiler: Compiler | None,
+    measured: tuple[str, str],
+    load: float,
 ) -> dict[str, Loop]:
     """Return the loops of all cases for one set of blocks, simulated together."""
-    controller, compiler = setup.controller, setup.compiler
-    count, steps = len(names), reference.x.size
+    count, steps = len(cases), reference.x.size
     control = Members(controller.block(), [{}] * count, compiler=compiler)
-    added = [
-        Members(block, [own[i] for own in values], setup.real, compiler)
-        for i, block in enumerate(blocks)
-    ]
-    random = np.random.default_rng(setup.seed)
-    places = [[v.name for v in plant.model.x].index(name) for name in setup.measured]
+    added = [Members(block, [*cases.values()], real, compiler) for block in blocks]
+    random = np.random.default_rng(seed)
+    places = [[v.name for v in plant.model.x].index(name) for name in measured]
     rows = np.zeros((4, steps + 1, count))  # position, velocity, acting and added force
     rows[:2, 0] = plant.x[:, places].T
     control.state[:, 0] = rows[0, 0]
-    forces = np.zeros((steps + 1 + setup.delay, len(added), count))  # by sample of action
-    queue = [np.zeros(count) for _ in range(setup.delay)]
+    forces = np.zeros((steps + 1 + delay, len(added), count))  # by sample of action
+    queue = [np.zeros(count) for _ in range(delay)]
     ended, k = "", 0
     try:
         for k in range(steps):
             now = {
-                "x": rows[0, k] + setup.noise * random.standard_normal(),
+                "x": rows[0, k] + noise * random.standard_normal(),
                 "r": reference.x[k], "v_ref": reference.v[k], "a_ref": reference.a[k],
-                "u": rows[2, k - 1], "N": setup.load, "enable": 1.0,
+                "u": rows[2, k - 1], "N": load, "enable": 1.0,
             }  # fmt: skip
-            command = _commanded(control, added, now, forces[k], forces[k + 1 + setup.delay], setup)
-            rows[3, k] = forces[k + 1 + setup.delay].sum(axis=0)
-            queue.append(command)
+            command = _commanded(control, added, now, forces[k], forces[k + 1 + delay])
+            rows[3, k] = forces[k + 1 + delay].sum(axis=0)
+            queue.append(np.clip(command, -controller.limit, controller.limit))
             rows[2, k] = queue.pop(0)
             rows[:2, k + 1] = plant.step(rows[2, k][:, None])[:, places].T
         k = steps
@@ -365,7 +343,7 @@ def _run(
     return {
         name: Loop(name, reference, *(rows[i, : k + (i < 2), m] for i in range(4)),
                    limit=controller.limit, ended=ended, status=int(status[m]))
-        for m, name in enumerate(names)
+        for m, name in enumerate(cases)
     }  # fmt: skip
 
 
@@ -375,7 +353,6 @@ def _commanded(
     now: Mapping[str, float | Array],
     acted: Array,
     forces: Array,
-    setup: Setup,
 ) -> Array:
     """Return the total command of controller and blocks; write the `forces` of the blocks.
 
@@ -394,5 +371,4 @@ def _commanded(
         forces[i] = block.outputs["F"]
         if "hold" in block.outputs:
             control.inputs["hold"][:] = block.outputs["hold"]
-    most = setup.controller.limit
-    return np.clip(control.outputs["u"] + forces.sum(axis=0), -most, most)
+    return control.outputs["u"] + forces.sum(axis=0)

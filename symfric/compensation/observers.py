@@ -1,6 +1,7 @@
 """Observers of friction as blocks: states of a law, or the force by the motion of a mass."""
 
 from collections.abc import Callable
+from typing import Any
 
 import casadi as ca
 
@@ -20,13 +21,14 @@ from symfric.model import Output
 
 USE = "Call it once a sample and add F to the force that the controller commands."
 ERROR = "e is the position error, reference less measured, in the direction of v."
+Bristles = LuGre | LuGreNormalised | LuGrePassive
 Corrected = tuple[ca.SX, ca.SX]
 """States after the step and mean force over the step."""
 ESTIMATE = "estimated friction force, to add to that of the controller; mean over the step"
 
 
 def lugre_observer(
-    law: LuGre | LuGreNormalised | LuGrePassive,
+    law: Bristles,
     gain: float,
     *,
     N: float = 1.0,
@@ -66,28 +68,25 @@ def lugre_observer(
     Source: Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE TAC 40(3), 1995, section V; the bound
     on z is an addition of symfric.
     """
-    kinds: tuple[type[Law], ...] = (LuGre, LuGreNormalised, LuGrePassive)
-    where = _check("lugre_observer", law, kinds, "LuGre()", gain)
-
-    def corrected(
-        known: Law, v: ca.SX, load: ca.SX, z: ca.SX, push: ca.SX, size: ca.SX | float
-    ) -> Corrected:
-        p, normalised = vars(known), isinstance(known, LuGreNormalised)
-        of_load = load if normalised else 1.0
-        most = p["mu_s"] * (1.0 if normalised else load) / p["sigma_0"]
-        rate = ca.SX(known.rate(v, load, z)) + push
-        step = held_step(rate, z, size, ca.SX(1, 1), where)
-        end, mean = ca.SX(smooth.clip(step.end, -most, most)), smooth.clip(step.mean, -most, most)
-        damping = p["sigma_1"]
-        if isinstance(known, LuGrePassive):
-            damping = damping * ca.exp(-((v / p["v_d"]) ** 2))
-        force = p["sigma_0"] * mean + damping * (end - z) / size + p["sigma_2"] * v
-        return end, ca.SX(force * of_load)
-
+    where = _check("lugre_observer", law, Bristles, "LuGre()", gain)
     return _observer(
-        law, corrected, gain, N, ramp, limit, h, where, turning, name or "lugre_observer",
+        law, _bristle, gain, N, ramp, limit, h, where, turning, name or "lugre_observer",
         "bristle deflection", "dz/dt of the law + k_e e, |z| <= mu_s N / sigma_0",
     )  # fmt: skip
+
+
+def _bristle(
+    law: Bristles, v: ca.SX, N: ca.SX, z: ca.SX, push: ca.SX, h: ca.SX | float, where: str
+) -> Corrected:
+    of_force = N if isinstance(law, LuGreNormalised) else 1.0
+    most = law.mu_s * (1.0 if isinstance(law, LuGreNormalised) else N) / law.sigma_0
+    step = held_step(ca.SX(law.rate(v, N, z)) + push, z, h, ca.SX(1, 1), where)
+    end, mean = ca.SX(smooth.clip(step.end, -most, most)), smooth.clip(step.mean, -most, most)
+    damping = law.sigma_1
+    if isinstance(law, LuGrePassive):
+        damping = damping * ca.exp(-((v / law.v_d) ** 2))
+    force = law.sigma_0 * mean + damping * (end - z) / h + law.sigma_2 * v
+    return end, ca.SX(force * of_force)
 
 
 def gms_observer(
@@ -125,28 +124,25 @@ def gms_observer(
     where = _check("gms_observer", law, (GMS,), "GMS(form='event')", gain)
     if law.form != "event":
         raise checks.refused(f"{where}: form", "'event', whose step is known", law.form)
-
-    def corrected(
-        known: Law, v: ca.SX, load: ca.SX, z: ca.SX, push: ca.SX, size: ca.SX | float
-    ) -> Corrected:
-        step = known.held_step(v, load, z, size)
-        if step is None or not isinstance(known, GMS):
-            raise checks.refused(where, "a law that knows its step", known)
-        end, mean = ca.SX(step[0]), ca.SX(step[1])
-        force = known.sigma_2 * v
-        for i, (element, share) in enumerate(zip(known.elements, known.shares(), strict=True)):
-            more, most = size * push * element.k, share * known.mu_s * load
-            end[i] = smooth.clip(end[i] + more, -most, most)
-            force = force + smooth.clip(mean[i] + more / 2, -most, most)
-        return end, ca.SX(force)
-
     return _observer(
-        law, corrected, gain, N, ramp, limit, h, where, turning, name or "gms_observer",
+        law, _springs, gain, N, ramp, limit, h, where, turning, name or "gms_observer",
         "spring forces", "F_i+ = F_i of the law + k_i h k_e e, |F_i| <= alpha_i mu_s N",
     )  # fmt: skip
 
 
-def _check(what: str, law: object, kinds: tuple[type[Law], ...], such_as: str, gain: object) -> str:
+def _springs(
+    law: GMS, v: ca.SX, N: ca.SX, z: ca.SX, push: ca.SX, h: ca.SX | float, _where: str
+) -> Corrected:
+    end, mean = map(ca.SX, law.held_step(v, N, z, h) or ())
+    force = law.sigma_2 * v
+    for i, (element, share) in enumerate(zip(law.elements, law.shares(), strict=True)):
+        more, most = h * push * element.k, share * law.mu_s * N
+        end[i] = smooth.clip(end[i] + more, -most, most)
+        force = force + smooth.clip(mean[i] + more / 2, -most, most)
+    return end, ca.SX(force)
+
+
+def _check(what: str, law: Any, kinds: Any, such_as: str, gain: object) -> str:
     check_law(what, law)
     if not isinstance(law, kinds):
         raise checks.refused(what, f"a law such as {such_as}", law)
@@ -157,7 +153,7 @@ def _check(what: str, law: object, kinds: tuple[type[Law], ...], such_as: str, g
 
 def _observer(
     law: Law,
-    corrected: Callable[[Law, ca.SX, ca.SX, ca.SX, ca.SX, ca.SX | float], Corrected],
+    corrected: Callable[..., Corrected],
     gain: float,
     N: float,
     ramp: float | None,
@@ -172,24 +168,23 @@ def _observer(
     """Return the block of an observer of the states of `law`.
 
     Args:
-        corrected: (law, v, N, states, gain times error, step size) -> states after the step and
-            mean force.
+        corrected: (law, v, N, states, gain times error, step size, where) -> states after the
+            step and mean force.
         what: name of the observed states.
         formula: formula of their correction.
     """
     inner = law_block(law, h=h)
     known = parameters(law)
     own = {p.name: p.symbol for p in inner.parameters if p.name in known}
-    size = [p for p in inner.parameters if p.name == "h"]
-    duration = size[0].symbol if size else float(inner.constants["h"])
+    size = step_size(where, h, inner)
     parts = Parts(inner, inner.inputs[0])
-    push = parts.parameter("k_e", gain, "1/s", "gain of the error") * parts.given("e")
+    push = parts.parameter("k_e", gain) * parts.given("e")
     load = checks.number(f"{where}: N", N, unit="N", lower=0.0)
-    least = ca.fmax(parts.parameter("N", load, "N", "normal force"), LEAST)
+    least = ca.fmax(parts.parameter("N", load), LEAST)
     v, z = inner.inputs[0].symbol, symbols_of(inner.states)
-    end, force = corrected(with_values(law, own), v, least, z, push, duration)
+    end, force = corrected(with_values(law, own), v, least, z, push, size.h, where)
     parts.next = ca.vertsplit(end)
-    force = finished(parts, force, ramp, limit, duration, where)
+    force = finished(parts, force, ramp, limit, size.h, where)
     block = arranged(Block(
         name,
         doc=f"Observer of the {what} by the position error. {inner.doc}",
@@ -201,7 +196,7 @@ def _observer(
         about=inner.about,
         limits=inner.limits,
         sources=inner.sources,
-        **parts.variables(tuple(size)),
+        **parts.variables(size.parameters),
     ))  # fmt: skip
     return in_turning(block) if turning else block
 
@@ -254,13 +249,12 @@ def disturbance_observer(
     order = checks.count(f"{where}: order", order, least=1, most=2)
     size, parts = step_size(where, h), Parts()
     u, v = map(parts.given, ("u", "v"))
-    m = parts.parameter("m", mass, "kg", "mass", lower=1e-12)
-    w = parts.parameter("w", bandwidth, "rad/s", "bandwidth of the filter")
-    before = parts.state("v_before", "m/s", "velocity at the last call", 0.1)
+    m, w = map(parts.parameter, ("m", "w"), (mass, bandwidth))
+    before = parts.state("v_before")
     parts.next.append(v)
     force = u - m * (v - before) / size.h
     for k in range(order):
-        d = parts.state(f"d_{k + 1}", "N", "filtered force")
+        d = parts.state(f"d_{k + 1}")
         force = d + (1 - ca.exp(-w * size.h)) * (force - d)
         parts.next.append(force)
     force = finished(parts, force, ramp, limit, size.h, where)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
+from symfric.foundation.shown import brief
 from symfric.foundation.style import line
 
 if TYPE_CHECKING:
@@ -43,9 +44,7 @@ class Reference:
             raise ValueError(f"Reference: expected x, v, a of one length >= 2, got {sizes}")
         object.__setattr__(self, "h", checks.number("Reference: h", self.h, unit="s", above=0.0))
 
-    def __repr__(self) -> str:
-        """Return one line."""
-        return f"<Reference: {self.x.size} samples of {self.h:g} s>"
+    __repr__ = brief
 
     @property
     def t(self) -> Array:
@@ -138,12 +137,9 @@ class Loop:
     status: int = 0
 
     def __repr__(self) -> str:
-        """Return one line."""
         ended = f", {self.ended}" if self.ended else ""
-        return (
-            f"<Loop '{self.name}': {self.force.size} samples, RMS error {self.rms:.3g}, "
-            f"peak {self.peak:.3g}{ended}>"
-        )
+        numbers = f"RMS error {self.rms:.3g}, peak {self.peak:.3g}"
+        return f"<Loop '{self.name}': {self.force.size} samples, {numbers}{ended}>"
 
     @property
     def t(self) -> Array:
@@ -163,7 +159,7 @@ class Loop:
     @property
     def peak(self) -> float:
         """Largest error [m] without the first tenth of the time."""
-        return float(np.abs(self._late).max(initial=0.0))
+        return _size(self._late)
 
     @property
     def hunting(self) -> float:
@@ -177,7 +173,7 @@ class Loop:
     @property
     def standing(self) -> float:
         """Magnitude of the error at the end [m]."""
-        return float(np.abs(self.error[-1:]).max(initial=0.0))
+        return _size(self.error[-1:])
 
     @property
     def work(self) -> float:
@@ -236,13 +232,12 @@ class Comparison:
             other = loop is not before
             if loop.ended:
                 found.append(f"{loop.name}: {loop.ended}")
-            if loop.hunting >= self.count:
-                counts = loop.hunting / self.count
-                found.append(f"{loop.name}: hunts at rest, {counts:.3g} counts to and fro")
-            elif not np.isnan(loop.hunting) and loop.standing >= self.count:
-                counts = loop.standing / self.count
+            hunting, standing = loop.hunting / self.count, loop.standing / self.count
+            if hunting >= 1.0:
+                found.append(f"{loop.name}: hunts at rest, {hunting:.3g} counts to and fro")
+            elif not np.isnan(hunting) and standing >= 1.0:
                 found.append(
-                    f"{loop.name}: rests {counts:.3g} counts off; unless its integrator is held "
+                    f"{loop.name}: rests {standing:.3g} counts off; unless its integrator is held "
                     "it may break away later"
                 )
             if other and loop.rms > before.rms:
@@ -265,7 +260,7 @@ class Comparison:
                 "reduction": self.reduction(loop.name),
                 "hunting": loop.hunting,
                 "work": loop.work,
-                "peak_added": float(np.abs(loop.added).max(initial=0.0)),
+                "peak_added": _size(loop.added),
                 "saturated": loop.saturated,
                 "status": loop.status,
                 "ended": loop.ended,
@@ -318,11 +313,10 @@ class Comparison:
         from symfric.foundation.panels import panels, save  # noqa: PLC0415  (matplotlib is slow)
 
         checks.check_names("comparison", names, self.loops)
-        shown: Sequence[Loop] = [self.loops[n] for n in names] or list(self.loops.values())
+        shown = [self.loops[n] for n in names or self.loops]
         x, force = self.units
         figure, axes = panels(5, height=1.6, shared=False)
-        window = self._reversal()
-        near = slice(window.start, window.stop)
+        near = self._reversal()
         large, of_x = _unit_for(_size(self.reference.x))
         small, of_error = _unit_for(max(_size(loop.error) for loop in shown))
         tiny, of_near = _unit_for(max(_size(loop.error[near]) for loop in shown))
@@ -349,15 +343,14 @@ class Comparison:
         figure.align_ylabels(axes)
         return save(figure, path)
 
-    def _reversal(self) -> range:
+    def _reversal(self) -> slice:
         """Return the samples of the final rest, or around the last reversal without a rest."""
-        rest = self.reference.rest
+        if self.reference.rest is not None:
+            return self.reference.rest
         size = self.reference.x.size
-        if rest is not None:
-            return range(int(rest.start), size)
         turns = np.flatnonzero(np.diff(np.sign(self.reference.v[1:])) != 0)
         middle = int(turns[-1]) if turns.size else size // 2
-        return range(max(0, middle - size // 30), min(size, middle + size // 15))
+        return slice(max(0, middle - size // 30), middle + size // 15)
 
 
 def _size(values: Array) -> float:

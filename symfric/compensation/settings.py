@@ -6,18 +6,10 @@ from typing import Any, final
 
 import numpy as np
 
-from symfric.compensation.force import TERMS
+from symfric.compensation.force import TABLES, TERMS
 from symfric.foundation import checks
 
 VELOCITIES = ("blend", "reference", "measured")
-BOUNDS: dict[str, tuple[str, dict[str, Any]]] = {
-    "N": ("N", {"lower": 0.0}), "offset": ("N", {}), "v_blend": ("m/s", {"above": 0.0}),
-    "build_up": ("m", {"above": 0.0}), "ramp": ("s", {"above": 0.0}),
-    "dead_zone": ("m/s", {"lower": 0.0}), "inertia": ("kg", {"lower": 0.0}),
-    "delay": ("s", {"lower": 0.0}), "error_gain": ("1/s", {"lower": 0.0}),
-    "limit": ("N", {"lower": 0.0}), "slew": ("N/s", {"lower": 0.0}),
-}  # fmt: skip
-"""Unit and bound of each setting that is a number."""
 
 
 @final
@@ -129,24 +121,20 @@ def chosen_settings(
     checks.choice(f"{where}: velocity", s.velocity, VELOCITIES)
     if isinstance(s.N, str):
         checks.choice(f"{where}: N", s.N, ["input"])
-    for name, (unit, bound) in BOUNDS.items():
+    for name, bound in TABLES["settings"].items():
         value = getattr(s, name)
         if value is not None and (name, value) != ("N", "input"):
-            checks.number(f"{where}: {name}", value, unit=unit, **bound)
+            checks.number(f"{where}: {name}", value, **bound)
     if s.velocity == "measured" and (s.error_gain is not None or s.delay is not None):
         raise ValueError(
             f"{where}: error_gain, delay: expected with a desired velocity only, got "
             "velocity = 'measured'"
         )
-    for name, what, count in (
-        ("hold", "(error [m], velocity [m/s])", 2),
-        ("stick", "(force [N], time [s], velocity [m/s])", 3),
-        ("dither", "(amplitude [N], frequency [Hz])", 2),
-    ):
+    for name, what in TABLES["groups"].items():
         value = getattr(s, name)
         if value is not None:
             found = checks.array(f"{where}: {name}", value, what=what)
-            if found.size != count or (found < 0).any():
+            if found.size != what.count("[") or (found < 0).any():
                 raise checks.refused(f"{where}: {name}", f"{what}, numbers >= 0", value)
     if s.stick is not None:
         checks.number(f"{where}: stick: velocity", s.stick[2], unit="m/s", above=0.0)
@@ -177,29 +165,20 @@ def _check_table(where: str, s: Compensation) -> None:
 
 def formula(s: Compensation) -> str:
     """Return the formula of the block, line by line."""
-    wanted = "v_ref" + " + t_ahead a_ref" * (s.delay is not None)
-    wanted += " + k_error e" * (s.error_gain is not None)
-    moves = {
-        "blend": f"v_c = {wanted} while |v| < v_blend, v beyond 2 v_blend, C2 in between",
-        "reference": f"v_c = {wanted}",
-        "measured": "v_c = v",
-    }[s.velocity]
-    lines = [moves]
-    if s.dead_zone is not None:
-        lines.append("v_c less what lies within +-v_dead")
-    force = "F_law(v_c, N)"
-    if s.build_up is not None:
-        lines.append("built+ = built + 2 v_c h / d_build, held within +-1")
-        force = "built F_sliding(|v_c|, N) + viscous"
-    force += " + offset" * (s.offset is not None)
-    force += " + inertia a_ref" * (s.inertia is not None)
-    force += " + F_stick stuck" * (s.stick is not None)
-    force += " + F_dither sin(2 pi phase)" * (s.dither is not None)
-    lines.append(f"F = {force}, terms of the law by their scales")
-    stages = (
-        ("faded in by enable over t_ramp", s.ramp),
-        ("within +-F_max", s.limit),
-        ("by F_rate h a step at most", s.slew),
-    )
-    last = ", ".join(text for text, value in stages if value is not None)
+    texts = TABLES["formula"]
+
+    def chosen(group: str, between: str) -> str:
+        parts = (text for name, text in texts[group].items() if getattr(s, name) is not None)
+        return between.join(parts)
+
+    desired = f"v_ref{chosen('desired', '')}"
+    built = s.build_up is not None
+    lines = [
+        texts["velocity"][s.velocity].format(desired=desired),
+        *[texts["dead_zone"]] * (s.dead_zone is not None),
+        *[texts["build_up"]] * built,
+        f"F = {texts['built_law' if built else 'law']}{chosen('added', '')}, "
+        "terms of the law by their scales",
+    ]
+    last = chosen("last", ", ")
     return "\n".join([*lines, *[f"F {last}"] * bool(last)])

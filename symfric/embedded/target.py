@@ -7,6 +7,7 @@ linker script and main programs are files in `sources`.
 """
 
 import shutil
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -117,17 +118,11 @@ class Core(NamedTuple):
     machine: str
 
 
-_SOFT, _HARD = "-mfloat-abi=soft", "-mfloat-abi=hard"
-_M4, _M7 = ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"), ("-mcpu=cortex-m7", "-mfpu=fpv5-d16")
+TABLES = tomllib.loads(Path(__file__).with_name("cores.toml").read_text(encoding="utf-8"))
 
 CORES = {
-    core.name: core
-    for core in (
-        Core("m0plus", "Cortex-M0+, no FPU", ("-mcpu=cortex-m0plus", _SOFT), "mps2-an385"),
-        Core("m3", "Cortex-M3, no FPU", ("-mcpu=cortex-m3", _SOFT), "mps2-an385"),
-        Core("m4f", "Cortex-M4F, FPU of float", (*_M4, _HARD), "mps2-an386"),
-        Core("m7", "Cortex-M7, FPU of double", (*_M7, _HARD), "mps2-an500"),
-    )
+    name: Core(name, row["title"], tuple(row["options"]), row["machine"])
+    for name, row in TABLES["cores"].items()
 }
 """Cores by name. Code for the M0+ runs on QEMU's M3 with the same counts: ARMv6-M is a subset of
 ARMv7-M, and QEMU's only board with an M0 has 16 kB of RAM."""
@@ -135,31 +130,23 @@ ARMv7-M, and QEMU's only board with an M0 has 16 kB of RAM."""
 CLOCK = 25e6
 """Frequency of SysTick on the boards [Hz]."""
 
-GCC, QEMU, NEWLIB = "arm-none-eabi-gcc", "qemu-system-arm", "newlib for arm-none-eabi"
-
-PACKAGES = {
-    GCC: "gcc-arm-none-eabi",
-    NEWLIB: "libnewlib-arm-none-eabi",
-    QEMU: "qemu-system-arm",
-}
+PACKAGES: dict[str, str] = TABLES["packages"]
 """Tool -> package of Debian and Ubuntu."""
+
+GCC, NEWLIB, QEMU = PACKAGES
 
 LIBRARY_PATIENCE = 10.0
 """Time limit of a compiler to print the path of its library [s]."""
 
 
-@final
-@dataclass(frozen=True)
-class Tools:
+class Tools(NamedTuple):
     """Cross compiler and path of the emulator."""
 
     gcc: Compiler
     qemu: str
 
 
-@final
-@dataclass(frozen=True)
-class Absent:
+class Absent(NamedTuple):
     """Names of the tools that are missing."""
 
     names: tuple[str, ...]

@@ -17,6 +17,7 @@ arrays or repetitions, the text is that of `emit`.
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from re import fullmatch, sub
 from typing import NamedTuple
 
@@ -104,20 +105,20 @@ def _part(plan: Plan, number: int) -> _Part:
     return _Part(number, kept, into, inputs, rows, results)
 
 
+@dataclass
 class _Rolled:
-    """Writer of a plan with loops."""
+    """Writer of a plan with loops, for the arguments of `emit_rolled`."""
 
-    def __init__(
-        self,
-        plan: Plan,
-        names: Sequence[Sequence[str]],
-        targets: Sequence[Sequence[str]],
-        real: Real,
-        arrays: Arrays,
-        loads: Places,
-    ) -> None:
-        self.plan, self.source, self.real = plan, plan.source, real
-        self.names, self.targets = names, targets
+    plan: Plan
+    names: Sequence[Sequence[str]]
+    targets: Sequence[Sequence[str]]
+    real: Real
+    arrays: Arrays
+    loads: Places
+
+    def __post_init__(self) -> None:
+        plan, names, arrays, loads = self.plan, self.names, self.arrays, self.loads
+        self.source = plan.source
         self.taken = {name for row in names for name in row}
         self.index = self.free("i")
         self.parts = [_part(plan, number) for number in range(plan.last + 1)]

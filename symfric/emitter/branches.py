@@ -6,8 +6,7 @@ needs. Branches may be nested; selects of one region with the same condition sha
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -40,9 +39,7 @@ class Region(NamedTuple):
     label: int
 
 
-@final
-@dataclass(frozen=True)
-class Placed:
+class Placed(NamedTuple):
     """Graph with the region of every operation.
 
     Attributes:

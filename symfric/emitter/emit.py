@@ -16,7 +16,7 @@ import casadi as ca
 
 from symfric.emitter.c99 import FORMS, FUNCTIONS, Real, Writer, operation_name
 from symfric.emitter.logic import LOWERED, logical, settled, simplified
-from symfric.emitter.statements import Branch, Local, Plan, Side, Statement, Store, Stores, planned
+from symfric.emitter.statements import Branch, Local, Side, Statement, Store, Stores, planned
 from symfric.foundation.graph import LEAVES, Graph
 
 INDENT = "    "
@@ -80,11 +80,9 @@ def emit(
         raise ValueError(f"codegen: expected operations that C99 has, got {got}")
     better = settled(simplified(source, conditions, truths))
     bools = logical(better.nodes, conditions)
-    loads = loads or {}
-    plan = planned(better, bools, _stores(better, names, targets, loads, truths))
-    body = _Body(plan, bools, names, targets, real, loads, stem, truths)
+    body = _Body(better, bools, names, targets, real, loads or {}, stem, truths)
     lines = tuple(body.region(0))
-    places = zip(better.nodes, plan.placed.place, strict=True)
+    places = zip(better.nodes, body.plan.placed.place, strict=True)
     done = [(node.op, place == 0) for node, place in places if node.op not in LEAVES]
     return Code(
         frozenset(body.used),
@@ -95,66 +93,62 @@ def emit(
     )
 
 
-def _stores(
-    source: Graph,
-    names: Sequence[Sequence[str]],
-    targets: Sequence[Sequence[str]],
-    loads: Mapping[tuple[int, int], str],
-    truths: Collection[int],
-) -> Stores:
-    """Return the rules for writing results, see `emit`."""
-    inputs = {node.entry: i for i, node in enumerate(source.nodes) if node.op == ca.OP_INPUT}
-    patterns = {Store(k, j): text for k, row in enumerate(targets) for j, text in enumerate(row)}
-    shared = [names[i][j] for i, j in inputs if (i, j) not in loads]
-    late = any(text.startswith("return") for text in patterns.values())
-    assigned = {f"{loads[entry]} = {{}};": i for entry, i in inputs.items() if entry in loads}
-    return Stores(
-        late or not all(fullmatch(r"\w+", name) for name in shared),
-        frozenset(
-            store
-            for store, text in patterns.items()
-            if fullmatch(r"\S+ \+?= \{\};", text) and store.result not in truths
-        ),
-        {store: assigned[text] for store, text in patterns.items() if text in assigned},
-    )
-
-
+@dataclass
 class _Body:
-    """Writer of the statements of a plan.
+    """Writer of the statements of a graph, for the arguments of `emit`.
 
     Attributes:
         used: (argument, row) of the inputs that occur.
-        loads: places of the inputs that are still to be loaded, by node.
+        waiting: places of the inputs that are still to be loaded, by node.
     """
 
-    def __init__(
-        self,
-        plan: Plan,
-        bools: Sequence[bool],
-        names: Sequence[Sequence[str]],
-        targets: Sequence[Sequence[str]],
-        real: Real,
-        loads: Mapping[tuple[int, int], str],
-        stem: str,
-        truths: Collection[int],
-    ) -> None:
-        self.plan, self.targets, self.truths, self.real = plan, targets, truths, real
-        while any(fullmatch(stem + r"\d+", name) for row in names for name in row):
-            stem += "_"
-        self.stem, self.count = stem, 0
-        self.writer, nodes = Writer(plan.placed.source, bools, real), plan.placed.source.nodes
-        taken = sorted({i for values in plan.takes.values() for i in values})
+    source: Graph
+    bools: Sequence[bool]
+    names: Sequence[Sequence[str]]
+    targets: Sequence[Sequence[str]]
+    real: Real
+    loads: Mapping[tuple[int, int], str]
+    stem: str
+    truths: Collection[int]
+
+    def __post_init__(self) -> None:
+        self.plan = planned(self.source, self.bools, self._stores())
+        while any(fullmatch(self.stem + r"\d+", name) for row in self.names for name in row):
+            self.stem += "_"
+        self.count, self.writer = 0, Writer(self.source, self.bools, self.real)
+        taken = sorted({i for values in self.plan.takes.values() for i in values})
+        nodes = self.source.nodes
         entries = {i: nodes[i].entry for i in taken if nodes[i].op == ca.OP_INPUT}
         self.used = set(entries.values())
-        self.writer.names |= {i: names[argument][row] for i, (argument, row) in entries.items()}
-        self.loads = {i: loads[entry] for i, entry in entries.items() if entry in loads}
+        self.writer.names |= {i: self.names[k][row] for i, (k, row) in entries.items()}
+        self.waiting = {i: self.loads[e] for i, e in entries.items() if e in self.loads}
+
+    def _stores(self) -> Stores:
+        """Return the rules for writing results, see `emit`."""
+        nodes, loads = enumerate(self.source.nodes), self.loads
+        inputs = {node.entry: i for i, node in nodes if node.op == ca.OP_INPUT}
+        patterns = {
+            Store(k, j): text for k, row in enumerate(self.targets) for j, text in enumerate(row)
+        }
+        shared = [self.names[i][j] for i, j in inputs if (i, j) not in loads]
+        late = any(text.startswith("return") for text in patterns.values())
+        assigned = {f"{loads[entry]} = {{}};": i for entry, i in inputs.items() if entry in loads}
+        return Stores(
+            late or not all(fullmatch(r"\w+", name) for name in shared),
+            frozenset(
+                store
+                for store, text in patterns.items()
+                if fullmatch(r"\S+ \+?= \{\};", text) and store.result not in self.truths
+            ),
+            {store: assigned[text] for store, text in patterns.items() if text in assigned},
+        )
 
     def region(self, number: int) -> list[str]:
         """Return the lines of a region."""
         lines: list[str] = []
         for statement in self.plan.bodies[number]:
             for i in self._loaded(number, statement):
-                place = self.loads.pop(i)
+                place = self.waiting.pop(i)
                 lines.append(f"const {self.real.name} {self.writer.names[i]} = {place};")
             lines += self.statement(statement)
         return lines
@@ -172,13 +166,13 @@ class _Body:
         }
         return sorted(
             i
-            for i, text in self.loads.items()
+            for i, text in self.waiting.items()
             if text in written or (i in taken and places[i] == number)
         )
 
     def statement(self, statement: Statement) -> list[str]:
         """Return the lines of a statement."""
-        nodes, write = self.plan.placed.source.nodes, self.writer
+        nodes, write = self.source.nodes, self.writer
         match statement:
             case Local(node):
                 text = write.expression(node).text
@@ -192,7 +186,7 @@ class _Body:
                 shown = (write.expression if write.logical[goal] else write.number)(value)
                 return [f"{write.names[goal]} = {shown.text};"]
             case Store(result, row):
-                return [self._stored(statement, self.plan.placed.source.results[result][row])]
+                return [self._stored(statement, self.source.results[result][row])]
 
     def _goal(self, select: int) -> int | Store:
         """Return the result that a select is written to, or the select whose variable it shares."""

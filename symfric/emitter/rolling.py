@@ -12,8 +12,8 @@ constants (a table). Graphs with other differences are not merged.
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import final
+from dataclasses import replace
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -30,9 +30,7 @@ Lanes = tuple[int, ...]
 """Corresponding nodes, one for each element."""
 
 
-@final
-@dataclass(frozen=True)
-class Array:
+class Array(NamedTuple):
     """Consecutive rows of an argument or a result that C can index.
 
     Attributes:
@@ -51,18 +49,14 @@ class Array:
         return entry[0] == self.group and self.first <= entry[1] < self.first + self.size
 
 
-@final
-@dataclass(frozen=True)
-class Arrays:
+class Arrays(NamedTuple):
     """Rows that C can index: rows of arguments (`read`) and of results (`written`)."""
 
     read: tuple[Array, ...] = ()
     written: tuple[Array, ...] = ()
 
 
-@final
-@dataclass(frozen=True)
-class Store:
+class Store(NamedTuple):
     """Consecutive rows of a result, beginning at `offset` in `array`."""
 
     lanes: Lanes
@@ -70,9 +64,7 @@ class Store:
     offset: int
 
 
-@final
-@dataclass(frozen=True)
-class Sum:
+class Sum(NamedTuple):
     """Node `total`: the sum of `start`, if there is one, and the lanes in their order."""
 
     lanes: Lanes
@@ -83,9 +75,7 @@ class Sum:
 Strand = Store | Sum
 
 
-@final
-@dataclass(frozen=True)
-class Body:
+class Body(NamedTuple):
     """Operations of a loop for each element, as a graph.
 
     Attributes:
@@ -196,12 +186,9 @@ def _gathered(
 def woven(source: Graph, strands: Sequence[Strand], arrays: Arrays) -> Body:
     """Return the body of the loop that computes all `strands`, which have equal numbers of lanes.
 
-    Raises:
-        ValueError: the graphs of the strands are not isomorphic.
+    The lanes of each strand are isomorphic, see `strands`.
     """
-    gathered = _gathered(source, [strand.lanes for strand in strands], arrays)
-    if gathered is None:
-        raise ValueError("woven: expected alike graphs, got others")
+    gathered = _gathered(source, [strand.lanes for strand in strands], arrays) or {}
     outer, truths = dict[int, int](), dict[int, int]()
     reads, tables = dict[tuple[Array, int], int](), dict[tuple[float, ...], int]()
     known, number = dict[Node, int](), dict[Lanes, int]()

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
-from typing import final
+from typing import NamedTuple, final
 
 from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.emitter.rolling import Arrays, Body, Store, Strand, Sum, strands, woven
@@ -27,9 +27,7 @@ MORE = 1.1
 """Largest ratio of executed operations with and without loops."""
 
 
-@final
-@dataclass(frozen=True)
-class Loop:
+class Loop(NamedTuple):
     """Loop over `size` elements in the stage `stage` >= 1."""
 
     stage: int

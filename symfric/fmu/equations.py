@@ -5,10 +5,9 @@ needed at run time.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from hashlib import sha256
 from math import inf
-from typing import final
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -43,9 +42,7 @@ EVENT_TOLERANCE = 1e-10
 """Tolerance of event times [s], as in `simulate`."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Equations:
+class Equations(NamedTuple):
     """Equations of a model and their numerical settings in a unit.
 
     Attributes:

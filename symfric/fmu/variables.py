@@ -5,9 +5,8 @@ the relative tolerance and the attempts of the integrator.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from math import inf
-from typing import final
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -21,9 +20,7 @@ from symfric.model import Model
 LEAST_RTOL, LARGEST_RTOL = 1e-13, 0.1
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Entry:
+class Entry(NamedTuple):
     """Variable of the unit.
 
     Attributes:

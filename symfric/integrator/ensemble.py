@@ -39,7 +39,7 @@ from symfric.integrator.arguments import (
 )
 from symfric.integrator.equations.initial import first_step
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.many.chunk import Chunk, EventJob, Job, Points, Solved, digest, suited
+from symfric.integrator.many.chunk import Chunk, Job, Points, SingleJob, Solved, digest, suited
 from symfric.integrator.many.member_data import MemberData, MemberInput, ends_of, member_data
 from symfric.integrator.many.program import program
 from symfric.integrator.many.store import Store
@@ -54,13 +54,13 @@ from symfric.results.ensemble import Ensemble
 if TYPE_CHECKING:
     from symfric.integrator.cuda.on_device import OnDevice
 
-    Task = Job | EventJob | OnDevice
+    Task = Job | SingleJob | OnDevice
     """Part of the work that all chunks of an ensemble share."""
 
 Array = NDArray[np.float64]
 CUDA, REALS = "cuda", ("double", "float")
 EXECUTORS = ("serial", "threads", "processes")
-RESULTS = 3
+RESULTS = 4
 """Format number of the result folders, incremented with every change."""
 CHUNK = 500
 """Number of members of a task on a CPU."""
@@ -111,10 +111,10 @@ def simulate_many(
             supports models without events; equations, steps, failures and counts equal those of
             the other backends up to last digits. "auto" never chooses it; there is no fallback.
         executor: "serial", "threads" (the compiled loop holds no lock), "processes", or any
-            `concurrent.futures.Executor`, such as those of dask and mpi4py. A task is plain data
-            and C source, so a worker needs only this package and, for compiled code, a compiler.
-            The task of a model with events contains the model, and each worker builds its
-            integrator once.
+            `concurrent.futures.Executor`, such as those of dask and mpi4py. A compiled task is
+            plain data and C source, so a worker needs only this package and a compiler. With
+            events or backend="vm", the task contains the model, and each worker builds its
+            integrator once and runs the members one by one, as `simulate` does.
         workers: number of threads or processes, or of the executor's workers; default all cores of
             this machine. Twice as many chunks are in progress at once.
         chunk: members per task; default 500. On a graphics processor the default is limited by a
@@ -177,9 +177,8 @@ def simulate_many(
     folder = None
     if out is not None:
         chunks = tuple(digest(prepare(pick)) for pick in picks.values())
-        folder = checks.path("simulate_many: out", out) / _identity(
-            task, integrator, allowed, looks, chunks
-        )
+        identity = digest(RESULTS, task.identity, allowed, looks, chunks)
+        folder = checks.path("simulate_many: out", out) / identity[:16]
     store = Store(folder, model.signals, members, max(1, looks.size), len(model.x))
     todo = {first: picks[first] for first in store.left(picks)}
     done, ended = members - sum(pick.stop - pick.start for pick in todo.values()), None
@@ -297,18 +296,18 @@ def _task(
     executor: str | Executor,
 ) -> Task:
     """Return the task of the workers; compile its C first if they run on this machine."""
-    if integrator.model.events:
-        parts = integrator.tableau, tuple(points), allowed, backend, looks
-        return EventJob(integrator.model, inputs, *parts)
-    compiled = backend == "compiled" or (backend == "auto" and find_compiler() is not None)
-    if compiled and isinstance(executor, str):
+    model = integrator.model
+    together = backend == "compiled" or (backend == "auto" and find_compiler() is not None)
+    if together and not model.events:
         try:
-            _ = program(integrator, True).members
+            if isinstance(executor, str):
+                _ = program(integrator).members
+            return Job(program(integrator), inputs.breaks, looks, allowed.max_steps)
         except CompileError:
             if backend == "compiled":
                 raise
-            compiled = False  # simulate in the VM if the compiler is broken
-    return Job(program(integrator, compiled), inputs.breaks, looks, allowed.max_steps)
+            backend = "vm"  # simulate in the VM if the compiler is broken
+    return SingleJob(model, inputs, integrator.tableau, tuple(points), allowed, backend, looks)
 
 
 def _chunk(integrator: Integrator, given: MemberData, tolerances: Tolerances, pick: slice) -> Chunk:
@@ -322,17 +321,6 @@ def _chunk(integrator: Integrator, given: MemberData, tolerances: Tolerances, pi
     at_start = np.broadcast_to(data[:, :, 0], (y.shape[0], data.shape[1]))
     R = tolerances.given(float(given.inputs.breaks[-1]), np.hstack([p, at_start]))
     return Chunk(S, R, data, ends)
-
-
-def _identity(
-    task: Task, integrator: Integrator, allowed: Tolerances, looks: Array, chunks: tuple[str, ...]
-) -> str:
-    """Return a hash of the division into chunks and of all data that determine the results."""
-    events = [
-        (e.name, e.direction, e.terminal, e.at_start, *e.reset) for e in integrator.model.events
-    ]
-    jump = () if integrator.crossings is None else (integrator.crossings.jump, integrator.events)
-    return digest(RESULTS, task.program, allowed, looks, chunks, tuple(events), jump)[:16]
 
 
 def solved(

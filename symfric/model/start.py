@@ -132,24 +132,13 @@ class System:
         start = self._start.map(count)(known, chosen, inputs, parameters, times).full()
         return start.T, parameters.T
 
-    def start_by_parameters(
+    def start_slopes(
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None,
         t: float = 0.0,
-    ) -> NDArray[np.float64]:  # fmt: skip
-        """Return the derivative of `initial_state` with respect to p, shape (nx, n_p)."""
-        return evaluate_all(self._start_slopes, *self._start_arguments(given, p, t))[0]
-
-    def start_by_state(
-        self,
-        name: str,
-        given: Mapping[str, float] | None = None,
-        p: Mapping[str, float] | None = None,
-        t: float = 0.0,
-    ) -> NDArray[np.float64]:
-        """Return the derivative of `initial_state` with respect to a start value, shape (nx,)."""
-        i = [v.name for v in self.x].index(name)
-        chosen = dict(given or {}) | {name: float(self.initial_state(given, p, t)[i])}
-        return evaluate_all(self._start_slopes, *self._start_arguments(chosen, p, t))[1][:, i]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
+        """Return the derivatives of `initial_state` by p (nx, n_p) and by values in `given`."""
+        by_p, by_start = evaluate_all(self._start_slopes, *self._start_arguments(given, p, t))
+        return by_p, by_start
 
     def _start_arguments(
         self, given: Mapping[str, float] | None, p: Mapping[str, float] | None, t: float

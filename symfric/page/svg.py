@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from math import ceil, floor, isfinite, log10
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +118,22 @@ LETTER = 6.6
 """Approximate width of a letter of the legend [px]."""
 
 
+class Frame(NamedTuple):
+    """Frame of a chart: its axes and its size [px]."""
+
+    x: Axis
+    y: Axis
+    width: float
+    height: float
+
+    def places(self, x: Array, y: Array) -> Array:
+        """Return the pixels (n, 2) of the finite points; far outliers are moved near the frame."""
+        across, up = self.x.at(x), self.y.at(y)
+        good = np.isfinite(across) & np.isfinite(up)
+        across, up = np.clip(across[good], -1.0, 2.0), np.clip(up[good], -1.0, 2.0)
+        return np.round(np.column_stack([self.width * across, self.height * (1.0 - up)]), 1)
+
+
 @dataclass(frozen=True, eq=False)
 class Mark(ABC):
     """Mark in a chart; `kind` is its class in the style sheet."""
@@ -125,71 +141,53 @@ class Mark(ABC):
     kind: str
 
     @abstractmethod
-    def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """Return the SVG of the mark inside a frame of the given size [px]."""
+    def draw(self, frame: Frame) -> str:
+        """Return the SVG of the mark inside a frame."""
 
 
-def _places(
-    x: Axis, y: Axis, width: float, height: float, xs: Array, ys: Array
-) -> NDArray[np.float64]:
-    """Return the pixels (n, 2) of the finite points; far outliers are moved near the frame."""
-    across, up = x.at(xs), y.at(ys)
-    good = np.isfinite(across) & np.isfinite(up)
-    across, up = np.clip(across[good], -1.0, 2.0), np.clip(up[good], -1.0, 2.0)
-    return np.round(np.column_stack([width * across, height * (1.0 - up)]), 1)
-
-
-@final
 @dataclass(frozen=True, eq=False)
-class Path(Mark):
-    """Line through points; `entry` is the name of the line in the legend."""
+class Points(Mark):
+    """Points (x, y); `entry` is their name in the legend."""
 
     x: Array
     y: Array
     entry: str = ""
 
-    def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
-        """Return a polyline for each sequence of finite points."""
-        bad = np.flatnonzero(~np.isfinite(self.y))
-        runs = zip(np.split(self.x, bad), np.split(self.y, bad), strict=True)
-        places = (_places(x, y, width, height, *run) for run in runs if np.isfinite(run[1]).any())
-        return "".join(f'<polyline class="{self.kind}" points="{_points(at)}"/>' for at in places)
 
+@final
+class Path(Points):
+    """Line through points."""
 
-def _points(at: Array) -> str:
-    """Return the points of a polyline without consecutive duplicates."""
-    kept = np.concatenate([[True], (np.diff(at, axis=0) != 0).any(axis=1)])
-    return " ".join(f"{a:g},{b:g}" for a, b in at[kept])
+    def draw(self, frame: Frame) -> str:
+        """Return a polyline for each sequence of finite points, without repeated points."""
+        bad, text = np.flatnonzero(~np.isfinite(self.y)), ""
+        for x, y in zip(np.split(self.x, bad), np.split(self.y, bad), strict=True):
+            at = frame.places(x, y)
+            if len(at):
+                kept = np.concatenate([[True], (np.diff(at, axis=0) != 0).any(axis=1)])
+                points = " ".join(f"{a:g},{b:g}" for a, b in at[kept])
+                text += f'<polyline class="{self.kind}" points="{points}"/>'
+        return text
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Dots(Mark):
-    """Points, drawn as short strokes with round ends; `entry` is their name in the legend."""
+class Dots(Points):
+    """Points, drawn as short strokes with round ends."""
 
-    x: Array
-    y: Array
-    entry: str = ""
-
-    def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
+    def draw(self, frame: Frame) -> str:
         """Return one path with all points."""
-        at = np.unique(_places(x, y, width, height, self.x, self.y), axis=0)
+        at = np.unique(frame.places(self.x, self.y), axis=0)
         points = "".join(f"M{a:g} {b:g}h0" for a, b in at)
         return f'<path class="dots {self.kind}" d="{points}"/>' if points else ""
 
 
 @final
-@dataclass(frozen=True, eq=False)
-class Stems(Mark):
+class Stems(Points):
     """Vertical lines from zero."""
 
-    x: Array
-    y: Array
-
-    def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
+    def draw(self, frame: Frame) -> str:
         """Return one path with all lines."""
-        zero = _places(x, y, width, height, self.x, np.zeros(self.x.size))
-        ends = _places(x, y, width, height, self.x, self.y)
+        zero, ends = (frame.places(self.x, y) for y in (np.zeros(self.x.size), self.y))
         stems = "".join(f"M{a:g} {b:g}V{c:g}" for (a, b), (_, c) in zip(zero, ends, strict=True))
         return f'<path class="{self.kind}" d="{stems}"/>'
 
@@ -202,15 +200,13 @@ class Level(Mark):
     value: float
     upright: bool = False
 
-    def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
+    def draw(self, frame: Frame) -> str:
         """Return one line; "" if the value is outside the axis."""
-        along = x if self.upright else y
-        share = float(along.at(np.array([self.value]))[0])
-        if not 0.0 <= share <= 1.0:
-            return ""
+        share = float((frame.x if self.upright else frame.y).at(np.array([self.value]))[0])
+        line = f"M0 {frame.height * (1 - share):.1f}H{frame.width:g}"
         if self.upright:
-            return f'<path class="{self.kind}" d="M{width * share:.1f} 0V{height:g}"/>'
-        return f'<path class="{self.kind}" d="M0 {height * (1 - share):.1f}H{width:g}"/>'
+            line = f"M{frame.width * share:.1f} 0V{frame.height:g}"
+        return f'<path class="{self.kind}" d="{line}"/>' if 0.0 <= share <= 1.0 else ""
 
 
 @final
@@ -221,11 +217,11 @@ class Band(Mark):
     low: float
     high: float
 
-    def draw(self, x: Axis, y: Axis, width: float, height: float) -> str:
+    def draw(self, frame: Frame) -> str:
         """Return a rectangle across the frame."""
-        low, high = np.clip(y.at(np.array([self.low, self.high])), 0.0, 1.0)
-        top = height * (1 - high)
-        size = f'width="{width:g}" height="{height * (high - low):.1f}"'
+        low, high = np.clip(frame.y.at(np.array([self.low, self.high])), 0.0, 1.0)
+        top = frame.height * (1 - high)
+        size = f'width="{frame.width:g}" height="{frame.height * (high - low):.1f}"'
         return f'<rect class="{self.kind}" x="0" y="{top:.1f}" {size}/>'
 
 
@@ -248,7 +244,7 @@ def chart(
         says: description for screen readers.
     """
     w, h = width - LEFT - RIGHT, height - TOP - BOTTOM
-    inside = "".join(mark.draw(x, y, w, h) for mark in marks)
+    inside = "".join(mark.draw(Frame(x, y, w, h)) for mark in marks)
     return (
         f'<svg class="chart" role="img" viewBox="0 0 {width:g} {height:g}">'
         f"<title>{escape(title)}</title><desc>{escape(says or title)}</desc>"
@@ -283,7 +279,7 @@ def _legend(marks: Sequence[Mark], width: float) -> str:
     """Return the entries of the legend, at the right of the line of the title."""
     text: list[str] = []
     at = width - RIGHT
-    for mark in reversed([m for m in marks if isinstance(m, Path | Dots) and m.entry]):
+    for mark in reversed([m for m in marks if isinstance(m, Points) and m.entry]):
         at -= LETTER * len(mark.entry)
         text.append(f'<text class="entry" x="{at:.1f}" y="15">{escape(mark.entry)}</text>')
         at -= 20

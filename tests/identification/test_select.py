@@ -108,17 +108,6 @@ def test_errors_are_compared_where_all_have_some() -> None:
     assert np.isnan(relative([]))
 
 
-@pytest.mark.parametrize("laws", ["stribeck", []])
-def test_bad_laws_are_refused(laws: object) -> None:
-    with pytest.raises(ValueError, match="select: laws"):
-        select(laws, points(1), Points())  # pyright: ignore
-
-
-def test_misspelt_arguments_are_refused_in_a_sentence() -> None:
-    with pytest.raises(ValueError, match=r"select: expected one of .*start.*, got begins"):
-        select(["stribeck"], points(1), Points(), begins=3)
-
-
 def test_criteria_are_those_of_the_errors_and_the_numbers_of_parameters(ranking: Ranking) -> None:
     first, other = ranking["stribeck"], ranking["coulomb"]
     n, better = ranking.effective, 2 * np.log(other.fitted / first.fitted)

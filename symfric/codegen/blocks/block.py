@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
+from pathlib import Path
 from re import ASCII, fullmatch
 from typing import NamedTuple, final
 
@@ -24,17 +25,7 @@ from symfric.model import Output, Variables
 GROUPS = ("state", "param", "in", "out")
 """Names of the structs, and of the pointers to them."""
 
-KEYWORDS = frozenset(
-    """
-    alignas alignof and and_eq asm auto bitand bitor bool break case catch char class compl const
-    const_cast constexpr continue decltype default delete do double dynamic_cast else enum explicit
-    export extern false float for friend goto if inline int long mutable namespace new noexcept
-    not not_eq nullptr operator or or_eq private protected public register reinterpret_cast
-    restrict return short signed sizeof static static_assert static_cast struct switch template
-    this thread_local throw true try typedef typeid typename union unsigned using virtual void
-    volatile wchar_t while xor xor_eq
-    """.split()  # noqa: SIM905
-)
+KEYWORDS = frozenset(Path(__file__).with_name("keywords.txt").read_text(encoding="utf-8").split())
 """Keywords of C99 and C++."""
 
 RESERVED = frozenset(
@@ -142,13 +133,13 @@ class Block:
     arrays: tuple[Elements, ...] = ()
 
     def __post_init__(self) -> None:
-        problems = "; ".join([*self._name_problems(), *self._shape_problems()])
+        problems = "; ".join(self._problems())
         if problems:
             raise ValueError(f"block '{self.name}': {problems}")
         for variable in (*self.states, *self.parameters):
             checks.number(f"block '{self.name}': {variable.name}", variable.start)
 
-    def _name_problems(self) -> Iterator[str]:
+    def _problems(self) -> Iterator[str]:
         names = [v.name for v in self.variables] + [*self.outputs]
         for name in (self.name, *names, *self.resets):
             if not fullmatch(r"[A-Za-z]\w*", name, ASCII) or name in RESERVED:
@@ -156,8 +147,6 @@ class Block:
         for name, count in Counter(names).items():
             if count > 1:
                 yield f"expected every name once, got '{name}' twice"
-
-    def _shape_problems(self) -> Iterator[str]:
         expected = len(self.states)
         for what, rows in {"next": self.next, **self._reset_states}.items():
             count = ca.SX(rows).numel()

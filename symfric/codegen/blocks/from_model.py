@@ -121,7 +121,9 @@ def plant_block(
             "remove your own events, and use a smooth or bristle law"
         )
     size, formula = step_size(where, h), METHODS[method]
-    whole = suited_to_start(_held(model), formula, model)
+    u = model.vector("u")
+    held = InputData(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("plant",))
+    whole = suited_to_start(system(model, held), formula, model)
     following = build_fixed(whole, formula)(whole.y, ca.SX(size.h), whole.d)
     block = Block(
         name or model.name,
@@ -162,12 +164,6 @@ def _opened(
     if problems:
         raise ValueError(f"codegen '{type(machine).__name__}': {'; '.join(problems)}")
     return machine.model(names), [p for n, p in parameters(machine).items() if n not in names]
-
-
-def _held(model: Model) -> System:
-    """Return the equations with held inputs, which are data of the run."""
-    u = model.vector("u")
-    return system(model, InputData(u, u, np.zeros(2), np.zeros((len(model.u), 1)), ("plant",)))
 
 
 def _states(model: Model, whole: System, where: str) -> Variables:

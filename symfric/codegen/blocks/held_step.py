@@ -1,8 +1,7 @@
 """Step of the states of a law with velocity and load held, and its case without load."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -25,9 +24,7 @@ overflow.
 """
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Step:
+class Step(NamedTuple):
     """States of a law after a step of h [s], columns.
 
     Attributes:
@@ -68,9 +65,9 @@ def advanced(
             for term, (_, own), (_, rates) in terms
             if term.states
         ]
-        names = ("end", "mean", "mean_rate", "end_rate")
-        columns = (ca.vertcat(*(getattr(part, name) for part in parts)) for name in names)
-        return Step(*columns, kinds=tuple(dict.fromkeys(k for part in parts for k in part.kinds)))
+        *columns, kinds = zip(*parts, strict=True)
+        columns = (ca.vertcat(*column) for column in columns)
+        return Step(*columns, kinds=tuple(dict.fromkeys(k for kind in kinds for k in kind)))
     known = law.held_step(v, N, z, h)
     if known is not None:
         end, mean = map(ca.SX, known)

@@ -1,9 +1,8 @@
 """Blocks of a mechanism: inverse dynamics with joint friction, and gravity compensation."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, final
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -136,9 +135,7 @@ def gravity_block(
     ))  # fmt: skip
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Machine:
+class _Machine(NamedTuple):
     """Equations of a mechanism in its leading coordinates.
 
     Attributes:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from symfric.codegen.blocks.block import RESERVED, Block, Elements
 from symfric.emitter.arrays import looped
@@ -50,12 +51,17 @@ class StepSize(NamedTuple):
     constants: dict[str, float]
 
 
-def step_size(where: str, h: float | None) -> StepSize:
-    """Return the step size `h` [s] as a constant; if None, as a parameter, by default 1 ms."""
+def step_size(where: str, h: float | None, of: Block | None = None) -> StepSize:
+    """Return the step size `h` [s] as a constant; if None, as a parameter, by default 1 ms.
+
+    The parameter is that of the block `of`, if it has one.
+    """
     if h is not None:
         h = checks.number(f"{where}: h", h, unit="s", above=0.0)
         return StepSize(h, (), {"h": h})
     size = Variable("h", "s", start=STEP_SIZE, lower=0.0, doc="step size")
+    if of is not None:
+        size = next((v for v in of.parameters if v.name == size.name), size)
     return StepSize(size.symbol, (size,), {})
 
 
@@ -89,17 +95,17 @@ def variable(
         problems.append(f"fold: expected none with free, which folds all others, got {fold!r}")
     if fold is False:
         problems.append("fold: expected True, names, or None for the default, got False")
-    known, given = parameters(obj), {"free": free, "fold": None if fold in (True, False) else fold}
     chosen: dict[str, tuple[str, ...]] = {}
-    for what, names in given.items():
+    for what, names in (("free", free), ("fold", fold)):
         try:
-            chosen[what] = () if names is None else checks.names(what, names, known)
+            if not (names is None or isinstance(names, bool)):
+                chosen[what] = checks.names(what, names, parameters(obj))
         except ValueError as error:
             problems.append(str(error))
     if problems or free is not None:
         return chosen.get("free", ()), problems
     kept = () if fold is True else _worth_it(obj)
-    return tuple(name for name in kept if name not in chosen["fold"]), []
+    return tuple(name for name in kept if name not in chosen.get("fold", ())), []
 
 
 def _worth_it(obj: Parametric) -> tuple[str, ...]:
@@ -201,11 +207,6 @@ class Family(NamedTuple):
     name: str
     rows: tuple[int, ...]
 
-    @property
-    def contiguous(self) -> bool:
-        """True if the rows are consecutive."""
-        return self.rows == tuple(range(self.rows[0], self.rows[0] + len(self.rows)))
-
 
 def arranged(block: Block) -> Block:
     """Return the block with identical elements as arrays; parameters are reordered for them.
@@ -214,10 +215,8 @@ def arranged(block: Block) -> Block:
     ranges are equal. States keep their order, which an array must match. Inputs form no arrays,
     because each is guarded separately.
     """
-    found = {
-        "state": [f for f in families(block.states) if f.contiguous],
-        "param": families(block.parameters),
-    }
+    found = {"state": families(block.states), "param": families(block.parameters)}
+    found["state"] = [f for f in found["state"] if np.all(np.diff(f.rows) == 1)]
     if not any(found.values()):
         return block
     whole = _with(block, found)

@@ -16,7 +16,8 @@ static bool @{name}_beyond(@real x, @real limit)
 static bool @{name}_outside(@real x, @real low, @real high)
 {
     const @whole span = @{name}_bits(high) - @{name}_bits(low);
-    return @{name}_bits(x) - @{name}_bits(low) > span && x != low;
+    return @{name}_bits(x) - @{name}_bits(low) > span
+        && (@{name}_bits(x) | @{name}_bits(low)) != ~@magnitude;
 }
 
 /* x clamped to low ... high, or safe where it is not finite; says so by bits of the status. */

@@ -1,7 +1,7 @@
 """Members of an ensemble on a graphics processor: the task of the chunks, and the launches."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, final
 
@@ -14,7 +14,7 @@ from symfric.integrator.cuda.kernel import Kernel, kernel_of
 from symfric.integrator.many.chunk import Chunk, Job, Solved
 from symfric.integrator.many.member_data import MemberData
 from symfric.integrator.many.members import Advanced, Counts, Stretch, struct
-from symfric.integrator.many.program import Program, program
+from symfric.integrator.many.program import Program, with_code
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import State
@@ -102,18 +102,17 @@ class OnDevice:
         device = Device.found()
         between = not np.isin(times, breaks).all()
         kernel = kernel_of(integrator, between, REALS[real])
-        # the results depend on the code of the kernel
-        own = replace(program(integrator, False), code=kernel.text)
-        return cls(Job(own, breaks, times, max_steps), kernel, device, device.load(kernel))
+        job = Job(with_code(integrator, kernel.text), breaks, times, max_steps)
+        return cls(job, kernel, device, device.load(kernel))
 
     @property
-    def program(self) -> Program:
-        """Equations that determine the results."""
+    def identity(self) -> Program:
+        """Data that determine the results."""
         return self.job.program
 
     def solve(self, chunk: Chunk) -> Solved:
         """Integrate the members of a chunk."""
-        return self.job.solve(chunk, self)
+        return self.job.solve(chunk, self.run)
 
     def chunk(self, given: MemberData) -> int:
         """Return the number of members of a chunk.

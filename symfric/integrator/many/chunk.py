@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_step
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.many.members import Members, Stretch
-from symfric.integrator.many.program import Program, program
+from symfric.integrator.many.members import Runner, Stretch
+from symfric.integrator.many.program import Program, with_code
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator, built
@@ -101,7 +101,7 @@ def digest(*parts: Any) -> str:
 @final
 @dataclass(frozen=True, eq=False)
 class Job:
-    """Task of a model without events; picklable.
+    """Task whose members run together, in compiled code; for a model without events; picklable.
 
     Attributes:
         program: the equations.
@@ -115,15 +115,20 @@ class Job:
     times: Array
     max_steps: int
 
-    def solve(self, chunk: Chunk, members: Members | None = None) -> Solved:
+    @property
+    def identity(self) -> Program:
+        """Data that determine the results."""
+        return self.program
+
+    def solve(self, chunk: Chunk, run: Runner | None = None) -> Solved:
         """Integrate the members of a chunk; repeat those with tiny motion at a smaller scale.
 
         Args:
             chunk: data of the members.
-            members: runner of the members; by default that of the program.
+            run: runner of the members; by default that of the program.
         """
-        members, nominal = members or self.program.members, self.program.nominal
-        found = self._solved(chunk, members)
+        run, nominal = run or self.program.members.run, self.program.nominal
+        found = self._solved(chunk, run)
         size = found.size
         scale, last = np.tile(nominal, (size.shape[0], 1)), np.arange(size.shape[0])
         for _ in range(ROUNDS):
@@ -136,14 +141,14 @@ class Job:
             scale[last] = own[small]
             those = chunk[last]
             those.R[:, Given.atol(nominal.size)] *= scale[last] / nominal
-            again = self._solved(those, members)
+            again = self._solved(those, run)
             better = np.array([m not in again.failed for m in range(last.size)])
             last, size = last[better], again.size[better]
             for name in ("signals", "attempts", "reached", "reach"):
                 getattr(found, name)[last] = getattr(again, name)[better]
         return found
 
-    def _solved(self, chunk: Chunk, members: Members) -> Solved:
+    def _solved(self, chunk: Chunk, run: Runner) -> Solved:
         """Integrate the members of a chunk once.
 
         Each member runs through its input intervals. It stops at the start of an interval if the
@@ -167,7 +172,7 @@ class Job:
                 here = self._consistent(chunk, S, here, first, failed)
             stretch, inside = self._stretch(chunk[here], first, follow)
             part, made = S[here], attempts[here]
-            found, reason, unknowns = members.run(part, chunk.R[here], made, stretch)
+            found, reason, unknowns = run(part, chunk.R[here], made, stretch)
             for k, widest in enumerate((np.fmin, np.fmax)):
                 reach[here, k] = widest(reach[here, k], unknowns[:, k, :nx])
             S[here], attempts[here], t = part, made, part[:, State.T]
@@ -227,10 +232,11 @@ def suited(integrator: Integrator, points: Points, inputs: InputData) -> Integra
 
 @final
 @dataclass(frozen=True, eq=False)
-class EventJob:
-    """Task of a model with events, whose members run one by one as in `simulate`; picklable.
+class SingleJob:
+    """Task whose members run one by one as in `simulate`; picklable.
 
-    Each process builds its own integrator, with the same pivots.
+    It serves models with events, and CasADi's virtual machine. Each process builds its own
+    integrator, with the same pivots.
 
     Attributes:
         model, inputs, method: arguments of the integrator; the inputs of the members differ only
@@ -258,9 +264,12 @@ class EventJob:
         return suited(plain, self.points, self.inputs)
 
     @property
-    def program(self) -> Program:
-        """Equations that determine the results."""
-        return program(self.integrator, False)
+    def identity(self) -> tuple[Any, ...]:
+        """Data that determine the results."""
+        made, events = self.integrator, self.model.events
+        of_events = [(e.name, e.direction, e.terminal, e.at_start, *e.reset) for e in events]
+        jump = () if made.crossings is None else (made.crossings.jump, made.events)
+        return with_code(made, ""), made.step, made.signals, tuple(of_events), jump
 
     def solve(self, chunk: Chunk) -> Solved:
         """Integrate the members of a chunk; signals are NaN after a terminal event.

@@ -1,23 +1,19 @@
-"""Runs of many members of an ensemble, in compiled code or in CasADi's virtual machine.
-
-Both engines advance the columns S of the members in place and return signals; no steps are kept.
-"""
+"""Runs of many members of an ensemble, and of plants, in the lanes of compiled vector code."""
 
 import ctypes
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.integrator.compiled.columns import Columns, densified
+from symfric.integrator.compiled.columns import densified
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import FLOOR
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
-from symfric.integrator.running.engine import VmEngine, Work
-from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.plants import (
     AGAIN,
@@ -28,12 +24,10 @@ from symfric.integrator.running.plants import (
     Plants,
     loaded,
 )
-from symfric.integrator.running.record import Dense, Outputs
 from symfric.integrator.step.attempt import Given, State
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-ROWS, ATTEMPTS = 2048, 2000
 PAIRED = 2500
 """Number of instructions below which a step runs in two groups of lanes at once; with more, one
 group uses the processor fully.
@@ -42,9 +36,6 @@ LEAST_PLANTS = 8
 """Smallest number of plants for which lanes are faster."""
 MOST_INSTRUCTIONS = 10_000
 """Number of instructions above which compiling a step for vectors takes too long."""
-
-
-Advanced = tuple[Array, Counts, Array]
 
 
 @final
@@ -87,83 +78,9 @@ class Stretch:
         }  # fmt: skip
 
 
-class Members(Protocol):
-    """Engine that runs members."""
-
-    def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
-        """Advance members over a stretch.
-
-        Args:
-            S: columns of the members, one per row, advanced in place.
-            R: run data of the members, one per row.
-            made: number of attempts of each member, updated in place.
-            stretch: intervals and times.
-
-        Returns:
-            Signals (members, times, signals), NaN after a member stopped; reasons to stop
-            (members,); least and greatest unknowns over the start and the ends of steps (members,
-            2, n).
-        """
-        ...
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class VmMembers:
-    """Members in CasADi's virtual machine, with the engine of single runs; needs no compiler."""
-
-    engine: VmEngine
-    signals: Columns
-    follow: Following | None
-
-    def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
-        """Advance members over a stretch."""
-        members, n, signals = S.shape[0], S.shape[1] - State.MEMORY, self.signals.function
-        step, n_d, breaks = self.engine.step, signals.numel_in(2), stretch.breaks
-        found = np.full((members, stretch.times.shape[1], signals.numel_out(0)), np.nan)
-        reason, reach = np.zeros(members, dtype=np.int64), np.stack([S[:, State.Y]] * 2, axis=1)
-        work = Work(n, step.numel_in(1), step.numel_out(1) // n, ROWS)
-        for m, end in enumerate(stretch.ends.tolist()):
-            times, data = (rows[m % rows.shape[0]] for rows in (stretch.times, stretch.data))
-            first = int(np.searchsorted(times, breaks[0]))
-            own = np.concatenate([breaks[:1], breaks[1:][breaks[1:] < end], [end]])
-            work.S[:], work.R[:] = S[m], R[m]
-            work.want(Outputs.at(times[first:], n), None)
-            work.over(own, data[:, : own.size - 1])
-            work.loop.h_min = stretch.h_min[m]
-            made[m], reason[m] = self._advance(work, stretch, int(made[m]), reach[m])
-            S[m], outputs = work.S, work.outputs
-            at = outputs.times[: outputs.found]
-            d = np.tile(work.R[work.R.size - n_d :], (at.size, 1))
-            d[:, n_d - work.data.shape[0] :] = work.data[:, work.interval(at)].T
-            found[m, first : first + at.size] = self.signals([at, outputs.reached.T, d])[0]
-        return found, reason, reach
-
-    def _advance(self, work: Work, stretch: Stretch, made: int, reach: Array) -> tuple[int, Stop]:
-        """Advance a member; return its number of attempts and the reason to stop."""
-        stop = Stop.SEARCH if stretch.follow else Stop.FULL
-        while stop in (Stop.SEARCH, Stop.FULL) or (
-            stop is Stop.ATTEMPTS and made < stretch.max_steps
-        ):
-            if stop is Stop.SEARCH and not self._follows(work):
-                return made, stop
-            allowed = min(ATTEMPTS, stretch.max_steps - made)
-            records, count, stop = self.engine.march(work, allowed)
-            ends, made = Dense.of(records, work.n).y1, made + count
-            reach[0] = np.minimum(reach[0], ends.min(axis=0, initial=np.inf))
-            reach[1] = np.maximum(reach[1], ends.max(axis=0, initial=-np.inf))
-        work.outputs.stand(work.S[State.T], work.S[State.Y])
-        return made, stop
-
-    def _follows(self, work: Work) -> bool:
-        """Update the algebraic unknowns after a jump of data; return False if that fails."""
-        if self.follow is None:
-            return not self.engine.follows
-        y, n_d = work.S[State.Y], self.signals.function.numel_in(2)
-        found = self.follow(y, work.R[work.R.size - n_d :])
-        if found is not None:
-            y[:] = found
-        return found is not None
+Advanced = tuple[Array, Counts, Array]
+Runner = Callable[[Array, Array, Counts, Stretch], Advanced]
+"""Function that advances members over a stretch, as `CompiledMembers.run`."""
 
 
 def struct(names: str) -> type[ctypes.Structure]:
@@ -207,6 +124,17 @@ class CompiledMembers:
 
     def run(self, S: Array, R: Array, made: Counts, stretch: Stretch) -> Advanced:
         """Advance members over a stretch.
+
+        Args:
+            S: columns of the members, one per row, advanced in place.
+            R: run data of the members, one per row.
+            made: number of attempts of each member, updated in place.
+            stretch: intervals and times.
+
+        Returns:
+            Signals (members, times, signals), NaN after a member stopped; reasons to stop
+            (members,); least and greatest unknowns over the start and the ends of steps (members,
+            2, n).
 
         Raises:
             MemoryError: about a megabyte of work memory is not available.

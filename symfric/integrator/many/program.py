@@ -5,7 +5,6 @@ from functools import cached_property
 from threading import Lock
 from typing import Any, final
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,8 +12,7 @@ from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, Equations
 from symfric.integrator.equations.manifold import Manifold
-from symfric.integrator.many.members import CompiledMembers, Members, VmMembers, many_source
-from symfric.integrator.running.engine import VmEngine
+from symfric.integrator.many.members import CompiledMembers, many_source
 from symfric.integrator.running.integrator import Integrator
 
 Array = NDArray[np.float64]
@@ -74,20 +72,18 @@ class Program:
 
     Attributes:
         where: name of the caller in messages.
-        code: C of steps, signals and their loop; or the step for the virtual machine.
-        signals: signals, as in `Integrator.signals`.
+        code: C of steps, signals and their loop.
+        n_signals: number of signals.
         equations: the algebraic equations; None if there are none.
         nominal: typical magnitudes of the differential states.
-        follows: True if there are algebraic unknowns, which follow jumps of inputs.
-        follow: fast update of these unknowns; None for a full search.
+        follow: fast update of algebraic unknowns after jumps of inputs; None for a full search.
     """
 
     where: str
-    code: str | ca.Function
-    signals: ca.Function
+    code: str
+    n_signals: int
     equations: Equations | None
     nominal: Array
-    follows: bool
     follow: Following | None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -98,18 +94,10 @@ class Program:
         """Number of differential states."""
         return self.nominal.size
 
-    @property
-    def n_signals(self) -> int:
-        """Number of signals."""
-        return self.signals.numel_out(0)
-
     @cached_property
-    def members(self) -> Members:
+    def members(self) -> CompiledMembers:
         """Engine of the members; raises `CompileError` without a working compiler."""
-        if isinstance(self.code, str):
-            return CompiledMembers.of(self.code, self.n_signals)
-        engine = VmEngine(self.code, follows=self.follows)
-        return VmMembers(engine, Columns(self.signals), self.follow)
+        return CompiledMembers.of(self.code, self.n_signals)
 
     @cached_property
     def constraints(self) -> Columns | None:
@@ -124,26 +112,33 @@ class Program:
         return Assembly(self.equations.manifold, self.nx)
 
 
-def program(integrator: Integrator, compiled: bool) -> Program:
+def program(integrator: Integrator) -> Program:
     """Return the program of an integrator; written once, then cached in the integrator."""
     with _LOCK:
-        known: dict[bool, Program] = integrator.memory.setdefault("programs", {})
-        if compiled not in known:
-            known[compiled] = _written(integrator, compiled)
-        return known[compiled]
+        known: Program | None = integrator.memory.get("program")
+        if known is None:
+            follow = follow_of(integrator)
+            step, signals = integrator.step, integrator.signals
+            code = many_source(step, signals, integrator.follows, follow)
+            known = integrator.memory["program"] = with_code(integrator, code)
+        return known
 
 
-def _written(integrator: Integrator, compiled: bool) -> Program:
-    s, step, signals = integrator.system, integrator.step, integrator.signals
-    jumps = integrator.model.u or s.manifold is not None
-    follow = integrator.follow if integrator.follows and jumps else None
+def follow_of(integrator: Integrator) -> Following | None:
+    """Return the fast update of algebraic unknowns, if members need it."""
+    jumps = integrator.model.u or integrator.system.manifold is not None
+    return integrator.follow if integrator.follows and jumps else None
+
+
+def with_code(integrator: Integrator, code: str) -> Program:
+    """Return the program of an integrator with this C."""
+    s = integrator.system
     equations = Equations(s.names, s.nx, s.free, s.constraints, s.manifold)
     return Program(
         where=f"simulate_many of '{integrator.model.name}'",
-        code=many_source(step, signals, integrator.follows, follow) if compiled else step,
-        signals=signals,
+        code=code,
+        n_signals=integrator.signals.numel_out(0),
         equations=equations if s.algebraic[0] else None,
         nominal=s.nominal,
-        follows=integrator.follows,
-        follow=follow,
+        follow=follow_of(integrator),
     )

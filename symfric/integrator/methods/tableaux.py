@@ -37,9 +37,11 @@ def shampine(b: Array, D: Array) -> Array:
     With the increment r = sum_j b_j k_j and the free term q = sum_j D_j k_j, the quartic is
 
         y_0 + theta [r + (1 - theta) (k_1 - r + theta (2 r - k_1 - k_s + (1 - theta) q))]
+
+    D = 0 gives the cubic of Hermite, which has two rows.
     """
     first, last = np.eye(b.size)[[0, -1]]
-    return np.array([first - b, 2 * b - first - last + D, -D])
+    return np.array([first - b, 2 * b - first - last + D, -D][: 2 + bool(D.any())])
 
 
 def through(c: Array) -> Array:

@@ -100,6 +100,10 @@ class State:
     doc: str = ""
     whole: bool = False
 
+    def __post_init__(self) -> None:
+        hint = "parameters are symbols in fits and generated code, so give a number for all values"
+        checks.number(f"state '{self.name}': nominal", self.nominal, above=0.0, hint=hint)
+
 
 @dataclass(frozen=True)
 class Input:
@@ -383,18 +387,13 @@ def states_of(law: Law, v: Scalar, z: Scalar) -> Scalar:
         rows = z.shape[0]
     else:
         rows = -1
-    if rows != len(law.states):
-        raise _wrong_states(law, given, rows)
-    return z
-
-
-def _wrong_states(law: Law, z: Scalar, rows: int) -> ValueError:
-    name, known = type(law).__name__, law.states
-    if not known:
-        hint, what = "leave z out", "no states"
-    else:
+    known = law.states
+    if rows == len(known):
+        return z
+    hint, what = "leave z out", "no states"
+    if known:
         names = checks.listed(s.name for s in known)
         what = f"z with {len(known)} {'state' if len(known) == 1 else 'states'}, {names}"
         hint = "z = law.steady_state(v, N) gives those of steady sliding"
-    got = "none" if rows == 0 else checks.shown(z)
-    return ValueError(f"{name}: expected {what}, got {got}; {hint}")
+    got = "none" if rows == 0 else checks.shown(given)
+    raise ValueError(f"{type(law).__name__}: expected {what}, got {got}; {hint}")

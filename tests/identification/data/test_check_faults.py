@@ -1,6 +1,7 @@
 """Each fault is found, with its kind, severity and place."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,13 +9,8 @@ import pytest
 from identification.data.dataset import Dataset
 
 Array = np.ndarray
-Spoil = Callable[[Array, Array, Array], tuple[Array, Array, Array]]
-
-
-def spoiled(data: Dataset, spoil: Spoil) -> Dataset:
-    record = data[0]
-    t, x, force = spoil(record.time.copy(), record["x"].copy(), record["force"].copy())
-    return Dataset.of(t=t, x=x, force=force)
+LINES = Path(__file__).with_name("faults.txt").read_text("utf-8").splitlines()[1:]
+FAULTS = {name: rest for name, *rest in (line.split(" => ") for line in LINES)}
 
 
 def put(y: Array, rows: object, values: object) -> Array:
@@ -26,104 +22,51 @@ def noise(n: int, size: float = 1.0) -> Array:
     return size * np.random.default_rng(0).standard_normal(n)
 
 
-FAULTS: dict[str, tuple[Spoil, str, str, str]] = {
-    "clipped force": (lambda t, x, f: (t, x, np.clip(f, -40, 40)), "error", "clipping", "force"),
-    "force clipped on one side": (
-        lambda t, x, f: (t, x, np.minimum(f, 40)), "error", "clipping", "force"),
-    "force spikes": (lambda t, x, f: (t, x, put(f, [500, 900], 1e5)), "error", "spikes", "force"),
-    "small force spikes": (
-        lambda t, x, f: (t, x, put(f, [500, 900], 200.0)), "warning", "spikes", "force"),
-    "position glitch": (
-        lambda t, x, f: (t, put(x, 800, x[800] + 1e-3), f), "error", "glitch", "x"),
-    "lost counts": (
-        lambda t, x, f: (t, x + 3e-3 * (t > 2.0), f), "error", "jump", "x"),
-    "frozen encoder": (
-        lambda t, x, f: (t, put(x, slice(1500, 1900), x[1500]), f), "error", "frozen", "x"),
-    "frozen encoder that finds back": (
-        lambda t, x, f: (t, put(x, slice(1500, 1540), x[1500]), f), "warning", "frozen", "x"),
-    "frozen force": (
-        lambda t, x, f: (t, x, put(f, slice(1500, 1900), f[1500])), "warning", "frozen", "force"),
-    "force frozen for most of the time": (
-        lambda t, x, f: (t, x, put(f, slice(1500, None), f[1500])), "error", "frozen", "force"),
-    "wrapped position": (lambda t, x, f: (t, x % 0.02, f), "error", "wrap", "x"),
-    "flipped force": (lambda t, x, f: (t, x, -f), "error", "sign", "force"),
-    "flipped position": (lambda t, x, f: (t, -x, f), "error", "sign", "force"),
-    "swapped columns": (lambda t, x, f: (t, f, x), "error", "swapped", "force"),
-    "standstill": (lambda t, x, f: (t, 0.1 + 0 * x, noise(f.size)), "error", "standstill", "x"),
-    "standstill of an encoder": (
-        lambda t, x, f: (t, 1e-6 * (noise(x.size) > 2), noise(f.size)), "error", "standstill", "x"),
-    "noise": (lambda t, x, f: (t, noise(x.size, 1e-7), noise(f.size)), "error", "noise", "x"),
-    "force of noise": (lambda t, x, f: (t, x, noise(f.size)), "error", "unrelated", "force"),
-    "constant force": (lambda t, x, f: (t, x, 0 * f + 3), "error", "constant", "force"),
-    "one way": (lambda t, x, f: (t[:850], x[:850], f[:850]), "warning", "one-way", "x"),
-    "late force": (lambda t, x, f: (t[8:], x[8:], f[:-8]), "warning", "delay", "force"),
-    "drifting force": (lambda t, x, f: (t, x, f + 4 * t), "warning", "drift", "force"),
-    "slow hum": (
-        lambda t, x, f: (t, x, f + 10 * np.sin(2 * t)), "warning", "hum", "force"),
-    "hum of 8.5 Hz": (
-        lambda t, x, f: (t, x, f + 5 * np.sin(17 * np.pi * t)), "warning", "hum", "force"),
-    "hum of the mains": (
-        lambda t, x, f: (t, x, f + 20 * np.sin(100 * np.pi * t)), "warning", "hum", "force"),
-    "gain that differs by the sign": (
-        lambda t, x, f: (t, x, np.where(f > 0, 1.3, 1.0) * f), "warning", "unequal", "force"),
-    "coarse encoder": (
-        lambda t, x, f: (t, 1e-3 * np.round(x / 1e-3), f), "warning", "resolution", "x"),
-    "coarse force": (
-        lambda t, x, f: (t, x, 20 * np.round(f / 20)), "warning", "resolution", "force"),
-    "times in ms": (lambda t, x, f: (1e3 * t, x, f), "warning", "units", "t"),
-    "position in mm": (lambda t, x, f: (t, 1e3 * x, f), "warning", "units", "x"),
-    "huge numbers": (lambda t, x, f: (t, 1e9 * x, 1e9 * f), "error", "units", "x"),
-    "tiny numbers": (lambda t, x, f: (t, 1e-9 * x, 1e-9 * f), "error", "units", "x"),
-    "gap": (
-        lambda t, x, f: tuple(np.delete(y, slice(1000, 1500)) for y in (t, x, f)),
-        "warning", "gap", "t"),
-    "jitter": (lambda t, x, f: (np.sort(t + noise(t.size, 1e-4)), x, f), "warning", "irregular",
-               "t"),
-    "few samples": (lambda t, x, f: (t[:15], x[:15], f[:15]), "error", "short", "t"),
-}  # fmt: skip
+def spoiled(data: Dataset, fault: str) -> Dataset:
+    t, x, f = (data[0][name].copy() for name in ("t", "x", "force"))
+    names = {"np": np, "put": put, "noise": noise, "t": t, "x": x, "f": f}
+    t, x, force = eval(FAULTS[fault][0], names)
+    return Dataset.of(t=t, x=x, force=force)
 
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_fault_is_found(stage_data: Dataset, fault: str) -> None:
-    spoil, severity, kind, signal = FAULTS[fault]
-    found = spoiled(stage_data, spoil).check()
+    severity, kind, signal = FAULTS[fault][1].split()
+    found = spoiled(stage_data, fault).check()
     hits = [f for f in found if f.kind == kind and f.signal == signal]
     assert hits, str(found)
     assert {f.severity for f in hits} == {severity}
-    if severity == "warning":
-        assert not found.errors, str(found)
+    assert severity == "error" or not found.errors, str(found)
 
 
 def test_places_are_told(stage_data: Dataset) -> None:
-    def only(spoil: Spoil, kind: str) -> tuple[float, float, str]:
-        (hit,) = [f for f in spoiled(stage_data, spoil).check() if f.kind == kind]
+    def only(fault: str, kind: str) -> tuple[float, float, str]:
+        (hit,) = [f for f in spoiled(stage_data, fault).check() if f.kind == kind]
         return hit.begin, hit.end, hit.sentence
 
-    begin, end, text = only(FAULTS["frozen encoder"][0], "frozen")
+    begin, end, text = only("frozen encoder", "frozen")
     assert (begin, end) == (1.5, 1.899)
     assert "for 400 samples from t = 1.5 s (sample 1500) on, then jumps by 0.0016 m" in text
-    assert only(FAULTS["position glitch"][0], "glitch")[:2] == (0.8, 0.8)
-    assert only(FAULTS["lost counts"][0], "jump")[:2] == pytest.approx((2.0, 2.001))
-    assert only(FAULTS["gap"][0], "gap")[:2] == pytest.approx((0.999, 1.5))
-    assert "by about 0.007 s (7 samples)" in only(FAULTS["late force"][0], "delay")[2]
+    assert only("position glitch", "glitch")[:2] == (0.8, 0.8)
+    assert only("lost counts", "jump")[:2] == pytest.approx((2.0, 2.001))
+    assert only("gap", "gap")[:2] == pytest.approx((0.999, 1.5))
+    assert "by about 0.007 s (7 samples)" in only("late force", "delay")[2]
 
 
 def test_repairs_undo_what_was_found(stage_data: Dataset) -> None:
     record = stage_data[0]
-    spiked = spoiled(stage_data, FAULTS["force spikes"][0]).without_spikes()
+    spiked = spoiled(stage_data, "force spikes").without_spikes()
     assert not spiked.check().errors
     assert np.abs(spiked[0]["force"] - record["force"]).max() < 20
-    wrapped = spoiled(stage_data, FAULTS["wrapped position"][0])
+    wrapped = spoiled(stage_data, "wrapped position")
     assert "data.unwrapped({'x': 0.02})" in str(wrapped.check())
     np.testing.assert_allclose(wrapped.unwrapped({"x": 0.02})[0]["x"], record["x"], atol=1e-12)
-    flipped = spoiled(stage_data, FAULTS["flipped force"][0])
+    flipped = spoiled(stage_data, "flipped force")
     assert not flipped.scaled({"force": -1}).check().errors
     volts = Dataset.of({"t": record.time, "u [V]": record["force"] / 5})
     newtons = volts.scaled({"u": 5.0}, units={"u": "N"}).renamed({"u": "force"})[0]
     np.testing.assert_allclose(newtons["force"], record["force"])
     assert newtons.unit("force") == "N"
-    with pytest.raises(ValueError, match="expected a factor other than 0"):
-        volts.scaled({"u": 0.0})
 
 
 @pytest.mark.parametrize(
@@ -149,8 +92,6 @@ def test_roles_name_signals_that_are_called_otherwise(stage_data: Dataset) -> No
     assert not data.check().errors
     (error,) = data.check(x="theta_2", force="tau_2").errors
     assert (error.kind, error.signal) == ("sign", "tau_2")
-    with pytest.raises(ValueError, match="expected one of x, v, a, force, got y"):
-        data.check(y="theta_2")
 
 
 def test_a_slide_with_a_torque_is_refused() -> None:
@@ -175,7 +116,7 @@ def test_points(v: Array, force: Callable[[Array], Array], kinds: set[str]) -> N
 
 
 def test_findings_print_and_count(stage_data: Dataset) -> None:
-    both = stage_data + spoiled(stage_data, FAULTS["flipped force"][0])
+    both = stage_data + spoiled(stage_data, "flipped force")
     found = both.check()
     assert (len(found), len(found.errors), found[0].record) == (1, 1, 1)
     assert "error: data: force brakes the motion that it drives" in str(found)

@@ -79,26 +79,6 @@ def test_noise_of_the_velocity_is_that_of_the_filtered_noise() -> None:
     assert measured == pytest.approx(lowpass(noise, 100.0, 1e-3).std(), rel=0.15)
 
 
-@pytest.mark.parametrize(
-    ("data", "filter", "message"),
-    [
-        (
-            WAVE,
-            Filter(100.0, 300),
-            r"data 'wave': expected enough samples.*decimation 300.*got 4001",
-        ),
-        (WAVE, Filter(100.0, 5, v_min=99.0), "lower the decimation or v_min"),
-        (WAVE, Filter(1.0, 5), "raise the cut-off"),
-        (record(t=T**1.1, x=WAVE["x"], force=WAVE["force"]), None, "expected equal intervals"),
-    ],
-)
-def test_records_too_short_or_uneven_are_refused(
-    data: Record, filter: Filter | None, message: str
-) -> None:
-    with pytest.raises(ValueError, match=message):
-        differentiate(data, filter)
-
-
 LEVELS = (0.02, 0.05, 0.1, 0.2, -0.2, -0.1, -0.05, -0.02)
 LAW = Stribeck(mu_s=3.0, mu_d=2.0, v_s=0.03, sigma_2=5.0, v_eps=1e-6)
 
@@ -131,10 +111,3 @@ def test_each_step_of_a_staircase_is_a_point_of_the_curve() -> None:
 def test_units_turn_with_the_machine() -> None:
     (found,) = plateaus(staircase(rotary=True))
     assert (found.unit("v"), found.unit("F")) == ("rad/s", "N m")
-
-
-def test_a_record_without_plateaus_is_refused() -> None:
-    t = np.arange(0.0, 3.0, 1e-3)
-    data = Dataset.of(t=t, x=np.sin(3 * t), force=np.cos(t), units={"x": "m", "force": "N"})
-    with pytest.raises(ValueError, match="expected at least two stretches"):
-        plateaus(data)

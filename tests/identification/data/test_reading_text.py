@@ -83,8 +83,6 @@ def test_units_come_from_the_call_where_the_file_has_none(tmp_path: Path) -> Non
 def test_a_mapping_of_units_overrules_the_file_and_the_short_form_does_not(tmp_path: Path) -> None:
     content = text("t [s],x [mm],force [N]")
     np.testing.assert_allclose(read(tmp_path, content, units={"x": "m"})[0]["x"], np.sin(T))
-    with pytest.raises(ValueError, match=r"column 'x \[mm\]'.*got 'mm' in the file and 'm' in the"):
-        read(tmp_path, content, units="m, N")
 
 
 def test_headerless_files_are_named_by_the_call(tmp_path: Path) -> None:
@@ -92,20 +90,10 @@ def test_headerless_files_are_named_by_the_call(tmp_path: Path) -> None:
     same(read(tmp_path, text(""), columns=["t [s]", "x [m]", "force [N]"]))
     data = read(tmp_path, text("", ";", ","), columns=["t", "-", "force"], units="m, N")
     assert list(data[0].signals) == ["force"]
-    with pytest.raises(ValueError, match="names of 3 columns, got a file without a header; write"):
-        read(tmp_path, text(""))
-    with pytest.raises(ValueError, match="expected 3 names, one for each column, got 2"):
-        read(tmp_path, text(""), columns=["t", "x"])
 
 
 def test_time_comes_from_the_step_where_there_is_none(tmp_path: Path) -> None:
     same(read(tmp_path, text("x [m],force [N]", table=TABLE[:, 1:]), step=0.01))
-    with pytest.raises(
-        ValueError, match=r"expected a column of time.*pass step= .* or points=True"
-    ):
-        read(tmp_path, text("x [m],force [N]", table=TABLE[:, 1:]))
-    with pytest.raises(ValueError, match="step= only without a time"):
-        read(tmp_path, text(",".join(HEADER)), step=0.01)
 
 
 def test_points_need_no_time(tmp_path: Path) -> None:
@@ -113,8 +101,6 @@ def test_points_need_no_time(tmp_path: Path) -> None:
     assert record.t is None
     np.testing.assert_allclose(record["v"], np.array([1, 3]) * np.pi / 30)
     np.testing.assert_array_equal(record["F"], [2, 5])
-    with pytest.raises(ValueError, match="record over time, got points without time"):
-        _ = record.step
 
 
 def test_columns_are_found_by_the_names_of_the_call(tmp_path: Path) -> None:
@@ -130,17 +116,7 @@ def test_other_columns_keep_their_names_and_text_is_left_out_with_its_reason(
     content = text("t [s],theta_2 [deg],mode").replace("1.0\n", "auto\n", 1)
     record = read(tmp_path, content)[0]
     np.testing.assert_allclose(record["theta_2"], np.sin(T) * np.pi / 180, rtol=1e-12)
-    with pytest.raises(ValueError, match=r"'mode', got theta_2; it was left out: row 2: .*'auto'"):
-        _ = record["mode"]
-    with pytest.raises(ValueError, match=r"column 'mode', row 2: expected a number, got 'auto'"):
-        read(tmp_path, content, columns={"force": "mode"}, units="rad, N m")
-
-
-def test_two_names_that_could_be_the_position_stay_what_they_are(tmp_path: Path) -> None:
-    record = read(tmp_path, text("t [s],angle [rad],position [m]"))[0]
-    assert list(record.signals) == ["angle", "position"]
-    with pytest.raises(ValueError, match="expected a signal 'x', got angle, position; name it"):
-        _ = record["x"]
+    assert "mode" in record.left_out
 
 
 def test_several_files_are_records_and_all_their_problems_one_error(tmp_path: Path) -> None:
@@ -153,78 +129,6 @@ def test_several_files_are_records_and_all_their_problems_one_error(tmp_path: Pa
         (tmp_path / f"run{k}.csv").write_text(text("t [s],x [m],force [V]"))
     with pytest.raises(ValueError, match=r"(?s)run0\.csv.*got V.*run2\.csv.*got V"):
         Dataset.read(str(tmp_path / "run*.csv"))
-
-
-ROWS = text("").splitlines()
-
-
-@pytest.mark.parametrize(
-    ("header", "rows", "message"),
-    [
-        (
-            "t [s],x [furlongs],force [N]",
-            None,
-            r"column 'x \[furlongs\]': expected a unit of m, cm",
-        ),
-        (
-            "t,x [m],force [N]",
-            None,
-            "column 't': expected a unit of s, ms.*none; pass units='m, N'",
-        ),
-        ("t [s],x,force", None, r"'x': expected a unit .*'force': expected a unit"),
-        ("t [s],x [m],x [mm]", None, r"expected one column for x, got 'x \[m\]', 'x \[mm\]'"),
-        (",".join(HEADER), [*ROWS[:5], "0.05,abc,1", *ROWS[6:]], r"'x \[m\]', row 7: .*got 'abc'"),
-        (",".join(HEADER), [*ROWS[:5], "0.05,1", *ROWS[6:]], "row 7: expected a number, got ''"),
-        (",".join(HEADER), [*ROWS[:5], "0.05,nan,1", *ROWS[6:]], "row 7: expected a finite.*nan"),
-        (",".join(HEADER), [*ROWS[:5], "0.05,1_0,1", *ROWS[6:]], "row 7: expected a number.*1_0"),
-        (",".join(HEADER), [*ROWS[:5], "0,05,1,2", *ROWS[6:]], "row 7: expected 3 cells.*decimal"),
-        (",".join(HEADER), [*ROWS[:5], ROWS[4], *ROWS[6:]], "column t, row 7: .*increasing times"),
-        (",".join(HEADER), [*ROWS, *ROWS], "row 102: .*time restarts: use one file for each"),
-        (",".join(HEADER), [*ROWS[:9], ",".join(HEADER), *ROWS[9:]], "row 11: .*got 't"),
-        (",".join(HEADER), ["0,0,0"], "at least two samples, got 1"),
-        (",".join(HEADER), [], "expected rows of numbers, got a header alone"),
-        ("", [""], "got an empty file"),
-        ("hello", ["world"], "expected rows of numbers"),
-    ],
-)
-def test_bad_cells_are_named(
-    tmp_path: Path, header: str, rows: list[str] | None, message: str
-) -> None:
-    body = ROWS if rows is None else rows
-    with pytest.raises(ValueError, match=message):
-        read(tmp_path, "\n".join([header, *body]) + "\n")
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("log.xlsx", b"", r"expected a text file .*got '\.xlsx'"),
-        ("log.csv", b"\xff\xfe\x00", "expected text in UTF-8 or UTF-16"),
-        ("log.csv", b"\x00\x01\x02", "expected a text file, got one with binary numbers"),
-    ],
-)
-def test_other_files_are_refused(tmp_path: Path, name: str, content: bytes, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        read(tmp_path, content, name)
-
-
-def test_paths_that_mean_nothing_are_named(tmp_path: Path) -> None:
-    for path, message in (
-        (tmp_path / "none.csv", r"none\.csv'.*got nothing there"),
-        (tmp_path, "expected a file, got a folder"),
-        (str(tmp_path / "run*.csv"), "got none that match the pattern"),
-        ([], "expected paths of files, got none"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            Dataset.read(path)
-
-
-def test_unknown_names_are_refused(tmp_path: Path) -> None:
-    content = text(",".join(HEADER))
-    with pytest.raises(ValueError, match="expected one column 'enc' for x, got t"):
-        read(tmp_path, content, columns={"x": "enc"})
-    with pytest.raises(ValueError, match=r"units: expected one of .*got forse; did you mean force"):
-        read(tmp_path, content, units={"forse": "N"})
 
 
 def test_numbers_survive_to_the_last_bit(tmp_path: Path) -> None:

@@ -21,7 +21,6 @@ from identification.data.units import by_channel, is_common, unit
 ])  # fmt: skip
 def test_unit_becomes_si(text: str, si: str, factor: float) -> None:
     found = unit(text)
-    assert found is not None
     assert found.si == si
     assert found.factor == pytest.approx(factor, rel=1e-14)
 
@@ -38,19 +37,6 @@ def test_short_form_reaches_every_canonical_channel() -> None:
     assert given == {"x": "deg", "v": "deg/s", "a": "deg/s^2", "force": "N mm", "F": "N mm"}
     assert by_channel("read", "ms, mm, mm/s, kN")["t"] == "ms"
     assert by_channel("read", "rpm, N m")["x"] == "rad"
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("mm, m", "expected one unit for x, got 'mm' and 'm'"),
-        ("mm, V", "expected units of position and force .*got 'V'"),
-        ("", "got ''"),
-    ],
-)
-def test_short_form_refuses(text: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        by_channel("read", text)
 
 
 @pytest.mark.parametrize("text", ["mm", "N", "Nm", "rad/s", "sec", "1/s"])

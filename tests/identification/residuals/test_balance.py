@@ -65,10 +65,8 @@ def test_forward_dynamics_leaves_nothing(model: Model, signals: list[str]) -> No
     made = balance(model, names, found, w[:, 0], "test")
     assert [row.signal for row in made.rows] == signals
     path = made.equations.along(w, 1.0, p)
-    assert not isinstance(path, str), path
     np.testing.assert_allclose(path.rows, 0.0, atol=1e-8)
     other = made.equations.along(w, 1.0, 1.2 * p)
-    assert not isinstance(other, str), other
     assert (np.abs(other.rows) > 1e-3).any()
 
 

@@ -72,11 +72,6 @@ def test_cuts_move_to_where_the_motion_is_fast() -> None:
         assert speed[window.start] > 0.5
 
 
-def test_windows_of_few_samples_are_refused() -> None:
-    with pytest.raises(ValueError, match="at least 8 samples"):
-        cut(LONG, 0.05)
-
-
 X, RATE = Variable("x", "m", start=1.0), Variable("rate", "1/s", start=1.0, lower=0.1)
 DECAY = Model("decay", x=(X,), p=(RATE,), ode=-RATE.symbol * X.symbol)
 TIMES = np.linspace(0.0, 4.0, 401)
@@ -97,11 +92,6 @@ def test_the_length_whose_fits_predict_is_taken(right: float | None) -> None:
     assert len(asked) == 4 * 5
     assert list(dict.fromkeys(tried)) == [None, 2.0, 1.0, 0.5, 0.25]
     assert set(asked) <= {300, 301}  # three quarters
-
-
-def test_no_length_is_a_sentence() -> None:
-    with pytest.raises(ValueError, match="better start values"):
-        choose(Shooting(windows="choose"), subject(DECAY), DATA, lambda kind, data: None)
 
 
 @pytest.mark.slow

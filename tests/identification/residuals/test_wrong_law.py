@@ -7,7 +7,6 @@ from made_up_gms import LAW, NOISE, gms_data
 from identification.data.synthetic import synthetic_drive_data
 from identification.fit import Fit
 from identification.residuals.closed_loop import ClosedLoop
-from identification.residuals.evaluation import Evaluation
 from identification.residuals.shooting import Shooting
 from identification.unknowns.subject import subject
 from symfric.foundation.status import Status
@@ -19,7 +18,6 @@ def test_the_law_that_made_the_data_is_believed() -> None:
     fit = Fit(ClosedLoop(), "stribeck", data, starts=1, fixed={"v_eps": 1e-4}).solve()
     mass = fit.parameters["m"]
     assert fit.status is Status.SOLVED
-    assert mass.standard_error is not None
     assert abs(mass.value - 95.0) < mass.standard_error < 0.02
 
 
@@ -38,7 +36,6 @@ def test_mass_has_no_bias_and_the_fit_no_doubt() -> None:
         fit = Fit(ClosedLoop(), "stribeck", data).solve()
         mass = fit.parameters["m"]
         assert fit.status is Status.SOLVED
-        assert mass.standard_error is not None
         errors.append((mass.value - 95.0) / mass.standard_error)
     assert abs(sum(errors)) / len(errors) < 1.0
 
@@ -48,7 +45,6 @@ def test_the_law_that_made_the_data_leaves_their_noise() -> None:
     made = subject(drive, free=["k_1"], fixed="others")
     found = Shooting(x0="given").prepare(made, gms_data(), {"k_1": 50000.0})
     there = found.at(np.array([50000.0]))
-    assert isinstance(there, Evaluation)
     assert np.std(there.r) == pytest.approx(NOISE, rel=0.1)
 
 

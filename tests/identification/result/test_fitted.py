@@ -29,11 +29,7 @@ def test_the_truth_lies_inside_the_intervals_and_white_noise_stays_white(good: F
     assert good.status is Status.SOLVED
     for name in ("mu_s", "mu_d", "v_s", "sigma_2"):
         e = good.parameters[name]
-        assert e.standard_error is not None
-        assert e.white_error is not None
         assert abs(e.value - getattr(TRUTH, name)) < 4 * e.standard_error
-        assert e.low is not None
-        assert e.high is not None
         assert e.low < e.value < e.high
         assert e.standard_error == pytest.approx(e.white_error, rel=0.3)
 
@@ -66,7 +62,6 @@ def test_law_and_model_hold_the_numbers(good: Fitted) -> None:
 
 
 def test_errors_are_those_of_the_residuals(good: Fitted) -> None:
-    assert good.live is not None
     r = good.live.point.evaluation.r
     for k in range(3):
         e = good.errors[f"run {k + 1}", "force"]
@@ -98,8 +93,6 @@ def test_a_wrong_model_is_called_doubtful_at_the_top(wrong: Fitted) -> None:
     assert lines[0] == "coulomb+viscous fitted by ForceUnderVelocity(): DOUBTFUL"
     assert "residuals of force[0] depend on" in " ".join(line.strip() for line in lines[1:8])
     e = wrong.parameters["mu_d"]
-    assert e.standard_error is not None
-    assert e.white_error is not None
     assert e.standard_error > 5 * e.white_error
     assert repr(wrong) == "<Fitted coulomb+viscous: DOUBTFUL>"
 

@@ -63,8 +63,6 @@ def test_files_of_others_are_told_apart(fit: Fitted, tmp_path: Path) -> None:
         match=r"fit.npz': expected a file of the kind 'symfric run', got a 'symfric fit'",
     ):
         load_run(tmp_path / "fit.npz")
-    with pytest.raises(ValueError, match=r"load_fit '.*none': expected a saved fit, got no such"):
-        load_fit(tmp_path / "none")
 
 
 def test_a_table_of_parameters(fit: Fitted) -> None:

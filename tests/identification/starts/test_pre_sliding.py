@@ -27,7 +27,6 @@ def test_turning_points_ignore_what_is_within_the_dead_band() -> None:
 
 def test_stiffness_of_a_bristle() -> None:
     found = hysteresis(Measured(V, dahl(X, 2e5, 1.0), X, T))
-    assert found is not None
     assert abs(found.bristle / 2e5 - 1) < 0.05
 
 
@@ -35,7 +34,6 @@ def test_stiffness_of_an_elastic_element_with_noise() -> None:
     noise = 0.02 * np.random.default_rng(0).standard_normal(T.size)
     F = stretches(X, np.array([2e-6]))[0] @ np.array([3e5]) + noise
     found = hysteresis(Measured(V, F, X, T))
-    assert found is not None
     assert abs(found.elastic / 3e5 - 1) < 0.1
 
 
@@ -69,11 +67,6 @@ def test_slopes_of_the_stretches_by_differences() -> None:
     assert np.mean(error > 1e-3) < 1e-3  # at corners alone
 
 
-def test_force_against_the_path_is_refused() -> None:
-    with pytest.raises(ValueError, match="check that its sign is that of the sliding"):
-        fit_elements(Measured(V, -np.sign(V), X, T), 3, offset=False)
-
-
 def ramps(rates: list[float], level: float, per_decade: float) -> Measured:
     """Force ramps from rest, each followed by a slide and by a rest."""
     h, F, v = 1e-3, list[float](), list[float]()
@@ -89,7 +82,6 @@ def test_break_away_of_ramps_and_how_it_depends_on_their_rate() -> None:
     found = break_away(ramps([1.0, 3.0, 10.0, 30.0], 2.0, -0.2))
     assert len(found.events) == 4
     assert np.allclose([e.rate for e in found.events], [1, 3, 10, 30], rtol=1e-6)
-    assert found.per_decade is not None
     assert abs(found.per_decade + 0.2) < 1e-9
     assert "decreases" in found.note
 
@@ -98,11 +90,6 @@ def test_ramps_of_one_rate_say_nothing_about_it() -> None:
     found = break_away(ramps([2.0, 2.0, 2.0], 2.0, 0.0))
     assert found.per_decade is None
     assert abs(found.level - 2.0) < 1e-12
-
-
-def test_record_without_rest_is_refused() -> None:
-    with pytest.raises(ValueError, match="expected a rest"):
-        break_away(Measured(1 + 0.1 * T, np.ones(T.size), t=T))
 
 
 @pytest.mark.parametrize("loaded", [1, -1])

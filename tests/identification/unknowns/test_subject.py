@@ -8,9 +8,9 @@ import pytest
 from identification.unknowns.spec import Unknown, above, linear, log, tied
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import Unknowns, unknowns_of
-from symfric.laws import GMS, ExactCoulomb, LuGre, Stribeck
+from symfric.laws import GMS, LuGre, Stribeck
 from symfric.laws.catalogue import ALL_LAWS
-from symfric.scenes import Drive, Rabinowicz
+from symfric.scenes import Rabinowicz
 
 NEED_MORE = {"wojewoda", "quarter_car_general", "bam"}
 """Laws with inputs that a drive does not offer."""
@@ -166,27 +166,6 @@ def test_what_processes_need_pickles() -> None:
         at, guard = pickle.loads(pickle.dumps((coordinates(found), found.guard)))
         assert (at.values(at.start) == coordinates(found).values(at.start)).all()
         guard(at.named(at.start))
-
-
-@pytest.mark.parametrize(
-    ("what", "given", "said"),
-    [
-        ("stribeck", {"free": {"mu_q": 1.0}, "fixed": {"v_x": 2.0}}, "mu_q.*v_x"),
-        ("stribeck", {"free": ["mu_s"], "fixed": {"mu_s": 1.0}}, "both"),
-        ("stribeck", {"free": {"v_s": (1.0, 0.1), "m": "heavy"}}, "v_s.*m"),
-        ("stribeck", {"free": {"mu_d": tied("mu_q")}}, "mu_q"),
-        ("stribeck", {"fixed": {"mu_s": 0.1, "mu_d": 0.2}}, "mu_d <= mu_s"),
-        ("stribeck", {"free": {"v_s": (-1.0, 0.1)}}, "v_s: lower"),
-        ("stribeck", {"fixed": "all"}, "others"),
-        (3, {}, "a law or its text"),
-        (Drive(Stribeck()).model(), {}, "parameters, got none"),
-        (ExactCoulomb, {}, "a law or its text"),
-    ],
-)
-def test_errors_say_all_at_once(what: object, given: dict[str, object], said: str) -> None:
-    with pytest.raises(ValueError, match=said):
-        found = subject(what, **given)  # pyright: ignore[reportArgumentType]
-        coordinates(found)
 
 
 def test_bounds_of_the_lower_level_take_the_upper_one_along() -> None:

@@ -9,7 +9,8 @@ from scipy.stats import t as student
 
 from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import unknowns_of
-from identification.verdict.covariance import Covariance, Levels, covariance_of
+from identification.verdict.covariance import Covariance, Levels
+from identification.verdict.covariance import covariance as covariance_of
 from identification.verdict.minimum import Minimum
 
 N = 400
@@ -24,8 +25,9 @@ def covariance(names: str, values: tuple[float, ...], *columns: np.ndarray) -> C
     """Of a fit at `values` with these derivatives by them."""
     J = np.column_stack(columns)
     made = fitted(J, ar1(N, 0.0, 1), unknowns(*names.split()))
-    made = replace(made, values=np.array(values))
-    return covariance_of(made, lambda there: float(np.linalg.norm(J @ (there - made.values))))
+    at = np.array(values)
+    made = replace(made, values=at, change=lambda p: float(np.linalg.norm(J @ (p - at))))
+    return covariance_of(made)
 
 
 @pytest.mark.parametrize(
@@ -54,8 +56,12 @@ def test_equal_values_are_told_apart_by_going_a_little_way() -> None:
     """a = b = 2: a product and a sum have the same derivatives."""
     made = fitted(2 * np.column_stack([C, C]), ar1(N, 0.0, 1), unknowns("a", "b"))
     made = replace(made, values=np.array([2.0, 2.0]))
-    product = covariance_of(made, lambda p: float(np.linalg.norm((p[0] * p[1] - 4) * C)))
-    total = covariance_of(made, lambda p: float(np.linalg.norm(2 * (p[0] + p[1] - 4) * C)))
+    product = covariance_of(
+        replace(made, change=lambda p: float(np.linalg.norm((p[0] * p[1] - 4) * C)))
+    )
+    total = covariance_of(
+        replace(made, change=lambda p: float(np.linalg.norm(2 * (p[0] + p[1] - 4) * C)))
+    )
     assert "product a b" in product.sentences[0]
     assert "sum a + b" in total.sentences[0]
 
@@ -65,7 +71,9 @@ def test_difference_is_told_where_the_coordinate_is_the_excess() -> None:
     J = np.column_stack([0 * C, C])
     made = fitted(J, ar1(N, 0.0, 1), unknowns("mu_d", "mu_s"))
     made = replace(made, values=np.array([2.0, 5.0]), slope=np.array([[1.0, 0.0], [1.0, 1.0]]))
-    found = covariance_of(made, lambda p: float(np.linalg.norm((p[1] - p[0] - 3) * C)))
+    found = covariance_of(
+        replace(made, change=lambda p: float(np.linalg.norm((p[1] - p[0] - 3) * C)))
+    )
     assert found.sentences[0].startswith("Only the difference mu_d - mu_s is identifiable")
     assert np.isnan(found.standard_errors).all()
 
@@ -74,7 +82,7 @@ def test_bounds_count_as_known_and_logarithms_keep_their_sign() -> None:
     log = replace_unknown("v_s", logarithmic=True)
     made = fitted(np.column_stack([C, V]), 30 * ar1(N, 0.0, 1), (log, *unknowns("b")))
     made = replace(made, values=np.array([0.5, 3.0]), held=np.array([False, True]))
-    found = covariance_of(made, lambda _: 0.0)
+    found = covariance_of(made)
     assert found.at_bound == ("b",)
     assert np.isnan(found.standard_errors[1])
     assert found.low[0] > 0
@@ -84,9 +92,9 @@ def test_bounds_count_as_known_and_logarithms_keep_their_sign() -> None:
 
 def test_half_of_itself_is_hardly_told() -> None:
     made = fitted(C[:, None], ar1(N, 0.0, 1), unknowns("F_C"))
-    (error,) = covariance_of(made, lambda _: 0.0).standard_errors
+    (error,) = covariance_of(made).standard_errors
     for share, told in ((0.45, True), (0.55, False)):
-        found = covariance_of(replace(made, values=np.array([error / share])), lambda _: 0.0)
+        found = covariance_of(replace(made, values=np.array([error / share])))
         assert (found.sentences == ()) == told
         assert told or found.sentences[0].startswith("F_C is poorly identified: between ")
 
@@ -96,7 +104,7 @@ def test_what_could_be_nearly_anything_has_no_interval(logarithmic: bool) -> Non
     """A stiffness between 2e-164 and 7e+96 is none; its neighbour keeps its interval."""
     both = (Unknown("k", "N/m", 1.0, lower=0.0, logarithmic=logarithmic), *unknowns("b"))
     made = fitted(np.column_stack([1e-5 * C, V]), ar1(N, 0.0, 1), both)
-    found = covariance_of(replace(made, values=np.array([0.5, 3.0])), lambda _: 0.0)
+    found = covariance_of(replace(made, values=np.array([0.5, 3.0])))
     for lost in (found.standard_errors, found.white_errors, found.low, found.high):
         assert np.isnan(lost).tolist() == [True, False]
     assert set(found.notes) == {"k"}
@@ -110,7 +118,7 @@ def test_a_level_far_above_every_force_is_not_told() -> None:
     J = np.column_stack([C, V, np.gradient(V)])
     made = fitted(J, ar1(N, 0.0, 1), unknowns("mu_s", "mu_d", "m"))
     made = replace(made, values=np.array([253.0, 0.2, 900.0]))
-    found = covariance_of(made, lambda _: 0.0, Levels({"mu_s": 2.0, "mu_d": 2.0}, 0.6))
+    found = covariance_of(made, Levels({"mu_s": 2.0, "mu_d": 2.0}, 0.6))
     assert np.isnan(found.standard_errors).tolist() == [True, False, False]
     assert found.sentences[0] == (
         "mu_s is not identifiable: no friction force in the data is near 506 N, "
@@ -124,14 +132,14 @@ def test_tied_values_follow() -> None:
     made = fitted(J, ar1(N, 0.0, 1), unknowns("a", "b"))
     slope = np.array([[1.0, 0.0], [0.0, 1.0], [1.2, 0.0]])
     made = replace(made, names=("a", "b", "c"), values=slope @ made.values, slope=slope)
-    found = covariance_of(made, lambda _: 0.0)
+    found = covariance_of(made)
     assert found.standard_errors[2] == pytest.approx(1.2 * found.standard_errors[0])
     assert found.correlation[0, 2] == pytest.approx(1.0)
 
 
 def test_few_effective_samples_are_said() -> None:
     made: Minimum = fitted(coulomb(200), 0.01 * np.cumsum(ar1(200, 0.5, 2)))
-    said = covariance_of(made, lambda _: 0.0).sentences
+    said = covariance_of(made).sentences
     assert any("independent samples for 4 unknowns" in s for s in said)
 
 
@@ -155,7 +163,7 @@ def test_a_level_at_its_upper_bound_has_no_interval() -> None:
     at = fitted(J, ar1(N, 0.0, 1), made.unknowns)
     at = replace(at, names=made.names, values=values.ravel(), slope=slope,
                  held=np.array([False, True]))  # fmt: skip
-    found = covariance_of(at, lambda there: 1.0)
+    found = covariance_of(replace(at, change=lambda _: 1.0))
     assert found.at_bound == ("mu_s",)
     assert np.isnan(found.standard_errors[0])
     assert np.isfinite(found.standard_errors[1])
@@ -174,6 +182,6 @@ def test_a_level_whose_excess_has_no_effect_does_not_borrow_the_error_of_the_low
     J = np.column_stack([0 * C, 3e7 * C, 10.0 * V]) @ slope
     at = fitted(J, ar1(N, 0.0, 1), both)
     at = replace(at, values=values, slope=slope)
-    found = covariance_of(at, lambda there: 1.0)
+    found = covariance_of(replace(at, change=lambda _: 1.0))
     assert np.isnan(found.standard_errors).tolist() == [True, False, False]
     assert found.sentences[0] == "mu_s has no influence on the measured signals."

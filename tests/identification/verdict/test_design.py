@@ -35,23 +35,3 @@ def test_information_is_that_of_differences() -> None:
     errors = expected_errors(FREE, motion)
     expected = np.sqrt(np.diag(np.linalg.inv(information)))
     np.testing.assert_allclose(list(errors.values()), expected, rtol=1e-2)
-
-
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        ({"free": ("k",)}, "informative: free"),
-        ({"measured": {"y": 1.0}}, "informative: measured"),
-        ({"measured": {"x": 0.0}}, "informative: measured: x"),
-        ({"step": 0.0}, "informative: step"),
-    ],
-)
-def test_bad_input_is_refused(given: dict[str, object], text: str) -> None:
-    asked = {"free": FREE, "measured": {"x": 1e-4}, "step": 1e-3} | given
-    with pytest.raises(ValueError, match=text):
-        informative(MODEL, **asked)  # pyright: ignore[reportArgumentType]
-
-
-def test_parameter_that_is_zero_has_no_relative_change() -> None:
-    with pytest.raises(ValueError, match="not zero"):
-        informative(DRIVE.model(free=["offset"]), ["offset"], {"x": 1e-4}, step=1e-3)

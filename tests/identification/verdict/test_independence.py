@@ -11,7 +11,7 @@ from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.points import Points
 from identification.verdict.colour import whiteness
-from identification.verdict.judge import ALARM, judged
+from identification.verdict.judge import ALARM, judge
 from identification.verdict.minimum import positions
 from symfric import LuGre
 from symfric.foundation.status import Status
@@ -24,7 +24,7 @@ def test_right_models_are_seldom_doubted(rho: float) -> None:
     J = coulomb(300)
     right = J @ TRUTH
     noise = [ar1(300, rho, seed) for seed in range(30)]
-    assert sum(not judged(fitted(J, right + e)).good for e in noise) <= 2
+    assert sum(not judge(fitted(J, right + e)).good for e in noise) <= 2
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])
@@ -41,7 +41,7 @@ def test_what_is_missing_is_named(
 ) -> None:
     m = motion(2000)
     J = coulomb(2000)
-    found = judged(fitted(J, 3 * J @ TRUTH + ar1(2000, rho, 1) + 1.5 * missing(m)))
+    found = judge(fitted(J, 3 * J @ TRUTH + ar1(2000, rho, 1) + 1.5 * missing(m)))
     assert not found.good
     failed = [t for t in found.tests if t.decides and not t.passed]
     assert any(named in t.name for t in failed)
@@ -52,17 +52,17 @@ def test_rounding_is_no_model_error() -> None:
     """Of noise-free data what is left depends on everything, and means nothing."""
     J, v = coulomb(1000), motion(1000)["v"]
     right = J @ TRUTH
-    assert judged(fitted(J, right + 1e-4 * np.sign(v) * v**2)).good
-    assert not judged(fitted(J, right + 1.0 * np.sign(v) * v**2)).good
-    assert judged(fitted(J, np.round(right, 2))).good
-    assert judged(fitted(J, right)).good
+    assert judge(fitted(J, right + 1e-4 * np.sign(v) * v**2)).good
+    assert not judge(fitted(J, right + 1.0 * np.sign(v) * v**2)).good
+    assert judge(fitted(J, np.round(right, 2))).good
+    assert judge(fitted(J, right)).good
 
 
 def test_noise_that_was_given_is_a_yardstick() -> None:
     J = coulomb(500)
     e = J @ TRUTH + ar1(500, 0.0, 2)
-    assert judged(fitted(J, e, noise={"force": 1.0})).good
-    found = judged(fitted(J, e, noise={"force": 0.5}))
+    assert judge(fitted(J, e, noise={"force": 1.0})).good
+    found = judge(fitted(J, e, noise={"force": 0.5}))
     assert [t.name for t in found.tests if t.decides and not t.passed] == ["size"]
 
 
@@ -85,7 +85,7 @@ def test_coloured_residuals_are_as_large_as_their_noise() -> None:
     J, level = coulomb(400)[:, :1], 1 / np.sqrt(1 - 0.9**2)
     failed = 0
     for seed in range(15):
-        found = judged(fitted(J, ar1(400, 0.9, seed), noise={"force": level}))
+        found = judge(fitted(J, ar1(400, 0.9, seed), noise={"force": level}))
         failed += any(t.name == "size" and not t.passed for t in found.tests)
     assert failed <= 1
 

@@ -8,14 +8,13 @@ from linear_fits import ar1, coulomb, fitted
 from scipy.stats import t as student
 
 from identification.verdict.colour import Colour, colour, predictors, whitened
-from identification.verdict.covariance import sandwich
 from identification.verdict.minimum import places, positions
 
 
 def test_white_noise_gives_the_textbook_covariance() -> None:
     J = coulomb(400)
     made = fitted(J, ar1(400, 0.0, 3))
-    found = sandwich(made)
+    found = made.sandwich
     s2 = float(made.r @ made.r) / (400 - 4)
     np.testing.assert_allclose(found.white, s2 * np.linalg.inv(J.T @ J), rtol=1e-9)
     np.testing.assert_allclose(found.coloured, found.white, rtol=1e-9)
@@ -25,7 +24,7 @@ def test_white_noise_gives_the_textbook_covariance() -> None:
 def test_coloured_covariance_is_that_of_its_autocovariance() -> None:
     """B' Sigma B written out."""
     J = coulomb(300)
-    found = sandwich(made := fitted(J, ar1(300, 0.9, 3)))
+    found = (made := fitted(J, ar1(300, 0.9, 3))).sandwich
     colour = found.colours[0]
     phi = float(colour.phi[0])
     lag = np.abs(np.subtract.outer(np.arange(300), np.arange(300)))
@@ -35,7 +34,7 @@ def test_coloured_covariance_is_that_of_its_autocovariance() -> None:
     gap = np.delete(np.arange(300), slice(100, 140))  # rows that are missing stay apart
     channel = made.channels[0]
     short = replace(channel, rows=slice(0, 260), t=channel.t[gap])
-    again = sandwich(replace(made, channels=(short,), r=made.r[gap], J=J[gap], gain=np.ones(260)))
+    again = replace(made, channels=(short,), r=made.r[gap], J=J[gap], gain=np.ones(260)).sandwich
     phi = float(again.colours[0].phi[0])
     sigma = again.colours[0].variance / (1 - phi**2) * phi ** lag[np.ix_(gap, gap)]
     B = np.linalg.pinv(J[gap]).T
@@ -47,7 +46,7 @@ def test_values_of_any_size_keep_their_freedom(rho: float) -> None:
     """Squares of their variances would overflow, or vanish."""
     made = fitted(coulomb(300), ar1(300, rho, 3))
     size = np.array([1e90, 1.0, 1e-90, 1e-3])
-    found, large = (sandwich(replace(made, slope=k * made.slope)) for k in (1.0, size[:, None]))
+    found, large = (replace(made, slope=k * made.slope).sandwich for k in (1.0, size[:, None]))
     np.testing.assert_allclose(large.freedom, found.freedom, rtol=1e-12)
     np.testing.assert_allclose(large.coloured, np.outer(size, size) * found.coloured, rtol=1e-12)
 
@@ -58,7 +57,7 @@ def test_intervals_cover(rho: float) -> None:
     inside = np.zeros(4)
     for seed in range(seeds):
         made = fitted(J, ar1(200, rho, seed))
-        found = sandwich(made)
+        found = made.sandwich
         reach = student.ppf(0.975, found.freedom) * np.sqrt(np.diag(found.coloured))
         inside += np.abs(made.values) <= reach
     assert ((inside / seeds >= 0.9) & (inside / seeds <= 0.99)).all()
@@ -76,7 +75,7 @@ def test_windows_share_the_noise_of_time() -> None:
 def test_freedom_of_a_mean_is_that_of_its_estimated_correlation() -> None:
     """Var of s^2 / (1 - phi)^2, of which s has n degrees and phi the variance (1 - phi^2) / n."""
     n = 2000
-    found = sandwich(fitted(np.ones((n, 1)), ar1(n, 0.9, 3)))
+    found = fitted(np.ones((n, 1)), ar1(n, 0.9, 3)).sandwich
     (phi,) = found.colours[0].phi
     assert found.freedom[0] == pytest.approx(n / (1 + 2 * (1 + phi) / (1 - phi)), rel=0.05)
 
@@ -84,7 +83,7 @@ def test_freedom_of_a_mean_is_that_of_its_estimated_correlation() -> None:
 def test_what_a_bound_holds_counts_as_known() -> None:
     J = coulomb(400)
     made = fitted(J, ar1(400, 0.0, 3))
-    held = sandwich(replace(made, held=np.array([False, False, False, True])))
+    held = replace(made, held=np.array([False, False, False, True])).sandwich
     expected = held.colours[0].white * np.linalg.inv(J[:, :3].T @ J[:, :3])
     np.testing.assert_allclose(held.white[:3, :3], expected, rtol=1e-9)
     assert not held.white[3].any()

@@ -36,14 +36,10 @@ def test_rows_are_steps_of_the_block_from_numbers_of_the_type(found, real):
         slid = LUGRE.reset("init_sliding")(0.0, p, rows.steps.inputs[k])
         expected = np.concatenate([x.full().ravel() for x in (z, F, slid)])
         assert np.array_equal(rows.results[k], expected)
-
-
-def test_rows_rest_creep_slide_and_turn_under_loads_that_jump(found):
-    v, N = found[DOUBLE].steps.inputs.T
-    assert (v == 0).any()
+    v, N = rows.steps.inputs.T
+    assert {*np.sign(v[np.abs(v) > 0.05])} == {-1.0, 1.0}
     assert ((v != 0) & (np.abs(v) < 1e-6)).any()
-    assert (v > 0.05).any()
-    assert (v < -0.05).any()
+    assert (v == 0).any()
     assert N.max() > 5 * N.min() > 0
 
 

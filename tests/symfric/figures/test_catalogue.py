@@ -5,8 +5,6 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-import symfric
-import symfric.laws
 from symfric import (
     ALL_LAWS,
     GMS,
@@ -19,7 +17,7 @@ from symfric import (
     simulate,
     with_values,
 )
-from symfric.figures import FIGURES, FigureData, compare, phenomena
+from symfric.figures import FIGURES, compare, phenomena
 from symfric.figures.catalogue import in_scene, scene_figure
 from symfric.laws import GenericAsperity, RandomBristles
 from symfric.scenes import Pendulum
@@ -156,11 +154,6 @@ def test_a_law_that_cannot_show_it_is_left_out_and_the_note_says_why() -> None:
     assert {curve.law for curve in data.curves} == {"lugre"}
     assert data.note == "without coulomb: expected a law that shows pre-sliding displacement"
     assert data.to_dict()["note"] == data.note
-
-
-def test_it_is_reached_from_the_front() -> None:
-    assert symfric.compare is compare
-    assert isinstance(symfric.compare(["coulomb"]), FigureData)
 
 
 def test_a_population_is_compared_by_name_and_as_an_instance() -> None:

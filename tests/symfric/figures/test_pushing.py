@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from symfric import Dahl, ExactCoulomb, GenericAsperity, LuGre, Viscous, law_from_text
-from symfric.figures import Curve, break_away, compare, drift, push, stiction
+from symfric.figures import Curve, break_away, drift, push, stiction
 from symfric.figures.motion import scales
 from symfric.figures.pushing import over_period
 from symfric.laws import ElastoPlastic
@@ -65,16 +65,6 @@ def test_laws_with_hysteresis_settle_instead_of_drifting(name: str) -> None:
     t, x = curve["t"], curve["x"]
     early, late = (np.mean(x[(t >= a) & (t < a + 1)]) for a in (3.0, 7.0))
     assert abs(late - early) < 2e-6  # LuGre: 1.6e-4
-
-
-@pytest.mark.slow
-def test_the_mean_over_two_periods_drifts_with_lugre_and_stays_with_gms() -> None:
-    data = compare(["lugre", "gms"], "drift")
-    assert data.panels == (("t", "x_mean"),)
-    for law, rise in (("lugre", 1.6e-4), ("gms", 0.0)):
-        t, mean = data[law]["t"], data[law]["x_mean"]
-        late = mean[np.abs(t - 7.0).argmin()] - mean[np.abs(t - 3.0).argmin()]
-        assert late == pytest.approx(rise, rel=0.1, abs=2e-7)
 
 
 def test_a_mean_over_a_period_forgets_its_sine_and_keeps_a_line() -> None:

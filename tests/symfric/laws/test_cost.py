@@ -1,7 +1,6 @@
 """Costs as counts: a table that is checked in, and options that cost nothing while switched off."""
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -27,16 +26,7 @@ from symfric import (
 from symfric.laws import (
     BAM,
     POPULATIONS,
-    Andersson,
-    BrittleSelfTuning,
-    Hollars,
-    PoppStelter,
-    PowerLawViscous,
     QuarterCarGeneral,
-    RuiWang,
-    Specker,
-    SteadyStateLuGre,
-    Tustin,
 )
 from symfric.laws.composed.populations import cost
 
@@ -74,32 +64,34 @@ def instructions(law: Law) -> int:
     return sum(f.instruction_id(k) not in idle for k in range(f.n_instructions()))
 
 
-OPTIONS: list[tuple[Callable[..., Law], str, float, float]] = [
-    (BrownMcPhee, "mu_v", 0.0, 0.4),
-    (Stribeck, "sigma_2", 0.0, 0.4),
-    (Stribeck, "delta", 2.0, 1.5),
-    (SelfTuning, "E", 0.0, 0.5),
-    (Dahl, "n", 1.0, 2.0),
-    (LuGre, "sigma_1", 0.0, 190.0),
-    (LuGre, "sigma_2", 0.0, 0.4),
-    (LuGre, "delta", 2.0, 1.5),
-    (LuGre, "v_eps", 0.0, 1e-6),
-    (PowerLawViscous, "d", 1.0, 1.5),
-    (Tustin, "v_eps", 0.0, 1e-4),
-    (Andersson, "p", 2.0, 1.5),
-    (SteadyStateLuGre, "delta", 2.0, 3.2),
-    (PoppStelter, "kappa", 0.0, 0.1),
-    (Specker, "sigma_2", 0.0, 0.4),
-    (RuiWang, "E", 0.0, 0.5),
-    (BrittleSelfTuning, "E", 0.0, 0.5),
-    (Hollars, "u_eps", 0.0, 0.2),
-    (Hollars, "mu_v", 0.0, 0.4),
-    (QuarterCarGeneral, "mu", 0.0, 0.1),
-]
+OPTIONS = """
+    brown_mcphee mu_v 0.0 0.4
+    stribeck sigma_2 0.0 0.4
+    stribeck delta 2.0 1.5
+    self_tuning E 0.0 0.5
+    dahl n 1.0 2.0
+    lugre sigma_1 0.0 190.0
+    lugre sigma_2 0.0 0.4
+    lugre delta 2.0 1.5
+    lugre v_eps 0.0 1e-6
+    power_law_viscous d 1.0 1.5
+    tustin v_eps 0.0 1e-4
+    andersson p 2.0 1.5
+    steady_state_lugre delta 2.0 3.2
+    popp_stelter kappa 0.0 0.1
+    specker sigma_2 0.0 0.4
+    rui_wang E 0.0 0.5
+    brittle_self_tuning E 0.0 0.5
+    hollars u_eps 0.0 0.2
+    hollars mu_v 0.0 0.4
+    quarter_car_general mu 0.0 0.1
+"""
+"""Law, parameter, its value that switches a term off, and a value in use."""
 
 
 def test_switched_off_option_costs_less_than_in_use_and_than_its_symbol() -> None:
-    for kind, name, off, on in OPTIONS:
+    for law, name, *values in map(str.split, OPTIONS.strip().splitlines()):
+        kind, (off, on) = ALL_LAWS[law], map(float, values)
         without = instructions(kind(**{name: off}))
         assert without < instructions(kind(**{name: on})), (kind, name)
         assert without < instructions(symbolise(kind(), name)[0]), (kind, name)

@@ -6,14 +6,27 @@ from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
+import numpy as np
 import pytest
 from refusing import not_refused
 
 import symfric
 import symfric.laws
 import symfric.model
-from symfric import BrownMcPhee, Model, Output, Variable, rabinowicz, simulate
-from symfric.scenes import Arm
+from symfric import (
+    BrownMcPhee,
+    LuGre,
+    Model,
+    Output,
+    RateAndState,
+    Variable,
+    contact,
+    rabinowicz,
+    simulate,
+    simulate_many,
+)
+from symfric.laws import Armstrong
+from symfric.scenes import ALL_SCENES, Arm, FourBar
 
 x, y = Variable("x", "m", start=1.0, nominal=0.1), Variable("y", "m/s")
 w, u, k = Variable("w", "N"), Variable("u", "N", start=2.0), Variable("k", "N/m", start=3.0)
@@ -118,3 +131,122 @@ def test_a_copy_and_a_pickle_have_the_same_symbols() -> None:
     assert copy(run).model is model
     assert copy(machine).inputs[0] is machine.inputs[0]
     assert ca.is_equal(pickle.loads(pickle.dumps(model)).x[0].symbol, model.x[0].symbol)
+
+
+def test_scenes_have_the_accelerations_of_their_positions() -> None:
+    """Differences of the dense rates: of second order in h, and rounded by 1e-16 / h."""
+    for name in ("rabinowicz", "drill_string", "nip", "clutch", "pendulum_box", "slider_crank"):
+        scene = ALL_SCENES[name](BrownMcPhee())
+        given = {n: g.function for n, g in scene.inputs.items()}
+        model = scene.model()
+        run = simulate(model, 0.2, u=given, rtol=1e-8, samples=5)
+        found = [n for n in run.details if n.endswith("_acc")]
+        moves = {v.unit for v in model.x} & {"m/s", "rad/s"}
+        assert bool(found) is bool(moves), name
+        assert all(run.details[n] in ("m/s^2", "rad/s^2") for n in found), name
+        h, t = 1e-6, np.linspace(0.02, 0.18, 23)
+        here, after, before = run.at(t), run.at(t + h), run.at(t - h)
+        slopes = {v.name: (after[v.name] - before[v.name]) / (2 * h) for v in model.x}
+        for n in found:  # the rate of q is the state that is the slope of q, whatever it is called
+            q = n.removesuffix("_acc")
+            speeds = [v.name for v in model.x if run.units[v.name] in ("m/s", "rad/s")]
+            if q in speeds:  # of nothing that is a state
+                rate = q
+            else:
+                rate = min(speeds, key=lambda r: float(np.abs(here[r] - slopes[q]).max()))
+            wanted = run.of(model.expression(n), t)
+            scale = max(1.0, float(np.abs(wanted).max()))
+            assert np.abs(slopes[rate] - wanted).max() < 2e-3 * scale, (name, n, rate)
+
+
+def test_the_acceleration_of_the_block_is_what_newton_says() -> None:
+    run = simulate(rabinowicz(LuGre()), 3.0, samples=301)
+    np.testing.assert_allclose(run["x_acc"], (-2.1 * run["x"] - run["friction"]) / 0.8, atol=1e-12)
+    assert run.unit("x_acc") == "m/s^2"
+
+
+def test_a_velocity_that_a_law_keeps_has_no_acceleration() -> None:
+    model = rabinowicz(Armstrong())
+    assert [v.unit for v in model.x if v.name == "w"] == ["m/s"]
+    assert [*model.further] == ["x_acc"]
+
+
+def test_accelerations_cost_nothing_until_they_are_asked_for() -> None:
+    model = FourBar(BrownMcPhee()).model()
+    run = simulate(model, 0.05, samples=3)
+    assert "further" not in model.__dict__
+    assert not any(n.endswith("_acc") for n in run.units)
+    assert "theta_crank_acc" in run.details
+
+
+def test_only_rates_that_are_states_have_accelerations_and_names_are_not_taken_twice() -> None:
+    x, v, w = Variable("x", "m"), Variable("v", "m/s"), Variable("w", "V")
+    model = Model(
+        "own", x=(x, v, w), ode=ca.vertcat(v.symbol, -x.symbol, 2 * v.symbol),
+        details=lambda: {"x_acc": Output(7.0, "m")},
+    )  # fmt: skip
+    assert list(model.further) == ["x_acc"]
+    assert model.further["x_acc"].unit == "m"
+    rate = ca.SX.sym("rate")
+    implicit = Model("rc", x=(w,), xdot=rate, residual=rate + w.symbol)
+    assert implicit.further == {}
+    volts = Model("volts", x=(w, x), ode=ca.vertcat(x.symbol, w.symbol))
+    assert {n: o.unit for n, o in volts.further.items()} == {"w_acc": "m/s", "x_acc": "V/s"}
+
+
+LAW = RateAndState(mu_0=0.6, a=0.01, b=0.015, v_0=1e-6, D_c=1e-3)
+PLATE, STRESS, ETA = 1e-9, 50e6, 5e6
+
+
+def fault() -> Model:
+    """A patch without mass: its velocity is an algebraic variable."""
+    load = Variable("load", "Pa", start=3.2e7, nominal=1e7)
+    v = Variable("v", "m/s", start=PLATE, nominal=PLATE)
+    rock = contact("fault", LAW, v.symbol, STRESS)
+    return Model(
+        "fault",
+        x=(load,),
+        z=(v,),
+        ode=3e8 * (PLATE - v.symbol),
+        alg=load.symbol - ETA * v.symbol - rock.force,
+        contacts=(rock,),
+    )
+
+
+def test_a_law_starts_by_the_start_value_of_an_algebraic_velocity() -> None:
+    steady = LAW.steady_state(PLATE, STRESS).item()
+    assert fault().initial_state() == pytest.approx([3.2e7, steady])
+    assert fault().initial_state({"psi": 2.0}) == pytest.approx([3.2e7, 2.0])
+    with pytest.raises(ValueError, match="got v; algebraic variables follow from their equations"):
+        fault().initial_state({"v": 1e-6})
+    many, _ = fault().initial_states({"load": np.array([3e7, 3.1e7])}, {}, 2)
+    assert many == pytest.approx(np.array([[3e7, steady], [3.1e7, steady]]))
+
+
+def test_a_fault_without_mass_comes_to_creep_where_the_rock_is_stiff() -> None:
+    end = simulate(fault(), 3e8).final  # 3e8 Pa/m is above (b - a) STRESS / D_c
+    assert end["v"] == pytest.approx(PLATE, rel=1e-3)
+    mu = 0.6 + (0.01 - 0.015) * np.log(PLATE / 1e-6)
+    assert end["load"] == pytest.approx(mu * STRESS, rel=1e-3)
+
+
+def under_varying_load(law: LuGre) -> Model:
+    x, v, t = Variable("x", "m"), Variable("v", "m/s", start=0.3), ca.SX.sym("t")
+    floor = contact("floor", law, v, 5 + ca.sin(t))
+    return Model("varying", x=(x, v), ode=ca.vertcat(v, 1 - floor.force), contacts=(floor,), t=t)
+
+
+def test_a_bristle_under_a_load_that_varies_starts_at_its_steady_state() -> None:
+    law = LuGre()
+    model = under_varying_load(law)
+    for begin in (0.0, 1.5):
+        steady = float(law.steady_state(0.3, 5 + np.sin(begin))[0])
+        assert model.initial_state(t=begin)[2] == pytest.approx(steady, rel=1e-14)
+        run = simulate(model, begin + 0.5, t_start=begin, samples=3, sensitivities=["x0.v"])
+        many = simulate_many(
+            model, begin + 0.5, t_start=begin, x0={"v": [0.3, 0.4]}, backend="vm", executor="serial"
+        )
+        assert run["z"][0] == pytest.approx(steady, rel=1e-14)
+        assert many["x"][0, -1] == pytest.approx(run.final["x"], rel=1e-7)
+        slope = (many["x"][1, -1] - many["x"][0, -1]) / 0.1
+        assert run.sensitivities["x0.v"]["x"][-1] == pytest.approx(slope, rel=1e-4)

@@ -5,6 +5,7 @@ from math import inf
 from pathlib import Path
 
 import casadi as ca
+import numpy as np
 import pytest
 from law_cases import CASES
 from refusing import not_refused
@@ -14,19 +15,24 @@ import symfric.laws
 import symfric.scenes
 from symfric import (
     ALL_LAWS,
+    BrownMcPhee,
     Coulomb,
     Law,
     LuGre,
     LuGreNormalised,
+    Model,
+    Output,
     Variable,
     Viscous,
+    contact,
     drive,
     parameters,
     rabinowicz,
     simulate,
 )
 from symfric.laws.catalogue import DYNAMIC_LAWS
-from symfric.scenes import ALL_SCENES, MECHANISMS, Drive, Robot, Scene
+from symfric.scenes import ALL_SCENES, MECHANISMS, Drive, FourMass, Robot, Scene, SliderCrank
+from symfric.scenes.linkages import MechanismScene
 from symfric.scenes.rigs import ANY
 
 SINGLE = {name: kind for name, kind in ALL_SCENES.items() if name not in MECHANISMS}
@@ -180,3 +186,135 @@ def test_block_is_carried_as_far_as_stated(name: str) -> None:
     run = simulate(rabinowicz(law), 20.0, x0=start, rtol=1e-6, samples=8001)
     reach, error = REACH[name]
     assert run["x"].max() == pytest.approx(reach, abs=error)
+
+
+def belt(law: Law) -> Model:
+    """Rabinowicz's block, written by a user."""
+    x, v = Variable("x", "m", nominal=0.1), Variable("v", "m/s", nominal=0.1)
+    pull = -2.1 * x.symbol
+    slip = contact("belt", law, v.symbol - 0.1, 0.8 * 9.81, rest={"v": 0.1}, F_e=pull)
+    rate = (pull - slip.force) / 0.8
+    outputs = {"friction": Output(slip.force, "N")}
+    ode = ca.vertcat(v.symbol, rate)
+    return Model("own", x=(x, v), ode=ode, contacts=(slip,), outputs=outputs)
+
+
+def test_equations_of_ones_own_run_as_the_scene_does() -> None:
+    for name in ("brown_mcphee", "lugre", "exact_coulomb", "karnopp"):
+        own, scene = belt(ALL_LAWS[name]()), rabinowicz(ALL_LAWS[name]())
+        one, other = (simulate(model, 3.0, samples=51) for model in (own, scene))
+        assert one.statistics.steps == other.statistics.steps, name
+        np.testing.assert_array_equal(one["x"], other["x"])
+        np.testing.assert_array_equal(one["friction"], other["friction"])
+
+
+def test_a_sled_slides_as_the_closed_form_says() -> None:
+    x, v, pull = Variable("x", "m"), Variable("v", "m/s"), Variable("pull", "N")
+    slip = contact("floor", Coulomb(mu_d=0.1, v_eps=1e-5), v.symbol, 10.0)
+    ode = ca.vertcat(v.symbol, (pull.symbol - slip.force) / 2.0)
+    model = Model("sled", x=(x, v), u=(pull,), ode=ode, contacts=(slip,))
+    run = simulate(model, 1.0, u={"pull": 3.0}, rtol=1e-9)
+    assert run.final["v"] == pytest.approx(1.0, rel=1e-4)
+
+
+def test_two_contacts_have_states_of_their_own_names() -> None:
+    v = Variable("v", "m/s")
+    pairs = [("left", True), ("right", True)]
+    with pytest.raises(ValueError, match="got z; contacts made with bare=False call their states"):
+        bare = tuple(contact(n, LuGre(), v.symbol, 1.0, bare=b) for n, b in pairs)
+        Model("two", x=(v,), ode=-bare[0].force - bare[1].force, contacts=bare)
+    both = tuple(contact(n, LuGre(), v.symbol, 1.0, bare=False) for n, _ in pairs)
+    model = Model("two", x=(v,), ode=-both[0].force - both[1].force, contacts=both)
+    assert [s.name for s in model.x] == ["v", "left_z", "right_z"]
+
+
+def test_a_contact_that_turns_has_its_units() -> None:
+    w = Variable("w", "rad/s")
+    hub = contact("hub", LuGre(mu_s=1.4, mu_d=0.9), w.symbol, 1.0, rest={"w": 0.0}, turning=True)
+    model = Model("hub", x=(w,), ode=-hub.force / 0.01, contacts=(hub,))
+    assert [state.unit for state in model.x] == ["rad/s", "rad"]
+
+
+def test_the_front_door_names_all_that_it_hands_out() -> None:
+    said = symfric.__doc__ or ""
+    laws = {kind.__name__ for kind in ALL_LAWS.values()}
+    for name in symfric.__all__:
+        thing = getattr(symfric, name)
+        is_law = isinstance(thing, type) and issubclass(thing, Law | symfric.Population)
+        assert name in said or name in laws or is_law, name
+    with pytest.raises(AttributeError) as error:
+        symfric.Lugre  # noqa: B018  # pyright: ignore
+    assert (error.value.name, error.value.obj) == ("Lugre", symfric)  # Python offers LuGre by these
+
+
+RUBS = {
+    ("double_pendulum", "lower"): "phi_2",
+    ("pendulum_box", "hinge"): "phi",
+    ("four_mass", "guide_2"): "y2",
+    ("four_mass", "guide_3"): "z3",
+    ("four_mass", "guide_4"): "x4",
+    ("slider_crank", "guide"): "slider",
+    ("four_bar", "hinge_coupler"): "theta_coupler",
+    ("four_bar", "hinge_rocker"): "theta_rocker",
+    ("four_bar", "pin"): "pin",
+    **{("arm", f"q{i}"): f"q{i}" for i in range(2, 7)},
+}
+"""Scene and place -> the joint whose friction it is."""
+
+WITHOUT = {"guide", "pin"}
+"""Places that do not rub where no law is given."""
+
+
+def test_every_place_is_tested() -> None:
+    """That of the second block by its own oracle."""
+    there = {(name, place) for name, kind in ALL_SCENES.items() for place in kind.places()}
+    assert there == {*RUBS, ("coupled_blocks", "block_2")}
+    for kind in ALL_SCENES.values():
+        assert all(kind.places().values())
+
+
+ONE_OF_THE_ARM = [at for at in RUBS if at[0] != "arm" or at[1] == "q4"]
+
+
+@pytest.mark.parametrize(("name", "place"), ONE_OF_THE_ARM)
+def test_a_law_of_a_place_rubs_there_and_nowhere_else(name: str, place: str) -> None:
+    scene = MECHANISMS[name](Viscous(sigma_2=0.0), **{place: Coulomb(mu_d=0.3, v_eps=0.01)})
+    run = simulate(scene.model(), 0.01, samples=11)
+    rubbed = {n for n in run.units if n.endswith("_friction") and abs(run[n]).max() > 1e-3}
+    assert rubbed == {f"{RUBS[name, place]}_friction"}
+
+
+@pytest.mark.parametrize("kind", MECHANISMS.values(), ids=[*MECHANISMS])
+def test_without_laws_of_their_own_places_have_that_of_the_scene(
+    kind: type[MechanismScene],
+) -> None:
+    law = BrownMcPhee(v_t=0.05)
+    laws = {place: law for place in kind.places() if place not in WITHOUT}
+    given, own = kind(law, **laws).model(), kind(law).model()
+    assert [v.name for v in given.x] == [v.name for v in own.x]
+    rates = [
+        model.function("ode")(0.0, model.initial_state(), np.zeros(len(model.z)), [], []).full()
+        for model in (given, own)
+    ]
+    np.testing.assert_array_equal(*rates)
+
+
+def test_parameters_of_places_have_endings_where_they_share_a_name() -> None:
+    scene = FourMass(BrownMcPhee(), guide_3=Coulomb(mu_d=0.2), guide_4=LuGre(mu_s=0.4))
+    found = {n: p.value for n, p in parameters(scene).items()}
+    assert (found["mu_d_1"], found["mu_d_2"], found["mu_d_3"]) == (0.1, 0.2, 0.1)
+    assert (found["mu_s_1"], found["mu_s_3"], found["sigma_0"]) == (0.15, 0.4, 1e5)
+
+
+def test_the_guide_of_the_slider_takes_its_share_of_the_energy() -> None:
+    """And it is the law at the speed and the normal force of the guide."""
+    law = BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01)
+    run = simulate(SliderCrank.preset("haug_with_guide", law).model(), 0.25, rtol=1e-9)
+    alone = simulate(SliderCrank.preset("haug", law).model(), 0.25, rtol=1e-9)
+    assert run["slider_friction"] == pytest.approx(
+        [law.force(v, N) for v, N in zip(run["slider_rate"], run["slider_N"], strict=True)],
+        abs=1e-8,
+    )
+    assert run["slider_N"].min() > 0
+    assert run.energy_balance().relative < 1e-6
+    assert run["energy"][-1] < alone["energy"][-1] - 10.0

@@ -63,14 +63,13 @@ def constraints(run: Trajectory) -> tuple[float, float, float]:
     )  # type: ignore[return-value]
 
 
-@pytest.mark.parametrize("amplitude", [0.1, 1.0, 3.0])
-def test_pendulum_swings_with_the_elliptic_period(amplitude: float) -> None:
-    inertia = 1 / 12 + 0.25
-    period = pendulum_period(np.sqrt(9.81 * 0.5 / inertia), amplitude)
-    model = Pendulum(SMOOTH, phi_0=amplitude).model()
-    run = simulate(model, 2 * period, rtol=1e-10, t_eval=[period, 2 * period])
-    assert run["phi"] == pytest.approx([amplitude, amplitude], abs=1e-8)
-    assert run["phi_rate"] == pytest.approx([0.0, 0.0], abs=1e-7)
+def test_pendulum_swings_with_the_elliptic_period() -> None:
+    for amplitude in (0.1, 1.0, 3.0):
+        period = pendulum_period(np.sqrt(9.81 * 0.5 / (1 / 12 + 0.25)), amplitude)
+        model = Pendulum(SMOOTH, phi_0=amplitude).model()
+        run = simulate(model, 2 * period, rtol=1e-10, t_eval=[period, 2 * period])
+        assert run["phi"] == pytest.approx([amplitude, amplitude], abs=1e-8)
+        assert run["phi_rate"] == pytest.approx([0.0, 0.0], abs=1e-7)
 
 
 def test_double_pendulum_agrees_with_the_textbook() -> None:
@@ -193,11 +192,6 @@ def test_four_bar_closes_as_freudenstein_says() -> None:
     off = np.abs(np.exp(1j * run["theta_rocker"]) - np.exp(1j * np.array(expected)))
     assert off.max() < 1e-11
     assert (np.diff(run["energy"]) < 1e-9).all()
-
-
-def test_four_bar_without_friction_keeps_its_energy() -> None:
-    run = simulate(FourBar(SMOOTH).model(), 3.0, rtol=1e-10)
-    assert np.ptp(run["energy"]) < 1e-6 * run["kinetic"].max()
 
 
 def test_arm_loses_what_friction_takes() -> None:

@@ -189,10 +189,3 @@ def test_a_web_that_carries_the_roller_winds_up_its_shaft_to_the_static_level() 
     run = simulate(scene.model(), 1.0, x0=x0, u={"v_set": 0.5, "load": 499.0}, rtol=1e-9)
     breaks = next(t for t, name in run.happened if name == "slip" and t > 0)
     assert breaks == pytest.approx((0.15 * 500.0 * RADIUS / SHAFT) / (LAG * 0.5 / RADIUS), rel=1e-7)
-
-
-def test_an_open_nip_leaves_the_roller_to_its_drive() -> None:
-    law = LuGre()
-    run = simulate(Nip(law).model(), 30.0, u={"v_set": 0.5, "load": -200.0})
-    assert run["N"].max() == 1.0
-    assert run["v_rel"][-1] == pytest.approx(LAG * 0.5, rel=1e-3)

@@ -1,4 +1,4 @@
-"""Ensembles on a device: the bits of the virtual machine, also of counts and failures.
+"""Ensembles on a device: the bits of the CPU, also of counts and failures.
 
 A module in the place of CuPy compiles the same text of the kernel for the processor.
 """
@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from device_cases import ALIKE, CASES, VELOCITIES
 from differentiable import oscillator, root, switched
-from ensembles import after, assert_same
+from ensembles import after, assert_same, with_functions_of_libm
 from fake_cupy import LAUNCH_ON_HOST, ON_HOST, FakeCupy
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Status, rabinowicz, simulate_many
@@ -34,6 +34,7 @@ TWENTY: dict[str, Any] = {"x0": {"x": np.linspace(0.5, 2.0, 20)}, "backend": "cu
 
 @pytest.fixture(autouse=True)
 def cupy(monkeypatch: pytest.MonkeyPatch) -> FakeCupy:
+    with_functions_of_libm(monkeypatch)
     module = FakeCupy()
     monkeypatch.setitem(sys.modules, "cupy", module)
     return module
@@ -46,11 +47,11 @@ def integrator(model: Model) -> Integrator:
 @pytest.mark.parametrize(
     "case", [pytest.param(c, marks=pytest.mark.slow) if c in ALIKE else c for c in CASES]
 )
-def test_members_are_those_of_the_virtual_machine(case: str) -> None:
+def test_members_are_those_of_the_cpu(case: str) -> None:
     make, t_end, arguments = CASES[case]
     model = make()
     ours = simulate_many(model, t_end, backend="cuda", **arguments)
-    assert_same(ours, simulate_many(model, t_end, backend="vm", **arguments))
+    assert_same(ours, simulate_many(model, t_end, backend="compiled", **arguments))
     if not any(word in case for word in ("fail", "assembled", "unknowns start", "jams")):
         assert not ours.failed
         assert ours.attempts.min() > 0
@@ -62,7 +63,7 @@ def test_members_are_those_of_the_virtual_machine(case: str) -> None:
 def test_a_member_without_enough_steps_is_named() -> None:
     arguments: dict[str, Any] = {"p": {"k": [1.0, 1e8, 4.0]}, "max_steps": 1000}
     ours = simulate_many(oscillator(), 1.0, backend="cuda", **arguments)
-    assert_same(ours, simulate_many(oscillator(), 1.0, backend="vm", **arguments))
+    assert_same(ours, simulate_many(oscillator(), 1.0, backend="compiled", **arguments))
     assert ours.failed[1].startswith(Status.MAX_STEPS.value)
     assert ours.attempts[1] == 1000
 
@@ -76,7 +77,7 @@ def members(backend: str = "cuda") -> Any:
 def test_threads_launches_and_memory_change_nothing(
     cupy: FakeCupy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    expected = members("vm")
+    expected = members("compiled")
     assert_same(members(), expected)
     assert cupy.launches[0] == ((1,), (BLOCK,))
     assert cupy.waited == len(cupy.launches)
@@ -244,14 +245,14 @@ def test_the_kernel_has_only_what_it_needs() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=lambda law: type(law).__name__)
 @pytest.mark.parametrize("name", ALL_SCENES)
-def test_all_scenes_have_the_bits_of_the_virtual_machine(name: str, law: Law) -> None:
+def test_all_scenes_have_the_bits_of_the_cpu(name: str, law: Law) -> None:
     """The arm compiles for half a minute."""
     made = ALL_SCENES[name](law).model()
     x = made.x[0]
     x0 = {x.name: float(x.start) + np.array([-0.01, 0.0, 0.01])}
     arguments: dict[str, Any] = {"x0": x0, "t_eval": np.linspace(0.0, 0.3, 4)}
     ours = simulate_many(made, 0.3, backend="cuda", **arguments)
-    assert_same(ours, simulate_many(made, 0.3, backend="vm", **arguments))
+    assert_same(ours, simulate_many(made, 0.3, backend="compiled", **arguments))
 
 
 @pytest.mark.slow

@@ -24,9 +24,7 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import Given, State
 
 
-def task(
-    model: Model, start: list[float], backend: str = "vm", u: dict[str, Input] | None = None
-) -> tuple[Job, Chunk]:
+def task(model: Model, start: list[float], u: dict[str, Input] | None = None) -> tuple[Job, Chunk]:
     """Two equal members over a second, results at three times."""
     inputs = input_data(model, u, 0.0, 1.0)
     integrator = Integrator(model, inputs, RODAS5P)
@@ -34,15 +32,14 @@ def task(
     S = State.at(0.0, 1e-8, start)
     R = Given.of(1.0, 1e-6, 1.0, atol, [*p, *inputs.values[:, 0]])
     times = np.array([0.0, 0.5, 1.0])
-    job = Job(program(integrator, backend == "compiled"), inputs.breaks, times, 10_000)
+    job = Job(program(integrator), inputs.breaks, times, 10_000)
     return job, Chunk(np.tile(S, (2, 1)), np.tile(R, (2, 1)), inputs.values[None], np.full(2, 1.0))
 
 
-@pytest.mark.parametrize("backend", ["vm", "compiled"])
-def test_solving_does_not_change_a_chunk(backend: str) -> None:
+def test_solving_does_not_change_a_chunk() -> None:
     u: dict[str, Input] = {"u": Hold([0.0, 0.5], [1.0, -1.0])}
     for model, start in ((oscillator(), [1.0, 0.0]), (switched(), [1.0, 0.0])):
-        job, chunk = task(model, start, backend, u)
+        job, chunk = task(model, start, u)
         S, R = chunk.S.copy(), chunk.R.copy()
         first, second = job.solve(chunk), job.solve(chunk)
         np.testing.assert_array_equal(chunk.S, S)
@@ -101,19 +98,19 @@ def test_another_call_builds_writes_and_compiles_nothing(
         monkeypatch.setattr(place, name, call)
 
     for place, name in (
-        (built, "Integrator"), (module, "_written"), (compiler, "opened"), (Compiler, "run"),
+        (built, "Integrator"), (module, "with_code"), (compiler, "opened"), (Compiler, "run"),
     ):  # fmt: skip
         counted(place, name)
     model = make()
     first = simulate_many(model, 1.0, x0={"x": [0.5, 1.0]}, backend="compiled")
-    assert made[:2] == ["Integrator", "_written"]
+    assert made[:2] == ["Integrator", "with_code"]
     made.clear()
     again = simulate_many(model, 1.0, x0={"x": [1.0, 0.5]}, u={"u": 0.0}, backend="compiled")
     simulate(model, 1.0, backend="vm")
     assert made == []
     np.testing.assert_array_equal(again["x"], first["x"][::-1])
     simulate_many(model, 1.0, method="rodas4p", backend="compiled")
-    assert made[:2] == ["Integrator", "_written"]
+    assert made[:2] == ["Integrator", "with_code"]
     gone = weakref.ref(model)
     del model
     gc.collect()
