@@ -12,13 +12,13 @@ import pytest
 from differentiable import oscillator, switched
 
 import symfric.integrator.compiled.compiler as compiler
-import symfric.integrator.many.program as module
+import symfric.integrator.many.members as module
 import symfric.integrator.running.integrator as built
 from symfric import Hold, Model, simulate, simulate_many
 from symfric.foundation.programs import Compiler
 from symfric.integrator.equations.inputs import Input, input_data
 from symfric.integrator.many.chunk import Chunk, Job, digest
-from symfric.integrator.many.program import program
+from symfric.integrator.many.members import program
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import Given, State
