@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from law_cases import CASES, NO_STEP
-from one_program import STRICT, OneProgram, block_of, has_bits, is_near
+from one_program import LIMITED, STRICT, OneProgram, block_of, has_bits, is_near
 
 from symfric.codegen import plant_block
 from symfric.codegen.runner import run_vm
@@ -19,8 +19,6 @@ from symfric.scenes import ALL_SCENES, Drive
 LAWS = [name for name in CASES if name not in NO_STEP]
 STEEP = "lagged(stribeck)"
 """A filtered velocity of 2 m/s in float is known to 1e-7 m/s, a thousandth of the law's width."""
-LIMITED = ("quarter_car_general", "rate_and_state", "rate_and_state, slip")
-"""Without a value for every argument: a stroke beyond the damper's length, exp of any age."""
 FEW = (
     *("stribeck", "brown_mcphee", "self_tuning", "lugre", "dahl, n 0.5", "maxwell_slip"),
     *("bouc_wen", "lagged(stribeck)", "asymmetric(lugre)", "haessig_friedland, event"),
