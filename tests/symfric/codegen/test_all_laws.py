@@ -28,7 +28,7 @@ FEW = (
 @pytest.fixture(scope="module")
 def laws(compiler: Compiler, tmp_path_factory) -> OneProgram:
     blocks = [block_of(CASES[name]) for name in LAWS]
-    return OneProgram(blocks, tmp_path_factory.mktemp("laws"), compiler)
+    return OneProgram(blocks, tmp_path_factory.mktemp("laws"), compiler, flags=("-O0",))
 
 
 def test_double_has_the_bits_of_casadi_and_guards_report_every_repair(laws: OneProgram) -> None:
