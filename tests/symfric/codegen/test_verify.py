@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from law_cases import CASES, NO_STEP
 from one_program import LIMITED, block_of
+from tables import Names, table
 
 from symfric import BrownMcPhee, LuGre, Model, Output, Stribeck, Variable, law_from_text
 from symfric.codegen import Block, fuzz, generate, guards, law_block, plant_block, source, verify
@@ -31,25 +32,12 @@ def few_steps(monkeypatch):
 
 
 LAWS = {"stribeck": Stribeck(), "lugre": LuGre(), "brown_mcphee": BrownMcPhee()}
-WRONG = {
-    "last bit": ("stribeck", "double", "0.1 +", "0.10000000000000002 +", "F differs from CasADi"),
-    "silent guard": ("lugre", "double", "*status |= clamped;", "", "status differs"),
-    "altered input": ("brown_mcphee", "double", "_mended(v, -1000000.0, 1000000.0",
-                      "_mended(v, -1000000.0, 1e-3", "F differs"),
-    "offset": ("lugre", "float", "out->F_end = ", "out->F_end = 1.0f + ", "F_end is off by "),
-    "default": ("brown_mcphee", "float", "0.15f, ", "0.16f, ", "more than rounding explains"),
-    "reset": ("lugre", "double", "state->z = N * t2 /", "state->z = 2.0 * N * t2 /",
-              "init_sliding.z differs"),
-    "warning": ("brown_mcphee", "float", "const float t1 =",
-                "const float unused = 1.0; const float t1 =", "unused"),
-    "foreign": ("brown_mcphee", "float", "SF_TANHF tanhf", "SF_TANHF (float)tanh", "it needs tanh"),
-    "NaN": ("brown_mcphee", "double", "return F;", "return 0.0 * HUGE_VAL + F;", "F differs"),
-}  # fmt: skip
+TABLE = table(__file__)
 
 
-@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize("name", TABLE["wrong"])
 def test_wrong_c_is_found(name, compiler, tmp_path):
-    law, real, old, new, why = WRONG[name]
+    law, real, old, new, why = TABLE["wrong"][name]
     made = generate(
         LAWS[law], tmp_path, real=real, free=() if law == "stribeck" else None, kit=False
     )
@@ -125,21 +113,13 @@ LEFT = (A.symbol + B.symbol) - LARGE
 """2, of a = 2 and b = 1e6."""
 
 
-@pytest.mark.parametrize(
-    ("expression", "kind", "wanted"),
-    [
-        (LEFT, "", LARGE), (-ca.fabs(LEFT), "", LARGE), (LEFT**2, "", LARGE**2),
-        (ca.sqrt(LEFT), "", LARGE**0.5), (ca.sin(LEFT), "", abs(np.sin(2.0))),
-        (3.0 * LEFT, "", 6.0), (3.0 * LEFT, CONSTRAINTS, 3.0 * LARGE),
-        (0.25 * LEFT, CONSTRAINTS, 0.25 * LARGE), (LEFT / (1 + A.symbol), CONSTRAINTS, LARGE / 3.0),
-        (LEFT + LEFT, "", 2.0 * LARGE), (ca.if_else(A.symbol > 0, LEFT, 1.0), "", LARGE),
-    ],
-)  # fmt: skip
-def test_a_difference_has_the_magnitude_of_its_larger_term(expression, kind, wanted):
-    block = Block("b", inputs=(A, B), outputs={"y": Output(expression, "1", kind=kind)})
-    none = np.zeros((1, 0))
-    found = magnitudes(block, none, none[0], np.array([[2.0, LARGE]]))
-    assert float(found[0]) == pytest.approx(wanted)
+def test_a_difference_has_the_magnitude_of_its_larger_term():
+    names, none = Names(globals()), np.zeros((1, 0))
+    for expression, closing, wanted in TABLE["magnitudes"]:
+        y = Output(names.value(expression), "1", kind=CONSTRAINTS if closing else "")
+        block = Block("b", inputs=(A, B), outputs={"y": y})
+        found = magnitudes(block, none, none[0], np.array([[2.0, LARGE]]))
+        assert float(found[0]) == pytest.approx(names.value(wanted)), expression
     assert terms(block) is terms(block)
 
 

@@ -1,7 +1,6 @@
 """Friction compensators as blocks: stage by stage, and what is refused."""
 
 from math import exp, inf, pi
-from re import escape
 
 import casadi as ca
 import numpy as np
@@ -15,7 +14,6 @@ from symfric import (
     BrownMcPhee,
     Coulomb,
     Dahl,
-    Karnopp,
     Law,
     LuGre,
     SelfTuning,
@@ -24,7 +22,7 @@ from symfric import (
     Viscous,
 )
 from symfric.codegen import law_block
-from symfric.compensation import TERMS, compensator, settings_from_text
+from symfric.compensation import compensator, settings_from_text
 from symfric.foundation.graph import graph
 from symfric.scenes import Drive
 
@@ -266,38 +264,3 @@ def test_settings_are_read_from_texts() -> None:
     assert s.scales == {"coulomb": 0.9, "stribeck": 0.0}
     assert tuple(s.without) == ("viscous",)
     assert s.build_up_table == ((0.0, 0.0), (1.0, 1.0))
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"v_blend": 0.0}, "v_blend: expected a number > 0"),
-        ({"N": "given"}, "N: expected one of input"),
-        ({"scales": ["force"]}, "scales: expected one of coulomb, stribeck, viscous, bristle"),
-        ({"scales": ["coulomb"], "without": ["coulomb"]}, "in scales or in without"),
-        ({"build_up": 1e-4}, "expected a law without states"),
-        ({"build_up_table": ((0, 0), (1, 1))}, "expected with build_up only"),
-        ({"stick": (1.0, 0.1)}, "stick: expected (force [N], time [s], velocity [m/s])"),
-        ({"stick": (1.0, 0.1, 0.0)}, "stick: velocity: expected a number > 0"),
-        ({"dither": (1.0, -1.0)}, "dither: expected (amplitude [N], frequency [Hz])"),
-        ({"velocity": "measured", "delay": 1e-3}, "with a desired velocity only"),
-        ({"limt": 3.0}, "did you mean limit?"),
-        ({"settings": 3}, "expected settings, Compensation()"),
-        ({"h": 0.0}, "h: expected a number > 0"),
-    ],
-)
-def test_bad_settings_are_refused(given: dict[str, object], words: str) -> None:
-    with pytest.raises(ValueError, match=escape(words)) as caught:
-        compensator(LuGre(), **given)
-    assert str(caught.value).startswith(("compensator", "codegen", "settings"))
-
-
-def test_unsuitable_laws_and_tables_are_refused() -> None:
-    for law, settings, words in (
-        (Karnopp(form="original"), {}, "expected a law of v and N only, got one with F_e"),
-        ("lugre", {}, "expected a law such as"),
-        (STEP, {"build_up": 1e-4, "build_up_table": ((0, 0), (1, 0.5))}, "expected rising pairs"),
-    ):
-        with pytest.raises(ValueError, match=words):
-            compensator(law, **settings)
-    assert set(TERMS) >= {"coulomb", "stribeck", "viscous", "bristle"}

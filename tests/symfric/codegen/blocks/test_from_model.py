@@ -1,7 +1,5 @@
 """Plants in fixed steps: C and CasADi agree to the bit, and the step is that of the method."""
 
-from typing import Any
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -24,7 +22,6 @@ from symfric.codegen.runner import run_vm
 from symfric.codegen.verification import excitation
 from symfric.foundation.programs import Compiler
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.model import Event
 from symfric.scenes import Arm, DoublePendulum, Drive, Rabinowicz
 
 x, z, u = Variable("x", "m", start=1.0), Variable("z", "1", start=0.5), Variable("u", "m/s")
@@ -137,26 +134,3 @@ def test_mechanisms_with_friction_use_backward_euler_by_default() -> None:
         (DoublePendulum(LuGre()).model(), {}, "backward Euler"),
     ):
         assert method in plant_block(model, **options).discretisation
-
-
-BOUNCE = Model("ball", x=(x,), ode=-x.symbol, events=(Event("hit", x.symbol - 0.5),))
-LATE = Model("clock", x=(x,), ode=-x.symbol, outputs={"now": Output(BOUNCE.t, "s")}, t=BOUNCE.t)
-
-
-@pytest.mark.parametrize(
-    ("model", "arguments", "message"),
-    [
-        (BOUNCE, {}, "expected a model without events, got 1"),
-        (LATE, {}, "got now; make time a state"),
-        (LEAK, {"h": 0.0}, r"h: expected a number > 0 \[s\]"),
-        (LEAK, {"method": "rodas5"}, "did you mean rodas5p"),
-        (LEAK, {"method": "exponential"}, "got the algebraic unknowns z"),
-        (LEAK, {"name": "int"}, "free C identifier"),
-        (LEAK, {"fold": True}, "fold: expected with a scene only, got a model"),
-        (Drive(LuGre()), {"free": ["mass"]}, "free: expected one of .* got mass"),
-        (3, {}, "a model, or a scene such as Rabinowicz"),
-    ],
-)
-def test_what_cannot_be_a_plant_is_refused(model: Any, arguments: dict[str, Any], message: str):
-    with pytest.raises(ValueError, match=message):
-        plant_block(model, **arguments)
