@@ -204,20 +204,6 @@ def test_a_bead_on_a_turning_wire_is_pressed_by_coriolis_and_weight() -> None:
     assert run["along_N"] == pytest.approx(0.1 * np.hypot(2 * w * v, g), rel=1e-6)
 
 
-def test_a_joint_that_closes_may_be_driven() -> None:
-    """A motor in the pin that closes the four-bar: the angle of the rocker against the coupler."""
-    m = four_bar("pin")
-    scene = FourBar(LAW)
-    beta, gamma, beta_rate, gamma_rate = scene.closed()
-    begin, speed = beta - gamma, beta_rate - gamma_rate
-    m.constraint(PrescribedMotion("motor", "pin", lambda t: begin + speed * t))
-    run = simulate(m.build(), 0.05, backend="vm", samples=6)
-    assert run["pin_slip"] == pytest.approx(scene.R * speed, rel=1e-6)
-    assert np.abs(run["motor_moment"]).min() > 0.0
-    work = run["drive_work_rate"]
-    assert work == pytest.approx(run["motor_moment"] * speed, rel=1e-6)
-
-
 def test_what_is_open_is_refused_and_the_way_out_named() -> None:
     """A hinge fixes what the plane fixes; a line in the plane fixes the way out of it."""
     bar, crank = four_bar("pin"), slider_crank("guide")

@@ -6,7 +6,7 @@ from math import pi, sin
 import casadi as ca
 import numpy as np
 import pytest
-from chains import X, Y, Z, attach, begin, chain, in_both, in_joint_coordinates_first, rod, solve
+from chains import X, Y, attach, begin, chain, in_both, in_joint_coordinates_first, rod, solve
 from scipy.integrate import solve_ivp
 
 from symfric import Viscous, simulate
@@ -346,19 +346,3 @@ def test_an_offset_is_part_of_a_consistent_start() -> None:
         m.build()
     first, second, *_ = m.assembled().build().initial_state()
     assert second == pytest.approx(2.0 * first + 0.5)
-
-
-@in_both
-def test_a_pinion_and_its_rack_feel_each_others_inertia(formulation: str) -> None:
-    """Force 5 N on the rack: a = 5 / (m + J / r^2)."""
-    m = Mechanism("rack")
-    attach(m, Prismatic, "x", "rack", mass=2.0, z=X, x=Z)
-    attach(m, Revolute, "angle", "pinion", J=(0.1, 0.1, 0.06), at=(0.0, 0.1, 0.0))
-    m.constraint(Rolling("mesh", "angle", "x", radius=-0.1))
-    m.force(JointSpringDamper("push", "x", "slide", actuator=5.0))
-    made = m.prepare(formulation=formulation)
-    found = solve(made.eq, made.q0, made.qd0)
-    a = 5.0 / (2.0 + 0.06 / 0.01)
-    assert found.bodies["rack"][3] == pytest.approx(a, rel=1e-13)
-    assert found.bodies["pinion"][2] == pytest.approx(-a / 0.1, rel=1e-13)
-    assert found.lam[made.labels.index("mesh_force")] == pytest.approx(2.0 * a - 5.0, rel=1e-12)

@@ -1,5 +1,6 @@
 """Newton-Euler against Lagrange, energy against work, both formulations, named Functions."""
 
+from dataclasses import replace
 from functools import cache
 
 import casadi as ca
@@ -93,9 +94,10 @@ def test_velocities_and_accelerations_are_derivatives_of_positions(reverse: bool
 
 
 @cache
-def loaded(formulation: str) -> Prepared:
-    """The chain with every kind of force."""
+def loaded(formulation: str, bearing: JointFriction | None = None) -> Prepared:
+    """The chain with every kind of force, and friction in all joints that have any."""
     m = chain()
+    m.joints = [replace(j, friction=bearing if j.rubs else None) for j in m.joints]
     m.force(SpringDamper("spring", "ground", "b3.out", 30.0, 0.5, 2.0, 1.0))
     m.force(SpringDamper("pull", "b1", "b5.out", stiffness=4.0))
     m.force(JointSpringDamper("torsion", "j0", "turn", 5.0, 0.2, 0.3, 1.5))
@@ -133,13 +135,19 @@ def test_both_formulations_agree(name: str) -> None:
         assert wrench == pytest.approx(expected.reactions[joint], abs=1e-11 * scale), joint
 
 
-def test_reactions_of_every_joint_agree_between_the_formulations() -> None:
-    tree, whole = loaded("joint"), loaded("absolute")
-    ours = solve(tree.eq, tree.q0, tree.qd0).reactions
-    expected = solve(whole.eq, whole.q0, whole.qd0).reactions
-    assert len(ours) == len(TREE)
-    for joint, wrench in ours.items():
-        assert wrench == pytest.approx(expected[joint], rel=1e-10, abs=1e-9), joint
+def test_both_formulations_agree_on_every_joint_and_its_friction() -> None:
+    law = BrownMcPhee(mu_s=0.03, mu_d=0.02, v_t=0.5)
+    bearing = JointFriction(law, radius=0.05, length=0.5, width=0.5)
+    made = [loaded(formulation, bearing) for formulation in ("joint", "absolute")]
+    ours, expected = (solve(one.eq, one.q0, one.qd0) for one in made)
+    names = [c.name for c in made[0].eq.contacts]
+    assert names == ["j0", "j1", "j2_slide", "j2_turn", "j3_x", "j3_y", "j5"]
+    assert len(ours.reactions) == len(TREE)
+    assert pytest.approx(expected.N, rel=1e-10) == ours.N
+    for body, motion in ours.bodies.items():
+        assert motion == pytest.approx(expected.bodies[body], rel=1e-9, abs=1e-9), body
+    for joint, wrench in ours.reactions.items():
+        assert wrench == pytest.approx(expected.reactions[joint], rel=1e-9, abs=1e-8), joint
 
 
 def test_swinging_rod_carries_the_centrifugal_force() -> None:

@@ -11,7 +11,7 @@ from chains import X, Y, Z, attach, in_both
 
 from symfric import BrownMcPhee, SolveError, Status, simulate
 from symfric.bench.ivp import correct_digits
-from symfric.bench.ivp_problems import ABSOLUTE, JOINT
+from symfric.bench.ivp_problems import JOINT
 from symfric.multibody import (
     Cylindrical,
     JointFriction,
@@ -237,22 +237,3 @@ def test_squeezer_of_joints_meets_the_published_digits() -> None:
     digits, worst = correct_digits(problem, run)
     assert digits > 7, worst
     assert run.final["constraint_position"] < 1e-15
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["bricard", "governor", "squeezer"])
-def test_absolute_coordinates_agree(name: str) -> None:
-    if name == "squeezer":
-        problem = ABSOLUTE
-        run = simulate(problem.model(), problem.t_end, rtol=1e-8, samples=2, backend="vm")
-        assert correct_digits(problem, run)[0] > 6.5
-        return
-    m = getattr(iftomm, name)()
-    ours, absolute = (
-        simulate(m.build(formulation=f), 1.0, rtol=1e-8, backend="vm")
-        for f in ("joint", "absolute")
-    )
-    for body in m.bodies[1:]:
-        for axis in "xyz":
-            signal = f"{body.name}_{axis}"
-            np.testing.assert_allclose(absolute[signal], ours[signal], atol=1e-5, err_msg=signal)
