@@ -82,9 +82,9 @@ SPIN = np.array([1.0, -4.0, 8.0])
 """9 rad/s."""
 
 
-def ball(law: Law, m: Mechanism | None = None, **friction: Any) -> Mechanism:
+def ball(law: Law, **friction: Any) -> Mechanism:
     """A rotor of J = 0.05 kg m^2 on a ball of 2 cm, pressed by 20 N, spinning about a skew axis."""
-    m = m or Mechanism("rotor", gravity=(0.0, 0.0, -10.0))
+    m = Mechanism("rotor", gravity=(0.0, 0.0, -10.0))
     bearing = JointFriction(law, radius=0.02, **friction)
     rate = (0.0, *(0.5 * SPIN).tolist())
     attach(m, Spherical, "ball", "wheel", mass=2.0, J=0.05, rate=rate, friction=bearing)
