@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from law_cases import given_inputs, state_symbols
 
-import symfric.laws
+import symfric as sf
 from symfric import ALL_LAWS, Law
 from symfric.laws import GMS, Bristle2D, ElastoPlastic, Gonthier, HaessigFriedland, StickSlip
 
-LAWS = {name: getattr(symfric.laws, name) for name in symfric.laws.__all__}
+LAWS = {name: getattr(sf.laws, name) for name in sf.laws.__all__}
 TABLE = tomllib.loads(Path(__file__).with_name("knots.toml").read_text(encoding="utf-8"))
 FORMS: dict[str, tuple[Law, list[tuple[float, int]]]] = {
     text: (eval(text, LAWS), knots) for text, knots in TABLE.items()

@@ -9,42 +9,26 @@ from oracles import StickSlip, rabinowicz_coulomb, rabinowicz_lugre
 from scipy.integrate import solve_ivp
 from stored import stored
 
-from symfric import (
-    ALL_LAWS,
-    BrownMcPhee,
-    Coulomb,
-    Dahl,
-    ExactCoulomb,
-    Law,
-    LuGre,
-    OverloadWarning,
-    SelfTuning,
-    Stribeck,
-    Trajectory,
-    Viscous,
-    drive,
-    rabinowicz,
-    simulate,
-)
+import symfric as sf
 from symfric.scenes import CoupledBlocks, Drive
 
 
 def test_coulomb_braking_takes_the_closed_form_time_and_distance() -> None:
     """From 1 m/s with mu g, the smoothing being far below the velocities that count."""
-    run = simulate(drive(Coulomb(mu_d=0.1, v_eps=1e-6)), 0.9, x0={"v": 1.0}, rtol=1e-8)
+    run = sf.simulate(sf.drive(sf.Coulomb(mu_d=0.1, v_eps=1e-6)), 0.9, x0={"v": 1.0}, rtol=1e-8)
     deceleration = 0.1 * 9.81
     assert run["v"] == pytest.approx(1.0 - deceleration * run.t, abs=1e-6)
     assert run.final["x"] == pytest.approx(0.9 - deceleration * 0.9**2 / 2, abs=1e-6)
 
 
 def test_offset_opposes_the_input() -> None:
-    model = drive(Viscous(sigma_2=2.0), m=1.0, offset=3.0)
-    assert simulate(model, 20.0, u={"force": 5.0}).final["v"] == pytest.approx(1.0, rel=1e-5)
+    model = sf.drive(sf.Viscous(sigma_2=2.0), m=1.0, offset=3.0)
+    assert sf.simulate(model, 20.0, u={"force": 5.0}).final["v"] == pytest.approx(1.0, rel=1e-5)
 
 
-@pytest.mark.parametrize("law", [Stribeck(), LuGre()])
-def test_input_work_is_kinetic_energy_plus_what_friction_takes(law: Stribeck | LuGre) -> None:
-    run = simulate(drive(law), 2.0, u={"force": 2.0}, rtol=1e-8, samples=20_001)
+@pytest.mark.parametrize("law", [sf.Stribeck(), sf.LuGre()])
+def test_input_work_is_kinetic_energy_plus_what_friction_takes(law: sf.Stribeck | sf.LuGre) -> None:
+    run = sf.simulate(sf.drive(law), 2.0, u={"force": 2.0}, rtol=1e-8, samples=20_001)
     kinetic = 0.5 * 0.8 * run.final["v"] ** 2
     taken = np.trapezoid(run["power"], run.t)
     assert 2.0 * run.final["x"] == pytest.approx(kinetic + taken, rel=1e-6)
@@ -53,14 +37,14 @@ def test_input_work_is_kinetic_energy_plus_what_friction_takes(law: Stribeck | L
 
 def test_axis_that_turns_has_the_equations_of_one_that_slides_and_its_own_units() -> None:
     free = ["m", "sigma_0"]
-    slides, turns = Drive(LuGre()).model(free), Drive(LuGre(), turning=True).model(free)
-    runs = [simulate(m, 1.0, u={"force": 1.3}, backend="vm") for m in (slides, turns)]
+    slides, turns = Drive(sf.LuGre()).model(free), Drive(sf.LuGre(), turning=True).model(free)
+    runs = [sf.simulate(m, 1.0, u={"force": 1.3}, backend="vm") for m in (slides, turns)]
     assert runs[0].final == runs[1].final
     assert turns.signals == {
         "x": "rad", "v": "rad/s", "z": "rad", "force": "N m", "friction": "N m", "power": "W",
     }  # fmt: skip
     assert [p.unit for p in turns.p] == ["kg m^2", "N m/rad"]
-    assert drive(LuGre(), turning=True).signals == turns.signals
+    assert sf.drive(sf.LuGre(), turning=True).signals == turns.signals
 
 
 M, K, V_BELT, G = 0.8, 2.1, 0.1, 9.81
@@ -79,22 +63,22 @@ def test_closed_form_has_the_published_numbers() -> None:
 
 
 def test_belt_carries_the_block_along_while_friction_opposes_the_slip() -> None:
-    for name, kind in ALL_LAWS.items():
+    for name, kind in sf.ALL_LAWS.items():
         if {i.name for i in kind().inputs} <= {"F_e"}:
-            model = rabinowicz(kind())
+            model = sf.rabinowicz(kind())
             at = 0.0, model.initial_state(), [], [], []
             assert float(model.function("v_rel")(*at)) == -V_BELT, name
             assert float(model.function("friction")(*at)) < 0, name
             assert float(model.function("ode")(*at)[1]) > 0, name
 
 
-def energy(run: Trajectory) -> np.ndarray:
+def energy(run: sf.Trajectory) -> np.ndarray:
     return 0.5 * M * run["v"] ** 2 + 0.5 * K * run["x"] ** 2
 
 
-@pytest.mark.parametrize("law", [BrownMcPhee(v_t=1e-2), LuGre(), Dahl()])
-def test_energy_gained_is_work_of_the_belt_less_what_the_contact_takes(law: Law) -> None:
-    run = simulate(rabinowicz(law), 9.0, rtol=1e-8, samples=100_001)
+@pytest.mark.parametrize("law", [sf.BrownMcPhee(v_t=1e-2), sf.LuGre(), sf.Dahl()])
+def test_energy_gained_is_work_of_the_belt_less_what_the_contact_takes(law: sf.Law) -> None:
+    run = sf.simulate(sf.rabinowicz(law), 9.0, rtol=1e-8, samples=100_001)
     belt = np.trapezoid(-run["friction"] * V_BELT, run.t)
     contact = np.trapezoid(run["power"], run.t)
     gained = energy(run)[-1] - energy(run)[0]
@@ -104,9 +88,9 @@ def test_energy_gained_is_work_of_the_belt_less_what_the_contact_takes(law: Law)
 
 
 @cache
-def cycle(law: Law) -> tuple[float, float, float]:
+def cycle(law: sf.Law) -> tuple[float, float, float]:
     """Period, largest and smallest elongation of the settled stick-slip."""
-    run = simulate(rabinowicz(law), 26.0, rtol=1e-9, samples=26_001)
+    run = sf.simulate(sf.rabinowicz(law), 26.0, rtol=1e-9, samples=26_001)
     settled, x = run.t > 7.0, run["x"] - ideal().x_centre
     falling = np.flatnonzero((x[:-1] > 0) & (x[1:] <= 0))
     share = x[falling] / (x[falling] - x[falling + 1])
@@ -118,7 +102,7 @@ def cycle(law: Law) -> tuple[float, float, float]:
 def brown_mcphee_peak() -> float:
     """Its peak misses the static level, which is what its stick-slip tends to."""
     x = np.linspace(0.9, 1.1, 200_001)
-    return float(np.max(BrownMcPhee(v_t=1.0).force(x, 1.0)))
+    return float(np.max(sf.BrownMcPhee(v_t=1.0).force(x, 1.0)))
 
 
 WIDTHS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -128,9 +112,9 @@ WIDTHS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 def errors(kind: str) -> np.ndarray:
     """Distance of period, x_max and x_min to the closed form, a row per width."""
     if kind == "brown_mcphee":
-        target, laws = ideal(mu_s=brown_mcphee_peak()), [BrownMcPhee(v_t=w) for w in WIDTHS]
+        target, laws = ideal(mu_s=brown_mcphee_peak()), [sf.BrownMcPhee(v_t=w) for w in WIDTHS]
     else:
-        target, laws = ideal(), [SelfTuning.from_peak_velocity(w) for w in WIDTHS]
+        target, laws = ideal(), [sf.SelfTuning.from_peak_velocity(w) for w in WIDTHS]
     expected = target.period, target.x_max, target.x_min
     return np.abs(np.array([cycle(law) for law in laws]) - expected)
 
@@ -152,7 +136,7 @@ def test_stick_slip_approaches_the_closed_form_with_the_width(kind: str) -> None
 
 def test_seed_widths_of_brown_mcphee_come_as_close_as_stated() -> None:
     """Against the plain closed form: 1e-5 hits it by chance, between its two errors."""
-    periods = [cycle(BrownMcPhee(v_t=w))[0] for w in WIDTHS]
+    periods = [cycle(sf.BrownMcPhee(v_t=w))[0] for w in WIDTHS]
     assert [round(p - ideal().period, 3) for p in periods] == [0.48, 0.097, 0.017, 0.0, -0.003]
 
 
@@ -183,20 +167,20 @@ def test_lugre_agrees_with_an_independent_integrator_if_smoothed_below_its_creep
     for v_eps, rtol, error in (
         (0.0, 1e-6, 2e-4), (0.0, 1e-10, 2e-8), (1e-9, 1e-10, 2e-8), (1e-6, 1e-10, 1e-6),
     ):  # fmt: skip
-        run = simulate(rabinowicz(LuGre(v_eps=v_eps)), 8.0, t_eval=t, rtol=rtol)
+        run = sf.simulate(sf.rabinowicz(sf.LuGre(v_eps=v_eps)), 8.0, t_eval=t, rtol=rtol)
         assert np.abs(run["x"] - expected[0]).max() < error
         assert v_eps or np.abs(run["v"] - expected[1]).max() < error
         assert v_eps or np.abs(run["z"] - expected[2]).max() < error * 1e-4
-    with pytest.warns(OverloadWarning, match="times its static level"):
-        run = simulate(rabinowicz(LuGre(v_eps=1e-5)), 8.0, t_eval=t, rtol=1e-8)
+    with pytest.warns(sf.OverloadWarning, match="times its static level"):
+        run = sf.simulate(sf.rabinowicz(sf.LuGre(v_eps=1e-5)), 8.0, t_eval=t, rtol=1e-8)
     assert np.abs(run["x"] - expected[0]).max() > 0.1
 
 
 def test_free_parameters_become_symbols_with_unit_and_start() -> None:
-    model = rabinowicz(BrownMcPhee(), free=["mu_s", "k"], k=3.0)
+    model = sf.rabinowicz(sf.BrownMcPhee(), free=["mu_s", "k"], k=3.0)
     assert [(p.name, p.unit, p.start) for p in model.p] == [("mu_s", "1", 0.15), ("k", "N/m", 3.0)]
-    one = simulate(model, 3.0, p={"mu_s": 0.2, "k": 2.1}, rtol=1e-8)
-    other = simulate(rabinowicz(BrownMcPhee(mu_s=0.2)), 3.0, rtol=1e-8)
+    one = sf.simulate(model, 3.0, p={"mu_s": 0.2, "k": 2.1}, rtol=1e-8)
+    other = sf.simulate(sf.rabinowicz(sf.BrownMcPhee(mu_s=0.2)), 3.0, rtol=1e-8)
     assert one["x"] == pytest.approx(other["x"], abs=1e-6)
 
 
@@ -205,13 +189,13 @@ UNIT = {"m_1": 1.0, "m_2": 1.0, "g": 1.0, "start_2": 0.0}
 
 @pytest.mark.parametrize("v_belt", [0.1, 0.3])
 def test_blocks_stick_and_slip_as_the_matrix_exponential_says(v_belt: float) -> None:
-    laws = ExactCoulomb(mu_s=1.0, mu_d=0.7), ExactCoulomb(mu_s=1.3, mu_d=0.9)
+    laws = sf.ExactCoulomb(mu_s=1.0, mu_d=0.7), sf.ExactCoulomb(mu_s=1.3, mu_d=0.9)
     K = np.array([[1.0 + 1.2, -1.2], [-1.2, 0.8 + 1.2]])
     happened, last = blocks_on_belt(K, (1.0, 1.3), (0.7, 0.9), v_belt, 40.0)
     scene = CoupledBlocks(
         laws[0], block_2=laws[1], k_1=1.0, k_2=0.8, k_c=1.2, v_belt=v_belt, **UNIT
     )
-    run = simulate(scene.model(), 40.0, rtol=1e-10)
+    run = sf.simulate(scene.model(), 40.0, rtol=1e-10)
     found = [(t, int(name[6]) - 1, name[8:]) for t, name in run.happened]
     assert len(happened) > 10
     assert [(i, what) for _, i, what in found] == [(i, what) for _, i, what in happened]
@@ -221,8 +205,8 @@ def test_blocks_stick_and_slip_as_the_matrix_exponential_says(v_belt: float) -> 
 
 
 def test_work_of_the_belt_is_what_springs_and_friction_take() -> None:
-    scene = CoupledBlocks(LuGre())
-    run = simulate(scene.model(), 5.0, rtol=1e-9, samples=50001)
+    scene = CoupledBlocks(sf.LuGre())
+    run = sf.simulate(scene.model(), 5.0, rtol=1e-9, samples=50001)
     energy = 0.4 * (run["v_1"] ** 2 + run["v_2"] ** 2) + 1.05 * (run["x_1"] ** 2 + run["x_2"] ** 2)
     energy += 1.25 * (run["x_2"] - run["x_1"]) ** 2
     belt = -0.1 * (run["friction_1"] + run["friction_2"])
