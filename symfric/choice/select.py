@@ -1,6 +1,5 @@
 """Choice of a law: candidates run in the user's machine and are ranked by work at equal error."""
 
-import csv
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -19,7 +18,7 @@ from symfric.choice.nature import forms, needed
 from symfric.choice.ranking import FAILED, Ranking, Row, lines, ordered
 from symfric.figures.regularisation import Measure, machine_of
 from symfric.foundation import checks
-from symfric.foundation.files import write_text, written
+from symfric.foundation.files import write_table, write_text
 from symfric.foundation.workers import Crashed, outcomes
 from symfric.integrator.equations.inputs import Input
 from symfric.laws import ALL_LAWS, BrownMcPhee, Law
@@ -70,10 +69,7 @@ class Choice(Ranking):
     def to_csv(self, path: str | Path) -> None:
         """Write the table as CSV, with one line per law."""
         rows = self.table
-        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            sheet = csv.DictWriter(file, fieldnames=list(rows[0]) if rows else ["law"])
-            sheet.writeheader()
-            sheet.writerows(rows)
+        write_table(path, rows[0] if rows else ["law"], (row.values() for row in rows))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; NaN and infinity are None."""
