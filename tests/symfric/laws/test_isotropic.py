@@ -209,14 +209,6 @@ def test_slip_in_a_plane_of_space_is_slip_in_the_plane() -> None:
         assert rate == pytest.approx(whole, rel=1e-9, abs=1e-12)
 
 
-def test_sideways_slip_lowers_the_resistance_along() -> None:
-    """Coulomb's cone: while sliding fast across, a slow push along meets viscous friction only."""
-    law = sf.PlanarSlip(sf.Coulomb(mu_d=0.1, v_eps=1e-3))
-    F = law.force((0.01, 1.0), N)
-    assert F[1] == pytest.approx(0.1 * N, rel=1e-4)
-    assert F[0] == pytest.approx(0.1 * N * 0.01, rel=1e-3)
-
-
 def test_sliding_points_against_the_motion_with_the_force_of_the_law() -> None:
     e = np.array([0.6, -0.8])
     for name in DYNAMIC:

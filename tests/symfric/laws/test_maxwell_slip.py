@@ -197,13 +197,6 @@ PUBLISHED = Leuven(SLIDERS, mu_s=1.05, mu_d=0.2, v_s=98e-6, delta=0.78, sigma_1=
 LEUVEN_POINTS = [0.0, 1.0e-6, 0.4e-6, 0.8e-6, 0.4e-6, -0.2e-6]
 
 
-def test_every_sharing_of_the_level_is_steady() -> None:
-    v, level = 2e-4, stribeck_curve(2e-4, 1.0, 1.05, 0.2, 98e-6, 0.78)
-    for shares in ([0.25] * 4, [0.1, 0.2, 0.3, 0.4]):
-        rate = PUBLISHED.rate(v, 1.0, level * np.array(shares))
-        assert np.abs(rate).max() < 1e-3 * 1.3e6 * v
-
-
 def test_far_below_the_level_it_is_maxwell_slip() -> None:
     """Up to half the level the transition takes less than (1/2)^8/8 of the stretch."""
     strong = Leuven(SLIDERS, mu_s=1.05, mu_d=1.05, sigma_1=0.0, n=100.0, delta_l=50.0)
@@ -214,10 +207,3 @@ def test_far_below_the_level_it_is_maxwell_slip() -> None:
         for law in (strong, MaxwellSlip(SLIDERS, n=100.0))
     )
     assert one == pytest.approx(other, abs=1e-4)
-
-
-def test_closed_inner_loop_returns_nearly() -> None:
-    strong = Leuven(SLIDERS, mu_s=1.05, mu_d=1.05, sigma_1=0.0, n=200.0)
-    run = simulate(prescribed_motion(strong, 1.0, through(LEUVEN_POINTS, 1.0)), 5.0, rtol=1e-9)
-    corners = np.interp(np.arange(6.0), run.t, run["friction"])
-    assert corners[4] == pytest.approx(corners[2], abs=5e-3)

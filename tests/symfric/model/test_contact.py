@@ -106,20 +106,6 @@ def test_an_unknown_may_hold_the_contact() -> None:
     assert held.open is held
 
 
-def test_further_parameters_and_monitors_come_with_the_forces() -> None:
-    model = sf.drive(sf.LuGre())
-    (contact,) = model.contacts
-    v_t = sf.Variable("guide_v_t", "m/s", start=1e-2)
-    law = sf.BrownMcPhee(v_t=v_t.symbol)
-    force = law.force(contact.slip, contact.N)
-    watched = (sf.Monitor(contact.slip, v_t.symbol),)
-    smooth = model.with_forces({"guide": force}, p=(v_t,), monitors=watched)
-    assert [v.name for v in smooth.p] == ["guide_v_t"]
-    slow = sf.simulate(smooth, 1.0, u={"force": 0.5}, p={"guide_v_t": 1e-4})["v"][-1]
-    fast = sf.simulate(smooth, 1.0, u={"force": 0.5})["v"][-1]
-    assert fast == pytest.approx(100 * slow, rel=1e-3)
-
-
 def test_a_load_may_follow_from_the_friction_of_another_contact() -> None:
     x, v = sf.Variable("x", "m"), sf.Variable("v", "m/s", start=1.0)
     one = sf.Contact("one", v.symbol, 10.0, sf.Stribeck(sigma_2=0.1))
