@@ -41,11 +41,10 @@ def functions(
     eq = mechanism.prepare(p, formulation).eq
     where = f"mechanism '{mechanism.name}'"
     if applied := [c for c in eq.contacts if c.law.inputs]:
+        law = type(applied[0].friction.law).__name__
         raise ValueError(
-            f"{where} > joint '{applied[0].joint}' > friction > law: expected "
-            "one that needs only v and N, got "
-            f"{type(applied[0].friction.law).__name__}, whose force in stick depends on the motion;"
-            " use `build` for a model"
+            f"{where} > joint '{applied[0].joint}' > friction > law: expected one that needs only "
+            f"v and N, got {law}, whose force in stick depends on the motion; use `build`"
         )
     contacts = slips(eq, [1.0] * len(eq.contacts))
     forces = stacked(c.force for c in contacts)

@@ -187,7 +187,7 @@ class Mechanism(packed.Portable, Showing):
         if index not in (None, 0, 1):
             raise ValueError(f"mechanism '{self.name}': index: expected 0 or 1, got {index!r}")
         chosen = (0 if formulation == "absolute" else 1) if index is None else index
-        return assemble(self.name, self.prepare(p, formulation), tuple(self.inputs), chosen)
+        return assemble(self.name, self.prepare(p, formulation), chosen)
 
     def prepare(self, p: Variables = (), formulation: str = "joint") -> Prepared:
         """Check the mechanism and return its equations of motion with their variables.
@@ -200,14 +200,15 @@ class Mechanism(packed.Portable, Showing):
         p = many(where, p, "variables")
         for variable in p:
             kind(where, variable, Variable, "variables made by Variable(...)")
-        made = written(self._tree(p), self.forces, self.constraints, p)
-        loose = undeclared_in_forces(made, tuple(self.inputs))
+        u = tuple(self.inputs)
+        made = replace(written(self._tree(p), self.forces, self.constraints, p), u=u)
+        loose = undeclared_in_forces(made)
         self._refuse([*made.problems, *made.misfits, *left_open(made), *loose])
         self._refuse(infinite(made))
         self._refuse(without_inertia(made))
         if formulation == "absolute":
             self._refuse(inseparable(made))
-            made = in_absolute_coordinates(made, self.constraints)
+            made = replace(in_absolute_coordinates(made, self.constraints), u=u)
             self._refuse([*made.problems, *left_open(made)])
         return made
 
@@ -279,16 +280,12 @@ class Mechanism(packed.Portable, Showing):
             near = made.q0
         _, J, phi_t = at(near)
         rates = following(J, made.qd0, phi_t)
-        links = made.eq.kin.topology.link_of
-        placed = copy(self)
-        placed.joints = [
-            replace(
-                joint,
-                start=tuple(near[links[joint.name].rows].tolist()),
-                rate=tuple(rates[links[joint.name].rows].tolist()),
-            )
-            if joint.name in links
-            else joint
-            for joint in self.joints
-        ]
+        placed, links = copy(self), made.eq.kin.topology.link_of
+        placed.joints = []
+        for joint in self.joints:
+            if (link := links.get(joint.name)) is not None:
+                start, rate = (tuple(x[link.rows].tolist()) for x in (near, rates))
+                placed.joints.append(replace(joint, start=start, rate=rate))
+            else:
+                placed.joints.append(joint)
         return placed

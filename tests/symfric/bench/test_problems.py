@@ -23,7 +23,7 @@ MOST_STEPS = {
     "Chemical Akzo Nobel": 130, "transistor amplifier": 4500, "Pleiades": 330,
     "Andrews' squeezer": 400, "Andrews' squeezer, absolute coordinates": 1000, "car axis": 1100,
 }  # fmt: skip
-"""The squeezer in joint coordinates is a case of `multibody/test_iftomm.py`."""
+"""The squeezer in joint coordinates is a case of `multibody/test_loops.py`."""
 
 
 def reached(problem: Problem, method: str, rtol: float, engine: str | None = None) -> Row:

@@ -270,7 +270,7 @@ class Crooked(sf.StaticLaw):
 
 
 def test_expressions_without_vectors_are_refused_by_what_they_do() -> None:
-    assert anisotropy(Crooked()) == "it adds a number to what has a direction"
+    assert anisotropy(Crooked()) == "it adds a number to a vector"
 
 
 def test_every_law_without_sides_and_modes_has_a_vector_form() -> None:
