@@ -54,9 +54,8 @@ def main(out: Path) -> None:
     for i in JOINTS:
         q, torque = best[f"q{i}"], best[f"tau{i}"]
         table.add_row(f"q{i}", f"{q[0]:+.3f}", f"{q[-1]:+.3f}", f"{abs(torque).max():.1f}")
-    console = Console()
-    console.print(table)
-    console.print(f"J = {best.cost:.3f}, verified: {best.verified}")
+    Console().print(table)
+    print(f"J = {best.cost:.3f}, verified: {best.verified}")
     best.plot(*(f"q{i}" for i in JOINTS), path=out / "arm_to_a_place.png")
 
 

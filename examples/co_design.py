@@ -68,9 +68,8 @@ def main(out: Path) -> None:
     for k in (100.0, 250.0, 400.0):
         other = solve(replace(chosen, choose={}, p={"k": k}))
         table.add_row(f"{k:.2f}", f"{other.cost:.4f}", str(other.verified))
-    console = Console()
-    console.print(table)
-    console.print(f"in resonance: {RESONANCE:.2f} N/m, {PRICE:.4f} N^2 s")
+    Console().print(table)
+    print(f"in resonance: {RESONANCE:.2f} N/m, {PRICE:.4f} N^2 s")
     best.plot("x", "v", "force", path=out / "co_design.png")
 
 

@@ -16,7 +16,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 
 from identification import Dataset, Fit, Points
 from symfric import ElastoPlastic, ExactCoulomb, Law, LuGre, drive
@@ -49,25 +48,24 @@ def identified() -> LuGre:
 
 def main(out: Path) -> None:
     """Fit, write the C, close the loops, print, and leave data and pictures in `out`."""
-    say = Console(width=100, highlight=False, markup=False).print
     law = identified()
-    say(
+    print(
         f"fitted: mu_s {law.mu_s:.3g}, mu_d {law.mu_d:.3g} N, v_s {1e3 * law.v_s:.3g} mm/s, ",
         end="",
     )
-    say(f"sigma_2 {law.sigma_2:.3g} N s/m")
+    print(f"sigma_2 {law.sigma_2:.3g} N s/m")
 
     # the excess of break-away over sliding is left out: it is what makes an axis jump at rest
     block = compensator(law, v_blend=0.02, error_gain=CONTROLLER.kp, without=["stribeck"])
-    say(f"C: {verify(generate(block, out / 'c')).status}")
+    print(f"C: {verify(generate(block, out / 'c')).status}")
 
     for name, friction in PLANTS.items():
         plant = drive(friction, m=CONTROLLER.inertia, N=1.0)
         moving = close_loop(plant, sine(0.02, 0.5, 6.0), block, controller=CONTROLLER)
         resting = close_loop(plant, step(0.01, 20.0), block, controller=CONTROLLER)
         hunting = [1e6 * loop.hunting for loop in resting.loops.values()]
-        say(f"{name}: RMS error {moving.reduction('compensated'):.1f} times smaller, ", end="")
-        say("hunting {:.4g} um without, {:.2g} um with".format(*hunting))
+        print(f"{name}: RMS error {moving.reduction('compensated'):.1f} times smaller, ", end="")
+        print("hunting {:.4g} um without, {:.2g} um with".format(*hunting))
         if friction is TRUTH:
             moving.plot(path=out / "compensate_drive.png")
             resting.plot(path=out / "compensate_drive_at_rest.png")

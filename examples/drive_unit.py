@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from symfric import LuGre, stepper
 from symfric.fmu import export_fmu, running
@@ -60,11 +59,10 @@ def main(out: Path) -> None:
     law = LuGre(mu_s=6.0, mu_d=4.0, v_s=1e-2, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0)
     scene = Drive(law, m=1.0, N=1.0)
     unit = export_fmu(scene, out / "drive.fmu", rtol=1e-8, t_end=END)
-    say = Console(highlight=False, soft_wrap=True).print
-    say(str(unit))
+    print(unit)
     x, attempts = in_unit(unit.path)
     difference = float(np.abs(x - in_python(scene)).max())
-    say(f"1 kHz: {attempts / TIMES.size:.2f} attempts a sample, unit - Python {difference:.1e} m")
+    print(f"1 kHz: {attempts / TIMES.size:.2f} attempts a sample, unit - Python {difference:.1e} m")
     figure, (axes,) = panels(1)
     axes.plot(TIMES, 1e3 * x)
     title = "Drive with LuGre friction as a unit, PD at 1 kHz"

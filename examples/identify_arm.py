@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from identification import Dataset, Fit, InverseDynamics
 from symfric import simulate
@@ -90,9 +89,9 @@ def main(out: Path) -> None:
     start = {n: 2.0 * x for n, x in TRUE.items()}
     data = recorded(1) + recorded(2)
     found = Fit(InverseDynamics(), arm(servo=False), data, free=start).solve()
-    (console := Console()).print(str(found))
+    print(found)
     for name, true in TRUE.items():
-        console.print(f"{name}: {found.values[name]:.4g}, put in {true:g}")
+        print(f"{name}: {found.values[name]:.4g}, put in {true:g}")
     found.plot(out / "identify_arm.png")
 
 

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from identification.data.dataset import Dataset
 from identification.fit import Fit
@@ -60,10 +59,9 @@ def laws() -> dict[str, tuple[LuGre | GMS, list[str]]]:
 def main(out: Path, file: Path | None) -> None:
     """Read, fit to one half, judge by the other, and leave pictures in `out`."""
     out.mkdir(parents=True, exist_ok=True)
-    console = Console(soft_wrap=True, highlight=False)
     if file is None:
         file = MEASURED if MEASURED.is_file() else made_up(out / "made_up.csv")
-    console.print(f"data: {file.name}")
+    print(f"data: {file.name}")
 
     record = Dataset.read(file, columns=COLUMNS, units=UNITS).thinned(2)[0]
     v = np.gradient(record["x"], record.time)  # the encoder knows the path better than a tachometer
@@ -74,8 +72,8 @@ def main(out: Path, file: Path | None) -> None:
         fit = Fit(Points(offset=True), law, first, free=free, starts=3).solve(throw=False)
         fit.plot(out / f"{name}.png")
         (half,) = fit.validate(rest).values()
-        console.print(f"{name}: {half.rms:.4f} N m on the second half, {fit.status.name}")
-        console.print(str(fit), "", sep="\n", markup=False)
+        print(f"{name}: {half.rms:.4f} N m on the second half, {fit.status.name}")
+        print(fit, "", sep="\n")
 
 
 if __name__ == "__main__":

@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from identification.data.dataset import Dataset
 from identification.fit import Fit
@@ -88,9 +87,8 @@ def main(out: Path) -> None:
         raise SystemExit("no law came out of the fit")
     path = slow((4, 0.07), (3, 0.11), (0.7, 0.43))
     wrong = forces(fit.law, *path) - forces(law, *path)
-    console = Console(soft_wrap=True, highlight=False)
-    console.print(str(fit), markup=False)
-    console.print(f"another path: {np.sqrt(np.mean(wrong**2)) / NOISE:.3f} of the noise")
+    print(fit)
+    print(f"another path: {np.sqrt(np.mean(wrong**2)) / NOISE:.3f} of the noise")
 
 
 if __name__ == "__main__":

@@ -56,10 +56,10 @@ def main(out: Path) -> None:
     data = recorded(model)
     swings, other = Dataset(data.records[:4], "swings"), Dataset(data.records[4:], "other")
     fit = Fit(Shooting(), model, swings).solve()
-    sys.stdout.write(f"{fit}\n")
+    print(fit)
     for (record, signal), error in fit.validate(other).items():
         off, line = 1e3 * error.rms, 1e3 * LINE
-        sys.stdout.write(f"{record}, {signal}: off by {off:.2f} mrad; a line is {line:.2f} mrad\n")
+        print(f"{record}, {signal}: off by {off:.2f} mrad; a line is {line:.2f} mrad")
     fit.plot(out / "pendulum.png")
 
 

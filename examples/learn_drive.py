@@ -15,7 +15,6 @@ from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from symfric import LuGre, drive, stepper
 from symfric.foundation.panels import grid, save
@@ -89,7 +88,7 @@ def main(out: Path) -> None:
     left.set(xlabel="round", ylabel="best reward")
     for axes, title, (total, errors) in ((middle, "before", before), (right, "after", after)):
         last = 1e3 * np.median(np.abs(errors[-1]))
-        Console().print(f"{title}: reward {total.mean():.2f}, median error after 1 s {last:.2f} mm")
+        print(f"{title}: reward {total.mean():.2f}, median error after 1 s {last:.2f} mm")
         axes.plot(DT * np.arange(STEPS + 1), 1e3 * errors[:, :40], color=COLOURS[0], alpha=0.3)
         axes.set(xlabel="t [s]", ylabel="error [mm]", title=title, ylim=(-100, 100))
     save(figure, out / "learn_drive.png")

@@ -78,9 +78,8 @@ def main(out: Path) -> None:
         for name, plant in plants().items()
     }
     check = made.to_c(out / "c").verify()
-    console = Console()
-    console.print(table(loops))
-    console.print(f"C: {check.status}, {check.bytes} bytes of memory")
+    Console().print(table(loops))
+    print(f"C: {check.status}, {check.bytes} bytes of memory")
     plot_loops(loops, ["x", "v", "force"], out / "mpc_drive.png")
     loops["Coulomb"].to_csv(out / "mpc_drive.csv")
 

@@ -12,12 +12,10 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from rich.console import Console
 
 from symfric import Hold, LuGre, drive, flow, simulate
 
 GOAL, T, N = 0.1, 1.0, 50
-console = Console(highlight=False)
 
 
 def main(folder: Path) -> None:
@@ -40,10 +38,8 @@ def main(folder: Path) -> None:
 
     held = Hold(np.linspace(0.0, T, N + 1)[:-1], np.ravel(found.value(u)))
     run = simulate(model, T, u={"force": held}, x0={"x": 0.0, "v": 0.0, "z": 0.0})
-    console.print(f"{opti.stats()['iter_count']} iterations, J = {found.value(opti.f):.4f} N^2 s")
-    console.print(
-        f"simulated: {1e6 * (run.final['x'] - GOAL):+.1f} um, {1e6 * run.final['v']:+.1f} um/s"
-    )
+    print(f"{opti.stats()['iter_count']} iterations, J = {found.value(opti.f):.4f} N^2 s")
+    print(f"simulated: {1e6 * (run.final['x'] - GOAL):+.1f} um, {1e6 * run.final['v']:+.1f} um/s")
     folder.mkdir(parents=True, exist_ok=True)
     run.plot("x", "v", "force", "friction", path=folder / "opti_lugre.png")
 

@@ -45,10 +45,9 @@ def modes(best: Solution) -> Table:
 def main(out: Path) -> None:
     """Solve, say what came out, and draw it."""
     best = solve(problem())
-    console = Console()
-    console.print(best.message)
-    console.print(modes(best))
-    console.print(f"J = {best.cost:.4f} N^2 s, exact {EXACT:.4f}; verified: {best.verified}")
+    print(best.message)
+    Console().print(modes(best))
+    print(f"J = {best.cost:.4f} N^2 s, exact {EXACT:.4f}; verified: {best.verified}")
     best.plot("x", "v", "force", path=out / "out_and_back.png")
 
 

@@ -78,9 +78,8 @@ def main() -> None:
         mean = LAW.mu_d * real[f"{name}_N"].mean() * np.abs(real[f"{name}_slip"]).mean()
         table.add_row(name, f"{lost:.1f}", f"{mean * real.t[-1]:.1f}")
     work = [OMEGA * float(run.integral("drive_moment")[-1]) for run in (smooth, real)]
-    console = Console()
-    console.print(table)
-    console.print(f"work of the drive: {work[0]:.0f} J without friction, {work[1]:.0f} J with it")
+    Console().print(table)
+    print(f"work of the drive: {work[0]:.0f} J without friction, {work[1]:.0f} J with it")
     figure, (upper, lower) = panels(2)
     for k, (run, label) in enumerate(((smooth, "without friction"), (real, "with friction"))):
         upper.plot(np.degrees(run["crank"]), run["drive_moment"], label=label, **line(k))

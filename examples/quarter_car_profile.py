@@ -17,7 +17,6 @@ import sys
 from pathlib import Path
 
 import casadi as ca
-from rich.console import Console
 
 from ocp import Phase, Problem, integral, solve
 from symfric import BrownMcPhee, Contact, Model, Output, Variable
@@ -65,10 +64,9 @@ def problem() -> Problem:
 def main(out: Path) -> None:
     """Solve, print and draw."""
     best = solve(problem())
-    console = Console()
-    console.print(best.message)
-    console.print(f"J = {best.cost:.5f} m^2/s^3, a body alone {GENTLEST:.5f}")
-    console.print(f"plate: {1e3 * best['plate'].max():.1f} mm at most; verified: {best.verified}")
+    print(best.message)
+    print(f"J = {best.cost:.5f} m^2/s^3, a body alone {GENTLEST:.5f}")
+    print(f"plate: {1e3 * best['plate'].max():.1f} mm at most; verified: {best.verified}")
     best.plot("body", "plate", "speed", "a_body", path=out / "quarter_car_profile.png")
 
 

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from symfric import BrownMcPhee, stepper
 from symfric.codegen import generate, inverse_dynamics_block, verify
@@ -70,7 +69,7 @@ def main(out: Path) -> None:
     arm = Arm(BrownMcPhee(), load=LOAD)
     block = inverse_dynamics_block(Arm(BrownMcPhee()).mechanism(), payload="link6")
     made = generate(block, out / "c", real=("double", "float"))
-    Console().print(f"C: {verify(made).status}")
+    print(f"C: {verify(made).status}")
     sys.path.insert(0, str(out / "c"))
     kit = import_module("arm_ctypes")
 
@@ -88,7 +87,7 @@ def main(out: Path) -> None:
     t, off = H * np.arange(len(q)), 1e3 * np.linalg.norm(np.array(errors), axis=2)
     figure, (axes,) = panels(1, height=2.8)
     for i, name in enumerate(CASES):
-        Console().print(f"{name}: {np.sqrt(np.mean(off[:, i] ** 2)):.3f} mrad rms")
+        print(f"{name}: {np.sqrt(np.mean(off[:, i] ** 2)):.3f} mrad rms")
         axes.semilogy(t, off[:, i], label=name, **line(i))
     axes.set(xlabel="t [s]", ylabel="error of all joints [mrad]", ylim=(1e-3, None))
     axes.legend()

@@ -63,11 +63,10 @@ def main(out: Path) -> None:
     table = Table("mode", "from [s]", "to [s]")
     for mode in best.modes.get("x", ()):
         table.add_row(mode.kind, f"{mode.begin:.4f}", f"{mode.end:.4f}")
-    console = Console()
-    console.print(table)
+    Console().print(table)
     reach = max(abs(best["bob_x"]))
-    console.print(f"J = {best.cost:.2f} in {best.T:.3f} s, bob within {reach:.3f} m")
-    console.print(f"verified: {best.verified}")
+    print(f"J = {best.cost:.2f} in {best.T:.3f} s, bob within {reach:.3f} m")
+    print(f"verified: {best.verified}")
     best.plot("x", "theta", "bob_x", "force", path=out / "swing_up.png")
 
 

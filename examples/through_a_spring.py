@@ -63,10 +63,9 @@ def main(out: Path) -> None:
     table = Table("mode", "from [s]", "to [s]")
     for mode in best.modes.get("guide", ()):
         table.add_row(mode.kind, f"{mode.begin:.4f}", f"{mode.end:.4f}")
-    console = Console()
-    console.print(best.message)
-    console.print(table)
-    console.print(f"J = {best.cost:.4f} N^2 s, verified: {best.verified}")
+    print(best.message)
+    Console().print(table)
+    print(f"J = {best.cost:.4f} N^2 s, verified: {best.verified}")
     best.plot("load", "v_load", "spring", "force", path=out / "through_a_spring.png")
 
 

@@ -15,7 +15,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from rich.console import Console
 
 from symfric import BrownMcPhee, Model, drive
 
@@ -59,9 +58,6 @@ def compiled(function: ca.Function, folder: Path) -> ca.Function:
     return ca.external(function.name(), ca.Importer(source, "shell", {"compiler": "cc"}))
 
 
-console = Console(highlight=False)
-
-
 def main() -> None:
     """Write, compile, compare."""
     OUT.mkdir(exist_ok=True)
@@ -70,15 +66,13 @@ def main() -> None:
     x, u, p = np.array([0.0, 2e-3]), np.array([1.0]), np.zeros(0)
     ode, vde = functions(m)
     rate = compiled(ode, OUT)(x, u, p)
-    console.print(
+    print(
         f"acceleration {float(rate[1]):.6f} m/s^2, by hand {1.0 - float(law.force(2e-3, 10.0)):.6f}"
     )
     _, vdeX, vdeU = compiled(vde, OUT)(x, np.eye(2), np.zeros((2, 1)), u, p)
     h = 1e-8
     slope = (float(law.force(2e-3 + h, 10.0)) - float(law.force(2e-3 - h, 10.0))) / (2 * h)
-    console.print(
-        f"da/dv {float(vdeX[1, 1]):.4f} 1/s, by differences {-slope:.4f}; da/du {float(vdeU[1])}"
-    )
+    print(f"da/dv {float(vdeX[1, 1]):.4f} 1/s, by differences {-slope:.4f}; da/du {float(vdeU[1])}")
 
 
 if __name__ == "__main__":

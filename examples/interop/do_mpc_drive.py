@@ -11,7 +11,6 @@ import warnings
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from symfric import BrownMcPhee, ElastoPlastic, drive, flow, stepper
 
@@ -42,9 +41,6 @@ def controller() -> Any:
     return mpc
 
 
-console = Console(highlight=False)
-
-
 def main() -> None:
     """One second in closed loop."""
     mpc = controller()
@@ -52,10 +48,8 @@ def main() -> None:
     for _ in range(50):
         force = float(mpc.make_step(np.array(plant.x[:2])[:, None])[0, 0])
         plant.step(force)
-    console.print(
-        f"after {plant.t:.1f} s: {1e3 * (plant.x[0] - GOAL):+.3f} mm from the goal,", end=" "
-    )
-    console.print(f"{1e3 * plant.x[1]:+.3f} mm/s")
+    print(f"after {plant.t:.1f} s: {1e3 * (plant.x[0] - GOAL):+.3f} mm from the goal,", end=" ")
+    print(f"{1e3 * plant.x[1]:+.3f} mm/s")
 
 
 if __name__ == "__main__":

@@ -9,12 +9,10 @@ implicit step of symfric. Needs rockit (pip install rockit-meco).
 import casadi as ca
 import numpy as np
 import rockit  # pyright: ignore[reportMissingImports]
-from rich.console import Console
 
 from symfric import Hold, LuGre, drive, flow, simulate
 
 GOAL, T, N = 0.1, 1.0, 50
-console = Console(highlight=False)
 
 
 def main() -> None:
@@ -43,9 +41,7 @@ def main() -> None:
         held = Hold(np.linspace(0.0, T, N + 1)[:-1], controls)
         run = simulate(model, T, u={"force": held}, x0={"x": 0.0, "v": 0.0, "z": 0.0})
         miss = 1e6 * (run.final["x"] - GOAL)
-        console.print(
-            f"{way}: J = {np.sum(controls**2) * T / N:.4f} N^2 s, simulated {miss:+.1f} um"
-        )
+        print(f"{way}: J = {np.sum(controls**2) * T / N:.4f} N^2 s, simulated {miss:+.1f} um")
 
 
 if __name__ == "__main__":
