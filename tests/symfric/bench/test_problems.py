@@ -7,8 +7,7 @@ import pytest
 
 from symfric import BrownMcPhee, ExactCoulomb, Model, Variable, simulate
 from symfric.bench import ivp, multibody, regularisation
-from symfric.bench.ivp import DIGITS, DRIFT, correct_digits
-from symfric.bench.ivp_problems import ANDREWS, JOINT, PROBLEMS, Problem
+from symfric.bench.ivp import ANDREWS, DIGITS, DRIFT, JOINT, PROBLEMS, Problem, correct_digits
 from symfric.bench.multibody import CHAINS, chain, chains, count, exponent
 from symfric.bench.regularisation import CASES, last_cycle, peak
 from symfric.bench.report import Row

@@ -10,8 +10,7 @@ import pytest
 from chains import X, Y, Z, attach, in_both
 
 from symfric import BrownMcPhee, SolveError, Status, simulate
-from symfric.bench.ivp import correct_digits
-from symfric.bench.ivp_problems import ABSOLUTE, JOINT
+from symfric.bench.ivp import ABSOLUTE, JOINT, correct_digits
 from symfric.multibody import (
     Cylindrical,
     JointFriction,
