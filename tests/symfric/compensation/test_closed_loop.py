@@ -168,22 +168,18 @@ def test_ctrl_c_keeps_what_there_is(monkeypatch) -> None:
     ("given", "words"),
     [
         ({"block": 3}, "blocks: expected a sequence of blocks, got 3"),
-        ({"block": [3]}, "expected a block, such as compensator(LuGre())"),
+        ({"block": [3]}, r"expected a block, such as compensator\(LuGre\(\)\)"),
         ({"block": compensator(BELIEVED, h=2e-3)}, "give h = 0.001"),
-        ({"controller": 3}, "expected a controller, Cascade()"),
         ({"reference": sine(0.01, 1.0, 1.0, h=2e-3)}, "expected the sample time of the controller"),
         ({"cases": {"a": {"scale_columb": 1.0}}}, "did you mean scale_coulomb?"),
         ({"delay": -1}, "delay: expected a whole number >= 0"),
-        ({"noise": np.nan}, "noise: expected a number >= 0"),
         ({"real": "half"}, "real: expected one of"),
         ({"position": "y"}, "expected one of x, v, z, got y"),
     ],
 )
 def test_bad_input_is_refused(given, words) -> None:
-    settings = {"reference": sine(0.01, 1.0, 1.0)} | given
-    with pytest.raises(ValueError) as caught:
-        compared("bristles", **settings)
-    assert words in str(caught.value)
+    with pytest.raises(ValueError, match=words):
+        compared("bristles", **({"reference": sine(0.01, 1.0, 1.0)} | given))
 
 
 def test_references_are_smooth_and_rest() -> None:

@@ -1,6 +1,7 @@
 """Friction compensators as blocks: stage by stage, and what is refused."""
 
 from math import exp, inf, pi
+from re import escape
 
 import casadi as ca
 import numpy as np
@@ -271,10 +272,7 @@ def test_settings_are_read_from_texts() -> None:
     ("given", "words"),
     [
         ({"v_blend": 0.0}, "v_blend: expected a number > 0"),
-        ({"velocity": "desired"}, "velocity: expected one of blend, reference, measured"),
         ({"N": "given"}, "N: expected one of input"),
-        ({"N": -1.0}, "N: expected a number >= 0"),
-        ({"scales": ["coulom"]}, "did you mean coulomb?"),
         ({"scales": ["force"]}, "scales: expected one of coulomb, stribeck, viscous, bristle"),
         ({"scales": ["coulomb"], "without": ["coulomb"]}, "in scales or in without"),
         ({"build_up": 1e-4}, "expected a law without states"),
@@ -288,10 +286,10 @@ def test_settings_are_read_from_texts() -> None:
         ({"h": 0.0}, "h: expected a number > 0"),
     ],
 )
-def test_bad_settings_are_refused_in_a_sentence(given: dict[str, object], words: str) -> None:
-    with pytest.raises(ValueError, match=r"^compensator|^codegen|^settings") as caught:
+def test_bad_settings_are_refused(given: dict[str, object], words: str) -> None:
+    with pytest.raises(ValueError, match=escape(words)) as caught:
         compensator(LuGre(), **given)
-    assert words in str(caught.value)
+    assert str(caught.value).startswith(("compensator", "codegen", "settings"))
 
 
 def test_unsuitable_laws_and_tables_are_refused() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from symfric.foundation.workers import Crashed, TimedOut
 from symfric.gallery import rendering
 from symfric.gallery.plate import (
     VERDICTS,
@@ -29,7 +30,6 @@ from symfric.gallery.plate import (
 from symfric.gallery.rendering import draw, index_page, read, render, together
 from symfric.gallery.shared import LOOKS, look
 from symfric.laws import ALL_LAWS, POPULATIONS
-from symfric.stress.workers import Crashed, TimedOut
 
 PLATES = plates()
 NAME = "self_tuning/fig_07_shape_factor"
