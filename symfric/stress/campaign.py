@@ -11,10 +11,10 @@ from typing import Any, final
 
 import numpy as np
 
+from symfric.foundation.workers import Crashed, TimedOut, outcomes
 from symfric.stress.cases import Case, draw
 from symfric.stress.judge import CLASSES, FAILING, Verdict, judge
 from symfric.stress.problem import WORK
-from symfric.stress.workers import Crashed, TimedOut, outcomes
 
 LIMIT = 120.0
 """Processor time [s] after which a case counts as a hang; the slowest cases need 10 s."""
