@@ -13,29 +13,29 @@ constants, from microseconds in sliding to milliseconds at rest; shooting by exp
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from time import perf_counter
-from typing import final
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ocp.checking.interval_errors import cut_meshes, local_errors
 from ocp.checking.resimulate import arcs_of
 from ocp.checking.verify import verified
+from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solved
-from ocp.solving.prepared import Clock, Option
+from ocp.solving.prepared import Option, Supervisor
 from ocp.solving.solution import Solution
 from ocp.solving.starts import start_of
-from ocp.transcription.program import Iterate, Program, Report
+from ocp.transcription.program import Iterate, Program
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.transcribe import Discretisation, Transcription, discretise
 from symfric.foundation.status import Status
 
-Array = NDArray[np.float64]
 STEPS = 20
 """Default number of steps of an interval."""
 PASSES = 6
@@ -51,9 +51,7 @@ KEPT = 1e-6
 """Violation of a scaled row below which an iterate is feasible."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class OriginalLaw:
+class OriginalLaw(NamedTuple):
     """Solver of a problem with laws with states, and its settings.
 
     Attributes:
@@ -61,16 +59,14 @@ class OriginalLaw:
         scheme: shooting scheme that resolves these states.
         solver: solver with the user's options, which take precedence.
         tolerance: tolerance of the verification.
-        clock: time limit.
-        progress: function called after each iteration.
+        supervisor: time limit and progress.
     """
 
     problem: Problem
     scheme: Shooting
     solver: Ipopt
     tolerance: float
-    clock: Clock
-    progress: Report | None = None
+    supervisor: Supervisor
 
     def solved(self, static: Solution) -> Solution:
         """Return the verified motion with the law itself near `static`.
@@ -115,9 +111,7 @@ class OriginalLaw:
             on = made.on(meshes)
             start = start_of(on, guess)[0]
             prepared = self._solver(CLOSE).prepared(project_control(on, start.w))
-            outcome = self.clock.run(
-                on, prepared, start, self.progress, f"law itself {number}", begin=begin
-            )
+            outcome = self.supervisor.run(on, prepared, start, f"law itself {number}", begin=begin)
             past = outcome.statistics if past is None else past.then(outcome.statistics)
             cost = float(on.program.gradient(outcome.iterate.w, on.program.values)[0])
             guess = replace(Solved(on, outcome).solution, cost=cost, statistics=past)
@@ -143,7 +137,7 @@ class OriginalLaw:
         on = made.on(near.meshes)
         prepared = self._solver(COST).prepared(on.program)
         start = Iterate.cold(near.iterate.w, on.program.g.numel())
-        outcome = self.clock.run(on, prepared, start, self.progress, "law itself, cost")
+        outcome = self.supervisor.run(on, prepared, start, "law itself, cost")
         statistics = near.statistics.then(outcome.statistics)
         found = Solved(on, outcome).solution
         if not found.ok and not outcome.status.stopped:

@@ -12,7 +12,7 @@ from ocp.formulation.problem import Problem, cost_size, sized
 from ocp.formulation.validate import doubts
 from ocp.solving.methods import Fatrop, Ipopt, Sqp
 from ocp.solving.one_solve import Solver
-from ocp.solving.prepared import Clock
+from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
 from ocp.solving.starts import STARTS, Start
 from ocp.transcription.program import Report
@@ -100,13 +100,7 @@ def solve(
     Limits: the solution is a local optimum; with friction, the best of a few starts.
     """
     from ocp.checking.mesh_refinement import Goals  # noqa: PLC0415  (slow to load)
-    from ocp.strategies import (  # noqa: PLC0415  (slow to load)
-        Direct,
-        Friction,
-        ModeSearch,
-        Verifier,
-        solved,
-    )
+    from ocp.strategies import Direct, Friction, Search, solved  # noqa: PLC0415  (slow to load)
 
     checks.kind("solve", problem, Problem, "a problem, such as Problem(Phase(model, T=1.0), cost)")
     tolerance = checks.number("solve: tolerance", tolerance, above=0.0)
@@ -130,9 +124,9 @@ def solve(
     posed = sized(problem)
     if posed is not problem and isinstance(solver, Ipopt) and OVER not in solver.options:
         solver = solver.with_options(**{OVER: 1.0 / cost_size(posed)})
-    goals = Goals.of(tolerance) if refine else replace(Goals.of(tolerance), passes=1)
-    direct = Direct(posed, scheme, solver, intervals, goals, Clock(max_time), progress)
-    search = ModeSearch(direct, Verifier(tolerance, verify), resting_margin)
+    goals = Goals.of(tolerance) if refine else Goals.of(tolerance)._replace(passes=1)
+    direct = Direct(posed, scheme, solver, intervals, goals, Supervisor(max_time, progress))
+    search = Search(direct, tolerance, verify, resting_margin)
     solution = solved(search, friction, guess, starts)
     odd = "" if solution.ok else doubts(problem)
     if odd:

@@ -1,15 +1,15 @@
 """Strategies of `solve`: direct, by homotopy, by modes, and the order in which they are tried."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import isfinite, nan
-from typing import Literal, NamedTuple, final
+from typing import Literal, NamedTuple
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.checking.verify import verified, verify
+from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import verify_exactly
 from ocp.friction.homotopy import FINE, LAST, Sharp, sharpened
@@ -18,16 +18,14 @@ from ocp.friction.smooth_models import own_level, speeds_at, sticking
 from ocp.original_law import STEPS, OriginalLaw
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solver
-from ocp.solving.prepared import Clock
+from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start
 from ocp.solving.verification import Verification
-from ocp.transcription.program import Report
 from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
-Array = NDArray[np.float64]
 Friction = Literal["auto", "smooth", "sharpen", "modes"]
 INTERVALS = 50
 EARLY = 0.04
@@ -48,15 +46,13 @@ FAILURES = (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeErro
 """Exceptions after which the next strategy is tried."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Direct:
+class Direct(NamedTuple):
     """Direct solves of a problem, on meshes refined by its local errors.
 
     Attributes:
-        problem, scheme, solver, intervals, progress: as in `ocp.solve`.
+        problem, scheme, solver, intervals: as in `ocp.solve`.
         goals: goals of mesh refinement; with one pass the mesh is not refined.
-        clock: time limit shared by all solves.
+        supervisor: time limit and progress of all solves.
     """
 
     problem: Problem
@@ -64,8 +60,7 @@ class Direct:
     solver: Solver
     intervals: int | ArrayLike | Sequence[ArrayLike] | None
     goals: Goals
-    clock: Clock
-    progress: Report | None
+    supervisor: Supervisor
 
     @property
     def ipopt(self) -> Ipopt:
@@ -81,15 +76,16 @@ class Direct:
             wanted = INTERVALS if self.intervals is None else self.intervals
             meshes = make_meshes(self.problem, wanted)
         elif self.problem.scenarios:
-            goals, most = replace(goals, passes=min(goals.passes, SHARED_PASSES)), SHARED_ITERATIONS
+            passes, most = min(goals.passes, SHARED_PASSES), SHARED_ITERATIONS
+            goals = goals._replace(passes=passes)
         if close:
             passes, most = min(goals.passes, CLOSE_PASSES), CLOSE_ITERATIONS
-            goals = replace(goals, passes=passes, most=CLOSE_INTERVALS, patient=False)
+            goals = goals._replace(passes=passes, most=CLOSE_INTERVALS, patient=False)
         if most and isinstance(solver, Ipopt) and "max_iter" not in solver.options:
             solver = solver.with_options(max_iter=most)
         return refined_solve(
-            self.problem, meshes, self.scheme, solver, guess, self.progress,
-            goals=goals, clock=self.clock,
+            self.problem, meshes, self.scheme, solver, guess, goals=goals,
+            supervisor=self.supervisor,
         )  # fmt: skip
 
     def sharpened(self, guess: Start, starts: int, last: float) -> Iterator[Sharp]:
@@ -100,7 +96,7 @@ class Direct:
             intervals = sum(mesh.size - 1 for mesh in meshes[: len(self.problem.chain)])
         return sharpened(
             self.problem, self.scheme, self.solver, guess, intervals=intervals, starts=starts,
-            last=last, clock=self.clock, progress=self.progress,
+            last=last, supervisor=self.supervisor,
         )  # fmt: skip
 
 
@@ -111,13 +107,20 @@ class Judged(NamedTuple):
     right: bool
 
 
-@final
-@dataclass(frozen=True)
-class Verifier:
-    """Verification within a tolerance, skipped if `active` is False."""
+class Search(NamedTuple):
+    """Solution of a problem by its strategies, and verification of the motions that they find.
 
+    Attributes:
+        direct: direct solves of the problem.
+        tolerance: tolerance of the verification.
+        verify: True to verify motions.
+        margin: margin of a contact at rest, as a share of its static level.
+    """
+
+    direct: Direct
     tolerance: float
-    active: bool
+    verify: bool
+    margin: float
 
     def checked(self, solution: Solution) -> Solution:
         """Return `solution` with its verification.
@@ -125,7 +128,7 @@ class Verifier:
         The law states of a motion by modes are unknown, so their simulated values are not compared,
         and local errors are not evaluated.
         """
-        if not self.active or solution.status.stopped:
+        if not self.verify or solution.status.stopped:
             return solution
         chain = solution.problem.chain
         laws = {c.name: c for phase in chain for c in phase.model.contacts if c.states}
@@ -145,7 +148,7 @@ class Verifier:
 
     def judged(self, solution: Solution) -> Judged:
         """Return a motion by modes with the verdict of a simulation with exact friction."""
-        if not self.active or not (solution.ok or solution.status in MISSED):
+        if not self.verify or not (solution.ok or solution.status in MISSED):
             return Judged(solution, solution.ok)
         try:
             exact = verify_exactly(solution, self.tolerance, EXACT_RTOL)
@@ -162,29 +165,13 @@ class Verifier:
             text += "narrower, or allow this by `tolerance`"
         return Judged(with_sentence(solution, f"{text}."), solution.ok)
 
-
-@final
-@dataclass(frozen=True, eq=False)
-class ModeSearch:
-    """Search for a motion with exact friction near one with sharpened friction.
-
-    Attributes:
-        direct: direct solves of the problem.
-        verifier: verification of the motions.
-        margin: margin of a contact at rest, as a share of its static level.
-    """
-
-    direct: Direct
-    verifier: Verifier
-    margin: float
-
     def near(self, sharp: Sharp) -> Judged:
         """Return the exact motion near a sharpened one, verified with the user's laws."""
         direct, problem = self.direct, self.direct.problem
         speeds = speeds_at(problem, sharp.scales, sharp.level)
         motions = optimise_modes(
             sharp.solution, problem, speeds, solver=direct.ipopt, scheme=direct.scheme,
-            progress=direct.progress, margin=self.margin, clock=direct.clock,
+            margin=self.margin, supervisor=direct.supervisor,
         )  # fmt: skip
         exact, margin = next(motions)
         if exact.status.stopped and not exact.modes:
@@ -193,18 +180,18 @@ class ModeSearch:
             both = _after(exact, sharp.solution)
             stopped = replace(both, status=exact.status, message=text, cause=exact.cause)
             return Judged(stopped, right=False)
-        exact = self.verifier.checked(_after(sharp.solution, exact))
-        if exact.status in MISSED and law_states(problem) and not direct.clock.over:
+        exact = self.checked(_after(sharp.solution, exact))
+        if exact.status in MISSED and law_states(problem) and not direct.supervisor.over:
             exact = self.by_original_law(exact)
             if exact.verified:
                 return Judged(exact, True)
         narrow = own_level(problem, sharp.scales) < SHARPEST
-        if exact.status in MISSED and not narrow and not direct.clock.over:
-            own = self.verifier.checked(direct.solved(exact, exact.meshes, close=True))
+        if exact.status in MISSED and not narrow and not direct.supervisor.over:
+            own = self.checked(direct.solved(exact, exact.meshes, close=True))
             if own.verified:
                 return Judged(_after(exact, replace(own, modes=exact.modes)), True)
             exact = _after(own, exact)
-        first = self.verifier.judged(exact)
+        first = self.judged(exact)
         return self._closer(first, margin, motions, sharp.solution) if first.right else first
 
     def _closer(
@@ -224,7 +211,7 @@ class ModeSearch:
                 slope = max(0.0, first.solution.cost - exact.cost) / (margin - less)
             if exact.status.stopped or less < self.margin:
                 break
-            nearer = self.verifier.judged(self.verifier.checked(last)) if exact.ok else first
+            nearer = self.judged(self.checked(last)) if exact.ok else first
             if exact.ok and nearer.right:
                 best, kept = nearer, less
                 break
@@ -243,7 +230,7 @@ class ModeSearch:
         """
         direct, scheme = self.direct, self.direct.scheme
         scheme = scheme if isinstance(scheme, Shooting) else Shooting("exponential", STEPS)
-        settings = direct.ipopt, self.verifier.tolerance, direct.clock, direct.progress
+        settings = direct.ipopt, self.tolerance, direct.supervisor
         try:
             own = OriginalLaw(direct.problem, scheme, *settings).solved(exact)
         except FAILURES as error:  # shooting does not support all models
@@ -257,9 +244,9 @@ class ModeSearch:
         return replace(kept, status=own.status, cause=own.cause) if stopped else kept
 
 
-def solved(search: ModeSearch, friction: Friction, guess: Start, starts: int) -> Solution:
+def solved(search: Search, friction: Friction, guess: Start, starts: int) -> Solution:
     """Solve the problem of `search.direct` by the strategy that it requires."""
-    direct, check = search.direct, search.verifier.checked
+    direct, check = search.direct, search.checked
     problem, shooting = direct.problem, isinstance(direct.scheme, Shooting)
     holding = any(sticking(phase.model) for phase in problem.chain)
     static = friction == "auto" and not isinstance(guess, Solution) and bool(law_states(problem))
@@ -278,25 +265,22 @@ def solved(search: ModeSearch, friction: Friction, guess: Start, starts: int) ->
     return check(direct.solved(guess))
 
 
-def _by_shooting(search: ModeSearch, guess: Start, starts: int) -> Solution:
+def _by_shooting(search: Search, guess: Start, starts: int) -> Solution:
     """Solve with laws with states by shooting, started from the motion with static friction."""
-    collocation = replace(search.direct, scheme=Radau())
-    unverified = replace(search.verifier, active=False)
-    static = _by_homotopy(
-        replace(search, direct=collocation, verifier=unverified), "modes", guess, starts
-    )
+    collocation = search._replace(direct=search.direct._replace(scheme=Radau()), verify=False)
+    static = _by_homotopy(collocation, "modes", guess, starts)
     if static.status.stopped or not static.ok:
         return static
     own = search.by_original_law(static)
-    return own if own.verification is not None else search.verifier.checked(own)
+    return own if own.verification is not None else search.checked(own)
 
 
-def _by_homotopy(search: ModeSearch, friction: Friction, guess: Start, starts: int) -> Solution:
+def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int) -> Solution:
     """Return the first valid motion on the path of decreasing widths.
 
     If there is none, return the best motion, with a message about the steps that failed.
     """
-    problem, check = search.direct.problem, search.verifier.checked
+    problem, check = search.direct.problem, search.checked
     reason = _refused(problem) if friction != "sharpen" else "not requested"
     if reason and friction == "modes":
         raise ValueError(f"solve: friction 'modes': {reason}")

@@ -1,6 +1,5 @@
 """Small problems in phases, for tests."""
 
-from dataclasses import replace
 from typing import Any
 
 from motions import double_integrator, stage
@@ -10,6 +9,7 @@ from ocp.formulation.expressions import TIME, integral
 from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem
 from ocp.solving.one_solve import Solver
+from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Start
 from ocp.transcription.program import Report
@@ -51,8 +51,9 @@ def solve_once(
     progress: Report | None = None,
 ) -> Solution:
     """Solve on one mesh."""
-    goals, meshes = replace(Goals.of(1e-3), passes=1), make_meshes(problem, intervals)
-    return refined_solve(problem, meshes, scheme, solver, guess, progress, goals=goals)
+    goals, meshes = Goals.of(1e-3)._replace(passes=1), make_meshes(problem, intervals)
+    supervisor = Supervisor(progress=progress)
+    return refined_solve(problem, meshes, scheme, solver, guess, goals=goals, supervisor=supervisor)
 
 
 SLIDER_CRANK = SliderCrank(BrownMcPhee(mu_s=0.2, mu_d=0.15, v_t=0.02), omega=0.0)

@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.resimulate import Arc
-from ocp.transcription.blocks import Entries
+from ocp.transcription.blocks import Array, Entries
 from ocp.transcription.program import Iterate
 from ocp.transcription.transcribe import Transcription
 from symfric.foundation.parameters import Variable
 from symfric.integrator import simulate_many
 from symfric.model import Model
 
-Array = NDArray[np.float64]
 RTOL = 1e-6
 """Relative tolerance of the flow over one interval."""
 

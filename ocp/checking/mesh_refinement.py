@@ -4,10 +4,10 @@ Meshes are refined only where the estimates require it.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil, inf, sqrt
 from time import perf_counter
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +15,17 @@ from numpy.typing import NDArray
 from ocp.checking.interval_errors import local_errors, zoh_losses
 from ocp.checking.resimulate import Arc, arcs_of
 from ocp.checking.verify import TOLERANCE, left_between, restarted
+from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solved, Solver
-from ocp.solving.prepared import Clock, Prepared
+from ocp.solving.prepared import Prepared, Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start, start_of
-from ocp.transcription.program import Report
 from ocp.transcription.schemes import Radau, Scheme, Shooting
 from ocp.transcription.transcribe import Discretisation, Skeleton, discretise
 from symfric.foundation.status import Status
 
-Array = NDArray[np.float64]
 GROWTH = 3.0
 """Largest growth of the number of intervals in one pass, as errors are only estimates."""
 LEAST_PARTS = 0.5
@@ -143,9 +142,7 @@ def _spread(mesh: Array, parts: Array, keep: Sequence[float]) -> Array:
     return new
 
 
-@final
-@dataclass(frozen=True)
-class Goals:
+class Goals(NamedTuple):
     """Criteria for a sufficiently fine mesh.
 
     Attributes:
@@ -183,10 +180,9 @@ def refined_solve(
     scheme: Scheme | None = None,
     solver: Solver | None = None,
     guess: Start = None,
-    progress: Report | None = None,
     *,
     goals: Goals | None = None,
-    clock: Clock | None = None,
+    supervisor: Supervisor | None = None,
 ) -> Solution:
     """Solve `problem` repeatedly, each time on meshes derived from the remaining errors.
 
@@ -200,9 +196,8 @@ def refined_solve(
         scheme: `Radau(3)` by default.
         solver: `Ipopt()` by default.
         guess: see `ocp.solving.starts`.
-        progress: function called with a `Progress` after each iteration.
         goals: criteria for a fine mesh, by default for a verification within 1e-3.
-        clock: time limit.
+        supervisor: time limit and progress.
 
     Returns:
         The last successful solution with the statistics of all passes, or the first solution if it
@@ -211,7 +206,7 @@ def refined_solve(
         result.
     """
     begin = perf_counter()
-    goals, clock = goals or Goals.of(TOLERANCE), clock or Clock()
+    goals, supervisor = goals or Goals.of(TOLERANCE), supervisor or Supervisor()
     solver, made = solver or Ipopt(), discretise(problem, scheme or Radau())
     ready: dict[tuple[Skeleton, bool, bool], Prepared] = {}
 
@@ -220,12 +215,15 @@ def refined_solve(
         transcription = made.on(meshes)
         key = (transcription.skeleton, number == 1, capped)
         if key not in ready:  # meshes with equal numbers of intervals have the same program
-            later = _later(problem, solver, number, capped)
-            ready[key] = later.prepared(transcription.program)
+            later: dict[str, float] = {"max_iter": CAP} if capped else {}
+            if problem.kind != "worst":  # a small barrier prevents convergence of its multipliers
+                later["mu_init"] = LATER
+            again = isinstance(solver, Ipopt) and number > 1
+            own = solver.with_options(**(later | dict(solver.options))) if again else solver
+            ready[key] = own.prepared(transcription.program)
         start, warm = start_of(transcription, guess)
-        stage = f"mesh {number}"
-        outcome = clock.run(
-            transcription, ready[key], start, progress, stage, warm=warm, begin=began
+        outcome = supervisor.run(
+            transcription, ready[key], start, f"mesh {number}", warm=warm, begin=began
         )
         return Solved(transcription, outcome).solution
 
@@ -254,19 +252,7 @@ def refined_solve(
     return replace(best, statistics=statistics)
 
 
-def _later(problem: Problem, solver: Solver, number: int, capped: bool) -> Solver:
-    """Return the solver of a later pass; the user's options take precedence."""
-    if number == 1 or not isinstance(solver, Ipopt):
-        return solver
-    later: dict[str, float] = {"max_iter": CAP} if capped else {}
-    if problem.kind != "worst":  # a small barrier prevents convergence of its multipliers
-        later["mu_init"] = LATER
-    return solver.with_options(**(later | dict(solver.options)))
-
-
-@final
-@dataclass(frozen=True)
-class Excess:
+class Excess(NamedTuple):
     """Errors of a mesh in comparison with its goals.
 
     Attributes:
@@ -302,7 +288,7 @@ class Excess:
             gained = (self.cost - cost) / (self.lost - lost)
             trust = float(np.clip(gained, LEAST_TRUST, 1.0))
         now = Excess(local, lost, cost, allowed, trust)
-        return replace(now, stuck=now.whole > 0.7 * self.whole)
+        return now._replace(stuck=now.whole > 0.7 * self.whole)
 
 
 def finer_meshes(

@@ -6,21 +6,19 @@ An `Arc` contains the data of one optimised phase that the simulation requires.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
-from ocp.formulation.phase import Span, clipped
+from ocp.formulation.phase import Array, Span, clipped
 from ocp.formulation.problem import Problem
 from ocp.transcription.unknowns import Points
 from symfric.foundation.variable import stacked
 from symfric.integrator import Hold, simulate
 from symfric.results.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 REST = 1e-3
 """Magnitude of a state, in multiples of its nominal value, that counts as zero."""
 RTOL = 1e-9
@@ -95,9 +93,7 @@ def arcs_of(problem: Problem, meshes: Sequence[Array], points: Points) -> tuple[
     return tuple(arcs)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Run:
+class Run(NamedTuple):
     """Simulated motion of an arc, or of a part of an arc.
 
     Attributes:

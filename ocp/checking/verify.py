@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import local_errors
 from ocp.checking.resimulate import RTOL, Arc, Run, arcs_of, resimulated, run_from
-from ocp.formulation.phase import FREE, Box, fixed, size_of
+from ocp.formulation.phase import FREE, Array, Box, fixed, size_of
 from ocp.formulation.problem import Problem
 from ocp.solving.solution import Solution
 from ocp.solving.verification import Miss, Verification
@@ -23,7 +23,6 @@ from symfric.foundation import checks
 from symfric.foundation.status import Status
 from symfric.foundation.variable import stacked
 
-Array = NDArray[np.float64]
 CLOSER, PARTS = 2, 16
 """Number of refinements of the worst time, and of parts of its neighbourhood in each."""
 TOLERANCE = 1e-3
@@ -207,50 +206,39 @@ def verified(solution: Solution, tolerance: float = TOLERANCE) -> Solution:
 
 
 def verified_arcs(
-    problem: Problem,
-    arcs: Sequence[Arc],
-    cost: float,
-    tolerance: float = TOLERANCE,
+    problem: Problem, arcs: Sequence[Arc], cost: float, tolerance: float = TOLERANCE,
     rtol: float = RTOL,
-) -> Verification:
+) -> Verification:  # fmt: skip
     """Verify optimised arcs whose optimised cost is `cost`; see `verify`."""
     errors = local_errors(arcs, min(1e-6, 1e-2 * tolerance))
-    found = _judged(problem, arcs, resimulated(arcs, rtol), errors, cost, tolerance, rtol)
+
+    def judged(runs: Sequence[Run]) -> Verification:
+        """Return the verification of the arcs by `runs`, which are in the order of time."""
+        bad = next((run.trajectory for run in runs if not run.ok), None)
+        checked, value = [*misses_of(problem, runs)], float("nan")
+        for arc, error in zip(arcs, errors, strict=True):
+            k = int(np.argmax(error))
+            at = float(arc.times[k]), float(error[k])
+            checked.append(Miss("local error", arc.span.name, *at, 0.0, 1.0))
+        if bad is None:
+            value = cost_of(problem, runs)
+            sizes = (abs(run.integral(run.arc.span.running)) for run in runs)
+            size = max([abs(value), *sizes]) or 1.0
+            checked.append(Miss("cost", "the cost", runs[-1].end, value, cost, size))
+        failed = ("", Status.SUCCESS) if bad is None else (bad.message, bad.status)
+        motions = tuple(run.trajectory for run in runs)
+        worst_first = tuple(sorted(checked, key=lambda miss: -miss.relative))
+        return Verification(tolerance, rtol, worst_first, errors, motions, value, *failed)
+
+    found = judged(resimulated(arcs, rtol))
     local = max((float(e.max()) for e in errors), default=0.0)
     if found.ok or not local <= SMALL * tolerance:
         return found
     runs, restarts = restarted(arcs, tolerance, rtol)
     if not restarts:
         return found
-    again = _judged(problem, arcs, runs, errors, cost, tolerance, rtol)
     off = max(m.relative for m in found.checked if m.what in ("end", "motion", "local error"))
-    return replace(found, restarted=again, restarts=restarts, growth=off / max(local, rtol))
-
-
-def _judged(
-    problem: Problem,
-    arcs: Sequence[Arc],
-    runs: Sequence[Run],
-    errors: Sequence[Array],
-    cost: float,
-    tolerance: float,
-    rtol: float,
-) -> Verification:
-    """Return the verification of the arcs by `runs`, which are in the order of time."""
-    bad = next((run.trajectory for run in runs if not run.ok), None)
-    checked, value = [*misses_of(problem, runs)], float("nan")
-    for arc, error in zip(arcs, errors, strict=True):
-        k = int(np.argmax(error))
-        at = float(arc.times[k]), float(error[k])
-        checked.append(Miss("local error", arc.span.name, *at, 0.0, 1.0))
-    if bad is None:
-        value = cost_of(problem, runs)
-        size = max([abs(value), *(abs(run.integral(run.arc.span.running)) for run in runs)]) or 1.0
-        checked.append(Miss("cost", "the cost", runs[-1].end, value, cost, size))
-    failed = ("", Status.SUCCESS) if bad is None else (bad.message, bad.status)
-    trajectories = tuple(run.trajectory for run in runs)
-    worst_first = tuple(sorted(checked, key=lambda miss: -miss.relative))
-    return Verification(tolerance, rtol, worst_first, tuple(errors), trajectories, value, *failed)
+    return replace(found, restarted=judged(runs), restarts=restarts, growth=off / max(local, rtol))
 
 
 def misses_of(problem: Problem, runs: Sequence[Run], *, optimised: bool = True) -> Iterator[Miss]:
@@ -303,7 +291,7 @@ def restarted(
             last = _departs(run, node, tolerance / 10)
             if last == node or len(restarts) >= MOST_RESTARTS:
                 return (), ()
-            runs.append(replace(run, end=float(arc.times[last])))
+            runs.append(run._replace(end=float(arc.times[last])))
             if last < arc.intervals:
                 restarts.append(float(arc.times[last]))
             node = last

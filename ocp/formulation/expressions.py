@@ -1,6 +1,6 @@
 """Functions of the signals of a model: their expressions, comparisons and costs."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from math import inf, isfinite, isnan
 from typing import Any, final
@@ -9,7 +9,6 @@ import casadi as ca
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.variable import stacked
 from symfric.model import Model
 
 EXPRESSION = "one expression of the signals, such as lambda s: s.x**2"
@@ -34,29 +33,23 @@ class Signals:
     parameters, outputs, and the details of a mechanism, which are written out on demand.
     """
 
-    def __init__(
-        self,
-        model: Model,
-        symbols: Mapping[str, ca.SX] | None = None,
-        convert: Callable[[ca.SX], ca.SX] | None = None,
-    ) -> None:
-        """Create signals; `convert` expresses details in `symbols` if given (name -> symbol)."""
-        self._model = model
-        self._symbols = known_symbols(model) if symbols is None else symbols
-        self._convert = convert
-        self._details: dict[str, ca.SX] = {}
+    def __init__(self, model: Model, convert: Callable[[ca.SX], ca.SX] | None = None) -> None:
+        """Create signals; `convert` expresses them in other symbols."""
+        self._model, self._convert = model, convert or ca.SX
+        self._details: dict[str, None] = {}
 
     def __getitem__(self, name: str) -> ca.SX:
-        known = self._symbols
-        if name not in known and name in self._model.further:
-            expression = ca.SX(self._model.further[name].expression)
-            self._details[name] = self._convert(expression) if self._convert else expression
-            return self._details[name]
-        try:
-            checks.check_names(f"signals of '{self._model.name}'", [name], known)
-        except ValueError as error:
-            raise MissingError(str(error)) from None
-        return known[name]
+        model = self._model
+        known = {"t": model.t} | {v.name: v.symbol for g in "xzup" for v in getattr(model, g)}
+        if name not in (*known, *model.outputs):
+            if name not in model.further:
+                try:
+                    names = [*known, *model.outputs]
+                    checks.check_names(f"signals of '{model.name}'", [name], names)
+                except ValueError as error:
+                    raise MissingError(str(error)) from None
+            self._details[name] = None
+        return self._convert(known[name] if name in known else model.expression(name))
 
     def __getattr__(self, name: str) -> ca.SX:
         if name.startswith("_"):
@@ -73,24 +66,12 @@ def arguments(model: Model) -> list[ca.SX]:
     return [model.t, *(model.vector(letter) for letter in "xzup")]
 
 
-def known_symbols(model: Model) -> dict[str, ca.SX]:
-    """Return name -> expression of all signals and parameters, without the details."""
-    groups = (model.x, model.z, model.u, model.p)
-    known = {"t": model.t} | {v.name: v.symbol for group in groups for v in group}
-    return known | {name: ca.SX(o.expression) for name, o in model.outputs.items()}
-
-
 def fresh_symbols(model: Model, mark: str) -> tuple[list[ca.SX], Signals]:
     """Return new symbols [t, x, z, u, p] and signals in them, as two phases may share a model."""
     old = arguments(model)
     new = [ca.SX.sym(f"{mark}_{letter}", s.numel()) for letter, s in zip("txzup", old, strict=True)]
-    known = known_symbols(model)
-    rows = ca.vertsplit(ca.SX(ca.Function("signals", old, [stacked(known.values())])(*new)))
-
-    def convert(expression: ca.SX) -> ca.SX:
-        return ca.substitute(expression, ca.vertcat(*old), ca.vertcat(*new))
-
-    return new, Signals(model, dict(zip(known, rows, strict=True)), convert)
+    both = ca.vertcat(*old), ca.vertcat(*new)
+    return new, Signals(model, lambda expression: ca.substitute(expression, *both))
 
 
 def called(function: Callable[..., Any], *signals: Any, what: str) -> Any:

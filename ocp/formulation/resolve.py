@@ -87,7 +87,8 @@ def _span(setting: Setting, result: Evaluated, chosen: Sequence[Choice]) -> Span
     given = {0.0: phase.start, **{float(s): phase.via[s] for s in phase.via}, 1.0: phase.end}
     given = dict(sorted(given.items()))
     named = (*setting.bounds, *(name for at in given.values() for name in at))
-    model = with_outputs(setting.model, (*named, *result.details))
+    details = dict.fromkeys(n for n in (*named, *result.details) if n not in setting.model.signals)
+    model = with_outputs(setting.model, tuple(details))
     variables = [v.name for group in (model.x, model.z, model.u) for v in group]
     boxes = {name: _box_of(setting, name) for name in variables}
     parameters = {v.name for v in model.p}

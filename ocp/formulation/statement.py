@@ -4,9 +4,9 @@ Functions that change a model return a new one with the same symbols and names, 
 outputs written for the original model remain valid.
 """
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
-from functools import partial
+from functools import wraps
 from math import inf, isfinite, sqrt
 from typing import Any, NamedTuple, TypeVar, final
 
@@ -31,6 +31,7 @@ from symfric.foundation.variable import symbols_of
 from symfric.model import Model
 
 T = TypeVar("T")
+Request = TypeVar("Request", bound=Mapping[str, Any] | Sequence[str])
 
 Duration = tuple[Sequence[int], float | Free]
 """(indices of phases, sum of their durations [s])."""
@@ -197,24 +198,27 @@ def rate_name(name: str) -> str:
 def rebuilt(model: Model, again: Callable[[Model], Model] | None = None, **changes: Any) -> Model:
     """Return `model` with changed fields; `again` applies the same change to its open form."""
     if model.contacts and again is not None:
-        changes["opening"] = partial(_opened, model, again)
+        changes["opening"] = lambda: again(model.open)
     if model.holonomic is not None:
         changes |= {"ode": None, "alg": ca.SX(0, 1)}  # derived again from `holonomic`
     return replace(model, **changes)
 
 
-def _opened(model: Model, again: Callable[[Model], Model]) -> Model:
-    return again(model.open)
+def _cached(change: Callable[[Model, Request], Model]) -> Callable[[Model, Request], Model]:
+    """Return `change` with its results cached in the model; an empty request changes nothing."""
+
+    @wraps(change)
+    def changed(model: Model, request: Request) -> Model:
+        key = tuple(request.items() if isinstance(request, Mapping) else request)
+        kept = model.memory.setdefault(f"ocp {change.__name__}", {(): model})
+        if key not in kept:
+            kept[key] = change(model, request)
+        return kept[key]
+
+    return changed
 
 
-def _remembered(model: Model, what: str, key: Hashable, make: Callable[[], Model]) -> Model:
-    """Return the model of `make`, cached in `model` by `what` and `key`."""
-    kept = model.memory.setdefault(f"ocp {what}", {})
-    if key not in kept:
-        kept[key] = make()
-    return kept[key]
-
-
+@_cached
 def with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
     """Return `model` with some inputs as states and the rates of these as inputs.
 
@@ -227,25 +231,17 @@ def with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
         model: the model.
         nominal: input -> typical magnitude of its rate.
     """
-    if not nominal:
-        return model
-
-    def make() -> Model:
-        states = tuple(v for v in model.u if v.name in nominal)
-        rates = {
-            v.name: Variable(
-                rate_name(v.name),
-                f"{v.unit}/s",
-                nominal=nominal[v.name],
-                doc=f"rate of {v.doc or v.name}",
-            )
-            for v in states
-        }
-        inputs = tuple(rates.get(v.name, v) for v in model.u)
-        changes = further_states(model, states, symbols_of(rates[v.name] for v in states))
-        return rebuilt(model, partial(with_rates, nominal=nominal), u=inputs, **changes)
-
-    return _remembered(model, "rates", tuple(nominal.items()), make)
+    states = tuple(v for v in model.u if v.name in nominal)
+    rates = {
+        v.name: Variable(
+            rate_name(v.name), f"{v.unit}/s", nominal=nominal[v.name],
+            doc=f"rate of {v.doc or v.name}",
+        )
+        for v in states
+    }  # fmt: skip
+    inputs = tuple(rates.get(v.name, v) for v in model.u)
+    changes = further_states(model, states, symbols_of(rates[v.name] for v in states))
+    return rebuilt(model, lambda other: with_rates(other, nominal), u=inputs, **changes)
 
 
 def further_states(model: Model, states: Sequence[Variable], rates: ca.SX) -> dict[str, Any]:
@@ -265,33 +261,19 @@ def further_states(model: Model, states: Sequence[Variable], rates: ca.SX) -> di
     return {"x": x, "holonomic": together}
 
 
+@_cached
 def with_parameters(model: Model, units: Mapping[str, str]) -> Model:
     """Return `model` with additional parameters (name -> unit) that its equations do not use."""
-    if not units:
-        return model
-
-    def make() -> Model:
-        p = (*model.p, *(Variable(name, unit) for name, unit in units.items()))
-        return rebuilt(model, partial(with_parameters, units=units), p=p)
-
-    return _remembered(model, "parameters", tuple(units.items()), make)
+    p = (*model.p, *(Variable(name, unit) for name, unit in units.items()))
+    return rebuilt(model, lambda other: with_parameters(other, units), p=p)
 
 
-def with_outputs(model: Model, names: Iterable[str]) -> Model:
+@_cached
+def with_outputs(model: Model, names: Sequence[str]) -> Model:
     """Return `model` with some of its details as outputs, for solutions and simulations."""
-    details = tuple(name for name in dict.fromkeys(names) if name not in model.signals)
-    if not details:
-        return model
-
-    def make() -> Model:
-        outputs = {**model.outputs, **{name: model.further[name] for name in details}}
-        again = partial(with_outputs, names=details)
-        return rebuilt(
-            model, again, outputs=outputs, details=partial(_details_without, model, details)
-        )
-
-    return _remembered(model, "outputs", details, make)
-
-
-def _details_without(model: Model, names: Sequence[str]) -> dict[str, Any]:
-    return {name: output for name, output in model.further.items() if name not in names}
+    wanted = {name: model.further[name] for name in names if name not in model.signals}
+    others = {name: output for name, output in model.further.items() if name not in wanted}
+    outputs = {**model.outputs, **wanted}
+    return rebuilt(
+        model, lambda other: with_outputs(other, names), outputs=outputs, details=lambda: others
+    )

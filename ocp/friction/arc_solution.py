@@ -10,25 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import zoh_losses
-from ocp.formulation.phase import Row, Span
+from ocp.formulation.phase import Array, Row, Span
 from ocp.formulation.problem import Problem
 from ocp.friction.arcs import CAUGHT, FIRST, PULLED, STOPPED, Rules, breaks_away, in_arcs
-from ocp.friction.mode_models import KINDS
-from ocp.friction.sequence import Leg, Legs, flat, placed, shown, tracks_of
+from ocp.friction.sequence import Leg, Legs, flat, modes_of, placed, shown, tracks_of
 from ocp.friction.transfer import Known, points_in
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import motions_of
-from ocp.solving.one_solve import Solved
-from ocp.solving.prepared import Clock, Option
-from ocp.solving.solution import Mode, Solution
-from ocp.transcription.program import Iterate, Report, SolverStatistics
+from ocp.solving.one_solve import Solved, along_points
+from ocp.solving.prepared import Option, Supervisor
+from ocp.solving.solution import Solution
+from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
 
-Array = NDArray[np.float64]
 LEAST = 3
 """Smallest number of intervals of an arc."""
 NEAR = 1.5
@@ -77,21 +75,18 @@ class SolvedSequence(Solved):
     @cached_property
     def overloaded(self) -> list[NDArray[np.bool_]]:
         """Masks of intervals at whose start stiction exceeds its static level."""
-        return [
-            np.any(_at_starts(span, points, _margins(span)) < 0.0, axis=0)
-            for span, points in self._arcs()
-        ]
+        return [np.any(_margins(span, points) < 0.0, axis=0) for span, points in self._arcs()]
 
     def pressed(self, margin: float) -> bool:
         """Return True if stiction, or a start or end of stick, is near the limit of the margin."""
         for span, points in self._arcs():
-            kept = _at_starts(span, points, _margins(span))
+            kept = _margins(span, points)
             changes = [
                 ca.SX(o.expression) + (0 if PULLED in name else margin)
                 for name, o in span.model.outputs.items()
                 if name.endswith((PULLED, CAUGHT, STOPPED))
             ]
-            first = _at_starts(span, points, changes)[:, :1]
+            first = along_points(span, points, stacked(changes), starts=True)[:, :1]
             if min(kept.min(initial=np.inf), first.min(initial=np.inf)) < NEAR * margin:
                 return True
         return False
@@ -106,17 +101,14 @@ class SolvedSequence(Solved):
         return sum(mesh.size - 1 for mesh in self.transcription.meshes)
 
 
-def _margins(span: Span) -> list[ca.SX]:
-    """Return the expressions of the friction margins at starts of intervals."""
-    return [ca.SX(o.expression) for name, o in span.model.outputs.items() if FIRST in name]
+def _margins(span: Span, points: SpanPoints) -> Array:
+    """Return the friction margins at the starts of all intervals of an arc, (rows, N)."""
+    margins = (o.expression for name, o in span.model.outputs.items() if FIRST in name)
+    return along_points(span, points, stacked(margins), starts=True)
 
 
-def _at_starts(span: Span, points: SpanPoints, expressions: Sequence[ca.SX]) -> Array:
-    """Return the values of expressions at the starts of all intervals of a phase, (rows, N)."""
-    n = points.u.shape[1]
-    rows = ca.Function("rows", span.symbols, [stacked(expressions)]).map(n)
-    z, p = points.z[:, :: points.z.shape[1] // n], np.tile(span.p[:, None], (1, n))
-    return rows(np.zeros((1, n)), points.nodes[:, :-1], z, points.u, p).full()
+class StoppedError(Exception):
+    """Exception after a solve that the user or the time limit has stopped."""
 
 
 @final
@@ -126,17 +118,17 @@ class ModeSolver:
 
     Attributes:
         rules: rules by which arcs become phases.
-        solver, scheme, progress: as in `optimise_modes`.
+        solver, scheme, supervisor: as in `optimise_modes`.
         kick: smallest length of the interval in which a contact breaks away or is stopped [s].
-        clock: time limit.
+        tried: results of all solves. A stopped solve is added before `StoppedError` is raised.
     """
 
     rules: Rules
     solver: Ipopt
     scheme: Scheme
     kick: float
-    progress: Report | None
-    clock: Clock = field(default_factory=Clock)
+    supervisor: Supervisor = field(default_factory=Supervisor)
+    tried: list[SolvedSequence] = field(default_factory=list[SolvedSequence])
 
     def solve(self, legs: Legs, known: Known, intervals: int, barrier: float) -> SolvedSequence:
         """Optimise the durations and the motion of a sequence.
@@ -167,10 +159,19 @@ class ModeSolver:
             peaks[number] = [row for row in rows if ca.depends_on(row.expression, u)]
         return discretise(problem, self.scheme, peaks)
 
+    @property
+    def stopped(self) -> bool:
+        """True if the user or the time limit has stopped the last solve."""
+        return self.tried[-1].outcome.status.stopped
+
+    def with_margin(self, margin: float) -> "ModeSolver":
+        """Return the solver with another friction margin."""
+        return replace(self, rules=self.rules._replace(margin=margin))
+
     def again(self, solved: SolvedSequence) -> SolvedSequence:
         """Solve a sequence again with the margin of `rules`, from its motion and on its meshes."""
-        made = self._discretised(solved.legs)
-        return self.on(solved.legs, made, solved.transcription.meshes, solved.known, 1e-4)
+        made, meshes = self._discretised(solved.legs), solved.transcription.meshes
+        return self.on(solved.legs, made, meshes, solved.known, 1e-4)
 
     def on(
         self,
@@ -181,7 +182,11 @@ class ModeSolver:
         barrier: float,
         options: Mapping[str, Option] = FINER,
     ) -> SolvedSequence:
-        """Solve a discretised sequence on given meshes from the motion `known`."""
+        """Solve a discretised sequence on given meshes from the motion `known`.
+
+        Raises:
+            StoppedError: the user or the time limit has stopped the solver.
+        """
         spans, arcs = discretisation.problem.spans, flat(legs)
         meshes = [
             _with_kick(mesh, self.kick / arc.duration) if breaks_away(span) else mesh
@@ -190,10 +195,13 @@ class ModeSolver:
         made = discretisation.on(meshes)
         prepared = self.solver.with_options(mu_init=barrier, **options).prepared(made.program)
         start = Iterate.cold(made.pack(points_in(made, arcs, known)), made.program.g.numel())
-        stage = f"modes {shown(legs)}"
-        outcome = self.clock.run(made, prepared, start, self.progress, stage)
+        outcome = self.supervisor.run(made, prepared, start, f"modes {shown(legs)}")
         durations = [span.T for span in made.unpack(outcome.iterate.w).spans]
-        return SolvedSequence(made, outcome, placed(legs, durations), discretisation)
+        solved = SolvedSequence(made, outcome, placed(legs, durations), discretisation)
+        self.tried.append(solved)
+        if outcome.status.stopped:
+            raise StoppedError
+        return solved
 
 
 def _with_kick(mesh: Array, kick: float) -> Array:
@@ -241,10 +249,7 @@ def reassemble(
         meshes=tuple(meshes),
         points=points,
         iterate=Iterate.cold(np.zeros(0), 0),  # multipliers do not apply to the user's problem
-        modes={
-            contact: tuple(Mode(KINDS[run.mode], run.begin, run.end) for run in runs)
-            for contact, runs in tracks_of(solved.legs).items()
-        },
+        modes={contact: modes_of(runs) for contact, runs in tracks_of(solved.legs).items()},
         cause=outcome.cause,
     )
 

@@ -217,25 +217,82 @@ class ArcPhase:
         """Sticking contact that breaks away by a force that cannot jump -> direction."""
         return {n: side for n, side in self.leaves.items() if side and not self.jumps(n, side)}
 
+    @cached_property
+    def leaving(self) -> Sides:
+        """Contact that breaks away at the end by a force that cannot jump -> direction."""
+        return {n: side for n, side in self.tight.items() if self.after.get(n) == side}
+
+    @cached_property
+    def stopped(self) -> Sides:
+        """Contact that stops at the start -> direction of its previous slip."""
+        return {n: side for n, side in self.before.items() if side and self.arc.modes.get(n) == 0}
+
+    @cached_property
+    def caught(self) -> Sides:
+        """Contact that stops at the start under a control that may jump -> its direction."""
+        return {n: side for n, side in self.stopped.items() if self.jumps(n, 1)}
+
+    def model(self, fade: float) -> Model:
+        """Return the mode model with the quantities in the conditions of the arc as outputs.
+
+        Returns:
+            A model with the output "<contact>_slip" and the following outputs as shares of the
+            level: "<contact>_up" and "<contact>_down", the friction margins in both directions,
+            minus margin tanh (remaining time / `fade`)^2 before break-away; "<contact>_first_up"
+            and "<contact>_first_down", the margins at the start of an interval; "<contact>_pull",
+            the excess of released contacts; "<contact>_catch", the margin of caught contacts to the
+            sliding force backwards; "<contact>_stop", the margin of stopped contacts to the sliding
+            force.
+        """
+        model, modes, sizes = self.base.model, self.arc.modes, self.rules.sizes
+        kept: dict[Any, Model] = model.memory.setdefault("ocp arcs", {})
+        groups = (modes, self.leaving, self.caught, self.stopped, sizes)
+        margin = self.rules.margin
+        key = (*(tuple(group.items()) for group in groups), *self.released, margin, fade)
+        if key in kept:
+            return kept[key]
+        made = mode_model(model, modes)
+        outputs: dict[str, ca.SX] = {}
+        fading, catch = ca.SX(0), 1.0 - CATCH * margin
+        if self.leaving:
+            left = Variable(LEFT, "s", nominal=0.1)
+            made = rebuilt(made, **further_states(made, (left,), ca.SX(-1.0)))
+            fading = margin * ca.tanh((left.symbol / fade) ** 2)
+        for c in sticking(model):
+            outputs[f"{c.name}_slip"] = c.slip
+            size, mode = sizes[c.name], modes[c.name]
+            if mode and c.name not in self.released:
+                continue
+            force, margins = holding(model, modes, c.name)
+            if mode:
+                outputs[f"{c.name}{PULLED}"] = -margins[mode] / size
+                continue
+            for side, name in SIDES.items():
+                less = fading if self.leaving.get(c.name) == side else 0.0
+                outputs[f"{c.name}_{name}"] = made.expression(f"{c.name}_grip_{name}") / size - less
+                outputs[f"{c.name}{FIRST}{name}"] = margins[side] / size
+            if side := self.stopped.get(c.name, 0):
+                ahead = side * c.sliding(side)
+                outputs[f"{c.name}{STOPPED}"] = (catch * ahead - side * force) / size
+            if side := self.caught.get(c.name, 0):
+                back = -side * c.sliding(-side)
+                outputs[f"{c.name}{CAUGHT}"] = (side * force + catch * back) / size
+        new = {name: Output(expression, "1") for name, expression in outputs.items()}
+        kept[key] = rebuilt(made, outputs={**made.outputs, **new})
+        return kept[key]
+
     def in_modes(self, fade: float) -> Phase:
         """Return the phase of this arc with the user's conditions and those of its modes.
 
         The margin of a contact that breaks away decreases to zero within the time `fade` [s].
         """
-        base, modes, margin = self.base, self.arc.modes, self.rules.margin
-        leaving = {n: side for n, side in self.tight.items() if self.after.get(n) == side}
-        stopped = {n: side for n, side in self.before.items() if side and modes.get(n) == 0}
-        caught = {n: side for n, side in stopped.items() if self.jumps(n, 1)}
-        margins = margin, fade
-        model = arc_model(
-            base.model, modes, self.released, leaving, caught, stopped, self.rules.sizes, margins
-        )
+        base, modes, margin, model = self.base, self.arc.modes, self.rules.margin, self.model(fade)
         start: Ranges = dict(base.start) if self.opens else {}
         link: dict[str, Start] = dict(base.link) if self.opens else {}
         end: Ranges = dict(base.end) if self.closes else {}
         if self.arc is self.leg.arcs[-1] and not self.closes:
             end = dict(base.via[sorted(base.via)[self.leg.part]])
-        if leaving:
+        if self.leaving:
             start, end = start | {LEFT: (0.0, None)}, end | {LEFT: 0.0}
             link |= {LEFT: None} if self.number else {}
         bounds: Ranges = dict(base.bounds)
@@ -259,8 +316,8 @@ class ArcPhase:
                     bounds[f"{name}_{row}"] = (least, None)
                     # the start precedes the first collocation point
                     start[f"{name}{FIRST}{row}"] = (least, None)
-                start |= {f"{name}{CAUGHT}": (0.0, None)} if name in caught else {}
-                start |= {f"{name}{STOPPED}": (0.0, None)} if name in stopped else {}
+                start |= {f"{name}{CAUGHT}": (0.0, None)} if name in self.caught else {}
+                start |= {f"{name}{STOPPED}": (0.0, None)} if name in self.stopped else {}
             if name in self.released:
                 start[f"{name}{PULLED}"] = self._pull(name)
         signals = {*model.signals, *model.further}
@@ -325,72 +382,3 @@ def carrier(model: Model, contact: Contact) -> tuple[str, int] | None:
     if not ca.is_equal(ca.simplify(contact.slip - factor * x[index]), ca.SX(0), 2):
         return None
     return model.x[index].name, 1 if factor > 0 else -1
-
-
-def arc_model(
-    model: Model,
-    modes: Sides,
-    released: Sequence[str],
-    leaving: Sides,
-    caught: Sides,
-    stopped: Sides,
-    sizes: Mapping[str, float],
-    margin: tuple[float, float],
-) -> Model:
-    """Return the mode model of `modes` with the quantities in the conditions of an arc as outputs.
-
-    Args:
-        model: the user's model.
-        modes: contact -> mode, for all contacts that can stick.
-        released: contacts that break away at the start of the arc.
-        leaving: contact that breaks away at the end by a force that cannot jump -> direction.
-        caught: contact that stops at the start under a control that may jump -> direction of its
-            previous slip.
-        stopped: contact that stops at the start under any control -> direction of its previous
-            slip.
-        sizes: contact -> typical static level [N].
-        margin: friction margin in stick as a share of the level, and the time before break-away in
-            which it decreases to zero [s].
-
-    Returns:
-        A model with the output "<contact>_slip" and the following outputs as shares of the level:
-        "<contact>_up" and "<contact>_down", the friction margins in both directions, minus
-        margin tanh (remaining time / given time)^2 before break-away; "<contact>_first_up" and
-        "<contact>_first_down", the margins at the start of an interval; "<contact>_pull", the
-        excess of released contacts; "<contact>_catch", the margin of caught contacts to the sliding
-        force backwards; "<contact>_stop", the margin of stopped contacts to the sliding force.
-    """
-    kept: dict[Any, Model] = model.memory.setdefault("ocp arcs", {})
-    groups = (modes, leaving, caught, stopped, sizes)
-    key = (*(tuple(group.items()) for group in groups), *released, *margin)
-    if key in kept:
-        return kept[key]
-    made = mode_model(model, modes)
-    outputs: dict[str, ca.SX] = {}
-    fading, catch = ca.SX(0), 1.0 - CATCH * margin[0]
-    if leaving:
-        left = Variable(LEFT, "s", nominal=0.1)
-        made = rebuilt(made, **further_states(made, (left,), ca.SX(-1.0)))
-        fading = margin[0] * ca.tanh((left.symbol / margin[1]) ** 2)
-    for c in sticking(model):
-        outputs[f"{c.name}_slip"] = c.slip
-        size, mode = sizes[c.name], modes[c.name]
-        if mode and c.name not in released:
-            continue
-        force, margins = holding(model, modes, c.name)
-        if mode:
-            outputs[f"{c.name}{PULLED}"] = -margins[mode] / size
-            continue
-        for side, name in SIDES.items():
-            less = fading if leaving.get(c.name) == side else 0.0
-            outputs[f"{c.name}_{name}"] = made.expression(f"{c.name}_grip_{name}") / size - less
-            outputs[f"{c.name}{FIRST}{name}"] = margins[side] / size
-        if side := stopped.get(c.name, 0):
-            ahead = side * c.sliding(side)
-            outputs[f"{c.name}{STOPPED}"] = (catch * ahead - side * force) / size
-        if side := caught.get(c.name, 0):
-            back = -side * c.sliding(-side)
-            outputs[f"{c.name}{CAUGHT}"] = (side * force + catch * back) / size
-    new = {name: Output(expression, "1") for name, expression in outputs.items()}
-    kept[key] = rebuilt(made, outputs={**made.outputs, **new})
-    return kept[key]

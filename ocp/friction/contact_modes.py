@@ -20,25 +20,18 @@ from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.formulation.expressions import arguments
+from ocp.formulation.phase import Array
 from ocp.formulation.statement import further_states, rebuilt
-from ocp.friction.mode_models import (
-    KINDS,
-    SIDES,
-    loops_of,
-    mode_model,
-    nominal_load,
-    slip_change,
-)
+from ocp.friction.mode_models import SIDES, loops_of, mode_model, nominal_load, slip_change
+from ocp.friction.sequence import KINDS
 from ocp.friction.smooth_models import sticking
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import SolveError, Status
 from symfric.foundation.variable import at_start, stacked
 from symfric.model import Event, Model
 
-Array = NDArray[np.float64]
 Modes = dict[str, int]
 OVERLOAD = 1e-9
 """Excess of a reaction over its static level at break-away, relative to the level at the start."""
@@ -182,7 +175,7 @@ class Machine:
         return x - np.linalg.lstsq(slopes[held], values[held], rcond=None)[0]
 
     def solved(self, modes: Modes, at: Instant) -> tuple[dict[str, float], Array]:
-        """Return the algebraic unknowns with `modes` by name, and the rows of `InModes.look`.
+        """Return algebraic unknowns and forces "<contact>_F" by name, and rows of `InModes.look`.
 
         Raises:
             SolveError: Newton's method does not converge.
@@ -196,9 +189,9 @@ class Machine:
         for _ in range(NEWTON_STEPS):
             worst = np.abs(residual[:, 0] / size).max(initial=0.0)
             if worst <= NEWTON_TOLERANCE * max(1.0, float(np.max(scale, initial=0.0))):
-                names = (v.name for v in variables)
                 look = made.look(at.t, at.x, z, at.u, self.p).full()
-                return dict(zip(names, z, strict=True)), look
+                names = (*(v.name for v in variables), *(f"{c.name}_F" for c in self.contacts))
+                return dict(zip(names, [*z, *look[:, 3].tolist()], strict=True)), look
             step = np.linalg.lstsq(slope, residual[:, 0], rcond=None)[0]
             for damping in (1.0, 0.5, 0.25, 0.1, 0.02):
                 tried = z - damping * step
@@ -240,30 +233,27 @@ class Machine:
         while trial not in seen:
             seen.append(dict(trial))
             found, look = self.solved(trial, at)
-            objection = self._objection(trial, free, look)
+            objection = self._objection(trial, free, found, look)
             if objection is None:
                 if lifted := self._lifted(look):
                     raise self.undecided(at.t, f"with {shown(trial)} {lifted} lifts off")
-                return trial, found | self._forces(look)
+                return trial, found
             trial |= objection
         return self._tried(at, trial, free)
-
-    def _forces(self, look: Array) -> dict[str, float]:
-        pairs = zip(self.contacts, look, strict=True)
-        return {f"{c.name}_F": float(row[3]) for c, row in pairs}
 
     def _lifted(self, look: Array) -> str:
         """Return the name of the first contact with a negative normal force, or ""."""
         pairs = zip(self.contacts, look, strict=True)
         return next((c.name for c, row in pairs if row[4] < -LIFTED * abs(row[3])), "")
 
-    def _objection(self, modes: Modes, free: list[str], look: Array) -> Modes | None:
+    def _objection(
+        self, modes: Modes, free: list[str], forces: Mapping[str, float], look: Array
+    ) -> Modes | None:
         """Return corrected modes of the most inconsistent contact, or None if all are consistent.
 
         Contacts that stick together with this contact change with it.
         """
         largest = max(1e-300, float(np.abs(look[:, 2]).max(initial=0.0)))
-        forces = self._forces(look)
         found: list[tuple[float, str, Modes]] = []
         for c, (up, down, change, *_) in zip(self.contacts, look, strict=True):
             mode, members = modes[c.name], self.together[c.name]
@@ -291,8 +281,8 @@ class Machine:
                 found, look = self.solved(trial, at)
             except SolveError:
                 continue
-            if self._objection(trial, free, look) is None and not self._lifted(look):
-                fits.append((trial, found | self._forces(look)))
+            if self._objection(trial, free, found, look) is None and not self._lifted(look):
+                fits.append((trial, found))
         if len(fits) != 1:
             what = "; ".join(shown(m) for m, _ in fits)
             text = f"{what} are consistent" if fits else "no choice of modes is consistent"

@@ -8,51 +8,185 @@ smooth run of the model in its modes (`mode_models`). Between pieces `decided` (
 determines which contacts stick. The method has no smoothing width and no penalty; it simulates the
 limit of smooth laws.
 
-`simulate` with `ExactCoulomb` supports the same explicit models and mechanisms (tests compare
-both). This module covers cases that `ExactCoulomb` does not: any law, by its sliding force and
-static level, without rebuilding the model; normal forces that are algebraic unknowns of the
-friction, for which `symfric.model.forces` refuses the applied force; release of the most overloaded
-contact first, after which all modes are decided again; and an error if no motion or more than one
-is consistent.
+`simulate` with `ExactCoulomb` supports the same explicit models and mechanisms. This module covers
+further cases: any law, by its sliding force and static level; normal forces that are algebraic
+unknowns of the friction, for which `symfric.model.forces` refuses the applied force; release of the
+most overloaded contact first; and an error if no motion or more than one is consistent.
 
-Limits: the simulation raises `SolveError` for several consistent motions, for none (jamming), and
-for reactions without a solution, which includes contacts of a loop with several degrees of freedom.
-Contacts in ball joints keep their laws.
+Limits: `SolveError` for several consistent motions, for none (jamming), and for reactions without a
+solution, as of a loop with several degrees of freedom. Contacts in ball joints keep their laws.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple, final
 
+import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ocp.checking.resimulate import Arc, Run, arcs_of, resimulated
 from ocp.checking.verify import cost_of, misses_of
+from ocp.formulation.phase import Array
+from ocp.friction import sequence
 from ocp.friction.contact_modes import Instant, Machine, Modes
-from ocp.friction.exact_motion import Given, Inputs, Piece, SetValued
-from ocp.solving.solution import Solution
+from ocp.solving.solution import Mode, Solution
 from ocp.solving.verification import Miss, Verification
-from symfric import Hold, Trajectory, simulate
+from symfric import Hold, Statistics, Trajectory, simulate
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
-from symfric.foundation.variable import symbols_of
+from symfric.foundation.variable import stacked, symbols_of
 from symfric.integrator.equations.initial import JammedError
+from symfric.integrator.equations.inputs import Input, input_data
 from symfric.model import Model
 from symfric.model.model import check_model
 
-Array = NDArray[np.float64]
-MOST = 10_000
-"""Largest number of mode changes in a run."""
-PILED = 40
-"""Largest number of consecutive mode changes without time between them."""
+LATER = 1e-13
+"""Relative time difference by which times just after a jump are found."""
+MOST, PILED = 10_000, 40
+"""Largest number of mode changes in a run, and of consecutive ones without time between them."""
 CREEP = 1e4
 """Sliding velocity, in zero thresholds, above which a loop moves although one contact stops."""
 APART = 1e-6
 """Relative difference of an unknown above which two solvers have found different solutions."""
-TOLERANCE = 1e-4
-RTOL = 1e-9
+
+
+class Piece(NamedTuple):
+    """Run in which no contact changes its mode and no input jumps."""
+
+    run: Trajectory
+    modes: Modes
+    begin: float
+    end: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SetValued:
+    """Motion with exact Coulomb friction, up to its end or a failure; see `trajectory`.
+
+    `motion["v"]` is a signal at the times `motion.t`. Signals are those of the model except law
+    states, and the friction forces "<contact>_F".
+
+    Attributes:
+        model: the user's model.
+        t: times of the result [s].
+        pieces: runs between changes of mode and jumps of inputs.
+        status, message: status of the simulation and its description.
+        contacts: names of the contacts.
+    """
+
+    model: Model
+    t: Array
+    pieces: tuple[Piece, ...]
+    status: Status = Status.SUCCESS
+    message: str = Status.SUCCESS.value
+    contacts: tuple[str, ...] = ()
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First time and last time reached [s]."""
+        return self.pieces[0].begin, self.pieces[-1].end
+
+    @cached_property
+    def modes(self) -> dict[str, tuple[Mode, ...]]:
+        """Contact -> its modes in the order of time."""
+        return {
+            name: sequence.modes_of(
+                [sequence.Run(p.modes[name], p.begin, p.end) for p in self.pieces]
+            )
+            for name in self.contacts
+        }
+
+    @property
+    def last(self) -> Modes:
+        """Modes in the last piece, with which a simulation can continue."""
+        return dict(self.pieces[-1].modes)
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """Trajectory of the user's model, with "<contact>_F" as additional signals.
+
+        Expressions that contain law states or algebraic unknowns of other laws are NaN.
+        """
+        of_laws = {v.name for c in self.model.contacts for v in c.states}
+        known = set.intersection(*(set(p.run.units) for p in self.pieces)) - of_laws
+        contacts = {c.name: c for c in self.model.contacts}
+        units = {n: u for n, u in self.model.signals.items() if n in known}
+        units |= {f"{name}_F": contacts[name].unit("N") for name in self.contacts}
+        steps = [p.run.step_times[(p.run.step_times < p.end)] for p in self.pieces]
+
+        def evaluated(at: Array) -> dict[str, Array]:
+            def values(piece: Piece, times: Array) -> list[Array]:
+                found = piece.run.at(times)
+                for name, mode in piece.modes.items():
+                    found[f"{name}_F"] = (
+                        piece.run.express(contacts[name].sliding(mode), times)[0]
+                        if mode
+                        else found[f"{name}_reaction"]
+                    )
+                return [found[name] for name in units]
+
+            return dict(zip(units, self._joined(at, len(units), values), strict=True))
+
+        def expressed(column: ca.SX, at: Array) -> Array:
+            def values(piece: Piece, times: Array) -> Array:
+                model = piece.run.model
+                known = {v.symbol.__hash__() for group in "xzup" for v in getattr(model, group)}
+                every = [v.symbol for group in "xz" for v in getattr(self.model, group)]
+                gone = stacked(s for s in every if s.__hash__() not in known)
+                there = ca.substitute(column, gone, ca.SX(ca.DM(gone.numel(), 1) + np.nan))
+                return piece.run.express(ca.densify(there), times)
+
+            return self._joined(at, column.numel(), values)
+
+        return Trajectory(
+            scene=self.model.name, t=self.t, units=units, status=self.status, message=self.message,
+            count=self._statistics, span=self.span, states=self._states, evaluate=evaluated,
+            express=expressed, model=self.model,
+            ends=lambda: np.unique(np.concatenate([*steps, [self.span[1]]])),
+            happened=tuple((p.end, "change") for p in self.pieces[:-1]),
+        )  # fmt: skip
+
+    def _statistics(self) -> Statistics:
+        every = [p.run.statistics for p in self.pieces]
+        names = ("steps", "rejections", "evaluations", "jacobians", "factorisations", "run_time",
+                 "build_time", "compile_time")  # fmt: skip
+        total = {name: sum(getattr(s, name) for s in every) for name in names}
+        least = min(s.smallest_step for s in every)
+        return replace(every[0], **total, events=len(self.pieces) - 1, smallest_step=least)
+
+    def _joined(self, at: Array, rows: int, values: Callable[[Piece, Array], ArrayLike]) -> Array:
+        """Return rows over time from `values(piece, times)`; changes belong to the later piece."""
+        found = np.zeros((rows, at.size))
+        which = np.searchsorted([p.begin for p in self.pieces[1:]], at, side="right")
+        for k in np.unique(which):
+            piece, here = self.pieces[k], which == k
+            found[:, here] = values(piece, np.clip(at[here], piece.begin, piece.end))
+        return found
+
+    def _states(self, at: Array) -> dict[str, Array]:
+        names = [v.name for v in self.model.open.x]
+
+        def values(piece: Piece, times: Array) -> list[Array]:
+            states = piece.run.states(times)
+            return [states[name] for name in names]
+
+        return dict(zip(names, self._joined(at, len(names), values), strict=True))
+
+    def __getitem__(self, name: str) -> Array:
+        return self.t if name == "t" else self.trajectory[name]
+
+    def at(self, times: ArrayLike) -> dict[str, Array]:
+        """Return all signals at `times` [s]; at a change of mode, the values after it."""
+        return self.trajectory.at(times)
+
+    def final(self) -> dict[str, float]:
+        """Return the states at the end by name, without law states."""
+        return {n: float(row[-1]) for n, row in self._states(np.array([self.span[1]])).items()}
 
 
 def set_valued(
@@ -61,7 +195,7 @@ def set_valued(
     *,
     t_start: float = 0.0,
     x0: Mapping[str, float] | None = None,
-    u: Mapping[str, Given] | None = None,
+    u: Mapping[str, Input] | None = None,
     p: Mapping[str, float] | None = None,
     modes: Mapping[str, int] | None = None,
     rtol: float = 1e-9,
@@ -96,15 +230,14 @@ def set_valued(
         if t_eval is None
         else checks.times("set_valued: t_eval", t_eval, begin, end)
     )
-    machine = Machine(model, model.values("p", p or {}))
-    run = _Run(machine, Inputs(model, dict(u or {}), end), dict(p or {}), rtol)
-    state = run.start(begin, dict(x0 or {}), dict(modes or {}))
+    run = _Run(Machine(model, model.values("p", p)), dict(p or {}), rtol, u, (begin, end))
+    run.start(begin, dict(x0 or {}), dict(modes or {}))
     status, message, problem = Status.SUCCESS, Status.SUCCESS.value, False
     try:
-        run.go(state, end)
+        run.go(end)
     except SolveError as error:
         status, message, problem = error.status, str(error), True
-    names = tuple(c.name for c in machine.contacts)
+    names = tuple(c.name for c in run.machine.contacts)
     reached = run.pieces[-1].end if run.pieces else begin
     made = SetValued(model, wanted[wanted <= reached], tuple(run.pieces), status, message, names)
     if problem and throw:
@@ -112,24 +245,24 @@ def set_valued(
     return made
 
 
-class _State(NamedTuple):
-    t: float
-    x: Array
-    modes: Modes
-    guess: Mapping[str, float]
-
-
 @final
 class _Run:
-    """Simulation of a motion piece by piece."""
+    """Simulation of a motion piece by piece, with its state after the last piece."""
 
-    def __init__(self, machine: Machine, inputs: Inputs, p: dict[str, float], rtol: float) -> None:
-        self.machine, self.inputs, self.p, self.rtol = machine, inputs, p, rtol
-        self.names = [v.name for v in machine.model.open.x]
+    def __init__(
+        self, machine: Machine, p: dict[str, float], rtol: float,
+        u: Mapping[str, Input] | None, span: tuple[float, float],
+    ) -> None:  # fmt: skip
+        model = machine.model
+        self.machine, self.p, self.rtol = machine, p, rtol
+        self.given, self.inputs = model.named("u", u), input_data(model, u, *span)
+        symbols = [model.t, self.inputs.data]
+        self._values = ca.Function("inputs", symbols, [self.inputs.expression])
+        self.names = [v.name for v in model.open.x]
         self.pieces: list[Piece] = []
 
-    def start(self, t: float, x0: dict[str, float], modes: dict[str, int]) -> _State:
-        """Return the state at the start, in which contacts without velocity stick by default."""
+    def start(self, t: float, x0: dict[str, float], modes: dict[str, int]) -> None:
+        """Set the state at the start, in which contacts without velocity stick by default."""
         machine, model = self.machine, self.machine.model
         names = [c.name for c in machine.contacts]
         checks.check_names("set_valued: modes", modes, names)
@@ -139,31 +272,37 @@ class _Run:
         found: Modes = {}
         for name, v, still in zip(names, machine.slips(t, x)[0], machine.still, strict=True):
             found[name] = modes.get(name, 0) if abs(v) <= still else int(np.sign(v))
-        return _State(t, machine.at_rest(t, x, found), found, {})
+        self.t, self.x, self.modes = t, machine.at_rest(t, x, found), found
+        self.guess: dict[str, float] = {}
 
-    def go(self, state: _State, end: float) -> None:
+    def go(self, end: float) -> None:
         """Simulate all pieces up to `end`."""
         piled = 0
-        for _ in range(MOST + self.inputs.knots.size):
-            before = state.t
-            state = self.piece(state, end)
-            if state.t >= end:
+        for _ in range(MOST + self.inputs.breaks.size):
+            before = self.t
+            self.piece()
+            if self.t >= end:
                 return
-            piled = piled + 1 if state.t - before <= 1e-12 * (end - before) else 0
+            piled = piled + 1 if self.t - before <= 1e-12 * (end - before) else 0
             if piled > PILED:
                 raise SolveError(
-                    f"at t = {state.t:.9g} s: {Status.EVENT_STORM.value}", Status.EVENT_STORM
+                    f"at t = {self.t:.9g} s: {Status.EVENT_STORM.value}", Status.EVENT_STORM
                 )
         raise SolveError(f"more than {MOST} changes of mode", Status.EVENT_STORM)
 
-    def piece(self, state: _State, end: float) -> _State:
-        """Decide the modes, simulate to the next change, and return the state after it."""
-        t, machine = state.t, self.machine
-        at = Instant(t, state.x, self.inputs.at(t), state.guess)
-        modes, guess = machine.decided(at, state.modes)
+    def piece(self) -> None:
+        """Decide the modes, and simulate to the next change."""
+        t, machine, inputs = self.t, self.machine, self.inputs
+        k = int(inputs.interval(np.array([t + LATER * max(1.0, abs(t))]))[0])
+        u = self._values(t, inputs.values[:, k]).full()[:, 0]
+        modes, guess = machine.decided(Instant(t, self.x, u, self.guess), self.modes)
         model = machine.within(modes).model
-        run = self._run(model, t, self.inputs.next(t, end), state.x)
-        begin, reached = self._unknowns(run, model, t), run.span[1]
+        held = dict(zip((v.name for v in machine.model.u), u.tolist(), strict=True))
+        run = self._run(model, float(inputs.breaks[k + 1]), {
+            name: held[name] if isinstance(value, Hold) else value
+            for name, value in self.given.items()
+        })  # fmt: skip
+        begin, reached = _unknowns(run, model, t), run.span[1]
         for v in model.z:
             value = begin[v.name]
             if abs(value - guess[v.name]) > APART * max(v.nominal, abs(value)):
@@ -171,10 +310,11 @@ class _Run:
                     t, f"{v.name} is {guess[v.name]:.6g} or {value:.6g}: two solutions"
                 )
         self.pieces.append(Piece(run, modes, t, reached))
-        x = self._states(run, reached)
-        guess |= self._unknowns(run, model, reached)
-        modes = modes | self._stopped(modes, machine.slips(reached, x)[0])
-        return _State(reached, machine.at_rest(reached, x, modes), modes, guess)
+        states = run.states(np.array([reached]))
+        x = np.array([float(states[name][-1]) for name in self.names])
+        self.guess = guess | _unknowns(run, model, reached)
+        self.modes = modes | self._stopped(modes, machine.slips(reached, x)[0])
+        self.t, self.x = reached, machine.at_rest(reached, x, self.modes)
 
     def _stopped(self, modes: Modes, slips: Array) -> Modes:
         """Return the modes of stopped contacts: stick, or reversal at a dead centre of a loop."""
@@ -188,42 +328,37 @@ class _Run:
                 found |= {c.name: -modes[c.name]} if turns else dict.fromkeys(members, 0)
         return found
 
-    def _run(self, model: Model, begin: float, end: float, x: Array) -> Trajectory:
+    def _run(self, model: Model, end: float, u: Mapping[str, Input]) -> Trajectory:
+        where, x0 = f"at t = {self.t:.9g} s", dict(zip(self.names, self.x.tolist(), strict=True))
         try:
             run = simulate(
-                model, end, t_start=begin, x0=dict(zip(self.names, x.tolist(), strict=True)),
-                u=self.inputs.within(begin), p=self.p, rtol=self.rtol, samples=2, throw=False,
+                model, end, t_start=self.t, x0=x0, u=u, p=self.p, rtol=self.rtol, samples=2,
+                throw=False,
             )  # fmt: skip
         except JammedError as error:
-            raise SolveError(f"at t = {begin:.9g} s: {error}", Status.JAMMED) from None
+            raise SolveError(f"{where}: {error}", Status.JAMMED) from None
         except ValueError as error:
             if not self.pieces:
                 raise
-            raise SolveError(f"at t = {begin:.9g} s: {error}", Status.SOLVER_FAILED) from None
+            raise SolveError(f"{where}: {error}", Status.SOLVER_FAILED) from None
         if not run.status.ok:
             raise SolveError(run.message, run.status)
         return run
 
-    def _states(self, run: Trajectory, t: float) -> Array:
-        states = run.states(np.array([t]))
-        return np.array([float(states[name][-1]) for name in self.names])
 
-    def _unknowns(self, run: Trajectory, model: Model, t: float) -> dict[str, float]:
-        """Return the algebraic unknowns of a run at a time by name."""
-        if not model.z:
-            return {}
-        values = run.express(symbols_of(model.z), np.array([t]))[:, 0].tolist()
-        return dict(zip((v.name for v in model.z), values, strict=True))
+def _unknowns(run: Trajectory, model: Model, t: float) -> dict[str, float]:
+    """Return the algebraic unknowns of a run at a time by name."""
+    if not model.z:
+        return {}
+    values = run.express(symbols_of(model.z), np.array([t]))[:, 0].tolist()
+    return dict(zip((v.name for v in model.z), values, strict=True))
 
 
-def verify_exactly(
-    solution: Solution, tolerance: float = TOLERANCE, rtol: float = RTOL
-) -> Verification:
+def verify_exactly(solution: Solution, tolerance: float = 1e-4, rtol: float = 1e-9) -> Verification:
     """Verify `solution` with exact friction in place of its laws.
 
-    The function checks start, via points, end, joints, periodicity, bounds, path conditions and
-    cost. An expression that contains a law, such as an output "friction", is evaluated with this
-    law. `Verification.trajectories` are the exact motions; `motions` returns their modes.
+    All conditions and the cost are checked. An expression that contains a law, such as an output
+    "friction", is evaluated with this law. `Verification.trajectories` are the exact motions.
 
     Args:
         solution: solution of a problem whose models have contacts.
@@ -236,32 +371,7 @@ def verify_exactly(
     checks.kind("verify_exactly", solution, Solution, "a solution, such as solve(...)")
     tolerance = checks.number("verify_exactly: tolerance", tolerance, above=0.0)
     problem = solution.problem
-    arcs = arcs_of(problem, solution.meshes, solution.points)
-    runs, _, failed = _followed(arcs, rtol)
-    checked, value = list(misses_of(problem, runs, optimised=False)), float("nan")
-    if not failed:
-        value = cost_of(problem, runs)
-        size = max(abs(value), abs(solution.cost)) or 1.0
-        checked.append(Miss("cost", "the cost", runs[-1].end, value, solution.cost, size))
-    worst_first = tuple(sorted(checked, key=lambda miss: -miss.relative))
-    trajectories = tuple(run.trajectory for run in runs)
-    failure = Status.SOLVER_FAILED if failed else Status.SUCCESS
-    return Verification(tolerance, rtol, worst_first, (), trajectories, value, failed, failure)
-
-
-def motions(solution: Solution, rtol: float = RTOL) -> tuple[SetValued, ...]:
-    """Return the exact motion of each phase with its contact modes, up to a failure.
-
-    Raises:
-        ValueError: see `verify_exactly`.
-    """
-    arcs = arcs_of(solution.problem, solution.meshes, solution.points)
-    return tuple(_followed(arcs, rtol)[1])
-
-
-def _followed(arcs: Sequence[Arc], rtol: float) -> tuple[tuple[Run, ...], list[SetValued], str]:
-    """Return runs of the arcs with exact friction, their motions, and the failure message or ""."""
-    found, failures = list[SetValued](), list[str]()
+    failures: list[str] = []
 
     def follow(arc: Arc, start: Mapping[str, float]) -> Run | None:
         rows = zip(arc.span.model.u, arc.u, strict=True)
@@ -275,8 +385,15 @@ def _followed(arcs: Sequence[Arc], rtol: float) -> tuple[tuple[Run, ...], list[S
         except SolveError as error:
             failures.append(str(error))
             return None
-        found.append(motion)
         return Run(arc, motion.trajectory, float(arc.times[-1]))
 
-    runs = resimulated(arcs, follow=follow)
-    return runs, found, next(iter(failures), "")
+    runs = resimulated(arcs_of(problem, solution.meshes, solution.points), follow=follow)
+    checked, value = list(misses_of(problem, runs, optimised=False)), float("nan")
+    if not failures:
+        value = cost_of(problem, runs)
+        size = max(abs(value), abs(solution.cost)) or 1.0
+        checked.append(Miss("cost", "the cost", runs[-1].end, value, solution.cost, size))
+    failed = (failures[0], Status.SOLVER_FAILED) if failures else ("", Status.SUCCESS)
+    worst_first = tuple(sorted(checked, key=lambda miss: -miss.relative))
+    trajectories = tuple(run.trajectory for run in runs)
+    return Verification(tolerance, rtol, worst_first, (), trajectories, value, *failed)

@@ -25,26 +25,24 @@ from math import sqrt
 from typing import NamedTuple, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import cut_meshes, local_errors
 from ocp.checking.resimulate import arcs_of
-from ocp.formulation.phase import initial
+from ocp.formulation.phase import Array, initial
 from ocp.formulation.problem import Problem
 from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
-from ocp.solving.one_solve import Solved, Solver, starts_around
-from ocp.solving.prepared import Clock, Option, Prepared
+from ocp.solving.one_solve import Solved, Solver
+from ocp.solving.prepared import Option, Prepared, Supervisor
 from ocp.solving.solution import Solution
-from ocp.solving.starts import STARTS, Start, resample, start_of
-from ocp.transcription.program import Iterate, Report, SolverStatistics
+from ocp.solving.starts import STARTS, Start, resample, start_of, starts_around
+from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
 from ocp.transcription.unknowns import Points
 
-Array = NDArray[np.float64]
 FINALISTS = 3
 """Number of coarse solutions that are solved again on the finer mesh."""
 ALIKE = 1e-3
@@ -113,21 +111,15 @@ class Step(Solved):
         """True if the user or the time limit has stopped the solver."""
         return self.outcome.status.stopped
 
-    def better_than(self, other: "Step") -> bool:
-        """Return True if only this step is solved, or if it has a lower cost or violation."""
-        if self.ok != other.ok:
-            return self.ok
-        if self.ok:
-            return self.outcome.cost < other.outcome.cost
-        return self.outcome.violation < other.outcome.violation
-
 
 def least(steps: Sequence[Step]) -> Step:
-    """Return the best of several steps, or the step that was stopped."""
-    best = steps[0]
-    for step in steps[1:]:
-        best = step if step.ended or (not best.ended and step.better_than(best)) else best
-    return best
+    """Return the stopped step, or the cheapest one, or the least violated if none is solved."""
+
+    def rank(step: Step) -> tuple[bool, bool, float]:
+        outcome = step.outcome
+        return not step.ended, not step.ok, outcome.cost if step.ok else outcome.violation
+
+    return min(steps, key=rank)
 
 
 def finalists(steps: Sequence[Step]) -> list[Step]:
@@ -168,8 +160,7 @@ def sharpened(
     intervals: int = FINE,
     starts: int = STARTS,
     last: float = LAST,
-    clock: Clock | None = None,
-    progress: Report | None = None,
+    supervisor: Supervisor | None = None,
 ) -> Iterator[Sharp]:
     """Yield solutions with decreasing smoothing widths, one solve at a time.
 
@@ -183,10 +174,9 @@ def sharpened(
         intervals: total number of intervals before refinement.
         starts: number of coarse solves from different starts; the best one is continued.
         last: final smoothing width, in multiples of the speeds.
-        clock: time limit.
-        progress: function called with a `Progress` after each iteration.
+        supervisor: time limit and progress.
     """
-    path = _Path(problem, scheme, solver, clock or Clock(), progress)
+    path = _Path(problem, scheme, solver, supervisor or Supervisor())
     step = path.first(guess, starts, intervals)
     factor, steady = FACTOR, True
     yield path.sharp(step, steady)
@@ -213,10 +203,9 @@ class _Path:
     """Problem with smooth models, scales and prepared solvers, shared by all steps."""
 
     def __init__(
-        self, user: Problem, scheme: Scheme, solver: Solver, clock: Clock, progress: Report | None
+        self, user: Problem, scheme: Scheme, solver: Solver, supervisor: Supervisor
     ) -> None:
-        self.user, self.scheme, self.solver = user, scheme, solver
-        self.clock, self.progress = clock, progress
+        self.user, self.scheme, self.solver, self.supervisor = user, scheme, solver, supervisor
         self.problem = smooth_models.smoothed(user)
         self.discretisation = discretise(self.problem, scheme)
         self.scales: Scales = {}
@@ -332,9 +321,7 @@ class _Path:
                 solver = Ipopt(max_time=solver.max_time, **(dict(options) | dict(solver.options)))
             self.prepared[key] = solver.prepared(transcription.program)
         start = Iterate.cold(transcription.pack(points), transcription.program.g.numel())
-        outcome = self.clock.run(
-            transcription, self.prepared[key], start, self.progress, stage, values
-        )
+        outcome = self.supervisor.run(transcription, self.prepared[key], start, stage, values)
         self.solves.append(outcome.statistics)
         return Step(transcription, outcome, values, level)
 

@@ -48,8 +48,6 @@ RANK = 1e-11
 """Relative size below which singular values of the scaled equations count as zero."""
 UNLOADED = 1e-9
 """Static level [N] at the start below which a contact counts as unloaded."""
-KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
-"""Name of each mode."""
 SIDES = {1: "up", -1: "down"}
 """Side -> suffix of the output "<contact>_grip_<side>", the friction margin of a contact."""
 NEWTON_STEPS = 2

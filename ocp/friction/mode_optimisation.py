@@ -16,31 +16,29 @@ Source: Betts, Practical Methods for Optimal Control, 2nd ed., 2010, 3.7 (phases
 Applied Optimal Control, 1975, 3.7 (conditions at free times).
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
 from math import inf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import local_errors
 from ocp.checking.mesh_refinement import MeshErrors, refined
 from ocp.checking.resimulate import arcs_of
+from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
-from ocp.friction.arc_solution import ModeSolver, SolvedSequence, reassemble
+from ocp.friction.arc_solution import ModeSolver, SolvedSequence, StoppedError, reassemble
 from ocp.friction.arcs import MARGIN, Rules
 from ocp.friction.mode_models import restless
 from ocp.friction.sequence import Legs, flat, inserted, neighbours, pruned, shown
-from ocp.friction.transfer import Known, Reading, sequence_of, sizes_of, starts_at_rest
+from ocp.friction.transfer import Known, Reader
 from ocp.solving.methods import Ipopt
-from ocp.solving.prepared import Clock
+from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
-from ocp.transcription.program import Report
 from ocp.transcription.schemes import Radau, Scheme
 
-Array = NDArray[np.float64]
 TOUCH = 1e-5
 """Share of the largest sliding velocity of a contact below which its slip touches zero. It exceeds
 the distance of an interior-point method to an active bound."""
@@ -77,7 +75,6 @@ CLOSER = 5.0
 """Divisor of the margin for a motion that is computed only to find the cost of a margin."""
 LEAST_INTERVALS = 40
 MOST = 800
-Keep = Callable[[SolvedSequence], SolvedSequence]
 
 
 def rests_inside(solved: SolvedSequence) -> Legs | None:
@@ -108,10 +105,6 @@ def rests_inside(solved: SolvedSequence) -> Legs | None:
     return pruned(legs, 0.0) if legs is not solved.legs else None
 
 
-class _StoppedError(Exception):
-    """Exception after a solve that the user or the time limit has stopped."""
-
-
 def optimise_modes(
     smooth: Solution,
     problem: Problem,
@@ -119,9 +112,8 @@ def optimise_modes(
     *,
     solver: Ipopt | None = None,
     scheme: Scheme | None = None,
-    progress: Report | None = None,
     margin: float = MARGIN,
-    clock: Clock | None = None,
+    supervisor: Supervisor | None = None,
 ) -> Iterator[tuple[Solution, float]]:
     """Yield motions with exact friction near a sharpened one, with their friction margins.
 
@@ -134,9 +126,9 @@ def optimise_modes(
             speeds; it need not be verified.
         problem: the user's problem.
         widths: contact -> sliding velocity [m/s] over which its friction is smoothed in `smooth`.
-        solver, scheme, progress: as in `ocp.solve`.
+        solver, scheme: as in `ocp.solve`.
         margin: margin between stiction and its static level, as a share of this level.
-        clock: time limit.
+        supervisor: time limit and progress.
 
     Yields:
         A solution with `modes` for exact Coulomb friction with stiction, without verification, and
@@ -160,55 +152,45 @@ def optimise_modes(
     known = Known.of(problem, smooth.motions[0], smooth.chosen)
     N = max(LEAST_INTERVALS, smooth.motions[0].t_control.size // 2)
     whole, first = known.motion.T, max(MARGIN, margin)
-    sizes, at_rest = sizes_of(problem, known), starts_at_rest(problem, known, widths)
+    reader = Reader(problem, known)
+    at_rest = reader.starts_at_rest(widths)
     modes_solver = ModeSolver(
-        rules=Rules(problem, sizes, at_rest, SHORTEST * whole, first),
+        rules=Rules(problem, reader.sizes(), at_rest, SHORTEST * whole, first),
         solver=solver.with_options(max_iter=limits[0]),
         scheme=scheme or Radau(3),
         kick=KICK * whole,
-        progress=progress,
-        clock=clock or Clock(),
+        supervisor=supervisor or Supervisor(),
     )
-    tried: list[SolvedSequence] = []
-
-    def keep(solved: SolvedSequence) -> SolvedSequence:
-        tried.append(solved)
-        if solved.outcome.status.stopped:
-            raise _StoppedError
-        return solved
-
     best: SolvedSequence | None = None
-    with suppress(_StoppedError):
-        for limit, legs in _attempts(limits, problem, known, widths):
+    with suppress(StoppedError):
+        for limit, legs in _attempts(limits, reader, widths):
             patient = replace(modes_solver, solver=solver.with_options(max_iter=limit))
-            found = keep(patient.solve(legs, known, N, 1e-2))
+            found = patient.solve(legs, known, N, 1e-2)
             if found.ok:
                 best = found  # kept if the following steps are stopped
-                best = settled(modes_solver, best, keep)
-                best = better(modes_solver, best, NEW_ARC * whole, keep)
-                best = _fine(modes_solver, best, keep)
+                best = settled(modes_solver, best)
+                best = better(modes_solver, best, NEW_ARC * whole)
+                best = _fine(modes_solver, best)
                 break
-    yield _solution(problem, best, tried), first
-    if best is None or tried[-1].outcome.status.stopped or not best.pressed(first):
+    yield _solution(modes_solver, best), first
+    if best is None or modes_solver.stopped or not best.pressed(first):
         return
     least = margin if margin < first else margin / CLOSER
     for closer in (least, sqrt(least * first)):
-        rules = modes_solver.rules._replace(margin=closer)
-        near, found = replace(modes_solver, rules=rules), None
-        with suppress(_StoppedError):
-            found = keep(near.again(best))
-            found = _fine(near, found, keep) if found.ok else found
-        yield _solution(problem, found, tried), closer
+        near, found = modes_solver.with_margin(closer), None
+        with suppress(StoppedError):
+            found = near.again(best)
+            found = _fine(near, found) if found.ok else found
+        yield _solution(modes_solver, found), closer
 
 
-def _solution(
-    problem: Problem, best: SolvedSequence | None, tried: Sequence[SolvedSequence]
-) -> Solution:
+def _solution(modes_solver: ModeSolver, best: SolvedSequence | None) -> Solution:
     """Return the best or the first sequence, with total statistics and the reason for a stop."""
+    problem, tried = modes_solver.rules.problem, modes_solver.tried
     found = reassemble(problem, best or tried[0], [s.outcome.statistics for s in tried])
-    last = tried[-1].outcome
-    if not last.status.stopped:
+    if not modes_solver.stopped:
         return found
+    last = tried[-1].outcome
     message = f"ocp '{problem.name}': {last.sentence}"
     message += "" if best is None else " The result has the best modes so far."
     modes = {} if best is None else found.modes
@@ -232,7 +214,7 @@ def refusal(problem: Problem) -> str:
 
 
 def _attempts(
-    limits: Sequence[int], problem: Problem, known: Known, widths: Mapping[str, float]
+    limits: Sequence[int], reader: Reader, widths: Mapping[str, float]
 ) -> Iterator[tuple[int, Legs]]:
     """Yield iteration limits and possible sequences, the most likely one first.
 
@@ -241,14 +223,14 @@ def _attempts(
     sequences: dict[str, Legs] = {}
     for rests, factor in product((True, False), CREEP):
         creep = {name: factor * width for name, width in widths.items()}
-        legs = sequence_of(problem, known, Reading(creep, rests))
+        legs = reader.sequence(creep, rests)
         if shown(legs) not in sequences:
             sequences[shown(legs)] = legs
             yield limits[0], legs
     yield from product(limits[1:], sequences.values())
 
 
-def settled(modes_solver: ModeSolver, solved: SolvedSequence, keep: Keep) -> SolvedSequence:
+def settled(modes_solver: ModeSolver, solved: SolvedSequence) -> SolvedSequence:
     """Return the solution without superfluous arcs and with stick where slips touch zero."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
@@ -258,16 +240,14 @@ def settled(modes_solver: ModeSolver, solved: SolvedSequence, keep: Keep) -> Sol
         if shown(legs) in seen:
             break
         seen.add(shown(legs))
-        changed = keep(modes_solver.solve(legs, solved.known, solved.intervals, AGAIN))
+        changed = modes_solver.solve(legs, solved.known, solved.intervals, AGAIN)
         if not changed.ok:
             break
         solved = changed
     return solved
 
 
-def better(
-    modes_solver: ModeSolver, solved: SolvedSequence, width: float, keep: Keep
-) -> SolvedSequence:
+def better(modes_solver: ModeSolver, solved: SolvedSequence, width: float) -> SolvedSequence:
     """Return the best one of the solved sequence and its neighbours."""
     seen = {shown(solved.legs)}
     for _ in range(ROUNDS):
@@ -275,11 +255,11 @@ def better(
             if shown(legs) in seen:
                 continue
             seen.add(shown(legs))
-            other = keep(modes_solver.solve(legs, solved.known, solved.intervals, AGAIN))
+            other = modes_solver.solve(legs, solved.known, solved.intervals, AGAIN)
             left = pruned(other.legs, GONE * modes_solver.rules.shortest)
             if not other.ok or shown(left) in seen - {shown(legs)}:
                 continue
-            other = settled(modes_solver, other, keep)
+            other = settled(modes_solver, other)
             if other.ideal_cost < solved.ideal_cost - WORTH * abs(solved.ideal_cost):
                 solved = other
                 break
@@ -288,7 +268,7 @@ def better(
     return solved
 
 
-def _fine(modes_solver: ModeSolver, solved: SolvedSequence, keep: Keep) -> SolvedSequence:
+def _fine(modes_solver: ModeSolver, solved: SolvedSequence) -> SolvedSequence:
     """Refine the intervals until the loss by constant inputs is negligible.
 
     The estimate of this loss is reliable if two meshes agree on the cost without the loss. Until
@@ -303,8 +283,7 @@ def _fine(modes_solver: ModeSolver, solved: SolvedSequence, keep: Keep) -> Solve
         enough = solved.loss <= allowed or 0.0 <= before[1] - solved.outcome.cost <= allowed
         exact = max(float(own.max()) for own in local) <= LOCAL
         outside = solved.overloaded
-        held = not any(own.any() for own in outside)
-        if agree and exact and held and enough:
+        if agree and exact and enough and not any(own.any() for own in outside):
             break
         least = 0.0 if agree else HALVED * LOCAL
         errors = [
@@ -315,11 +294,11 @@ def _fine(modes_solver: ModeSolver, solved: SolvedSequence, keep: Keep) -> Solve
             t.meshes, errors, [()] * len(errors), local=LOCAL, loss=allowed / 2, most=MOST
         )
         parts = solved.legs, solved.discretisation, meshes
-        finer = keep(modes_solver.on(*parts, solved.known, 1e-4))
+        finer = modes_solver.on(*parts, solved.known, 1e-4)
         if not finer.ok:  # in a flat minimum the solution may be far from the start
-            finer = keep(modes_solver.on(*parts, finer.known, 1e-2))
+            finer = modes_solver.on(*parts, finer.known, 1e-2)
         if not finer.ok:
             break
         before = solved.ideal_cost, solved.outcome.cost
-        solved = settled(modes_solver, finer, keep)
+        solved = settled(modes_solver, finer)
     return solved

@@ -11,11 +11,15 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ocp.formulation.phase import Array
+from ocp.solving.solution import Mode
+
 SAME_INSTANT = 1e-9
 """Time difference, relative to the duration, below which two times coincide."""
+
+KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
+"""Name of each mode."""
 
 
 class Run(NamedTuple):
@@ -197,13 +201,19 @@ def inserted(legs: Legs, number: int, contact: str, mode: int, begin: float, end
     raise IndexError(number)
 
 
-def tracks_of(legs: Legs) -> dict[str, tuple[Run, ...]]:
+def tracks_of(legs: Legs) -> dict[str, list[Run]]:
     """Return contact -> its runs over all legs."""
     runs: dict[str, list[Run]] = {}
     for arc in flat(legs):
         for contact, mode in arc.modes.items():
             runs.setdefault(contact, []).append(Run(mode, arc.begin, arc.end))
-    return {contact: tuple(_merged(own)) for contact, own in runs.items()}
+    return {contact: _merged(own) for contact, own in runs.items()}
+
+
+def modes_of(runs: Sequence[Run]) -> tuple[Mode, ...]:
+    """Return consecutive runs of one contact as modes of a solution."""
+    merged = _merged(runs)
+    return tuple(Mode(KINDS[run.mode], *run[1:]) for run in merged if run.end > run.begin)
 
 
 def shown(legs: Legs) -> str:

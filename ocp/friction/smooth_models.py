@@ -7,9 +7,8 @@ from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from ocp.formulation.phase import Chain
+from ocp.formulation.phase import Array, Chain
 from ocp.formulation.problem import Problem
 from ocp.solving.one_solve import along_points
 from ocp.transcription.unknowns import Points
@@ -23,7 +22,6 @@ from symfric.model import Contact, Model, Monitor
 
 WIDTH = 1e-3
 """Default smoothing width [m/s] of a substitute for a law without a velocity scale."""
-Array = NDArray[np.float64]
 LEAST = 0.1
 """Smallest ratio of the scale of a contact to its previous scale, for contacts that barely move."""
 

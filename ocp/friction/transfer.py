@@ -1,15 +1,15 @@
 """Transfer of motions to arcs by name and time, and deduction of mode sequences from motions."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from math import isfinite
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.formulation.expressions import arguments
-from ocp.formulation.phase import clipped, limits
+from ocp.formulation.phase import Array, clipped, limits
 from ocp.formulation.problem import Problem
 from ocp.formulation.statement import only
 from ocp.friction.arcs import LEFT
@@ -21,7 +21,6 @@ from ocp.transcription.transcribe import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.model import Model
 
-Array = NDArray[np.float64]
 SHORT_RUN = 5e-3
 """Duration, relative to the total one, below which a run is merged with its neighbours."""
 NEW_REST = 2.5e-3
@@ -109,133 +108,117 @@ def points_in(into: Transcription, arcs: Sequence[Arc], known: Known) -> Points:
     return Points(tuple(spans), dict(known.chosen))
 
 
-class Reading(NamedTuple):
-    """Settings for deducing modes from a motion.
+class Reader(NamedTuple):
+    """Deduction of modes from a sharpened motion.
 
     Attributes:
-        creep: contact -> sliding velocity [m/s] below which it sticks.
-        rests: True to insert stick at reversals and at the ends.
-    """
-
-    creep: Mapping[str, float]
-    rests: bool = True
-
-
-def sequence_of(problem: Problem, known: Known, reading: Reading) -> Legs:
-    """Return the mode sequence of a motion of `problem`.
-
-    Args:
         problem: the user's problem without scenarios.
-        known: sharpened motion of the problem.
-        reading: settings for deducing modes.
+        known: motion of the problem.
     """
-    tracks = [_track(problem, known, reading, *stay) for stay in _stays(problem)]
-    if reading.rests:
-        tracks = [_with_rests(problem, known, reading, track, tracks) for track in tracks]
-    legs: list[Leg] = []
-    for number, (phase, when) in enumerate(zip(problem.chain, known.motion.phases, strict=True)):
-        fractions = [0.0, *sorted(phase.via), 1.0]
-        for part in range(len(fractions) - 1):
-            a, b = (when.begin + when.T * s for s in fractions[part : part + 2])
-            legs.append(cut(tracks, (number, part), a, b))
-    return tuple(legs)
 
+    problem: Problem
+    known: Known
 
-def sizes_of(problem: Problem, known: Known) -> dict[str, float]:
-    """Return the typical static level of each contact [N], the mean over the motion."""
-    sizes: dict[str, float] = {}
-    for phase in problem.chain:
-        contacts = sticking(phase.model)
-        held = mode_model(phase.model, {c.name: 0 for c in contacts})
-        for contact in contacts:
-            up, down = (held.expression(f"{contact.name}_grip_{s}") for s in SIDES.values())
-            levels = known.along(held, (up + down) / 2, known.motion.t)
-            size = float(np.mean(np.abs(levels[np.isfinite(levels)]))) if levels.size else 1.0
-            sizes.setdefault(contact.name, size if isfinite(size) and size > 0 else 1.0)
-    return sizes
+    def sequence(self, creep: Mapping[str, float], rests: bool = True) -> Legs:
+        """Return the mode sequence of the motion.
 
+        Args:
+            creep: contact -> sliding velocity [m/s] below which it sticks.
+            rests: True to insert stick at reversals and at the ends.
+        """
+        tracks = [self._track(creep, *stay) for stay in self._stays()]
+        if rests:
+            tracks = [self._with_rests(creep, track, tracks) for track in tracks]
+        legs: list[Leg] = []
+        phases = zip(self.problem.chain, self.known.motion.phases, strict=True)
+        for number, (phase, when) in enumerate(phases):
+            times = [when.begin + when.T * s for s in (0.0, *sorted(phase.via), 1.0)]
+            legs += [cut(tracks, (number, k), *ends) for k, ends in enumerate(pairwise(times))]
+        return tuple(legs)
 
-def starts_at_rest(problem: Problem, known: Known, creep: Mapping[str, float]) -> tuple[str, ...]:
-    """Return the names of contacts without slip at the start."""
-    t = known.motion.t[:1]
-    names = (c.name for c in sticking(problem.chain[0].model))
-    return tuple(n for n in names if abs(_slip(problem, known, 0, n, t)[0]) < 1e-3 * creep[n])
+    def sizes(self) -> dict[str, float]:
+        """Return the typical static level of each contact [N], the mean over the motion."""
+        sizes: dict[str, float] = {}
+        for phase in self.problem.chain:
+            contacts = sticking(phase.model)
+            held = mode_model(phase.model, {c.name: 0 for c in contacts})
+            for contact in contacts:
+                up, down = (held.expression(f"{contact.name}_grip_{s}") for s in SIDES.values())
+                levels = self.known.along(held, (up + down) / 2, self.known.motion.t)
+                size = float(np.mean(np.abs(levels[np.isfinite(levels)]))) if levels.size else 1.0
+                sizes.setdefault(contact.name, size if isfinite(size) and size > 0 else 1.0)
+        return sizes
 
+    def starts_at_rest(self, creep: Mapping[str, float]) -> tuple[str, ...]:
+        """Return the names of contacts without slip at the start."""
+        t, contacts = self.known.motion.t[:1], sticking(self.problem.chain[0].model)
+        return tuple(
+            c.name for c in contacts if abs(self._slip(0, c.name, t)[0]) < 1e-3 * creep[c.name]
+        )
 
-def _slip(problem: Problem, known: Known, number: int, name: str, t: Array) -> Array:
-    """Return the sliding velocities of a contact at times in one phase."""
-    model = problem.chain[number].model
-    contact = next(c for c in model.contacts if c.name == name)
-    return known.along(model, contact.slip, t)[0]
+    def _slip(self, number: int, name: str, t: Array) -> Array:
+        """Return the sliding velocities of a contact at times in one phase."""
+        model = self.problem.chain[number].model
+        contact = next(c for c in model.contacts if c.name == name)
+        return self.known.along(model, contact.slip, t)[0]
 
+    def _stays(self) -> list[tuple[int, int, str]]:
+        """Return (first phase, last phase, contact) for each contact over consecutive phases."""
+        stays: list[tuple[int, int, str]] = []
+        for number, phase in enumerate(self.problem.chain):
+            for contact in sticking(phase.model):
+                stay = (number, number, contact.name)
+                for old in stays if not phase.link else ():
+                    if old[1:] == (number - 1, contact.name):
+                        stay = (old[0], number, contact.name)
+                        stays.remove(old)
+                        break
+                stays.append(stay)
+        return stays
 
-def _stays(problem: Problem) -> list[tuple[int, int, str]]:
-    """Return (first phase, last phase, contact) for each contact over consecutive phases."""
-    stays: list[tuple[int, int, str]] = []
-    for number, phase in enumerate(problem.chain):
-        for contact in sticking(phase.model):
-            stay = (number, number, contact.name)
-            for old in stays if not phase.link else ():
-                if old[1:] == (number - 1, contact.name):
-                    stay = (old[0], number, contact.name)
-                    stays.remove(old)
-                    break
-            stays.append(stay)
-    return stays
+    def _track(self, creep: Mapping[str, float], first: int, last: int, name: str) -> Track:
+        t, phases = self.known.motion.t, self.known.motion.phases
+        kept = (t >= phases[first].begin) & (t <= phases[last].end)
+        slips = np.zeros(t.size)
+        for number in range(first, last + 1):
+            here = (t >= phases[number].begin) & (t <= phases[number].end)
+            slips[here] = self._slip(number, name, t[here])
+        return read(name, t[kept], slips[kept], creep[name], SHORT_RUN * self.known.motion.T)
 
+    def _with_rests(
+        self, creep: Mapping[str, float], track: Track, tracks: Sequence[Track]
+    ) -> Track:
+        """Return `track` with inserted stick where inputs can hold the contact."""
+        name, phases = track.contact, self.known.motion.phases
 
-def _track(
-    problem: Problem, known: Known, reading: Reading, first: int, last: int, name: str
-) -> Track:
-    t, phases = known.motion.t, known.motion.phases
-    kept = (t >= phases[first].begin) & (t <= phases[last].end)
-    slips = np.zeros(t.size)
-    for number in range(first, last + 1):
-        here = (t >= phases[number].begin) & (t <= phases[number].end)
-        slips[here] = _slip(problem, known, number, name, t[here])
-    return read(name, t[kept], slips[kept], reading.creep[name], SHORT_RUN * known.motion.T)
+        def phase_at(t: float) -> int:
+            return next((k for k, phase in enumerate(phases) if t <= phase.end), len(phases) - 1)
 
+        def can_rest(t: float) -> bool:
+            return self._holdable(phase_at(t), name, tracks, t)
 
-def _with_rests(
-    problem: Problem, known: Known, reading: Reading, track: Track, tracks: Sequence[Track]
-) -> Track:
-    """Return `track` with inserted stick where inputs can hold the contact."""
-    name, phases = track.contact, known.motion.phases
+        times = track.runs[0].begin, track.runs[-1].end
+        first, last = (self._slip(phase_at(t), name, np.array([t]))[0] for t in times)
+        ends = abs(first) < creep[name], abs(last) < creep[name]
+        return with_rests(track, can_rest, NEW_REST * self.known.motion.T, ends)
 
-    def phase_at(t: float) -> int:
-        return next((k for k, phase in enumerate(phases) if t <= phase.end), len(phases) - 1)
+    def _holdable(self, number: int, name: str, tracks: Sequence[Track], t: float) -> bool:
+        """Return True if inputs within their bounds can hold a contact at a time.
 
-    def can_rest(t: float) -> bool:
-        return _holdable(problem, phase_at(t), known, name, tracks, t)
-
-    def resting(t: float) -> bool:
-        slip = _slip(problem, known, phase_at(t), name, np.array([t]))
-        return abs(float(slip[0])) < reading.creep[name]
-
-    ends = resting(track.runs[0].begin), resting(track.runs[-1].end)
-    return with_rests(track, can_rest, NEW_REST * known.motion.T, ends)
-
-
-def _holdable(
-    problem: Problem, number: int, known: Known, name: str, tracks: Sequence[Track], t: float
-) -> bool:
-    """Return True if inputs within their bounds can hold a contact at a time.
-
-    The required force is affine in the inputs of most models, and is linearised for others.
-    """
-    model, span, at = problem.chain[number].model, problem.spans[number], np.array([t])
-    modes = {c.name: 0 for c in sticking(model)}
-    modes |= only({track.contact: track.at(t) or 0 for track in tracks}, modes)
-    for side in (1, -1):
-        modes[name] = side
-        moving, beyond = mode_model(model, modes), excess(model, modes, name, side)
-        slope = ca.jacobian(beyond, moving.vector("u")).T
-        least, *gradients = known.along(moving, ca.vertcat(beyond, slope), at)[:, 0]
-        for gradient, v in zip(gradients, model.u, strict=True):
-            low, high = span.boxes[v.name]
-            now = float(known.held(v.name, at)[0])
-            if gradient:
-                least += min(gradient * (low - now), gradient * (high - now))
-        if not least < 0.0:
-            return False
-    return True
+        The required force is affine in the inputs of most models, and is linearised for others.
+        """
+        model, span = self.problem.chain[number].model, self.problem.spans[number]
+        at, modes = np.array([t]), {c.name: 0 for c in sticking(model)}
+        modes |= only({track.contact: track.at(t) or 0 for track in tracks}, modes)
+        for side in (1, -1):
+            modes[name] = side
+            moving, beyond = mode_model(model, modes), excess(model, modes, name, side)
+            slope = ca.jacobian(beyond, moving.vector("u")).T
+            least, *gradients = self.known.along(moving, ca.vertcat(beyond, slope), at)[:, 0]
+            for gradient, v in zip(gradients, model.u, strict=True):
+                if gradient:
+                    now = float(self.known.held(v.name, at)[0])
+                    least += min(gradient * (bound - now) for bound in span.boxes[v.name])
+            if not least < 0.0:
+                return False
+        return True

@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ocp.formulation.phase import Array
 from ocp.mpc.design import CycleData, CycleStatus, Design, Plan
 from ocp.mpc.session import Action, Session
 from symfric.foundation import checks
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-Array = NDArray[np.float64]
 Reference = float | Callable[[Array], ArrayLike]
 """A number, or a function of times [s]."""
 

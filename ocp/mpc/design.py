@@ -10,11 +10,10 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.phase import Array
 from ocp.mpc.horizon import Horizon
 from ocp.mpc.kernels import Kernels, kernels
 from symfric.foundation.shown import brief
-
-Array = NDArray[np.float64]
 
 
 class CycleStatus(IntEnum):

@@ -14,7 +14,6 @@ from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.formulation.phase import Free, Row, Span
 from ocp.formulation.problem import Problem
@@ -23,7 +22,6 @@ from symfric.foundation.variable import stacked
 from symfric.integrator.stepper import flow
 from symfric.model import Model
 
-Array = NDArray[np.float64]
 Terms = Iterable[tuple[float, ca.SX]]
 
 MOST_STEPS = 10_000

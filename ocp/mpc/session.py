@@ -10,15 +10,14 @@ from time import perf_counter, thread_time
 from typing import final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from ocp.formulation.phase import Array
 from ocp.mpc.design import CycleData, CycleStatus, Design, Plan
 from ocp.mpc.source import header, sizes, source, timed
 from symfric.foundation import checks
 from symfric.foundation.numeric import address
 from symfric.integrator.compiled.compiler import FLAGS, library, opened
-
-Array = NDArray[np.float64]
 
 BACKENDS = ("auto", "compiled")
 SCALAR = (*FLAGS, "-fno-tree-vectorize")

@@ -11,20 +11,28 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.solving.prepared import OVERDETERMINED, Built, Option, Prepared, made
+from ocp.formulation.phase import Array
+from ocp.solving.prepared import (
+    LEAN,
+    OVERDETERMINED,
+    Built,
+    Option,
+    Prepared,
+    reason_of,
+    refused_options,
+)
 from ocp.solving.watch import GradientHook, IterationHook, Shaped
 from ocp.transcription.program import Program
 from symfric.foundation import checks
 from symfric.foundation.status import Status
 
-POINT = ["x", "p"]
 MULTIPLIERS = ["x", "p", "lam_f", "lam_g"]
 
 
 def symmetric(triangle: ca.MX) -> ca.MX:
     """Return the symmetric matrix of an upper triangle.
 
-    Each nonzero of the result is a nonzero of the triangle, so no arithmetic is necessary.
+    Each nonzero of the result is a nonzero of the triangle; no arithmetic is necessary.
     """
     sparsity = triangle.sparsity()
     numbered = ca.DM(sparsity, np.arange(1.0, sparsity.nnz() + 1))
@@ -54,10 +62,7 @@ def lagrangian(program: Program) -> ca.Function:
 
 
 def gradients(program: Program) -> ca.Function:
-    """Return (x, p, lam_f, lam_g) -> f, g, gradients of lam_f f + lam_g' g in x and in p.
-
-    The gradient in p is zero, because CasADi requires it but does not use it.
-    """
+    """Return (x, p, lam_f, lam_g) -> f, g, gradients of lam_f f + lam_g' g in x and in p (zero)."""
     x, p, lam_f, lam_g = _symbols(program)
     f, slope = program.gradient(x, p)
     g, jacobian = program.jacobian(x, p)
@@ -73,10 +78,9 @@ def both(program: Program) -> ca.Function:
     outputs = [*program.gradient(x, p), *program.jacobian(x, p)]
     outputs[1] = ca.densify(outputs[1])
     names = ["f", "grad_f_x", "g", "jac_g_x"]
-    return ca.Function("nlp_jac_fg", [x, p], outputs, POINT, names)
+    return ca.Function("nlp_jac_fg", [x, p], outputs, MULTIPLIERS[:2], names)
 
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FLOOR = 1e-8
@@ -257,8 +261,16 @@ class _Method(ABC):
     def _build(self, program: Program, warm: bool) -> Built:
         """Return the CasADi solver; `warm` is True for a start with multipliers."""
 
-    def _made(self, program: Program, **common: Any) -> Any:
-        return made(type(self).__name__, self.plugin, program, self.options, common)
+    def _made(self, program: Program, **common: Any) -> ca.Function:
+        """Return the CasADi solver of `program`; the user's options override `common`."""
+        prefix = "" if self.plugin == "sqpmethod" else f"{self.plugin}."
+        own = {f"{prefix}{name}": value for name, value in self.options.items()}
+        try:
+            return ca.nlpsol("solver", self.plugin, program.nlp, LEAN | common | own)
+        except (RuntimeError, NotImplementedError) as error:
+            if not self.options:
+                raise
+            raise refused_options(type(self).__name__, self.options, reason_of(error)) from None
 
     def _read(self, stats: Mapping[str, Any]) -> tuple[str, Status]:
         """Return the return code of the solver and its status."""

@@ -8,14 +8,12 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.phase import Span
+from ocp.formulation.phase import Array, Span
 from ocp.formulation.problem import Posed, Problem
 from ocp.transcription.schemes import Coefficients, Scheme
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation.parameters import check_names
 from symfric.foundation.storable import agree
-
-Array = NDArray[np.float64]
 
 SAME = 1e-6
 """Difference, in multiples of the nominal value, up to which a state is continuous at a joint."""

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ocp.formulation.phase import Array
 from ocp.solving.watch import (
     FAR,
     At,
@@ -33,7 +33,6 @@ from ocp.transcription.program import (
 from ocp.transcription.transcribe import Transcription
 from symfric.foundation.status import Status
 
-Array = NDArray[np.float64]
 Option = str | float | int
 LEAST = 1e-3
 """Smallest time limit of a solver [s], with which it stops at once."""
@@ -72,29 +71,7 @@ class Built(NamedTuple):
     kept: tuple[ca.Callback, ...] = ()
 
 
-def made(
-    solver: str,
-    plugin: str,
-    program: Program,
-    options: Mapping[str, Option],
-    common: Mapping[str, Any],
-) -> ca.Function:
-    """Return the CasADi solver of `program`; the user's `options` override `common`.
-
-    Raises:
-        ValueError: the solver refuses options.
-    """
-    prefix = "" if plugin == "sqpmethod" else f"{plugin}."
-    own = {f"{prefix}{name}": value for name, value in options.items()}
-    try:
-        return ca.nlpsol("solver", plugin, program.nlp, LEAN | dict(common) | own)
-    except (RuntimeError, NotImplementedError) as error:
-        if not options:
-            raise
-        raise refused_options(solver, options, _reason_of(error)) from None
-
-
-def _reason_of(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
     """Return the last line of an error of CasADi without its source location."""
     lines = [line for line in str(error).strip().splitlines() if line.strip()]
     return re.sub(r"^\S*:\d+: ", "", lines[-1]).strip()
@@ -206,7 +183,7 @@ class Prepared:
             with interrupts(watch):
                 result = solver.function(**arguments)
         except RuntimeError as error:  # some solvers check options and structure only here
-            reason = _reason_of(error)
+            reason = reason_of(error)
             if "option" in reason.lower():
                 raise refused_options(self.solver, self.options, reason) from None
             return None, reason, Status.SOLVER_FAILED
@@ -277,22 +254,24 @@ class Prepared:
 
 @final
 @dataclass(frozen=True)
-class Clock:
-    """Total time limit of several solves, which starts at construction.
+class Supervisor:
+    """Total time limit and progress of several solves; the time starts at construction.
 
     Attributes:
-        allowed: total wall time [s], or None for no limit.
+        max_time: total wall time [s], or None for no limit.
+        progress: function called with a `Progress` after each iteration.
     """
 
-    allowed: float | None = None
+    max_time: float | None = None
+    progress: Report | None = None
     started: float = field(default_factory=perf_counter)
 
     @property
     def left(self) -> float | None:
         """Remaining time [s]; None without a limit."""
-        if self.allowed is None:
+        if self.max_time is None:
             return None
-        return max(LEAST, self.allowed - (perf_counter() - self.started))
+        return max(LEAST, self.max_time - (perf_counter() - self.started))
 
     @property
     def over(self) -> bool:
@@ -300,22 +279,15 @@ class Clock:
         return self.left == LEAST
 
     def run(
-        self,
-        transcription: Transcription,
-        prepared: Prepared,
-        start: Iterate,
-        progress: Report | None,
-        stage: str,
-        values: Array | None = None,
-        warm: bool = False,
-        begin: float | None = None,
-    ) -> Outcome:
+        self, transcription: Transcription, prepared: Prepared, start: Iterate, stage: str,
+        values: Array | None = None, warm: bool = False, begin: float | None = None,
+    ) -> Outcome:  # fmt: skip
         """Run `prepared` within the remaining time, and report progress under the name `stage`."""
         left = self.left
         if left is not None and (prepared.max_time is None or prepared.max_time > left):
-            prepared = replace(prepared, max_time=left, told_time=self.allowed)
-        report = in_stage(progress, stage)
+            prepared = replace(prepared, max_time=left, told_time=self.max_time)
         values = transcription.program.values if values is None else values
+        report = in_stage(self.progress, stage)
         return prepared.run(start, values, report, warm, transcription.when, begin)
 
 

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ocp.formulation.phase import Free
+from ocp.formulation.phase import Array, Free
 from ocp.formulation.problem import Posed, Problem, posed
 from ocp.solving.motion import Motion, Stretch
 from ocp.solving.verification import Verification
@@ -28,7 +27,6 @@ from symfric.results.trajectory import Trajectory
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 AT_BOUND = 1e-5
 """Relative distance from a bound within which a duration counts as equal to it."""

@@ -1,15 +1,15 @@
 """Initial guesses of the optimiser from prescribed values, the user's guess or a solution."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from math import isfinite
+from math import isfinite, pi
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ocp.formulation.phase import Box, Free, Link, Span, clipped, initial, limits
+from ocp.formulation.phase import Array, Box, Free, Link, Span, clipped, initial, limits
 from ocp.formulation.problem import Problem
 from ocp.solving.motion import SpanMotion, along, span_motions, structure_of
 from ocp.solving.solution import Solution
@@ -17,9 +17,8 @@ from ocp.transcription.program import Iterate
 from ocp.transcription.transcribe import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks
+from symfric.foundation.variable import Variable
 from symfric.model import Model
-
-Array = NDArray[np.float64]
 
 Guess = float | ArrayLike | Callable[[Array], ArrayLike]
 """A constant, equally spaced samples from 0 to the end, or a function of the times [s]."""
@@ -29,6 +28,11 @@ Start = Mapping[str, Guess] | Solution | Points | None
 
 STARTS = 6
 """Number of coarse solves of a problem with friction; the best one is continued."""
+HALF_WAVES = np.arange(1, 4)
+"""Numbers of half waves over the whole motion in a deviation."""
+STILL = 0.3
+"""Deviation, relative to the nominal value, of a state that is constant in the given start if all
+states of its unit are constant."""
 
 
 def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
@@ -297,3 +301,77 @@ def _middle(box: Box) -> float:
 def _rest(box: Box) -> float:
     """Return zero, or the middle of `box` if it does not contain zero."""
     return 0.0 if box[0] <= 0.0 <= box[1] else _middle(box)
+
+
+def starts_around(
+    into: Transcription, begin: Points, seeds: Iterable[int], spread: float
+) -> tuple[Points, ...]:
+    """Return `begin` for the seed 0, and `begin` with a random smooth deviation for other seeds.
+
+    The deviation of a state is a sum of half waves over the whole motion, with amplitudes of
+    `spread` times its range in `begin`, smaller in short waves. The deviation of a rate of another
+    state (x' = v) is the rate of that deviation. Amplitudes of inputs are `spread` times a quarter
+    of the range of their bounds, or times their nominal value.
+
+    Args:
+        into: transcription of the points.
+        begin: the first start.
+        seeds: seeds of NumPy's default generator.
+        spread: relative size of the deviations; 0.5 finds most local optima of a swing-up.
+    """
+    return tuple(_around(into, begin, spread, seed) if seed else begin for seed in seeds)
+
+
+def _around(into: Transcription, begin: Points, spread: float, seed: int) -> Points:
+    problem, phases = into.problem, len(into.problem.chain)
+    random = np.random.default_rng(seed)
+    names = {v.name for s in problem.spans for group in (s.model.x, s.model.u) for v in group}
+    waves = {name: spread * random.standard_normal(HALF_WAVES.size) for name in sorted(names)}
+    sizes = _ranges(into, begin)
+    spans: list[SpanPoints] = []
+    for number, (span, old) in enumerate(zip(problem.spans, begin.spans, strict=True)):
+        first = number - span.phase
+        whole = sum(points.T for points in begin.spans[first : first + phases])
+        start = sum(points.T for points in begin.spans[first:number]) / whole
+        mesh, positions = into.meshes[number], rates_of(span.model)
+
+        def angles(fractions: Array, start: float = start, share: float = old.T / whole) -> Array:
+            return pi * (start + share * fractions)[:, None] * HALF_WAVES
+
+        nodes, points, u = old.nodes.copy(), old.inner.copy(), old.u.copy()
+        for states, fractions in ((nodes, mesh), (points, into.inner_fractions(number))):
+            at = angles(fractions)
+            for row, v in zip(states, span.model.x, strict=True):
+                name = positions.get(v.name)
+                if name is None:
+                    row += sizes[v.name] * (np.sin(at) / HALF_WAVES) @ waves[v.name]
+                else:
+                    row += sizes[name] * pi / whole * np.cos(at) @ waves[name]
+        at = angles((mesh[1:] + mesh[:-1]) / 2)
+        for row, v in zip(u, span.model.u, strict=True):
+            low, high = span.boxes[v.name]
+            size = 0.25 * (high - low) if isfinite(low) and isfinite(high) else v.nominal
+            row += size * np.sin(at) @ waves[v.name]
+        spans.append(SpanPoints(old.T, nodes, points, old.z, u))
+    return Points(tuple(spans), begin.chosen)
+
+
+def _ranges(into: Transcription, begin: Points) -> dict[str, float]:
+    """Return state -> range of its values in `begin`, over all phases.
+
+    A constant state has the largest range of the states of its unit.
+    """
+    states: dict[str, Variable] = {}
+    values: dict[str, list[float]] = {}
+    for span, points in zip(into.problem.spans, begin.spans, strict=True):
+        for v, row in zip(span.model.x, points.nodes, strict=True):
+            values.setdefault(v.name, []).extend((float(row.min()), float(row.max())))
+            states[v.name] = v
+    ranges = {name: max(found) - min(found) for name, found in values.items()}
+    largest: dict[str, float] = {}
+    for name, v in states.items():
+        largest[v.unit] = max(largest.get(v.unit, 0.0), ranges[name])
+    return {
+        n: size or largest[states[n].unit] or STILL * states[n].nominal
+        for n, size in ranges.items()
+    }

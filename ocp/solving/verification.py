@@ -4,15 +4,11 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any, final
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ocp.formulation.phase import Array
 from symfric.foundation.shown import brief
 from symfric.foundation.status import Status
 from symfric.foundation.storable import agree
 from symfric.results.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 
 @final

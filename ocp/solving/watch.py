@@ -10,12 +10,10 @@ from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from ocp.formulation.phase import Array
 from ocp.transcription.program import Place, Program, Progress, Report, outside, worst_of
 from symfric.foundation.status import Status
-
-Array = NDArray[np.float64]
 
 FEASIBLE = 1e-6
 """Largest scaled violation of an iterate that counts as feasible."""

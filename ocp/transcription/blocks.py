@@ -19,9 +19,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.phase import Join, Row
+from ocp.formulation.phase import Array, Join, Row
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Symbols = Any
 """SX or MX columns of one type, for which CasADi's stubs have no common type."""

@@ -39,13 +39,11 @@ class Stages(NamedTuple):
         nx, nu: numbers of states and of other unknowns of each stage, in the order of w; the last
             nu is 0.
         ng: numbers of rows of each stage without its gap x_(k+1) = F(x_k, u_k), in the order of g.
-        equality: mask of the rows of g that are equations, shape (m,).
     """
 
     nx: tuple[int, ...]
     nu: tuple[int, ...]
     ng: tuple[int, ...]
-    equality: tuple[bool, ...]
 
 
 @final
@@ -142,18 +140,9 @@ def bounds_of(problem: Problem, grid: Grid) -> tuple[Array, Array]:
 
 
 def stages_of(
-    problem: Problem,
-    layout: Layout,
-    pieces: Sequence[Piece],
-    made: Assembled,
-    equality: Array,
+    problem: Problem, layout: Layout, pieces: Sequence[Piece], made: Assembled
 ) -> tuple[Stages | None, str]:
-    """Return the stages and "", or None and the coupling that prevents them.
-
-    Args:
-        problem, layout, pieces, made: problem, layout, pieces and functions of the program.
-        equality: mask of the rows that are equations, shape (m,).
-    """
+    """Return the stages and "", or None and the coupling that prevents them."""
     if len(problem.scenarios) > 1:
         return None, "several scenarios"
     if problem.chosen:
@@ -185,8 +174,7 @@ def stages_of(
         return None, f"{next(names)}, which depends on more than its interval"
     sizes = np.diff(np.append(first, layout.size))
     ng = np.bincount(owner[~gap], minlength=K + 1)
-    counts = (nx, sizes - nx, ng, np.asarray(equality, dtype=bool))
-    return Stages(*(tuple(part.tolist()) for part in counts)), ""
+    return Stages(*(tuple(part.tolist()) for part in (nx, sizes - nx, ng))), ""
 
 
 def _owners(

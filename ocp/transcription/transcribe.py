@@ -21,7 +21,6 @@ from ocp.formulation.problem import Problem
 from ocp.transcription.assembly import Assembled, Slot, assemble
 from ocp.transcription.blocks import Array, Piece
 from ocp.transcription.closed_loops import Closing, closing
-from ocp.transcription.collocation import PointEquations, gaps, piece_of_points, point_equations
 from ocp.transcription.conditions import (
     Maker,
     at_nodes,
@@ -31,9 +30,17 @@ from ocp.transcription.conditions import (
     plain_links,
     whole,
 )
+from ocp.transcription.intervals import (
+    PointEquations,
+    Shot,
+    gaps,
+    piece_of_points,
+    pieces_of_intervals,
+    point_equations,
+    shot,
+)
 from ocp.transcription.program import Place, Program, Stages, bounds_of, stages_of
 from ocp.transcription.schemes import Scheme, Shooting, check_meshes, nodes_of
-from ocp.transcription.shooting import Shot, pieces_of_intervals, shot
 from ocp.transcription.unknowns import (
     Grid,
     Layout,
@@ -203,8 +210,7 @@ class Skeleton:
     @cached_property
     def structure(self) -> tuple[Stages | None, str]:
         """Stages of the program, or None and the reason why it has none."""
-        equality = self.program.lower_g == self.program.upper_g
-        return stages_of(self.problem, self.layout, self.pieces, self.assembled, equality)
+        return stages_of(self.problem, self.layout, self.pieces, self.assembled)
 
     @cached_property
     def largest(self) -> list[int]:

@@ -8,7 +8,7 @@ processor times of a whole call, including building and verification.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from math import inf, isfinite, nan
+from math import inf, isfinite, nan, pi
 from statistics import median
 from time import process_time
 from typing import Any
@@ -17,18 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.expressions import at_end, effort, track
-from ocp.formulation.phase import Phase, Span
+from ocp.formulation.phase import Phase, Span, clipped, limits
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import set_valued
 from ocp.problems import READY, Ready, guide
 from ocp.solve import solve
-from ocp.solving.one_solve import perturbed
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Start, initial_points
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric.bench.ocp_contenders import Attempt, has_rockit, opti, rockit
 from symfric.bench.report import Found, Progress, Report, curves
+from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import find_compiler
 from symfric.integrator import Hold, simulate
 from symfric.laws import BrownMcPhee, ExactCoulomb, Law, LuGre
@@ -38,7 +38,9 @@ from symfric.scenes.blocks import drive
 Array = NDArray[np.float64]
 STARTS, RANDOM = 12, 50
 NEAR, FAR = 0.1, 0.5
-"""Scales of the starts, see `perturbed`: near the default guess, and anywhere in the bounds."""
+"""Scales of the starts, see `starts_of`: near the default guess, and anywhere in the bounds."""
+WAVES = 4
+"""Number of half waves in a perturbation."""
 WANTED = 1e-4
 """Largest relative miss of a verified motion."""
 BEST = 1e-3
@@ -76,22 +78,52 @@ def bench(
 
 
 def starts_of(problem: Problem, count: int, scale: float) -> Iterator[dict[str, Array]]:
-    """Yield guesses of all states and inputs by name; the first near start is the default one."""
+    """Yield guesses of all states and inputs by name; the first near start is the default one.
+
+    A random sum of half waves is added to each signal. Its standard deviation is `scale` times half
+    the width of the bounds, or the larger of the largest and the nominal value without bounds. Free
+    durations are multiplied by exp(scale r / 2), r normal.
+    """
     into = discretise(problem, Radau()).on(make_meshes(problem, 50))
-    points = initial_points(into)
-    model = problem.spans[0].model
+    model, first = problem.spans[0].model, int(scale == NEAR)
     for seed in range(count):
-        moved = points if seed == 0 and scale == NEAR else perturbed(into, points, scale, seed)
-        lengths = np.array([span.T for span in moved.spans])
-        begins = np.concatenate([[0.0], np.cumsum(lengths)])
-        at = np.concatenate(
-            [b + T * m for b, T, m in zip(begins, lengths, into.meshes, strict=False)]
-        )
-        nodes = np.hstack([span.nodes for span in moved.spans])
-        held = np.hstack([np.hstack([span.u, span.u[:, -1:]]) for span in moved.spans])
+        random, begins = np.random.default_rng(seed), [0.0]
+        at, nodes, held = list[Array](), list[Array](), list[Array]()
+        parts = zip(problem.spans, into.meshes, initial_points(into).spans, strict=True)
+        for span, mesh, old in parts:
+            x, u, time = old.nodes, old.u, old.T
+            if seed >= first:
+                x = x + _waves(random, scale, span, model.x, x)(mesh)
+                u = u + _waves(random, scale, span, model.u, u)((mesh[1:] + mesh[:-1]) / 2)
+                time *= float(np.exp(0.5 * scale * random.standard_normal()))
+            time = clipped(time, limits(span.T))
+            at.append(begins[-1] + time * mesh)
+            begins.append(begins[-1] + time)
+            nodes.append(x)
+            held.append(np.hstack([u, u[:, -1:]]))
         times = np.linspace(0.0, begins[-1], 201)
-        rows = zip((*model.x, *model.u), (*nodes, *held), strict=True)
-        yield {v.name: np.interp(times, at, row) for v, row in rows}
+        rows = zip((*model.x, *model.u), (*np.hstack(nodes), *np.hstack(held)), strict=True)
+        yield {v.name: np.interp(times, np.concatenate(at), row) for v, row in rows}
+
+
+def _waves(
+    random: np.random.Generator, scale: float, span: Span, group: Sequence[Variable], rows: Array
+) -> Callable[[Array], Array]:
+    """Return random sums of half waves over [0, 1], one row for each variable."""
+
+    def size(v: Variable, row: Array) -> float:
+        low, high = span.boxes[v.name]
+        bounded = isfinite(low) and isfinite(high)
+        return 0.5 * (high - low) if bounded else max(v.nominal, float(np.abs(row).max()))
+
+    sizes = [scale * size(v, row) for v, row in zip(group, rows, strict=True)]
+    a = [random.standard_normal((2, WAVES)) * one / np.sqrt(WAVES) for one in sizes]
+
+    def at(fractions: Array) -> Array:
+        angles = pi * np.arange(1, WAVES + 1)[:, None] * fractions
+        return np.array([one[0] @ np.sin(angles) + one[1] @ np.cos(angles) for one in a])
+
+    return at
 
 
 def _case(ready: Ready, quick: bool) -> Iterator[Found]:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 
+from symfric.choice.friction import WORDS
 from symfric.choice.nature import NEEDS
 from symfric.choice.ranking import STANDING_TEXTS, Ranking, Row, interruption, number
 from symfric.foundation.panels import blank, dressed, save
@@ -159,24 +160,7 @@ def _round(axis: Axes, values: Sequence[float]) -> None:
     axis.minorticks_off()
 
 
-COLUMNS = (
-    ("rank", "rank among all laws that run; similar laws share it"),
-    ("law", "name in the catalogue"),
-    ("work", "attempts of a step times what one counts, in millions of instructions: it ranks"),
-    ("ms", "processor time of that run in CasADi's virtual machine"),
-    ("error", "largest difference from the reference, relative to the motion"),
-    ("own error", "that from the finest run of the law itself: the integrator's part"),
-    ("attempts", "of a step"),
-    ("rtol", "loosest relative tolerance that keeps the accuracy"),
-    ("fixed [s]", "largest step of backward Euler in which the plant follows the motion"),
-    ("explicit [s]", "largest step of an explicit Runge-Kutta method of order 5 in which it does"),
-    ("M4F", "instructions of the law's step on a Cortex-M4F, averaged over a typical drive"),
-    ("C", "operations of the law's step in C, float"),
-    ("parameters", "that describe friction; of these hard to measure"),
-    ("class", "smoothness in the velocity"),
-    ("shows", "codes of its phenomena"),
-    ("numbers", "parameters that differ from the defaults of the law"),
-)
+COLUMNS: dict[str, str] = WORDS["columns"]
 """Headings of the columns of the table, and their meanings."""
 NARROW = 700
 """Width of a screen [pixel] below which the narrow figure is shown."""
@@ -196,7 +180,7 @@ def page(choice: Ranking) -> str:
     codes = "; ".join(f"{code}: {word} ({why})" for word, (code, why) in NEEDS.items())
     meaning = [
         "<h2>What the columns mean</h2>",
-        html.bullets(f"{name}: {why}" for name, why in COLUMNS),
+        html.bullets(f"{name}: {why}" for name, why in COLUMNS.items()),
         html.paragraph(f"Shows: {codes}."),
     ]
     parts = (html.title(choice.title), about, body(choice, 760), *meaning)
@@ -232,7 +216,9 @@ def _image(choice: Ranking, width: int) -> str:
 
 def _placed(choice: Ranking) -> str:
     """Return the HTML table of all laws that run, grouped by standing."""
-    head = "".join(f'<th title="{escape(why)}">{escape(name)}</th>' for name, why in COLUMNS)
+    head = "".join(
+        f'<th title="{escape(why)}">{escape(name)}</th>' for name, why in COLUMNS.items()
+    )
     lines = list[str]()
     for standing, text in STANDING_TEXTS.items():
         group = [row for row in choice.placed if row.standing == standing]

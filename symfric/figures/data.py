@@ -145,21 +145,13 @@ class FigureData(Showing):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data: name, title, units, panels and the columns of each curve."""
-        return {
-            "name": self.name,
-            "title": self.title,
-            "note": self.note,
-            "units": dict(self.units),
-            "panels": [list(panel) for panel in self.panels],
-            "curves": [
-                {
-                    "law": c.law,
-                    "case": c.case,
-                    "columns": {name: values.tolist() for name, values in c.columns.items()},
-                }
-                for c in self.curves
-            ],
-        }
+        curves = [
+            {"law": c.law, "case": c.case, "columns": {n: v.tolist() for n, v in c.columns.items()}}
+            for c in self.curves
+        ]
+        texts = {name: getattr(self, name) for name in ("name", "title", "note")}
+        units, panels = dict(self.units), [list(panel) for panel in self.panels]
+        return texts | {"units": units, "panels": panels, "curves": curves}
 
 
 def _range(values: Array) -> str:

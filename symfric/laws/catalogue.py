@@ -19,68 +19,36 @@ from symfric.laws.static import (
     smooth_peak,
 )
 
-STATIC_LAWS: dict[str, type[Law]] = {
-    "coulomb": coulomb.Coulomb,
-    "viscous": coulomb.Viscous,
-    "power_law_viscous": coulomb.PowerLawViscous,
-    "stribeck": exponential.Stribeck,
-    "tustin": exponential.Tustin,
-    "lorentzian": smooth_peak.Lorentzian,
-    "steady_state_lugre": exponential.SteadyStateLuGre,
-    "brown_mcphee": smooth_peak.BrownMcPhee,
-    "simscape_breakaway": smooth_peak.SimscapeBreakaway,
-    "specker": smooth_peak.Specker,
-    "self_tuning": self_tuning.SelfTuning,
-    "brittle_self_tuning": self_tuning.BrittleSelfTuning,
-    "rui_wang": self_tuning.RuiWang,
-    "threlfall": piecewise.Threlfall,
-    "modified_threlfall": piecewise.ModifiedThrelfall,
-    "bengisu_akay": piecewise.BengisuAkay,
-    "velocity_based": piecewise.VelocityBased,
-    "ambrosio": piecewise.Ambrosio,
-    "hollars": piecewise.Hollars,
-    "exudyn": piecewise.Exudyn,
-    "step5": piecewise.Step5,
-    "benson": exponential.Benson,
-    "andersson": exponential.Andersson,
-    "duan_singh": exponential.DuanSingh,
-    "berger": exponential.Berger,
-    "popp_stelter": smooth_peak.PoppStelter,
-    "makkar_dixon": smooth_peak.MakkarDixon,
-    "karnopp": applied_force.Karnopp,
-    "awrejcewicz": applied_force.Awrejcewicz,
-    "leine_switch": applied_force.LeineSwitch,
-    "wojewoda": applied_force.Wojewoda,
-    "quarter_car_general": machines.QuarterCarGeneral,
-    "quarter_car_simple": machines.QuarterCarSimple,
-    "bittencourt": machines.Bittencourt,
-    "bam": machines.BAM,
-    "capstan": machines.Capstan,
-}
-"""Memoryless laws by name, with the most widely used laws first."""
+STATIC = """
+    coulomb viscous power_law_viscous stribeck tustin lorentzian steady_state_lugre brown_mcphee
+    simscape_breakaway specker self_tuning brittle_self_tuning rui_wang threlfall
+    modified_threlfall bengisu_akay velocity_based ambrosio hollars exudyn step5 benson andersson
+    duan_singh berger popp_stelter makkar_dixon karnopp awrejcewicz leine_switch wojewoda
+    quarter_car_general quarter_car_simple bittencourt bam capstan
+"""
+"""Names of memoryless laws, with the most widely used laws first."""
+DYNAMIC = """
+    dahl bliman_sorine haessig_friedland lugre lugre_normalised lugre_passive elasto_plastic leuven
+    maxwell_slip gms stick_slip gonthier bristle_2d bouc_wen rate_and_state armstrong exact_coulomb
+"""
+"""Names of laws with states."""
+FILES = (
+    *(applied_force, coulomb, exponential, machines, piecewise, self_tuning, smooth_peak),
+    *(dahl, dwell, lugre, maxwell_slip, stick_slip),
+)
 
-DYNAMIC_LAWS: dict[str, type[Law]] = {
-    "dahl": dahl.Dahl,
-    "bliman_sorine": dahl.BlimanSorine,
-    "haessig_friedland": stick_slip.HaessigFriedland,
-    "lugre": lugre.LuGre,
-    "lugre_normalised": lugre.LuGreNormalised,
-    "lugre_passive": lugre.LuGrePassive,
-    "elasto_plastic": lugre.ElastoPlastic,
-    "leuven": maxwell_slip.Leuven,
-    "maxwell_slip": maxwell_slip.MaxwellSlip,
-    "gms": maxwell_slip.GMS,
-    "stick_slip": stick_slip.StickSlip,
-    "gonthier": dwell.Gonthier,
-    "bristle_2d": stick_slip.Bristle2D,
-    "bouc_wen": dahl.BoucWen,
-    "rate_and_state": dwell.RateAndState,
-    "armstrong": dwell.Armstrong,
-    "exact_coulomb": stick_slip.ExactCoulomb,
-}
+
+def _named(names: str) -> dict[str, type[Law]]:
+    """Return the classes by name; a name is that of the class in lower case with underscores."""
+    kinds = {name.lower(): value for file in FILES for name, value in vars(file).items()}
+    return {name: kinds[name.replace("_", "")] for name in names.split()}
+
+
+STATIC_LAWS = _named(STATIC)
+"""Memoryless laws by name."""
+DYNAMIC_LAWS = _named(DYNAMIC)
 """Laws with states by name."""
-
-ALL_LAWS: dict[str, type[Law]] = {**STATIC_LAWS, **DYNAMIC_LAWS}
+ALL_LAWS = STATIC_LAWS | DYNAMIC_LAWS
 """All laws by name; the contract tests cover every entry."""
 
 
@@ -105,7 +73,9 @@ ALIASES = {
 }
 """Other names of laws that papers and programs use."""
 
-WRAPPERS: dict[str, type[LoadDependent | LoadNormalised | Lagged | TemperatureDependent]] = {
+Wrapping = Asymmetric | LoadDependent | LoadNormalised | Lagged | TemperatureDependent
+WRAPPERS: dict[str, type[Wrapping]] = {
+    "asymmetric": Asymmetric,
     "load_dependent": LoadDependent,
     "load_normalised": LoadNormalised,
     "lagged": Lagged,
@@ -124,13 +94,11 @@ def law_name(law: AnyLaw) -> str:
         check_law("law_name", law)
     if isinstance(law, Sum):
         return "+".join(law_name(term) for term in law.laws)
-    if isinstance(law, Asymmetric):
-        return f"asymmetric({law_name(law.positive)})"
-    if isinstance(law, LoadDependent | LoadNormalised | Lagged | TemperatureDependent):
-        name = next(name for name, kind in WRAPPERS.items() if kind is type(law))
-        return f"{name}({law_name(law.law)})"
-    known = (name for name, kind in (ALL_LAWS | POPULATIONS).items() if kind is type(law))
-    return next(known, type(law).__name__)
+    known: dict[type, str] = {
+        kind: name for name, kind in (ALL_LAWS | POPULATIONS | WRAPPERS).items()
+    }
+    name = known.get(type(law), type(law).__name__)
+    return f"{name}({law_name(law.inner)})" if isinstance(law, Wrapping) else name
 
 
 def any_from_text(text: str) -> AnyLaw:
@@ -161,19 +129,16 @@ def law_from_text(text: str) -> Law:
 
 
 def _single(term: str, text: str) -> Law:
-    wrapped = fullmatch(rf"(asymmetric|{'|'.join(WRAPPERS)})\((.+)\)", term)
-    if wrapped:
-        inner = law_from_text(wrapped[2])
-        return (
-            Asymmetric(inner, inner) if wrapped[1] == "asymmetric" else WRAPPERS[wrapped[1]](inner)
-        )
+    if wrapped := fullmatch(rf"({'|'.join(WRAPPERS)})\((.+)\)", term):
+        kind, inner = WRAPPERS[wrapped[1]], law_from_text(wrapped[2])
+        return Asymmetric(inner, inner) if kind is Asymmetric else kind(inner)  # pyright: ignore[reportCallIssue]  (the others wrap one law)
     name = ALIASES.get(term, term)
     if name in POPULATIONS:
         raise ValueError(
             f"law '{text}': expected a law with equations, got {name}, a population of random "
             "contacts; it has figures and `force(t, x, N)`; the most similar law is gms"
         )
-    if name in ("asymmetric", *WRAPPERS):
+    if name in WRAPPERS:
         raise ValueError(f"law '{text}': expected a law to wrap, as in {name}(stribeck), got none")
     check_names(f"law {checks.shown(text)}", [name], ALL_LAWS, "`symfric laws` lists them")
     return ALL_LAWS[name]()

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.numeric import evaluate, evaluate_all
 from symfric.foundation.parameters import Variable
+from symfric.foundation.units import per_second
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model.contact import Contact, Variables
 from symfric.model.holonomic import Holonomic
 from symfric.model.parts import Event, Monitor, Output
 from symfric.model.sketch import Sketch
-
-PER_SECOND = {"m/s": "m/s^2", "rad/s": "rad/s^2", "1/s": "1/s^2"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,24 +131,13 @@ class System:
         start = self._start.map(count)(known, chosen, inputs, parameters, times).full()
         return start.T, parameters.T
 
-    def start_by_parameters(
+    def start_slopes(
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None,
         t: float = 0.0,
-    ) -> NDArray[np.float64]:  # fmt: skip
-        """Return the derivative of `initial_state` with respect to p, shape (nx, n_p)."""
-        return evaluate_all(self._start_slopes, *self._start_arguments(given, p, t))[0]
-
-    def start_by_state(
-        self,
-        name: str,
-        given: Mapping[str, float] | None = None,
-        p: Mapping[str, float] | None = None,
-        t: float = 0.0,
-    ) -> NDArray[np.float64]:
-        """Return the derivative of `initial_state` with respect to a start value, shape (nx,)."""
-        i = [v.name for v in self.x].index(name)
-        chosen = dict(given or {}) | {name: float(self.initial_state(given, p, t)[i])}
-        return evaluate_all(self._start_slopes, *self._start_arguments(chosen, p, t))[1][:, i]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
+        """Return the derivatives of `initial_state` by p (nx, n_p) and by values in `given`."""
+        by_p, by_start = evaluate_all(self._start_slopes, *self._start_arguments(given, p, t))
+        return by_p, by_start
 
     def _start_arguments(
         self, given: Mapping[str, float] | None, p: Mapping[str, float] | None, t: float
@@ -216,7 +204,6 @@ def accelerations(model: System) -> dict[str, Output]:
         if i is None and not alone:
             continue
         r = k if i is None else i
-        unit = model.x[r].unit
-        unit = PER_SECOND.get(unit, f"{unit}/s" if unit else "")
+        unit = model.x[r].unit and per_second(model.x[r].unit)
         found[f"{v.name}_acc"] = Output(model.ode[r], unit, f"acceleration of {v.name}")
     return found

@@ -1,6 +1,7 @@
 """Predefined machines by name."""
 
-from collections.abc import Iterator, Mapping
+from collections import UserDict
+from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, TypeVar, final
 
@@ -9,28 +10,20 @@ from symfric.scenes.base import Scene
 if TYPE_CHECKING:
     from symfric.scenes.linkages import MechanismScene
 
-S = TypeVar("S", bound=Scene, covariant=True)
+S = TypeVar("S", bound=Scene)
 
 
 @final
-class Catalogue(Mapping[str, type[S]]):
+class Catalogue(UserDict[str, type[S]]):
     """Scenes by name; the module of a scene is imported at its first use."""
 
     def __init__(self, places: Mapping[str, str]) -> None:
-        self._places = dict(places)
+        super().__init__()
+        self.data = dict(places)  # pyright: ignore[reportAttributeAccessIssue]
 
     def __getitem__(self, name: str) -> type[S]:
-        module, kind = self._places[name].split()
+        module, kind = str(self.data[name]).split()
         return getattr(import_module(f"symfric.scenes.{module}"), kind)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._places)
-
-    def __len__(self) -> int:
-        return len(self._places)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._places
 
 
 _MECHANISMS = {

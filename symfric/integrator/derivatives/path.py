@@ -55,11 +55,15 @@ def seeds(
     free, states = [v.name for v in model.p], [v.name for v in model.x]
     known = [*free, *(f"x0.{name}" for name in states)]
     check_names(f"sensitivities of '{model.name}' (parameters must be free)", names, known)
-    by_p = model.start_by_parameters(x0, p, t)
-    columns = [
-        by_p[:, free.index(n)] if n in free else model.start_by_state(n[3:], x0, p, t)
-        for n in names
-    ]
+    start = dict(zip(states, model.initial_state(x0, p, t).tolist(), strict=True))
+
+    def column(name: str) -> NDArray[np.float64]:
+        if name in free:
+            return model.start_slopes(x0, p, t)[0][:, free.index(name)]
+        given = {**(x0 or {}), name[3:]: start[name[3:]]}
+        return model.start_slopes(given, p, t)[1][:, states.index(name[3:])]
+
+    columns = [column(name) for name in names]
     rows = tuple(free.index(n) if n in free else -1 for n in names)
     return Seeds(tuple(names), rows, np.column_stack(columns))
 

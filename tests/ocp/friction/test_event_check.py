@@ -219,7 +219,7 @@ def test_bad_input_is_refused() -> None:
         (lambda: set_valued(model, 0.0), "set_valued: t_end: expected"),
         (lambda: set_valued(model, 1.0, modes={"belt": 0}), "modes: expected .*got belt"),
         (lambda: set_valued(model, 1.0, u={"push": 0.0}), "got push"),
-        (lambda: set_valued(model, 1.0, u={"force": "1"}), "u: force: expected a"),
+        (lambda: set_valued(model, 1.0, u={"force": "1"}), "input 'force': expected"),
         (lambda: set_valued(watched, 1.0), "expected no events but those of contacts, got e"),
         (lambda: set_valued(LAW, 1.0), "set_valued: expected a model"),  # type: ignore[arg-type]
     ]

@@ -10,7 +10,7 @@ from phases import solve_once
 
 from ocp.formulation.problem import Problem
 from ocp.friction.arc_solution import ModeSolver, SolvedSequence
-from ocp.friction.arcs import STOPPED, Rules, arc_model, in_arcs
+from ocp.friction.arcs import STOPPED, Rules, in_arcs
 from ocp.friction.mode_optimisation import KICK, SHORTEST, better, settled
 from ocp.friction.sequence import (
     Leg,
@@ -28,11 +28,10 @@ from ocp.friction.sequence import (
     with_rests,
 )
 from ocp.friction.smooth_models import smoothed, widths
-from ocp.friction.transfer import Known, sizes_of
+from ocp.friction.transfer import Known, Reader
 from ocp.problems import cart_pendulum, load_through_spring, out_and_back
 from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import starts_around
-from ocp.solving.starts import initial_points
+from ocp.solving.starts import initial_points, starts_around
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
 
@@ -47,9 +46,12 @@ def one(*runs: tuple[int, float, float]) -> tuple[Leg]:
     return (cut([Track("guide", tuple(Run(*run) for run in runs))], (0, 0), 0.0, runs[-1][2]),)
 
 
-def two(*runs: tuple[int, float, float]) -> tuple[Leg, Leg]:
-    """Two legs of 1 s of the contact "guide"."""
-    track = Track("guide", tuple(Run(*run) for run in runs))
+SPRING = Rules(load_through_spring(), {"load": 6.0}, (), 1e-4)
+
+
+def two(*runs: tuple[int, float, float], contact: str = "guide") -> tuple[Leg, Leg]:
+    """Two legs of 1 s of a contact."""
+    track = Track(contact, tuple(Run(*run) for run in runs))
     return cut([track], (0, 0), 0.0, 1.0), cut([track], (1, 0), 1.0, 2.0)
 
 
@@ -81,7 +83,7 @@ def test_legs_are_cut_where_any_contact_changes() -> None:
     legs = tuple(cut([first, second], (k, 0), k, k + 1.0) for k in range(2))
     assert shown(legs) == "(+0)(++) | (++)(-+)"
     assert [arc.duration for arc in flat(legs)] == pytest.approx([0.5, 0.5, 0.2, 0.8])
-    assert tracks_of(legs) == {"one": first.runs, "two": second.runs}
+    assert tracks_of(legs) == {"one": [*first.runs], "two": [*second.runs]}
 
 
 def test_vanished_arcs_are_pruned_and_modes_inserted() -> None:
@@ -112,9 +114,8 @@ def test_stops_keep_a_distance_from_the_sliding_force(
     side: int, stretch: float, left: float
 ) -> None:
     """200 N/m hold a load that slides against 4 N: 5 % less than that is allowed at a stop."""
-    model = load_through_spring().chain[0].model
-    made = arc_model(model, {"load": 0}, (), {}, {}, {"load": side}, {"load": 6.0}, (0.01, 0.002))
-    symbols = [made.vector("x"), made.vector("z"), made.vector("u"), made.vector("p")]
+    made = in_arcs(SPRING, two((side, 0, 1), (0, 1, 2), contact="load")).chain[1].model
+    symbols = [made.vector(letter) for letter in "xzup"]
     room = ca.Function("room", symbols, [made.expression(f"load{STOPPED}")])
     p = made.values("p", {})
     assert float(room([stretch, 0, 0, 0], 0, 0, p)) * 6.0 == pytest.approx(left, abs=1e-5)
@@ -122,8 +123,7 @@ def test_stops_keep_a_distance_from_the_sliding_force(
 
 @pytest.mark.parametrize(("left", "margin"), [(1.0, 0.01), (0.002, 0.01 * np.tanh(1.0)), (0, 0)])
 def test_margin_fades_before_break_away(left: float, margin: float) -> None:
-    model = load_through_spring().chain[0].model
-    made = arc_model(model, {"load": 0}, (), {"load": 1}, {}, {}, {"load": 6.0}, (0.01, 0.002))
+    made = in_arcs(SPRING, two((0, 0, 0.5), (1, 0.5, 2), contact="load")).chain[0].model
     symbols = [made.vector(letter) for letter in "xzup"]
     up, down = (ca.Function("f", symbols, [made.expression(f"load_{n}")]) for n in ("up", "down"))
     at = [0, 0, 0, 0, left], 0, 0, made.values("p", {})
@@ -143,14 +143,14 @@ def known() -> Known:
 
 def modes_solver() -> ModeSolver:
     problem = out_and_back()
-    rules = Rules(problem, sizes_of(problem, known()), ("guide",), SHORTEST * 2)
-    return ModeSolver(rules, Ipopt(max_iter=100), Radau(3), KICK * 2, None)
+    rules = Rules(problem, Reader(problem, known()).sizes(), ("guide",), SHORTEST * 2)
+    return ModeSolver(rules, Ipopt(max_iter=100), Radau(3), KICK * 2)
 
 
 def found_for(legs: tuple[Leg, ...]) -> SolvedSequence:
     first = modes_solver().solve(legs, known(), 30, 1e-2)
     assert first.ok
-    return settled(modes_solver(), first, lambda solved: solved)
+    return settled(modes_solver(), first)
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_neighbouring_sequences_are_tried_and_the_better_one_is_kept() -> None:
     legs = two((1, 0, 1), (-1, 1, 2))
     assert [shown(other) for other in neighbours(legs, 0.01)] == ["+- | -", "+ | +-"]
     found = found_for(legs)
-    kept = better(modes_solver(), found, 0.01, lambda solved: solved)
+    kept = better(modes_solver(), found, 0.01)
     assert shown(kept.legs) == "+ | -"
     assert kept.outcome.cost <= found.outcome.cost
     forces = [points.u[0, 0] for points in found.points.spans]

@@ -11,7 +11,6 @@ from math import pi, tanh
 from typing import Any
 
 import casadi as ca
-import numpy as np
 import pytest
 from phases import unit_move
 from rubbing import KINDS, Machine, machine
@@ -19,7 +18,7 @@ from rubbing import KINDS, Machine, machine
 from ocp import Phase, Problem, Progress, Solution, at_end, integral, solve, strategies
 from ocp.formulation.phase import FREE
 from ocp.friction import homotopy
-from ocp.friction.event_check import motions, verify_exactly
+from ocp.friction.event_check import verify_exactly
 from ocp.friction.homotopy import FIRST, LAST, Sharp, sharpened
 from ocp.friction.mode_models import holding, mode_model
 from ocp.friction.smooth_models import (
@@ -149,11 +148,8 @@ def test_motion_by_modes_holds_under_exact_friction(by_modes: Solution) -> None:
     assert found.ok, str(found)
     assert {m.what for m in found.checked} >= {"start", "end", "cost"}
     assert found.cost == pytest.approx(by_modes.cost, rel=1e-9)
-    exact = [m for motion in motions(by_modes) for m in motion.modes["guide"]]
-    kept = [m for m in exact if m.end - m.begin > 1e-6]
-    assert [m.kind for m in kept] == [m.kind for m in by_modes.modes["guide"]]
-    ends = [m.end for m in by_modes.modes["guide"]]
-    np.testing.assert_allclose([m.end for m in kept], ends, atol=1e-5)
+    out, back = (run["guide_F"][5:-5] for run in found.trajectories)
+    assert out.min() >= 4.0 and back.max() <= -4.0  # slides forwards, then backwards
     with pytest.raises(ValueError, match="verify_exactly: expected a solution"):
         verify_exactly(out_and_back())  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="verify_exactly: tolerance: expected"):

@@ -6,14 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from motions import double_integrator
 from phases import UNIT, solve_once, there_and_back, unit_move
 
 from ocp.formulation.expressions import integral
 from ocp.formulation.phase import FREE, Free, Phase
 from ocp.formulation.problem import Problem
 from ocp.solving.motion import span_motions
-from ocp.solving.one_solve import perturbed
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Guess, initial_points, resample, start_of
 from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
@@ -173,13 +171,3 @@ def test_multipliers_are_used_where_the_program_is_the_same() -> None:
         start, warm = start_of(other, old)
         assert not warm
         assert not start.lam_g.any()
-
-
-def test_perturbations_are_equal_on_every_mesh_and_of_the_given_size() -> None:
-    coarse, fine = (on(unit_move(model=double_integrator(4.0)), n) for n in (5, 10))
-    one, two = (perturbed(t, initial_points(t), 0.1, seed=3) for t in (coarse, fine))
-    np.testing.assert_allclose(one.spans[0].nodes, two.spans[0].nodes[:, ::2])
-    moved = [perturbed(fine, initial_points(fine), 0.1, seed).spans[0].u for seed in range(200)]
-    assert np.std(moved) == pytest.approx(0.1 * 4.0, rel=0.1)
-    still = perturbed(fine, initial_points(fine), 0.0, seed=3)
-    np.testing.assert_array_equal(still.spans[0].nodes, initial_points(fine).spans[0].nodes)

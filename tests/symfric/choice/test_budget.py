@@ -1,12 +1,14 @@
 """What runs of a law may cost, and which run it is judged by, with runs that are written down."""
 
 from dataclasses import dataclass, field
-from math import log, log10
+from math import log, log10, pi
 from types import SimpleNamespace
 from typing import Any, cast
 
+import casadi as ca
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from symfric import Model, SolveError, Status, Variable, rabinowicz, simulate
 from symfric.choice import continuation
@@ -23,11 +25,17 @@ from symfric.choice.continuation import (
     nearest,
 )
 from symfric.choice.machine import Candidate, Reference
-from symfric.choice.measured import _holds  # pyright: ignore[reportPrivateUsage]
+from symfric.choice.measured import (
+    Motion,
+    _holds,  # pyright: ignore[reportPrivateUsage]
+    largest,
+)
 from symfric.choice.smoothing import Smoothed, SmoothingStudy
 from symfric.figures.regularisation import Machine, Sample
-from symfric.laws import LuGre, Stribeck
+from symfric.integrator import Input, Linear
+from symfric.laws import LuGre, Stribeck, Viscous
 from symfric.model import Event
+from symfric.scenes import Drive
 
 TRUTH = Reference("one", np.ones((1, 1)), np.ones(1), 0.0)
 
@@ -146,14 +154,6 @@ def test_where_only_the_finest_run_keeps_the_accuracy_its_own_error_is_that_of_t
     assert found.own > 1e-3  # not zero, the difference from itself
 
 
-def test_a_fine_run_that_would_take_too_much_is_not_begun() -> None:
-    held = Written(lambda _, rtol: 2 * rtol, lambda _, rtol: 10**9 if rtol < 1e-6 else 9_000)
-    level = Smoothed(1.0, 1e-6, 9_000, 1e-6)
-    found = at_equal_error(budget(held), 1.0, TRUTH, GOAL, level, whole=True)
-    assert all(rtol >= 1e-6 for _, rtol in held.asked)
-    assert found.rtol == pytest.approx(10**-3.5)
-
-
 @pytest.mark.parametrize(
     ("tight", "status", "kept"),
     [(1e-4, Status.SOLVER_FAILED, True), (0.5, Status.SOLVER_FAILED, False),
@@ -174,3 +174,41 @@ def test_bristles_keep_the_accuracy_in_a_far_tighter_run_or_are_not_ranked(
     assert _holds(task, at, budget(held)) is kept
     held.law = Stribeck()
     assert _holds(task, at, budget(held))
+
+
+Array = NDArray[np.float64]
+C, W, END = 20.0, 4 * pi, 2.0
+
+
+def exact(t: Array) -> Array:
+    """x of v' = sin(W t) - C v from rest."""
+    swing = (1 - np.cos(W * t)) * C / W - np.sin(W * t)
+    return (swing + (1 - np.exp(-C * t)) * W / C) / (C * C + W * W)
+
+
+def off(h: float) -> float:
+    """Largest error of backward Euler, the force that of the middle of each step."""
+    x, v, worst = 0.0, 0.0, 0.0
+    for k in range(round(END / h)):
+        v = (v + h * np.sin(W * h * (k + 0.5))) / (1 + h * C)
+        x += h * v
+        worst = max(worst, abs(x - float(exact(np.array(h * (k + 1))))))
+    return worst
+
+
+FINE = np.linspace(0.0, END, 20001)
+
+
+@pytest.mark.parametrize(("step", "sampled"), [(2e-3, False), (5e-3, True), (2e-2, False)])
+def test_it_is_the_largest_round_step_that_stays_near(step: float, sampled: bool) -> None:
+    """An error that this step has by a hair, and none that is larger."""
+    size = float(np.ptp(exact(FINE)))
+    share = 1.02 * off(step) / size
+    assert all(off(h) / size > share for h in (2e-3, 5e-3, 1e-2, 2e-2, 5e-2) if h > step)
+    push: Input = Linear(FINE, np.sin(W * FINE)) if sampled else lambda t: ca.sin(W * t)  # pyright: ignore
+    machine = Machine("drive", Drive, END, u={"force": push})
+    motion = Motion(("x",), FINE, exact(FINE)[None, :], np.array([size]))
+    model = Drive(Viscous(sigma_2=C), m=1.0, N=1.0).model()
+    found, why = largest(machine, model, "backward_euler", motion, share)
+    assert why == ""
+    assert found == pytest.approx(step)

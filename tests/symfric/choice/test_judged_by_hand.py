@@ -116,10 +116,17 @@ def test_a_law_of_which_nothing_is_scaled_is_run_once() -> None:
     assert (len(found.levels), found.stopped) == (1, "nothing of it is scaled")
 
 
-def test_every_width_of_a_bristle_is_scaled() -> None:
-    """Else it creeps below v_eps as sigma_0 grows, and relaxes no more."""
-    law = smoothing(LuGre(v_eps=1e-15), Friction(0.2, 0.1), 10.0).at(1e-6)
-    assert parameters(law)["v_eps"].value == pytest.approx(1e-21)
+def test_widths_and_dampings_of_a_bristle_are_scaled_within_their_bounds() -> None:
+    """sigma_1^2 / sigma_0 stays; with a fixed v_eps a stiffer bristle would relax no more."""
+    law, friction = LuGre(sigma_0=1e5, sigma_1=200.0, v_eps=1e-15), Friction(0.2, 0.1)
+    found = parameters(smoothing(law, friction, 10.0).at(0.01))
+    assert found["sigma_0"].value == pytest.approx(1e7)
+    assert found["sigma_1"].value == pytest.approx(2000.0)
+    assert found["v_eps"].value == pytest.approx(1e-17)
+    dwell = parameters(smoothing(Gonthier(), friction, 10.0).at(1e-12))
+    assert dwell["s_eps"].value == parameters(Gonthier())["s_eps"].lower
+    with pytest.raises(ValueError, match="v_t"):  # which shapes the law: another one is refused
+        smoothing(BrownMcPhee(), friction, 10.0).at(1e-10)
 
 
 def test_errors_that_follow_a_power_are_followed_in_strides() -> None:
@@ -145,22 +152,6 @@ def test_an_error_that_falls_too_slowly_is_not_followed_for_ever() -> None:
     found = study(lambda s: Smoothed(s, 0.4 * s**0.01, 1), 1e-3, 1e-3, 1.0, (ValueError,))
     assert len(found.levels) == MOST + 1
     assert found.stopped.startswith("its error still changes")
-
-
-def test_bristles_of_all_stiffnesses_are_damped_alike() -> None:
-    """sigma_1^2 / sigma_0 stays, and with it the share of the damping that is critical."""
-    law = LuGre(sigma_0=1e5, sigma_1=200.0)
-    found = parameters(smoothing(law, Friction(0.2, 0.1), 10.0).at(0.01))
-    assert found["sigma_0"].value == pytest.approx(1e7)
-    assert found["sigma_1"].value == pytest.approx(2000.0)
-
-
-def test_a_width_at_its_bound_stays_there() -> None:
-    law = Gonthier()
-    found = parameters(smoothing(law, Friction(0.2, 0.1), 10.0).at(1e-12))
-    assert found["s_eps"].value == parameters(law)["s_eps"].lower
-    with pytest.raises(ValueError, match="v_t"):  # which shapes the law: another one is refused
-        smoothing(BrownMcPhee(), Friction(0.2, 0.1), 10.0).at(1e-10)
 
 
 def test_the_peaks_of_sums_and_products_are_the_static_level() -> None:

@@ -6,8 +6,7 @@ which `select` has no part in.
 
 import warnings
 from collections.abc import Callable
-from functools import partial
-from math import pi, sqrt
+from math import pi
 
 import casadi as ca
 import numpy as np
@@ -16,7 +15,7 @@ import pytest
 from symfric import ExactCoulomb, Law, Model, Variable, contact, simulate, with_values
 from symfric.choice import Friction, select
 from symfric.laws import ALL_LAWS
-from symfric.scenes import PendulumBox, Rabinowicz
+from symfric.scenes import Rabinowicz
 
 LAWS = ("stribeck", "brown_mcphee", "lugre", "elasto_plastic")
 """Laws that all tend to dry friction: to none of them may another motion be ascribed."""
@@ -35,29 +34,6 @@ def belt(random: Random, mu_s: float, mu_d: float) -> Made:
     cycle = 2 * jump * m / (k * v_belt) + 2 * pi / omega
     t_end = mu_s * m * 9.81 / (k * v_belt) + random.uniform(1.0, 4.0) * cycle
     return lambda law: Rabinowicz(law, m=m, k=k, v_belt=v_belt).model(), t_end
-
-
-def box(random: Random, mu_s: float, mu_d: float) -> Made:
-    """A pendulum that swings on a box, for a few periods."""
-    L, m = 10 ** random.uniform(-1, 0.5), 10 ** random.uniform(-1, 2)
-    given = {"L": L, "m": m, "m_box": m * random.uniform(0.3, 3), "phi_0": random.uniform(0.3, 1)}
-    t_end = random.uniform(0.5, 2.0) * 2 * pi * sqrt(L / 9.81)
-    return lambda law: PendulumBox(law, **given).model(), t_end
-
-
-def push(law: Law, m: float, N: float, F: float, omega: float) -> Model:
-    """A mass on a guide under a force that swings."""
-    x, v, t = Variable("x", "m"), Variable("v", "m/s"), ca.SX.sym("t")
-    applied = F * ca.sin(omega * t)
-    guide = contact("guide", law, v.symbol, N, rest={"v": 0.0}, F_e=applied)
-    ode = ca.vertcat(v.symbol, (applied - guide.force) / m)
-    return Model("push", x=(x, v), ode=ode, contacts=(guide,), t=t)
-
-
-def drive(random: Random, mu_s: float, mu_d: float) -> Made:
-    m, N, omega = (10 ** random.uniform(*span) for span in ((-1, 2), (-1, 3), (0, 1.5)))
-    F = mu_s * N * random.uniform(1.2, 4.0)
-    return partial(push, m=m, N=N, F=F, omega=omega), random.uniform(1.0, 3.0) * 2 * pi / omega
 
 
 def own(random: Random, mu_s: float, mu_d: float) -> Made:
@@ -85,7 +61,7 @@ def judged(seed: int) -> tuple[int, int]:
     random = np.random.default_rng(seed)
     mu_s = 10 ** random.uniform(-1, 0)
     mu_d = mu_s * random.uniform(0.4, 0.9)
-    made, t_end = (belt, box, drive, own)[seed % 4](random, mu_s, mu_d)
+    made, t_end = (belt, own)[seed % 2](random, mu_s, mu_d)
     found = select(
         made, LAWS, t_end=t_end, friction=Friction(mu_s, mu_d), accuracy=ACCURACY,
         fixed_steps=False,

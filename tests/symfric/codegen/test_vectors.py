@@ -36,14 +36,10 @@ def test_rows_are_steps_of_the_block_from_numbers_of_the_type(found, real):
         slid = LUGRE.reset("init_sliding")(0.0, p, rows.steps.inputs[k])
         expected = np.concatenate([x.full().ravel() for x in (z, F, slid)])
         assert np.array_equal(rows.results[k], expected)
-
-
-def test_rows_rest_creep_slide_and_turn_under_loads_that_jump(found):
-    v, N = found[DOUBLE].steps.inputs.T
-    assert (v == 0).any()
+    v, N = rows.steps.inputs.T
+    assert {*np.sign(v[np.abs(v) > 0.05])} == {-1.0, 1.0}
     assert ((v != 0) & (np.abs(v) < 1e-6)).any()
-    assert (v > 0.05).any()
-    assert (v < -0.05).any()
+    assert (v == 0).any()
     assert N.max() > 5 * N.min() > 0
 
 
@@ -70,13 +66,10 @@ def test_every_parameter_is_changed_where_it_matters(law):
         steps = rows.steps.chosen(changed)
         steps.changed[:] = -1
         effect = (np.abs(rows.results[changed] - made(c, steps)) / rows.tolerance).max()
-        assert effect > 100 or v.name == "v_eps"  # 1e-15 m/s: nothing but rest is slower
-
-
-def test_a_changed_value_stays_within_the_bounds():
-    assert changed_value(Variable("p", "1", start=2.0)) == 2.5
-    assert changed_value(Variable("p", "1", start=2.0, upper=2.1)) == 1.5
-    assert changed_value(Variable("p", "1", start=0.0, nominal=4.0)) == 1.0
+        assert effect > 100 or v.name == "v_eps"  # 1e-15 m/s, which only rest is below
+    for bounds, changed in (({"start": 2.0}, 2.5), ({"start": 2.0, "upper": 2.1}, 1.5),
+                            ({"nominal": 4.0}, 1.0)):  # fmt: skip
+        assert changed_value(Variable("p", "1", **bounds)) == changed
 
 
 def test_guards_add_a_row_for_each_number_that_is_bad(found):

@@ -1,8 +1,9 @@
-"""The closed loop against a mass without friction, whose motion is known sample by sample."""
+"""The closed loop of a mass without friction against closed forms, and the controller."""
 
 import casadi as ca
 import numpy as np
 import pytest
+from one_program import Stepper
 
 from symfric import Model, Output, Variable
 from symfric.codegen import Block
@@ -84,12 +85,43 @@ def test_a_block_holds_the_integrator_of_the_controller() -> None:
     assert (free.force[5:] > held.force[5:] + 1e-4).all()
 
 
-def test_what_is_counted_begins_after_a_tenth_of_the_time() -> None:
-    """The error is 1 mm before and 1 um after that, on a mass that stands."""
+def test_errors_are_counted_after_a_tenth_of_the_time() -> None:
+    """The error of a mass at rest is 1 mm before that and 1 um after it."""
     x = np.where(np.arange(STEPS) < STEPS // 10, 1e-3, 1e-6)
-    zero = np.zeros(STEPS)
     found = close_loop(
-        mass(), Reference(x, zero, zero, H), push("push", 0.0), controller=STILL, backend="vm"
+        mass(), Reference(x, 0 * x, 0 * x, H), push("push", 0.0), controller=STILL, backend="vm"
     )
     assert found["without"].rms == pytest.approx(1e-6)
     assert found["without"].peak == pytest.approx(1e-6)
+
+
+COUNT = 1e-3
+OWN = Cascade(h=H, kp=10.0, kv=5.0, ki=2.0, inertia=3.0, limit=4.0, count=COUNT, share=0.25)
+
+
+def test_the_controller_obeys_its_equations() -> None:
+    go, v = Stepper(OWN.block()), 0.0
+    for x, counts, before in ((1.4e-3, 1, 0), (1.6e-3, 2, 1), (-0.6e-3, -1, 2), (-0.4e-3, 0, -1)):
+        found = go(x=x)
+        v += 0.25 * ((counts - before) * COUNT / H - v)
+        assert found["x_m"] == pytest.approx(counts * COUNT, abs=1e-15)
+        assert found["e"] == pytest.approx(-counts * COUNT, abs=1e-15)
+        assert found["v_m"] == pytest.approx(v)
+    go = Stepper(OWN.block())
+    first = go(r=0.02, v_ref=0.1, a_ref=0.2)
+    assert (first["v_s"], first["u"]) == pytest.approx((0.3, 5.0 * 0.3 + 3.0 * 0.2))
+    assert go.x[2] == pytest.approx(2.0 * 5.0 * H * 0.3)
+    assert go(r=0.02, v_ref=0.1)["u"] == pytest.approx(5.0 * 0.3 + 3e-3)
+
+
+def test_the_controller_stops_its_integration_at_the_limit_and_on_hold() -> None:
+    go = Stepper(OWN.block())
+    for v_ref, u in ((2.0, 4.0), (2.0, 4.0), (-2.0, -4.0)):
+        assert go(v_ref=v_ref)["u"] == u
+        assert go.x[2] == 0.0
+    go(v_ref=0.1, hold=1.0)
+    assert go.x[2] == 0.0
+    go(v_ref=0.1, hold=0.5)
+    assert go.x[2] == pytest.approx(2.0 * 5.0 * H * 0.1)
+    go(v_ref=-2.0, a_ref=10.0)  # the acceleration moves it to the other limit: it continues to fall
+    assert go.x[2] < 0.0

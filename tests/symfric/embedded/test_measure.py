@@ -1,16 +1,17 @@
-"""Instructions, bytes and results of C on Cortex-M cores under QEMU."""
+"""Instructions, bytes, results and unit tests of C on Cortex-M cores under QEMU."""
 
 import casadi as ca
 import numpy as np
 import pytest
 from cortex import on_target
 
-from symfric import Dahl, LuGre, VelocityBased
-from symfric.codegen import Block, law_block
-from symfric.embedded import CORES, measure
+from symfric import BrownMcPhee, Dahl, LuGre, VelocityBased
+from symfric.codegen import Block, generate, law_block
+from symfric.embedded import CORES, measure, wrong_on_target
 from symfric.embedded.measure import day
 from symfric.embedded.target import Absent, find_tools
 from symfric.foundation.parameters import Variable
+from symfric.foundation.programs import CompileError
 from symfric.model import Output
 
 
@@ -58,37 +59,21 @@ def test_casadi_calls_functions_of_double():
     )
     assert own.average < mapped.average < raw.average
     assert own.error < 1e-6
+    assert own.data == 4 * (1 + len(block.parameters))
     assert own.error == pytest.approx(raw.error, rel=2.0)
     assert np.isnan(raw.equal)  # it has no program for the host here
 
 
-@on_target
-@pytest.mark.heavy
-def test_states_are_carried_and_bytes_counted():
-    found = measure(law_block(LuGre()), steps=100)
-    assert found.data == 4 * (1 + len(law_block(LuGre()).parameters))
-    assert found.error < 1e-6
-
-
-def test_absent_tools_are_named():
+def test_absent_tools_are_named(monkeypatch):
     found = measure(law_block(LuGre()), tools=Absent(("qemu-system-arm",)))
     assert not found.ok
     assert found.status.startswith("skipped: qemu-system-arm not found; on Debian")
     assert found.to_dict()["average"] is None
-
-
-def test_nothing_in_path_is_no_error(monkeypatch):
     monkeypatch.setenv("PATH", "")
-    found = find_tools()
-    assert isinstance(found, Absent)
-    assert found.names == ("arm-none-eabi-gcc", "newlib for arm-none-eabi", "qemu-system-arm")
-    assert "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm" in found.advice
-
-
-@pytest.mark.parametrize("wrong", [{"core": "m5"}, {"real": "half"}, {"by": "hand"}, {"steps": 0}])
-def test_unknown_names_are_refused(wrong):
-    with pytest.raises(ValueError, match="embedded: "):
-        measure(law_block(LuGre()), **wrong)
+    missing = find_tools()
+    assert isinstance(missing, Absent)
+    assert missing.names == ("arm-none-eabi-gcc", "newlib for arm-none-eabi", "qemu-system-arm")
+    assert "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm" in missing.advice
 
 
 def test_a_day_has_steps_of_the_load():
@@ -96,3 +81,31 @@ def test_a_day_has_steps_of_the_load():
     assert (v == 0).sum() == 80
     assert N.max() / N.min() > 80
     assert (np.abs(N[1:] / N[:-1]) > 10).any()
+
+
+@on_target
+@pytest.mark.heavy
+@pytest.mark.parametrize(
+    ("real", "core"), [("float", "m0plus"), ("float", "m4f"), ("double", "m7"), ("double", "m3")]
+)
+def test_a_kit_passes_its_own_test(real, core, tmp_path):
+    assert wrong_on_target(generate(LuGre(), tmp_path, real=real), real, core) == 0
+
+
+@on_target
+@pytest.mark.heavy
+def test_what_is_wrong_is_counted(tmp_path):
+    made = generate(BrownMcPhee(), tmp_path, real="float")
+    file = made.source("float")
+    text = file.read_text(encoding="utf-8")
+    assert "SF_TANHF tanhf" in text
+    file.write_text(text.replace("SF_TANHF tanhf", "SF_TANHF sinf"), encoding="utf-8")
+    assert wrong_on_target(made) > 0
+
+
+def test_absent_tools_and_types_are_named(tmp_path):
+    made = generate(BrownMcPhee(), tmp_path, real="float")
+    with pytest.raises(CompileError, match="qemu-system-arm not found"):
+        wrong_on_target(made, tools=Absent(("qemu-system-arm",)))
+    with pytest.raises(ValueError, match="embedded: real"):
+        wrong_on_target(made, "double")

@@ -8,8 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from symfric import BrownMcPhee, Karnopp, LuGre, law_from_text, with_values
-from symfric.figures import compare, figure, hysteresis
-from symfric.figures.data import Curve, FigureData, clear
+from symfric.figures import compare, hysteresis
 from symfric.figures.pictures import behaviours, decades, plot_catalogue, plot_laws, window
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import steady_force
@@ -103,11 +102,6 @@ def test_viscous_friction_does_not_hide_the_curve_over_decades() -> None:
     assert decades(law_from_text("stribeck"), 1.0)[1] == pytest.approx(0.1)
 
 
-def test_a_turning_contact_has_its_units() -> None:
-    drawn = plot_laws({"bittencourt": law_from_text("bittencourt")})
-    assert (drawn.axes[0].get_xlabel(), drawn.axes[0].get_ylabel()) == ("v [rad/s]", "F [N m]")
-
-
 def test_a_law_that_is_not_odd_shows_both_sides_over_decades() -> None:
     far = plot_laws({"capstan": law_from_text("capstan")}).axes[1]
     assert [line.get_label() for line in far.lines] == ["capstan", "capstan: -F(-v)"]
@@ -141,12 +135,6 @@ def test_a_figure_says_its_note_and_reads_in_its_units() -> None:
     assert plt.get_fignums() == []
 
 
-def test_a_sweep_says_what_is_swept_and_what_for() -> None:
-    data = figure(law_from_text("self_tuning"), "sweep_c")
-    assert data.title.startswith("profiles for values of the shape factor C")
-    assert data.note.startswith("C up to 1 gives a plateau")
-
-
 def test_one_colour_a_law_one_line_style_a_case() -> None:
     drawn = compare(["lugre", "gms"], "lag").plot()
     lines = drawn.axes[0].lines
@@ -159,22 +147,6 @@ def test_one_colour_a_law_one_line_style_a_case() -> None:
     assert len({line.get_color() for line in lines}) == 2
     assert len({str(line._dash_pattern) for line in lines[:3]}) == 3  # type: ignore[attr-defined]
     assert drawn.axes[0].get_title(loc="left") == "not drawn: steady"
-
-
-@pytest.mark.slow
-def test_of_many_laws_the_first_and_last_case_are_drawn_and_all_are_in_the_data() -> None:
-    data = compare(["lugre", "gms", "dahl"], "hysteresis")
-    drawn, said = clear(data.curves)  # as of any figure
-    assert (len(data.curves), len(drawn), said) == (9, 6, "not drawn: 5x")
-
-
-def test_measured_levels_stand_above_zero() -> None:
-    data = FigureData("levels", "", {"rate": "N/s", "F": "N"}, (("rate", "F"),),
-                      (Curve("a", "", {"rate": np.array([1.0, 10.0]),
-                                       "F": np.array([1.0, 1.00001])}),),
-                      log=("rate",), dots=True)  # fmt: skip
-    axis = data.plot().axes[0]
-    assert axis.get_ylim() == pytest.approx((0.0, 1.1), rel=1e-3)
 
 
 def test_loops_of_several_laws_are_drawn_at_one_speed_and_the_picture_says_so() -> None:

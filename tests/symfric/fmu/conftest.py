@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Iterator
 from functools import cache
+from typing import Any
 
 import casadi as ca
 import pytest
 from device_cases import wedge
-from units import Archive
+from units import OK, Archive, Rates, Second
 from wires import wire
 
 from symfric import BrownMcPhee, ExactCoulomb, LuGre
@@ -15,7 +16,7 @@ from symfric.foundation.parameters import Variable
 from symfric.model import Event, Model
 from symfric.scenes import Drive, Pendulum, SliderCrank
 
-Exported = Callable[..., tuple[Archive, Model]]
+RTOL = 1e-9
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -61,15 +62,34 @@ MACHINES = {
 
 
 @pytest.fixture(scope="session")
-def exported(tmp_path_factory) -> Exported:
+def exported(tmp_path_factory) -> Callable[..., tuple[Archive, Model]]:
     """Function of a name, the version and options of `export_fmu`: archive, and the model in it."""
 
     @cache
-    def make(name: str, fmi: int = 2, **options) -> tuple[Archive, Model]:
+    def make(name: str, fmi: int, **options) -> tuple[Archive, Model]:
         folder, what = tmp_path_factory.mktemp("unit"), MACHINES[name]()
-        unit = export_fmu(what, folder / "unit.fmu", fmi=fmi, **{"t_end": 2.0} | options)
+        options = {"t_end": 2.0, "rtol": RTOL} | options
+        unit = export_fmu(what, folder / "unit.fmu", fmi=fmi, **options)
         tuned = [e.name for e in unit.variables if e.causality == "parameter" and e.name != "rtol"]
         model = what if isinstance(what, Model) else what.model(tuned)
         return Archive(unit.path, folder / "open"), model
 
     return make
+
+
+@pytest.fixture
+def opened(exported) -> Iterator[Callable[..., tuple[Any, Model]]]:
+    """Function that returns an instance, initialised if `start` is given, and its model."""
+    units: list[Any] = []
+
+    def make(kind, name, start=None, stop=None, **options):
+        if kind is Rates:
+            options["kind"] = "model-exchange"
+        archive, model = exported(name, 2 if kind is Second else 3, **options)
+        units.append(kind(archive))
+        assert start is None or units[-1].begin(stop=stop, **start) == OK, units[-1].said
+        return units[-1], model
+
+    yield make
+    for unit in units:
+        unit.free()

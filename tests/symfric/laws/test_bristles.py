@@ -125,12 +125,6 @@ def test_cycles_take_the_published_work_and_that_of_coulomb_in_the_limit() -> No
     assert work(LuGre(), 5e-3) == pytest.approx(2e-2 * LEVEL, rel=5e-3)
 
 
-def test_original_dahl_with_exponent_has_no_smoothing() -> None:
-    law = Dahl(n=2.0, v_eps=0.0)
-    assert law.rate(1e-15, N, np.array([0.0]))[0] == pytest.approx(1e-15, rel=1e-9)
-    assert law.steady_state(-1e-15, N)[0] == pytest.approx(-REACH)
-
-
 def test_no_step_leaps_over_a_reversal_at_the_level() -> None:
     """A block that slides, is stopped and driven back: its bristle ends at the other level."""
     for n, rtol in product((0.0, 0.1), (1e-5, 1e-6)):

@@ -1,7 +1,6 @@
 """Costs as counts: a table that is checked in, and options that cost nothing while switched off."""
 
 import json
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
@@ -9,42 +8,14 @@ import casadi as ca
 import pytest
 from law_cases import CASES, state_symbols
 
-from symfric import (
-    ALL_LAWS,
-    Asymmetric,
-    BrownMcPhee,
-    Coulomb,
-    Dahl,
-    Law,
-    LoadDependent,
-    LuGre,
-    SelfTuning,
-    Stribeck,
-    Sum,
-    Viscous,
-    symbolise,
-)
-from symfric.laws import (
-    BAM,
-    POPULATIONS,
-    Andersson,
-    BrittleSelfTuning,
-    Hollars,
-    PoppStelter,
-    PowerLawViscous,
-    QuarterCarGeneral,
-    RuiWang,
-    Specker,
-    SteadyStateLuGre,
-    Tustin,
-)
+import symfric as sf
 from symfric.laws.composed.populations import cost
 
 TABLE = Path(__file__).parents[2] / "golden" / "instructions.json"
 
 
 def test_instructions_of_every_law_are_those_of_the_table(request: pytest.FixtureRequest) -> None:
-    found = {name: asdict(cost(kind())) for name, kind in (ALL_LAWS | POPULATIONS).items()}
+    found = {name: asdict(cost(kind())) for name, kind in (sf.ALL_LAWS | sf.POPULATIONS).items()}
     if request.config.getoption("--update-golden"):
         TABLE.parent.mkdir(exist_ok=True)
         lines = (f"  {json.dumps(name)}: {json.dumps(counts)}" for name, counts in found.items())
@@ -64,7 +35,7 @@ def test_gradient_costs_a_small_multiple_of_the_value() -> None:
         assert found.gradient <= 2 * directions * found.value, name
 
 
-def instructions(law: Law) -> int:
+def instructions(law: sf.Law) -> int:
     """Arithmetic of force and rate, with common parts counted once."""
     v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), state_symbols(law)
     outputs = ca.cse(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)))
@@ -74,50 +45,54 @@ def instructions(law: Law) -> int:
     return sum(f.instruction_id(k) not in idle for k in range(f.n_instructions()))
 
 
-OPTIONS: list[tuple[Callable[..., Law], str, float, float]] = [
-    (BrownMcPhee, "mu_v", 0.0, 0.4),
-    (Stribeck, "sigma_2", 0.0, 0.4),
-    (Stribeck, "delta", 2.0, 1.5),
-    (SelfTuning, "E", 0.0, 0.5),
-    (Dahl, "n", 1.0, 2.0),
-    (LuGre, "sigma_1", 0.0, 190.0),
-    (LuGre, "sigma_2", 0.0, 0.4),
-    (LuGre, "delta", 2.0, 1.5),
-    (LuGre, "v_eps", 0.0, 1e-6),
-    (PowerLawViscous, "d", 1.0, 1.5),
-    (Tustin, "v_eps", 0.0, 1e-4),
-    (Andersson, "p", 2.0, 1.5),
-    (SteadyStateLuGre, "delta", 2.0, 3.2),
-    (PoppStelter, "kappa", 0.0, 0.1),
-    (Specker, "sigma_2", 0.0, 0.4),
-    (RuiWang, "E", 0.0, 0.5),
-    (BrittleSelfTuning, "E", 0.0, 0.5),
-    (Hollars, "u_eps", 0.0, 0.2),
-    (Hollars, "mu_v", 0.0, 0.4),
-    (QuarterCarGeneral, "mu", 0.0, 0.1),
-]
+OPTIONS = """
+    brown_mcphee mu_v 0.0 0.4
+    stribeck sigma_2 0.0 0.4
+    stribeck delta 2.0 1.5
+    self_tuning E 0.0 0.5
+    dahl n 1.0 2.0
+    lugre sigma_1 0.0 190.0
+    lugre sigma_2 0.0 0.4
+    lugre delta 2.0 1.5
+    lugre v_eps 0.0 1e-6
+    power_law_viscous d 1.0 1.5
+    tustin v_eps 0.0 1e-4
+    andersson p 2.0 1.5
+    steady_state_lugre delta 2.0 3.2
+    popp_stelter kappa 0.0 0.1
+    specker sigma_2 0.0 0.4
+    rui_wang E 0.0 0.5
+    brittle_self_tuning E 0.0 0.5
+    hollars u_eps 0.0 0.2
+    hollars mu_v 0.0 0.4
+    quarter_car_general mu 0.0 0.1
+"""
+"""Law, parameter, its value that switches a term off, and a value in use."""
 
 
 def test_switched_off_option_costs_less_than_in_use_and_than_its_symbol() -> None:
-    for kind, name, off, on in OPTIONS:
+    for law, name, *values in map(str.split, OPTIONS.strip().splitlines()):
+        kind, (off, on) = sf.ALL_LAWS[law], map(float, values)
         without = instructions(kind(**{name: off}))
         assert without < instructions(kind(**{name: on})), (kind, name)
-        assert without < instructions(symbolise(kind(), name)[0]), (kind, name)
-    m1 = BAM(K_s=0.0, K_e=0.0, K_m=0.0, K_es=0.0, K_ms=0.0)
+        assert without < instructions(sf.symbolise(kind(), name)[0]), (kind, name)
+    m1 = sf.BAM(K_s=0.0, K_e=0.0, K_m=0.0, K_es=0.0, K_ms=0.0)
     assert m1.inputs == ()
-    assert cost(m1).value < cost(BAM()).value < cost(BAM(Q_e=0.01)).value
-    assert cost(Coulomb(v_eps=0.0)).value < cost(Coulomb()).value
-    assert cost(QuarterCarGeneral(mu=0.0)).value < cost(QuarterCarGeneral()).value - 8
+    assert cost(m1).value < cost(sf.BAM()).value < cost(sf.BAM(Q_e=0.01)).value
+    assert cost(sf.Coulomb(v_eps=0.0)).value < cost(sf.Coulomb()).value
+    assert cost(sf.QuarterCarGeneral(mu=0.0)).value < cost(sf.QuarterCarGeneral()).value - 8
 
 
 def test_arithmetic_of_laws_and_of_what_composes_them() -> None:
     counts = {
-        Viscous(): 1, Coulomb(): 4, SelfTuning(): 6, Dahl(): 8, Stribeck(): 10, BrownMcPhee(): 12,
-        LuGre(): 17, Asymmetric(LuGre(), LuGre()): 17, Sum((Stribeck(), Viscous())): 12,
+        "viscous": 1, "coulomb": 4, "self_tuning": 6, "dahl": 8, "stribeck": 10, "lugre": 17,
+        "brown_mcphee": 12, "asymmetric(lugre)": 17, "stribeck+viscous": 12,
     }  # fmt: skip
-    assert {law: instructions(law) for law in counts} == counts
-    one = instructions(Asymmetric(LuGre(), LuGre(sigma_0=2e5)))
-    two = instructions(Asymmetric(LuGre(), LuGre(sigma_0=2e5, sigma_1=200.0)))
+    assert {law: instructions(sf.law_from_text(law)) for law in counts} == counts
+    one = instructions(sf.Asymmetric(sf.LuGre(), sf.LuGre(sigma_0=2e5)))
+    two = instructions(sf.Asymmetric(sf.LuGre(), sf.LuGre(sigma_0=2e5, sigma_1=200.0)))
     assert two - one == 3, "each parameter that differs costs two products and a sum"
-    full = instructions(LoadDependent(Stribeck(), N_0=2.0, c=0.5))
-    assert full - instructions(LoadDependent(Stribeck())) == 2, "the smooth maximum is always there"
+    full = instructions(sf.LoadDependent(sf.Stribeck(), N_0=2.0, c=0.5))
+    assert full - instructions(sf.LoadDependent(sf.Stribeck())) == 2, (
+        "the smooth maximum is always there"
+    )

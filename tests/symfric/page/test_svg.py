@@ -42,17 +42,12 @@ class Balanced(HTMLParser):
         assert self.open.pop() == tag
 
 
-def test_points_stand_where_their_numbers_say() -> None:
+def test_points_are_at_their_numbers_and_a_missing_number_splits_a_line() -> None:
     x, y = Axis("t", "s", 0.0, 10.0), Axis("v", "m/s", -1.0, 1.0)
     drawn = chart("v", x, y, [Path("line", np.array([0.0, 5.0, 10.0]), np.array([-1.0, 0.0, 1.0]))])
     w, h = 920 - LEFT - RIGHT, 230 - TOP - BOTTOM
-    found = findall(r'points="([^"]*)"', drawn)
-    assert found == [f"0,{h:g} {w / 2:g},{h / 2:g} {w:g},0"]
-
-
-def test_a_missing_number_parts_a_line() -> None:
-    y = np.array([0.0, 1.0, np.nan, 1.0, 0.0, np.nan, np.nan])
-    line = Path("line", np.arange(7.0), y)
+    assert findall(r'points="([^"]*)"', drawn) == [f"0,{h:g} {w / 2:g},{h / 2:g} {w:g},0"]
+    line = Path("line", np.arange(7.0), np.array([0.0, 1.0, np.nan, 1.0, 0.0, np.nan, np.nan]))
     drawn = line.draw(Frame(Axis("x", "", 0.0, 6.0), Axis("y", "", 0.0, 1.0), 60.0, 10.0))
     assert findall(r'points="([^"]*)"', drawn) == ["0,10 10,0", "30,0 40,10"]
 
@@ -79,20 +74,14 @@ def test_ticks_are_few_round_and_distinct(low: float, high: float) -> None:
     assert all(axis.low <= value <= axis.high for value, _ in ticks)
 
 
-def test_ticks_of_counts_are_whole() -> None:
+def test_labels_have_whole_counts_and_powers_of_ten() -> None:
     assert [label for _, label in Axis("n", "", 0.5, 3.5, whole=True).ticks(9)] == ["1", "2", "3"]
-
-
-def test_small_and_large_numbers_give_their_power_to_the_label() -> None:
-    assert Axis("x", "m", -3e-7, 4e-7).label == "x [10⁻⁹ m]"
-    assert Axis("F", "N", 0.0, 2e6).label == "F [10⁶ N]"
-    assert Axis("F", "N", 0.0, 2e3).label == "F [N]"
-    assert Axis("n", "1", 0.0, 2.0).label == "n"
-
-
-def test_signals_without_numbers_or_range_are_drawn() -> None:
-    none, same = np.full(3, np.nan), np.full(3, 7.0)
-    for y in (none, same, np.zeros(0)):
+    for axis, label in (
+        (Axis("x", "m", -3e-7, 4e-7), "x [10⁻⁹ m]"), (Axis("F", "N", 0.0, 2e6), "F [10⁶ N]"),
+        (Axis("F", "N", 0.0, 2e3), "F [N]"), (Axis("n", "1", 0.0, 2.0), "n"),
+    ):  # fmt: skip
+        assert axis.label == label
+    for y in (np.full(3, np.nan), np.full(3, 7.0), np.zeros(0)):  # no numbers, or no range
         x = np.arange(float(y.size))
         drawn = chart("x", around("x", "", [x]), around("y", "", [y]), [Path("a", x, y)])
         ET.fromstring(drawn)
