@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from symfric.emitter.c99 import REALS
-from symfric.integrator.cuda.device import Device, Loaded
-from symfric.integrator.cuda.kernel import Kernel, kernel_of
+from symfric.integrator.cuda.device import Device, Kernel, Loaded, kernel_of
 from symfric.integrator.many.chunk import Chunk, Job, Solved
 from symfric.integrator.many.member_data import MemberData
 from symfric.integrator.many.members import Advanced, Counts, Program, Stretch, struct, with_code
