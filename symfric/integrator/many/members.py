@@ -5,7 +5,7 @@ A `Program` contains the equations of an ensemble for workers that do not have t
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from threading import Lock
 from typing import Any, final
@@ -68,11 +68,6 @@ class Stretch:
     times: Array
     max_steps: int
     follow: bool = False
-
-    def __getitem__(self, pick: slice) -> "Stretch":
-        data, times = (a[pick] if a.shape[0] > 1 else a for a in (self.data, self.times))
-        ends, h_min = self.ends[pick], self.h_min[pick]
-        return replace(self, data=data, times=times, ends=ends, h_min=h_min)
 
     @property
     def numbers(self) -> dict[str, int]:
