@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
 from threading import Lock
-from typing import Any, final
+from typing import Any, cast, final
 
 import casadi as ca
 import numpy as np
@@ -279,9 +279,9 @@ class Program:
         return CompiledMembers.of(self.code, self.n_signals)
 
     @cached_property
-    def constraints(self) -> Columns | None:
-        """Algebraic equations, evaluated for many columns."""
-        return None if self.equations is None else Columns(self.equations.constraints)
+    def constraints(self) -> Columns:
+        """Algebraic equations, evaluated for many columns; only if there are some."""
+        return Columns(cast("Equations", self.equations).constraints)
 
     @cached_property
     def assembly(self) -> Assembly | None:
