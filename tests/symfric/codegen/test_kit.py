@@ -58,7 +58,7 @@ class UnitTests:
         return [int(line.split()[1]) for line in done.stdout.splitlines() if line[0] == "t"]
 
 
-def test_unit_tests_pass_on_what_was_generated(compiler, tmp_path):
+def test_unit_tests_of_generated_c_pass(compiler, tmp_path):
     tests = UnitTests()
     for block in (LUGRE, block_of(BrownMcPhee())):
         for real, guards in ((DOUBLE, True), (FLOAT, True), (FLOAT, False)):

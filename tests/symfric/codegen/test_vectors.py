@@ -43,7 +43,7 @@ def test_rows_are_steps_of_the_block_from_numbers_of_the_type(found, real):
     assert N.max() > 5 * N.min() > 0
 
 
-def test_each_outcome_of_a_comparison_is_there():
+def test_rows_contain_each_outcome_of_a_comparison():
     """A comparison that is true in one step of eight hundred, and a sign of a difference."""
     x, u = Variable("x", "1"), Variable("u", "1")
     rare = (x.symbol > 399.5) * (x.symbol < 400.5)
@@ -101,7 +101,7 @@ def test_tolerance_is_relative_to_the_peak_or_to_what_rounding_changes(found):
     assert 1e-5 < tolerance[0] < 1e-2  # a last digit of 1000, of a number of 2e-3
 
 
-def test_rows_that_rounding_decides_or_that_are_not_finite_are_left_out():
+def test_rows_that_rounding_decides_or_that_are_not_finite_are_omitted():
     """The input is exactly at the edge in some rows, and not a last digit from it in any."""
     b, edge = Variable("b", "1"), float(np.float32(0.1))
     outputs = {"y": Output(ca.if_else(ca.eq(b.symbol, edge), 1.0, 0.0), "1")}

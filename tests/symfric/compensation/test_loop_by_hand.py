@@ -37,7 +37,7 @@ def closed(a: np.ndarray, blocks: object, **how: object):
 
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
-def test_a_force_acts_as_many_samples_later_as_it_is_delayed(delay: int) -> None:
+def test_a_force_acts_after_its_delay(delay: int) -> None:
     a = np.random.default_rng(0).uniform(-1.0, 1.0, STEPS)
     found = closed(a, push("push", 0.5), delay=delay)
     for name, extra in (("without", 0.0), ("compensated", 0.5)):

@@ -109,7 +109,7 @@ def test_states_may_be_results():
     assert found[-2:] == ["r[0] = a[1];", "r[1] = t1;"]
 
 
-def test_conditions_come_in_and_go_out_as_bools():
+def test_arguments_and_results_may_be_bools():
     found = code(
         choose(x, y, 2), either(x, y < 0), 1 - x, names="b y z", conditions=[0], truths=[1],
         targets=["r = {};", "const bool u = {};", "s = {};"],
@@ -202,7 +202,7 @@ def values(source: Graph, points: np.ndarray) -> np.ndarray:
 a, b = x < y, y < z
 
 
-def test_selects_whose_condition_is_known_are_gone():
+def test_selects_whose_condition_is_known_are_removed():
     points = np.random.default_rng(0).integers(-2, 3, (400, 3)).astype(float)
     names = Names(globals(), smooth=smooth)
     for text, left in CASES["known_conditions"].items():

@@ -56,7 +56,7 @@ def arm_block() -> Block:
     return inverse_dynamics_block(arm(), separate=True)
 
 
-def test_arm_is_its_function_with_friction_from_reactions():
+def test_the_arm_agrees_with_its_functions():
     u = moved(6)
     given = (*np.split(u, 3), [], [], np.zeros(6), [])
     expected, free = (
@@ -116,7 +116,7 @@ def rotor(law: Any, radius: float = 0.1, normal: float = 1.0) -> Mechanism:
     return m
 
 
-def test_bristles_make_the_step_of_their_law_and_are_those_of_their_joint():
+def test_bristles_of_joints_make_the_step_of_their_law():
     """Under a constant load a joint is the block of its law at the bearing's surface."""
     law, radius = LuGre(), 0.05
     block, alone = inverse_dynamics_block(rotor(law, radius, 20.0)), law_block(law)
@@ -133,7 +133,7 @@ def test_bristles_make_the_step_of_their_law_and_are_those_of_their_joint():
     assert np.flatnonzero(same != z).tolist() == [2]
 
 
-def test_fingers_that_mimic_are_moved_along():
+def test_mimicking_fingers_follow_their_leader():
     inertial = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
     mimic = '<mimic joint="ja" multiplier="-2" offset="0.3"/>'
     links = "".join(
@@ -188,7 +188,7 @@ def test_urdf_is_accepted_as_text_and_a_fixed_tool_carries_the_load():
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_random_robots_are_their_functions(seed):
+def test_random_robots_agree_with_their_functions(seed):
     """The functions of random robots agree with Pinocchio (tests/symfric/multibody)."""
     robot = read_urdf(random_robot(seed, n=5 + seed), law=Coulomb(mu_d=1.0, v_eps=0.1))
     of_robot = functions(robot)["inverse_dynamics"]
