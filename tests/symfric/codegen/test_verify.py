@@ -110,7 +110,7 @@ def test_inputs_are_of_every_kind():
 A, B = Variable("a", "1"), Variable("b", "1")
 LARGE = 1e6
 LEFT = (A.symbol + B.symbol) - LARGE
-"""2, of a = 2 and b = 1e6."""
+"""Its value is 2 for a = 2 and b = 1e6."""
 
 
 def test_a_difference_has_the_magnitude_of_its_larger_term():
@@ -245,7 +245,7 @@ def test_a_mode_that_ties_is_counted_and_a_wrong_mode_or_force_is_an_error(compi
         assert wrong.error > 0.1
         assert wrong.worst == worst
     many = in_float(tie(), np.random.default_rng(0).uniform(size=(1000, 1)))
-    assert many.error == 1.0  # of a tenth, not of one in a hundred
+    assert many.error == 1.0  # more than one step in a hundred differs
     assert not many.tied.any()
     found = verify(generate(tie(1.9), tmp_path, kit=False, real="float"))
     (check,) = found.checks

@@ -1,4 +1,4 @@
-"""The C of compensators in the loop of a drive whose friction is another one than theirs."""
+"""Compensators in the closed loop of a drive with another friction law."""
 
 from dataclasses import replace
 
@@ -40,7 +40,7 @@ EACH = [pytest.param(name, marks=() if name == "bristles" else pytest.mark.slow)
 BLOCK = compensator(
     BELIEVED, v_blend=0.02, error_gain=20.0, scales={"coulomb": 1.0, "stribeck": 0.0}
 )
-"""Without the excess of break-away over sliding, which is what makes an axis jump."""
+"""Compensator without the Stribeck term, which makes an axis jump."""
 
 
 def compared(name: str, reference: Reference, block=BLOCK, **settings) -> Comparison:
@@ -59,7 +59,7 @@ def test_the_rms_tracking_error_is_more_than_nine_times_smaller(name: str) -> No
 
 @pytest.mark.parametrize("name", EACH)
 def test_a_limit_cycle_of_a_millimetre_vanishes(name: str) -> None:
-    """After a step of 1 cm the integrator hunts for ever, 1000 counts to and fro; then not one."""
+    """After a step of 1 cm the axis hunts by 1000 counts; with compensation by less than one."""
     found = compared(name, step(0.01, 20.0 if name == "springs" else 12.0))
     assert found["without"].hunting > 1000 * SOFT.count
     assert found["compensated"].hunting < SOFT.count

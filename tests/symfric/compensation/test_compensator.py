@@ -1,4 +1,4 @@
-"""Friction compensators as blocks: stage by stage, and what is refused."""
+"""Friction compensators as blocks, stage by stage."""
 
 from math import exp, inf, pi
 
@@ -34,7 +34,7 @@ STEP = Stribeck(v_eps=1e-9, **CURVE)
 
 
 class Machine(Stepper):
-    """Stepper that is enabled and returns the force."""
+    """Stepper with `enable` = 1 that returns the force."""
 
     def __call__(self, **inputs: float) -> float:
         self.found = super().__call__(**({"enable": 1.0} | inputs))
@@ -52,7 +52,7 @@ def force(law: Law, inputs: dict[str, float], steps: int = 1, **settings: object
 
 
 VISCOUS = Stribeck(mu_s=0.0, mu_d=0.0, sigma_2=1.0, v_eps=1e-3)
-"""Law whose force is its velocity."""
+"""Law whose force equals its velocity."""
 
 
 @pytest.mark.parametrize("law", [STEP, LuGre(), GMS(form="event"), Dahl(), BrownMcPhee()])

@@ -1,4 +1,4 @@
-"""Inverse dynamics against the functions of a mechanism, Pinocchio, energies and closed forms."""
+"""Inverse dynamics compared with the functions of mechanisms and with closed forms."""
 
 from functools import cache
 from typing import Any
@@ -206,11 +206,17 @@ def test_joints_are_arrays_and_friction_has_the_number_of_its_joint(compiler, tm
     m.joint(Prismatic("rail", "wheel", "slide", friction=friction))
     mixed = inverse_dynamics_block(m)
     names = [v.name for v in mixed.parameters]
-    assert names == ["mu_s_1", "mu_d_1", "v_t_1", "N_1", "sigma_2_2"]  # N does not matter there
+    assert names == [
+        "mu_s_1",
+        "mu_d_1",
+        "v_t_1",
+        "N_1",
+        "sigma_2_2",
+    ]  # N has no effect
     assert "Friction, numbered by joints: brown_mcphee in 1; viscous in 2." in mixed.use
     text = header(CBlock(mixed, FLOAT))
     assert "float q_2;" in text
-    assert "q[2]" not in text  # of two units
+    assert "q[2]" not in text  # the joints have different units
     block = inverse_dynamics_block(arm(LuGre), payload="link6.root")
     text = header(CBlock(block, FLOAT))
     for declared in ("q[6]", "qd[6]", "qdd[6]", "tau[6]", "z[6]", "mu_s[6]", "payload_c[3]"):
