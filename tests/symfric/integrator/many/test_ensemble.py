@@ -33,7 +33,7 @@ from symfric import (
 from symfric.foundation.programs import CompileError
 from symfric.integrator import ensemble as module
 from symfric.integrator.many import chunk as chunk_module
-from symfric.integrator.many import program as program_module
+from symfric.integrator.many import members as program_module
 from symfric.model import Event
 
 each_engine = pytest.mark.parametrize("backend", ["vm", "compiled"])
