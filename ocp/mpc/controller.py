@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from re import fullmatch
 from tempfile import TemporaryDirectory
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ocp.formulation.problem import Problem
 from ocp.mpc.closed_loop import SLACK, ClosedLoopRun, Optimality, Reference, run_closed_loop
 from ocp.mpc.design import Control, CycleData, CycleStatus, Design, Settings
 from ocp.mpc.horizon import Horizon
-from ocp.mpc.session import BACKENDS, Session
+from ocp.mpc.session import Session
 from ocp.mpc.source import header, source, timed
 from symfric.codegen.blocks.block import KEYWORDS
 from symfric.codegen.runner import compile_object, needed_symbols
@@ -35,9 +35,7 @@ ALLOWED = frozenset(TRANSCENDENTAL.values()) | {
 TINY = float(np.finfo(float).tiny)
 
 
-@final
-@dataclass(frozen=True)
-class ControllerCheck:
+class ControllerCheck(NamedTuple):
     """Result of checking generated C.
 
     Attributes:
@@ -63,9 +61,7 @@ class ControllerCheck:
         return self.status == "verified"
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class GeneratedController:
+class GeneratedController(NamedTuple):
     """Files written by `Controller.to_c`.
 
     Attributes:
@@ -182,16 +178,12 @@ class Controller:
         """Name in C -> value of each bound."""
         return dict(zip(self.design.bound_names, self.design.bounds.tolist(), strict=True))
 
-    def start(self, backend: str = "auto") -> Session:
-        """Return a running controller, without a plan.
-
-        Args:
-            backend: "auto" or "compiled", which both compile the C of `to_c` for this machine.
+    def start(self) -> Session:
+        """Return a running controller, without a plan; it runs the C of `to_c`.
 
         Raises:
             CompileError: there is no compiler (install gcc or clang, or set $CC), or it failed.
         """
-        checks.choice("start: backend", backend, BACKENDS)
         if find_compiler() is None:
             raise CompileError(
                 "start: expected a C compiler ($CC, gcc, clang or cc), found none; a controller "
@@ -211,7 +203,6 @@ class Controller:
         noise: Mapping[str, float] | None = None,
         seed: int = 0,
         check: bool = True,
-        backend: str = "auto",
     ) -> ClosedLoopRun:
         """Simulate the controller on a plant, whose equations may differ from its model.
 
@@ -227,7 +218,6 @@ class Controller:
             noise: standard deviations of measured states by name.
             seed: seed of the noise.
             check: compute an independent residual for each cycle, which takes some milliseconds.
-            backend: see `start`.
 
         Raises:
             ValueError: unknown names or bad numbers.
@@ -235,7 +225,7 @@ class Controller:
             CompileError: see `start`.
         """
         return run_closed_loop(
-            self.start(backend), plant, t_end, references or {},
+            self.start(), plant, t_end, references or {},
             x0=x0, p=p, plant_p=plant_p, noise=noise, seed=seed, check=check,
         )  # fmt: skip
 

@@ -50,9 +50,7 @@ class Entries:
         return np.setdiff1d(np.arange(self.rows.size), self.varying)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Block:
+class Block(NamedTuple):
     """Rows r (m, 1) and a share q of the cost as functions of (v, theta), with derivatives.
 
     Attributes:

@@ -15,7 +15,7 @@ levels); Ascher and Petzold, SIAM J. Numer. Anal. 28, 1991, 1097-1120 (projected
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple, final
 
 import casadi as ca
@@ -161,9 +161,7 @@ class Known(NamedTuple):
     imposed: bool = True
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Closing:
+class Closing(NamedTuple):
     """Constraints of a phase.
 
     Attributes:

@@ -21,7 +21,7 @@ those of the discrete map. Bounds and path conditions are imposed at the nodes.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -90,7 +90,7 @@ class Engine:
         """Block with compiled Functions."""
         path = str(library(self._prospect.written(), *self._prospect.names))
         functions = {name: ca.external(f.name(), path) for name, f in self._functions.items()}
-        return replace(self.block, **functions)
+        return self.block._replace(**functions)
 
     def at(self, places: int) -> Block:
         """Return the block for a number of places per iteration, compiled if this saves time."""
@@ -109,9 +109,7 @@ LEAST, MOST = 1e-6, 1e6
 """Limits of the scales of rows without nominal value, which are derived from derivatives."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class PointEquations:
+class PointEquations(NamedTuple):
     """Equations of one collocation point of a phase.
 
     Attributes:
@@ -233,9 +231,7 @@ LARGEST = 20_000
 the steps remain function calls, which are slower but take less time to differentiate."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Shot:
+class Shot(NamedTuple):
     """Equations of one interval of a phase.
 
     Attributes:

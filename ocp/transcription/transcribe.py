@@ -147,7 +147,7 @@ class Discretisation:
                 yield gap
                 yield piece_of_points(equations, grid)
             if span.phase:
-                yield from plain_links(number, spans[number - 1], span, grid)
+                yield from plain_links(self.problem, number, grid)
         yield from filter(None, (condition(grid) for condition in self.conditions))
         yield from whole(self.problem, grid)
 
@@ -177,7 +177,7 @@ def discretise(
         if key not in made:
             shooting = isinstance(scheme, Shooting)
             made[key] = shot(local, scheme) if shooting else point_equations(local)
-        spans.append(replace(made[key], local=local))
+        spans.append(made[key]._replace(local=local))
         periodic, named = () if earlier else problem.periodic, problem.chain[span.phase].start
         loops.append(closing(local, earlier[-1][1] if earlier else None, periodic, named))
         nodes += at_nodes(local)
