@@ -120,21 +120,16 @@ def motions_of(
         points: values of all unknowns.
     """
     phases = len(problem.chain)
-    motions: list[Motion] = []
-    for k, name in enumerate(problem.scenario_names or ("",)):
-        numbers = range(k * phases, (k + 1) * phases)
-        motions.append(_motion(name, problem, numbers, meshes, scheme, points))
-    return tuple(motions)
+    return tuple(
+        _motion(name, problem, range(k * phases, (k + 1) * phases), meshes, scheme, points)
+        for k, name in enumerate(problem.scenario_names or ("",))
+    )
 
 
 def _motion(
-    name: str,
-    problem: Problem,
-    numbers: Sequence[int],
-    meshes: Sequence[Array],
-    scheme: Coefficients,
-    points: Points,
-) -> Motion:
+    name: str, problem: Problem, numbers: Sequence[int], meshes: Sequence[Array],
+    scheme: Coefficients, points: Points,
+) -> Motion:  # fmt: skip
     spans, own = [problem.spans[k] for k in numbers], [points.spans[k] for k in numbers]
     pieces: list[_Piece] = []
     phases: list[Stretch] = []
@@ -183,13 +178,9 @@ def _jumps(before: Span, old: SpanPoints, after: Span, new: SpanPoints) -> bool:
 
 
 def _piece(
-    span: Span,
-    points: SpanPoints,
-    mesh: Array,
-    scheme: Coefficients,
-    chosen: Mapping[str, float],
-    begin: float,
-) -> _Piece:
+    span: Span, points: SpanPoints, mesh: Array, scheme: Coefficients,
+    chosen: Mapping[str, float], begin: float,
+) -> _Piece:  # fmt: skip
     """Return the signals of one phase at its nodes and collocation points."""
     model, N, d = span.model, mesh.size - 1, scheme.degree
     inside = scheme.nodes[1:-1] if d and scheme.meets_end else scheme.nodes[1:]
