@@ -231,14 +231,10 @@ def with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
         model: the model.
         nominal: input -> typical magnitude of its rate.
     """
-    states = tuple(v for v in model.u if v.name in nominal)
-    rates = {
-        v.name: Variable(
-            rate_name(v.name), f"{v.unit}/s", nominal=nominal[v.name],
-            doc=f"rate of {v.doc or v.name}",
-        )
-        for v in states
-    }  # fmt: skip
+    states, rates = tuple(v for v in model.u if v.name in nominal), dict[str, Variable]()
+    for v in states:
+        doc, size = f"rate of {v.doc or v.name}", nominal[v.name]
+        rates[v.name] = Variable(rate_name(v.name), f"{v.unit}/s", nominal=size, doc=doc)
     inputs = tuple(rates.get(v.name, v) for v in model.u)
     changes = further_states(model, states, symbols_of(rates[v.name] for v in states))
     return rebuilt(model, lambda other: with_rates(other, nominal), u=inputs, **changes)

@@ -150,12 +150,10 @@ def optimise_modes(
     whole, first = known.motion.T, max(MARGIN, margin)
     reader = Reader(problem, known)
     at_rest = reader.starts_at_rest(widths)
+    rules = Rules(problem, reader.sizes(), at_rest, SHORTEST * whole, first)
+    first_solver = solver.with_options(max_iter=limits[0])
     modes_solver = ModeSolver(
-        rules=Rules(problem, reader.sizes(), at_rest, SHORTEST * whole, first),
-        solver=solver.with_options(max_iter=limits[0]),
-        scheme=scheme or Radau(3),
-        kick=KICK * whole,
-        supervisor=supervisor or Supervisor(),
+        rules, first_solver, scheme or Radau(3), KICK * whole, supervisor or Supervisor()
     )
     best: SolvedSequence | None = None
     with suppress(StoppedError):

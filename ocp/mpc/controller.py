@@ -24,6 +24,7 @@ from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.programs import CompileError, find_compiler
+from symfric.foundation.variable import Variable
 from symfric.model import Model
 
 ALLOWED = frozenset(TRANSCENDENTAL.values()) | {
@@ -297,10 +298,8 @@ def controller_of(
     be arbitrarily sharp.
     """
     h = Horizon(problem, step, method=method, steps=steps)
-    settings = Settings(
-        checks.number("to_mpc: tolerance", tolerance, above=0.0),
-        checks.count("to_mpc: iterations", iterations, most=1000),
-    )
+    tolerance = checks.number("to_mpc: tolerance", tolerance, above=0.0)
+    settings = Settings(tolerance, checks.count("to_mpc: iterations", iterations, most=1000))
     own, span = problem.chain[0].model, problem.spans[0]
     states, inputs = [v.name for v in h.model.x], [v.name for v in h.model.u]
     measurable = [name for name in states if name not in {v.name for v in own.u}]
@@ -309,22 +308,19 @@ def controller_of(
     bounds = {limit.name: i for i, limit in enumerate(h.limits)}
     boxes = np.array([span.boxes.get(name, (-np.inf, np.inf)) for name in inputs])
     parameters = dict(zip((v.name for v in span.model.p), span.p.tolist(), strict=True))
+
+    def control(v: Variable) -> Control:
+        lower, upper = (bounds.get(f"{side} bound on {v.name}") for side in ("lower", "upper"))
+        rated = v.name not in inputs
+        place = (states if rated else inputs).index(v.name)
+        return Control(v.name, v.unit, place, rated, lower, upper)
+
     design = Design(
         name=name or f"{own.name}_mpc",
         horizon=h,
         settings=settings,
         measured=tuple(i for i, state in enumerate(states) if state in measurable),
-        controls=tuple(
-            Control(
-                v.name,
-                v.unit,
-                place=(inputs if v.name in inputs else states).index(v.name),
-                rated=v.name not in inputs,
-                lower=bounds.get(f"lower bound on {v.name}"),
-                upper=bounds.get(f"upper bound on {v.name}"),
-            )
-            for v in own.u
-        ),
+        controls=tuple(map(control, own.u)),
         x0=h.model.initial_state(p=parameters),
         u0=np.clip(h.model.values("u"), *boxes.T),
         p0=np.array([parameters[name] for name in h.parameters]),

@@ -51,14 +51,9 @@ def lagrangian(program: Program) -> ca.Function:
     """Return (x, p, lam_f, lam_g) -> gradient and Hessian of lam_f f + lam_g' g, for fatrop."""
     x, p, lam_f, lam_g = _symbols(program)
     slope = lam_f * program.gradient(x, p)[1] + program.jacobian(x, p)[1].T @ lam_g
-    hessian = symmetric(program.hessian(x, p, lam_f, lam_g))
-    return ca.Function(
-        "nlp_hess_l",
-        [x, p, lam_f, lam_g],
-        [ca.densify(slope), hessian],
-        MULTIPLIERS,
-        ["grad_gamma_x", "hess_gamma_x_x"],
-    )
+    results = [ca.densify(slope), symmetric(program.hessian(x, p, lam_f, lam_g))]
+    names = ["grad_gamma_x", "hess_gamma_x_x"]
+    return ca.Function("nlp_hess_l", [x, p, lam_f, lam_g], results, MULTIPLIERS, names)
 
 
 def gradients(program: Program) -> ca.Function:

@@ -202,16 +202,12 @@ def _piece(
     x, z = joined(points.nodes, points.inner), joined(z, points.z)
     held = points.u[:, np.minimum(np.arange(at.size) // (shown + 1), N - 1)]
     p = np.array([chosen.get(v.name, number) for v, number in zip(model.p, span.p, strict=True)])
-    values = model.function("signals").map(at.size)(
-        at[None, :], x, z, held, np.tile(p[:, None], (1, at.size))
-    )
-    return _Piece(
-        at,
-        np.arange(at.size) % (shown + 1) == 0,
-        dict(zip(model.signals, values.full(), strict=True)),
-        begin + points.T * mesh,
-        {v.name: row for v, row in zip(model.u, points.u, strict=True)},
-    )
+    signals, p = model.function("signals").map(at.size), np.tile(p[:, None], (1, at.size))
+    rows = signals(at[None, :], x, z, held, p).full()
+    values = dict(zip(model.signals, rows, strict=True))
+    controls = {v.name: row for v, row in zip(model.u, points.u, strict=True)}
+    nodes = np.arange(at.size) % (shown + 1) == 0
+    return _Piece(at, nodes, values, begin + points.T * mesh, controls)
 
 
 class SpanMotion(NamedTuple):

@@ -172,10 +172,10 @@ class Linear(NamedTuple):
 
     @staticmethod
     def of(rows: Indices, columns: Indices, weights: Array) -> "Linear":
-        """Return entries in the same rows (terms,) of each place; others are (terms, places)."""
-        terms, places = columns.shape
-        at = np.tile(np.arange(places), terms)
-        return Linear(at, np.repeat(rows, places), columns.ravel(), weights.ravel())
+        """Return entries in the same `rows` (m,) of each place; others are (m, terms, places)."""
+        m, terms, places = columns.shape
+        at, factors = np.tile(np.arange(places), m * terms), np.broadcast_to(weights, columns.shape)
+        return Linear(at, np.repeat(rows, terms * places), columns.ravel(), factors.ravel())
 
 
 @final
@@ -266,7 +266,9 @@ def linear_piece(rows: Rows, columns: Indices, weights: Array, span: int, order:
         span=span,
         interval=np.zeros(1, np.int64),
         offset=np.zeros(1),
-        linear=Linear.of(numbers[kept], columns.ravel()[kept, None], weights.ravel()[kept, None]),
+        linear=Linear(
+            0 * numbers[kept], numbers[kept], columns.ravel()[kept], weights.ravel()[kept]
+        ),
     )
 
 

@@ -268,26 +268,17 @@ def closing(
         for k in (0, 1)
     ]
     rows = ca.vertcat(*moved, ca.SX(len(span.model.x) - 2 * n, 1))
-    return Closing(
-        local=local,
-        loops=loops,
-        correction=block("correction", ca.vertcat(local.v, multipliers), local.theta, rows),
-        levels=(
-            block("loops", local.v, local.theta, phi / size),
-            block("loop_rates", local.v, local.theta, phi_dot / size),
-        ),
-        known={at: _known(span, loops, at, before, periodic, named) for at in span.nodes},
-    )
+    correction = block("correction", ca.vertcat(local.v, multipliers), local.theta, rows)
+    positions = block("loops", local.v, local.theta, phi / size)
+    rates = block("loop_rates", local.v, local.theta, phi_dot / size)
+    known = {at: _known(span, loops, at, before, periodic, named) for at in span.nodes}
+    return Closing(local, loops, correction, (positions, rates), known)
 
 
 def _known(
-    span: Span,
-    loops: Loops,
-    at: float,
-    before: Span | None,
-    periodic: Sequence[str],
+    span: Span, loops: Loops, at: float, before: Span | None, periodic: Sequence[str],
     named: Collection[str],
-) -> tuple[Known, Known]:
+) -> tuple[Known, Known]:  # fmt: skip
     """Return the prescribed coordinates and the prescribed rates at the fraction `at` of T."""
     n, names = loops.n, [v.name for v in span.model.x]
     boxes = [span.nodes[at][name] for name in names]

@@ -188,21 +188,13 @@ def piece_of_points(equations: PointEquations, grid: Grid) -> Piece:
     velocities = np.flatnonzero(equations.sloped < 0)
     known = np.flatnonzero(equations.sloped >= 0)
     factors = np.broadcast_to(slopes, (velocities.size, *slopes.shape))
+    columns, places = (span.inner, span.z, span.u[:, interval]), (interval, scheme.nodes[1 + j])
     return local.piece(
-        grid,
-        equations.rows,
-        equations.engine.at(N * d),
-        (span.inner, span.z, span.u[:, interval]),
-        (interval, scheme.nodes[1 + j]),
-        order_of(local.number, interval, 2 + j),
+        grid, equations.rows, equations.engine.at(N * d), columns, places,
+        order_of(local.number, interval, 2 + j), weights=scheme.weights[j],
         extra=[(carrying[velocities], factors)] if velocities.size else [],
-        weights=scheme.weights[j],
-        linear=Linear.of(
-            np.repeat(equations.sloped[known], d + 1),
-            carrying[known].reshape(-1, N * d),
-            -np.tile(slopes, (known.size, 1)),
-        ),
-    )
+        linear=Linear.of(equations.sloped[known], carrying[known], -slopes),
+    )  # fmt: skip
 
 
 def gaps(number: int, span: Span, grid: Grid) -> Piece:
@@ -218,11 +210,7 @@ def gaps(number: int, span: Span, grid: Grid) -> Piece:
         span=number,
         interval=interval,
         offset=np.ones(own.intervals),
-        linear=Linear.of(
-            np.repeat(np.arange(len(names)), weights.shape[1]),
-            columns.reshape(-1, own.intervals),
-            weights.reshape(-1, own.intervals),
-        ),
+        linear=Linear.of(np.arange(len(names)), columns, weights),
     )
 
 

@@ -335,7 +335,7 @@ def test_jacobian_has_the_form_of_the_stages() -> None:
     made = put(Problem(phase, EFFORT)).program
     stages, _ = made.structure()
     assert stages is not None
-    assert stages.nu == (11, 11, 11, 11, 0)  # 3 points of 2 states more than the copy, and force
+    assert stages.nu == (7, 7, 7, 7, 0)  # 3 points of 2 states, and the force
     at = np.random.default_rng(1).standard_normal(made.w.numel())
     jacobian = made.jacobian(at, made.values)[1].full()
     row = column = 0
