@@ -13,7 +13,7 @@ Source: Griewank and Toint, Numerische Mathematik 39, 1982, 119-137 (partial sep
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple, final
+from typing import Any, ClassVar, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -240,6 +240,14 @@ class Piece:
     linear: Linear | None = None
     slot: int = 0
 
+    LAST: ClassVar[int] = 63
+    """Last number inside an interval; 0 is the gap to the next interval."""
+
+    @staticmethod
+    def order_of(span: int, interval: Indices | int, inside: Indices | int) -> Indices:
+        """Return the sort key of rows by phase, interval and number inside it, up to `LAST`."""
+        return (np.int64(span) << 40) + (np.asarray(interval, np.int64) << 6) + inside
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the rows of a place."""
@@ -270,12 +278,3 @@ def linear_piece(rows: Rows, columns: Indices, weights: Array, span: int, order:
             0 * numbers[kept], numbers[kept], columns.ravel()[kept], weights.ravel()[kept]
         ),
     )
-
-
-LAST = 63
-"""Last number inside an interval; 0 is the gap to the next interval."""
-
-
-def order_of(span: int, interval: Indices | int, inside: Indices | int) -> Indices:
-    """Return the sort key of rows by phase, interval and number inside it, up to `LAST`."""
-    return (np.int64(span) << 40) + (np.asarray(interval, np.int64) << 6) + inside

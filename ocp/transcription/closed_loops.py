@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Box, Span, fixed, initial, meet
-from ocp.transcription.blocks import Array, Block, Piece, Rows, block, order_of
+from ocp.transcription.blocks import Array, Block, Piece, Rows, block
 from ocp.transcription.unknowns import Grid, Local, SpanPoints
 from symfric.foundation.checks import listed
 from symfric.model.holonomic import Holonomic
@@ -229,7 +229,10 @@ class Closing(NamedTuple):
             interval, offset = np.maximum(at - 1, 0), np.minimum(at, 1).astype(float)
             z = np.tile(own.z[:, :1], (1, at.size))  # not in the constraints
             rows = Rows.zero([f"the {what} {i + 1}" for i in range(self.m)], self.loops.sizes)
-            columns, order = (own.nodes[:, at], z, own.u[:, interval]), order_of(number, at, 1)
+            columns, order = (
+                (own.nodes[:, at], z, own.u[:, interval]),
+                Piece.order_of(number, at, 1),
+            )
             place = interval, offset
             yield self.local.piece(grid, rows, self.levels[level], columns, place, order)
 

@@ -12,18 +12,7 @@ import numpy as np
 
 from ocp.formulation.phase import Free, Row, Span, limits
 from ocp.formulation.problem import Problem
-from ocp.transcription.blocks import (
-    LAST,
-    Array,
-    Block,
-    Indices,
-    Piece,
-    Rows,
-    block,
-    linear_piece,
-    order_of,
-    select,
-)
+from ocp.transcription.blocks import Array, Block, Indices, Piece, Rows, block, linear_piece, select
 from ocp.transcription.unknowns import Columns, Grid, Layout, Local, time_scale
 from symfric.foundation.variable import stacked
 
@@ -55,9 +44,11 @@ def _at_node(
     """
     node = grid.nodes[local.number][fraction]
     interval, columns = _columns_at(local, grid, node, inside)
-    stage, k = (interval, LAST - 1) if inside else (node, 1)
+    stage, k = (interval, Piece.LAST - 1) if inside else (node, 1)
     at = np.array([interval]), np.array([float(node > 0)])
-    return local.piece(grid, rows, made, columns, at, order_of(local.number, np.array([stage]), k))
+    return local.piece(
+        grid, rows, made, columns, at, Piece.order_of(local.number, np.array([stage]), k)
+    )
 
 
 def _columns_at(
@@ -101,7 +92,7 @@ def at_starts(local: Local, rows: Sequence[Row]) -> Maker:
         if not at.size:
             return None
         columns = span.nodes[:, at], span.z[:, at * grid.scheme.degree], span.u[:, at]
-        order = order_of(local.number, at, LAST - 1)
+        order = Piece.order_of(local.number, at, Piece.LAST - 1)
         return local.piece(grid, Rows.of(rows), made, columns, (at, np.zeros(at.size)), order)
 
     return piece
@@ -137,7 +128,7 @@ def between(before: Local, after: Local) -> Iterator[Maker]:
         rows = Rows.of(span.joins)
         values = [join.function.call([*before.values, *after.values])[0] for join in span.joins]
         made = block("join", v, theta, stacked(values) / ca.DM(rows.scale))
-        yield partial(_between, before, after, made, rows, LAST)
+        yield partial(_between, before, after, made, rows, Piece.LAST)
 
 
 def _between(
@@ -152,7 +143,7 @@ def _between(
     theta = grid.data[a].theta(np.array([N - 1]), one), grid.data[b].theta(zero, 0 * one)
     return Piece(
         rows=rows,
-        order=order_of(a, np.array([N]), inside),
+        order=Piece.order_of(a, np.array([N]), inside),
         span=b,
         interval=zero,
         offset=0 * one,
@@ -172,7 +163,7 @@ def plain_links(problem: Problem, number: int, grid: Grid) -> list[Piece]:
     links = [(link.state, before.same_state(link.expression)) for link in span.links]
     pairs = [(to, of) for to, of in links if of and new.index(to) not in released]
     pairs.sort(key=lambda pair: new.index(pair[0]))
-    order = order_of(number - 1, grid.layout.spans[number - 1].intervals, 0)
+    order = Piece.order_of(number - 1, grid.layout.spans[number - 1].intervals, 0)
     ends = (number, 0), (number - 1, -1)
     what = "the continuity"
     return [_equal_states(problem, grid.layout, ends, pairs, what, order)] if pairs else []
@@ -181,7 +172,7 @@ def plain_links(problem: Problem, number: int, grid: Grid) -> list[Piece]:
 def whole(problem: Problem, grid: Grid) -> Iterator[Piece]:
     """Yield the rows of periodicity, of shared starts, and of sums of durations."""
     spans, phases, layout = problem.spans, len(problem.chain), grid.layout
-    end = order_of(len(spans), 0, 0)
+    end = Piece.order_of(len(spans), 0, 0)
     for first in range(0, len(spans), phases):
         last = first + phases - 1
         released = [spans[first].model.x[i].name for i in grid.released[first].get(0.0, ())]
@@ -226,6 +217,6 @@ def largest(layout: Layout, scenarios: int, spans: int, name: str) -> list[Piece
     column = np.array([[layout.largest]])
     rows = Rows((name,), np.ones(1), np.array([-inf]), np.zeros(1))
     return [
-        linear_piece(rows, column, np.array([[-1.0]]), 0, order_of(spans + 1, i, 0))
+        linear_piece(rows, column, np.array([[-1.0]]), 0, Piece.order_of(spans + 1, i, 0))
         for i in range(scenarios)
     ]

@@ -28,18 +28,7 @@ import numpy as np
 
 from ocp.formulation.phase import Span
 from ocp.formulation.statement import further_states, rebuilt
-from ocp.transcription.blocks import (
-    LAST,
-    Array,
-    Block,
-    Indices,
-    Linear,
-    Piece,
-    Rows,
-    block,
-    order_of,
-    select,
-)
+from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, Rows, block, select
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.unknowns import Grid, Local
 from symfric import integrator
@@ -191,7 +180,7 @@ def piece_of_points(equations: PointEquations, grid: Grid) -> Piece:
     columns, places = (span.inner, span.z, span.u[:, interval]), (interval, scheme.nodes[1 + j])
     return local.piece(
         grid, equations.rows, equations.engine.at(N * d), columns, places,
-        order_of(local.number, interval, 2 + j), weights=scheme.weights[j],
+        Piece.order_of(local.number, interval, 2 + j), weights=scheme.weights[j],
         extra=[(carrying[velocities], factors)] if velocities.size else [],
         linear=Linear.of(equations.sloped[known], carrying[known], -slopes),
     )  # fmt: skip
@@ -206,7 +195,7 @@ def gaps(number: int, span: Span, grid: Grid) -> Piece:
     weights = np.concatenate([np.ones((len(names), 1, own.intervals)), -weights], axis=1)
     return Piece(
         rows=Rows.zero([f"the continuity of {name}" for name in names], span.model.nominal("x")),
-        order=order_of(number, interval, 0),
+        order=Piece.order_of(number, interval, 0),
         span=number,
         interval=interval,
         offset=np.ones(own.intervals),
@@ -333,5 +322,5 @@ def pieces_of_intervals(made: Shot, gap: Piece, grid: Grid) -> Iterator[Piece]:
         if inputs:
             at, node, offset = np.append(at, N - 1), np.arange(N + 1), np.append(zero, 1.0)
         columns = own.nodes[:, node], own.z, own.u[:, at]
-        order = order_of(number, node, LAST - 2)
+        order = Piece.order_of(number, node, Piece.LAST - 2)
         yield local.piece(grid, rows, path, columns, (at, offset), order)

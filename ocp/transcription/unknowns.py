@@ -351,7 +351,7 @@ class Local:
             made: the block.
             columns: columns of x, z and u at all places.
             at: interval and offset of each place.
-            order: order of the rows; see `blocks.order_of`.
+            order: order of the rows; see `Piece.order_of`.
             extra: columns of further local unknowns of the block, which follow v.
             weights: quadrature weights of the places for an interval of length 1.
             linear: linear part of the rows.

@@ -15,9 +15,10 @@ from ocp.formulation.phase import FREE, Free, Phase
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Convexified
 from ocp.solving.motion import span_motions
+from ocp.solving.prepared import as_fraction, not_finite, worst
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Guess, initial_points, resample, start_of
-from ocp.solving.watch import WINDOW, Seen, Watch, as_fraction, not_finite, worst
+from ocp.solving.watch import WINDOW, Seen, Watch
 from ocp.transcription.program import Place, Program, SolverStatistics, outside, worst_of
 from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
