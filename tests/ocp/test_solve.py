@@ -12,19 +12,8 @@ from bad_values import NAN, Thing, flag, number
 from motions import double_integrator, stage
 from phases import unit_move
 
-from ocp import (
-    Ipopt,
-    Phase,
-    Problem,
-    Progress,
-    Radau,
-    Shooting,
-    Verification,
-    at_end,
-    integral,
-    solve,
-    worst,
-)
+from ocp import Ipopt, Phase, Problem, Progress, Radau, Shooting, Verification, solve
+from ocp.formulation.expressions import at_end, integral, worst
 from ocp.formulation.phase import Chain
 from ocp.friction.homotopy import sharpened
 from ocp.original_law import project_control

@@ -11,27 +11,9 @@ from rigs import blocks
 from ocp.friction.event_check import set_valued
 from ocp.friction.mode_models import mode_model, restless
 from ocp.friction.smooth_models import WIDTH, smooth_model, sticking, widths
-from symfric import (
-    GMS,
-    BrownMcPhee,
-    Contact,
-    ExactCoulomb,
-    Hold,
-    Law,
-    Linear,
-    LuGre,
-    Model,
-    RateAndState,
-    SelfTuning,
-    Stribeck,
-    Sum,
-    Variable,
-    Viscous,
-    drive,
-    simulate,
-)
+from symfric import Contact, Hold, Linear, Model, Variable, drive, laws, simulate
 from symfric.foundation.status import SolveError, Status
-from symfric.laws import Capstan, Coulomb, LeineSwitch
+from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
 from symfric.model import Event
 from symfric.scenes import FourBar, FourMass, Pendulum, PendulumBox, Rabinowicz, SliderCrank
 
@@ -87,11 +69,11 @@ def test_two_contacts_have_their_own_modes() -> None:
 
 
 def test_curves_and_sides_of_a_law_are_kept() -> None:
-    falling = drive(Stribeck(v_s=0.5, mu_s=0.3, mu_d=0.1), m=1.0, N=10.0)
+    falling = drive(laws.Stribeck(v_s=0.5, mu_s=0.3, mu_d=0.1), m=1.0, N=10.0)
     run = simulate(mode_model(falling, {"guide": 1}), 0.01, u={"force": 5.0}, rtol=1e-9)
     assert run["friction"][0] == pytest.approx(3.0)
     assert run["v"][-1] == pytest.approx(0.02, rel=1e-3)
-    belt = drive(Capstan(beta=2.0), m=1.0, N=1.0)
+    belt = drive(laws.Capstan(beta=2.0), m=1.0, N=1.0)
     rest = simulate(mode_model(belt, {"guide": 0}), 0.1, u={"force": 0.1})
     assert rest["guide_grip_up"][-1] == pytest.approx(np.exp(0.2) - 1 - 0.1)
     assert rest["guide_grip_down"][-1] == pytest.approx(1 - np.exp(-0.2) + 0.1)
@@ -109,8 +91,10 @@ def test_names_remain_except_for_states_of_laws() -> None:
     assert smooth_model(model) is smooth_model(model)
 
 
-@pytest.mark.parametrize("law", [SHARP, SelfTuning(), Sum((Coulomb(), Viscous())), Stribeck()])
-def test_smooth_model_at_its_own_widths_is_the_model(law: Law) -> None:
+@pytest.mark.parametrize(
+    "law", [SHARP, laws.SelfTuning(), laws.Sum((laws.Coulomb(), laws.Viscous())), laws.Stribeck()]
+)
+def test_smooth_model_at_its_own_widths_is_the_model(law: laws.Law) -> None:
     model = PendulumBox(law).model()
     smooth = smooth_model(model)
     rng = np.random.default_rng(0)
@@ -122,7 +106,7 @@ def test_smooth_model_at_its_own_widths_is_the_model(law: Law) -> None:
 
 
 def test_widths_have_exponents_and_layers() -> None:
-    model = PendulumBox(SelfTuning(B=500.0), hinge=BrownMcPhee(v_t=1e-2)).model()
+    model = PendulumBox(laws.SelfTuning(B=500.0), hinge=BrownMcPhee(v_t=1e-2)).model()
     found = {w.parameter: w for w in widths(model)}
     assert set(found) == {"x_B", "phi_v_t", "x_eps", "phi_eps"}
     assert set(found) == {v.name for v in smooth_model(model).p}
@@ -133,12 +117,12 @@ def test_widths_have_exponents_and_layers() -> None:
     assert (load.number, load.layer) == (1e-4, None)
     with pytest.raises(ValueError, match="x_eps: expected a width of velocities"):
         load.at(0.1)
-    assert [w.parameter for w in widths(drive(LeineSwitch()))] == ["guide_v_eps"]
-    assert widths(drive(Viscous())) == ()
+    assert [w.parameter for w in widths(drive(laws.LeineSwitch()))] == ["guide_v_eps"]
+    assert widths(drive(laws.Viscous())) == ()
 
 
-@pytest.mark.parametrize("law", [LuGre(mu_s=0.3), ExactCoulomb(mu_s=0.3), Coulomb(v_eps=0.0)])
-def test_stand_in_has_the_sliding_force_and_static_level_of_its_law(law: Law) -> None:
+@pytest.mark.parametrize("law", [LuGre(mu_s=0.3), ExactCoulomb(mu_s=0.3), laws.Coulomb(v_eps=0.0)])
+def test_stand_in_has_the_sliding_force_and_static_level_of_its_law(law: laws.Law) -> None:
     model = drive(law, N=10.0)
     smooth = smooth_model(model)
     (width,) = smooth.p
@@ -157,7 +141,7 @@ def test_stand_in_has_the_sliding_force_and_static_level_of_its_law(law: Law) ->
 def moving_ground() -> Model:
     """A contact that slips against an input."""
     v, u = Variable("v", "m/s"), Variable("ground", "m/s")
-    c = Contact("floor", v.symbol - u.symbol, 1.0, Coulomb())
+    c = Contact("floor", v.symbol - u.symbol, 1.0, laws.Coulomb())
     return Model("moving", x=(v,), u=(u,), ode=-c.force, contacts=(c,))
 
 
@@ -195,7 +179,10 @@ def test_impossible_modes_are_refused() -> None:
         (lambda: mode_model(model, {"x": 1, "phi": 2}), "modes: phi: expected .* got 2"),
         (lambda: mode_model(model, {"x": 1, "hinge": 0}), "modes: expected .* got hinge"),
         (lambda: mode_model(moving_ground(), {"floor": 0}), "floor.: slip: expected one of states"),
-        (lambda: smooth_model(drive(RateAndState())), "contact 'guide': RateAndState: expected"),
+        (
+            lambda: smooth_model(drive(laws.RateAndState())),
+            "contact 'guide': RateAndState: expected",
+        ),
     ]
     for call, message in cases:
         with pytest.raises(ValueError, match=message):
@@ -208,7 +195,7 @@ def test_impossible_modes_are_refused() -> None:
     assert restless(model) == ""
     with pytest.raises(ValueError, match=r"got arm, slide at rest together; in a loop of few"):
         mode_model(driven_twice(), {"arm": 0, "slide": 0})
-    assert mode_model(drive(Viscous()), {}).z == ()
+    assert mode_model(drive(laws.Viscous()), {}).z == ()
     loose, pressed = (drive(BrownMcPhee(), N=N) for N in (0.0, 1.0))
     assert [len(sticking(model)) for model in (loose, pressed)] == [0, 1]
 
@@ -319,7 +306,9 @@ def test_smooth_laws_converge_at_first_order() -> None:
     assert_allclose(far[:-1] / far[1:], 10.0, rtol=0.15)
 
 
-@pytest.mark.parametrize("law", [GMS(mu_s=0.3, mu_d=0.2, sigma_2=0.3), LuGre(mu_s=0.3, mu_d=0.2)])
+@pytest.mark.parametrize(
+    "law", [laws.GMS(mu_s=0.3, mu_d=0.2, sigma_2=0.3), LuGre(mu_s=0.3, mu_d=0.2)]
+)
 def test_dynamic_laws_are_replaced_by_their_sliding_force_and_level(law: Any) -> None:
     """A force far beyond: the same as the dynamic law itself, but for its pre-sliding."""
     model = drive(law, N=10.0, m=1.0)

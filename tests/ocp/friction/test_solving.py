@@ -11,31 +11,19 @@ from math import tanh
 from typing import Any
 
 import casadi as ca
+import numpy as np
 import pytest
 from phases import unit_move
 from rubbing import KINDS, Machine, machine
 
-from ocp import Phase, Problem, Progress, Solution, at_end, integral, solve, strategies
+from ocp import Phase, Problem, Progress, Solution, at_end, integral, problems, solve, strategies
 from ocp.formulation.phase import FREE
-from ocp.friction import homotopy
+from ocp.friction import homotopy, smooth_models
 from ocp.friction.event_check import verify_exactly
 from ocp.friction.homotopy import FIRST, LAST, Sharp, sharpened
 from ocp.friction.mode_models import holding, mode_model
-from ocp.friction.smooth_models import (
-    Scale,
-    own_level,
-    same_size,
-    speeds_at,
-    sticking,
-    widths_at,
-)
-from ocp.problems import (
-    cart_pendulum,
-    load_through_spring,
-    out_and_back,
-    parcel_on_tray,
-    two_blocks,
-)
+from ocp.friction.smooth_models import Scale, own_level, speeds_at, sticking, widths_at
+from ocp.problems import out_and_back
 from ocp.solving.methods import Ipopt
 from ocp.transcription.schemes import Radau
 from symfric import BrownMcPhee, Contact, Model, SolveError, Status, Variable, drive
@@ -98,10 +86,10 @@ def test_widths_follow_from_speeds_and_are_not_smaller_than_the_users() -> None:
     assert widths_at(sharp, SCALES, 0.1) == {"guide_v_t": pytest.approx(0.2)}
     assert own_level(wide, SCALES) == 0.25
     assert own_level(sharp, SCALES) == pytest.approx(5e-6)
-    assert same_size(SCALES, {"guide": Scale(5.0)}, 3.0)
-    assert not same_size(SCALES, {"guide": Scale(7.0)}, 3.0)
+    assert smooth_models.same_size(SCALES, {"guide": Scale(5.0)}, 3.0)
+    assert not smooth_models.same_size(SCALES, {"guide": Scale(7.0)}, 3.0)
     assert not sticking(unit_move().chain[0].model)
-    assert sticking(parcel_on_tray().chain[0].model)
+    assert sticking(problems.parcel_on_tray().chain[0].model)
 
 
 # --- motions by modes ---------------------------------------------------------------------------
@@ -160,9 +148,14 @@ def judged(of: Machine, found: Solution) -> str:
     return "reported" if any(text in found.message for text in TELLING) else found.message
 
 
-def test_random_machine_is_solved_by_modes() -> None:
-    of = machine(12)
-    assert judged(of, solve(of.problem(), starts=2, throw=False)) == "exact"
+def test_motion_by_modes_arrives_by_other_equations(by_modes: Solution) -> None:
+    guide = Machine(
+        "guide", 1, lambda s, c, q, v: [[1.0]], lambda s, c, q, v: [0.5 * v[0]], (0,), ((1.0,),),
+        ((6.0, 4.0),), {0: 1.0},
+    )  # fmt: skip
+    controls = np.array([by_modes.controls["force"]])
+    end = guide.follow(np.append(by_modes.t_control, by_modes.T), controls)
+    assert np.abs(end).max() < NEAR
 
 
 @pytest.mark.slow
@@ -180,9 +173,9 @@ def test_a_hundred_machines_are_solved_or_reported() -> None:
 @pytest.mark.parametrize(
     ("make", "cost", "kinds"),
     [
-        (cart_pendulum, 71.534, {"x": ["slip+", "slip-", "stick", "slip+"]}),
-        (load_through_spring, 28.480, {"load": ["stick", "slip+", "slip-"]}),
-        (two_blocks, 59.18, {}),
+        (problems.cart_pendulum, 71.534, {"x": ["slip+", "slip-", "stick", "slip+"]}),
+        (problems.load_through_spring, 28.480, {"load": ["stick", "slip+", "slip-"]}),
+        (problems.two_blocks, 59.18, {}),
     ],
 )
 def test_rests_on_the_way_hold_under_exact_friction(

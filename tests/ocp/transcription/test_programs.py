@@ -6,20 +6,10 @@ from typing import Any
 from unittest.mock import patch
 
 import casadi as ca
+import discretised
 import numpy as np
 import pytest
-from discretised import (
-    CASES,
-    EFFORT,
-    all_at_once,
-    free_time,
-    largest_of_scenarios,
-    mean_of_scenarios,
-    mechanism,
-    one_phase,
-    stage,
-    three_phases,
-)
+from discretised import CASES, EFFORT, all_at_once, mean_of_scenarios, mechanism, stage
 from phases import UNIT, unit_move
 
 from ocp.formulation.expressions import at_end, integral
@@ -136,7 +126,8 @@ def test_nominal_values_scale_unknowns_and_rows() -> None:
     [
         *((make, Radau(2)) for make in CASES),
         *((make, Legendre(3)) for make in (all_at_once, mechanism, mean_of_scenarios)),
-        *((make, Shooting("rodas5p", 1)) for make in (free_time, three_phases)),
+        (discretised.free_time, Shooting("rodas5p", 1)),
+        (discretised.three_phases, Shooting("rodas5p", 1)),
     ],
     ids=lambda value: getattr(value, "__name__", str(value)),
 )  # fmt: skip
@@ -230,7 +221,7 @@ def test_bounds_apply_once_at_their_places(scheme: Scheme) -> None:
 
 
 def test_scenarios_share_inputs_and_durations_and_the_largest_cost_bounds_each() -> None:
-    t = put(largest_of_scenarios())
+    t = put(discretised.largest_of_scenarios())
     light, heavy = t.layout.spans
     np.testing.assert_array_equal(light.u, heavy.u)
     assert light.T == heavy.T
@@ -262,7 +253,7 @@ def test_unpack_inverts_pack(make: Callable[[], Problem]) -> None:
 
 
 def test_parameters_are_numbers_of_the_program() -> None:
-    problem = one_phase()
+    problem = discretised.one_phase()
     t, other = put(problem), put(replace(problem, p={"m": 2.0}))
     np.testing.assert_array_equal(t.values({"m": 2.0}), other.program.values)
     w = np.full(t.program.w.numel(), 0.3)
@@ -273,14 +264,14 @@ def test_parameters_are_numbers_of_the_program() -> None:
 
 
 def test_second_mesh_builds_nothing_and_another_number_differentiates_nothing() -> None:
-    made = discretise(three_phases(), Radau(3))
+    made = discretise(discretised.three_phases(), Radau(3))
     even, uneven = np.linspace(0, 1, 6), np.linspace(0, 1, 6) ** 2
     one = made.on([even] * 3)
     with patch.object(ca, "Function", side_effect=AssertionError("built")):
         two = made.on([uneven] * 3)
     assert two.program.jacobian is one.program.jacobian
     w = np.full(two.program.w.numel(), 0.4)
-    fresh = discretise(three_phases(), Radau(3)).on([uneven] * 3)
+    fresh = discretise(discretised.three_phases(), Radau(3)).on([uneven] * 3)
     np.testing.assert_array_equal(
         two.program.jacobian(w, two.program.values)[0].full(),
         fresh.program.jacobian(w, fresh.program.values)[0].full(),
@@ -305,7 +296,7 @@ def test_nonzeros_grow_linearly_and_the_graph_does_not_grow(make: Callable[[], P
 
 
 def test_blocks_are_compiled_only_where_that_pays() -> None:
-    made = discretise(one_phase(), Radau(3))
+    made = discretise(discretised.one_phase(), Radau(3))
     equations = made.spans[0]
     assert isinstance(equations, PointEquations)
     made.on(make_meshes(made.problem, 500))
