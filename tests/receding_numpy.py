@@ -1,6 +1,6 @@
 """A reference in NumPy for the C of controllers: cycles with the same bits."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, isfinite
 from typing import final
 
@@ -182,7 +182,7 @@ class NumpyCycles:
         self._plan = Plan(X, self._plan.U, self._plan.z)
         u = self._shown(given)
         with np.errstate(all="ignore"):
-            settings = replace(design.settings, tolerance=tolerance, iterations=iterations)
+            settings = design.settings._replace(tolerance=tolerance, iterations=iterations)
             plan, report = improved(self._sweeps, self._plan, given, design.prices, settings)
         self._plan, self._warm = plan, report.status is not CycleStatus.FAILED
         if self._warm:

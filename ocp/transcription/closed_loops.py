@@ -238,12 +238,17 @@ class Closing(NamedTuple):
 
 
 def closing(
-    local: Local, before: Span | None, periodic: Sequence[str], named: Collection[str]
-) -> Closing | None:
-    """Return the constraints of a phase, or None if it has none.
+    local: Local,
+    mechanics: Holonomic,
+    before: Span | None,
+    periodic: Sequence[str],
+    named: Collection[str],
+) -> Closing:
+    """Return the constraints of a phase.
 
     Args:
         local: unknowns of the phase.
+        mechanics: equations of its mechanism, with constraints.
         before: previous phase in the same scenario; None for the first one.
         periodic: periodic states of the problem if this is the first phase.
         named: states with a start given by the user; others are released if constraints require it.
@@ -252,10 +257,7 @@ def closing(
         ValueError: named coordinates do not satisfy the constraints, or links prescribe more
             states than the constraints leave free.
     """
-    span, mechanics = local.span, local.span.model.holonomic
-    if mechanics is None or not mechanics.phi.numel():
-        return None
-    n, x = mechanics.n, span.model.vector("x")
+    span, n, x = local.span, mechanics.n, local.span.model.vector("x")
     slope = ca.jacobian(mechanics.phi, x[:n])
     rate = slope @ x[n : 2 * n] + ca.jacobian(mechanics.phi, span.model.t)
     phi, phi_dot, phi_q = ca.Function(

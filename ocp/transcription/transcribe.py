@@ -157,7 +157,9 @@ def discretise(
             )
         spans.append(made[key]._replace(local=local))
         periodic, named = () if earlier else problem.periodic, problem.chain[span.phase].start
-        loops.append(closing(local, earlier[-1][1] if earlier else None, periodic, named))
+        before, mechanics = earlier[-1][1] if earlier else None, span.model.holonomic
+        closed = mechanics is not None and bool(mechanics.phi.numel())
+        loops.append(closing(local, mechanics, before, periodic, named) if closed else None)
         nodes += conditions.at_nodes(local)
         if earlier:
             joined += conditions.between(spans[-2].local, local)
