@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from symfric.multibody import (
@@ -24,6 +25,10 @@ from symfric.multibody.prepare import Prepared
 
 Array = NDArray[np.float64]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+in_both = pytest.mark.parametrize("formulation", ["joint", "absolute"])
+in_joint_coordinates_first = pytest.mark.parametrize(
+    "formulation", ["joint", pytest.param("absolute", marks=pytest.mark.slow)]
+)
 TREE = (Revolute, Prismatic, Cylindrical, Universal, Planar, Spherical, Fixed, Floating)
 
 
@@ -133,8 +138,20 @@ def solve(eq: Equations, q: Array, qd: Array, rounds: int = 60) -> Solved:
 def rod(friction: JointFriction | None = None, **start: float) -> Mechanism:
     """A rod on a hinge about y."""
     m = Mechanism("rod")
-    m.body("rod", 2.0, (0.1, 0.1, 0.1))
-    m.frame("ground.hinge", z=Y)
-    m.frame("rod.hinge", at=(0.0, 0.0, 0.4), z=Y)
-    m.joint(Revolute("hinge", "ground.hinge", "rod.hinge", friction=friction, **start))
+    at = {"to": (0.0, 0.0, 0.4), "z": Y}
+    attach(m, Revolute, "hinge", "rod", mass=2.0, J=0.1, friction=friction, **at, **start)
     return m
+
+
+def attach(
+    m: Mechanism, kind: type[Joint], name: str, child: str, parent: str = "ground", *,
+    mass: float = 1.0, J: object = 1.0, com: tuple[float, ...] = (0.0, 0.0, 0.0),
+    at: tuple[float, ...] = (0.0, 0.0, 0.0), to: tuple[float, ...] = (0.0, 0.0, 0.0),
+    z: tuple[float, ...] = Z, x: tuple[float, ...] | None = None, **more: object,
+) -> None:  # fmt: skip
+    """Add a joint with frames of the given axes on both bodies, and its child if it is new."""
+    if child not in [b.name for b in m.bodies]:
+        m.body(child, mass, (J, J, J) if isinstance(J, float) else J, com)
+    for place, position in ((f"{parent}.{name}", at), (f"{child}.{name}", to)):
+        m.frame(place, position, z, x)
+    m.joint(kind(name, f"{parent}.{name}", f"{child}.{name}", **more))

@@ -14,10 +14,8 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from queue import SimpleQueue
 from tempfile import TemporaryDirectory
 from typing import final
 
@@ -81,19 +79,21 @@ def _text(node: ast.BinOp) -> bool:
 def mutants_of(path: Path) -> list[Mutant]:
     """Return every mutant of the functions of a file."""
     source = path.read_text(encoding="utf-8")
-    lines, found = source.splitlines(), list[Mutant]()
+    lines, found = source.splitlines(), dict[tuple[int, int, int, int], list[Mutant]]()
     name = path.relative_to(ROOT).as_posix()
-    functions = [n for n in ast.walk(ast.parse(source)) if isinstance(n, ast.FunctionDef)]
-    seen = set[tuple[int, int, int, int]]()
-    for function in functions:
-        for node in _expressions(function.body):
-            at = (node.lineno, node.col_offset, node.end_lineno or 0, node.end_col_offset or 0)
-            if at in seen:
-                continue
-            seen.add(at)
-            for other in changed(node):
-                found += _replaced(name, lines, at, node, other)
-    return found
+    for function in ast.walk(ast.parse(source)):
+        body = function.body if isinstance(function, ast.FunctionDef) else []
+        for node in _expressions(body):
+            first, last = node.lineno, node.end_lineno or 0
+            begin, end = node.col_offset, node.end_col_offset or 0
+            head = lines[first - 1].encode()[:begin].decode()
+            tail = lines[last - 1].encode()[end:].decode()
+            old, texts = ast.unparse(node), [ast.unparse(other) for other in changed(node)]
+            found[first, begin, last, end] = [
+                Mutant(name, first, last, f"{head}({new}){tail}", f"{old[:60]} -> {new[:60]}")
+                for new in texts
+            ]
+    return [mutant for mutants in found.values() for mutant in mutants]
 
 
 def _expressions(body: Sequence[ast.stmt]) -> Iterator[ast.expr]:
@@ -116,23 +116,9 @@ def _expressions(body: Sequence[ast.stmt]) -> Iterator[ast.expr]:
         ]
 
 
-def _replaced(
-    name: str, lines: Sequence[str], at: tuple[int, int, int, int], node: ast.expr, other: ast.expr
-) -> list[Mutant]:
-    """Return the mutant that writes `other` in place of `node`."""
-    first, begin, last, end = at
-    head = lines[first - 1].encode()[:begin].decode()
-    tail = lines[last - 1].encode()[end:].decode()
-    old, new = ast.unparse(node), ast.unparse(other)
-    return [Mutant(name, first, last, f"{head}({new}){tail}", f"{old[:60]} -> {new[:60]}")]
-
-
 def drawn(count: int, seed: int, under: Sequence[str], only: set[tuple[str, int]]) -> list[Mutant]:
     """Draw `count` mutants of different lines, in files below `under` and in the lines `only`."""
-    places = [ROOT / place for place in under]
-    files = [
-        p for place in places for p in (sorted(place.rglob("*.py")) if place.is_dir() else [place])
-    ]
+    files = [p for u in under for p in (sorted((ROOT / u).rglob("*.py")) or [ROOT / u])]
     pool = [m for path in files for m in mutants_of(path)]
     pool = [m for m in pool if not only or (m.file, m.first) in only]
     random.Random(seed).shuffle(pool)
@@ -222,30 +208,18 @@ def main() -> int:
     parser.add_argument("--under", nargs="*", default=PACKAGES, help="folders or files")
     parser.add_argument("--changed", metavar="COMMIT", help="only lines that differ from COMMIT")
     parser.add_argument("--near", action="store_true", help="only the tests of the folder")
-    parser.add_argument("--jobs", type=int, default=1, help="mutants at a time")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="for each mutant")
     given = parser.parse_args()
     only = changed_lines(given.changed) if given.changed else set[tuple[str, int]]()
-    mutants = drawn(given.count, given.seed, given.under, only)
+    mutants, alive = drawn(given.count, given.seed, given.under, only), 0
     print(f"{len(mutants)} mutants of seed {given.seed}", flush=True)
-    alive = 0
     with TemporaryDirectory(prefix="symfric-mutants-") as folder:
-        free: SimpleQueue[Path] = SimpleQueue()
-        for k in range(given.jobs):
-            free.put(copied(Path(folder) / str(k)))
-
-        def one(mutant: Mutant) -> str:
-            tree = free.get()
-            try:
-                return outcome(mutant, tree, given.workers, given.near)
-            finally:
-                free.put(tree)
-
-        with ThreadPoolExecutor(given.jobs) as pool:
-            for m, seen in zip(mutants, pool.map(one, mutants), strict=True):
-                alive += not seen
-                line = f"{'killed' if seen else 'ALIVE':<7} {m.file}:{m.first} {m.what}"
-                print(f"{line}  [{seen[:80]}]" if seen else line, flush=True)
+        tree = copied(Path(folder))
+        for m in mutants:
+            seen = outcome(m, tree, given.workers, given.near)
+            alive += not seen
+            verdict = f"killed [{seen[:80]}]" if seen else "ALIVE "
+            print(f"{verdict} {m.file}:{m.first} {m.what}", flush=True)
     print(f"{len(mutants) - alive} of {len(mutants)} mutants killed")
     return 1 if alive else 0
 

@@ -6,16 +6,16 @@ is changed is imported by the child alone, so that no cache holds what was compu
 
 import ast
 import json
-import os
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from importlib import import_module
-from importlib.machinery import ModuleSpec, SourceFileLoader
-from importlib.util import spec_from_file_location
+from importlib.machinery import SourceFileLoader
+from multiprocessing import get_context
 from pathlib import Path
 from types import CodeType
-from typing import Any
 
 ROOT = Path(__file__).parents[1]
 FACTOR = 1.05
@@ -55,15 +55,10 @@ def numbers(source: str, name: str) -> Iterator[ast.Constant]:
         classes = (n for n in ast.walk(tree) if isinstance(n, ast.ClassDef))
         tree = next(n for n in classes if n.name == owner)
     for node in ast.walk(tree):
-        targets = (
-            node.targets
-            if isinstance(node, ast.Assign)
-            else [node.target]
-            if isinstance(node, ast.AnnAssign)
-            else []
-        )
-        names = {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)}
-        if name not in names or not isinstance(node, ast.Assign | ast.AnnAssign) or not node.value:
+        if not isinstance(node, ast.Assign | ast.AnnAssign) or not node.value:
+            continue
+        targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+        if name not in {n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)}:
             continue
         found = [n for n in ast.walk(node.value) if isinstance(n, ast.Constant)]
         found = [n for n in found if type(n.value) in (int, float) and n.value]
@@ -92,33 +87,16 @@ _before = {law}.{method}
 """
 
 
-class Loader(SourceFileLoader):
-    """Loads a changed source."""
-
-    job: Job
-
-    def get_code(self, fullname: str) -> CodeType:
-        return compile(changed(self.job), self.path, "exec", dont_inherit=True)
-
-
-class Finder:
-    """Finds the module of a job before anybody else does."""
-
-    def __init__(self, job: Job) -> None:
-        self.job = job
-        self.module = job.file.removesuffix(".py").replace("/", ".")
-
-    def find_spec(self, name: str, *_: Any) -> ModuleSpec | None:
-        if name != self.module:
-            return None
-        loader = Loader(name, str(ROOT / self.job.file))
-        loader.job = self.job
-        return spec_from_file_location(name, loader.path, loader=loader)
-
-
 def verdict(job: Job, quick: bool) -> str:
-    """Which figure refuses, and in which words; empty where all are drawn as before."""
-    sys.meta_path.insert(0, Finder(job))  # pyright: ignore[reportArgumentType]
+    """Return which figure fails, and its message; empty if all are drawn as before."""
+    get_code, file = SourceFileLoader.get_code, str(ROOT / job.file)
+
+    def code(loader: SourceFileLoader, name: str) -> CodeType | None:
+        if loader.path == file:
+            return compile(changed(job), file, "exec", dont_inherit=True)
+        return get_code(loader, name)
+
+    SourceFileLoader.get_code = code
     name = "importing"
     try:
         gallery = import_module("symfric.gallery")
@@ -130,19 +108,12 @@ def verdict(job: Job, quick: bool) -> str:
 
 
 def forked(job: Job, quick: bool) -> str:
-    """The verdict, found by a child."""
-    read, write = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(read)
-        with os.fdopen(write, "w") as out:
-            out.write(verdict(job, quick))
-        os._exit(0)
-    os.close(write)
-    with os.fdopen(read) as answers:
-        answer = answers.read()
-    _, status = os.waitpid(child, 0)
-    return answer if status == 0 else f"the process died, {status}"
+    """Return the verdict of a child process."""
+    with ProcessPoolExecutor(1, get_context("fork")) as pool:
+        try:
+            return pool.submit(verdict, job, quick).result()
+        except BrokenProcessPool as error:
+            return str(error)
 
 
 def main() -> None:

@@ -34,37 +34,57 @@ class Archive:
         self.library = c.CDLL(str(folder / binary))
 
 
-class Second:
-    """An instance of FMI 2.0; what it says is kept."""
+class Unit:
+    """An instance of a unit; `said` keeps its messages."""
+
+    prefix, real, counts = "fmi3", "Float64", 2
+
+    def instantiate(self, archive: Archive, name: str, *arguments) -> None:
+        function = getattr(archive.library, f"{self.prefix}{name}")
+        function.restype = c.c_void_p
+        self.archive, self.library = archive, archive.library
+        self.handle = function(*arguments)
+        self.self = c.c_void_p(self.handle)
+
+    def call(self, name: str, *arguments) -> int:
+        return getattr(self.library, f"{self.prefix}{name}")(self.self, *arguments)
+
+    def references(self, names) -> c.Array:
+        return (c.c_uint32 * len(names))(*(self.archive.reference[n] for n in names))
+
+    def exchange(self, name: str, names, numbers: c.Array) -> int:
+        count = c.c_size_t(len(names))
+        last = [count] * (self.counts - 1)
+        return self.call(f"{name}{self.real}", self.references(names), count, numbers, *last)
+
+    def set(self, **values: float) -> int:
+        return self.exchange("Set", values, (c.c_double * len(values))(*values.values()))
+
+    def get(self, *names: str) -> np.ndarray:
+        numbers = (c.c_double * len(names))()
+        assert self.exchange("Get", names, numbers) == OK, self.said
+        return np.array(numbers[:])
+
+    def free(self) -> None:
+        self.call("FreeInstance")
+
+
+class Second(Unit):
+    """An instance of FMI 2.0; `said` keeps status and text of each message."""
+
+    prefix, real, counts = "fmi2", "Real", 1
 
     def __init__(self, archive: Archive, name: str = "unit", token: str | None = None) -> None:
-        self.archive, self.said = archive, list[tuple[int, str]]()
-        self.library = archive.library
+        self.said = list[tuple[int, str]]()
         self.logger = LOGGER(
             lambda _e, _n, status, _c, text: self.said.append((status, text.decode()))
         )
         self.callbacks = Callbacks(self.logger, None, None, None, None)
-        self.library.fmi2Instantiate.restype = c.c_void_p
         token = archive.token if token is None else token
-        self.handle = self.library.fmi2Instantiate(
-            name.encode(), 1, token.encode(), b"", c.byref(self.callbacks), 0, 1
-        )
-        self.self = c.c_void_p(self.handle)
-
-    def call(self, name: str, *arguments) -> int:
-        return getattr(self.library, f"fmi2{name}")(self.self, *arguments)
-
-    def set(self, **values: float) -> int:
-        references = (c.c_uint * len(values))(*(self.archive.reference[n] for n in values))
-        numbers = (c.c_double * len(values))(*values.values())
-        return self.call("SetReal", references, c.c_size_t(len(values)), numbers)
-
-    def get(self, *names: str) -> np.ndarray:
-        references = (c.c_uint * len(names))(*(self.archive.reference[n] for n in names))
-        numbers = (c.c_double * len(names))()
-        status = self.call("GetReal", references, c.c_size_t(len(names)), numbers)
-        assert status == OK, self.said
-        return np.array(numbers[:])
+        self.instantiate(
+            archive, "Instantiate", name.encode(), 1, token.encode(), b"", c.byref(self.callbacks),
+            0, 1,
+        )  # fmt: skip
 
     def setup(
         self, begin: float = 0.0, stop: float | None = None, rtol: float | None = None
@@ -81,9 +101,6 @@ class Second:
     def step(self, t: float, size: float) -> int:
         return self.call("DoStep", c.c_double(t), c.c_double(size), 1)
 
-    def free(self) -> None:
-        self.library.fmi2FreeInstance(self.self)
-
 
 def over(unit, times, names, inputs=None):
     """Signals `names` (times, names) at communication points; inputs(t) by name before each."""
@@ -96,35 +113,20 @@ def over(unit, times, names, inputs=None):
     return np.array(rows)
 
 
-class Third:
-    """An instance of FMI 3.0 for co-simulation; what it says is kept."""
+class Third(Unit):
+    """An instance of FMI 3.0 for co-simulation."""
 
     def __init__(self, archive: Archive) -> None:
-        self.archive, self.said = archive, list[str]()
+        self.start(archive, "CoSimulation", False, False, False, False, None, c.c_size_t(0), None)
+
+    def start(self, archive: Archive, kind: str, *between) -> None:
+        self.said = list[str]()
         log = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)
         self.log = log(lambda _e, _s, _c, text: self.said.append(text.decode()))
-        self.library = archive.library
-        self.library.fmi3InstantiateCoSimulation.restype = c.c_void_p
-        self.self = c.c_void_p(
-            self.library.fmi3InstantiateCoSimulation(
-                b"unit", archive.token.encode(), None, False, False, False, False, None,
-                c.c_size_t(0), None, self.log, None,
-            )
-        )  # fmt: skip
-
-    def call(self, name: str, *arguments) -> int:
-        return getattr(self.library, f"fmi3{name}")(self.self, *arguments)
-
-    def set(self, **values: float) -> int:
-        references = (c.c_uint32 * len(values))(*(self.archive.reference[n] for n in values))
-        numbers, count = (c.c_double * len(values))(*values.values()), c.c_size_t(len(values))
-        return self.call("SetFloat64", references, count, numbers, count)
-
-    def get(self, *names: str) -> np.ndarray:
-        references = (c.c_uint32 * len(names))(*(self.archive.reference[n] for n in names))
-        numbers, count = (c.c_double * len(names))(), c.c_size_t(len(names))
-        assert self.call("GetFloat64", references, count, numbers, count) == OK, self.said
-        return np.array(numbers[:])
+        token, environment = archive.token.encode(), [None] * (kind == "CoSimulation")
+        self.instantiate(
+            archive, f"Instantiate{kind}", b"unit", token, None, *between, self.log, *environment
+        )
 
     def begin(self, begin: float = 0.0, stop: float | None = None, **start: float) -> int:
         worst = self.set(**start) if start else OK
@@ -142,25 +144,12 @@ class Third:
             "DoStep", c.c_double(t), c.c_double(size), True, *places, c.byref(self.reached)
         )
 
-    def free(self) -> None:
-        self.library.fmi3FreeInstance(self.self)
-
 
 class Rates(Third):
     """An instance of FMI 3.0 for model exchange."""
 
     def __init__(self, archive: Archive) -> None:
-        self.archive, self.said = archive, list[str]()
-        log = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)
-        self.log = log(lambda _e, _s, _c, text: self.said.append(text.decode()))
-        self.library = archive.library
-        self.library.fmi3InstantiateModelExchange.restype = c.c_void_p
-        token = archive.token.encode()
-        self.self = c.c_void_p(
-            self.library.fmi3InstantiateModelExchange(
-                b"unit", token, None, False, False, None, self.log
-            )
-        )
+        self.start(archive, "ModelExchange", False, False, None)
         count = c.c_size_t()
         assert self.call("GetNumberOfContinuousStates", c.byref(count)) == OK
         self.n = count.value
@@ -183,8 +172,7 @@ class Rates(Third):
 
     def along(self, unknowns: list[str], seeds: dict[str, float]) -> np.ndarray:
         """Directional derivatives."""
-        of = (c.c_uint32 * len(unknowns))(*(self.archive.reference[n] for n in unknowns))
-        by = (c.c_uint32 * len(seeds))(*(self.archive.reference[n] for n in seeds))
+        of, by = self.references(unknowns), self.references(seeds)
         given, values = (c.c_double * len(seeds))(*seeds.values()), np.zeros(len(unknowns))
         n, k = c.c_size_t(len(unknowns)), c.c_size_t(len(seeds))
         place = c.c_void_p(values.ctypes.data)

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from symfric.foundation import checks
-from symfric.integrator.arguments import BACKENDS, check_span, chosen, tolerances
+from symfric.integrator import arguments
 from symfric.integrator.equations.initial import first_guess, smallest_step
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.manifold import Manifold
@@ -76,14 +76,14 @@ def stepper(
     check_model(where, model)
     dt = checks.number(f"{where}: dt", dt, unit="s", above=0.0)
     t_start = checks.number(f"{where}: t_start", t_start, unit="s")
-    _, t_end, rtol = check_span(where, model, t_start, t_start + dt, rtol)
-    formula = chosen(where, method, rtol)
-    checks.choice(f"{where}: backend", backend, BACKENDS)
+    _, t_end, rtol = arguments.check_span(where, model, t_start, t_start + dt, rtol)
+    formula = arguments.chosen(where, method, rtol)
+    checks.choice(f"{where}: backend", backend, arguments.BACKENDS)
     members = 1 if batch is None else checks.count(f"{where}: batch", batch)
     # constant inputs have one entry each in the run data
     inputs = input_data(model, {v.name: float(v.start) for v in model.u}, t_start, t_end)
     integrator, _ = built(model, inputs, formula)
-    allowed = tolerances(
+    allowed = arguments.tolerances(
         where, rtol, atol, integrator.system.nominal, event_tolerance, max_steps, max_step
     )
     plants = _plants(integrator, members, dt, t_start, allowed)

@@ -13,8 +13,7 @@ from symfric.integrator.cuda.device import Device, Loaded
 from symfric.integrator.cuda.kernel import Kernel, kernel_of
 from symfric.integrator.many.chunk import Chunk, Job, Solved
 from symfric.integrator.many.member_data import MemberData
-from symfric.integrator.many.members import Advanced, Counts, Stretch, struct
-from symfric.integrator.many.program import Program, with_code
+from symfric.integrator.many.members import Advanced, Counts, Program, Stretch, struct, with_code
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import State

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_step
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.many.members import Runner, Stretch
-from symfric.integrator.many.program import Program, with_code
+from symfric.integrator.many.members import Program, Runner, Stretch, with_code
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator, built

@@ -66,13 +66,10 @@ def test_every_parameter_is_changed_where_it_matters(law):
         steps = rows.steps.chosen(changed)
         steps.changed[:] = -1
         effect = (np.abs(rows.results[changed] - made(c, steps)) / rows.tolerance).max()
-        assert effect > 100 or v.name == "v_eps"  # 1e-15 m/s: nothing but rest is slower
-
-
-def test_a_changed_value_stays_within_the_bounds():
-    assert changed_value(Variable("p", "1", start=2.0)) == 2.5
-    assert changed_value(Variable("p", "1", start=2.0, upper=2.1)) == 1.5
-    assert changed_value(Variable("p", "1", start=0.0, nominal=4.0)) == 1.0
+        assert effect > 100 or v.name == "v_eps"  # 1e-15 m/s, which only rest is below
+    for bounds, changed in (({"start": 2.0}, 2.5), ({"start": 2.0, "upper": 2.1}, 1.5),
+                            ({"nominal": 4.0}, 1.0)):  # fmt: skip
+        assert changed_value(Variable("p", "1", **bounds)) == changed
 
 
 def test_guards_add_a_row_for_each_number_that_is_bad(found):

@@ -14,7 +14,6 @@ from symfric import (
     BrownMcPhee,
     Coulomb,
     Dahl,
-    Karnopp,
     Law,
     LuGre,
     SelfTuning,
@@ -23,7 +22,7 @@ from symfric import (
     Viscous,
 )
 from symfric.codegen import law_block
-from symfric.compensation import TERMS, compensator, settings_from_text
+from symfric.compensation import compensator, settings_from_text
 from symfric.foundation.graph import graph
 from symfric.scenes import Drive
 
@@ -265,41 +264,3 @@ def test_settings_are_read_from_texts() -> None:
     assert s.scales == {"coulomb": 0.9, "stribeck": 0.0}
     assert tuple(s.without) == ("viscous",)
     assert s.build_up_table == ((0.0, 0.0), (1.0, 1.0))
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"v_blend": 0.0}, "v_blend: expected a number > 0"),
-        ({"velocity": "desired"}, "velocity: expected one of blend, reference, measured"),
-        ({"N": "given"}, "N: expected one of input"),
-        ({"N": -1.0}, "N: expected a number >= 0"),
-        ({"scales": ["coulom"]}, "did you mean coulomb?"),
-        ({"scales": ["force"]}, "scales: expected one of coulomb, stribeck, viscous, bristle"),
-        ({"scales": ["coulomb"], "without": ["coulomb"]}, "in scales or in without"),
-        ({"build_up": 1e-4}, "expected a law without states"),
-        ({"build_up_table": ((0, 0), (1, 1))}, "expected with build_up only"),
-        ({"stick": (1.0, 0.1)}, "stick: expected (force [N], time [s], velocity [m/s])"),
-        ({"stick": (1.0, 0.1, 0.0)}, "stick: velocity: expected a number > 0"),
-        ({"dither": (1.0, -1.0)}, "dither: expected (amplitude [N], frequency [Hz])"),
-        ({"velocity": "measured", "delay": 1e-3}, "with a desired velocity only"),
-        ({"limt": 3.0}, "did you mean limit?"),
-        ({"settings": 3}, "expected settings, Compensation()"),
-        ({"h": 0.0}, "h: expected a number > 0"),
-    ],
-)
-def test_bad_settings_are_refused_in_a_sentence(given: dict[str, object], words: str) -> None:
-    with pytest.raises(ValueError, match=r"^compensator|^codegen|^settings") as caught:
-        compensator(LuGre(), **given)
-    assert words in str(caught.value)
-
-
-def test_unsuitable_laws_and_tables_are_refused() -> None:
-    for law, settings, words in (
-        (Karnopp(form="original"), {}, "expected a law of v and N only, got one with F_e"),
-        ("lugre", {}, "expected a law such as"),
-        (STEP, {"build_up": 1e-4, "build_up_table": ((0, 0), (1, 0.5))}, "expected rising pairs"),
-    ):
-        with pytest.raises(ValueError, match=words):
-            compensator(law, **settings)
-    assert set(TERMS) >= {"coulomb", "stribeck", "viscous", "bristle"}

@@ -76,12 +76,6 @@ def test_absent_tools_are_named(monkeypatch):
     assert "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm" in missing.advice
 
 
-@pytest.mark.parametrize("wrong", [{"core": "m5"}, {"real": "half"}, {"by": "hand"}, {"steps": 0}])
-def test_unknown_names_are_refused(wrong):
-    with pytest.raises(ValueError, match="embedded: "):
-        measure(law_block(LuGre()), **wrong)
-
-
 def test_a_day_has_steps_of_the_load():
     v, N = day(law_block(LuGre()), 400).T
     assert (v == 0).sum() == 80

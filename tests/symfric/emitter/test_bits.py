@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from one_program import OneProgram
+from tables import Names, table
 
 from symfric import Output, Variable
 from symfric.codegen import Block
@@ -27,48 +28,11 @@ UNARY = (
     *("acosh", "atanh", "exp", "expm1", "log", "log1p", "erf", "fabs", "sign", "floor", "ceil"),
 )
 BINARY = ("atan2", "hypot", "fmod", "remainder", "copysign", "fmin", "fmax")
+NAMES = Names(globals())
 OPERATIONS = {
     **{name: getattr(ca, name)(x) for name in UNARY},
     **{name: getattr(ca, name)(x, y) for name in BINARY},
-    "add": x + y,
-    "sub": x - y,
-    "mul": x * y,
-    "div": x / y,
-    "neg": -x,
-    "sq": x * x,
-    "twice": 2 * x,
-    "inv": 1 / x,
-    "pow": x**y,
-    "constpow": x**1.7,
-    "lt": less,
-    "le": x <= y,
-    "eq": equal,
-    "ne": x != y,
-    "not": ca.logic_not(x),
-    "and": ca.logic_and(less, y < 2),
-    "or": ca.logic_or(less, y < 0),
-    "if_else": ca.if_else(less, x, y),
-    "if_else_zero": ca.if_else(less, x, 0),
-    "if_number": ca.if_else(x, x + 1, y),
-    "nested logic": ca.logic_or(ca.logic_and(less, x < 1), ca.logic_not(equal)),
-    "bool as number": 2 * less - equal,
-    "nested if_else": ca.if_else(less, ca.if_else(x < 0, y, x), ca.if_else(y < 0, x, -y)),
-    "sign of a sum": ca.sign(x + y),
-    "minus a negative constant": x - ca.SX(-3) * y + ca.cos(-x),
-    "clip": ca.fmin(ca.fmax(x, -0.7), 1.2),
-    "clip from above": ca.fmax(ca.fmin(x, 1.2), -0.7),
-    "clip with bounds": ca.fmax(-1, ca.fmin(x, 3 - ca.fabs(ca.fmin(y, 2)))),
-    "cut at zero": ca.fmax(0, x),
-    "clip of a clip": ca.fmin(ca.fmax(ca.fmin(x, 2), y), 1),
-    "logic as number": ca.fmax(less, y < 2) + ca.fmin(x < 1, equal) * ca.if_else(less, equal, 1),
-    "number as logic": ca.if_else(ca.if_else(less, x < 0, 0) * 1, y, ca.if_else(equal, 0, less)),
-    "logic of signs": ca.if_else(ca.sign(x) == 0, y, ca.if_else(ca.sign(y) < 0, x, -y)),
-    "opposite against zero": (-ca.sin(x) < 0) + 2 * (ca.fabs(y - 1) <= 0),
-    "negated": ca.logic_not(ca.logic_and(ca.logic_not(equal), ca.logic_or(less, x < 1))),
-    "negated order": ca.if_else(ca.logic_not(less), x, ca.if_else(ca.logic_not(x <= 2), y, 3)),
-    "branch": ca.if_else(less, ca.sin(x) / y, ca.if_else(y < 0, ca.exp(-x * x), ca.cos(y))),
-    "derivative of fmin": ca.jacobian(ca.fmin(x * x, y) + ca.fmax(x, 0.5), x),
-    "infinity": ca.fmin(x, ca.SX.inf()),
+    **{name: NAMES.value(text) for name, text in table(__file__)["operations"].items()},
 }
 OTHER_AT_NAN = {"fmin", "fmax", "clip with bounds", "derivative of fmin"}
 """See `logic`: what is not a number stays that in fmin and fmax of two variables."""

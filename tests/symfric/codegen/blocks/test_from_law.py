@@ -8,12 +8,11 @@ import pytest
 from law_cases import CASES, NO_STEP
 from one_program import along, block_of
 from rigs import prescribed_motion
+from tables import Names, table
 
 from symfric import (
-    Dahl,
     LoadDependent,
     LuGre,
-    Stribeck,
     Sum,
     Viscous,
     parameters,
@@ -24,16 +23,9 @@ from symfric.codegen.blocks.held_step import force_of_rate, held_step
 from symfric.laws import (
     GMS,
     Armstrong,
-    BoucWen,
-    ElastoPlastic,
     Element,
-    Gonthier,
-    HaessigFriedland,
-    Lagged,
     MaxwellSlip,
-    RateAndState,
     Slider,
-    StickSlip,
 )
 
 LOAD = 8.0
@@ -110,20 +102,7 @@ def errors_along_a_motion(law, steps):
     return worst, abs(np.sum(forces * middle) * t[1] / reference["work"][-1] - 1)
 
 
-SECOND_ORDER = {
-    "lugre": (LuGre(sigma_2=0.4), 200),
-    "elasto_plastic": (ElastoPlastic(), 2000),
-    "armstrong and lugre": (Sum((Armstrong(n=2.0), LuGre())), 2000),
-    "dahl": (Dahl(), 200),
-    "dahl, n 2": (Dahl(n=2.0), 2000),
-    "dahl, n 0.5": (Dahl(n=0.5), 2000),
-    "bouc_wen": (BoucWen(), 2000),
-    "maxwell_slip, n 2": (MaxwellSlip(n=2.0), 2000),
-    "stick_slip": (StickSlip(D_max=1e-5), 2000),
-    "gonthier": (Gonthier(), 2000),
-    "rate_and_state": (RateAndState(), 2000),
-    "lagged": (Lagged(Stribeck()), 2000),
-}
+SECOND_ORDER = table(__file__)["second_order"]
 
 
 @pytest.mark.parametrize(
@@ -131,7 +110,7 @@ SECOND_ORDER = {
     [pytest.param(n, marks=[pytest.mark.slow] * (k > 1)) for k, n in enumerate(SECOND_ORDER)],
 )
 def test_second_order_along_a_motion(name):
-    law, steps = SECOND_ORDER[name]
+    law, steps = Names().value(name), SECOND_ORDER[name]
     coarse, fine = (np.array(errors_along_a_motion(law, n)) for n in (steps, 2 * steps))
     assert fine[0] < 2e-3
     assert fine[1] < 2e-4
@@ -139,15 +118,9 @@ def test_second_order_along_a_motion(name):
     assert (coarse / fine < 5.0).all()
 
 
-YIELDING = [
-    LuGre(), Dahl(n=2.0), Dahl(n=0.5), ElastoPlastic(), BoucWen(n=20.0), MaxwellSlip(),
-    HaessigFriedland(), MaxwellSlip(form="event"), HaessigFriedland(form="event"),
-    GMS(form="event"), Armstrong(),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("law", YIELDING, ids=lambda law: type(law).__name__)
-def test_no_step_leaves_the_bounds_of_the_states(law):
+@pytest.mark.parametrize("text", table(__file__)["bounded"]["laws"])
+def test_no_step_leaves_the_bounds_of_the_states(text):
+    law = Names().value(text)
     random = np.random.default_rng(0)
     velocities = 10.0 ** random.uniform(-6, 3, 300) * random.choice([-1.0, 1.0], 300)
     for h in (1e-6, 1e-3, 1.0, 1e3):

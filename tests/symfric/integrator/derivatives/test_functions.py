@@ -4,71 +4,10 @@ import casadi as ca
 import numpy as np
 import pytest
 from backends import needs_compiler
-from differentiable import oscillator, pendulum, root, switched
-from numpy.typing import NDArray
 
-from symfric import (
-    BrownMcPhee,
-    Hold,
-    Law,
-    Linear,
-    LuGre,
-    Model,
-    Output,
-    Trajectory,
-    Variable,
-    rabinowicz,
-    simulate,
-)
+from symfric import Model, Output, Variable, simulate
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.derivatives.functions import FEW, MANY, lanes_source
-
-Array = NDArray[np.float64]
-LAWS: dict[str, Law] = {"brown_mcphee": BrownMcPhee(), "lugre": LuGre()}
-
-
-def summed(run: Trajectory, weights: dict[str, Array]) -> dict[str, float]:
-    """What the gradient must be, by the forward derivatives."""
-    return {
-        name: sum(float(w @ slopes[signal]) for signal, w in weights.items())
-        for name, slopes in run.sensitivities.items()
-    }
-
-
-@pytest.mark.parametrize("backend", ["vm", "compiled"])
-@pytest.mark.parametrize("law", LAWS)
-def test_backward_and_forward_give_one_gradient(law: str, backend: str) -> None:
-    """Times between the steps, states and outputs, parameters and start values."""
-    model, rng = rabinowicz(LAWS[law], free=["mu_s", "mu_d", "k", "m"]), np.random.default_rng(5)
-    times = np.sort(rng.uniform(0.0, 9.0, 60))
-    names = [*(v.name for v in model.p), *(f"x0.{v.name}" for v in model.x)]
-    run = simulate(model, 9.0, x0={"v": 0.02}, t_eval=times, backend=backend, sensitivities=names)
-    weights = {signal: rng.normal(size=60) for signal in ("x", "v", "friction", "power")}
-    assert run.gradient(weights) == pytest.approx(summed(run, weights), rel=1e-9)
-
-
-def models() -> dict[str, tuple[Model, dict[str, Hold | Linear]]]:
-    return {
-        "algebraic": (root(), {}),
-        "mechanism": (pendulum(), {}),
-        "jumps of algebraic unknowns": (
-            switched(), {"u": Hold([0.0, 0.3, 0.7], [1.0, -2.0, 3.0])}
-        ),
-        "sampled input": (oscillator(), {"u": Linear([0.0, 0.35, 0.8], [1.0, -2.0, 0.5])}),
-    }  # fmt: skip
-
-
-@pytest.mark.parametrize("case", models())
-def test_gradient_of_every_kind_of_model(case: str) -> None:
-    model, u = models()[case]
-    names = [*(v.name for v in model.p), *(f"x0.{v.name}" for v in model.x)]
-    # the ends of the run and of the input intervals among the times
-    times = np.array([0.0, 0.1, 0.3, 0.35, 0.5, 0.7, 0.8, 1.0])
-    run = simulate(model, 1.0, u=u, t_eval=times, rtol=1e-9, sensitivities=names)
-    weights = {
-        signal: np.linspace(1.0, -2.0 * i, 8) for i, signal in enumerate(model.signals, start=1)
-    }
-    assert run.gradient(weights) == pytest.approx(summed(run, weights), rel=1e-10)
 
 
 def test_signal_without_weight_needs_no_derivative() -> None:
@@ -79,44 +18,6 @@ def test_signal_without_weight_needs_no_derivative() -> None:
     run = simulate(model, 1.0, samples=2, rtol=1e-8, sensitivities=["x0.x"])
     assert np.isnan(run.gradient({"apart": 1.0})["x0.x"])
     assert run.gradient({"x": [0.0, 1.0]}) == pytest.approx({"x0.x": np.exp(-1.0)})
-
-
-def test_gradient_of_a_cost_meets_its_difference_quotient() -> None:
-    """J = sum_i (x(t_i) - 1/10)^2 of the oscillator, whose weights are dJ/dx(t_i)."""
-
-    def cost(k: float) -> float:
-        run = simulate(oscillator(), 5.0, samples=21, rtol=1e-11, p={"k": k})
-        return float(((run["x"] - 0.1) ** 2).sum())
-
-    run = simulate(oscillator(), 5.0, samples=21, rtol=1e-11, sensitivities=["k"])
-    found = run.gradient({"x": 2 * (run["x"] - 0.1)})["k"]
-    assert found == pytest.approx((cost(4.0 + 1e-4) - cost(4.0 - 1e-4)) / 2e-4, rel=1e-6)
-
-
-def test_one_weight_counts_for_all_times() -> None:
-    run = simulate(oscillator(), 2.0, samples=5, sensitivities=["k"])
-    assert run.gradient({"x": 3.0}) == run.gradient({"x": [3.0] * 5})
-
-
-@pytest.mark.parametrize(
-    ("weights", "message"),
-    [
-        ({"y": 1.0}, "gradient: expected one of x, v, u, energy, got y"),
-        ({"x": [1.0, 2.0]}, r"expected numbers or arrays of 5 weights, got x of shape \(2,\)"),
-    ],
-)
-def test_bad_weights_are_refused(weights: dict[str, object], message: str) -> None:
-    run = simulate(oscillator(), 2.0, samples=5, sensitivities=["k"])
-    with pytest.raises(ValueError, match=message):
-        run.gradient(weights)  # pyright: ignore[reportArgumentType]
-
-
-def test_gradient_that_was_not_asked_for_is_missed_by_name() -> None:
-    with pytest.raises(ValueError, match="expected sensitivities, got none"):
-        simulate(oscillator(), 1.0).gradient({"x": 1.0})
-
-
-pytestmark = needs_compiler
 
 
 def pushed(linked: bool) -> ca.Function:
@@ -133,6 +34,7 @@ def pushed(linked: bool) -> ca.Function:
     return ca.Function("one", [X, y, h, d, of_d, *more], [ca.densify(behind), ca.densify(column)])
 
 
+@needs_compiler
 @pytest.mark.parametrize(
     ("names", "linked"), [(2, True), (FEW, False), (FEW + 1, False), (MANY + 3, True)]
 )

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -10,22 +11,8 @@ from differentiable import pendulum
 from numpy.typing import NDArray
 from stored import stored
 
-from symfric import (
-    GMS,
-    BrownMcPhee,
-    ExactCoulomb,
-    Hold,
-    Karnopp,
-    LeineSwitch,
-    Linear,
-    MaxwellSlip,
-    Model,
-    Trajectory,
-    Variable,
-    drive,
-    rabinowicz,
-    simulate,
-)
+import symfric as sf
+from symfric import Hold, Linear, Model, Trajectory, Variable, simulate
 from symfric.integrator.derivatives import saltation as module
 from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.path import seeds
@@ -87,10 +74,9 @@ def test_stick_and_slip_on_a_belt_meet_their_closed_form() -> None:
     """
     at = {"mu_s": 0.15, "mu_d": 0.1, "k": 2.1, "x0.v": 0.1}
     times = np.array([5.0, 5.59, 5.7, 6.3])
-    run = simulate(
-        rabinowicz(ExactCoulomb(), free=["mu_s", "mu_d", "k"]), 6.5, x0={"v": 0.1, "mode": 0.0},
-        t_eval=times, sensitivities=[*at],
-    )  # fmt: skip
+    model = sf.rabinowicz(sf.ExactCoulomb(), free=["mu_s", "mu_d", "k"])
+    start = {"v": 0.1, "mode": 0.0}
+    run = simulate(model, 6.5, x0=start, t_eval=times, sensitivities=[*at])
     weight, m = 0.8 * 9.81, 0.8
     for name in at:
         mu_s, mu_d, k, belt = (complex(x, 1e-20 * (n == name)) for n, x in at.items())
@@ -106,13 +92,18 @@ def test_stick_and_slip_on_a_belt_meet_their_closed_form() -> None:
 GRID = np.linspace(0.0, 4.0, 41)
 WAVE = 2.2 * np.sin(np.pi * GRID)
 CASES = {
-    "exact_box": (PendulumBox(ExactCoulomb()).model(["mu_d"]), 2.0, None),
-    "karnopp_belt": (rabinowicz(Karnopp(form="event"), free=["mu_d", "m"]), 20.0, None),
-    "leine_belt": (rabinowicz(LeineSwitch(form="event"), free=["mu_s", "k"]), 20.0, None),
-    "exact_drive": (drive(ExactCoulomb(), free=["m", "N"]), 4.0, Linear(GRID, WAVE)),
-    "gms_drive": (drive(GMS(form="event"), free=["m", "N"]), 4.0, lambda t: 2 * ca.sin(ca.pi * t)),
-    "maxwell_drive": (drive(MaxwellSlip(form="event"), free=["m", "N"]), 4.0, Hold(GRID, WAVE)),
-}  # fmt: skip
+    "exact_box": (PendulumBox(sf.ExactCoulomb()).model(["mu_d"]), 2.0, None),
+    "karnopp_belt": (sf.rabinowicz(sf.Karnopp(form="event"), free=["mu_d", "m"]), 20.0, None),
+    "leine_belt": (sf.rabinowicz(sf.LeineSwitch(form="event"), free=["mu_s", "k"]), 20.0, None),
+    **{
+        f"{name}_drive": (sf.drive(law, free=["m", "N"]), 4.0, force)
+        for name, law, force in (
+            ("exact", sf.ExactCoulomb(), Linear(GRID, WAVE)),
+            ("gms", sf.GMS(form="event"), lambda t: 2 * ca.sin(ca.pi * t)),
+            ("maxwell", sf.MaxwellSlip(form="event"), Hold(GRID, WAVE)),
+        )
+    },
+}
 
 
 def run_of(case: str, p: Mapping[str, float], **how: object) -> Trajectory:
@@ -202,7 +193,7 @@ def test_mechanism_stays_on_its_constraints_behind_an_event() -> None:
 
 def test_sweeps_cost_what_they_are_written_for() -> None:
     """Instructions of a step of Rabinowicz: itself, by four parameters, backwards, with jumps."""
-    model = rabinowicz(BrownMcPhee(), free=["mu_s", "mu_d", "k", "m"])
+    model = sf.rabinowicz(sf.BrownMcPhee(), free=["mu_s", "mu_d", "k", "m"])
     integrator, _ = built(model, input_data(model, None, 0.0, 1.0), METHODS["rodas5p"])
     made = derivatives(integrator)
     which = seeds(model, ["mu_s", "mu_d", "k", "m"], None, None)
@@ -215,131 +206,112 @@ def test_sweeps_cost_what_they_are_written_for() -> None:
     assert all(f <= m for f, m in zip(found, most, strict=True)), found
 
 
-def counter(events: tuple[Event, ...], x: Variable, *others: Variable) -> Model:
-    """x' = p, all others at rest."""
-    p = Variable("p", "1/s", start=2.0)
-    still = ca.SX.zeros(len(others))
-    return Model("counter", x=(x, *others), p=(p,), ode=ca.vertcat(p.symbol, still), events=events)
+def events_of(
+    *events: Event, x: tuple[Variable, ...], rates: tuple[Any, ...], **more: Any
+) -> Model:
+    return Model("small", x=x, ode=ca.vertcat(*rates), events=events, **more)
 
 
-def test_end_of_a_run_that_an_event_ends_has_a_derivative() -> None:
-    """x = p t reaches 1 at 1/p."""
-    x = Variable("x", "1")
-    model = counter((Event("full", x.symbol - 1, terminal=True),), x)
-    run = simulate(model, 3.0, samples=4, sensitivities=["p", "x0.x"])
-    assert run.event_sensitivities["p"] == pytest.approx([-0.25])
-    assert run.event_sensitivities["x0.x"] == pytest.approx([-0.5])
-    assert run.sensitivities["p"]["x"] == pytest.approx(run.t)
-
-
-def test_event_in_the_very_step_that_another_one_began() -> None:
-    """x = p t reaches 1, and 2e-8 s later another mark; at both y' = y jumps by p x."""
-    x, y = Variable("x", "1"), Variable("y", "1")
-    p = Variable("p", "1/s", start=2.0)
-    gap = 4e-8
-    events = tuple(
-        Event(name, x.symbol - mark, reset={"y": y.symbol + x.symbol * p.symbol})
-        for name, mark in (("first", 1.0), ("second", 1.0 + gap))
-    )
-    model = Model("marks", x=(x, y), p=(p,), ode=ca.vertcat(p.symbol, y.symbol), events=events)
-    times = np.array([0.25, 0.5 + 1e-8, 0.75])
-    run = simulate(model, 1.0, t_eval=times, rtol=1e-9, sensitivities=["p", "x0.x"])
-    assert run.event_sensitivities["p"] == pytest.approx([-0.25, -0.25], rel=1e-6)
-    assert run.event_sensitivities["x0.x"] == pytest.approx([-0.5, -0.5], rel=1e-6)
-    assert run.sensitivities["p"]["x"] == pytest.approx(times)
-    assert run.sensitivities["x0.x"]["x"] == pytest.approx(1.0)
-    # y = p exp(t - 1/p) after the first one, twice that after the second one
-    growth = np.exp(times - 0.5)
-    by_p = np.array([0.0, 1.0, 2.0]) * (1 + 2 / 4) * growth
-    assert run.sensitivities["p"]["y"] == pytest.approx(by_p, rel=1e-6)
-    gradient = run.gradient({"x": np.ones(3), "y": np.ones(3)})
-    assert gradient["p"] == pytest.approx((times + by_p).sum(), rel=1e-6)
-
-
-def test_event_that_another_one_brings_about_moves_along() -> None:
-    """x = 1 lets y jump over zero, which lets z take the value of t: z = 1/p."""
-    t = ca.SX.sym("t")
-    x, y, z = Variable("x", "1"), Variable("y", "1", start=-1.0), Variable("z", "1")
-    p = Variable("p", "1/s", start=2.0)
-    events = (
-        Event("first", x.symbol - 1, reset={"y": 3 * p.symbol}),
-        Event("second", y.symbol, reset={"z": t * y.symbol}),
-    )
-    model = Model("chain", x=(x, y, z), p=(p,), ode=ca.vertcat(p.symbol, 0, 0), events=events, t=t)
-    run = simulate(model, 1.0, t_eval=[0.4, 0.6], sensitivities=["p"])
-    assert run.event_sensitivities["p"] == pytest.approx([-0.25, -0.25])
-    assert run["z"] == pytest.approx([0.0, 3.0])
-    assert run.sensitivities["p"]["y"] == pytest.approx([0.0, 3.0])
-    assert run.sensitivities["p"]["z"] == pytest.approx([0.0, 0.0], abs=1e-9)  # 3 p / p
-
-
-def test_events_of_time_alone_do_not_move_even_with_jumps_of_the_inputs() -> None:
-    """v' = u/m, and v is halved at t = 1, when u jumps."""
-    t, v, m = ca.SX.sym("t"), Variable("v", "m/s"), Variable("m", "kg", start=2.0)
-    u = Variable("u", "N")
-    half = Event("half", t - 1, direction=1, reset={"v": v.symbol / 2})
-    model = Model("pushed", x=(v,), u=(u,), p=(m,), ode=u.symbol / m.symbol, events=(half,), t=t)
-    run = simulate(
-        model, 2.0, u={"u": Hold([0.0, 1.0], [1.0, -3.0])}, t_eval=[0.9, 1.1, 2.0],
-        sensitivities=["m"],
-    )  # fmt: skip
-    assert run["v"] == pytest.approx([0.45, 0.1, -1.25])
-    assert run.sensitivities["m"]["v"] == pytest.approx([-0.225, -0.05, 0.625])
-    assert run.event_sensitivities["m"] == [0.0]
+t = ca.SX.sym("t")
+x, y, z = Variable("x", "1"), Variable("y", "1", start=-1.0), Variable("z", "1")
+p, m, u = Variable("p", "1/s", start=2.0), Variable("m", "kg", start=2.0), Variable("u", "N")
+X, Y, Z, P = x.symbol, y.symbol, z.symbol, p.symbol
+STEP = {"u": Hold([0.0, 1.0], [1.0, -3.0])}
+GAP = 4e-8
+AT = np.array([0.25, 0.5 + 1e-8, 0.75])
+BY_P = np.array([0.0, 1.0, 2.0]) * (1 + 2 / 4) * np.exp(AT - 0.5)
 
 
 def twins(mixing: float) -> Model:
     """Two points that reach their walls at one time; each rebounds with a part of the other."""
     x, y = Variable("x", "m", start=1.0), Variable("y", "m", start=2.0)
     v, w = Variable("v", "m/s", start=-1.0), Variable("w", "m/s", start=-2.0)
-    events = (
-        Event("wall x", x.symbol, -1, reset={"v": -v.symbol + mixing * w.symbol}),
-        Event("wall y", y.symbol, -1, reset={"w": -w.symbol + mixing * v.symbol}),
-    )
-    return Model("twins", x=(x, y, v, w), ode=ca.vertcat(v.symbol, w.symbol, 0, 0), events=events)
+    V, W = v.symbol, w.symbol
+    return events_of(
+        Event("wall x", x.symbol, -1, reset={"v": -V + mixing * W}),
+        Event("wall y", y.symbol, -1, reset={"w": -W + mixing * V}),
+        x=(x, y, v, w), rates=(V, W, 0, 0),
+    )  # fmt: skip
 
 
-def test_events_at_one_time_that_do_not_disturb_each_other_are_taken_one_by_one() -> None:
-    times = [0.5, 1.5, 2.0]
-    run = simulate(twins(0.0), 2.0, t_eval=times, sensitivities=["x0.x", "x0.w"])
-    assert run.statistics.events == 2
-    assert run.sensitivities["x0.x"]["x"] == pytest.approx([1.0, -1.0, -1.0])
-    assert run.sensitivities["x0.x"]["y"] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
-    assert run.sensitivities["x0.w"]["y"][2] == pytest.approx(-2.0)
-    weights = {"x": [0.0, 0.0, 1.0], "y": [0.0, 0.0, 1.0]}
-    assert run.gradient(weights) == pytest.approx({"x0.x": -1.0, "x0.w": -2.0})
+Small = tuple[Model, dict[str, Any], dict[str, list[float]], dict[str, dict[str, Any]]]
+SMALL: dict[str, Small] = {
+    # x = p t reaches 1 at 1/p
+    "an event that ends the run": (
+        events_of(Event("full", X - 1, terminal=True), x=(x,), rates=(P,), p=(p,)),
+        {"t_eval": [0.0, 0.2, 0.4]}, {"p": [-0.25], "x0.x": [-0.5]}, {"p": {"x": [0.0, 0.2, 0.4]}},
+    ),
+    # a second mark 2e-8 s after the first; at both y' = y jumps by p x: y = p exp(t - 1/p), twice
+    "an event in the step that another one began": (
+        events_of(
+            *(Event(f"{k}", X - 1 - k * GAP, reset={"y": Y + X * P}) for k in (0, 1)),
+            x=(x, replace(y, start=0.0)), rates=(P, Y), p=(p,),
+        ),
+        {"t_eval": AT, "rtol": 1e-9}, {"p": [-0.25] * 2, "x0.x": [-0.5] * 2},
+        {"p": {"x": AT, "y": BY_P}, "x0.x": {"x": np.ones(3)}},
+    ),
+    # x = 1 lets y jump over zero, which lets z take the value of t y = 3 p / p
+    "an event that another one brings about": (
+        events_of(
+            Event("first", X - 1, reset={"y": 3 * P}), Event("second", Y, reset={"z": t * Y}),
+            x=(x, y, z), rates=(P, 0, 0), p=(p,), t=t,
+        ),
+        {"t_eval": [0.4, 0.6]}, {"p": [-0.25] * 2}, {"p": {"y": [0.0, 3.0], "z": [0.0, 0.0]}},
+    ),
+    # x' = u/m, and x is halved at t = 1, when u jumps
+    "an event of time alone, at a jump of an input": (
+        events_of(
+            Event("half", t - 1, direction=1, reset={"x": X / 2}),
+            x=(x,), rates=(u.symbol / m.symbol,), u=(u,), p=(m,), t=t,
+        ),
+        {"u": STEP, "t_eval": [0.9, 1.1, 2.0]}, {"m": [0.0]}, {"m": {"x": [-0.225, -0.05, 0.625]}},
+    ),
+    "events at one time that do not disturb each other": (
+        twins(0.0), {"t_eval": [0.5, 1.5, 2.0]}, {},
+        {"x0.x": {"x": [1.0, -1.0, -1.0], "y": [0.0] * 3}, "x0.w": {"y": [0.5, -1.5, -2.0]}},
+    ),
+}  # fmt: skip
+"""Model, arguments, derivatives of times of events, and of signals."""
 
 
-def cubed() -> Model:
-    x = Variable("x", "1")
-    return counter((Event("touch", (x.symbol - 1) ** 3),), x)
-
-
-def at_a_jump() -> Model:
-    """x = t reaches 1 when u jumps."""
-    x, u = Variable("x", "m"), Variable("u", "m/s")
-    done = Event("done", x.symbol - 1.0 + 1e-12, direction=1)
-    return Model("pushed", x=(x,), u=(u,), ode=u.symbol, events=(done,))
+@pytest.mark.parametrize("case", SMALL)
+def test_small_models_meet_their_derivatives_by_hand(case: str) -> None:
+    model, arguments, times, signals = SMALL[case]
+    end = max(arguments["t_eval"])
+    run = simulate(model, end + 0.25, sensitivities=[*(times | signals)], **arguments)
+    for name, expected in times.items():
+        assert run.event_sensitivities[name] == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    for name, expected in signals.items():
+        for signal, values in expected.items():
+            found = run.sensitivities[name][signal]
+            assert found == pytest.approx(values, rel=1e-6, abs=1e-8)
+        weights = {signal: np.ones(run.t.size) for signal in expected}
+        by_hand = sum(np.sum(values) for values in expected.values())
+        assert run.gradient(weights)[name] == pytest.approx(by_hand, rel=1e-6, abs=1e-7)
 
 
 @pytest.mark.parametrize(
     ("model", "seed", "message"),
     [
         (
-            twins(0.5),
-            "x0.x",
+            twins(0.5), "x0.x",
             "event 'wall x', 'wall y' at t = 1 s: .* whose order changes the result",
         ),
-        (cubed(), "p", "event 'touch' at t = 0.5 s: .*touches it at a rate of .* per second"),
-        (at_a_jump(), "x0.x", "event 'done' at t = 1 s: .* apart from the jumps of the inputs"),
+        (
+            events_of(Event("touch", (X - 1) ** 3), x=(x,), rates=(P,), p=(p,)), "p",
+            "event 'touch' at t = 0.5 s: .*touches it at a rate of .* per second",
+        ),
+        (
+            events_of(Event("done", X - 1 + 1e-12, direction=1), x=(x,), rates=(u.symbol,), u=(u,)),
+            "x0.x", "event 'done' at t = 1 s: .* apart from the jumps of the inputs",
+        ),
     ],
-)
+)  # fmt: skip
 def test_motion_without_a_derivative_is_named_with_event_and_time(
     model: Model, seed: str, message: str
 ) -> None:
-    u = {"u": Hold([0.0, 1.0], [1.0, 2.0])} if model.u else None
-    run = simulate(model, 2.0, u=u, samples=3, sensitivities=[seed])
-    with pytest.raises(ValueError, match=message):
-        _ = run.sensitivities
-    with pytest.raises(ValueError, match=message):
-        run.gradient({"x": 1.0})
+    given = {"u": Hold([0.0, 1.0], [1.0, 2.0])} if model.u else None
+    run = simulate(model, 2.0, u=given, samples=3, sensitivities=[seed])
+    for request in (lambda: run.sensitivities, lambda: run.gradient({"x": 1.0})):
+        with pytest.raises(ValueError, match=message):
+            request()

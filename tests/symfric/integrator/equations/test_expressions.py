@@ -8,19 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from symfric import (
-    BrownMcPhee,
-    LuGre,
-    Model,
-    SolveError,
-    Status,
-    Variable,
-    Viscous,
-    drive,
-    rabinowicz,
-    simulate,
-    simulate_many,
-)
+import symfric as sf
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.compiled import compiler
 from symfric.integrator.equations import expressions
@@ -46,7 +34,7 @@ from symfric.laws import Karnopp
 Array = NDArray[np.float64]
 Signal = Callable[[ca.SX], ca.SX]
 t, X = ca.SX.sym("t"), ca.SX.sym("x")
-x, force = Variable("x", "m"), Variable("force", "N")
+x, force = sf.Variable("x", "m"), sf.Variable("force", "N")
 AT = 5.1234
 
 
@@ -75,7 +63,7 @@ def operations(function: ca.Function) -> list[int]:
 
 
 def test_steps_have_no_tanh_and_what_is_differentiated_or_large_keeps_it() -> None:
-    model = rabinowicz(BrownMcPhee())
+    model = sf.rabinowicz(sf.BrownMcPhee())
     whole = system(model, input_data(model, None, 0.0, 1.0))
     for method in ("rodas5p", "radau5", "dopri5"):
         assert ca.OP_TANH in operations(build_fixed(whole, METHODS[method]))
@@ -149,18 +137,24 @@ def test_amplitudes_are_one_integrator_and_one_call_of_the_compiler(
     monkeypatch.setattr(
         compiler.Cache, "begin", lambda self, key: compilations.append(key) or begin(self, key)
     )
-    backend, model, ends = "vm" if find_compiler() is None else "compiled", drive(Viscous()), set()
+    backend, model, ends = (
+        "vm" if find_compiler() is None else "compiled",
+        sf.drive(sf.Viscous()),
+        set(),
+    )
     for k in range(6):
         late, w = 0.02 * (5.0 + k), 5.0 + k
         given = {"force": lambda t, w=w, late=late: ca.if_else(t > late, w * ca.sin(w * t), 0)}
-        ends.add(simulate(model, 0.5, u=given, samples=2, backend=backend).final["x"])
+        ends.add(sf.simulate(model, 0.5, u=given, samples=2, backend=backend).final["x"])
         assert 0.8 * late < input_data(model, given, 0.0, 0.5).breaks[1] <= late  # for each anew
     assert (len(ends), len(builds), len(compilations)) == (6, 1, int(backend == "compiled"))
-    model = drive(LuGre())
+    model = sf.drive(sf.LuGre())
     for a, w in ((5, 7), (12, 3)):
         signal = {"force": lambda t, a=a, w=w: a * ca.sin(w * t)}
-        again = simulate(model, 1.0, u=signal, backend="vm")
-    fresh = simulate(drive(LuGre()), 1.0, u={"force": lambda t: 12 * ca.sin(3 * t)}, backend="vm")
+        again = sf.simulate(model, 1.0, u=signal, backend="vm")
+    fresh = sf.simulate(
+        sf.drive(sf.LuGre()), 1.0, u={"force": lambda t: 12 * ca.sin(3 * t)}, backend="vm"
+    )
     np.testing.assert_array_equal(again["x"], fresh["x"])
     assert again["force"] == pytest.approx(12 * np.sin(3 * again.t), abs=1e-12)
 
@@ -199,40 +193,40 @@ def test_pieces_are_halved_and_changes_counted_from_the_last_one() -> None:
 
 def test_no_pulse_is_leapt_over() -> None:
     """A block on a table got none of the impulse and stayed where it was, with SUCCESS."""
-    model = drive(BrownMcPhee(mu_s=0.0, mu_d=0.0), m=1.0)
+    model = sf.drive(sf.BrownMcPhee(mu_s=0.0, mu_d=0.0), m=1.0)
     for width in (1.0, 0.1, 0.01, 0.001):
         times = np.array(found(pulse(width)).onsets)
         nearest = AT - times[times < AT].max(), times[times > AT].min() - AT
         assert max(nearest) < 50 * width + 20 * 10.0 / 2**DEPTH
         assert times.size < 12
-        run = simulate(model, 10.0, u={"force": pulse(width)}, backend="vm")
+        run = sf.simulate(model, 10.0, u={"force": pulse(width)}, backend="vm")
         assert run.final["v"] == pytest.approx(1.0, rel=1e-5)
-    many = simulate_many(model, 10.0, u={"force": pulse(width)}, backend="vm", executor="serial")
+    many = sf.simulate_many(model, 10.0, u={"force": pulse(width)}, backend="vm", executor="serial")
     assert many["v"][0, -1] == run.final["v"]
 
 
 def test_pulses_next_to_feedback_are_seen_and_shorter_ones_where_they_are_named() -> None:
-    model = Model("integrator", x=(x,), u=(force,), ode=force.symbol)
+    model = sf.Model("integrator", x=(x,), u=(force,), ode=force.symbol)
     feedback = {"force": lambda t: pulse(0.01)(t) - 1e-3 * x.symbol}
-    run = simulate(model, 10.0, u=feedback, backend="vm")
+    run = sf.simulate(model, 10.0, u=feedback, backend="vm")
     assert run.final["x"] == pytest.approx(np.exp(-1e-3 * (10 - AT)), rel=1e-5)
     how = {"u": {"force": pulse(1e-6)}, "backend": "vm"}
-    missed, hit = simulate(model, 10.0, **how), simulate(model, 10.0, times=[AT], **how)
+    missed, hit = sf.simulate(model, 10.0, **how), sf.simulate(model, 10.0, times=[AT], **how)
     assert missed.final["x"] == 0.0
     assert hit.final["x"] == pytest.approx(1.0, rel=1e-5)
     assert AT in hit.step_times
-    at, width = Variable("at", "s", start=2.0), Variable("width", "s", start=0.01)
+    at, width = sf.Variable("at", "s", start=2.0), sf.Variable("width", "s", start=0.01)
     own = ca.exp(-(((t - at.symbol) / width.symbol) ** 2)) / (width.symbol * sqrt(pi))
-    model = Model("pulsed", x=(x,), p=(at, width), ode=own, t=t)
-    assert simulate(model, 10.0, backend="vm").final["x"] == pytest.approx(1.0, rel=1e-5)
+    model = sf.Model("pulsed", x=(x,), p=(at, width), ode=own, t=t)
+    assert sf.simulate(model, 10.0, backend="vm").final["x"] == pytest.approx(1.0, rel=1e-5)
 
 
 def test_load_that_is_too_strong_for_a_moment_in_every_period_ends_rest() -> None:
     """By 4 %, for a tenth of the time: at rest steps grew over it, at the tighter tolerance."""
     law, A, w = Karnopp(form="event", mu_d=0.025), 0.0831, 0.74
-    model = drive(law, m=8.8, N=0.5327)
+    model = sf.drive(law, m=8.8, N=0.5327)
     for rtol in (1e-6, 1e-11):
-        run = simulate(model, 27.0, u={"force": lambda t: A * ca.sin(w * t)}, rtol=rtol)
+        run = sf.simulate(model, 27.0, u={"force": lambda t: A * ca.sin(w * t)}, rtol=rtol)
         slips = np.array([t for t, name in run.happened if name == "slip"])
         first = np.arcsin(0.15 * 0.5327 / A) / w
         assert slips == pytest.approx(first + pi / w * np.arange(6), abs=1e-6)
@@ -241,13 +235,13 @@ def test_load_that_is_too_strong_for_a_moment_in_every_period_ends_rest() -> Non
 @pytest.mark.parametrize("method", ["auto", "radau5", "rodas5p", "dopri5"])
 def test_a_ramp_in_the_equations_of_a_model_is_not_leapt_over(method: str) -> None:
     """Radau's stages lay on both sides of a short ramp under a car at rest: it never moved."""
-    ramp, v = ca.fmin(ca.fmax((t - 0.5) / 0.226, 0.0), 1.0), Variable("v", "m/s")
+    ramp, v = ca.fmin(ca.fmax((t - 0.5) / 0.226, 0.0), 1.0), sf.Variable("v", "m/s")
     rate = ca.jtimes(ramp, t, ca.SX(1)) - v.symbol / 10
-    model = Model("bump", x=(v,), ode=rate, t=t)
+    model = sf.Model("bump", x=(v,), ode=rate, t=t)
     exact = 10 / 0.226 * (np.exp(-(3.5 - 0.726) / 10) - np.exp(-(3.5 - 0.5) / 10))
-    run = simulate(model, 3.5, method=method, rtol=1e-5, backend="vm")
+    run = sf.simulate(model, 3.5, method=method, rtol=1e-5, backend="vm")
     assert run.final["v"] == pytest.approx(exact, rel=1e-3)
-    many = simulate_many(model, 3.5, p={}, x0={"v": [0.0, 0.0]}, rtol=1e-5, backend="vm")
+    many = sf.simulate_many(model, 3.5, p={}, x0={"v": [0.0, 0.0]}, rtol=1e-5, backend="vm")
     assert many["v"][:, -1] == pytest.approx(exact, rel=1e-3)
 
 
@@ -255,18 +249,18 @@ def test_a_ramp_in_the_equations_of_a_model_is_not_leapt_over(method: str) -> No
 @pytest.mark.parametrize("method", ["auto", "rodas5p", "dopri5"])
 def test_a_pulse_of_any_width_is_solved_or_refused(method: str) -> None:
     """The rate of a ramp of a nanosecond was leapt over, with SUCCESS."""
-    y, solved = Variable("y", "m"), 0
+    y, solved = sf.Variable("y", "m"), 0
     for width in np.logspace(-14, -1, 27)[::4]:
         ramp = ca.fmin(ca.fmax((t - 0.5) / width, 0.0), 1.0)
         rate = ramp + ca.jtimes(ramp, t, ca.SX(1)) - y.symbol / 10
-        model = Model("bump", x=(y,), ode=rate, t=t)
+        model = sf.Model("bump", x=(y,), ode=rate, t=t)
         # y during the ramp: 10 (1/w - 1) e(w) + 10 s / w, with e(s) = 1 - exp(-s/10)
         peak = (10 / width - 100 / width) * -np.expm1(-width / 10) + 10
         after = np.exp(-(3.0 - width) / 10)
         try:
-            run = simulate(model, 3.5, method=method, rtol=1e-4, backend="vm")
-        except SolveError as error:
-            assert error.status is Status.STEP_TOO_SMALL
+            run = sf.simulate(model, 3.5, method=method, rtol=1e-4, backend="vm")
+        except sf.SolveError as error:
+            assert error.status is sf.Status.STEP_TOO_SMALL
             continue
         assert run.final["y"] == pytest.approx(peak * after + 10 * (1 - after), abs=1e-2), width
         solved += 1

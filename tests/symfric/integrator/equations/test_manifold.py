@@ -2,18 +2,10 @@
 
 import numpy as np
 import pytest
+from closed_forms import assemble
 
-from symfric import BrownMcPhee, Model, SolveError, Status, Variable, Viscous, simulate
-from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.equations.system import System, system
-from symfric.multibody import (
-    Distance,
-    JointFriction,
-    JointSpringDamper,
-    Mechanism,
-    Prismatic,
-    Revolute,
-)
+import symfric.multibody as mb
+from symfric import BrownMcPhee, Model, SolveError, Status, Trajectory, Variable, Viscous, simulate
 from symfric.scenes import FourBar, FourMass, Pendulum, SliderCrank
 
 SMOOTH = Viscous(sigma_2=0.0)
@@ -25,21 +17,18 @@ LOOPS = {
 each_loop = pytest.mark.parametrize("name", LOOPS)
 
 
-def levels(run: object) -> list[float]:
-    return [
-        float(run[name].max())
-        for name in ("constraint_position", "constraint_velocity", "constraint_acceleration")
-    ]  # type: ignore[index]
+def largest(run: Trajectory) -> list[float]:
+    """Largest violation of the constraints in position, velocity and acceleration."""
+    levels = ("position", "velocity", "acceleration")
+    return [float(run[f"constraint_{level}"].max()) for level in levels]
 
 
 @each_loop
 @pytest.mark.parametrize("method", ["rodas5p", "rodas4p", "radau5"])
 def test_constraints_hold_on_three_levels_whatever_the_method(name: str, method: str) -> None:
-    run = simulate(LOOPS[name], 2.0, rtol=1e-6, method=method, samples=501)
-    position, velocity, acceleration = levels(run)
-    assert position < 1e-12
-    assert velocity < 1e-12
-    assert acceleration < 1e-10
+    """Between steps, too, where the dense output is projected."""
+    run = simulate(LOOPS[name], 1.0, rtol=1e-6, method=method, samples=77)
+    assert (np.array(largest(run)) < [1e-12, 1e-12, 1e-10]).all()
 
 
 @each_loop
@@ -47,30 +36,15 @@ def test_constraints_hold_on_three_levels_whatever_the_method(name: str, method:
 def test_energy_and_constraints_last_for_100_s(name: str) -> None:
     run = simulate(LOOPS[name], 100.0, rtol=1e-10, samples=5001)
     assert np.ptp(run["energy"]) / np.abs(run["energy"]).max() < 1e-6
-    assert levels(run)[:2] < [1e-11, 1e-11]
+    assert max(largest(run)[:2]) < 1e-11
 
 
-@each_loop
-def test_steps_end_where_results_are(name: str) -> None:
-    """Between steps the dense output is put onto the constraints."""
-    run = simulate(LOOPS[name], 1.0, rtol=1e-6)
-    assert run.at(np.linspace(0.0, 1.0, 77))["constraint_position"].max() < 1e-12
-
-
-def unknowns(model: Model) -> System:
-    return system(model, input_data(model, None, 0.0, 1.0))
-
-
-def test_accelerations_are_unknowns_and_no_mass_matrix_is_inverted() -> None:
-    s = unknowns(LOOPS["four_mass"])
+def test_accelerations_are_unknowns_and_projection_is_the_nearest_point() -> None:
+    """x1 and y2 of the four-mass system lie on a circle of 5 m; no mass matrix is inverted."""
+    s = assemble(LOOPS["four_mass"])
     assert s.names[8:12] == ("x1_rate_dot", "y2_rate_dot", "z3_rate_dot", "x4_rate_dot")
-    assert (s.n, s.nx, s.manifold is not None) == (8 + 4 + 2, 8, True)
+    assert (s.n, s.nx) == (8 + 4 + 2, 8)
     assert s.pivots == (tuple(range(12)), (12, 13), ())
-
-
-def test_projection_is_the_nearest_point() -> None:
-    """x1 and y2 of the four-mass system lie on a circle of 5 m."""
-    s = unknowns(LOOPS["four_mass"])
     assert s.manifold is not None
     y = np.zeros(s.n)
     y[:4] = 4.001, 3.001, 40**0.5, 5.0
@@ -80,19 +54,16 @@ def test_projection_is_the_nearest_point() -> None:
     assert np.abs([x1 - 4.001, y2 - 3.001]).max() < 2e-3
 
 
-def test_a_start_off_the_constraints_is_assembled() -> None:
+def test_a_start_off_the_constraints_is_assembled_or_refused() -> None:
     run = simulate(LOOPS["four_mass"], 0.1, x0={"x1": 3.9, "x4_rate": -2.0})
     assert run["constraint_position"].max() < 1e-12
     assert run["x4_rate"][0] == -2.0
-
-
-def test_a_start_that_closes_no_loop_is_refused() -> None:
     length = Variable("length", "m", start=2.5)
-    m = Mechanism("bead")
+    m = mb.Mechanism("bead")
     m.body("bead", 1.0, (0.1, 0.1, 0.1))
     m.frame("ground.peg", at=(2.0, 0.0, 0.0))
-    m.joint(Prismatic("z", "ground", "bead", start=1.5))
-    m.joint(Distance("rod", "ground.peg", "bead", length=length.symbol))
+    m.joint(mb.Prismatic("z", "ground", "bead", start=1.5))
+    m.joint(mb.Distance("rod", "ground.peg", "bead", length=length.symbol))
     model = m.build((length,))
     assert simulate(model, 0.01, p={"length": 2.1})["z"][0] == pytest.approx(0.41**0.5)
     with pytest.raises(ValueError, match="from which all loops can be closed"):
@@ -105,12 +76,12 @@ def drawer(mu_s: float, rate: float = 1.0, names: tuple[str, ...] = ("slide",)) 
     While it slides forward, a (1 - 2 mu c / length) = -F / m: with c = length it jams where the
     coefficient of friction reaches 1/2. More `names` make more of them, all alike.
     """
-    m = Mechanism("drawer", gravity=(0.0, 0.0, 0.0))
-    friction = JointFriction(BrownMcPhee(mu_s=mu_s, mu_d=0.1, v_t=0.01), length=0.1)
+    m = mb.Mechanism("drawer", gravity=(0.0, 0.0, 0.0))
+    friction = mb.JointFriction(BrownMcPhee(mu_s=mu_s, mu_d=0.1, v_t=0.01), length=0.1)
     for name in names:
         m.body(f"{name}r", 2.0, (0.01, 0.01, 0.01), com=(0.1, 0.0, 0.0))
-        m.joint(Prismatic(name, "ground", f"{name}r", rate=rate, friction=friction))
-        m.force(JointSpringDamper(f"pull_{name}", name, "slide", actuator=-5.0))
+        m.joint(mb.Prismatic(name, "ground", f"{name}r", rate=rate, friction=friction))
+        m.force(mb.JointSpringDamper(f"pull_{name}", name, "slide", actuator=-5.0))
     return m.build()
 
 
@@ -133,18 +104,16 @@ def test_jamming_ends_with_joint_law_and_time(method: str) -> None:
     assert (run["slide_N"] >= 0).all()
 
 
-def test_two_that_jam_at_once_are_seen_though_the_determinant_stays_positive() -> None:
+def test_two_that_jam_at_once_and_starts_beyond_jamming_are_seen() -> None:
+    """The determinant stays positive."""
     with pytest.raises(SolveError, match=r"stopped at t = 0\.309.*joint '(left|right)' with"):
         simulate(drawer(0.6, names=("left", "right")), 1.0, rtol=1e-8)
-
-
-def test_no_start_beyond_jamming_is_accepted() -> None:
     with pytest.raises(ValueError, match="model 'drawer': "):
         simulate(drawer(0.6, rate=0.01), 1.0)
 
 
-@pytest.mark.parametrize("mu", [0.3, 0.8, 1.5])
-@pytest.mark.parametrize("v_t", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("mu", [0.3, 1.5])
+@pytest.mark.parametrize("v_t", [1e-2, 1e-6])
 def test_sticking_friction_runs_at_every_width(mu: float, v_t: float) -> None:
     law = BrownMcPhee(mu_s=mu, mu_d=0.8 * mu, v_t=v_t)
     run = simulate(Pendulum(law, R=0.1).model(), 20.0, rtol=1e-7)
@@ -153,13 +122,13 @@ def test_sticking_friction_runs_at_every_width(mu: float, v_t: float) -> None:
 
 
 def test_mass_ratios_of_a_million_do_not_matter() -> None:
-    m = Mechanism("m")
+    m = mb.Mechanism("m")
     for name, mass in (("heavy", 1e3), ("light", 1e-3)):
         m.body(name, mass, (mass / 10,) * 3)
         m.frame(f"{name}.top", at=(0.0, 0.0, 0.5), z=(0.0, 1.0, 0.0))
         m.frame(f"{name}.end", at=(0.0, 0.0, -0.5), z=(0.0, 1.0, 0.0))
     m.frame("ground.top", z=(0.0, 1.0, 0.0))
-    m.joint(Revolute("a", "ground.top", "heavy.top", start=0.5))
-    m.joint(Revolute("b", "heavy.end", "light.top"))
+    m.joint(mb.Revolute("a", "ground.top", "heavy.top", start=0.5))
+    m.joint(mb.Revolute("b", "heavy.end", "light.top"))
     run = simulate(m.build(), 5.0, rtol=1e-9)
     assert np.ptp(run["energy"]) < 1e-5 * np.ptp(run["kinetic"])

@@ -14,78 +14,63 @@ from backends import needs_compiler
 from hybrid import ball
 from numpy.typing import NDArray
 
+import symfric as sf
 import symfric.integrator.running.engine as loop
 import symfric.integrator.running.integrator as module
 import symfric.integrator.running.run as running
-from symfric import (
-    BrownMcPhee,
-    Event,
-    ExactCoulomb,
-    Hold,
-    Linear,
-    LuGre,
-    MaxwellSlip,
-    Model,
-    RateAndState,
-    Trajectory,
-    Variable,
-    drive,
-    rabinowicz,
-    simulate,
-)
 from symfric.integrator.running import run
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import _March
 from symfric.laws import ALL_LAWS
 from symfric.scenes import PendulumBox, SliderCrank
 
-LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
+LAW = sf.BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 FORCE = {"force": lambda t: 12 * ca.sin(3 * t)}
-SAMPLED = {"force": Linear([0.0, 0.4, 0.9], [0.0, 15.0, -15.0])}
+SAMPLED = {"force": sf.Linear([0.0, 0.4, 0.9], [0.0, 15.0, -15.0])}
 
 
-def eventful_dae() -> Model:
+def eventful_dae() -> sf.Model:
     """An algebraic unknown that follows a reset and a jump of an input, and has an event itself."""
-    x, y = Variable("x", "1"), Variable("y", "1", start=1.0)
-    z, u = Variable("z", "1"), Variable("u", "1")
-    return Model(
+    x, y = sf.Variable("x", "1"), sf.Variable("y", "1", start=1.0)
+    z, u = sf.Variable("z", "1"), sf.Variable("u", "1")
+    return sf.Model(
         "dae", x=(x, y), z=(z,), u=(u,), ode=ca.vertcat(y.symbol, -z.symbol),
         alg=z.symbol + z.symbol**3 - 4 * x.symbol - u.symbol,
         events=(
-            Event("back", z.symbol - 0.5, 0, reset={"x": x.symbol / 2, "y": -0.9 * y.symbol}),
-            Event("turn", y.symbol, -1),
+            sf.Event("back", z.symbol - 0.5, 0, reset={"x": x.symbol / 2, "y": -0.9 * y.symbol}),
+            sf.Event("turn", y.symbol, -1),
         ),
     )  # fmt: skip
 
 
-HELD = {"force": Hold([0.0, 0.3, 0.4, 0.9], [0.0, 15.0, -15.0, 20.0])}
+HELD = {"force": sf.Hold([0.0, 0.3, 0.4, 0.9], [0.0, 15.0, -15.0, 20.0])}
 
 
-def cubic() -> Model:
+def cubic() -> sf.Model:
     """z + z^3 = x + u: near jumps of u are followed in the loop, a far one takes a search."""
-    x, z, u = Variable("x", "1"), Variable("z", "1"), Variable("u", "1")
+    x, z, u = sf.Variable("x", "1"), sf.Variable("z", "1"), sf.Variable("u", "1")
     alg = z.symbol + z.symbol**3 - x.symbol - u.symbol
-    return Model("cubic", x=(x,), z=(z,), u=(u,), ode=-z.symbol, alg=alg)
+    return sf.Model("cubic", x=(x,), z=(z,), u=(u,), ode=-z.symbol, alg=alg)
 
 
-Case = tuple[Callable[[], Model], float, dict[str, Any]]
+Case = tuple[Callable[[], sf.Model], float, dict[str, Any]]
 CASES: dict[str, Case] = {
-    "events": (lambda: drive(ExactCoulomb()), 2.0, {"u": FORCE}),
+    "events": (lambda: sf.drive(sf.ExactCoulomb()), 2.0, {"u": FORCE}),
     "storm": (lambda: ball(0.8), 5.0, {"rtol": 1e-10}),
-    "many events": (lambda: drive(MaxwellSlip(form="event")), 2.0, {"u": SAMPLED}),
-    "events of an unknown": (eventful_dae, 3.0, {"u": {"u": Hold([0, 1], [0, 2])}}),
-    "samples": (lambda: drive(LuGre()), 1.0, {"u": SAMPLED}),
-    "held events": (lambda: drive(ExactCoulomb()), 2.0, {"u": HELD}),
-    "held cubic": (cubic, 2.0, {"u": {"u": Hold([0.0, 0.5, 1.0], [0.0, 0.4, 90.0])}}),
-    "exponentials": (lambda: rabinowicz(RateAndState(), free=["k"]), 0.5, {"p": {"k": 3.0}}),
+    "many events": (lambda: sf.drive(sf.MaxwellSlip(form="event")), 2.0, {"u": SAMPLED}),
+    "events of an unknown": (eventful_dae, 3.0, {"u": {"u": sf.Hold([0, 1], [0, 2])}}),
+    "samples": (lambda: sf.drive(sf.LuGre()), 1.0, {"u": SAMPLED}),
+    "held events": (lambda: sf.drive(sf.ExactCoulomb()), 2.0, {"u": HELD}),
+    "held cubic": (cubic, 2.0, {"u": {"u": sf.Hold([0.0, 0.5, 1.0], [0.0, 0.4, 90.0])}}),
+    "exponentials": (lambda: sf.rabinowicz(sf.RateAndState(), free=["k"]), 0.5, {"p": {"k": 3.0}}),
     "normal force": (lambda: PendulumBox(LAW).model(), 2.0, {}),
     "loop": (lambda: SliderCrank(LAW).model(), 0.1, {"times": [0.02, 0.04]}),
-    "few steps": (lambda: rabinowicz(LuGre()), 5.0, {"max_steps": 70}),
-    "loose": (lambda: rabinowicz(LuGre()), 5.0, {"method": "radau5"}),
+    "few steps": (lambda: sf.rabinowicz(sf.LuGre()), 5.0, {"max_steps": 70}),
+    "loose": (lambda: sf.rabinowicz(sf.LuGre()), 5.0, {"method": "radau5"}),
 }
 
 
-def digest(run: Trajectory) -> str:
+def digest(run: sf.Trajectory) -> str:
     """Every bit of a run but how long it took and what ran it."""
     total = sha256(run.message.encode() + repr(run.happened).encode())
     total.update(repr((run.statistics.steps, run.statistics.rejections)).encode())
@@ -96,7 +81,7 @@ def digest(run: Trajectory) -> str:
 
 def of_case(case: str, backend: str) -> str:
     make, t_end, arguments = CASES[case]
-    return digest(simulate(make(), t_end, samples=51, backend=backend, throw=False, **arguments))
+    return digest(sf.simulate(make(), t_end, samples=51, backend=backend, throw=False, **arguments))
 
 
 @needs_compiler
@@ -132,8 +117,8 @@ def test_engines_may_change_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
 @needs_compiler
 def test_derivatives_have_the_same_bits_by_both_engines() -> None:
     vm, compiled = (
-        simulate(
-            rabinowicz(LuGre(), free=["mu_s", "k"]), 1.0, samples=5, backend=backend,
+        sf.simulate(
+            sf.rabinowicz(sf.LuGre(), free=["mu_s", "k"]), 1.0, samples=5, backend=backend,
             sensitivities=["mu_s", "k"],
         )
         for backend in ("vm", "compiled")
@@ -165,13 +150,13 @@ def test_every_process_gives_the_same_bits() -> None:
 def test_every_law_gives_the_same_bits_by_both_engines() -> None:
     count = 0
     for law in ALL_LAWS.values():
-        for scene, u in ((rabinowicz, {}), (drive, FORCE)):
+        for scene, u in ((sf.rabinowicz, {}), (sf.drive, FORCE)):
             try:
                 model = scene(law())
             except ValueError:  # a law that needs more than these scenes have
                 continue
             vm, compiled = (
-                digest(simulate(model, 2.0, u=u, samples=51, backend=backend, throw=False))
+                digest(sf.simulate(model, 2.0, u=u, samples=51, backend=backend, throw=False))
                 for backend in ("vm", "compiled")
             )
             assert vm == compiled, model.name
@@ -191,7 +176,7 @@ def test_only_a_far_jump_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(_March, "_make_consistent", counted)
     _, t_end, arguments = CASES["held cubic"]
-    simulate(cubic(), t_end, backend="compiled", **arguments)
+    sf.simulate(cubic(), t_end, backend="compiled", **arguments)
     assert searched == [1.0]
 
 
@@ -199,23 +184,23 @@ Array = NDArray[np.float64]
 RUNS = 150
 
 
-def driven_cubic(*events: Event) -> Model:
+def driven_cubic(*events: sf.Event) -> sf.Model:
     """z + z^3 = x + u."""
     alg = Z.symbol + Z.symbol**3 - X.symbol - U.symbol
     ode = ca.sin(3 * X.symbol) - Z.symbol + 0.5 * U.symbol
-    return Model("cubic", x=(X,), z=(Z,), u=(U,), ode=ode, alg=alg, events=events)
+    return sf.Model("cubic", x=(X,), z=(Z,), u=(U,), ode=ode, alg=alg, events=events)
 
 
-X, Z, U = Variable("v", "1", start=0.3), Variable("z", "1"), Variable("force", "1")
-HIT = Event("hit", X.symbol - 0.5, 1, reset={"v": -X.symbol})
+X, Z, U = sf.Variable("v", "1", start=0.3), sf.Variable("z", "1"), sf.Variable("force", "1")
+HIT = sf.Event("hit", X.symbol - 0.5, 1, reset={"v": -X.symbol})
 MODELS = [
-    *(drive(law) for law in (BrownMcPhee(), LuGre(), ExactCoulomb())),
+    *(sf.drive(law) for law in (sf.BrownMcPhee(), sf.LuGre(), sf.ExactCoulomb())),
     driven_cubic(),
-    driven_cubic(HIT, Event("low", X.symbol + 1, -1)),
+    driven_cubic(HIT, sf.Event("low", X.symbol + 1, -1)),
 ]
 
 
-def numbers(run: Trajectory) -> Iterator[bytes]:
+def numbers(run: sf.Trajectory) -> Iterator[bytes]:
     """Every bit of a run."""
     counts = run.statistics.steps, run.statistics.rejections, run.statistics.smallest_step
     yield f"{run.message} {run.happened} {counts}".encode()
@@ -229,7 +214,7 @@ def drawn(rng: np.random.Generator) -> tuple[float, dict[str, Any]]:
     t_end, count = rng.uniform(0.2, 3.0), int(rng.integers(2, 40))
     at, values = np.sort(rng.uniform(-0.1, 1.1 * t_end, count)), rng.uniform(-25.0, 25.0, count)
     size = rng.uniform(5.0, 20.0)
-    inputs = [Hold(at, values), Linear(at, values), size, lambda t: size * ca.sin(7 * t)]
+    inputs = [sf.Hold(at, values), sf.Linear(at, values), size, lambda t: size * ca.sin(7 * t)]
     inner = at[(at >= 0) & (at <= t_end)]
     further: dict[str, Any] = {
         "max_steps": int(rng.integers(1, 200)),
@@ -259,6 +244,6 @@ def test_random_runs_have_the_same_bits_by_both_engines(monkeypatch: pytest.Monk
             monkeypatch.setattr(running, "ATTEMPTS", attempts)
             monkeypatch.setattr(running, "MOST_BYTES", most)
             monkeypatch.setattr(loop, "MOST_ROWS", int(rng.choice([64, 2048])))
-            run = simulate(model, t_end, backend=backend, throw=False, **arguments)
+            run = sf.simulate(model, t_end, backend=backend, throw=False, **arguments)
             found.append(list(numbers(run)))
         assert found[0] == found[1], (case, arguments)

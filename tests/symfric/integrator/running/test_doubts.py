@@ -8,26 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import (
-    GMS,
-    BlimanSorine,
-    BrownMcPhee,
-    Dahl,
-    ElastoPlastic,
-    EnergyWarning,
-    Law,
-    LuGre,
-    Model,
-    OverloadWarning,
-    SolveError,
-    Status,
-    Variable,
-    contact,
-    report,
-    simulate,
-    simulate_many,
-    with_values,
-)
+import symfric as sf
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import parameters
 from symfric.integrator.running import doubts, record
@@ -40,66 +21,70 @@ SLOW = {"m": 2.0, "k": 37.0, "v_belt": 0.03}
 """A belt with a load that grows by 1.1 N/s, of 6.5 N at break-away."""
 
 
-def block(**of_law: float) -> Model:
-    law = LuGre(mu_s=0.33, mu_d=0.21, **{"v_s": 1e-8, "sigma_1": 2e7, **of_law})
+def block(**of_law: float) -> sf.Model:
+    law = sf.LuGre(mu_s=0.33, mu_d=0.21, **{"v_s": 1e-8, "sigma_1": 2e7, **of_law})
     return Rabinowicz(law, **SLOW).model()
 
 
 def quiet(*arguments: Any, **keywords: Any) -> Any:
     with warnings.catch_warnings():
-        warnings.simplefilter("error", OverloadWarning)
-        return simulate(*arguments, **keywords)
+        warnings.simplefilter("error", sf.OverloadWarning)
+        return sf.simulate(*arguments, **keywords)
 
 
 def test_a_bristle_that_creeps_below_its_width_is_said() -> None:
     """k v_belt / sigma_0 = 1.1e-16 m/s is below v_eps = 1e-15: it stretches, and never slides."""
-    with pytest.warns(OverloadWarning, match="contact 'belt' LuGre carries 2.29 times") as said:
-        run = simulate(block(sigma_0=1e16), 20.0, rtol=1e-7)
+    with pytest.warns(sf.OverloadWarning, match="contact 'belt' LuGre carries 2.29 times") as said:
+        run = sf.simulate(block(sigma_0=1e16), 20.0, rtol=1e-7)
     assert len(said) == 1
     assert run.status.ok
     assert "2.29 times" in run.doubts and run.doubts in run.message
     top = np.abs(run.at(run.step_times)["friction"]).max() / (0.33 * 2.0 * 9.81)
     assert f"{top:.3g}" == "2.29"
-    assert "In doubt" in report(run)
+    assert "In doubt" in sf.report(run)
     assert quiet(block(sigma_0=1e16, v_eps=1e-18), 20.0, rtol=1e-7).doubts == ""
 
 
-def swinging(v_eps: float, amplitude: float = 0.5) -> Model:
+def swinging(v_eps: float, amplitude: float = 0.5) -> sf.Model:
     """A mass pulled ever harder over a contact whose load swings."""
-    x, v, t = Variable("x", "m", nominal=0.1), Variable("v", "m/s", nominal=0.1), ca.SX.sym("t")
-    place = contact(
-        "pad", LuGre(mu_s=0.33, mu_d=0.21, sigma_1=300.0, v_eps=v_eps), v.symbol,
+    x, v, t = (
+        sf.Variable("x", "m", nominal=0.1),
+        sf.Variable("v", "m/s", nominal=0.1),
+        ca.SX.sym("t"),
+    )
+    place = sf.contact(
+        "pad", sf.LuGre(mu_s=0.33, mu_d=0.21, sigma_1=300.0, v_eps=v_eps), v.symbol,
         10 * (1 + amplitude * ca.sin(9 * t)), rest={"v": 0.0},
     )  # fmt: skip
     ode = ca.vertcat(v.symbol, 5 * t - 40 * x.symbol - place.force)
-    return Model("swinging", x=(x, v), ode=ode, contacts=(place,), t=t)
+    return sf.Model("swinging", x=(x, v), ode=ode, contacts=(place,), t=t)
 
 
 def test_it_is_seen_where_the_load_varies_and_no_drop_of_it_is_taken_for_it() -> None:
     (held,) = places(swinging(1e-15))
     assert held.screen is None
     assert quiet(swinging(1e-15), 4.0).doubts == ""
-    with pytest.warns(OverloadWarning, match="contact 'pad'"):
-        simulate(swinging(1e-3), 4.0)
+    with pytest.warns(sf.OverloadWarning, match="contact 'pad'"):
+        sf.simulate(swinging(1e-3), 4.0)
 
 
 def test_a_long_run_whose_steps_are_not_kept_is_looked_at(monkeypatch: Any) -> None:
     monkeypatch.setattr(record, "MOST_BYTES", 1000)
     monkeypatch.setattr("symfric.integrator.running.run.MOST_BYTES", 1000)
-    with pytest.warns(OverloadWarning, match="2.29 times"):
-        simulate(block(sigma_0=1e16), 20.0, rtol=1e-7, t_eval=[0.0, 1.0])
+    with pytest.warns(sf.OverloadWarning, match="2.29 times"):
+        sf.simulate(block(sigma_0=1e16), 20.0, rtol=1e-7, t_eval=[0.0, 1.0])
 
 
 def test_what_a_user_starts_with_is_no_doubt() -> None:
-    model = Drive(LuGre()).model()
+    model = Drive(sf.LuGre()).model()
     assert quiet(model, 0.1, x0={"z": 1e-4}).doubts == ""
 
 
 def test_an_ensemble_is_warned_of_once_and_says_which() -> None:
-    law = LuGre(mu_s=0.33, mu_d=0.21, v_s=1e-8, sigma_1=2e7)
+    law = sf.LuGre(mu_s=0.33, mu_d=0.21, v_s=1e-8, sigma_1=2e7)
     model = Rabinowicz(law, **SLOW).model(free=["sigma_0"])
-    with pytest.warns(OverloadWarning, match="2 of 3 members, the first is 1: .* 2.29") as said:
-        study = simulate_many(model, 20.0, p={"sigma_0": [1e15, 1e16, 1e17]}, rtol=1e-7)
+    with pytest.warns(sf.OverloadWarning, match="2 of 3 members, the first is 1: .* 2.29") as said:
+        study = sf.simulate_many(model, 20.0, p={"sigma_0": [1e15, 1e16, 1e17]}, rtol=1e-7)
     assert len(said) == 1
     assert [*study.doubtful] == [1, 2]
     assert "doubtful: 2" in repr(study)
@@ -108,15 +93,17 @@ def test_an_ensemble_is_warned_of_once_and_says_which() -> None:
 def test_what_states_may_carry_is_no_overload() -> None:
     """Behind a reversal both parts of Bliman and Sorine point the same way."""
     force = {"force": lambda t: 6 * ca.sin(3 * t)}
-    law = BlimanSorine(mu_1=0.41, mu_2=0.33, eta=0.27, s_f=6e-6)
+    law = sf.BlimanSorine(mu_1=0.41, mu_2=0.33, eta=0.27, s_f=6e-6)
     for other in (law, Sum((law, law)), Asymmetric(law, law), LoadNormalised(law, N_0=10.0)):
         assert quiet(Drive(other).model(), 3.0, u=force).doubts == ""
 
 
-@pytest.mark.parametrize("law", [Dahl(v_eps=1e-2), ElastoPlastic(v_eps=1e-2), GMS(v_eps=1e-2)])
-def test_every_bristle_is_looked_at(law: Law) -> None:
-    with pytest.warns(OverloadWarning, match=type(law).__name__):
-        simulate(Rabinowicz(law, v_belt=1e-3, k=100.0).model(), 40.0)
+@pytest.mark.parametrize(
+    "law", [sf.Dahl(v_eps=1e-2), sf.ElastoPlastic(v_eps=1e-2), sf.GMS(v_eps=1e-2)]
+)
+def test_every_bristle_is_looked_at(law: sf.Law) -> None:
+    with pytest.warns(sf.OverloadWarning, match=type(law).__name__):
+        sf.simulate(Rabinowicz(law, v_belt=1e-3, k=100.0).model(), 40.0)
 
 
 def alarms(seed: int, runs: int) -> list[str]:
@@ -130,7 +117,7 @@ def alarms(seed: int, runs: int) -> list[str]:
         wide, rtol = random.uniform(0.0, 1.5), 10 ** random.uniform(-8, -3)
         known = [p for p in parameters(law).values() if p.value and p.role != "width"]
         try:
-            law = with_values(
+            law = sf.with_values(
                 law, {p.name: float(p.value) * 10 ** random.uniform(-wide, wide) for p in known}
             )
             with warnings.catch_warnings(record=True) as said:
@@ -138,12 +125,14 @@ def alarms(seed: int, runs: int) -> list[str]:
                 kind = ALL_SCENES[scene]
                 u = {n: i.function for n, i in kind.inputs.items()}
                 model = kind(law).model()
-                simulate(
+                sf.simulate(
                     model, min(kind.t_end, 5.0), rtol=rtol, max_steps=10_000, u=u, backend="vm"
                 )
-        except (ValueError, SolveError):
+        except (ValueError, sf.SolveError):
             continue
-        found += [f"{law} in {scene}: {w.message}" for w in said if w.category is OverloadWarning]
+        found += [
+            f"{law} in {scene}: {w.message}" for w in said if w.category is sf.OverloadWarning
+        ]
     return found
 
 
@@ -157,7 +146,7 @@ def test_hundreds_of_random_laws_are_not_doubted() -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Pushing(BrownMcPhee):
+class Pushing(sf.BrownMcPhee):
     """A law whose author forgot that friction is positive where it opposes the slip."""
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
@@ -173,9 +162,9 @@ class Pushing(BrownMcPhee):
     ],
 )
 def test_friction_that_adds_energy_is_said(machine: Scene, u: dict[str, float]) -> None:
-    with pytest.warns(EnergyWarning, match=r"by Pushing adds \d\S* J .* check its sign"):
-        run = simulate(machine.model(), 2.0, u=u)
-    assert run.status is Status.SUCCESS
+    with pytest.warns(sf.EnergyWarning, match=r"by Pushing adds \d\S* J .* check its sign"):
+        run = sf.simulate(machine.model(), 2.0, u=u)
+    assert run.status is sf.Status.SUCCESS
     assert run.doubts in run.message and "along the slip" in run.doubts
 
 
@@ -192,6 +181,6 @@ def test_steady_friction_of_no_law_adds_energy(name: str) -> None:
 def test_bristles_that_give_back_what_they_stored_are_not_said() -> None:
     """A block at rest on stretched bristles: at first friction does nothing but push it."""
     with warnings.catch_warnings():
-        warnings.simplefilter("error", EnergyWarning)
-        run = simulate(Drive(LuGre(sigma_1=0.0)).model(), 0.01, x0={"z": 5e-6})
+        warnings.simplefilter("error", sf.EnergyWarning)
+        run = sf.simulate(Drive(sf.LuGre(sigma_1=0.0)).model(), 0.01, x0={"z": 5e-6})
     assert run["friction"][0] * run["v"][1] < 0

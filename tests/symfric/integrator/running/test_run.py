@@ -8,42 +8,27 @@ import numpy as np
 import pytest
 from backends import each_backend
 
+import symfric as sf
 import symfric.integrator.running.run as module
-from symfric import (
-    BrownMcPhee,
-    Event,
-    Hold,
-    Law,
-    LuGre,
-    Model,
-    SimscapeBreakaway,
-    Status,
-    Stribeck,
-    Variable,
-    drive,
-    rabinowicz,
-    simulate,
-    simulate_many,
-)
 from symfric.integrator.compiled.compiler import find_compiler
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import finer, own_scale
 
-x = Variable("x", "m", start=1.0)
+x = sf.Variable("x", "m", start=1.0)
 
 
 @each_backend
 def test_interrupt_keeps_what_was_reached(backend: str) -> None:
-    model = rabinowicz(LuGre())
-    whole = simulate(model, 2000.0, samples=20001)
+    model = sf.rabinowicz(sf.LuGre())
+    whole = sf.simulate(model, 2000.0, samples=20001)
 
     def interrupt(fraction: float) -> None:
         if fraction > 0.02:
             raise KeyboardInterrupt
 
-    run = simulate(model, 2000.0, backend=backend, progress=interrupt, samples=20001)
-    assert run.status is Status.INTERRUPTED
+    run = sf.simulate(model, 2000.0, backend=backend, progress=interrupt, samples=20001)
+    assert run.status is sf.Status.INTERRUPTED
     assert not run.status.ok
     assert 0.02 * 2000 < run.step_times[-1] < 2000
     assert f"reaches t = {run.step_times[-1]:g} s" in run.message
@@ -57,8 +42,8 @@ def test_interrupt_before_the_first_step_keeps_the_start(monkeypatch: pytest.Mon
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Integrator, "choose", interrupt)
-    run = simulate(rabinowicz(BrownMcPhee()), 1.0)
-    assert run.status is Status.INTERRUPTED
+    run = sf.simulate(sf.rabinowicz(sf.BrownMcPhee()), 1.0)
+    assert run.status is sf.Status.INTERRUPTED
     assert (run.t.tolist(), run["x"].tolist()) == ([0.0], [0.0])
 
 
@@ -66,17 +51,17 @@ def test_progress_spans_all_intervals_of_an_input(monkeypatch: pytest.MonkeyPatc
     """Told after so many attempts, however many intervals they went through."""
     monkeypatch.setattr(module, "ATTEMPTS", {"vm": 20, "compiled": 20})
     seen: list[float] = []
-    force = Hold([0.0, 1.0, 2.0, 3.0], [1.0, 2.0, 0.0, 3.0])
-    run = simulate(drive(BrownMcPhee()), 4.0, u={"force": force}, progress=seen.append)
+    force = sf.Hold([0.0, 1.0, 2.0, 3.0], [1.0, 2.0, 0.0, 3.0])
+    run = sf.simulate(sf.drive(sf.BrownMcPhee()), 4.0, u={"force": force}, progress=seen.append)
     assert seen == sorted(seen)
     assert len(seen) == -(-(run.statistics.steps + run.statistics.rejections) // 20)
     assert seen[-1] == 1.0
 
 
 @each_backend
-@pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=["brown_mcphee", "lugre"])
-def test_statistics_add_up(law: BrownMcPhee | LuGre, backend: str) -> None:
-    run = simulate(rabinowicz(law), 20.0, backend=backend)
+@pytest.mark.parametrize("law", [sf.BrownMcPhee(), sf.LuGre()], ids=["brown_mcphee", "lugre"])
+def test_statistics_add_up(law: sf.BrownMcPhee | sf.LuGre, backend: str) -> None:
+    run = sf.simulate(sf.rabinowicz(law), 20.0, backend=backend)
     s = run.statistics
     attempts = s.steps + s.rejections
     assert s.steps == run.step_times.size - 1
@@ -90,21 +75,21 @@ def test_statistics_add_up(law: BrownMcPhee | LuGre, backend: str) -> None:
 
 
 def test_easy_problem_is_never_rejected() -> None:
-    s = simulate(Model("decay", x=(x,), ode=-x.symbol), 1.0).statistics
+    s = sf.simulate(sf.Model("decay", x=(x,), ode=-x.symbol), 1.0).statistics
     assert s.rejections == 0
 
 
 def test_build_time_is_counted_once() -> None:
-    model = rabinowicz(BrownMcPhee())
-    first, second = (simulate(model, 1.0).statistics for _ in range(2))
+    model = sf.rabinowicz(sf.BrownMcPhee())
+    first, second = (sf.simulate(model, 1.0).statistics for _ in range(2))
     assert first.build_time > 0
     assert second.build_time == 0
 
 
 def test_steps_end_at_the_ends_of_input_intervals() -> None:
     ends = [0.3, 0.31, 1.1, 1.7]
-    force = Hold([0.0, *ends], [1.0, -3.0, 2.0, 0.5, 4.0])
-    run = simulate(drive(BrownMcPhee()), 2.0, u={"force": force})
+    force = sf.Hold([0.0, *ends], [1.0, -3.0, 2.0, 0.5, 4.0])
+    run = sf.simulate(sf.drive(sf.BrownMcPhee()), 2.0, u={"force": force})
     assert set(ends) <= set(run.step_times.tolist())
     assert (np.diff(run.step_times) > 0).all()
     assert (run.step_times[0], run.step_times[-1]) == (0.0, 2.0)
@@ -112,9 +97,9 @@ def test_steps_end_at_the_ends_of_input_intervals() -> None:
 
 def test_a_jump_that_is_near_takes_no_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """Near or far, the unknowns are the same; the search has done but the start."""
-    start, z, u = Variable("x", "m"), Variable("z", "1", start=0.9), Variable("u", "N")
+    start, z, u = sf.Variable("x", "m"), sf.Variable("z", "1", start=0.9), sf.Variable("u", "N")
     alg = z.symbol + z.symbol**3 - u.symbol
-    model = Model("dae", x=(start,), z=(z,), u=(u,), ode=z.symbol, alg=alg)
+    model = sf.Model("dae", x=(start,), z=(z,), u=(u,), ode=z.symbol, alg=alg)
     searches: list[float] = []
 
     def search(*arguments: Any) -> Any:
@@ -122,24 +107,24 @@ def test_a_jump_that_is_near_takes_no_search(monkeypatch: pytest.MonkeyPatch) ->
         return consistent(*arguments)
 
     monkeypatch.setattr(module, "consistent", search)
-    given = {"u": Hold([0.0, 1.0, 2.0], [2.0, 2.5, 1e3])}
-    run = simulate(model, 3.0, u=given, t_eval=[0.5, 1.5, 2.5])
+    given = {"u": sf.Hold([0.0, 1.0, 2.0], [2.0, 2.5, 1e3])}
+    run = sf.simulate(model, 3.0, u=given, t_eval=[0.5, 1.5, 2.5])
     assert run["z"] ** 3 + run["z"] == pytest.approx([2.0, 2.5, 1e3], rel=1e-12)
     assert searches == pytest.approx([run.at([2.0])["x"][0]])
 
 
 def test_jump_of_an_input_to_where_no_solution_is_fails_with_what_was_reached() -> None:
-    z, u = Variable("z", "1", start=1.0), Variable("u", "N")
-    model = Model("dae", x=(x,), z=(z,), u=(u,), ode=-z.symbol, alg=z.symbol**2 - u.symbol)
-    run = simulate(model, 2.0, u={"u": Hold([0.0, 1.0], [1.0, -1.0])}, throw=False)
-    assert run.status is Status.SINGULAR
+    z, u = sf.Variable("z", "1", start=1.0), sf.Variable("u", "N")
+    model = sf.Model("dae", x=(x,), z=(z,), u=(u,), ode=-z.symbol, alg=z.symbol**2 - u.symbol)
+    run = sf.simulate(model, 2.0, u={"u": sf.Hold([0.0, 1.0], [1.0, -1.0])}, throw=False)
+    assert run.status is sf.Status.SINGULAR
     assert "at t = 1 s" in run.message
     assert run.step_times[-1] == 1.0
 
 
 def test_measured_error_is_that_of_the_run() -> None:
     """x = exp(-t) at rtol 1e-5, compared with the closed form."""
-    run = simulate(Model("decay", x=(x,), ode=-x.symbol), 3.0, rtol=1e-5, measure_error=True)
+    run = sf.simulate(sf.Model("decay", x=(x,), ode=-x.symbol), 3.0, rtol=1e-5, measure_error=True)
     true = np.abs(run["x"] - np.exp(-run.t)).max()
     assert run.statistics.error == pytest.approx(true, rel=0.05)
     assert run.statistics.error < 1e-4
@@ -150,9 +135,12 @@ def test_measured_error_does_not_share_the_mistakes_of_the_run() -> None:
 
     The same formula at a hundredth of the tolerance found 8e-7 where runs were off by a metre.
     """
-    model, start = rabinowicz(SimscapeBreakaway(mu_s=0.3, mu_d=0.0)), {"v": -0.4736842105263158}
+    model, start = (
+        sf.rabinowicz(sf.SimscapeBreakaway(mu_s=0.3, mu_d=0.0)),
+        {"v": -0.4736842105263158},
+    )
     runs = [
-        simulate(model, 20.0, x0=start, rtol=rtol, measure_error=True, backend="vm")
+        sf.simulate(model, 20.0, x0=start, rtol=rtol, measure_error=True, backend="vm")
         for rtol in (1e-6, 1e-8)
     ]
     assert runs[0].final["x"] - runs[1].final["x"] > 1.0
@@ -161,19 +149,17 @@ def test_measured_error_does_not_share_the_mistakes_of_the_run() -> None:
 
 
 def test_a_run_without_a_step_has_its_start_at_any_time() -> None:
-    run = simulate(
-        Model(name="no way", x=(x,), ode=1 / (x.symbol - 1)), 2.0, t_start=1.0, t_eval=[1.0, 2.0],
-        throw=False,
-    )  # fmt: skip
+    model = sf.Model(name="no way", x=(x,), ode=1 / (x.symbol - 1))
+    run = sf.simulate(model, 2.0, t_start=1.0, t_eval=[1.0, 2.0], throw=False)
     assert not run.status.ok
     assert run["x"] == pytest.approx([1.0])
 
 
-place, v = Variable("x", "m"), Variable("v", "m/s")
+place, v = sf.Variable("x", "m"), sf.Variable("v", "m/s")
 
 
-@pytest.mark.parametrize("law", [BrownMcPhee(), LuGre(), Stribeck()])
-def test_tiny_motions_are_as_accurate_as_large_ones(law: Law) -> None:
+@pytest.mark.parametrize("law", [sf.BrownMcPhee(), sf.LuGre(), sf.Stribeck()])
+def test_tiny_motions_are_as_accurate_as_large_ones(law: sf.Law) -> None:
     """Friction that is linear near rest: a force 100 times smaller moves the block as much less.
 
     As tolerances were fractions of a nominal decimetre, 0.01 N gave motions of a tenth of a
@@ -182,7 +168,7 @@ def test_tiny_motions_are_as_accurate_as_large_ones(law: Law) -> None:
     found = []
     for force in (1e-5, 1e-6, 1e-8):
         u = {"force": lambda t, force=force: force * ca.sin(2 * pi * t)}
-        run = simulate(drive(law), 2.0, u=u, backend="vm")
+        run = sf.simulate(sf.drive(law), 2.0, u=u, backend="vm")
         found.append(np.array([run[name] for name in ("x", "v", "friction")]) / force)
     for row in range(3):
         size = np.abs(found[2][row]).max()
@@ -196,22 +182,24 @@ def test_members_have_scales_of_their_own(backend: str) -> None:
     if backend == "compiled" and find_compiler() is None:
         pytest.skip("no C compiler")
     rates = ca.vertcat(v.symbol, -place.symbol)
-    turn = Event("turn", v.symbol, 0)
+    turn = sf.Event("turn", v.symbol, 0)
     start = np.array([1.0, 1e-9, 0.0, 1e-6])
     for events in ((), (turn,)):
-        model = Model("swing", x=(place, v), ode=rates, events=events)
-        many = simulate_many(model, 10.0, x0={"x": start}, backend=backend, executor="serial")
+        model = sf.Model("swing", x=(place, v), ode=rates, events=events)
+        many = sf.simulate_many(model, 10.0, x0={"x": start}, backend=backend, executor="serial")
         assert many["x"][:, 0] == pytest.approx(start * np.cos(10.0), rel=1e-5, abs=0.0)
         for m in (0, 1):
-            alone = simulate(model, 10.0, x0={"x": start[m]}, t_eval=[10.0], backend=backend)
+            alone = sf.simulate(model, 10.0, x0={"x": start[m]}, t_eval=[10.0], backend=backend)
             # lanes of compiled members have a power of their own in the step control
             same = 0.0 if backend == "vm" or events else 1e-8
             assert many["x"][m, 0] == pytest.approx(alone.final["x"], rel=same, abs=0.0)
 
 
 def test_a_decay_from_a_nanometre_follows_its_closed_form() -> None:
-    model = Model("swing", x=(place, v), ode=ca.vertcat(v.symbol, -place.symbol - 0.2 * v.symbol))
-    run = simulate(model, 10.0, x0={"x": 1e-9}, measure_error=True)
+    model = sf.Model(
+        "swing", x=(place, v), ode=ca.vertcat(v.symbol, -place.symbol - 0.2 * v.symbol)
+    )
+    run = sf.simulate(model, 10.0, x0={"x": 1e-9}, measure_error=True)
     w = np.sqrt(0.99)
     exact = 1e-9 * np.exp(-0.1 * run.t) * (np.cos(w * run.t) + 0.1 / w * np.sin(w * run.t))
     assert run["x"] == pytest.approx(exact, abs=2e-15)
@@ -219,15 +207,15 @@ def test_a_decay_from_a_nanometre_follows_its_closed_form() -> None:
 
 
 def test_events_of_tiny_motions_are_met() -> None:
-    turn = Event("turn", v.symbol, 0)
-    model = Model("swing", x=(place, v), ode=ca.vertcat(v.symbol, -place.symbol), events=(turn,))
-    run = simulate(model, 7.0, x0={"v": 1e-9})
+    turn = sf.Event("turn", v.symbol, 0)
+    model = sf.Model("swing", x=(place, v), ode=ca.vertcat(v.symbol, -place.symbol), events=(turn,))
+    run = sf.simulate(model, 7.0, x0={"v": 1e-9})
     assert [t for t, _ in run.happened] == pytest.approx([pi / 2, 3 * pi / 2], abs=1e-5)
 
 
 def test_a_tolerance_that_is_given_is_kept() -> None:
-    model = Model("swing", x=(place, v), ode=ca.vertcat(v.symbol, -place.symbol))
-    given, own = (simulate(model, 10.0, x0={"x": 1e-9}, atol=a) for a in (1e-7, None))
+    model = sf.Model("swing", x=(place, v), ode=ca.vertcat(v.symbol, -place.symbol))
+    given, own = (sf.simulate(model, 10.0, x0={"x": 1e-9}, atol=a) for a in (1e-7, None))
     assert given.statistics.steps < own.statistics.steps / 3
 
 
@@ -243,7 +231,7 @@ def test_what_rests_or_is_rounding_has_no_scale_of_its_own() -> None:
 
 def test_a_tiny_motion_that_could_not_be_resolved_is_said() -> None:
     u = {"force": lambda t: 1e-6 * ca.sin(t)}
-    run = simulate(drive(LuGre()), 1.0, u=u, max_steps=30, backend="vm")
+    run = sf.simulate(sf.drive(sf.LuGre()), 1.0, u=u, max_steps=30, backend="vm")
     assert run.status.ok
     assert "not resolved on their own scale: The maximum number of steps" in run.message
 
@@ -251,5 +239,7 @@ def test_a_tiny_motion_that_could_not_be_resolved_is_said() -> None:
 def test_progress_does_not_go_back() -> None:
     for force in (2.0, 1e-6):
         told: list[float] = []
-        simulate(drive(LuGre()), 1.0, u={"force": force}, progress=told.append, backend="vm")
+        sf.simulate(
+            sf.drive(sf.LuGre()), 1.0, u={"force": force}, progress=told.append, backend="vm"
+        )
         assert told == sorted(told)

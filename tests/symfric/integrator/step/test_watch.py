@@ -11,41 +11,26 @@ from closed_forms import assemble
 from numpy.typing import NDArray
 from scipy.integrate import odeint
 
-from symfric import (
-    Andersson,
-    BengisuAkay,
-    Benson,
-    BrownMcPhee,
-    Coulomb,
-    Law,
-    SimscapeBreakaway,
-    Stribeck,
-    Sum,
-    Tustin,
-    Viscous,
-    rabinowicz,
-    simulate,
-    simulate_many,
-)
+import symfric as sf
 from symfric.integrator.step.attempt import REACH, Watch
 
 Array = NDArray[np.float64]
 CAPTURED = json.loads((Path(__file__).parents[3] / "golden" / "captured.json").read_text())
 STARTS = np.array(CAPTURED["v"])
-LAWS: dict[str, Law] = {
-    "stribeck": Stribeck(mu_s=0.3, mu_d=0.0),
-    "tustin": Tustin(mu_s=0.3, mu_d=0.0),
-    "benson": Benson(mu_s=0.3, mu_d=0.0),
-    "andersson": Andersson(mu_s=0.3, mu_d=0.0),
-    "simscape_breakaway": SimscapeBreakaway(mu_s=0.3, mu_d=0.0),
-    "bengisu_akay": BengisuAkay(mu_s=0.3, mu_d=0.0),
-    "brown_mcphee": BrownMcPhee(mu_s=0.3, mu_d=0.0, v_t=1e-4),
+LAWS: dict[str, sf.Law] = {
+    "stribeck": sf.Stribeck(mu_s=0.3, mu_d=0.0),
+    "tustin": sf.Tustin(mu_s=0.3, mu_d=0.0),
+    "benson": sf.Benson(mu_s=0.3, mu_d=0.0),
+    "andersson": sf.Andersson(mu_s=0.3, mu_d=0.0),
+    "simscape_breakaway": sf.SimscapeBreakaway(mu_s=0.3, mu_d=0.0),
+    "bengisu_akay": sf.BengisuAkay(mu_s=0.3, mu_d=0.0),
+    "brown_mcphee": sf.BrownMcPhee(mu_s=0.3, mu_d=0.0, v_t=1e-4),
 }
 
 
-def law(case: str) -> Law:
+def law(case: str) -> sf.Law:
     name, *more = case.split()
-    return Sum((LAWS[name], Viscous(sigma_2=0.02))) if more else LAWS[name]
+    return sf.Sum((LAWS[name], sf.Viscous(sigma_2=0.02))) if more else LAWS[name]
 
 
 def watch(before: float, half: float, after: float, scale: float = 1.0) -> Watch:
@@ -86,8 +71,8 @@ def test_friction_peaks_without_a_coulomb_level_catch_the_block() -> None:
     """
     for case, x in CAPTURED["x"].items():
         rtol = 1e-7 if case == "simscape_breakaway" else 1e-6
-        many = simulate_many(
-            rabinowicz(law(case)),
+        many = sf.simulate_many(
+            sf.rabinowicz(law(case)),
             20.0,
             x0={"v": STARTS[::4]},
             rtol=rtol,
@@ -99,8 +84,8 @@ def test_friction_peaks_without_a_coulomb_level_catch_the_block() -> None:
 
 def test_both_engines_catch_it() -> None:
     """x = -1.0404 m was found, at rtol 1e-9 -0.797; SciPy's LSODA with max_step 2e-4: -0.7783."""
-    model = rabinowicz(LAWS["stribeck"])
-    runs = [simulate(model, 20.0, x0={"v": -0.5}, backend=b) for b in ("vm", "compiled")]
+    model = sf.rabinowicz(LAWS["stribeck"])
+    runs = [sf.simulate(model, 20.0, x0={"v": -0.5}, backend=b) for b in ("vm", "compiled")]
     assert runs[0].final == runs[1].final
     assert runs[0].statistics.steps == runs[1].statistics.steps
     assert [r.final["x"] for r in runs] == pytest.approx([-0.77828] * 2, abs=1e-4)
@@ -111,30 +96,30 @@ def test_a_block_that_just_touches_the_velocity_of_the_belt_is_caught() -> None:
 
     Both ends of that step look harmless; x(6) was off by 0.39 m.
     """
-    model = rabinowicz(Stribeck(mu_s=0.3, mu_d=0.0, v_s=1e-6, v_eps=1e-7))
-    run = simulate(model, 6.0, x0={"v": 3e-6 - 0.1}, backend="vm")
-    fine = simulate(model, 6.0, x0={"v": 3e-6 - 0.1}, rtol=1e-8, method="radau5", backend="vm")
+    model = sf.rabinowicz(sf.Stribeck(mu_s=0.3, mu_d=0.0, v_s=1e-6, v_eps=1e-7))
+    run = sf.simulate(model, 6.0, x0={"v": 3e-6 - 0.1}, backend="vm")
+    fine = sf.simulate(model, 6.0, x0={"v": 3e-6 - 0.1}, rtol=1e-8, method="radau5", backend="vm")
     assert run.final["x"] == pytest.approx(fine.final["x"], abs=1e-7)
 
 
 def test_a_scale_set_as_a_parameter_is_resolved_as_one_set_in_the_law() -> None:
     """The scale stayed where the model was built: an error of 8.9e-3 instead of 1.7e-7."""
-    free = rabinowicz(Stribeck(v_s=1e-1, v_eps=1e-2), free=["v_s", "v_eps"])
-    run = simulate(free, 20.0, p={"v_s": 1e-3, "v_eps": 1e-4}, backend="vm")
-    held = simulate(rabinowicz(Stribeck(v_s=1e-3, v_eps=1e-4)), 20.0, backend="vm")
+    free = sf.rabinowicz(sf.Stribeck(v_s=1e-1, v_eps=1e-2), free=["v_s", "v_eps"])
+    run = sf.simulate(free, 20.0, p={"v_s": 1e-3, "v_eps": 1e-4}, backend="vm")
+    held = sf.simulate(sf.rabinowicz(sf.Stribeck(v_s=1e-3, v_eps=1e-4)), 20.0, backend="vm")
     assert run.statistics.steps == pytest.approx(held.statistics.steps, rel=0.02)
     assert run.final["x"] == pytest.approx(held.final["x"], abs=1e-6)
 
 
 def test_a_scale_too_fine_for_the_clock_ends_no_run() -> None:
     """Rest is crossed in steps that the clock still tells apart."""
-    law = Coulomb(mu_d=0.0, v_eps=1e-300)
+    law = sf.Coulomb(mu_d=0.0, v_eps=1e-300)
     for v in (0.5, 0.51, 0.3):
-        assert simulate(rabinowicz(law), 20.0, x0={"v": v}, backend="vm").status.ok
+        assert sf.simulate(sf.rabinowicz(law), 20.0, x0={"v": v}, backend="vm").status.ok
 
 
 def test_a_model_without_contacts_is_not_watched() -> None:
-    assert not assemble(rabinowicz(Viscous())).monitors.numel()
+    assert not assemble(sf.rabinowicz(sf.Viscous())).monitors.numel()
 
 
 # The references
