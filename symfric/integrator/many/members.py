@@ -5,10 +5,10 @@ A `Program` contains the equations of an ensemble for workers that do not have t
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from threading import Lock
-from typing import Any, final
+from typing import Any, cast, final
 
 import casadi as ca
 import numpy as np
@@ -68,11 +68,6 @@ class Stretch:
     times: Array
     max_steps: int
     follow: bool = False
-
-    def __getitem__(self, pick: slice) -> "Stretch":
-        data, times = (a[pick] if a.shape[0] > 1 else a for a in (self.data, self.times))
-        ends, h_min = self.ends[pick], self.h_min[pick]
-        return replace(self, data=data, times=times, ends=ends, h_min=h_min)
 
     @property
     def numbers(self) -> dict[str, int]:
@@ -284,9 +279,9 @@ class Program:
         return CompiledMembers.of(self.code, self.n_signals)
 
     @cached_property
-    def constraints(self) -> Columns | None:
-        """Algebraic equations, evaluated for many columns."""
-        return None if self.equations is None else Columns(self.equations.constraints)
+    def constraints(self) -> Columns:
+        """Algebraic equations, evaluated for many columns; only if there are some."""
+        return Columns(cast("Equations", self.equations).constraints)
 
     @cached_property
     def assembly(self) -> Assembly | None:

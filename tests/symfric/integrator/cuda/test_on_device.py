@@ -20,8 +20,7 @@ from fake_cupy import LAUNCH_ON_HOST, ON_HOST, FakeCupy
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Status, rabinowicz, simulate_many
 from symfric.emitter.c99 import DOUBLE, REALS
-from symfric.integrator.cuda.device import BLOCK, Device, DeviceError
-from symfric.integrator.cuda.kernel import Kernel, kernel_of
+from symfric.integrator.cuda.device import BLOCK, Device, DeviceError, Kernel, kernel_of
 from symfric.integrator.cuda.on_device import OnDevice
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
