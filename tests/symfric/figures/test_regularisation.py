@@ -13,22 +13,19 @@ from symfric.figures.regularisation import distance, machine_of, regularisation,
 from symfric.scenes import Drive, PendulumBox, Rabinowicz, SliderCrank
 
 
-@pytest.mark.parametrize(
-    ("law", "names"),
-    [
-        (sf.BrownMcPhee(), ("v_t",)),
-        (sf.Coulomb(), ("v_eps",)),
-        (sf.Specker(), ("v_t",)),
-        (sf.Asymmetric(sf.BrownMcPhee(), sf.BrownMcPhee()), ("v_t_pos", "v_t_neg", "v_blend")),
-        (sf.LuGre(), ("sigma_0", "sigma_1")),
-        (sf.LuGre(sigma_1=0.0), ("sigma_0",)),
-        (sf.ElastoPlastic(), ("sigma_0", "sigma_1", "z_ba")),
-        (sf.BlimanSorine(), ("s_f",)),
-        (sf.MaxwellSlip(), ("k_1", "k_2", "k_3", "k_4")),
-    ],
-)
-def test_roles_say_what_makes_a_law_smooth(law: sf.Law, names: tuple[str, ...]) -> None:
-    assert tuple(regularisation("here", law).powers) == names
+def test_roles_say_what_makes_a_law_smooth() -> None:
+    smoothing = {
+        sf.BrownMcPhee(): "v_t",
+        sf.Coulomb(): "v_eps",
+        sf.Specker(): "v_t",
+        sf.Asymmetric(sf.BrownMcPhee(), sf.BrownMcPhee()): "v_t_pos v_t_neg v_blend",
+        sf.LuGre(): "sigma_0 sigma_1",
+        sf.LuGre(sigma_1=0.0): "sigma_0",
+        sf.ElastoPlastic(): "sigma_0 sigma_1 z_ba",
+        sf.BlimanSorine(): "s_f",
+        sf.MaxwellSlip(): "k_1 k_2 k_3 k_4",
+    }
+    assert {law: " ".join(regularisation("here", law).powers) for law in smoothing} == smoothing
 
 
 def test_stiffness_and_inverse_velocity_grow_where_widths_shrink() -> None:
