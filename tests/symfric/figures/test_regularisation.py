@@ -9,6 +9,7 @@ import pytest
 
 import symfric as sf
 from symfric.bench.regularisation import last_cycle, peak
+from symfric.figures.recommended import _Search  # pyright: ignore[reportPrivateUsage]
 from symfric.figures.regularisation import distance, machine_of, regularisation, sample
 from symfric.scenes import Drive, PendulumBox, Rabinowicz, SliderCrank
 
@@ -112,6 +113,14 @@ def test_curve_holds_the_runs_and_is_drawn(found: sf.Recommendation, tmp_path: P
     assert (np.diff(curve["error"]) < 0).all()
     found.plot(tmp_path / "curve.svg")
     assert (tmp_path / "curve.svg").stat().st_size > 0
+
+
+def test_widths_are_rounded_to_two_digits_and_to_narrower_ones() -> None:
+    machine = machine_of("here", Rabinowicz, 1.0, None, None, LAW)
+    for law, name, value in ((LAW, "v_t", 1.2e-5), (sf.LuGre(), "sigma_0", 8.2e6)):
+        search = _Search(machine, regularisation("here", law), 0.01, 1e-6)
+        found = search.knob.values(search.rounded(0.0123456))[name]
+        assert found == pytest.approx(value, rel=1e-9)
 
 
 def test_a_law_that_is_too_dry_is_softened() -> None:
