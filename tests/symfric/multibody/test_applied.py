@@ -12,19 +12,8 @@ from dry import DryMotion, blocks_on_belt, pendulum_box
 from stored import stored
 
 from symfric import Coulomb, Model, SolveError, Status, Variable, Viscous, simulate, simulate_many
+from symfric import multibody as mb
 from symfric.laws import ALL_LAWS, Awrejcewicz, ExactCoulomb, Karnopp, Law, Stribeck
-from symfric.multibody import (
-    Distance,
-    JointFriction,
-    JointSpringDamper,
-    Mechanism,
-    PrescribedMotion,
-    Prismatic,
-    Revolute,
-    SpringDamper,
-    UserConstraint,
-    functions,
-)
 from symfric.scenes import Arm, FourBar, FourMass, PendulumBox, SliderCrank
 
 pytestmark = pytest.mark.heavy
@@ -79,26 +68,28 @@ def test_all_laws_of_the_selection_paper_run_on_its_pendulum_box(name: str) -> N
     assert energy[0] - energy[-1] == pytest.approx(7.69, rel=0.01)
 
 
-def block(m: Mechanism, i: int, law: Law, parent: str = "ground", **more: Any) -> None:
+def block(m: mb.Mechanism, i: int, law: Law, parent: str = "ground", **more: Any) -> None:
     """A block on a level track, with friction that its load of 1 N presses by 1 N."""
-    sole = JointFriction(law, eps=SHARP)
-    attach(m, Prismatic, f"s{i}", f"block{i}", parent, **{"z": X, "x": Z, "friction": sole} | more)
+    sole = mb.JointFriction(law, eps=SHARP)
+    attach(
+        m, mb.Prismatic, f"s{i}", f"block{i}", parent, **{"z": X, "x": Z, "friction": sole} | more
+    )
 
 
 def belt(
     laws: Sequence[Law], to_ground: Sequence[float], between: Sequence[float], v: float
 ) -> Model:
     """Blocks of 1 kg (g = 1) on a driven belt, with springs to the ground and between."""
-    m = Mechanism("belt", gravity=(0.0, 0.0, -1.0))
+    m = mb.Mechanism("belt", gravity=(0.0, 0.0, -1.0))
     m.frame("ground.wall", at=(-20.0, 0.0, 0.0))
-    attach(m, Prismatic, "belt_x", "belt", z=X, x=Z, rate=v)
-    m.constraint(PrescribedMotion("drive", "belt_x", lambda t: v * t, "slide"))
+    attach(m, mb.Prismatic, "belt_x", "belt", z=X, x=Z, rate=v)
+    m.constraint(mb.PrescribedMotion("drive", "belt_x", lambda t: v * t, "slide"))
     for i, law in enumerate(laws):
         block(m, i, law, "belt", rate=-v)
         m.frame(f"block{i}.far", at=(5.0, 0.0, 0.0))
-        m.force(SpringDamper(f"spring{i}", "ground.wall", f"block{i}", to_ground[i], 20.0))
+        m.force(mb.SpringDamper(f"spring{i}", "ground.wall", f"block{i}", to_ground[i], 20.0))
     for i, k in enumerate(between):
-        m.force(SpringDamper(f"link{i}", f"block{i}", f"block{i + 1}.far", k, 5.0))
+        m.force(mb.SpringDamper(f"link{i}", f"block{i}", f"block{i + 1}.far", k, 5.0))
     return m.build()
 
 
@@ -131,12 +122,12 @@ def test_a_loop_is_the_limit_of_its_smooth_law() -> None:
 
 def pair(law_1: Law, law_2: Law) -> Model:
     """Blocks of 1 and 2 kg (g = 10) in one line, a rod between them and a force that grows."""
-    m = Mechanism("pair", gravity=(0.0, 0.0, -10.0))
+    m = mb.Mechanism("pair", gravity=(0.0, 0.0, -10.0))
     force = m.input("push", "N")
     for i, law in enumerate((law_1, law_2)):
         block(m, i, law, mass=1.0 + i, at=(3.0 * i, 0.0, 0.0))
-    m.joint(Distance("rod", "block0", "block1", length=3.0))
-    m.force(JointSpringDamper("motor", "s0", "slide", actuator=force))
+    m.joint(mb.Distance("rod", "block0", "block1", length=3.0))
+    m.force(mb.JointSpringDamper("motor", "s0", "slide", actuator=force))
     return m.build()
 
 
@@ -190,16 +181,16 @@ def test_absolute_coordinates_give_the_same_motion() -> None:
     assert np.abs(runs[1].final["x_slip"]) < 1e-8
 
 
-def driven(law: Law) -> Mechanism:
-    m = Mechanism("driven")
-    attach(m, Revolute, "shaft", "wheel", rate=1.0, friction=JointFriction(law, radius=0.1))
-    m.constraint(PrescribedMotion("drive", "shaft", lambda t: t))
+def driven(law: Law) -> mb.Mechanism:
+    m = mb.Mechanism("driven")
+    attach(m, mb.Revolute, "shaft", "wheel", rate=1.0, friction=mb.JointFriction(law, radius=0.1))
+    m.constraint(mb.PrescribedMotion("drive", "shaft", lambda t: t))
     return m
 
 
-def moving_rod(law: Law) -> Mechanism:
+def moving_rod(law: Law) -> mb.Mechanism:
     """A pair of blocks whose rod changes its length with time, as a coupling of both."""
-    m = Mechanism("inchworm")
+    m = mb.Mechanism("inchworm")
     for i in range(2):
         block(m, i, law)
 
@@ -207,7 +198,7 @@ def moving_rod(law: Law) -> Mechanism:
         (first, _), (second, _) = (at.along(joint, "slide") for joint in m.joints)
         return second - first - 0.1 * ca.sin(at.t) ** 2
 
-    m.constraint(UserConstraint("rod", gap))
+    m.constraint(mb.UserConstraint("rod", gap))
     return m
 
 
@@ -220,7 +211,7 @@ def test_where_rest_cannot_be_told_the_joint_is_named() -> None:
         (partial(SliderCrank(law).mechanism().build, formulation="absolute"),
          "a loop of at most 8 coordinates"),
         (partial(pair, law, Karnopp()), "laws in one loop that all stick by modes, or none"),
-        (partial(functions, PendulumBox(law).mechanism()), f"joint 'x' {named}"),
+        (partial(mb.functions, PendulumBox(law).mechanism()), f"joint 'x' {named}"),
     ):  # fmt: skip
         with pytest.raises(ValueError, match=message):
             build()
@@ -264,13 +255,13 @@ def test_rest_is_found_where_loads_change_by_much() -> None:
 
 def test_blocks_that_move_differently_use_what_they_can_to_the_same_degree() -> None:
     """On two axes, a rod from 4 m to 3 m between them: s1' = -4/3 s0', 4 N + 3 N x 4/3 = 8 N."""
-    m = Mechanism("corner", gravity=(0.0, 0.0, 0.0))
+    m = mb.Mechanism("corner", gravity=(0.0, 0.0, 0.0))
     force = m.input("push", "N")
     for i, (axis, start, load, mu) in enumerate(((X, 4.0, 20.0, 0.2), (Y, 3.0, 10.0, 0.3))):
-        sole = JointFriction(ExactCoulomb(mu_s=mu, mu_d=0.1), normal=load)
+        sole = mb.JointFriction(ExactCoulomb(mu_s=mu, mu_d=0.1), normal=load)
         block(m, i, sole.law, z=axis, start=start, friction=sole)
-    m.joint(Distance("rod", "block0", "block1", length=5.0))
-    m.force(JointSpringDamper("motor", "s0", "slide", actuator=force))
+    m.joint(mb.Distance("rod", "block0", "block1", length=5.0))
+    m.force(mb.JointSpringDamper("motor", "s0", "slide", actuator=force))
     run = simulate(m.build(), 8.1, u={"push": lambda t: t}, samples=82)
     assert run.happened[0] == (pytest.approx(8.0, abs=1e-8), "s0_loop_slip")
     rest = run.t < 7.95

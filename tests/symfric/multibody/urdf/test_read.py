@@ -11,9 +11,7 @@ from symfric import Coulomb, LuGre, Sum, Viscous, parameters, simulate
 from symfric.laws import Stribeck
 from symfric.multibody import JointFriction, Mechanism, Universal, functions
 from symfric.multibody.urdf import (
-    carried,
     holding,
-    merged,
     read_urdf,
     relative,
     tag_friction,
@@ -298,16 +296,8 @@ TIP = '<joint name="tip" type="{}"><parent link="arm"/><child link="hand"/></joi
 HAND = '<link name="hand"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
 
 
-def test_massless_tips_are_held_and_links_on_fixed_joints_merged() -> None:
+def test_massless_tips_are_held() -> None:
     for link, held in (('<link name="hand"/>', ("tip",)), (f"{HAND}</link>", ())):
         urdf, names = holding(parse(SMALL.replace("</robot>", TIP.format("continuous", link))))
         assert names == held
         assert urdf.joints[1].kind == ("fixed" if held else "continuous")
-    urdf = parse(SMALL.replace("</robot>", TIP.format("fixed", f"{HAND}</link>")))
-    places = carried(urdf)
-    assert places["hand"].body == "arm"
-    whole = merged(urdf, places, "arm")
-    assert (whole.mass, whole.com.tolist()) == (3.0, [0, 0, -0.5 / 3])
-    # two masses 0.25 m apart, reduced mass 2/3 kg
-    apart = 0.25**2 * 2 / 3
-    assert np.diag(whole.J) == pytest.approx([1.1 + apart, 1.1 + apart, 1.01])
