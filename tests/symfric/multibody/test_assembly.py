@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from chains import X, Z, attach, in_both
 
-from symfric import BrownMcPhee, LuGre, Model, Variable, simulate
+from symfric import BrownMcPhee, LuGre, Model, Variable, Viscous, simulate
 from symfric.bench.multibody import chain
 from symfric.integrator.equations.blocks import blocks, corrected, signs
 from symfric.integrator.equations.inputs import input_data
@@ -43,6 +43,9 @@ def test_unknowns_guesses_and_monitors_are_those_that_are_needed() -> None:
     assert starts["rod_12_lambda"] == pytest.approx(bare.z[0].start)
     assert (force.name, force.start > 0) == ("x1_N", True)
     assert force.doc.endswith("'x1' with BrownMcPhee")
+    # a law that does not need the load gets none: reactions are no symbols of the model
+    (viscous,) = four_mass("x1", JointFriction(Viscous())).build().contacts
+    assert np.isnan(float(ca.DM(viscous.N)))
 
 
 @in_both
