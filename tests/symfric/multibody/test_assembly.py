@@ -87,12 +87,11 @@ LEVELS = BrownMcPhee(mu_s=0.3, mu_d=0.2, v_t=1e-2)
 
 def test_forces_of_ones_own_move_the_mechanism_as_its_law_would() -> None:
     """The whole run, with normal forces from reactions and a closed loop."""
-    for scene in (PendulumBox, SliderCrank):
-        model = scene(LEVELS).model()
-        again = model.with_forces({c.name: c.friction for c in model.contacts})
-        one, other = (simulate(m, 0.3, rtol=1e-9) for m in (model, again))
-        for name, signal in one.signals.items():
-            np.testing.assert_allclose(other[name][-1], signal[-1], rtol=1e-5, atol=1e-6)
+    model = SliderCrank(LEVELS).model()
+    again = model.with_forces({c.name: c.friction for c in model.contacts})
+    one, other = (simulate(m, 0.3, rtol=1e-9) for m in (model, again))
+    for name, signal in one.signals.items():
+        np.testing.assert_allclose(other[name][-1], signal[-1], rtol=1e-5, atol=1e-6)
 
 
 def test_width_of_the_normal_force_is_a_parameter_when_asked_for() -> None:
