@@ -1,10 +1,10 @@
-"""Hand a drive with friction to another tool, as a Functional Mock-up Unit.
+"""Export a drive with friction to other tools as a Functional Mock-up Unit.
 
     m v' = force - F(v),   m = 1 kg,   F: 6 N to break away, 4 N while sliding
 
-The unit has the adaptive step inside and knows nothing of Python. Here a position controller
-samples it at 1 kHz, as a tool for co-simulation would: its force jumps every millisecond, and the
-unit does what `stepper` does in Python.
+The unit contains the adaptive integrator and does not need Python. A position controller samples it
+at 1 kHz, as in co-simulation: its force jumps every millisecond. The result is compared with that
+of `stepper` in Python.
 
     python examples/drive_unit.py [OUT]
 """
@@ -26,7 +26,7 @@ TIMES: Array = np.arange(0.0, END, H)
 
 
 def force(x: float, v: float, t: float) -> float:
-    """PD control to 10 cm, and back after a second."""
+    """PD control to 10 cm, and back after a second, in N."""
     goal = 0.1 if t < 1.0 else 0.0
     return float(np.clip(2000.0 * (goal - x) - 60.0 * v, -20.0, 20.0))
 
@@ -44,7 +44,7 @@ def in_unit(path: Path) -> tuple[Array, float]:
 
 
 def in_python(scene: Drive) -> Array:
-    """The same loop around the plant in Python."""
+    """Position at the samples, by the plant in Python."""
     plant = stepper(scene.model(), H, rtol=1e-8)
     rows: list[float] = []
     for t in TIMES.tolist():

@@ -1,10 +1,10 @@
-"""Friction of a measured drive from one record, judged on another one with force pulses.
+"""Friction of a measured drive from one record, validated by another one with force pulses.
 
 EMPS is a positioning stage with a ball screw whose position controller is known (A. Janot,
 M. Gautier, M. Brunot, Nonlinear System Identification Benchmarks 2019). The drive is simulated
-under that controller, and what is left of position and force is minimised. The law, and whether
-the width of the change of sign is fitted, are chosen by the half of the record that is not fitted.
-A second fit compares positions under the measured force alone, in windows of 2 s.
+under that controller, and the residuals of position and force are minimised. The law is chosen by
+its error in the half of the record that is not fitted, as is a fit of its smoothing velocity. A
+second fit compares positions under the measured force alone, in windows of 2 s.
 
 Without the data in ../shared/data/EMPS a record is simulated.
 
@@ -45,7 +45,7 @@ def relative(fit: Fitted, data: Dataset) -> dict[str, float]:
 
 
 def closed_loop(data: Dataset) -> Fitted:
-    """The law that says most of the second half, fitted to all."""
+    """Fit the law that predicts the second half best to the whole record."""
     first, second = data.split(0.5)
     best, chosen = np.inf, ("", [""])
     for law, widths in WIDTHS.items():
@@ -59,7 +59,7 @@ def closed_loop(data: Dataset) -> Fitted:
 
 
 def free_run(fit: Fitted, data: Dataset) -> np.ndarray:
-    """Error [m] of the position that the measured force alone drives, from the measured start."""
+    """Error [m] of the position under the measured force alone, from the measured start."""
     record = data[0]
     t, x = record.time, record["x"]
     begin = local(t, x, 0, noise_of(x))
@@ -70,7 +70,7 @@ def free_run(fit: Fitted, data: Dataset) -> np.ndarray:
 
 
 def main(out: Path) -> None:
-    """Fit, judge, draw."""
+    """Fit, validate and draw."""
     data, other = records()
     loop = closed_loop(data)
     print(loop)

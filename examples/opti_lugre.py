@@ -1,10 +1,10 @@
-"""A control engineer's own Opti script, with LuGre inside: `flow` is the discrete plant.
+"""An Opti script with LuGre: `flow` is the discrete plant.
 
     min  sum of u_k^2 h,   0.1 m in 1 s from rest to rest,   |u| <= 20 N
 
-Bristles of 10 um are stiff: a transcription of the bare equations has to resolve them, `flow`
-takes ten implicit steps in every interval, with exact derivatives of any order. What Opti finds is
-then simulated with error control: that is the proof, not the word of the solver.
+Bristles of 10 um are stiff: a transcription of the equations would have to resolve them. `flow`
+takes ten implicit steps in every interval, with exact derivatives of any order. A simulation with
+error control verifies the result.
 """
 
 import sys
@@ -19,7 +19,7 @@ GOAL, T, N = 0.1, 1.0, 50
 
 
 def main(folder: Path) -> None:
-    """Solve, then prove."""
+    """Solve and verify."""
     model = drive(LuGre(), m=1.0, N=10.0)  # states x, v and the bristle z; input force
     advance = flow(model, steps=10)  # (x, u, p, h) -> x after h
 

@@ -1,11 +1,11 @@
-"""A model for acados: the names it wants, and the functions that it would generate, checked.
+"""A model for acados: its fields, and a check of the functions that acados would generate.
 
     x' = f(x, u, p),   its forward variational equations Sx' = df/dx Sx, Su' = df/dx Su + df/du
 
-acados has no wheel; where `acados_template` is installed the model is its own class, elsewhere a
-stand-in with the same fields. Either way the C that acados would have CasADi write is written,
-compiled and compared with the friction law. Take a smooth law: integrators of fixed steps, as
-acados has them, must resolve v_t, or the bristles of LuGre (sim_method_num_steps).
+acados has no wheel. If `acados_template` is installed, the model is an AcadosModel, else an object
+with the same fields. In both cases the C that CasADi writes for acados is compiled and compared
+with the friction law. Use a smooth law: the fixed steps of the integrators of acados must resolve
+v_t, or the bristles of LuGre (sim_method_num_steps).
 """
 
 from importlib.util import find_spec
@@ -22,7 +22,7 @@ OUT = Path("out")
 
 
 def acados_model(model: Model) -> Any:
-    """The fields of an AcadosModel from an explicit model without events."""
+    """Return an AcadosModel of an explicit model without events."""
     if model.ode is None or model.z or model.events:
         raise ValueError(f"acados_model: expected an explicit model without events: {model.name}")
     if find_spec("acados_template"):
@@ -40,7 +40,7 @@ def acados_model(model: Model) -> Any:
 
 
 def functions(m: Any) -> list[ca.Function]:
-    """expl_ode_fun and expl_vde_forw, as acados asks CasADi for them."""
+    """Return expl_ode_fun and expl_vde_forw, as acados generates them with CasADi."""
     nx, nu = m.x.numel(), m.u.numel()
     Sx, Su = ca.SX.sym("Sx", nx, nx), ca.SX.sym("Su", nx, nu)
     vdeX = ca.jtimes(m.f_expl_expr, m.x, Sx)
@@ -51,7 +51,7 @@ def functions(m: Any) -> list[ca.Function]:
 
 
 def compiled(function: ca.Function, folder: Path) -> ca.Function:
-    """The same function from generated and compiled C."""
+    """Return the function from generated and compiled C."""
     code = ca.CodeGenerator(f"{function.name()}.c")
     code.add(function)
     source = code.generate(f"{folder}/")
@@ -59,7 +59,7 @@ def compiled(function: ca.Function, folder: Path) -> ca.Function:
 
 
 def main() -> None:
-    """Write, compile, compare."""
+    """Write, compile and compare."""
     OUT.mkdir(exist_ok=True)
     law = BrownMcPhee(v_t=5e-3)
     m = acados_model(drive(law, m=1.0, N=10.0))

@@ -1,8 +1,8 @@
-"""The same move in rockit: `set_next` takes `flow`, and `set_der` any law's right-hand side.
+"""The move of `opti_lugre` in rockit: `set_next` takes `flow`, `set_der` a right-hand side.
 
     min  sum of u_k^2 h,   0.1 m in 1 s from rest to rest,   |u| <= 20 N
 
-With `set_der` rockit writes its own collocation of the bristles; with `set_next` the plant is the
+With `set_der` rockit transcribes the bristles by collocation; with `set_next` the plant is the
 implicit step of symfric. Needs rockit (pip install rockit-meco).
 """
 
@@ -16,7 +16,7 @@ GOAL, T, N = 0.1, 1.0, 50
 
 
 def main() -> None:
-    """Solve both ways, then prove both."""
+    """Solve in both ways and verify."""
     model = drive(LuGre(), m=1.0, N=10.0)
     for way in ("set_next", "set_der"):
         ocp = rockit.Ocp(T=T)

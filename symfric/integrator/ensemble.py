@@ -32,7 +32,7 @@ from symfric.integrator.equations.initial import first_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.chunk import Chunk, Job, Points, SingleJob, Solved, digest, suited
 from symfric.integrator.many.member_data import MemberData, MemberInput, ends_of, member_data
-from symfric.integrator.many.program import program
+from symfric.integrator.many.members import program
 from symfric.integrator.many.store import Store
 from symfric.integrator.running.doubts import of_members
 from symfric.integrator.running.integrator import Integrator, built

@@ -12,7 +12,7 @@ from symfric.foundation import checks
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess
-from symfric.integrator.many.members import pays, side_by_side
+from symfric.integrator.many.members import fastest
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.integrator import Integrator
@@ -28,7 +28,6 @@ from symfric.integrator.running.plants import (
     Advance,
     InPython,
     Plants,
-    compiled,
     looking,
 )
 from symfric.integrator.running.run import MOST_ORDERS
@@ -83,7 +82,7 @@ class Plant:
         if self._in_python:
             engine = integrator.vm if vm else integrator.compiled
             return InPython(integrator, plants, engine, self._tolerance)
-        return (side_by_side if pays(integrator, plants) else compiled)(integrator, plants)
+        return fastest(integrator, plants)
 
     def __repr__(self) -> str:
         many = "" if self._batch is None else f" x {self._batch}"

@@ -184,7 +184,7 @@ class _ArrayFile:
         if not missing and self._is_whole():
             return
         row = np.full(self.shape[1:], np.nan).tobytes()
-        rows = max(1, BLOCK // max(1, len(row)))
+        rows = max(1, BLOCK // len(row))
         try:
             with suppress(FileExistsError), written(self.path) as temporary:
                 with temporary.open("wb") as file:

@@ -6,7 +6,6 @@ The C has the operations of the Function in the same order; `lanes.h` defines fu
 import tomllib
 from collections import deque
 from collections.abc import Iterator
-from math import isinf, isnan
 from pathlib import Path
 from typing import final
 
@@ -94,16 +93,15 @@ class _Parts:
                 free.append(slot.pop(i))
             for i in part:
                 if self.last.get(i, k) > k:
-                    slot[i] = free.popleft() if free else self._more()
+                    if not free:
+                        free.append(self.slots)
+                        self.slots += 1
+                    slot[i] = free.popleft()
                     body.lines.append(f"w@[{slot[i]}] = {body.number(i)};")
             each = (line.replace("@", str(g)) for line in body.lines for g in self.groups)
             lines = "".join(f"  {line}\n" for line in each)
             noinline = "" if len(self.cuts) == 1 else "__attribute__((noinline)) "
             yield f"{noinline}{_head(self.names[-1], self.groups)}\n{{\n{lines}}}\n\n"
-
-    def _more(self) -> int:
-        self.slots += 1
-        return self.slots - 1
 
 
 @final
@@ -184,8 +182,5 @@ def _is_mask(node: Node) -> bool:
 
 
 def _literal(value: float) -> str:
-    if isnan(value):
-        return "NAN"
-    if isinf(value):
-        return "-INFINITY" if value < 0 else "INFINITY"
-    return f"({value!r})"
+    named = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
+    return named.get(repr(value), f"({value!r})")

@@ -4,6 +4,7 @@ import json
 
 import casadi as ca
 import pytest
+from tables import table
 
 from symfric import BrownMcPhee, LuGre, Output, Variable, Viscous, law_from_text
 from symfric.codegen import Block, generate, law_block
@@ -81,42 +82,9 @@ def test_the_manifest_counts_operations_calls_and_bytes(both, tmp_path, monkeypa
     assert "measured" not in bare.manifest["real"]["float"]
 
 
-@pytest.mark.parametrize(
-    ("law", "options", "message"),
-    [
-        (LuGre(), {"real": "half"}, "expected one of double, float, got half"),
-        (LuGre(), {"real": ()}, "expected double, float or both, got none"),
-        (LuGre(), {"free": ("mu",)}, "got mu"),
-        (GMS(), {}, "have circular dependencies"),
-        (LuGre(mu_s=0.3), {"free": (), "h": 1e-60}, "would become 0"),
-        (Block("b", outputs={"y": Output(1.0, "m")}), {"h": 1e-3}, "with a law only, got a block"),
-        (LUGRE, {"turning": True}, "turning: expected with a law only"),
-    ],
-)
-def test_bad_input_writes_nothing(tmp_path, law, options, message):
-    with pytest.raises(ValueError, match=message):
-        generate(law, tmp_path / "c", **options)
-    assert not (tmp_path / "c").exists()
-    (tmp_path / "c").write_text("")
-    with pytest.raises(ValueError, match="expected a folder, got the file"):
-        generate(LuGre(), tmp_path / "c", kit=False)
-
-
 def test_a_law_with_states_has_a_data_sheet_structs_and_a_step():
     text = header(CBlock(LUGRE, DOUBLE))
-    for part in (
-        "    double mu_s;    /* static friction coefficient [1], default 0.15, ",
-        "    double z; /* mean bristle deflection [m], start 0 */\n",
-        "extern const lugre_f64_state_t lugre_f64_start;",
-        "extern const lugre_f64_param_t lugre_f64_default;",
-        "void lugre_f64_reset(lugre_f64_state_t *state);\n",
-        "dz/dt = v - sigma_0 |v| z / g",
-        "    delta = 2  Stribeck exponent [1]\n",
-        "SPDX-License-Identifier: MIT-0",
-        "h, a parameter, 0.001 s by default",
-        "Inputs outside their range are clamped to it",
-        "A step size outside its range is clamped to it.",
-    ):
+    for part in table(__file__)["header"]["parts"]:
         assert part in text
     turning = header(CBlock(law_block(LuGre(), turning=True), DOUBLE))
     assert all(f"[{unit}]" in turning for unit in ("rad/s", "N m", "N m/rad", "N m s/rad", "rad"))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from law_cases import CASES, NO_STEP
 from one_program import LIMITED, block_of
+from tables import Names, table
 
 from symfric import BrownMcPhee, LuGre, Model, Output, Stribeck, Variable, law_from_text
 from symfric.codegen import Block, fuzz, generate, guards, law_block, plant_block, source, verify
@@ -31,25 +32,12 @@ def few_steps(monkeypatch):
 
 
 LAWS = {"stribeck": Stribeck(), "lugre": LuGre(), "brown_mcphee": BrownMcPhee()}
-WRONG = {
-    "last bit": ("stribeck", "double", "0.1 +", "0.10000000000000002 +", "F differs from CasADi"),
-    "silent guard": ("lugre", "double", "*status |= clamped;", "", "status differs"),
-    "altered input": ("brown_mcphee", "double", "_mended(v, -1000000.0, 1000000.0",
-                      "_mended(v, -1000000.0, 1e-3", "F differs"),
-    "offset": ("lugre", "float", "out->F_end = ", "out->F_end = 1.0f + ", "F_end is off by "),
-    "default": ("brown_mcphee", "float", "0.15f, ", "0.16f, ", "more than rounding explains"),
-    "reset": ("lugre", "double", "state->z = N * t2 /", "state->z = 2.0 * N * t2 /",
-              "init_sliding.z differs"),
-    "warning": ("brown_mcphee", "float", "const float t1 =",
-                "const float unused = 1.0; const float t1 =", "unused"),
-    "foreign": ("brown_mcphee", "float", "SF_TANHF tanhf", "SF_TANHF (float)tanh", "it needs tanh"),
-    "NaN": ("brown_mcphee", "double", "return F;", "return 0.0 * HUGE_VAL + F;", "F differs"),
-}  # fmt: skip
+TABLE = table(__file__)
 
 
-@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize("name", TABLE["wrong"])
 def test_wrong_c_is_found(name, compiler, tmp_path):
-    law, real, old, new, why = WRONG[name]
+    law, real, old, new, why = TABLE["wrong"][name]
     made = generate(
         LAWS[law], tmp_path, real=real, free=() if law == "stribeck" else None, kit=False
     )
@@ -90,7 +78,7 @@ def test_without_a_compiler_or_an_object_nothing_is_verified(compiler, tmp_path,
     assert found.table() == f"lugre: not verified: {none}"
 
 
-def test_a_verified_law_goes_to_json_and_to_a_table(compiler, tmp_path):
+def test_verification_results_convert_to_json_and_a_table(compiler, tmp_path):
     found = verify(generate(law_from_text("coulomb+viscous"), tmp_path, kit=False))
     content = json.loads(json.dumps(found.to_dict()))
     assert content["ok"] is True
@@ -122,24 +110,16 @@ def test_inputs_are_of_every_kind():
 A, B = Variable("a", "1"), Variable("b", "1")
 LARGE = 1e6
 LEFT = (A.symbol + B.symbol) - LARGE
-"""2, of a = 2 and b = 1e6."""
+"""Its value is 2 for a = 2 and b = 1e6."""
 
 
-@pytest.mark.parametrize(
-    ("expression", "kind", "wanted"),
-    [
-        (LEFT, "", LARGE), (-ca.fabs(LEFT), "", LARGE), (LEFT**2, "", LARGE**2),
-        (ca.sqrt(LEFT), "", LARGE**0.5), (ca.sin(LEFT), "", abs(np.sin(2.0))),
-        (3.0 * LEFT, "", 6.0), (3.0 * LEFT, CONSTRAINTS, 3.0 * LARGE),
-        (0.25 * LEFT, CONSTRAINTS, 0.25 * LARGE), (LEFT / (1 + A.symbol), CONSTRAINTS, LARGE / 3.0),
-        (LEFT + LEFT, "", 2.0 * LARGE), (ca.if_else(A.symbol > 0, LEFT, 1.0), "", LARGE),
-    ],
-)  # fmt: skip
-def test_a_difference_has_the_magnitude_of_its_larger_term(expression, kind, wanted):
-    block = Block("b", inputs=(A, B), outputs={"y": Output(expression, "1", kind=kind)})
-    none = np.zeros((1, 0))
-    found = magnitudes(block, none, none[0], np.array([[2.0, LARGE]]))
-    assert float(found[0]) == pytest.approx(wanted)
+def test_a_difference_has_the_magnitude_of_its_larger_term():
+    names, none = Names(globals()), np.zeros((1, 0))
+    for expression, closing, wanted in TABLE["magnitudes"]:
+        y = Output(names.value(expression), "1", kind=CONSTRAINTS if closing else "")
+        block = Block("b", inputs=(A, B), outputs={"y": y})
+        found = magnitudes(block, none, none[0], np.array([[2.0, LARGE]]))
+        assert float(found[0]) == pytest.approx(names.value(wanted)), expression
     assert terms(block) is terms(block)
 
 
@@ -180,7 +160,7 @@ def test_the_worst_signal_is_the_one_with_the_largest_error_relative_to_its_magn
     assert 0.0 < run.rounding < 1e-7
 
 
-def test_rounding_is_told_from_a_wrong_formula(compiler, tmp_path):
+def test_rounding_is_distinguished_from_a_wrong_formula(compiler, tmp_path):
     """A belt at 1 m/s and a contact that changes over 1 um/s: the last bit of v is 0.06 of it."""
     v, N = Variable("v", "m/s"), Variable("N", "N", lower=0.0, upper=10.0)
     x = Variable("x", "m/s", start=1.0)
@@ -234,7 +214,7 @@ PULLS = ["p_1", "p_2", "p_3", "p_4"]
         (compensator(LuGre(), hold=(1e-5, 1e-3)), ["hold"]),
     ],
 )  # fmt: skip
-def test_modes_are_what_only_decisions_choose(block, wanted):
+def test_modes_are_determined_by_decisions_alone(block, wanted):
     names = CBlock(block, DOUBLE, guards=False).signals
     found = [n for n, mode in zip(names, modes(block), strict=True) if mode]
     assert found == wanted + [f"{reset}.{n}" for reset in block.resets for n in wanted]
@@ -265,7 +245,7 @@ def test_a_mode_that_ties_is_counted_and_a_wrong_mode_or_force_is_an_error(compi
         assert wrong.error > 0.1
         assert wrong.worst == worst
     many = in_float(tie(), np.random.default_rng(0).uniform(size=(1000, 1)))
-    assert many.error == 1.0  # of a tenth, not of one in a hundred
+    assert many.error == 1.0  # more than one step in a hundred differs
     assert not many.tied.any()
     found = verify(generate(tie(1.9), tmp_path, kit=False, real="float"))
     (check,) = found.checks

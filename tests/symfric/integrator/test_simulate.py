@@ -213,22 +213,15 @@ def test_a_long_run_runs_on_and_one_without_progress_stops(monkeypatch: pytest.M
 
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"t_end": 0.0}, r"expected t_end > t_start = 0 s, got 0 s"),
-    ({"t_end": np.nan}, r"t_end: expected a finite number"),
     ({"t_start": "soon"}, r"t_start: expected a finite number \[s\], got 'soon'"),
     ({"rtol": 0.0}, r"rtol: expected 1e-13 <= number <= 0.1, got 0"),
-    ({"rtol": 1.0}, r"rtol: expected 1e-13 <= number <= 0.1, got 1"),
     ({"backend": "matlab"}, r"backend: expected .*auto, .* got '?matlab"),
     ({"x0": {"vel": 1.0}}, r"model 'drive' x0: .* got vel"),
-    ({"x0": {"v": np.inf}}, r"drive.v: expected a finite number, got inf"),
     ({"u": {"torque": 1.0}}, r"model 'drive' u: expected one of force, got torque"),
     ({"p": {"m": 1.0}}, r"model 'drive' p: expected no names, got m"),
     ({"t_eval": [0.0, 0.5, 0.5]}, r"t_eval: expected increasing times in \[0, 1\] s"),
-    ({"t_eval": [0.0, 2.0]}, r"t_eval: expected increasing times in \[0, 1\] s"),
     ({"max_step": 0.0}, r"max_step: expected a number > 0 \[s\], got 0"),
-    ({"max_step": "fine"}, r"max_step: expected a number > 0 \[s\], got 'fine'"),
     ({"times": [0.5, 0.5]}, r"simulate: times: expected increasing times in \[0, 1\] s"),
-    ({"times": [0.5, 1.5]}, r"simulate: times: expected increasing times in \[0, 1\] s"),
-    ({"t_eval": []}, r"t_eval: expected increasing times"),
     ({"t_eval": [[0.0, 1.0]]}, r"t_eval: expected increasing times .* got \[\[0.0, 1.0\]\]"),
 ]
 

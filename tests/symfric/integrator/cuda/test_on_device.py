@@ -20,8 +20,7 @@ from fake_cupy import LAUNCH_ON_HOST, ON_HOST, FakeCupy
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Status, rabinowicz, simulate_many
 from symfric.emitter.c99 import DOUBLE, REALS
-from symfric.integrator.cuda.device import BLOCK, Device, DeviceError
-from symfric.integrator.cuda.kernel import Kernel, kernel_of
+from symfric.integrator.cuda.device import BLOCK, Device, DeviceError, Kernel, kernel_of
 from symfric.integrator.cuda.on_device import OnDevice
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
@@ -156,21 +155,20 @@ def with_events() -> Model:
     return replace(model, events=(Event("through", model.x[0].symbol),))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"model": with_events()}, "a model without events, got 'oscillator' with through; use"),
-        ({"executor": "processes"}, "no executor and no workers.*, got executor = 'processes'"),
-        ({"workers": 2}, "no executor and no workers.*, got workers = 2"),
-        ({"real": "half"}, "simulate_many: real: expected one of double, float, got half"),
-        ({"real": "float"}, "rtol: expected at least 1e-05 with real='float', got 1e-06"),
-        ({"real": "float", "backend": "auto"}, "expected double for this backend, got float"),
-    ],
-)
-def test_unsupported_arguments_are_refused(arguments: dict[str, Any], message: str) -> None:
-    given = {"model": oscillator(), "t_end": 1.0, "backend": "cuda"} | arguments
-    with pytest.raises(ValueError, match=message):
-        simulate_many(**given)
+REFUSED: list[tuple[dict[str, Any], str]] = [
+    ({"model": with_events()}, "a model without events, got 'oscillator' with through; use"),
+    ({"executor": "processes"}, "no executor and no workers.*, got executor = 'processes'"),
+    ({"workers": 2}, "no executor and no workers.*, got workers = 2"),
+    ({"real": "half"}, "simulate_many: real: expected one of double, float, got half"),
+    ({"real": "float"}, "rtol: expected at least 1e-05 with real='float', got 1e-06"),
+    ({"real": "float", "backend": "auto"}, "expected double for this backend, got float"),
+]
+
+
+def test_unsupported_arguments_are_refused() -> None:
+    for arguments, message in REFUSED:
+        with pytest.raises(ValueError, match=message):
+            simulate_many(**{"model": oscillator(), "t_end": 1.0, "backend": "cuda"} | arguments)
 
 
 def test_the_device_of_cupy(cupy: FakeCupy, monkeypatch: pytest.MonkeyPatch) -> None:
