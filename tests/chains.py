@@ -6,28 +6,25 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.multibody import (
-    Cylindrical,
-    Fixed,
-    Floating,
-    Joint,
-    JointFriction,
-    Mechanism,
-    Planar,
-    Prismatic,
-    Revolute,
-    Spherical,
-    Universal,
-)
+from symfric import multibody as mb
 from symfric.multibody.equations import Equations
 from symfric.multibody.prepare import Prepared
 
 Array = NDArray[np.float64]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-TREE = (Revolute, Prismatic, Cylindrical, Universal, Planar, Spherical, Fixed, Floating)
+TREE = (
+    mb.Revolute,
+    mb.Prismatic,
+    mb.Cylindrical,
+    mb.Universal,
+    mb.Planar,
+    mb.Spherical,
+    mb.Fixed,
+    mb.Floating,
+)
 
 
-def body(m: Mechanism, name: str, seed: int) -> None:
+def body(m: mb.Mechanism, name: str, seed: int) -> None:
     """An unsymmetric body with its centre of mass beside its origin and two skew frames."""
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(3, 3))
@@ -40,7 +37,7 @@ def body(m: Mechanism, name: str, seed: int) -> None:
         m.frame(f"{name}.{frame}", tuple(at), tuple(z), tuple(x))
 
 
-def begin(kind: type[Joint], seed: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def begin(kind: type[mb.Joint], seed: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Random coordinates and rates of a joint, those of Euler parameters as they must be."""
     q, qd = np.random.default_rng(seed + 100).normal(size=(2, len(kind.coordinates))) * 0.5
     if kind.quaternion is not None:
@@ -50,9 +47,9 @@ def begin(kind: type[Joint], seed: int) -> tuple[tuple[float, ...], tuple[float,
     return tuple(q.tolist()), tuple(qd.tolist())
 
 
-def chain(reverse: bool = False, gravity: float = 9.81) -> Mechanism:
+def chain(reverse: bool = False, gravity: float = 9.81) -> mb.Mechanism:
     """A body behind every kind of joint, with the ground first or every joint turned round."""
-    m = Mechanism("chain", gravity=(0.0, 0.0, -gravity))
+    m = mb.Mechanism("chain", gravity=(0.0, 0.0, -gravity))
     m.frame("ground.out", (0.1, 0.2, 0.3), (0.3, 0.4, 0.9), (1.0, 0.2, 0.1))
     last = "ground.out"
     for i, kind in enumerate(TREE):
@@ -130,11 +127,11 @@ def solve(eq: Equations, q: Array, qd: Array, rounds: int = 60) -> Solved:
     )
 
 
-def rod(friction: JointFriction | None = None, **start: float) -> Mechanism:
+def rod(friction: mb.JointFriction | None = None, **start: float) -> mb.Mechanism:
     """A rod on a hinge about y."""
-    m = Mechanism("rod")
+    m = mb.Mechanism("rod")
     m.body("rod", 2.0, (0.1, 0.1, 0.1))
     m.frame("ground.hinge", z=Y)
     m.frame("rod.hinge", at=(0.0, 0.0, 0.4), z=Y)
-    m.joint(Revolute("hinge", "ground.hinge", "rod.hinge", friction=friction, **start))
+    m.joint(mb.Revolute("hinge", "ground.hinge", "rod.hinge", friction=friction, **start))
     return m
