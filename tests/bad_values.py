@@ -114,12 +114,11 @@ class Door:
                 yield f"{self.name}({argument}={_text(value)})", partial(self.call, **arguments)
 
 
-def door(
-    call: Callable[..., Any], good: Mapping[str, Any] | None = None, name: str = "", /,
-    **bad: list[Any],
-) -> Door:  # fmt: skip
-    """Return a public function with its bad values by argument."""
-    return Door(name or getattr(call, "__qualname__", repr(call)), call, good or {}, bad)
+def door(call: Callable[..., Any], *about: str | Mapping[str, Any], **bad: list[Any]) -> Door:
+    """Return a public function with its bad values; `about` are its name and good arguments."""
+    names = [one for one in about if isinstance(one, str)] or [getattr(call, "__qualname__", "")]
+    good = [one for one in about if not isinstance(one, str)] or [{}]
+    return Door(names[0], call, good[0], bad)
 
 
 def _text(value: Any) -> str:

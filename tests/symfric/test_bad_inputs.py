@@ -50,6 +50,11 @@ def members(name: str) -> list[Any]:
     ]
 
 
+def some_parameter(*more: Any) -> list[Any]:
+    """A few values that are no parameter; all fields of laws and scenes share their checks."""
+    return [None, "0.1", NAN, *more]
+
+
 def doors_of_simulation() -> Iterator[Door]:
     model, driven = belt(), sf.drive(BrownMcPhee())
     common = {
@@ -151,15 +156,15 @@ def doors_of_a_trajectory() -> Iterator[Door]:
     yield door(
         run.integral, {"name": "v"}, name=choice(), times=[x for x in inside if x is not None]
     )
-    yield door(lambda name: run[name], {}, "Trajectory[]", name=choice())
+    yield door(lambda name: run[name], "Trajectory[]", name=choice())
     yield door(run.gradient, weights=values("v"))
     yield door(run.to_csv, path=[*path(), "/dev/null", "."])
-    yield door(lambda name: run.to_csv("a.csv", name), {}, "Trajectory.to_csv", name=choice())
+    yield door(lambda name: run.to_csv("a.csv", name), "Trajectory.to_csv", name=choice())
     yield door(run.to_json, path=[*path(), "/dev/null", "."])
-    yield door(lambda name: run.plot(name), {}, "Trajectory.plot", name=choice())
+    yield door(lambda name: run.plot(name), "Trajectory.plot", name=choice())
     yield door(run.plot, path=[*path(), "a.xyz", "."])
     yield door(run.animate, {"path": "a.gif"}, path=path())
-    yield door(lambda x: run.energy_balance(), {}, "Trajectory.energy_balance", x=[1])
+    yield door(lambda x: run.energy_balance(), "Trajectory.energy_balance", x=[1])
 
 
 def doors_of_models() -> Iterator[Door]:
@@ -226,11 +231,11 @@ def doors_of_models() -> Iterator[Door]:
 
 def doors_of_laws() -> Iterator[Door]:
     for kind in (ALL_LAWS | POPULATIONS).values():
-        bad: dict[str, list[Any]] = {}
+        bad, every = dict[str, list[Any]](), parameter if kind is LuGre else some_parameter
         for item in fields(kind):
             if "unit" in item.metadata:
                 more = [item.metadata["lower"] - 1.0, item.metadata["upper"] + 1.0]
-                bad[item.name] = parameter(*(x for x in more if abs(x) < INF))
+                bad[item.name] = every(*(x for x in more if abs(x) < INF))
             elif "choices" in item.metadata:
                 bad[item.name] = choice()
         yield door(kind, **bad)
@@ -274,8 +279,8 @@ def doors_of_laws() -> Iterator[Door]:
         obj=thing(LuGre),
         values=[*values("mu_s")[:8], *({"mu_s": x} for x in parameter(-1.0))],
     )
-    yield door(lambda name: sf.symbolise(LuGre(), name), {}, "symbolise", name=choice())
-    yield door(lambda x: sf.symbolise(x, "mu_s"), {}, "symbolise", x=thing(LuGre))
+    yield door(lambda name: sf.symbolise(LuGre(), name), "symbolise", name=choice())
+    yield door(lambda x: sf.symbolise(x, "mu_s"), "symbolise", x=thing(LuGre))
 
 
 def doors_of_scenes() -> Iterator[Door]:
@@ -284,7 +289,8 @@ def doors_of_scenes() -> Iterator[Door]:
         for item in fields(kind):
             if "unit" in item.metadata:
                 low = item.metadata["lower"]
-                bad[item.name] = parameter(*([low - 1.0] if low > -INF else []))
+                every = parameter if kind is Rabinowicz else some_parameter
+                bad[item.name] = every(*([low - 1.0] if low > -INF else []))
         yield door(kind, {"law": BrownMcPhee()}, name, **bad)
     for make in (sf.rabinowicz, sf.drive):
         yield door(
@@ -316,7 +322,7 @@ def doors_of_figures() -> Iterator[Door]:
     for name, make in FIGURES.items():
         yield door(make, {"law": LuGre()}, name, law=thing(LuGre), N=number(0.0, -1.0))
     data = compare([Coulomb()])
-    yield door(lambda name: data[name], {}, "FigureData[]", name=choice())
+    yield door(lambda name: data[name], "FigureData[]", name=choice())
     yield door(data.plot, path=[*path(), "a.xyz", "."])
 
 

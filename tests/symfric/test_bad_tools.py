@@ -70,7 +70,6 @@ def doors_of_mechanisms() -> Iterator[Door]:
 
     yield door(
         pendulum,
-        {},
         "Mechanism",
         name=[None, 3, "", "a b", Thing(), []],
         gravity=vectors((0, 0, True)),
@@ -79,7 +78,6 @@ def doors_of_mechanisms() -> Iterator[Door]:
     rows = vectors()
     yield door(
         part("body"),
-        {},
         "Body",
         name=[None, 3, "", "a b", "ground", Thing(), []],
         mass=parameter(0.0, -1.0),
@@ -88,7 +86,6 @@ def doors_of_mechanisms() -> Iterator[Door]:
     )
     yield door(
         part("frame"),
-        {},
         "Frame",
         place=[None, 3, "", "bob", "nobody.x", Thing(), "bob."],
         at=rows,
@@ -125,7 +122,6 @@ def doors_of_mechanisms() -> Iterator[Door]:
     springs = {"name": "s", "a": "ground.pivot", "b": "bob.pivot"}
     yield door(
         part("force", lambda **a: mb.SpringDamper(**springs | {"stiffness": 1.0} | a)),
-        {},
         "SpringDamper",
         name=[None, 3, "", "a b", Thing()],
         a=[None, 3, "nobody", Thing()],
@@ -136,7 +132,6 @@ def doors_of_mechanisms() -> Iterator[Door]:
     )
     yield door(
         part("force", lambda **a: mb.JointSpringDamper(**{"name": "s", "joint": "hinge"} | a)),
-        {},
         "JointSpringDamper",
         joint=[None, 3, "nobody", Thing()],
         stiffness=parameter(),
@@ -147,7 +142,6 @@ def doors_of_mechanisms() -> Iterator[Door]:
     motor = {"name": "p", "joint": "hinge", "motion": lambda t: t}
     yield door(
         part("constraint", lambda **a: mb.Gear(**gear | a)),
-        {},
         "Gear",
         a=[None, 3, "nobody", Thing()],
         ratio=parameter(0.0),
@@ -156,14 +150,12 @@ def doors_of_mechanisms() -> Iterator[Door]:
     motions += [lambda t: ca.SX.sym("a"), lambda t: ca.vertcat(t, t), lambda t: NAN]
     yield door(
         part("constraint", lambda **a: mb.PrescribedMotion(**motor | a)),
-        {},
         "PrescribedMotion",
         joint=[None, 3, "nobody", Thing()],
         motion=motions,
     )
     yield door(
         part("input"),
-        {},
         "Mechanism.input",
         name=[None, 3, "", "a b", Thing()],
         unit=[None, 3, Thing()],
@@ -172,7 +164,6 @@ def doors_of_mechanisms() -> Iterator[Door]:
     )
     yield door(
         part("build"),
-        {},
         "Mechanism.build",
         p=[3, "x", (3,), Thing(), [ca.SX.sym("a")]],
         formulation=choice(),
@@ -235,7 +226,7 @@ def doors_of_control() -> Iterator[Door]:
     )
     for make in (ocp.integral, ocp.at_end):
         yield door(make, expression=[None, *function()])
-    yield door(lambda w: ocp.TIME * w, {}, "Cost * weight", w=number())
+    yield door(lambda w: ocp.TIME * w, "Cost * weight", w=number())
     yield door(
         ocp.rest_to_rest,
         {"model": model, "distance": 0.1, "T": 1.0, "limit": 9.0},
