@@ -1,13 +1,12 @@
-"""Bring the last link of a six-joint arm to a place: three coordinates are given, six angles not.
+"""Move the last link of a six-joint arm to a point, with all joints at rest and free angles.
 
-Every joint rubs under the reaction of all links beyond it. The goal is a point in space and all
-joints at rest; which angles the arm has there is the optimiser's choice. On the way the link stays
-above a table.
+The friction of every joint depends on the reaction of all links beyond it. The optimiser chooses
+the six angles at the end. The link stays above a table.
 
-The cost adds the speeds of the joints to the torques: torques alone leave so much open that the
-minimum is flat. Friction stays smooth here, 0.05 m/s wide: six contacts, whose normal forces depend
-on each other, have too many modes to be distinguished. The loads of the bearings of the wrist pass
-zero, where their size has a kink; it is rounded over 0.5 N.
+The cost contains the speeds of the joints as well as the torques, because the minimum over the
+torques alone is flat. Friction is smooth over 0.05 m/s: the normal forces of the six contacts
+depend on each other, so there are too many modes to distinguish. The loads of the bearings of the
+wrist pass through zero, where their magnitude has a kink; it is smoothed over 0.5 N.
 
     python examples/arm_to_a_place.py [OUT]
 """
@@ -36,7 +35,7 @@ def effort(s: Signals) -> object:
 
 
 def problem() -> Problem:
-    """To the place within a second."""
+    """Move to the point within a second."""
     arm = smooth_model(Arm(BrownMcPhee(mu_s=0.15, mu_d=0.1, v_t=0.05)).model())
     return Problem(
         Phase(arm, T=1.0, end=PLACE | AT_REST),
@@ -48,15 +47,14 @@ def problem() -> Problem:
 
 
 def main(out: Path) -> None:
-    """Solve, print the angles that were chosen, and draw."""
+    """Solve, print the chosen angles, and draw."""
     best = solve(problem(), intervals=20, friction="smooth", tolerance=1e-2)
     table = Table("joint", "from [rad]", "to [rad]", "largest torque [N m]")
     for i in JOINTS:
         q, torque = best[f"q{i}"], best[f"tau{i}"]
         table.add_row(f"q{i}", f"{q[0]:+.3f}", f"{q[-1]:+.3f}", f"{abs(torque).max():.1f}")
-    console = Console()
-    console.print(table)
-    console.print(f"J = {best.cost:.3f}, verified: {best.verified}")
+    Console().print(table)
+    print(f"J = {best.cost:.3f}, verified: {best.verified}")
     best.plot(*(f"q{i}" for i in JOINTS), path=out / "arm_to_a_place.png")
 
 

@@ -2,11 +2,11 @@
 
     m v' = force - k x - F(v),   m = 2 kg,   F = 2 N sliding, 3 N to break away
 
-The feeder goes from -50 mm to 50 mm and back in 0.5 s, again and again: the motion is periodic.
-With a spring that suits the stroke the mass swings by itself, and the motor pays for friction
-alone; a spring bought from the shelf makes it work. Without friction k = m (2 pi / T)^2 takes no
-force at all. With friction, which resists both ways alike, the best spring is hardly another one,
-but the stroke has a price: 8 F^2 T / pi^2 if the motion stays harmonic, and a little less if not.
+The feeder moves periodically from -50 mm to 50 mm and back in 0.5 s. With the right spring the mass
+oscillates freely and the motor overcomes friction only. Without friction, the spring with k = m (2
+pi / T)^2 requires no force. With friction, which is equal in both directions, the best spring is
+nearly the same. The cost of the stroke is 8 F^2 T / pi^2 if the motion is harmonic, and slightly
+less otherwise.
 
     python examples/co_design.py [OUT]
 """
@@ -60,7 +60,7 @@ def problem() -> Problem:
 
 
 def main(out: Path) -> None:
-    """Compare the best spring with some others."""
+    """Compare the best spring with three others."""
     chosen = problem()
     best = solve(chosen)
     table = Table("spring [N/m]", "J [N^2 s]", "verified")
@@ -68,9 +68,8 @@ def main(out: Path) -> None:
     for k in (100.0, 250.0, 400.0):
         other = solve(replace(chosen, choose={}, p={"k": k}))
         table.add_row(f"{k:.2f}", f"{other.cost:.4f}", str(other.verified))
-    console = Console()
-    console.print(table)
-    console.print(f"in resonance: {RESONANCE:.2f} N/m, {PRICE:.4f} N^2 s")
+    Console().print(table)
+    print(f"in resonance: {RESONANCE:.2f} N/m, {PRICE:.4f} N^2 s")
     best.plot("x", "v", "force", path=out / "co_design.png")
 
 

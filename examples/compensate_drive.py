@@ -1,13 +1,12 @@
-"""Identify the friction of a drive, compensate it in C, and prove that C in the loop of the drive.
+"""Identify the friction of a drive, compensate it in C, and test the C in the control loop.
 
     m v' = force - F,   m = 1 kg,   F: bristles, 6 N to break away, 4 N while sliding
 
-LuGre's law is fitted to forces at constant speeds, which show its levels; the stiffness of the
-bristles, which they do not show, is guessed at half of what it is. The law becomes a compensator,
-and the C of it runs at 1 kHz with a cascaded position controller whose encoder counts micrometres
-and whose force comes one sample late: on a sine, and at rest after a step, where the integrator of
-the controller hunts. The plants have bristles, elasto-plastic bristles, or Coulomb friction with an
-exact break-away.
+LuGre is fitted to forces at constant speeds, which determine its levels. They do not determine the
+stiffness of the bristles; half of the true value is assumed. The compensator of this law runs as C
+at 1 kHz with a cascaded position controller, an encoder of 1 um and a delay of one sample. The loop
+follows a sine, and rests after a step, where the integrator of the controller causes hunting. The
+plants have bristles, elasto-plastic bristles, or exact Coulomb friction.
 
     python examples/compensate_drive.py [OUT]
 """
@@ -16,7 +15,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 
 from identification import Dataset, Fit, Points
 from symfric import ElastoPlastic, ExactCoulomb, Law, LuGre, drive
@@ -35,7 +33,7 @@ PLANTS: dict[str, Law] = {
 
 
 def identified() -> LuGre:
-    """LuGre's law from noisy forces at constant speeds, of bristles with a guessed stiffness."""
+    """Fit LuGre to noisy forces at constant speeds, with an assumed stiffness of the bristles."""
     speeds = np.geomspace(5e-4, 0.1, 20)
     v = np.concatenate([-speeds[::-1], speeds])
     exact = [float(TRUTH.sliding(float(s), 1.0, int(np.sign(s)))) for s in v]
@@ -43,31 +41,30 @@ def identified() -> LuGre:
     guess = {"sigma_0": 1e5, "sigma_1": 300.0}
     fit = Fit(Points(), "lugre", Dataset.of(v=v, F=F, points=True), fixed=guess).solve(throw=False)
     if not isinstance(fit.law, LuGre):
-        raise SystemExit("no law came out of the fit")
+        raise SystemExit("the fit has no law")
     return fit.law
 
 
 def main(out: Path) -> None:
-    """Fit, write the C, close the loops, print, and leave data and pictures in `out`."""
-    say = Console(width=100, highlight=False, markup=False).print
+    """Fit, write the C, simulate the loops, print, and write data and pictures into `out`."""
     law = identified()
-    say(
+    print(
         f"fitted: mu_s {law.mu_s:.3g}, mu_d {law.mu_d:.3g} N, v_s {1e3 * law.v_s:.3g} mm/s, ",
         end="",
     )
-    say(f"sigma_2 {law.sigma_2:.3g} N s/m")
+    print(f"sigma_2 {law.sigma_2:.3g} N s/m")
 
-    # the excess of break-away over sliding is left out: it is what makes an axis jump at rest
+    # compensating the excess of break-away over sliding would make the axis jump at rest
     block = compensator(law, v_blend=0.02, error_gain=CONTROLLER.kp, without=["stribeck"])
-    say(f"C: {verify(generate(block, out / 'c')).status}")
+    print(f"C: {verify(generate(block, out / 'c')).status}")
 
     for name, friction in PLANTS.items():
         plant = drive(friction, m=CONTROLLER.inertia, N=1.0)
         moving = close_loop(plant, sine(0.02, 0.5, 6.0), block, controller=CONTROLLER)
         resting = close_loop(plant, step(0.01, 20.0), block, controller=CONTROLLER)
         hunting = [1e6 * loop.hunting for loop in resting.loops.values()]
-        say(f"{name}: RMS error {moving.reduction('compensated'):.1f} times smaller, ", end="")
-        say("hunting {:.4g} um without, {:.2g} um with".format(*hunting))
+        print(f"{name}: RMS error {moving.reduction('compensated'):.1f} times smaller, ", end="")
+        print("hunting {:.4g} um without, {:.2g} um with".format(*hunting))
         if friction is TRUTH:
             moving.plot(path=out / "compensate_drive.png")
             resting.plot(path=out / "compensate_drive_at_rest.png")

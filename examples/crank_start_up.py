@@ -1,12 +1,11 @@
 """Start up a slider-crank from rest to two turns a second in half a second, with least effort.
 
-A crank of 80 mm drives a slider of 5 kg over a massless rod of 300 mm; the motor turns the crank.
-The bearing of the crank rubs under the reaction of all that: its normal force is an unknown of the
-equations, and a loop closes over the rod. Only the speed of the crank is named at the end; the
-slider follows.
+A crank of 80 mm drives a slider of 5 kg through a massless rod of 300 mm; a motor turns the crank.
+The friction of the bearing of the crank depends on its reaction, which is an unknown of the
+equations, and the rod closes a loop. The end condition is the speed of the crank.
 
-The load of the bearing passes near zero on the way, where its size has a kink: below `eps` = 0.5 N
-it is rounded off. The same text serves the machine without friction.
+The load of the bearing comes near zero, where its magnitude has a kink, which is smoothed over
+`eps` = 0.5 N. The same problem is solved without friction.
 
     python examples/crank_start_up.py [OUT]
 """
@@ -34,7 +33,7 @@ CRANK, ROD = 0.08, 0.3  # m
 
 
 def machine(mu: float) -> Model:
-    """In the plane of x and z; the crank stands up at the start."""
+    """Return the machine in the plane of x and z, with a vertical crank at the start."""
     law = BrownMcPhee(mu_s=1.3 * mu, mu_d=mu, v_t=1e-4)
     bearing = JointFriction(law, radius=0.05, length=0.1, eps=0.5) if mu else None
     m = Mechanism("slider_crank", gravity=(0.0, 0.0, -9.81))
@@ -54,7 +53,7 @@ def machine(mu: float) -> Model:
 
 
 def start_up(model: Model) -> Problem:
-    """From rest to speed with least effort."""
+    """Return the problem of starting with least effort."""
     return Problem(
         Phase(model, T=0.5, end={"crank_rate": SPEED}),
         integral(lambda s: s.torque**2),
@@ -63,7 +62,7 @@ def start_up(model: Model) -> Problem:
 
 
 def main(out: Path) -> None:
-    """Solve both, print what friction costs, and draw."""
+    """Solve with and without friction, print the costs, and draw."""
     table = Table("bearing", "J [(N m)^2 s]", "turned [rad]", "friction took [J]", "verified")
     for name, mu in (("smooth", 0.0), ("rough", 0.15)):
         best = solve(start_up(machine(mu)))

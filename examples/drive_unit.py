@@ -1,10 +1,10 @@
-"""Hand a drive with friction to another tool, as a Functional Mock-up Unit.
+"""Export a drive with friction to other tools as a Functional Mock-up Unit.
 
     m v' = force - F(v),   m = 1 kg,   F: 6 N to break away, 4 N while sliding
 
-The unit has the adaptive step inside and knows nothing of Python. Here a position controller
-samples it at 1 kHz, as a tool for co-simulation would: its force jumps every millisecond, and the
-unit does what `stepper` does in Python.
+The unit contains the adaptive integrator and does not need Python. A position controller samples it
+at 1 kHz, as in co-simulation: its force jumps every millisecond. The result is compared with that
+of `stepper` in Python.
 
     python examples/drive_unit.py [OUT]
 """
@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from symfric import LuGre, stepper
 from symfric.fmu import export_fmu, running
@@ -27,7 +26,7 @@ TIMES: Array = np.arange(0.0, END, H)
 
 
 def force(x: float, v: float, t: float) -> float:
-    """PD control to 10 cm, and back after a second."""
+    """PD control to 10 cm, and back after a second, in N."""
     goal = 0.1 if t < 1.0 else 0.0
     return float(np.clip(2000.0 * (goal - x) - 60.0 * v, -20.0, 20.0))
 
@@ -45,7 +44,7 @@ def in_unit(path: Path) -> tuple[Array, float]:
 
 
 def in_python(scene: Drive) -> Array:
-    """The same loop around the plant in Python."""
+    """Position at the samples, by the plant in Python."""
     plant = stepper(scene.model(), H, rtol=1e-8)
     rows: list[float] = []
     for t in TIMES.tolist():
@@ -60,11 +59,10 @@ def main(out: Path) -> None:
     law = LuGre(mu_s=6.0, mu_d=4.0, v_s=1e-2, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0)
     scene = Drive(law, m=1.0, N=1.0)
     unit = export_fmu(scene, out / "drive.fmu", rtol=1e-8, t_end=END)
-    say = Console(highlight=False, soft_wrap=True).print
-    say(str(unit))
+    print(unit)
     x, attempts = in_unit(unit.path)
     difference = float(np.abs(x - in_python(scene)).max())
-    say(f"1 kHz: {attempts / TIMES.size:.2f} attempts a sample, unit - Python {difference:.1e} m")
+    print(f"1 kHz: {attempts / TIMES.size:.2f} attempts a sample, unit - Python {difference:.1e} m")
     figure, (axes,) = panels(1)
     axes.plot(TIMES, 1e3 * x)
     title = "Drive with LuGre friction as a unit, PD at 1 kHz"

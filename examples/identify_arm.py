@@ -1,11 +1,11 @@
 """Friction in the joints of an arm under gravity, from angles and torques of two recorded motions.
 
-Each joint has its own law, and its bearing carries the reactions of all links beyond it: the normal
-force of the shoulder depends on what the elbow does. Nothing of that is measured. The balance
-of forces is solved for the reactions at every sample, friction included, and what is left of the
-torques is minimised over coefficients of friction, viscosities and the payload.
+Each joint has its own law, and its bearing carries the reactions of all links beyond it, so the
+normal force of the shoulder depends on the motion of the elbow. Reactions are not measured. The
+balance of forces with friction is solved for them at every sample. The fit minimises the residual
+torques over coefficients of friction, viscosities and the payload.
 
-The records are simulated, servos as springs and dampers: noise of 1e-5 rad and 0.05 N m.
+The records are simulated with servos as springs and dampers, with noise of 1e-5 rad and 0.05 N m.
 
     python examples/identify_arm.py [OUT]
 """
@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from identification import Dataset, Fit, InverseDynamics
 from symfric import simulate
@@ -38,7 +37,7 @@ STIFFNESS, DAMPING = 4000.0, 120.0  # N m/rad, N m s/rad of the servo
 
 
 def arm(servo: bool) -> Model:
-    """Three links with a payload; the torques are inputs, on top of a servo or alone."""
+    """Return three links with a payload; torques are inputs, in addition to a servo or alone."""
     p = {n: Variable(n, UNITS[n.split("_")[0]], start=x, lower=0.0) for n, x in TRUE.items()}
     m = Mechanism("arm", gravity=(0.0, 0.0, -9.81))
     m.frame("ground.tip", at=(0.0, 0.0, 0.5), z=UP)
@@ -61,7 +60,7 @@ def arm(servo: bool) -> Model:
 
 
 def recorded(seed: int, duration: float = 6.0, rate: float = 400.0) -> Dataset:
-    """Angles and torques while every joint follows sines, with noise."""
+    """Return noisy angles and torques of joints that follow sines."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(duration * rate) + 1) / rate
     waves = {name: 2 * np.pi * rng.uniform(0.15, 0.6, 3) for name in JOINTS}
@@ -86,13 +85,13 @@ def recorded(seed: int, duration: float = 6.0, rate: float = 400.0) -> Dataset:
 
 
 def main(out: Path) -> None:
-    """Fit two records together, from twice the values, and print them with the true values."""
+    """Fit two records from twice the true values, and print the values found."""
     start = {n: 2.0 * x for n, x in TRUE.items()}
     data = recorded(1) + recorded(2)
     found = Fit(InverseDynamics(), arm(servo=False), data, free=start).solve()
-    (console := Console()).print(str(found))
+    print(found)
     for name, true in TRUE.items():
-        console.print(f"{name}: {found.values[name]:.4g}, put in {true:g}")
+        print(f"{name}: {found.values[name]:.4g}, put in {true:g}")
     found.plot(out / "identify_arm.png")
 
 

@@ -1,12 +1,12 @@
-"""The motion that tells most of the friction of a drive, within its limits.
+"""The most informative motion of a drive about its friction, within limits.
 
     maximise  log det I(T)   subject to   |force| <= 20 N, |x| <= 0.1 m, |v| <= 1 m/s, 2 s
 
-I is Fisher's information of the mass and three parameters of Stribeck friction in positions with
-0.1 mm of noise, taken every 10 ms. It is an optimal control problem: `informative` carries the
-sensitivities and I along as states. Beside it stands the best sine of the same limits, simulated.
-The optimised motion is simulated, too: its miss is how far that is from the one whose
-errors are printed. The optimum is a local one: other sines to start from lead to others.
+I is the Fisher information about the mass and three parameters of Stribeck friction in positions
+with 0.1 mm of noise, sampled every 10 ms. In this optimal control problem, `informative` adds the
+sensitivities and I to the states. The result is compared with the best sine within the same limits,
+and is simulated; the printed miss is the difference of the simulation. The optimum is local: other
+initial sines lead to other optima.
 
     python examples/identify_excitation.py [OUT]
 """
@@ -31,7 +31,7 @@ TIMES = np.linspace(0.0, T, 401)
 
 
 def machine() -> Model:
-    """The drive as far as it is known before, with what a motion tells of it."""
+    """The drive with assumed parameters, and the information as a state."""
     friction = Stribeck(mu_s=6.0, mu_d=4.0, v_s=0.1, v_eps=0.05, sigma_2=8.0)
     model = drive(friction, m=2.0, N=1.0, free=FREE)
     return informative(model, FREE, {"x": 1e-4}, step=1e-2, aim=1.5e-3)
@@ -49,7 +49,7 @@ def best_sine(model: Model) -> Trajectory:
 
 
 def best_motion(model: Model, guess: Trajectory) -> Solution:
-    """The motion of the largest information, from a sine."""
+    """Return the motion with the largest information, starting from a sine."""
     problem = Problem(
         Phase(model, T=T),
         -at_end(lambda s: s.information),
@@ -64,7 +64,7 @@ def best_motion(model: Model, guess: Trajectory) -> Solution:
 
 
 def main(out: Path) -> None:
-    """Print the errors that both motions make possible, draw the better one."""
+    """Print the expected errors of both motions, and draw the optimised one."""
     model = machine()
     sine = best_sine(model)
     motion = best_motion(model, sine)

@@ -1,15 +1,15 @@
-"""Friction in a joint of an arm at low speed: a bristle against elements with memory.
+"""Friction in a joint of an arm at low speed: a bristle compared with elements with memory.
 
-Angle and friction torque of a joint that creeps to and fro (400 Hz). Both laws follow the measured
-velocity and are fitted to the first half of the record, from starts that the data give: levels from
-bins of the speed, stiffness from the branches after reversals, elements from a convex problem. The
-second half judges them. LuGre forgets at each reversal where it came from; generalised Maxwell-slip
-(GMS) with three elements does not.
+The record has angle and friction torque of a joint that moves slowly back and forth (400 Hz). Both
+laws are fitted to the first half of it under the measured velocity. Initial values are computed
+from the data: levels from bins of the speed, stiffness from the branches after reversals, elements
+from a convex problem. The second half validates them. LuGre has no memory of earlier reversals;
+generalised Maxwell-slip (GMS) with three elements has.
 
     python examples/identify_franka.py [OUT] [CSV]
 
-CSV has columns time, q7 and q7_tau_J_compensate; without it the record in ../shared/data is taken,
-and where there is none either, one that a law makes up.
+CSV has columns time, q7 and q7_tau_J_compensate. By default the record in ../shared/data is used,
+or a simulated one if there is none.
 """
 
 import sys
@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from identification.data.dataset import Dataset
 from identification.fit import Fit
@@ -30,7 +29,7 @@ UNITS = {"t": "s", "x": "rad", "F": "N m"}
 
 
 def made_up(path: Path) -> Path:
-    """A file like the measured one: GMS of three elements, 20 s to and fro, noise and offset."""
+    """Write a simulated file: GMS of three elements, 20 s back and forth, noise and offset."""
     t = np.arange(0.0, 20.0, 0.005)
     q = 0.65 + 0.15 * np.sin(2 * t) + 0.03 * np.sin(0.7 * t)
     elements = (Element(2e4, 0.4), Element(900.0, 0.4), Element(4.0, 0.2))
@@ -49,7 +48,7 @@ def made_up(path: Path) -> Path:
 
 
 def laws() -> dict[str, tuple[LuGre | GMS, list[str]]]:
-    """Laws, and what is fitted besides levels, viscous coefficient and Stribeck velocity."""
+    """Laws, and parameters fitted besides levels, viscous coefficient and Stribeck velocity."""
     gms = GMS(elements=tuple(Element(1e3, 1 / 3) for _ in range(3)), form="event")
     return {
         "LuGre": (LuGre(), ["delta"]),
@@ -58,15 +57,14 @@ def laws() -> dict[str, tuple[LuGre | GMS, list[str]]]:
 
 
 def main(out: Path, file: Path | None) -> None:
-    """Read, fit to one half, judge by the other, and leave pictures in `out`."""
+    """Read, fit to one half, validate by the other, and write pictures into `out`."""
     out.mkdir(parents=True, exist_ok=True)
-    console = Console(soft_wrap=True, highlight=False)
     if file is None:
         file = MEASURED if MEASURED.is_file() else made_up(out / "made_up.csv")
-    console.print(f"data: {file.name}")
+    print(f"data: {file.name}")
 
     record = Dataset.read(file, columns=COLUMNS, units=UNITS).thinned(2)[0]
-    v = np.gradient(record["x"], record.time)  # the encoder knows the path better than a tachometer
+    v = np.gradient(record["x"], record.time)  # more accurate than a tachometer
     si = {"v": "rad/s", "F": "N m"}
     first, rest = Dataset.of(t=record.time, v=v, F=record["F"], units=si, name="arm").split(0.5)
 
@@ -74,8 +72,8 @@ def main(out: Path, file: Path | None) -> None:
         fit = Fit(Points(offset=True), law, first, free=free, starts=3).solve(throw=False)
         fit.plot(out / f"{name}.png")
         (half,) = fit.validate(rest).values()
-        console.print(f"{name}: {half.rms:.4f} N m on the second half, {fit.status.name}")
-        console.print(str(fit), "", sep="\n", markup=False)
+        print(f"{name}: {half.rms:.4f} N m on the second half, {fit.status.name}")
+        print(fit, "", sep="\n")
 
 
 if __name__ == "__main__":

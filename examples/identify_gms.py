@@ -1,13 +1,13 @@
 """Generalised Maxwell-slip friction with ten elements from hysteresis and sliding.
 
-A slide moves for half a minute by some micrometres, with turns inside turns, and for four seconds
-up to five times the Stribeck velocity; the force has 1 % of noise. The elements start from a convex
-problem (which springs and sliders explain the force along the path), levels and Stribeck velocity
-from bins of the fast record; then both records are fitted together under the measured velocity,
-with all stiffnesses and shares free. Shares count by their ratios alone, so one of them is held.
-Elements begin to slip between samples. The residuals therefore have kinks, where a descent can
-stop short of the minimum; the fit uses eight starts, and its status reports such a stop.
-The last line compares the fitted with the true law on another path, in units of the noise.
+A slide moves for half a minute by a few micrometres with nested reversals, and for four seconds at
+up to five times the Stribeck velocity; the force has 1 % noise. Initial values of the elements
+solve a convex problem (springs and sliders that explain the force along the path); those of levels
+and Stribeck velocity follow from bins of the fast record. Then both records are fitted together
+under the measured velocity with all stiffnesses and shares free. Only ratios of shares matter, so
+one of them is fixed. Elements begin to slip between samples, so the residuals have kinks, at which
+a descent may stop before the minimum; the fit uses eight starts, and its status reports such a
+stop. The last line compares the fitted with the true law on another path, in units of the noise.
 
     python examples/identify_gms.py [OUT]
 
@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from identification.data.dataset import Dataset
 from identification.fit import Fit
@@ -35,7 +34,7 @@ KNOWN = {"mu_s": 1.05, "mu_d": 0.2, "v_s": 98 * UM, "delta": 0.78, "C": 24.0}
 
 
 def true_law() -> GMS:
-    """Ten elements that slip between 0.1 and 10 um."""
+    """Return ten elements that slip between 0.1 and 10 um."""
     rng = np.random.default_rng(3)
     radii = np.sort(np.geomspace(8e-8, 9e-6, COUNT) * np.exp(0.25 * rng.standard_normal(COUNT)))
     shares = rng.uniform(0.5, 1.5, COUNT) / COUNT
@@ -44,7 +43,7 @@ def true_law() -> GMS:
 
 
 def forces(law: Law, t: Array, x: Array) -> Array:
-    """Force along a path that goes straight from sample to sample, after sliding."""
+    """Return the force along a path of straight pieces between samples, after sliding."""
     v = np.diff(x) / np.diff(t)
     z: Any = law.steady_state(float(v[0]), 1.0)
     found = [law.force(float(v[0]), 1.0, z)]
@@ -69,7 +68,7 @@ def record(law: Law, path: tuple[Array, Array], name: str, seed: int) -> Dataset
 
 
 def main(out: Path) -> None:
-    """Make the records, fit, print, and leave a picture and a page in `out`."""
+    """Simulate the records, fit, print, and write a picture into `out`."""
     law, t = true_law(), np.arange(0.0, 4.0, 4e-3)
     fast = t, 80 * UM * np.sin(2 * np.pi * t) * np.sin(0.25 * np.pi * t + 0.5)
     data = record(law, slow((5, 0.05), (2, 0.13), (1, 0.31)), "slow", 0)
@@ -85,12 +84,11 @@ def main(out: Path) -> None:
     fit.plot(out / "gms.png")
 
     if fit.law is None:
-        raise SystemExit("no law came out of the fit")
+        raise SystemExit("the fit has no law")
     path = slow((4, 0.07), (3, 0.11), (0.7, 0.43))
     wrong = forces(fit.law, *path) - forces(law, *path)
-    console = Console(soft_wrap=True, highlight=False)
-    console.print(str(fit), markup=False)
-    console.print(f"another path: {np.sqrt(np.mean(wrong**2)) / NOISE:.3f} of the noise")
+    print(fit)
+    print(f"another path: {np.sqrt(np.mean(wrong**2)) / NOISE:.3f} of the noise")
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""Friction of a pendulum from its free swings: four records, released somewhere, one fit.
+"""Friction of a pendulum from four records of free swings with unknown release, in one fit.
 
     phi'' = -w^2 sin phi - c sign(phi') - d phi' - e |phi'| phi'
 
-An encoder of 4096 lines reads the angle at 100 Hz. Nobody knows where and how fast the pendulum was
-when a recording began, so each record has its own start values; Coulomb, viscous and air friction
-and the natural frequency are common to all. Swings from small angles tell dry friction from that of
-the air, which those from large angles cannot. A fifth record, which no fit has seen, is the judge.
+An encoder of 4096 lines reads the angle at 100 Hz. Position and velocity at the start of each
+record are unknown, so each record has its own start values; Coulomb, viscous and air friction and
+the natural frequency are common to all. Swings from small angles distinguish dry friction from air
+friction, unlike those from large angles. A fifth record, which is not fitted, validates the result.
 
     python examples/identify_pendulum.py [OUT]
 """
@@ -26,7 +26,7 @@ T = np.linspace(0.0, 12.0, 1201)
 
 
 def pendulum() -> Model:
-    """Angle from hanging; dry friction changes its sign within 1 mrad/s."""
+    """Return the model; dry friction is smoothed over 1 mrad/s."""
     phi = Variable("phi", "rad", nominal=0.1)
     v = Variable("rate", "rad/s", nominal=0.5)
     w = Variable("w", "rad/s", start=5.0, lower=0.0, doc="natural frequency")
@@ -40,7 +40,7 @@ def pendulum() -> Model:
 
 
 def recorded(model: Model) -> Dataset:
-    """Swings as the encoder sees them; recording begins a while after the release."""
+    """Return quantised swings, recorded from some time after the release on."""
     records: list[Dataset] = []
     for k, angle in enumerate(RELEASED):
         late = 0.13 + 0.1 * k
@@ -56,10 +56,10 @@ def main(out: Path) -> None:
     data = recorded(model)
     swings, other = Dataset(data.records[:4], "swings"), Dataset(data.records[4:], "other")
     fit = Fit(Shooting(), model, swings).solve()
-    sys.stdout.write(f"{fit}\n")
+    print(fit)
     for (record, signal), error in fit.validate(other).items():
         off, line = 1e3 * error.rms, 1e3 * LINE
-        sys.stdout.write(f"{record}, {signal}: off by {off:.2f} mrad; a line is {line:.2f} mrad\n")
+        print(f"{record}, {signal}: off by {off:.2f} mrad; a line is {line:.2f} mrad")
     fit.plot(out / "pendulum.png")
 
 

@@ -1,9 +1,9 @@
-"""Nine files as recorders leave them, each read in at most five lines, and friction found in all.
+"""Friction from nine typical files of recorders, each read in at most five lines.
 
-One shaft is simulated, J = 0.01 kg m^2 with Stribeck friction of 0.3 and 0.2 N m, and written as
-others have written theirs: rotary units, columns of spaces without a header, decimal commas below
-title lines, structs of MATLAB, a vector without times, a staircase of speeds, two recorders whose
-clocks are 0.8137 s apart.
+One shaft is simulated, J = 0.01 kg m^2 with Stribeck friction of 0.3 and 0.2 N m, and written in
+different formats: rotary units, columns separated by spaces without a header, decimal commas below
+title lines, structs of MATLAB, a vector without times, a staircase of speeds, and two recorders
+with clocks that differ by 0.8137 s.
 
     python examples/identify_raw_files.py [OUT]
 """
@@ -25,7 +25,7 @@ SHIFT = 0.8137
 
 
 def write(folder: Path) -> None:
-    """The nine files, from one motion at 1 kHz."""
+    """Write nine files of one motion at 1 kHz."""
     data = synthetic_drive_data(
         LAW, turning=True, m=0.01, offset=0.0, speeds=(0.5, 1.5, 5.0, 10.0),
         position_noise=1e-6, force_noise=1e-3, dwell=0.4,

@@ -3,8 +3,8 @@
     m v' = force - F(v),   m = 1 kg,   |force| <= 20 N,   F: 6 N to break away, 4 N while sliding
 
 Every 10 ms the states are measured, the motion of the next 0.2 s is optimised, and its first force
-is applied. The controller believes in friction that is smooth over 1 cm/s. The plants have other
-friction: a hundred times sharper, bristles, or none but the set-valued law of Coulomb.
+is applied. The model of the controller has friction that is smooth over 1 cm/s. The plants have
+different friction: a hundred times sharper, bristles, or the set-valued law of Coulomb.
 
     python examples/mpc_drive.py [OUT]
 """
@@ -25,12 +25,12 @@ Array = NDArray[np.float64]
 
 
 def rubbing(law: Law) -> Model:
-    """A mass of 1 kg; with N = 1 N the coefficients of the law are newtons."""
+    """Return a mass of 1 kg; with N = 1 N the coefficients of the law are in newtons."""
     return drive(law, m=1.0, N=1.0)
 
 
 def controller() -> Controller:
-    """20 intervals of 10 ms; "goal" is where to go."""
+    """Return a controller with 20 intervals of 10 ms and the parameter "goal"."""
     cost = track("x", "goal", 900.0) + track("v", 0.0, 1.0) + effort("force", 1e-3)
     cost += at_end(lambda s: 100 * (s.x - s.goal) ** 2 + s.v**2)
     model = rubbing(BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-2))
@@ -49,12 +49,12 @@ def plants() -> dict[str, Model]:
 
 
 def goal(t: Array) -> Array:
-    """10 cm forth and back, 1 s each."""
+    """Return 10 cm and 0 in turn, each for 1 s."""
     return np.where(np.mod(t, 2.0) < 1.0, 0.1, 0.0)
 
 
 def table(loops: dict[str, ClosedLoopRun]) -> Table:
-    """A row a plant; the controller knows the goal ahead, so the error is looked at in between."""
+    """Return a row for each plant, with errors in the middle between changes of the goal."""
     result = Table("plant", "error", "median [ms]", "worst [ms]", "not converged", "unreported")
     for name, loop in loops.items():
         k = np.flatnonzero(np.isclose(np.mod(loop.t, 1.0), 0.5))
@@ -78,9 +78,8 @@ def main(out: Path) -> None:
         for name, plant in plants().items()
     }
     check = made.to_c(out / "c").verify()
-    console = Console()
-    console.print(table(loops))
-    console.print(f"C: {check.status}, {check.bytes} bytes of memory")
+    Console().print(table(loops))
+    print(f"C: {check.status}, {check.bytes} bytes of memory")
     plot_loops(loops, ["x", "v", "force"], out / "mpc_drive.png")
     loops["Coulomb"].to_csv(out / "mpc_drive.csv")
 

@@ -1,10 +1,10 @@
-"""A control engineer's own Opti script, with LuGre inside: `flow` is the discrete plant.
+"""An Opti script with LuGre: `flow` is the discrete plant.
 
     min  sum of u_k^2 h,   0.1 m in 1 s from rest to rest,   |u| <= 20 N
 
-Bristles of 10 um are stiff: a transcription of the bare equations has to resolve them, `flow`
-takes ten implicit steps in every interval, with exact derivatives of any order. What Opti finds is
-then simulated with error control: that is the proof, not the word of the solver.
+Bristles of 10 um are stiff: a transcription of the equations would have to resolve them. `flow`
+takes ten implicit steps in every interval, with exact derivatives of any order. A simulation with
+error control verifies the result.
 """
 
 import sys
@@ -12,16 +12,14 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
-from rich.console import Console
 
 from symfric import Hold, LuGre, drive, flow, simulate
 
 GOAL, T, N = 0.1, 1.0, 50
-console = Console(highlight=False)
 
 
 def main(folder: Path) -> None:
-    """Solve, then prove."""
+    """Solve and verify."""
     model = drive(LuGre(), m=1.0, N=10.0)  # states x, v and the bristle z; input force
     advance = flow(model, steps=10)  # (x, u, p, h) -> x after h
 
@@ -40,10 +38,8 @@ def main(folder: Path) -> None:
 
     held = Hold(np.linspace(0.0, T, N + 1)[:-1], np.ravel(found.value(u)))
     run = simulate(model, T, u={"force": held}, x0={"x": 0.0, "v": 0.0, "z": 0.0})
-    console.print(f"{opti.stats()['iter_count']} iterations, J = {found.value(opti.f):.4f} N^2 s")
-    console.print(
-        f"simulated: {1e6 * (run.final['x'] - GOAL):+.1f} um, {1e6 * run.final['v']:+.1f} um/s"
-    )
+    print(f"{opti.stats()['iter_count']} iterations, J = {found.value(opti.f):.4f} N^2 s")
+    print(f"simulated: {1e6 * (run.final['x'] - GOAL):+.1f} um, {1e6 * run.final['v']:+.1f} um/s")
     folder.mkdir(parents=True, exist_ok=True)
     run.plot("x", "v", "force", "friction", path=folder / "opti_lugre.png")
 

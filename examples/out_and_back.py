@@ -1,10 +1,10 @@
-"""Move a mass with friction 1 m out and back in 2 s with least effort, and know what friction does.
+"""Move a mass with friction 1 m out and back in 2 s with least effort.
 
     m v' = force - F(v),   m = 1 kg,   |force| <= 20 N,   J = integral of force^2
 
-F is dry friction, 6 N to break away, 4 N while sliding, and 0.5 N s/m. Two phases of 1 s each; when
-the mass sticks, and for how long, is not prescribed: the solver finds it and re-simulates it.
-With exact Coulomb friction the mass turns without a rest, and the optimum is known on paper:
+F is dry friction, 6 N to break away, 4 N while sliding, and 0.5 N s/m. There are two phases of 1 s
+each. The solver finds when the mass sticks, and verifies it by simulation. With exact Coulomb
+friction the mass turns without a rest, and the optimum is known in closed form:
 
     J = 40 + 0.5 / (1 - 4 tanh(1/4)) N^2 s
 
@@ -26,7 +26,7 @@ FRICTION = BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-5, mu_v=0.5)  # with N = 1 N t
 
 
 def problem() -> Problem:
-    """Out, and back."""
+    """Return the problem of two phases."""
     stage = drive(FRICTION, m=1.0, N=1.0)
     out = Phase(stage, T=1.0, start={"x": 0.0, "v": 0.0}, end={"x": 1.0}, name="out")
     back = Phase(stage, T=1.0, end={"x": 0.0, "v": 0.0}, name="back")
@@ -43,12 +43,11 @@ def modes(best: Solution) -> Table:
 
 
 def main(out: Path) -> None:
-    """Solve, say what came out, and draw it."""
+    """Solve, print and draw."""
     best = solve(problem())
-    console = Console()
-    console.print(best.message)
-    console.print(modes(best))
-    console.print(f"J = {best.cost:.4f} N^2 s, exact {EXACT:.4f}; verified: {best.verified}")
+    print(best.message)
+    Console().print(modes(best))
+    print(f"J = {best.cost:.4f} N^2 s, exact {EXACT:.4f}; verified: {best.verified}")
     best.plot("x", "v", "force", path=out / "out_and_back.png")
 
 

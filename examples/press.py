@@ -1,11 +1,11 @@
-"""A crank press at constant speed: what friction in its bearings costs, and where.
+"""Friction losses in the bearings of a crank press at constant speed.
 
     crank 60 mm, connecting rod 250 mm, slide 40 kg, one stroke a second;
     the blank resists with 60 kN over the last 8 mm of the way down
 
-The friction of every bearing follows from its own reaction, which the blank multiplies for a
-moment. The usual estimate takes the mean load of a bearing for constant; the last column says how
-far it is off. Writes torque and losses over the angle of the crank, and a film of one stroke.
+The friction of every bearing depends on its reaction, which is many times larger while the blank
+resists. The usual estimate assumes the mean load of a bearing; the last column shows its result.
+Writes torque and losses over the angle of the crank, and an animation of one stroke.
 
     python examples/press.py [OUT]
 """
@@ -39,7 +39,7 @@ LAW = BrownMcPhee(mu_s=0.08, mu_d=0.06, v_t=1e-3)
 
 
 def blank(kin: Kinematics) -> tuple[Vector, Vector]:
-    """Resistance against the slide on its way down, over the last millimetres."""
+    """Return the resistance of the blank against the slide over the last millimetres."""
     (p, v) = kin.point("slide")
     near = (1 + ca.tanh((p[0] - (R + L - DEPTH)) / 5e-4)) / 2
     down = (1 + ca.tanh(v[0] / 0.01)) / 2
@@ -47,7 +47,7 @@ def blank(kin: Kinematics) -> tuple[Vector, Vector]:
 
 
 def press(friction: bool) -> Trajectory:
-    """One stroke, from the top."""
+    """Simulate one stroke from the top."""
     bearing = {
         name: JointFriction(LAW, radius=r) if friction else None for name, r in BEARINGS.items()
     }
@@ -69,7 +69,7 @@ def press(friction: bool) -> Trajectory:
 
 
 def main() -> None:
-    """Both presses, the table, the picture and the film."""
+    """Simulate both presses; print the table, write picture and animation."""
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
     smooth, real = press(friction=False), press(friction=True)
     table = Table("bearing", "lost a stroke [J]", "with the mean load [J]")
@@ -78,9 +78,8 @@ def main() -> None:
         mean = LAW.mu_d * real[f"{name}_N"].mean() * np.abs(real[f"{name}_slip"]).mean()
         table.add_row(name, f"{lost:.1f}", f"{mean * real.t[-1]:.1f}")
     work = [OMEGA * float(run.integral("drive_moment")[-1]) for run in (smooth, real)]
-    console = Console()
-    console.print(table)
-    console.print(f"work of the drive: {work[0]:.0f} J without friction, {work[1]:.0f} J with it")
+    Console().print(table)
+    print(f"work of the drive: {work[0]:.0f} J without friction, {work[1]:.0f} J with it")
     figure, (upper, lower) = panels(2)
     for k, (run, label) in enumerate(((smooth, "without friction"), (real, "with friction"))):
         upper.plot(np.degrees(run["crank"]), run["drive_moment"], label=label, **line(k))

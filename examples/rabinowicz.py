@@ -2,10 +2,10 @@
 
     m x'' = -k x - F(x' - v_belt),   m = 0.8 kg, k = 2.1 N/m, belt 0.1 m/s
 
-The belt carries the block until the spring overcomes static friction; then it slips back. With dry
-friction that is 0.15 static and 0.1 dynamic the period is 6.069995 s and the spring is stretched to
-0.570501 m at most. The smooth law creeps while it should stick, so it breaks away late; the bristle
-of LuGre has a Stribeck curve that begins to fall at once, so it breaks away early.
+The belt carries the block until the spring overcomes static friction; then the block slips back.
+With coefficients of dry friction of 0.15 (static) and 0.1 (dynamic) the period is 6.069995 s, and
+the largest elongation is 0.570501 m. The smooth law creeps instead of sticking and breaks away
+late. The Stribeck curve of LuGre falls from rest on, so it breaks away early.
 
     python examples/rabinowicz.py [OUT]
 """
@@ -22,7 +22,7 @@ from symfric.results.pictures import plot_trajectories
 
 
 def period(motion: Trajectory) -> float:
-    """Mean time between the passages of x through 0.4 m on the way back [s]."""
+    """Return the mean time between the passages of x through 0.4 m on the way back [s]."""
     x, t = motion["x"], motion.t
     k = np.flatnonzero((x[:-1] > 0.4) & (x[1:] <= 0.4))
     passages = t[k] + (t[k + 1] - t[k]) * (x[k] - 0.4) / (x[k] - x[k + 1])

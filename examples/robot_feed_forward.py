@@ -1,11 +1,11 @@
-"""A six-axis arm carries a load along a planned path; its C knows friction and load beforehand.
+"""Feed-forward control in C of a six-axis arm with friction and load along a planned path.
 
     tau = inverse dynamics(q, qd, qdd of the plan) + 300 (q_plan - q) + 10 (qd_plan - qd), scaled
 
-`inverse_dynamics_block` writes the forces that a motion needs as one C function; mass of the load
-and coefficients of friction are numbers in its parameter struct. Here the C that would go into the
-robot is loaded by the kit's own loader and computes the feed-forward for the simulated arm, whose
-bearings are pressed by what they carry. The same C with other numbers shows what each term is for.
+`inverse_dynamics_block` writes the forces of a motion as one C function; the mass of the load and
+the coefficients of friction are in its parameter struct. The generated loader runs the C of the
+robot, which computes the feed-forward for the simulated arm; the friction of its bearings depends
+on their loads. Runs with other parameters show the effect of each term.
 
     python examples/robot_feed_forward.py [OUT]
 """
@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
 
 from symfric import BrownMcPhee, stepper
 from symfric.codegen import generate, inverse_dynamics_block, verify
@@ -30,7 +29,7 @@ H, T, LOAD, JOINTS = 1e-3, 1.6, 2.0, 6
 MOVE = np.array([0.8, -0.5, 0.7, -1.2, 0.9, 1.5])
 STIFF, DAMP = 300.0, 10.0
 SHARE = np.array([1.0, 1.0, 0.6, 0.1, 0.05, 0.01])
-"""Of stiffness and damping in each joint: as its inertia."""
+"""Factors of stiffness and damping of the joints, similar to their inertias."""
 
 CARRIED: dict[str, Any] = {"payload_m": LOAD, "payload_c": [0.04, 0.0, 0.0]}
 SMOOTH: dict[str, Any] = {"mu_s": [0.0] * JOINTS, "mu_d": [1e-12] * JOINTS}
@@ -43,7 +42,7 @@ CASES = {
 
 
 def plan(start: Array) -> tuple[Array, Array, Array]:
-    """There and back by polynomials of fifth order, shape (samples, joints) each."""
+    """Return q, qd and qdd by polynomials of fifth order, shape (samples, joints) each."""
     s = np.arange(0.0, T, H) / (T / 2)
     s, way = np.minimum(s, 2 - s), np.where(s <= 1, 1.0, -1.0)
     shape = s**3 * (10 - 15 * s + 6 * s * s)
@@ -53,7 +52,7 @@ def plan(start: Array) -> tuple[Array, Array, Array]:
 
 
 def feed_forward(kit: Any, numbers: dict[str, Any], motion: tuple[Array, Array, Array]) -> Array:
-    """Torques of the C for the plan, shape (samples, joints)."""
+    """Return torques of the C for the plan, shape (samples, joints)."""
     if not numbers:
         return np.zeros_like(motion[0])
     inputs = {
@@ -66,11 +65,11 @@ def feed_forward(kit: Any, numbers: dict[str, Any], motion: tuple[Array, Array, 
 
 
 def main(out: Path) -> None:
-    """Write the C, let the arm follow its plan in all cases side by side, show the errors."""
+    """Write the C, simulate the arm in all cases as a batch, and show the errors."""
     arm = Arm(BrownMcPhee(), load=LOAD)
     block = inverse_dynamics_block(Arm(BrownMcPhee()).mechanism(), payload="link6")
     made = generate(block, out / "c", real=("double", "float"))
-    Console().print(f"C: {verify(made).status}")
+    print(f"C: {verify(made).status}")
     sys.path.insert(0, str(out / "c"))
     kit = import_module("arm_ctypes")
 
@@ -88,7 +87,7 @@ def main(out: Path) -> None:
     t, off = H * np.arange(len(q)), 1e3 * np.linalg.norm(np.array(errors), axis=2)
     figure, (axes,) = panels(1, height=2.8)
     for i, name in enumerate(CASES):
-        Console().print(f"{name}: {np.sqrt(np.mean(off[:, i] ** 2)):.3f} mrad rms")
+        print(f"{name}: {np.sqrt(np.mean(off[:, i] ** 2)):.3f} mrad rms")
         axes.semilogy(t, off[:, i], label=name, **line(i))
     axes.set(xlabel="t [s]", ylabel="error of all joints [mrad]", ylim=(1e-3, None))
     axes.legend()

@@ -1,11 +1,11 @@
-"""Swing up the pendulum on a cart: free time, a motor that is slow, and walls on both sides.
+"""Swing up a pendulum on a cart in free time, with a slow motor and walls on both sides.
 
     cart 1 kg on a rail with friction (1.5 N sliding, 2.2 N to break away, 0.1 N s/m),
     bob 0.3 kg on a massless rod of 0.5 m;  |force| <= 20 N,  |d force / dt| <= 400 N/s
 
-The cost is the effort and 5 a second. The force has a bounded rate, so that it is continuous; the
-bob must not hit the walls at 0.4 m to the left and right, which is a condition on the path of a
-point of the mechanism and not on one of its coordinates.
+The cost is the effort plus 5 per second. The rate of the force is bounded, so the force is
+continuous. The bob must not hit the walls at 0.4 m to the left and right; this condition refers to
+a point of the mechanism, which is not one of its coordinates.
 
     python examples/swing_up.py [OUT]
 """
@@ -21,7 +21,7 @@ from ocp import TIME, Free, Phase, Problem, integral, solve
 from symfric import BrownMcPhee, Model
 from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prismatic, Revolute
 
-POINT = (1e-6, 1e-6, 1e-6)  # inertia of what is as good as a point [kg m^2]
+POINT = (1e-6, 1e-6, 1e-6)  # inertia, nearly that of a point [kg m^2]
 RAIL = BrownMcPhee(mu_s=2.2, mu_d=1.5, v_t=1e-5, mu_v=0.1)
 WALL = 0.4
 HANGING = {"x": 0.0, "theta": 0.0, "x_rate": 0.0, "theta_rate": 0.0}
@@ -29,7 +29,7 @@ UPRIGHT = HANGING | {"theta": pi}
 
 
 def cart_pole() -> Model:
-    """A slide along x with a hinge on it, about -y so that the bob hangs at theta = 0."""
+    """Return a slide along x with a hinge about -y; the bob hangs at theta = 0."""
     m = Mechanism("cart_pole", gravity=(0.0, 0.0, -9.81))
     m.body("cart", 1.0, POINT)
     m.body("bob", 0.3, POINT)
@@ -47,7 +47,7 @@ def cart_pole() -> Model:
 
 
 def problem() -> Problem:
-    """From hanging to upright, in whatever time is worth its price."""
+    """Return the problem from hanging to upright, with a cost of time."""
     return Problem(
         Phase(cart_pole(), T=Free(1.0, 4.0), start=HANGING, end=UPRIGHT),
         integral(lambda s: s.force**2) + 5.0 * TIME,
@@ -63,11 +63,10 @@ def main(out: Path) -> None:
     table = Table("mode", "from [s]", "to [s]")
     for mode in best.modes.get("x", ()):
         table.add_row(mode.kind, f"{mode.begin:.4f}", f"{mode.end:.4f}")
-    console = Console()
-    console.print(table)
+    Console().print(table)
     reach = max(abs(best["bob_x"]))
-    console.print(f"J = {best.cost:.2f} in {best.T:.3f} s, bob within {reach:.3f} m")
-    console.print(f"verified: {best.verified}")
+    print(f"J = {best.cost:.2f} in {best.T:.3f} s, bob within {reach:.3f} m")
+    print(f"verified: {best.verified}")
     best.plot("x", "theta", "bob_x", "force", path=out / "swing_up.png")
 
 

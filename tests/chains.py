@@ -4,27 +4,35 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
-from symfric import multibody as mb
+from symfric.multibody import (
+    Cylindrical,
+    Fixed,
+    Floating,
+    Joint,
+    JointFriction,
+    Mechanism,
+    Planar,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+)
 from symfric.multibody.equations import Equations
 from symfric.multibody.prepare import Prepared
 
 Array = NDArray[np.float64]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-TREE = (
-    mb.Revolute,
-    mb.Prismatic,
-    mb.Cylindrical,
-    mb.Universal,
-    mb.Planar,
-    mb.Spherical,
-    mb.Fixed,
-    mb.Floating,
+in_both = pytest.mark.parametrize("formulation", ["joint", "absolute"])
+in_joint_coordinates_first = pytest.mark.parametrize(
+    "formulation", ["joint", pytest.param("absolute", marks=pytest.mark.slow)]
 )
+TREE = (Revolute, Prismatic, Cylindrical, Universal, Planar, Spherical, Fixed, Floating)
 
 
-def body(m: mb.Mechanism, name: str, seed: int) -> None:
+def body(m: Mechanism, name: str, seed: int) -> None:
     """An unsymmetric body with its centre of mass beside its origin and two skew frames."""
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(3, 3))
@@ -37,7 +45,7 @@ def body(m: mb.Mechanism, name: str, seed: int) -> None:
         m.frame(f"{name}.{frame}", tuple(at), tuple(z), tuple(x))
 
 
-def begin(kind: type[mb.Joint], seed: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def begin(kind: type[Joint], seed: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Random coordinates and rates of a joint, those of Euler parameters as they must be."""
     q, qd = np.random.default_rng(seed + 100).normal(size=(2, len(kind.coordinates))) * 0.5
     if kind.quaternion is not None:
@@ -47,9 +55,9 @@ def begin(kind: type[mb.Joint], seed: int) -> tuple[tuple[float, ...], tuple[flo
     return tuple(q.tolist()), tuple(qd.tolist())
 
 
-def chain(reverse: bool = False, gravity: float = 9.81) -> mb.Mechanism:
+def chain(reverse: bool = False, gravity: float = 9.81) -> Mechanism:
     """A body behind every kind of joint, with the ground first or every joint turned round."""
-    m = mb.Mechanism("chain", gravity=(0.0, 0.0, -gravity))
+    m = Mechanism("chain", gravity=(0.0, 0.0, -gravity))
     m.frame("ground.out", (0.1, 0.2, 0.3), (0.3, 0.4, 0.9), (1.0, 0.2, 0.1))
     last = "ground.out"
     for i, kind in enumerate(TREE):
@@ -127,11 +135,23 @@ def solve(eq: Equations, q: Array, qd: Array, rounds: int = 60) -> Solved:
     )
 
 
-def rod(friction: mb.JointFriction | None = None, **start: float) -> mb.Mechanism:
+def rod(friction: JointFriction | None = None, **start: float) -> Mechanism:
     """A rod on a hinge about y."""
-    m = mb.Mechanism("rod")
-    m.body("rod", 2.0, (0.1, 0.1, 0.1))
-    m.frame("ground.hinge", z=Y)
-    m.frame("rod.hinge", at=(0.0, 0.0, 0.4), z=Y)
-    m.joint(mb.Revolute("hinge", "ground.hinge", "rod.hinge", friction=friction, **start))
+    m = Mechanism("rod")
+    at = {"to": (0.0, 0.0, 0.4), "z": Y}
+    attach(m, Revolute, "hinge", "rod", mass=2.0, J=0.1, friction=friction, **at, **start)
     return m
+
+
+def attach(
+    m: Mechanism, kind: type[Joint], name: str, child: str, parent: str = "ground", *,
+    mass: float = 1.0, J: object = 1.0, com: tuple[float, ...] = (0.0, 0.0, 0.0),
+    at: tuple[float, ...] = (0.0, 0.0, 0.0), to: tuple[float, ...] = (0.0, 0.0, 0.0),
+    z: tuple[float, ...] = Z, x: tuple[float, ...] | None = None, **more: object,
+) -> None:  # fmt: skip
+    """Add a joint with frames of the given axes on both bodies, and its child if it is new."""
+    if child not in [b.name for b in m.bodies]:
+        m.body(child, mass, (J, J, J) if isinstance(J, float) else J, com)
+    for place, position in ((f"{parent}.{name}", at), (f"{child}.{name}", to)):
+        m.frame(place, position, z, x)
+    m.joint(kind(name, f"{parent}.{name}", f"{child}.{name}", **more))

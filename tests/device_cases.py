@@ -67,6 +67,7 @@ CASES: dict[str, tuple[Callable[[], Model], Any, dict[str, Any]]] = {
     "friction jams in one": (
         wedge, 1e-3, {"x0": {"x": 0.0, "phi": np.arctan(WEDGES), "x_rate": 1.0, "phi_rate": 0.0}},
     ),
+    "too many steps in one": (oscillator, 1.0, {"p": {"k": [1.0, 1e8, 4.0]}, "max_steps": 1000}),
     "some fail": (
         explosive, 1.0, {"p": {"p": [0.1, 2.0, 0.5, 4.0, 0.0]}, "t_eval": [0.1, 1.0]},
     ),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.compiled.compiler import load
-from symfric.integrator.cuda.kernel import AFTER, BEFORE, NAME
+from symfric.integrator.cuda.device import AFTER, BEFORE, NAME
 
 ON_HOST = """#include <math.h>
 #include <stdbool.h>

@@ -15,14 +15,6 @@ LIGHT = 1e-6
 """Moment of inertia of a slender rod about its own axis [kg m^2]; the library has zero."""
 
 
-def pendulum() -> Mechanism:
-    """A point mass on a massless rod, from rest on the left at the height of the pivot."""
-    m = Mechanism("pendulum", gravity=(0.0, -G, 0.0))
-    m.body("bob", 1.0, (1e-12, 1e-12, 1e-12), com=(1.0, 0.0, 0.0))
-    m.joint(Revolute("phi", "ground", "bob", start=pi))
-    return m
-
-
 def four_bars(n: int) -> Mechanism:
     """n loops of slender rods, all square at the start, that move to the right at 1 m/s."""
     m = Mechanism("four_bars", gravity=(0.0, -G, 0.0))

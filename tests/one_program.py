@@ -59,6 +59,9 @@ class Stepper:
         return dict(zip(self.block.outputs, self.y.tolist(), strict=True))
 
 
+LIMITED = ("quarter_car_general", "rate_and_state", "rate_and_state, slip")
+"""Laws without a value for every argument: a stroke beyond the damper's length, exp of any age."""
+
 STRICT = ("-std=c99", "-ffp-contract=off", *WARNINGS, "-Werror")
 UNDEFINED = ("-O0", "-fsanitize=undefined", "-fno-sanitize-recover=all")
 

@@ -1,11 +1,11 @@
-"""A model for acados: the names it wants, and the functions that it would generate, checked.
+"""A model for acados: its fields, and a check of the functions that acados would generate.
 
     x' = f(x, u, p),   its forward variational equations Sx' = df/dx Sx, Su' = df/dx Su + df/du
 
-acados has no wheel; where `acados_template` is installed the model is its own class, elsewhere a
-stand-in with the same fields. Either way the C that acados would have CasADi write is written,
-compiled and compared with the friction law. Take a smooth law: integrators of fixed steps, as
-acados has them, must resolve v_t, or the bristles of LuGre (sim_method_num_steps).
+acados has no wheel. If `acados_template` is installed, the model is an AcadosModel, else an object
+with the same fields. In both cases the C that CasADi writes for acados is compiled and compared
+with the friction law. Use a smooth law: the fixed steps of the integrators of acados must resolve
+v_t, or the bristles of LuGre (sim_method_num_steps).
 """
 
 from importlib.util import find_spec
@@ -15,7 +15,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from rich.console import Console
 
 from symfric import BrownMcPhee, Model, drive
 
@@ -23,7 +22,7 @@ OUT = Path("out")
 
 
 def acados_model(model: Model) -> Any:
-    """The fields of an AcadosModel from an explicit model without events."""
+    """Return an AcadosModel of an explicit model without events."""
     if model.ode is None or model.z or model.events:
         raise ValueError(f"acados_model: expected an explicit model without events: {model.name}")
     if find_spec("acados_template"):
@@ -41,7 +40,7 @@ def acados_model(model: Model) -> Any:
 
 
 def functions(m: Any) -> list[ca.Function]:
-    """expl_ode_fun and expl_vde_forw, as acados asks CasADi for them."""
+    """Return expl_ode_fun and expl_vde_forw, as acados generates them with CasADi."""
     nx, nu = m.x.numel(), m.u.numel()
     Sx, Su = ca.SX.sym("Sx", nx, nx), ca.SX.sym("Su", nx, nu)
     vdeX = ca.jtimes(m.f_expl_expr, m.x, Sx)
@@ -52,33 +51,28 @@ def functions(m: Any) -> list[ca.Function]:
 
 
 def compiled(function: ca.Function, folder: Path) -> ca.Function:
-    """The same function from generated and compiled C."""
+    """Return the function from generated and compiled C."""
     code = ca.CodeGenerator(f"{function.name()}.c")
     code.add(function)
     source = code.generate(f"{folder}/")
     return ca.external(function.name(), ca.Importer(source, "shell", {"compiler": "cc"}))
 
 
-console = Console(highlight=False)
-
-
 def main() -> None:
-    """Write, compile, compare."""
+    """Write, compile and compare."""
     OUT.mkdir(exist_ok=True)
     law = BrownMcPhee(v_t=5e-3)
     m = acados_model(drive(law, m=1.0, N=10.0))
     x, u, p = np.array([0.0, 2e-3]), np.array([1.0]), np.zeros(0)
     ode, vde = functions(m)
     rate = compiled(ode, OUT)(x, u, p)
-    console.print(
+    print(
         f"acceleration {float(rate[1]):.6f} m/s^2, by hand {1.0 - float(law.force(2e-3, 10.0)):.6f}"
     )
     _, vdeX, vdeU = compiled(vde, OUT)(x, np.eye(2), np.zeros((2, 1)), u, p)
     h = 1e-8
     slope = (float(law.force(2e-3 + h, 10.0)) - float(law.force(2e-3 - h, 10.0))) / (2 * h)
-    console.print(
-        f"da/dv {float(vdeX[1, 1]):.4f} 1/s, by differences {-slope:.4f}; da/du {float(vdeU[1])}"
-    )
+    print(f"da/dv {float(vdeX[1, 1]):.4f} 1/s, by differences {-slope:.4f}; da/du {float(vdeU[1])}")
 
 
 if __name__ == "__main__":

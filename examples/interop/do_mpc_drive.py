@@ -1,17 +1,16 @@
-"""Receding horizon in do-mpc: it plans with a smooth law, the plant is symfric's stepper.
+"""A controller in do-mpc that plans with a smooth law; the plant is symfric's stepper.
 
     min  sum of 1e4 (x - r)^2 + u^2 over 25 steps of 20 ms,   |u| <= 20 N
 
 The plan needs friction that is smooth on the scale of its steps; plans with bristles at rest do not
-converge. The plant is as sharp as it is: bristles, 20 % more friction, adaptive steps inside that
-hold the input. Needs do-mpc (pip install do-mpc).
+converge. The plant has bristles, 20 % more friction, and adaptive steps under a held input. Needs
+do-mpc (pip install do-mpc).
 """
 
 import warnings
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from symfric import BrownMcPhee, ElastoPlastic, drive, flow, stepper
 
@@ -23,7 +22,7 @@ H, GOAL = 0.02, 0.1
 
 
 def controller() -> Any:
-    """Build the controller as users of do-mpc do; the right-hand side is one call of `flow`."""
+    """Return a controller of do-mpc; its right-hand side is a call of `flow`."""
     believed = drive(BrownMcPhee(v_t=5e-3), m=1.0, N=10.0)
     model = do_mpc.model.Model("discrete", "MX")
     x = model.set_variable("_x", "x", (len(believed.x), 1))
@@ -42,20 +41,15 @@ def controller() -> Any:
     return mpc
 
 
-console = Console(highlight=False)
-
-
 def main() -> None:
-    """One second in closed loop."""
+    """Simulate one second in closed loop."""
     mpc = controller()
     plant = stepper(drive(ElastoPlastic(mu_s=0.18, mu_d=0.12), m=1.0, N=10.0), dt=H)
     for _ in range(50):
         force = float(mpc.make_step(np.array(plant.x[:2])[:, None])[0, 0])
         plant.step(force)
-    console.print(
-        f"after {plant.t:.1f} s: {1e3 * (plant.x[0] - GOAL):+.3f} mm from the goal,", end=" "
-    )
-    console.print(f"{1e3 * plant.x[1]:+.3f} mm/s")
+    print(f"after {plant.t:.1f} s: {1e3 * (plant.x[0] - GOAL):+.3f} mm from the goal,", end=" ")
+    print(f"{1e3 * plant.x[1]:+.3f} mm/s")
 
 
 if __name__ == "__main__":

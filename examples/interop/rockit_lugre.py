@@ -1,24 +1,22 @@
-"""The same move in rockit: `set_next` takes `flow`, and `set_der` any law's right-hand side.
+"""The move of `opti_lugre` in rockit: `set_next` takes `flow`, `set_der` a right-hand side.
 
     min  sum of u_k^2 h,   0.1 m in 1 s from rest to rest,   |u| <= 20 N
 
-With `set_der` rockit writes its own collocation of the bristles; with `set_next` the plant is the
+With `set_der` rockit transcribes the bristles by collocation; with `set_next` the plant is the
 implicit step of symfric. Needs rockit (pip install rockit-meco).
 """
 
 import casadi as ca
 import numpy as np
 import rockit  # pyright: ignore[reportMissingImports]
-from rich.console import Console
 
 from symfric import Hold, LuGre, drive, flow, simulate
 
 GOAL, T, N = 0.1, 1.0, 50
-console = Console(highlight=False)
 
 
 def main() -> None:
-    """Solve both ways, then prove both."""
+    """Solve in both ways and verify."""
     model = drive(LuGre(), m=1.0, N=10.0)
     for way in ("set_next", "set_der"):
         ocp = rockit.Ocp(T=T)
@@ -43,9 +41,7 @@ def main() -> None:
         held = Hold(np.linspace(0.0, T, N + 1)[:-1], controls)
         run = simulate(model, T, u={"force": held}, x0={"x": 0.0, "v": 0.0, "z": 0.0})
         miss = 1e6 * (run.final["x"] - GOAL)
-        console.print(
-            f"{way}: J = {np.sum(controls**2) * T / N:.4f} N^2 s, simulated {miss:+.1f} um"
-        )
+        print(f"{way}: J = {np.sum(controls**2) * T / N:.4f} N^2 s, simulated {miss:+.1f} um")
 
 
 if __name__ == "__main__":

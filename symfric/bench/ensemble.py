@@ -12,7 +12,7 @@ from symfric.integrator import Ensemble, simulate_many
 from symfric.integrator.cuda.device import Device, DeviceError
 from symfric.integrator.equations.initial import first_guess, first_step, smallest_step
 from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.many.program import program
+from symfric.integrator.many.members import program
 from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import built

@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import asin, e, exp, log, pi
+from math import asin, exp, pi
 from pathlib import Path
 from typing import Any, final
 
@@ -90,16 +90,13 @@ Levels = Callable[[Friction, float], Mapping[str, float]]
 
 def _of_bliman(f: Friction, _: float) -> Mapping[str, float]:
     """Return mu_1 and mu_2 such that mu_1 - mu_2 is mu_d and the peak is mu_s."""
-    eta = BlimanSorine().eta
-
-    def peak(mu_2: float) -> float:
-        mu_1 = f.mu_d + mu_2
-        s = eta / (1 - eta) * log(mu_1 / (eta * mu_2))
-        return mu_1 * (1 - e ** (-s / eta)) - mu_2 * (1 - e**-s) - f.mu_s
-
     if f.mu_s <= f.mu_d:
         return {"mu_1": f.mu_d, "mu_2": 0.0}
-    mu_2 = float(brentq(peak, 1e-6 * f.mu_d, 1e6 * f.mu_d))  # pyright: ignore[reportArgumentType]
+
+    def missing(mu_2: float) -> float:
+        return float(BlimanSorine(f.mu_d + mu_2, mu_2).static_level(1.0)) - f.mu_s  # pyright: ignore[reportArgumentType]
+
+    mu_2 = float(brentq(missing, 1e-6 * f.mu_d, 1e6 * f.mu_d))  # pyright: ignore[reportArgumentType]
     return {"mu_1": f.mu_d + mu_2, "mu_2": mu_2}
 
 

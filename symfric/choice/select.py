@@ -1,18 +1,14 @@
 """Choice of a law: candidates run in the user's machine and are ranked by work at equal error."""
 
-import csv
 import json
-import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields
 from math import isfinite
-from multiprocessing import get_all_start_methods, get_context
-from multiprocessing.connection import wait
-from multiprocessing.context import ForkProcess
+from multiprocessing import get_all_start_methods
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, cast, final
+from typing import TYPE_CHECKING, Any, final
 
 from symfric.choice.continuation import RUN
 from symfric.choice.friction import Friction
@@ -22,7 +18,8 @@ from symfric.choice.nature import forms, needed
 from symfric.choice.ranking import FAILED, Ranking, Row, lines, ordered
 from symfric.figures.regularisation import Measure, machine_of
 from symfric.foundation import checks
-from symfric.foundation.files import write_text, written
+from symfric.foundation.files import write_table, write_text
+from symfric.foundation.workers import Crashed, outcomes
 from symfric.integrator.equations.inputs import Input
 from symfric.laws import ALL_LAWS, BrownMcPhee, Law
 from symfric.laws.base.law import check_law
@@ -72,10 +69,7 @@ class Choice(Ranking):
     def to_csv(self, path: str | Path) -> None:
         """Write the table as CSV, with one line per law."""
         rows = self.table
-        with written(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-            sheet = csv.DictWriter(file, fieldnames=list(rows[0]) if rows else ["law"])
-            sheet.writeheader()
-            sheet.writerows(rows)
+        write_table(path, rows[0] if rows else ["law"], (row.values() for row in rows))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; NaN and infinity are None."""
@@ -262,32 +256,7 @@ def _rows(task: Task, laws: Forms, workers: int) -> Iterator[Row]:
     if workers == 1 or "fork" not in get_all_start_methods():
         yield from (best_form(task, name, law) for name, law in laws.items())
         return
-    fork, left = get_context("fork"), list(laws)
-    crew: dict[Any, tuple[ForkProcess, str]] = {}
-    try:
-        while left or crew:
-            while left and len(crew) < workers:
-                name = left.pop(0)
-                ours, theirs = fork.Pipe(duplex=False)
-                arguments = theirs, task, name, laws[name]
-                process = fork.Process(target=_work, args=arguments, daemon=True)
-                process.start()
-                theirs.close()
-                crew[ours] = process, name
-            for pipe in cast("list[Any]", wait(list(crew))):
-                process, name = crew.pop(pipe)
-                row: Row | None = None
-                with suppress(EOFError):  # a process that died sends nothing
-                    row = pipe.recv()
-                process.join()
-                died = f"its process ended with exit status {process.exitcode}"
-                yield row or Row(name, FAILED, died)
-    finally:
-        for process, _ in crew.values():
-            process.kill()
-
-
-def _work(pipe: Any, task: Task, name: str, law: tuple[Law, ...]) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the parent process handles Ctrl-C
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    pipe.send(best_form(task, name, law))
+    names, tasks = [*laws], enumerate(laws.items())
+    for number, row in outcomes(lambda at: best_form(task, *at), tasks, workers, start="fork"):
+        died = isinstance(row, Crashed)
+        yield Row(names[number], FAILED, f"its process ended with {row.how}") if died else row

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from symfric.choice.friction import Friction, fall_of, peaked
-from symfric.figures.regularisation import Regularisation
+from symfric.figures.regularisation import Regularisation, apart
 from symfric.foundation.parameters import Parameter, parameters, with_values
 from symfric.laws import Law, LeineSwitch, RateAndState
 from symfric.laws.base.families import Sticking
@@ -255,7 +255,7 @@ def limit_order(levels: Sequence[Smoothed]) -> float | None:
 def _apart(one: Smoothed, other: Smoothed) -> float:
     """Return the largest difference of two motions relative to their size; inf if unknown."""
     a, b = one.motion, other.motion
-    return inf if a is None or b is None or a.shape != b.shape else float(np.abs(a - b).max())
+    return inf if a is None or b is None else apart(a, b, np.ones(len(b)))
 
 
 def _stride(levels: list[Smoothed], wanted: float) -> float:

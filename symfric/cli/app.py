@@ -12,7 +12,7 @@ import tomllib
 import warnings
 from collections.abc import Callable, Sequence
 from errno import ENOSPC
-from functools import cache, partial, wraps
+from functools import partial, wraps
 from importlib import import_module
 from inspect import Parameter, Signature, cleandoc, signature
 from io import TextIOWrapper
@@ -27,22 +27,6 @@ from typer.core import TyperCommand, TyperGroup
 from symfric import SolveError, Status, __version__
 from symfric.foundation.programs import ProgramError
 
-COMMANDS = {
-    "laws": "List the friction laws, or show one in full.",
-    "scenes": "List the scenes, or show one in full.",
-    "run": "Simulate SCENE with a friction law.",
-    "report": "Simulate SCENE and write a report of signals, friction, errors and laws.",
-    "identify": "Fit friction laws to measured data and assess the result.",
-    "codegen": "Write a friction law, a plant or inverse dynamics as C99, and verify it.",
-    "export-fmu": "Write a scene or a model as a Functional Mock-up Unit.",
-    "ocp": "Solve an optimal control problem and check it.",
-    "select": "Rank friction laws on a machine and recommend one.",
-    "demo": "Simulate, identify, optimise and generate C.",
-    "gallery": "Reproduce the figures of the source papers.",
-    "bench": "Compare symfric with other tools in run time and error.",
-    "stress": "Verify runs of random laws in random scenes.",
-}
-"""Command -> first line of its help."""
 MODULES = dict.fromkeys(("bench", "gallery", "stress"), "campaigns") | {"report": "run"}
 """Command -> name of its module, if the names differ."""
 
@@ -57,20 +41,21 @@ WIDTH = 78
 """Largest width of an example [columns]."""
 
 
-@cache
-def forms() -> dict[str, dict[str, list[str]]]:
-    """Return form, meaning and completion of each parameter of each command."""
-    return tomllib.loads(Path(__file__).with_name("options.toml").read_text(encoding="utf-8"))
+TEXTS = tomllib.loads(Path(__file__).with_name("options.toml").read_text(encoding="utf-8"))
+"""Commands, and form, meaning and completion of each parameter of each command."""
+
+COMMANDS: dict[str, str] = TEXTS["commands"]
+"""Command -> first line of its help."""
 
 
 def declared(function: Callable[..., None]) -> Callable[..., None]:
     """Return the function of a command with parameters for Typer, which accept texts."""
-    own, command = forms().get(function.__name__, {}), function.__name__.replace("_", "-")
+    own, command = TEXTS.get(function.__name__, {}), function.__name__.replace("_", "-")
     module, hints = vars(sys.modules[function.__module__]), get_type_hints(function)
     completions = vars(import_module("symfric.cli.completions"))
     parameters, where = list[Parameter](), dict[str, str]()
     for p in signature(function).parameters.values():
-        form, meaning, *completion = own.get(p.name) or forms()["all"][p.name]
+        form, meaning, *completion = own.get(p.name) or TEXTS["all"][p.name]
         flags = [word for word in form.split() if word.startswith("--")]
         several = list in (get_origin(hints[p.name]), *map(get_origin, get_args(hints[p.name])))
         where[p.name] = f"{command}: {flags[0] if flags else form}"
@@ -125,10 +110,6 @@ class Commands(TyperGroup):
         super().__init__(**attributes)
         known: dict[str, Any] = dict.fromkeys(COMMANDS)
         self.commands = known
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of the commands in the order of the help."""
-        return [*COMMANDS]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return the command of this name, or None if there is none."""

@@ -6,6 +6,7 @@ other methods.
 """
 
 from collections.abc import Iterable
+from dataclasses import asdict
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -188,7 +189,7 @@ def stress(
     if case is not None:
         one = Case.read(case)
         verdict = rerun(one, limit)
-        content = {"case": one.to_dict(), "verdict": verdict.to_dict()}
+        content = {"case": one.to_dict(), "verdict": asdict(verdict)}
         output.finish(content, json, partial(show_verdict, one, verdict))
         passed = verdict.kind not in FAILING
     else:

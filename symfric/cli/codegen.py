@@ -12,7 +12,8 @@ import typer
 from symfric import Law, any_from_text, law_from_text, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
-from symfric.cli.machines import formed, forms, kind_of
+from symfric.cli.app import TEXTS
+from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
     Block,
@@ -43,18 +44,7 @@ COMPENSATION = [item.name for item in fields(Compensation)]
 LAW, FUNCTION, POPULATION = "a law", "a law without states", "a population"
 PLANT, INVERSE, COMPENSATOR = "--scene", "--inverse-dynamics", "--compensator"
 
-APPLIES = {
-    "--step-size": (LAW, POPULATION, PLANT, INVERSE, COMPENSATOR),
-    "--method": (PLANT,),
-    "--free": (LAW, FUNCTION, PLANT),
-    "--fold": (LAW, FUNCTION, PLANT, INVERSE, COMPENSATOR),
-    "--turning": (LAW, FUNCTION, COMPENSATOR),
-    "--payload": (INVERSE,),
-    "--tunable-gravity": (INVERSE,),
-    "--compensation": (COMPENSATOR,),
-    "--preset": (PLANT,),
-    "--law-of": (PLANT,),
-}
+APPLIES: dict[str, list[str]] = TEXTS["applies"]
 """Option that applies only to some subjects -> these subjects."""
 
 WHY = {
@@ -78,11 +68,6 @@ class Chosen(NamedTuple):
     law: AnyLaw
     drive: Drive | None = None
     forces: tuple[str, ...] = ()
-
-    @property
-    def turning(self) -> bool:
-        """True if the law was fitted to a rotating axis."""
-        return self.drive is not None and self.drive.turning
 
 
 def codegen(
@@ -162,7 +147,7 @@ def codegen(
             made = compensated(made, chosen.drive, compensation or (), turning=turning, **own)
         else:
             options = own
-            if turning or chosen.turning:
+            if turning or (chosen.drive is not None and chosen.drive.turning):
                 options["turning"] = True
     generated = generate(made, out, real=REALS[kind], guards=guards, kit=kit, **options)
     verification = verify(generated, compiler=compiler, adjustable=adjustable)
@@ -285,22 +270,20 @@ def machine_of(
     Raises:
         ValueError: coefficients that are forces in a scene with a load, or unknown names.
     """
-    own = kind is Drive and chosen.drive is not None
-    if own and chosen.drive is not None:
-        machine: Scene = chosen.drive
-    else:  # `law_from_text` refuses a population
-        machine = kind(chosen.law if isinstance(chosen.law, Law) else law_from_text(chosen.text))
-    machine = formed(machine, texts)
-    check_names(f"--set of {scene}", texts, [*parameters(machine), *forms(machine)])
-    values = opt.numbers("--set", {n: t for n, t in texts.items() if n not in forms(machine)})
-    if chosen.forces and not own and values.get("N") != 1.0:
+    own = chosen.drive if kind is Drive else None
+    # `law_from_text` refuses a population
+    law = chosen.law if isinstance(chosen.law, Law) else law_from_text(chosen.text)
+    machine = own or kind(law)
+    check_names(f"--set of {scene}", texts, settable(machine, texts))
+    machine = with_set(machine, texts)
+    if chosen.forces and own is None and float(texts.get("N", 0)) != 1.0:
         names = ", ".join(chosen.forces)
         hint = "--set N=1" if "N" in parameters(machine) else "fit it with --normal-force"
         raise ValueError(
             f"codegen: --scene {scene}: expected coefficients of friction, got forces {names}, "
             f"fitted under a load of 1 N; {hint}"
         )
-    return with_values(machine, values)
+    return machine
 
 
 def compensated(law: AnyLaw, drive: Drive | None, texts: Sequence[str], **how: Any) -> Block:

@@ -1,6 +1,7 @@
 """`symfric demo`: simulation, identification, optimal control and generated C in one run."""
 
 import shlex
+import tomllib
 from pathlib import Path
 
 import typer
@@ -18,29 +19,7 @@ STAGE = Path("..", "shared", "data", "EMPS")
 INTERVALS = 100
 """Number of intervals of the moves."""
 
-PARTS = {
-    "Stick-slip of a block on a belt": (
-        "run rabinowicz --law brown_mcphee,lugre --plot {out}/rabinowicz/rabinowicz.png",
-        "run rabinowicz --law lugre --csv {out}/rabinowicz/lugre.csv",
-        "laws lugre --compare brown_mcphee --plot {out}/rabinowicz/laws.png",
-    ),
-    "Identification of a positioning drive": (
-        "identify {record} --validate {validation} --law {laws} "
-        "--json {out}/identification/fit.json --html {out}/identification/fit.html "
-        "--plot {out}/identification/fit.png",
-    ),
-    "Optimal moves of the identified drive": (
-        "ocp {out}/optimal_move/moves.py:fastest --intervals {intervals} --csv "
-        "{out}/optimal_move/fastest.csv --json {out}/optimal_move/fastest.json --plot "
-        "{out}/optimal_move/fastest.png",
-        "ocp {out}/optimal_move/moves.py:least_effort --intervals {intervals} --csv "
-        "{out}/optimal_move/least_effort.csv --plot {out}/optimal_move/least_effort.png",
-    ),
-    "C for embedded controllers": (
-        "codegen --law lugre --out {out}/c/lugre",
-        "codegen {out}/identification/fit.json --name stage_friction --out {out}/c/stage_friction",
-    ),
-}
+PARTS = tomllib.loads(Path(__file__).with_name("demo.toml").read_text(encoding="utf-8"))
 """Title of a part -> its commands."""
 
 
@@ -52,9 +31,8 @@ def demo(out: Path = Path("out"), data: Path | None = None) -> None:
     Example: symfric demo --out out
     """
     check_folder(out)
-    places = {"out": out.as_posix(), "intervals": str(INTERVALS)} | records(
-        out / "identification", data
-    )
+    places = records(out / "identification", data)
+    places |= {"out": out.as_posix(), "intervals": str(INTERVALS)}
     moves = Path(__file__).with_name("demo_moves.py").read_text(encoding="utf-8")
     write_text(out / "optimal_move" / "moves.py", moves)
     listed, failed = ["# Results of `symfric demo`"], False
@@ -83,10 +61,10 @@ def records(folder: Path, data: Path | None) -> dict[str, str]:
     """Return the files for identification and validation, and the laws to identify from them."""
     stage = data or (STAGE if STAGE.is_dir() else None)
     if stage is not None:
-        output.note(f"identification from the measured EMPS stage in {stage}")
         laws = "coulomb+viscous,asymmetric(coulomb+viscous)"
         files = stage / "DATA_EMPS.mat", stage / "DATA_EMPS_PULSES.mat"
         files[0].stat()  # a missing folder is an error now, not after the first part
+        output.note(f"identification from the measured EMPS stage in {stage}")
     else:
         output.note("no measured record found (--data DIR for the EMPS benchmark), simulating one")
         laws, files = "stribeck", (folder / "record.csv", folder / "validation.csv")

@@ -205,7 +205,13 @@ def identify(
         content["profiles"] = [p.to_dict() for p in found]
     if ranking is not None:
         content["ranking"] = ranking.to_dict()
-    output.finish(content, json, partial(show, fit, found, ranking), html, plot)
+
+    def show() -> None:
+        typer.echo(str(fit) if ranking is None else f"{ranking}\n\n{fit}")
+        for profile in found:
+            output.show(f"\n{profile}")
+
+    output.finish(content, json, show, html, plot)
     refuse(fit, ranking, failed)
 
 
@@ -228,16 +234,6 @@ def judged(
         except ValueError as error:
             failed.append(str(error))
     return fit, profiles, failed
-
-
-def show(fit: Fitted, profiles: Sequence[Profile], ranking: Ranking | None) -> None:
-    """Print the ranking, the fit of the best law, and the profiles."""
-    if ranking is not None:
-        typer.echo(f"{ranking}\n")
-    typer.echo(str(fit))
-    for profile in profiles:
-        typer.echo("")
-        output.show(str(profile))
 
 
 def refuse(fit: Fitted, ranking: Ranking | None, failed: Sequence[str]) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 from symfric import ALL_LAWS, parameters
 from symfric.cli import options as opt
 from symfric.cli import output
+from symfric.cli.app import TEXTS
 from symfric.cli.options import Strings
 from symfric.figures import FIGURES, FigureData, compare
 from symfric.figures.data import parts, phenomena
@@ -140,19 +141,6 @@ def costs(law: AnyLaw) -> str:
     return "a step of one contact" if isinstance(law, Population) else "force and rate"
 
 
-LEGEND = """
-shows:
-{codes}
-z: number of states, then smoothness (set: set-valued)
-value, slope: CasADi instructions for force and rate, and for their derivatives
-formula: verification of the formula; unverified: written from memory
-symfric laws NAME shows equation, parameters and more;
-symfric laws NAME --figure draws {figures}.
-Other names: {others}.
-Sums are written coulomb+viscous, wrappers asymmetric(lugre), load_dependent(lugre),
-lagged(stribeck), temperature_dependent(lugre)."""
-
-
 def show_list(chosen: dict[str, AnyLaw]) -> None:
     """Print all laws, one per line, and the meaning of the codes."""
     rows: list[tuple[str | float, ...]] = []
@@ -163,7 +151,9 @@ def show_list(chosen: dict[str, AnyLaw]) -> None:
     output.show_table(["law", "shows", "z", "value", "slope", "formula"], rows)
     codes = "\n".join(f"  {code:<3} {meaning}" for code, meaning in PHENOMENA.items())
     others = ", ".join(f"{alias} = {name}" for alias, name in ALIASES.items())
-    output.show(LEGEND.format(codes=codes, figures=", ".join(FIGURES), others=others))
+    output.show(
+        TEXTS["legends"]["laws"].format(codes=codes, figures=", ".join(FIGURES), others=others)
+    )
 
 
 def show_law(name: str, law: AnyLaw) -> None:

@@ -73,20 +73,28 @@ def scenes_with(
         ValueError: an unknown law, or a parameter that none of the scenes has; see also `kind_of`.
     """
     kind, texts = kind_of(scene, preset=preset, law_of=law_of), assignments("--set", settings)
-    machines = {law: formed(kind(law_from_text(law)), texts) for law in laws}
-    known = {law: parameters(machine) for law, machine in machines.items()}
-    groups = (*known.values(), *map(forms, machines.values()))
-    check_names(f"--set of {scene}", texts, dict.fromkeys(n for names in groups for n in names))
-    numeric = {n: text for n, text in texts.items() if any(n in names for names in known.values())}
-    values = numbers("--set", numeric)
+    machines = {law: kind(law_from_text(law)) for law in laws}
+    known = {law: settable(machine, texts) for law, machine in machines.items()}
+    check_names(f"--set of {scene}", texts, dict.fromkeys(n for own in known.values() for n in own))
     return {
-        law: with_values(machine, {n: v for n, v in values.items() if n in known[law]})
+        law: with_set(machine, {n: text for n, text in texts.items() if n in known[law]})
         for law, machine in machines.items()
     }
 
 
+def settable(machine: Scene, texts: Mapping[str, str]) -> list[str]:
+    """Return the names that --set accepts for a scene with the forms in `texts`."""
+    return [*parameters(formed(machine, texts)), *forms(machine)]
+
+
+def with_set(machine: Scene, texts: Mapping[str, str]) -> Scene:
+    """Return the scene with the parameters, the forms and the structure in `texts`."""
+    values = numbers("--set", {n: t for n, t in texts.items() if n not in forms(machine)})
+    return with_values(formed(machine, texts), values)
+
+
 def formed(machine: Scene, texts: Mapping[str, str]) -> Scene:
-    """Return the scene with the forms and the structure in `texts`.
+    """Return the scene with the forms and the structure in `texts`; other names are ignored.
 
     Raises:
         ValueError: a text that is neither one of the choices nor a count, true or false.

@@ -9,6 +9,7 @@ from typing import Any
 from symfric import Law, Viscous, parameters, simulate
 from symfric.cli import options as opt
 from symfric.cli import output
+from symfric.cli.app import TEXTS
 from symfric.cli.machines import driven, scenes_with
 from symfric.cli.options import Strings
 from symfric.cli.run import refuse_failed, simulated
@@ -139,15 +140,6 @@ def _forms(machine: Scene) -> dict[str, dict[str, str]]:
     return found
 
 
-LEGEND = """
-x: states without those of the law; u: inputs; F: contacts with friction; t_end: default end time \
-[s].
---preset, parameters of papers:
-{papers}
-symfric scenes NAME shows equations, parameters, inputs and more;
-symfric run NAME --law LAW simulates it. Other machines: FILE.urdf of a robot."""
-
-
 def show_list(rows: list[dict[str, Any]]) -> None:
     """Print all scenes, one per line."""
     output.show_table(
@@ -158,7 +150,7 @@ def show_list(rows: list[dict[str, Any]]) -> None:
         ],
     )
     papers = [f"  {r['name']}: {', '.join(r['presets'])}" for r in rows if r["presets"]]
-    output.show(LEGEND.format(papers="\n".join(papers)))
+    output.show(TEXTS["legends"]["scenes"].format(papers="\n".join(papers)))
 
 
 TABLES = {

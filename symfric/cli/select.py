@@ -15,7 +15,7 @@ from typing import Any
 
 import typer
 
-from symfric import Law, SolveError, Status, law_from_text, parameters, with_values
+from symfric import Law, SolveError, Status, law_from_text, parameters
 from symfric.choice import NEEDS as NEEDS
 from symfric.choice import Friction
 from symfric.choice import select as select_law
@@ -24,7 +24,7 @@ from symfric.choice.ranking import LEGEND, lines
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.identify import reader, residuals_of
-from symfric.cli.machines import formed, kind_of
+from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.figures.data import phenomena
 from symfric.foundation import checks
@@ -195,15 +195,13 @@ def _with(kind: Callable[[Law], Scene], scene: str, texts: dict[str, str]) -> An
     if not texts:
         return kind
     one = kind(law_from_text("coulomb"))
-    forms = (*options(one), *one.structures())
-    made = {n: text for n, text in texts.items() if n in forms}
     of_law = parameters(one.law)
-    known = [n for n in parameters(formed(one, made)) if n not in of_law]
-    check_names(f"--set of {scene}", texts, [*known, *forms, *OF_FRICTION])
-    values = opt.numbers("--set", {n: text for n, text in texts.items() if n not in forms})
+    known = [n for n in settable(one, texts) if n not in of_law]
+    check_names(f"--set of {scene}", texts, [*known, *OF_FRICTION])
+    with_set(one, texts)  # refuses bad values
 
     def machine(law: Law) -> Scene:
-        return with_values(formed(kind(law), made), values)
+        return with_set(kind(law), texts)
 
     machine.__name__ = scene
     return machine

@@ -124,7 +124,7 @@ def helpers(c: CBlock, text: str) -> str:
     limits = [parameter_range(v)[:2] for v in c.block.parameters]
     parts["unfit"] = _any(c, "unfit", "a parameter is outside its range", "param", limits)
     limits = [(-state_limit(v), state_limit(v)) for v in c.block.states]
-    parts["lost"] = _any(c, "lost", "a state is absurd or not finite", "state", limits)
+    parts["lost"] = _any(c, "lost", "a state is beyond its limit or not finite", "state", limits)
     needed = ""
     for what, body in reversed(parts.items()):
         if f"{c.name}_{what}(" in text + needed:

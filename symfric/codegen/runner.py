@@ -7,6 +7,7 @@ returns for the inputs, and with guards the status (`CBlock.signals`).
 import shutil
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
 from math import isfinite, nan, remainder
@@ -47,16 +48,13 @@ def compile_object(compiler: Compiler, source: Path, target: Path) -> list[str]:
 def needed_symbols(target: Path) -> frozenset[str] | None:
     """Return the undefined names of an object file; None if `nm` is not available."""
     nm = shutil.which("nm")
-    if nm is None:
-        return None
-    try:
-        listed = finished((nm, "-u", str(target))).output.decode(errors="replace")
-    except ProgramError:
-        return None
-    names = [line.split()[-1] for line in listed.splitlines() if line.split()]
-    if sys.platform == "darwin":
-        names = [name.removeprefix("_") for name in names]
-    return frozenset(names)
+    with suppress(ProgramError):
+        if nm is not None:
+            listed = finished((nm, "-u", str(target))).output.decode(errors="replace")
+            names = (line.split()[-1] for line in listed.splitlines() if line.split())
+            prefix = "_" * (sys.platform == "darwin")
+            return frozenset(name.removeprefix(prefix) for name in names)
+    return None
 
 
 def footprint(c: CBlock, folder: Path, compiler: Compiler) -> dict[str, Any]:
@@ -90,16 +88,11 @@ def _sizes(compiler: Compiler, target: Path) -> tuple[int | None, int | None]:
     program = Path(compiler.command[0])
     name = program.name.removesuffix("gcc") + "size" if program.name.endswith("gcc") else "size"
     size = shutil.which(str(program.with_name(name))) or shutil.which(name)
-    if size is None:
-        return None, None
-    try:
-        done = finished((size, str(target)))
-    except ProgramError:
-        return None, None
-    if done.status:
-        return None, None
-    text, data, bss, *_ = map(int, done.output.decode().splitlines()[1].split()[:3])
-    return text, data + bss
+    with suppress(ProgramError):
+        if size is not None and (done := finished((size, str(target)))).status == 0:
+            text, data, bss, *_ = map(int, done.output.decode().splitlines()[1].split()[:3])
+            return text, data + bss
+    return None, None
 
 
 Array = NDArray[Any]

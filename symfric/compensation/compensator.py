@@ -21,13 +21,13 @@ from symfric.model import Output
 from symfric.scenes import Drive
 
 USE = (
-    "Call it once a sample, with what the controller knows at that sample, and add F to the force "
-    "that it commands.",
-    "F has the sign of the velocity: it pushes where friction brakes.",
+    "Call it once per sample, with the signals of that sample, and add F to the force that the "
+    "controller commands.",
+    "F has the sign of the velocity and counteracts friction.",
 )
 OVER = (
-    "More than the friction that is there (a scale above 1, or a law that is too high) is negative "
-    "damping; where the desired velocity follows the position error the axis then hunts at rest."
+    "A force above the actual friction (a scale above 1, or too high a law) is negative damping; "
+    "if the desired velocity follows the position error, the axis then hunts at rest."
 )
 
 

@@ -49,11 +49,11 @@ class Cascade(Parametric):
     kp: float = param(60.0, unit="1/s", doc="position gain", lower=0.0)
     kv: float = param(200.0, unit="N s/m", doc="velocity gain", lower=0.0)
     ki: float = param(20.0, unit="1/s", doc="integral gain of the velocity loop", lower=0.0)
-    inertia: float = param(1.0, unit="kg", doc="mass that a_ref is times", lower=0.0)
+    inertia: float = param(1.0, unit="kg", doc="mass, multiplied by a_ref", lower=0.0)
     limit: float = param(100.0, unit="N", doc="largest force", lower=0.0)
-    count: float = param(1e-6, unit="m", doc="one count of the encoder", lower=1e-15)
+    count: float = param(1e-6, unit="m", doc="count of the encoder", lower=1e-15)
     share: float = param(
-        0.5, unit="1", doc="of a new difference in the velocity", lower=1e-6, upper=1.0
+        0.5, unit="1", doc="weight of a new difference in the velocity", lower=1e-6, upper=1.0
     )
 
     def block(self) -> Block:

@@ -19,12 +19,12 @@ from symfric.laws.base import smooth
 from symfric.laws.base.law import check_law
 from symfric.model import Output
 
-USE = "Call it once a sample and add F to the force that the controller commands."
-ERROR = "e is the position error, reference less measured, in the direction of v."
+USE = "Call it once per sample, and add F to the force that the controller commands."
+ERROR = "e is the position error, reference minus measured, in the direction of v."
 Bristles = LuGre | LuGreNormalised | LuGrePassive
 Corrected = tuple[ca.SX, ca.SX]
 """States after the step and mean force over the step."""
-ESTIMATE = "estimated friction force, to add to that of the controller; mean over the step"
+ESTIMATE = "estimated friction force, mean over the step, to add to the command"
 
 
 def lugre_observer(
@@ -260,14 +260,14 @@ def disturbance_observer(
     force = finished(parts, force, ramp, limit, size.h, where)
     block = Block(
         where if name is None else name,
-        doc="Disturbance observer: what opposes the force of a drive besides inertia.",
+        doc="Disturbance observer: all forces that oppose the force of a drive, except inertia.",
         equations=(
             "f  = u - m (v - v_before) / h\n"
             f"d+ = d + (1 - exp(-w h)) (f - d){', twice' if order == 2 else ''}\nF  = d+"
         ),
         discretisation="The balance of impulse over the last interval, and an exact filter of it.",
         use=(USE,),
-        outputs={"F": Output(force, "N", "estimated opposing force, to add to that commanded")},
+        outputs={"F": Output(force, "N", "estimated opposing force, to add to the command")},
         constants=size.constants,
         **parts.variables(size.parameters),
     )

@@ -91,22 +91,23 @@ def settings_from_text(texts: Sequence[str]) -> Compensation:
         checks.check_names(where, [name], known)
         if name in found or not value:
             raise checks.refused(where, "NAME=VALUE, every name once", text)
-        parts = value.split(",")
-        pairs = [part.split(":") for part in parts]
+        at, parts = f"{where}: {name}", tuple(value.split(","))
         if name == "velocity" or (name == "N" and value == "input"):
             found[name] = value
-        elif name == "without" or (name == "scales" and all(len(pair) == 1 for pair in pairs)):
-            found[name] = tuple(parts)
+        elif name == "without" or (name == "scales" and ":" not in value):
+            found[name] = parts
         elif name in ("scales", "build_up_table"):
-            if any(len(pair) != 2 for pair in pairs):
-                raise checks.refused(f"{where}: {name}", "A:B,A:B,...", value)
-            firsts = [pair[0] for pair in pairs]
-            if name == "build_up_table":
-                firsts = [checks.parsed(f"{where}: {name}", first) for first in firsts]
-            seconds = (checks.parsed(f"{where}: {name}", pair[1]) for pair in pairs)
-            found[name] = (dict if name == "scales" else tuple)(zip(firsts, seconds, strict=True))
+            pairs = [part.partition(":") for part in parts]
+            if not all(second for *_, second in pairs):
+                raise checks.refused(at, "A:B,A:B,...", value)
+            numbers = [checks.parsed(at, second) for *_, second in pairs]
+            if name == "scales":
+                found[name] = dict(zip((first for first, *_ in pairs), numbers, strict=True))
+            else:
+                firsts = (checks.parsed(at, first) for first, *_ in pairs)
+                found[name] = tuple(zip(firsts, numbers, strict=True))
         else:
-            numbers = tuple(checks.parsed(f"{where}: {name}", part) for part in parts)
+            numbers = tuple(checks.parsed(at, part) for part in parts)
             found[name] = numbers[0] if len(numbers) == 1 else numbers
     return chosen_settings(where, None, found)
 

@@ -9,6 +9,7 @@ linker script and main programs are files in `sources`.
 import shutil
 import tomllib
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from re import fullmatch
@@ -163,21 +164,15 @@ class Absent(NamedTuple):
 
 def find_tools() -> Tools | Absent:
     """Return the tools in PATH, or the names of the missing ones."""
-    gcc, qemu = shutil.which(GCC), shutil.which(QEMU)
-    library = gcc is not None and _has_library(gcc)
-    if gcc is not None and qemu is not None and library:
+    gcc, qemu, library = shutil.which(GCC), shutil.which(QEMU), b""
+    if gcc is not None:
+        with suppress(ProgramError):  # gcc prints the path of libm, or only its name if absent
+            command = (gcc, "-print-file-name=libm.a")
+            library = finished(command, limit=LIBRARY_PATIENCE).output.strip()
+    if gcc and qemu and library not in (b"", b"libm.a"):
         return Tools(Compiler((gcc,)), qemu)
-    found = {GCC: gcc, NEWLIB: library, QEMU: qemu}
+    found = {GCC: gcc, NEWLIB: library not in (b"", b"libm.a"), QEMU: qemu}
     return Absent(tuple(name for name, there in found.items() if not there))
-
-
-def _has_library(gcc: str) -> bool:
-    """Return True if the compiler finds libm, and therefore prints its path, not only its name."""
-    try:
-        said = finished((gcc, "-print-file-name=libm.a"), limit=LIBRARY_PATIENCE).output.strip()
-    except ProgramError:
-        return False
-    return said not in (b"", b"libm.a")
 
 
 SOURCES = Path(__file__).with_name("sources")

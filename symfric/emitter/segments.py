@@ -6,11 +6,10 @@ A loop belongs to the first stage at which all values that it takes from outside
 outside the loops is computed in the last part that precedes all its users.
 """
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
 from typing import NamedTuple, final
 
 from symfric.emitter.c99 import TRANSCENDENTAL
@@ -119,23 +118,17 @@ def planned(source: Graph, arrays: Arrays) -> Plan:
     """
     chosen = {s: woven(source, [s], arrays) for s in strands(source, arrays)}
     while chosen:
-        plan = Plan(source, _loops(source, chosen, arrays))
+        stages = _stages(source, chosen)
+        groups = defaultdict[tuple[int, int], list[Strand]](list)
+        for strand in chosen:
+            groups[stages[strand], len(strand.lanes)].append(strand)
+        loops = ((*key, tuple(groups[key])) for key in sorted(groups))
+        plan = Plan(source, tuple(Loop(*loop, woven(source, loop[2], arrays)) for loop in loops))
         out = _overwriting(plan.loops) or _idle(plan) or _wasteful(plan, chosen)
         if not out:
             return plan
         chosen = {s: body for s, body in chosen.items() if s not in out}
     return Plan(source)
-
-
-def _loops(source: Graph, chosen: Mapping[Strand, Body], arrays: Arrays) -> tuple[Loop, ...]:
-    """Return a loop for the strands of each stage and size."""
-    stages = _stages(source, chosen)
-
-    def key(strand: Strand) -> tuple[int, int]:
-        return stages[strand], len(strand.lanes)
-
-    groups = ((*k, tuple(group)) for k, group in groupby(sorted(chosen, key=key), key))
-    return tuple(Loop(stage, size, g, woven(source, g, arrays)) for stage, size, g in groups)
 
 
 def _stages(source: Graph, bodies: Mapping[Strand, Body]) -> dict[Strand, int]:

@@ -177,10 +177,7 @@ def lag(
     """
     V = (given or scales(law, N)).velocity
 
-    def velocity(t: ca.SX, pace: ca.SX) -> ca.SX:
-        return V * (2.5 + 2 * ca.sin(2 * ca.pi * pace * t))
-
-    slide = slides(law, N, velocity)
+    slide = slides(law, N, lambda t, pace: V * (2.5 + 2 * ca.sin(2 * ca.pi * pace * t)))
     curves = last_period(slide, frequencies, periods, 401)
     v = V * np.linspace(0.5, 4.5, 401)
     steady = Curve(law_name(law), "steady", {"v": v, "F": steady_force(law, v, N)}, reference=True)
@@ -206,10 +203,7 @@ def transition(
     """
     V = 5 * (given or scales(law, N)).velocity
 
-    def velocity(t: ca.SX, pace: ca.SX) -> ca.SX:
-        return V * ca.sin(2 * ca.pi * pace * t)
-
-    slide = slides(law, N, velocity)
+    slide = slides(law, N, lambda t, pace: V * ca.sin(2 * ca.pi * pace * t))
     title = f"from pre-sliding to sliding, v = {V:.3g} m/s sin(2πft), N = {N:g} N"
     return title, last_period(slide, frequencies, periods, 1201)
 

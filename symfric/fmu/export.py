@@ -156,7 +156,16 @@ def export_fmu(
             f"{where}: expected no step and no method for model exchange, where the importer "
             "integrates"
         )
-    method = _method(where, made, method, step)
+    if step is None:
+        checks.choice(f"{where}: method", method, ["auto", *ADAPTIVE])
+    else:
+        checks.number(f"{where}: step", step, unit="s", above=0.0)
+        if made.events:
+            raise ValueError(
+                f"{where}: step: expected a model without events, got {len(made.events)}; leave "
+                "the step adaptive, or use a smooth or bristle law"
+            )
+        method = fixed_method(where, made, method)
     begin = perf_counter()
     own = equations(made, rtol, step, method, span, exchange)
     model_c = source(own)
@@ -203,19 +212,6 @@ def _model(
     if t_end is not None:
         until = checks.number(f"{where}: t_end", t_end, unit="s", above=0.0)
     return given, (0.0, until)
-
-
-def _method(where: str, model: Model, method: str, step: float | None) -> str:
-    """Return the formula of the steps."""
-    if step is None:
-        return checks.choice(f"{where}: method", method, ["auto", *ADAPTIVE])
-    checks.number(f"{where}: step", step, unit="s", above=0.0)
-    if model.events:
-        raise ValueError(
-            f"{where}: step: expected a model without events, got {len(model.events)}; leave the "
-            "step adaptive, or use a smooth or bristle law"
-        )
-    return fixed_method(where, model, method)
 
 
 Array = NDArray[np.float64]

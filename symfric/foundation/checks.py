@@ -161,11 +161,9 @@ def count(
     Raises:
         ValueError: `value` is not a whole number or is out of bounds.
     """
-    found: int | None = value if type(value) is int and abs(value) < 2**63 else None
-    real = as_number(value) if found is None else None
+    found, real = None, as_number(value)
     if real is not None and isfinite(real) and real == int(real):
-        exact = isinstance(value, int | np.integer)
-        found = operator.index(value) if exact else int(real)
+        found = operator.index(value) if isinstance(value, int | np.integer) else int(real)
     if found is None or found < least or (most is not None and found > most):
         bounds = f" >= {least}" if most is None else f" from {least} to {most}"
         raise refused(where, f"a whole number{bounds}", value, hint)
@@ -198,11 +196,11 @@ def flag(where: str, value: object) -> bool:
     raise refused(where, "True or False", value)
 
 
-def text(where: str, value: object, what: str = "a text", hint: str = "") -> str:
+def text(where: str, value: object, what: str = "a text") -> str:
     """Return `value`, which must be a non-empty string."""
     if isinstance(value, str) and value.strip():
         return str(value)
-    raise refused(where, what, value, hint)
+    raise refused(where, what, value)
 
 
 def identifier(where: str, value: object) -> str:
@@ -282,9 +280,7 @@ def many(where: str, value: object, what: str) -> tuple[Any, ...]:
     return tuple(value)  # pyright: ignore[reportUnknownArgumentType, reportUnknownVariableType]
 
 
-def names(
-    where: str, value: object, known: Collection[str] | None = None, hint: str = ""
-) -> tuple[str, ...]:
+def names(where: str, value: object, known: Collection[str] | None = None) -> tuple[str, ...]:
     """Return a sequence of distinct names as a tuple; unknown names raise an error."""
     if isinstance(value, str):
         raise refused(where, "a sequence of names", value, f"write [{value!r}]")
@@ -296,7 +292,7 @@ def names(
     if len(set(given)) != len(given):
         raise ValueError(f"{where}: expected every name once, got {', '.join(given)}")
     if known is not None:
-        check_names(where, given, known, hint)
+        check_names(where, given, known)
     return given
 
 
@@ -378,9 +374,9 @@ def check_names(where: str, given: Iterable[str], known: Collection[str], hint: 
         return
     close = [get_close_matches(name, list(known), n=1, cutoff=0.4) for name in unknown]
     offers = ", ".join(c[0] for c in close if c)
-    advice = f"did you mean {offers}?" if offers else ("check the spelling" if known else "")
-    if hint and not offers:
-        advice = hint
+    advice = hint or ("check the spelling" if known else "")
+    if offers:
+        advice = f"did you mean {offers}?"
     got = ", ".join(_cut(name) for name in unknown)
     raise ValueError(
         f"{where}: expected {_one_of(known)}, got {got}" + f"; {advice}" * bool(advice)

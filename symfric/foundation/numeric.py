@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from symfric.foundation.symbolic import Symbolic
 from symfric.foundation.vector import Rows, Vector
 
+Array = NDArray[np.float64]
 Scalar = Any
 """Real number: float, NumPy array (element-wise), SX, MX or DM; in isotropic laws also `Vector`."""
 
@@ -135,7 +136,7 @@ def total(terms: Iterable[Scalar]) -> Scalar:
     return sum(rest, start=first)
 
 
-def evaluate(function: ca.Function, *arguments: NDArray[np.float64]) -> NDArray[np.float64]:
+def evaluate(function: ca.Function, *arguments: Array) -> Array:
     """Return the first output of `function` as a flat array; arguments must be contiguous.
 
     This is five times faster than calling the Function, which copies each array to a matrix.
@@ -143,9 +144,7 @@ def evaluate(function: ca.Function, *arguments: NDArray[np.float64]) -> NDArray[
     return evaluate_all(function, *arguments)[0].ravel(order="F")
 
 
-def evaluate_all(
-    function: ca.Function, *arguments: NDArray[np.float64]
-) -> list[NDArray[np.float64]]:
+def evaluate_all(function: ca.Function, *arguments: Array) -> list[Array]:
     """Return all outputs of `function` as matrices; outputs must be dense, see `evaluate`."""
     results = [np.zeros(function.size_out(i)[::-1]) for i in range(function.n_out())]
     bound(function, arguments, results)()
@@ -153,9 +152,7 @@ def evaluate_all(
 
 
 def bound(
-    function: ca.Function,
-    arguments: Sequence[NDArray[np.float64]],
-    results: Sequence[NDArray[np.float64]],
+    function: ca.Function, arguments: Sequence[Array], results: Sequence[Array]
 ) -> Callable[[], None]:
     """Return a call of `function` that reads and writes the given contiguous arrays in place."""
     buffer, call = cast(tuple[Any, Any], function.buffer())
@@ -170,7 +167,7 @@ def bound(
     return run
 
 
-def address(array: NDArray[np.float64]) -> int:
+def address(array: Array) -> int:
     """Return the memory address of the data of a contiguous array, for compiled code."""
     if array.flags.writeable and array.size:  # three times faster than below
         return ctypes.addressof(ctypes.c_char.from_buffer(cast(Any, array)))

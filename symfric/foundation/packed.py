@@ -159,8 +159,7 @@ class _Writer:
     def __init__(self, trusted: bool) -> None:
         self._arrays: list[NDArray[Any]] = []
         self._expressions: list[ca.SX] = []
-        self._known: dict[int, int] = {}
-        self._alive: list[object] = []
+        self._known: dict[int, tuple[int, object]] = {}
         self._trusted = trusted
 
     def pack(self, file: IO[bytes], thing: object, kind: str, form: int) -> None:
@@ -192,12 +191,16 @@ class _Writer:
         if isinstance(value, ca.MX | ca.Function):
             return self._of_casadi(where, value)
         if isinstance(value, np.ndarray):
-            return self._array(where, cast(NDArray[Any], value))
+            array = cast(NDArray[Any], value)
+            if array.dtype.kind not in storable.ARRAYS:
+                raise checks.refused(f"pack{where}", "an array of numbers", array)
+            self._arrays.append(array)
+            return {"array": len(self._arrays) - 1}
         if isinstance(value, Enum):
             return {"enum": [storable.path_of(type(value)), value.name]}
         if isinstance(value, tuple | list):
             several = [self.write(f"{where}[{i}]", v) for i, v in enumerate(value)]  # pyright: ignore
-            return {type(value).__name__: several} if type(value) is tuple else several
+            return {"tuple": several} if type(value) is tuple else several
         if isinstance(value, Mapping):
             pairs = cast(Mapping[Any, Any], value).items()
             return {
@@ -235,16 +238,10 @@ class _Writer:
         hint = "move it there (arguments by functools.partial), or write a casadi.Function"
         raise checks.refused(f"pack{where}", what, value, hint)
 
-    def _array(self, where: str, value: NDArray[Any]) -> Any:
-        if value.dtype.kind not in storable.ARRAYS:
-            raise checks.refused(f"pack{where}", "an array of numbers", value)
-        self._arrays.append(value)
-        return {"array": len(self._arrays) - 1}
-
     def _object(self, where: str, value: Any) -> Any:
         """Return an object as class and fields, or as a reference "same" if it is repeated."""
         if id(value) in self._known:
-            return {"same": self._known[id(value)]}
+            return {"same": self._known[id(value)][0]}
         kind = type(value)
         if hasattr(kind, "packed_as") and not isinstance(value, type):
             return {"was": self.write(where, value.packed_as())}
@@ -253,8 +250,7 @@ class _Writer:
         if isinstance(value, type) or not data or not known:
             what = "numbers, texts, expressions and objects made of them"
             raise checks.refused(f"pack{where}", what, value)
-        self._known[id(value)] = len(self._known)
-        self._alive.append(value)
+        self._known[id(value)] = len(self._known), value  # which keeps its id as long as it exists
         say: Callable[[], dict[str, Any]] = getattr(value, "to_pack", partial(state_of, value))
         state = say()
         has = {name: self.write(f"{where}.{name}", held) for name, held in state.items()}

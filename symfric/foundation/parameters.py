@@ -178,30 +178,19 @@ def _problems(obj: Parametric) -> Iterator[str]:
     for pairs, sign in ((obj.ordered, "<="), (obj.strictly_ordered, "<")):
         for low, high in pairs:
             a, b = getattr(obj, low), getattr(obj, high)
-            if _out_of_order(a, b, strictly=sign == "<"):
+            first, last = _numbers(a), _numbers(b)
+            fit = first.size == last.size or 1 in (first.size, last.size)
+            if fit and (first > last if sign == "<=" else first >= last).any():
                 shown = f"{low} = {_shown(a)} and {high} = {_shown(b)}"
                 yield f"expected {low} {sign} {high}, got {shown}"
 
 
 def _numbers(value: Any) -> NDArray[np.float64]:
     """Return a number, a numeric array or a constant matrix as a flat array; else an empty one."""
-    if is_casadi(value):
+    if is_casadi(value) and not is_symbolic(value):
         return ca.DM(value).full().ravel()
     numeric = isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
     return np.array(value, float).ravel() if numeric or is_number(value) else np.zeros(0)
-
-
-def _out_of_order(a: Scalar, b: Scalar, strictly: bool) -> bool:
-    """Return True if numbers violate a <= b, or a < b if `strictly`.
-
-    The result is False for symbols and for arrays of different sizes.
-    """
-    if is_symbolic(a) or is_symbolic(b):
-        return False
-    low, high = _numbers(a), _numbers(b)
-    if not low.size or not high.size or 1 not in (low.size, high.size, 1 + low.size - high.size):
-        return False
-    return bool(((low >= high) if strictly else (low > high)).any())
 
 
 def _shown(value: Scalar) -> str:
@@ -338,16 +327,13 @@ def symbolise(obj: P, *names: str) -> tuple[P, tuple[Variable, ...]]:
     """
     known = parameters(obj)
     names = checks.names(type(obj).__name__, names, known)
-    variables = tuple(
-        Variable(name, p.unit, p.value, _magnitude(p.value), p.lower, p.upper, p.doc)
-        for name, p in ((name, known[name]) for name in names)
-    )
-    return with_values(obj, {v.name: v.symbol for v in variables}), variables
+    variables: list[Variable] = []
+    for name in names:
+        p = known[name]
+        size = 1.0 if is_symbolic(p.value) else abs(float(p.value)) or 1.0
+        variables.append(Variable(name, p.unit, p.value, size, p.lower, p.upper, p.doc))
+    return with_values(obj, {v.name: v.symbol for v in variables}), tuple(variables)
 
 
 def _check_parametric(where: str, obj: object) -> None:
     checks.kind(where, obj, Parametric, "a law or a scene, such as LuGre()")
-
-
-def _magnitude(value: Scalar) -> float:
-    return 1.0 if is_symbolic(value) or float(value) == 0.0 else abs(float(value))

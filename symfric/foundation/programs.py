@@ -89,15 +89,12 @@ def started(
     Raises:
         ProgramError: the program cannot be started.
     """
+    env = {**os.environ, "LC_ALL": "C", **(variables or {})}
     try:
         return subprocess.Popen(
-            list(command),
-            stdin=stdin,
-            stdout=stdout,
-            stderr=stderr,
-            env={**os.environ, "LC_ALL": "C", **(variables or {})},
+            list(command), stdin=stdin, stdout=stdout, stderr=stderr, env=env,
             start_new_session=True,
-        )
+        )  # fmt: skip
     except OSError as error:
         raise ProgramError(f"{name or called(command)} does not start: {error.strerror}") from None
 
@@ -162,13 +159,10 @@ class Compiler:
             CompileError: the compiler cannot be started, rejects the code, or exceeds the time
                 limit.
         """
+        command = (*self.command, *arguments)
         try:
             done = finished(
-                (*self.command, *arguments),
-                code.encode(),
-                limit=patience(code),
-                variables=variables,
-                name=str(self),
+                command, code.encode(), limit=patience(code), variables=variables, name=str(self)
             )
         except ProgramError as error:
             raise CompileError(str(error)) from None
@@ -214,22 +208,13 @@ def find_compiler(name: str | None = None) -> Compiler | None:
     """
     wanted = os.environ.get("CC") if name is None else name
     for candidate in NAMES if wanted is None or not wanted.strip() else (wanted,):
-        command = _command(candidate)
-        if command is not None:
-            return Compiler(command)
+        with suppress(ValueError):  # unbalanced quotation marks
+            words = shlex.split(candidate)
+            if words and (path := shutil.which(words[0])) is not None:
+                return Compiler((str(Path(path)), *words[1:]))
     if name is not None:
         raise ValueError(f"compiler: expected a C compiler, got {name!r}, which is not found")
     return None
-
-
-def _command(text: str) -> tuple[str, ...] | None:
-    """Return `text` as a command with the full path of its program; None if not found."""
-    try:
-        words = shlex.split(text)
-    except ValueError:  # unbalanced quotation marks
-        return None
-    path = shutil.which(words[0]) if words else None
-    return None if path is None else (str(Path(path)), *words[1:])
 
 
 def missing_compiler() -> str:

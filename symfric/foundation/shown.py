@@ -151,13 +151,11 @@ def _rows(table: Table, most: int) -> list[str]:
     shown = rows if len(rows) <= room else rows[: max(0, room - 1)]
     lines += shown
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)] if lines else []
-    found = [
-        "  ".join(
-            text.rjust(w) if j in table.numbers else text.ljust(w)
-            for j, (text, w) in enumerate(zip(line, widths, strict=True))
-        )
-        for line in lines
-    ]
+    found: list[str] = []
+    for line in lines:
+        cells = enumerate(zip(line, widths, strict=True))
+        justified = (s.rjust(w) if j in table.numbers else s.ljust(w) for j, (s, w) in cells)
+        found.append("  ".join(justified))
     left = [row[0] for row in rows[len(shown) :]]
     if left:
         found.append(table.rest.format(n=len(left), names=", ".join(left)))

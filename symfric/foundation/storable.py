@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, fields
 from functools import cache, cached_property
 from importlib import import_module
 from io import BytesIO
@@ -63,7 +63,12 @@ def checked(kind: type, values: dict[str, Any]) -> dict[str, Any]:
     """Check the fields of a symfric class and return them, with defaults for missing fields."""
     known = {item.name: item for item in fields(kind)}
     for name, value in values.items():
-        hint = _hint(kind, known.get(name), name)
+        if name in known:
+            hint = known[name].metadata.get("packed", hints_of(kind)[name])
+        elif isinstance(made := vars(kind).get(name), cached_property):  # stored with the fields
+            hint = hints_of(made.func)["return"]
+        else:
+            raise ValueError(f"{kind.__name__}: expected its fields, got {name}")
         if not fits(value, hint):
             raise ValueError(f"{kind.__name__}.{name}: expected {hint}, got {value!r:.60}")
     for item in known.values():
@@ -73,15 +78,6 @@ def checked(kind: type, values: dict[str, Any]) -> dict[str, Any]:
         if values[item.name] is MISSING:
             raise ValueError(f"{kind.__name__}: expected {item.name}, got none")
     return values
-
-
-def _hint(kind: type, item: "Field[Any] | None", name: str) -> Any:
-    """Return the type in files of a field, or of a cached property stored with the fields."""
-    if item is not None:
-        return item.metadata.get("packed", hints_of(kind)[name])
-    if not isinstance(made := vars(kind).get(name), cached_property):
-        raise ValueError(f"{kind.__name__}: expected its fields, got {name}")
-    return hints_of(made.func)["return"]
 
 
 ANYTHING = object()
@@ -109,7 +105,9 @@ def fits(value: Any, hint: Any) -> bool:
     if kind is Literal:
         return any(type(value) is type(one) and value == one for one in of)
     if kind is np.ndarray or get_origin(kind) is np.ndarray:
-        return isinstance(value, np.ndarray) and _of_numbers(value, of)
+        wanted: Any = (get_args(of[-1]) or of)[-1] if of else np.generic
+        numbers: Any = value.dtype.type if isinstance(value, np.ndarray) else None
+        return numbers is not None and (not isinstance(wanted, type) or issubclass(numbers, wanted))
     if kind is Callable or getattr(kind, "__name__", "") == "Callable":
         held: Any = vars(value).get("value", ANYTHING) if hasattr(value, "__dict__") else ANYTHING
         return callable(value) and (held is ANYTHING or fits(held, of[-1]))
@@ -117,8 +115,7 @@ def fits(value: Any, hint: Any) -> bool:
         has = {*dir(type(value)), *getattr(value, "__dict__", ())}
         return has.issuperset(name for name in vars(kind) if not name.startswith("_"))
     if kind in (float, int):
-        wanted = float | int if kind is float else int
-        return isinstance(value, wanted) and not isinstance(value, bool)
+        return isinstance(value, (kind, int)) and not isinstance(value, bool)
     if not isinstance(value, kind):
         return False
     if issubclass(kind, tuple) and of and of[-1] is not Ellipsis:
@@ -126,12 +123,6 @@ def fits(value: Any, hint: Any) -> bool:
     if issubclass(kind, Mapping) and of:
         return all(fits(key, of[0]) and fits(held, of[1]) for key, held in value.items())
     return not (isinstance(value, Collection) and of) or all(fits(one, of[0]) for one in value)
-
-
-def _of_numbers(array: np.ndarray[Any, Any], of: tuple[Any, ...]) -> bool:
-    """Return True if the array has the annotated number type."""
-    wanted: Any = (get_args(of[-1]) or of)[-1] if of else np.generic
-    return not isinstance(wanted, type) or issubclass(array.dtype.type, wanted)
 
 
 def agree(what: str, *conditions: bool) -> None:

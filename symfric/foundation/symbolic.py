@@ -73,18 +73,15 @@ class Condition(ca.SX):
         )
 
 
-def _operator(operate: Callable[..., Any]) -> Callable[["Symbolic", Any], Any]:
-    def forward(self: "Symbolic", other: Any) -> Any:
-        return _written(operate, self, other)
-
-    return forward
+Operator = Callable[["Symbolic", Any], Any]
 
 
-def _reflected(operate: Callable[..., Any]) -> Callable[["Symbolic", Any], Any]:
-    def reflected(self: "Symbolic", other: Any) -> Any:
-        return _written(operate, other, self)
-
-    return reflected
+def _both(operate: Callable[..., Any]) -> tuple[Operator, Operator]:
+    """Return the methods of an operator with the object on the left and on the right."""
+    return (
+        lambda self, other: _written(operate, self, other),
+        lambda self, other: _written(operate, other, self),
+    )
 
 
 class Symbolic:
@@ -105,16 +102,16 @@ class Symbolic:
     def __SX__(self) -> ca.SX:
         return self.symbol
 
-    __add__, __radd__ = _operator(operator.add), _reflected(operator.add)
-    __sub__, __rsub__ = _operator(operator.sub), _reflected(operator.sub)
-    __mul__, __rmul__ = _operator(operator.mul), _reflected(operator.mul)
-    __truediv__, __rtruediv__ = _operator(operator.truediv), _reflected(operator.truediv)
-    __floordiv__, __rfloordiv__ = _operator(operator.floordiv), _reflected(operator.floordiv)
-    __mod__, __rmod__ = _operator(operator.mod), _reflected(operator.mod)
-    __pow__, __rpow__ = _operator(operator.pow), _reflected(operator.pow)
-    __matmul__, __rmatmul__ = _operator(operator.matmul), _reflected(operator.matmul)
-    __lt__, __le__ = _operator(operator.lt), _operator(operator.le)
-    __gt__, __ge__ = _operator(operator.gt), _operator(operator.ge)
+    __add__, __radd__ = _both(operator.add)
+    __sub__, __rsub__ = _both(operator.sub)
+    __mul__, __rmul__ = _both(operator.mul)
+    __truediv__, __rtruediv__ = _both(operator.truediv)
+    __floordiv__, __rfloordiv__ = _both(operator.floordiv)
+    __mod__, __rmod__ = _both(operator.mod)
+    __pow__, __rpow__ = _both(operator.pow)
+    __matmul__, __rmatmul__ = _both(operator.matmul)
+    (__lt__, _), (__le__, _) = _both(operator.lt), _both(operator.le)
+    (__gt__, _), (__ge__, _) = _both(operator.gt), _both(operator.ge)
 
     def __neg__(self) -> ca.SX:
         return -self.symbol

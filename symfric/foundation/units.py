@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from re import fullmatch, search, sub
+from re import Match, fullmatch, search, sub
 from typing import Any, final
 from warnings import warn
 
@@ -238,15 +238,13 @@ def _symbol(text: str) -> _Size | None:
 
 def nearest(text: str) -> str:
     """Return the unit that an invalid string probably means; "" if unknown."""
-    meant = sub(r"[A-Za-z]+", lambda word: _meant(word[0]), sub(r"[\[\]]", "", written(text)))
-    meant = sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", " ", sub(r"\s+per\s+", "/", meant))
-    return written(meant) if in_si(meant) is not None else ""
 
+    def meant(word: Match[str]) -> str:
+        return word[0] if _symbol(word[0]) is not None else WORDS.get(word[0].lower(), word[0])
 
-def _meant(word: str) -> str:
-    if _symbol(word) is not None:
-        return word
-    return WORDS.get(word.lower(), word)
+    known = sub(r"[A-Za-z]+", meant, sub(r"[\[\]]", "", written(text)))
+    known = sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", " ", sub(r"\s+per\s+", "/", known))
+    return written(known) if in_si(known) is not None else ""
 
 
 SHOWN_WITH = (

@@ -70,7 +70,7 @@ class Vector:
             return self.odd(f, ROUND)
         if name in EVEN:
             return f(self.length(ROUND))
-        raise NotIsotropicError(f"takes {name} of what has a direction")
+        raise NotIsotropicError(f"takes {name} of a vector")
 
     def __mul__(self, other: Vectors) -> Vectors:
         if isinstance(other, Vector):
@@ -81,21 +81,21 @@ class Vector:
 
     def __truediv__(self, other: Vectors) -> "Vector":
         if isinstance(other, Vector):
-            raise NotIsotropicError("divides by what has a direction")
+            raise NotIsotropicError("divides by a vector")
         return Vector([a / other for a in self.parts], self.turn)
 
     def __rtruediv__(self, other: Scalar) -> "Vector":
-        raise NotIsotropicError("divides by what has a direction")
+        raise NotIsotropicError("divides by a vector")
 
     def __pow__(self, n: Scalar) -> Vectors:
         if not isinstance(n, int | float) or n < 1 or n % 1:
-            raise NotIsotropicError("raises what has a direction to a power that is no integer")
+            raise NotIsotropicError("raises a vector to a power that is not an integer")
         even = self.dot(self) ** (n // 2)
         return even * self if n % 2 else even
 
     def __add__(self, other: Vectors) -> "Vector":
         if not isinstance(other, Vector):
-            raise NotIsotropicError("adds a number to what has a direction")
+            raise NotIsotropicError("adds a number to a vector")
         pairs = zip(self.parts, other.parts, strict=True)
         return Vector([a + b for a, b in pairs], self.turn)
 
@@ -111,7 +111,7 @@ class Vector:
         return -self + other
 
     def __lt__(self, other: Vectors) -> bool:
-        raise NotIsotropicError("compares what has a direction")
+        raise NotIsotropicError("compares a vector")
 
     __gt__ = __le__ = __ge__ = __eq__ = __ne__ = __lt__  # pyright: ignore
 
@@ -131,4 +131,4 @@ class Rows(tuple[Vectors, ...]):
 def no_vector(what: str, *values: Vectors) -> None:
     """Raise an error if one of `values` is a vector; `what` describes the operation."""
     if any(isinstance(value, Vector) for value in values):
-        raise NotIsotropicError(f"{what} what has a direction")
+        raise NotIsotropicError(f"{what} a vector")

@@ -12,9 +12,9 @@ from typing import Any, final
 from symfric import __version__
 from symfric.foundation.files import write_text
 from symfric.foundation.panels import save
+from symfric.foundation.workers import Crashed, TimedOut, outcomes
 from symfric.gallery.pages import index_page
 from symfric.gallery.plate import chosen, script, scripts
-from symfric.stress.workers import Crashed, TimedOut, outcomes
 
 LIMIT = 600.0
 """Largest processor time [s] of the figures of one process."""

@@ -33,14 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
-from symfric.integrator.arguments import (
-    check_flags,
-    check_model,
-    check_span,
-    chosen,
-    result_times,
-    tolerances,
-)
+from symfric.integrator import arguments
 from symfric.integrator.equations.initial import consistent, first_guess, first_step
 from symfric.integrator.equations.inputs import Input, InputData, input_data
 from symfric.integrator.equations.system import System
@@ -124,30 +117,20 @@ class Peer:
             grid: times [s].
             y: consistent unknowns at grid[0]; required for index 2.
         """
-        first = self.inputs.interval((grid[:-1] + grid[1:]) / 2)
-        extra: dict[str, Any] = {}
+        first, options = self.inputs.interval((grid[:-1] + grid[1:]) / 2), dict(self.options)
         if self.plugin == "rosenbrock":
             first, counts = np.unique(first, return_counts=True)
-            extra["control_group_size"] = counts.tolist()
+            options["control_group_size"] = counts.tolist()
+        data = self.inputs.values[:, first]
         if self.index == 2 and y is not None:
-            extra = self._begin(grid, y, self.inputs.values[:, first[0]])
-        solver = ca.integrator(
-            "solver",
-            self.plugin,
-            self.dae,
-            float(grid[0]),
-            grid[1:].tolist(),
-            {**self.options, **extra},
-        )
-        return solver, self.inputs.values[:, first]
-
-    def _begin(self, grid: Array, y: Array, data: Array) -> dict[str, Any]:
-        """Return the start options of idas; its own search for them is singular for index 2."""
-        rates, nominal = rates_of(self.system)
-        f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
-        slope = f(y, np.concatenate([self.p, data])).full().ravel()[rates] / nominal
-        # the default first step of idas is too long for tight tolerances
-        return {"init_xdot": slope.tolist(), "step0": first_step(float(grid[-1] - grid[0]))}
+            # the own search of idas for rates is singular, its first step too long
+            rates, nominal = rates_of(self.system)
+            f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
+            slope = f(y, np.concatenate([self.p, data[:, 0]])).full().ravel()[rates] / nominal
+            options["init_xdot"] = slope.tolist()
+            options["step0"] = first_step(float(grid[-1] - grid[0]))
+        times = float(grid[0]), grid[1:].tolist()
+        return ca.integrator("solver", self.plugin, self.dae, *times, options), data
 
 
 def rates_of(system: System) -> tuple[list[int], Array]:
@@ -311,21 +294,21 @@ def simulate_by_peer(
         SolveError: the integration failed; its `partial` is the trajectory so far.
     """
     where = "simulate_by_peer"
-    check_model(where, model)
-    check_flags(where, throw=throw)
-    t_start, t_end, rtol = check_span(where, model, t_start, t_end, rtol)
+    arguments.check_model(where, model)
+    arguments.check_flags(where, throw=throw)
+    t_start, t_end, rtol = arguments.check_span(where, model, t_start, t_end, rtol)
     checks.choice(f"{where}: peer", peer, PEERS)
     if model.events:
         raise ValueError(
             f"{where}: expected a model without events, got {len(model.events)} in "
             f"'{model.name}'; use simulate"
         )
-    times = result_times(where, t_start, t_end, t_eval, samples)
+    times = arguments.result_times(where, t_start, t_end, t_eval, samples)
     begin = perf_counter()
     inputs = input_data(model, u, t_start, t_end)
-    integrator, fresh = built(model, inputs, chosen(where, "auto", rtol))
+    integrator, fresh = built(model, inputs, arguments.chosen(where, "auto", rtol))
     built_at, system = perf_counter(), integrator.system
-    allowed = tolerances(where, rtol, atol, system.nominal, 1e-10, max_steps)
+    allowed = arguments.tolerances(where, rtol, atol, system.nominal, 1e-10, max_steps)
     y0 = first_guess(system, model, model.initial_state(x0, p, t_start), t_start)
     values = model.values("p", p)
     run, counts = integrate_by_peer(system, inputs, y0, values, times, allowed, peer)

@@ -27,21 +27,12 @@ from numpy.typing import ArrayLike, NDArray
 from symfric.foundation import checks
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import OverloadWarning, SolveError, Status
-from symfric.integrator.arguments import (
-    BACKENDS,
-    check_flags,
-    check_model,
-    check_span,
-    check_times,
-    chosen,
-    stopping,
-    tolerances,
-)
+from symfric.integrator import arguments
 from symfric.integrator.equations.initial import first_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.chunk import Chunk, Job, Points, SingleJob, Solved, digest, suited
 from symfric.integrator.many.member_data import MemberData, MemberInput, ends_of, member_data
-from symfric.integrator.many.program import program
+from symfric.integrator.many.members import program
 from symfric.integrator.many.store import Store
 from symfric.integrator.running.doubts import of_members
 from symfric.integrator.running.integrator import Integrator, built
@@ -141,30 +132,31 @@ def simulate_many(
             which are computed again.
         OverloadWarning: friction above its static level in some members (`Ensemble.doubtful`).
     """
-    check_model("simulate_many", model)
-    check_flags("simulate_many", progress)
+    where = "simulate_many"
+    arguments.check_model(where, model)
+    arguments.check_flags(where, progress)
     ends = ends_of(t_end)
-    t_start, last, rtol = check_span("simulate_many", model, t_start, float(np.max(ends)), rtol)
+    t_start, last, rtol = arguments.check_span(where, model, t_start, float(np.max(ends)), rtol)
     if np.min(ends) <= t_start:
         raise ValueError(
-            f"simulate_many: expected t_end > t_start = {t_start:g} s, got {np.min(ends):g} s for "
+            f"{where}: expected t_end > t_start = {t_start:g} s, got {np.min(ends):g} s for "
             f"member {np.argmin(ends)}"
         )
-    formula = chosen("simulate_many", method, rtol)
+    formula = arguments.chosen(where, method, rtol)
     _check(backend, executor, real)
-    workers = None if workers is None else checks.count("simulate_many: workers", workers)
-    chunk = None if chunk is None else checks.count("simulate_many: chunk", chunk)
+    workers = None if workers is None else checks.count(f"{where}: workers", workers)
+    chunk = None if chunk is None else checks.count(f"{where}: chunk", chunk)
     if backend == CUDA:
         _devices().check(model, executor, workers, rtol, real)
     given = member_data(model, (t_start, ends), x0, u, p)
-    inputs = stopping("simulate_many", given.inputs, times, t_start, last)
+    inputs = arguments.stopping(where, given.inputs, times, t_start, last)
     given, members = replace(given, inputs=inputs), given.count
     looks = np.zeros(0) if np.ndim(ends) else np.array([last])
     if t_eval is not None:
-        looks = check_times("simulate_many", t_start, last, t_eval)
+        looks = arguments.check_times(where, t_start, last, t_eval)
     integrator, _ = built(model, inputs, formula)
-    nominal = integrator.system.nominal
-    allowed = tolerances("simulate_many", rtol, None, nominal, event_tolerance, max_steps, max_step)
+    limits = integrator.system.nominal, event_tolerance, max_steps, max_step
+    allowed = arguments.tolerances(where, rtol, None, *limits)
     points = _points(integrator, given)
     integrator = suited(integrator, points, inputs)
     device: OnDevice | None = None
@@ -254,7 +246,7 @@ def _worker_ended(found: Ensemble, done: int, kept: bool) -> SolveError:
 
 
 def _check(backend: str, executor: object, real: str) -> None:
-    checks.choice("simulate_many: backend", backend, (*BACKENDS, CUDA))
+    checks.choice("simulate_many: backend", backend, (*arguments.BACKENDS, CUDA))
     checks.choice("simulate_many: real", real, REALS)
     if real != "double" and backend != CUDA:
         raise ValueError(

@@ -12,7 +12,7 @@ from symfric.foundation import checks
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess
-from symfric.integrator.many.members import pays, side_by_side
+from symfric.integrator.many.members import fastest
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.integrator import Integrator
@@ -28,7 +28,6 @@ from symfric.integrator.running.plants import (
     Advance,
     InPython,
     Plants,
-    compiled,
     looking,
 )
 from symfric.integrator.running.run import MOST_ORDERS
@@ -83,7 +82,7 @@ class Plant:
         if self._in_python:
             engine = integrator.vm if vm else integrator.compiled
             return InPython(integrator, plants, engine, self._tolerance)
-        return (side_by_side if pays(integrator, plants) else compiled)(integrator, plants)
+        return fastest(integrator, plants)
 
     def __repr__(self) -> str:
         many = "" if self._batch is None else f" x {self._batch}"
@@ -172,7 +171,11 @@ class Plant:
             plants.memory[b] = remembered
             self._fresh[b] = guess
             self.failed.pop(b, None)
-        self._suit(which, guesses)
+        if which:  # pivots that are stable at the start of the first plant
+            self._places = [(guesses[0], plants.R[which[0], Given.d(system.nx)].copy())]
+            suited = self._own.suited(self._places, SAMPLES * self.dt)
+            if suited is not self._integrator:
+                self._use(suited)
         self._seen = False
         return self._x.copy()
 
@@ -228,46 +231,38 @@ class Plant:
     @property
     def signals(self) -> dict[str, Any]:
         """Name -> value of every signal: states, algebraic variables, inputs, outputs."""
-        columns = self._looked.T
-        values = columns[:, 0].tolist() if self._batch is None else columns.copy()
+        if not self._seen:
+            self._values, self._seen = self._look(), True
+        values = self._values[0].tolist() if self._batch is None else self._values.T.copy()
         return dict(zip(self.model.signals, values, strict=True))
 
     def __getitem__(self, name: str) -> Any:
-        names = list(self.model.signals)
-        checks.check_names(f"plant of '{self.model.name}'", [name], names)
-        values = self._looked[:, names.index(name)]
-        return float(values[0]) if self._batch is None else values.copy()
-
-    @property
-    def _looked(self) -> Array:
-        """All signals, shape (plants, signals)."""
-        if not self._seen:
-            self._values, self._seen = self._look(), True
-        return self._values
+        checks.check_names(f"plant of '{self.model.name}'", [name], self.model.signals)
+        return self.signals[name]
 
     def _take(self, u: ArrayLike | Numbers) -> None:
         """Store the inputs of the next interval."""
-        where, own = f"plant of '{self.model.name}': u", self._u
-        if isinstance(u, Mapping):
-            for name, value in self.model.named("u", u).items():
-                i = next(k for k, v in enumerate(self.model.u) if v.name == name)
-                self._write(f"{where}: {name}", own[..., i : i + 1], value, common=True)
-        else:
-            self._write(where, own, u)
+        where = f"plant of '{self.model.name}': u"
+        if not isinstance(u, Mapping):
+            self._write(where, self._u, u)
+            return
+        values = self.model.named("u", u)
+        for i, v in enumerate(self.model.u):
+            if v.name in values:
+                part = self._u[..., i : i + 1]
+                self._write(f"{where}: {v.name}", part, values[v.name], common=True)
 
     def _write(self, where: str, place: Array, value: Any, common: bool = False) -> None:
         """Store `value` in `place`; with `common`, a number applies to all plants."""
-        given = np.asarray(value)
-        single = place.shape[-1] == 1 and given.shape == place.shape[:-1]
+        given, single = np.asarray(value), place.shape[-1] == 1
         if given.dtype.kind not in "fiub":
             raise checks.refused(where, "numbers", value)
-        if given.shape == place.shape or (common and not given.ndim):
-            place[...] = given
-        elif single:
-            place[..., 0] = given
-        else:
-            or_ = f" or {place.shape[:-1]}" if place.shape[-1] == 1 else ""
+        if single and given.shape == place.shape[:-1]:
+            given = given[..., None]
+        if given.shape != place.shape and not (common and not given.ndim):
+            or_ = f" or {place.shape[:-1]}" if single else ""
             raise ValueError(f"{where}: expected shape {place.shape}{or_}, got {given.shape}")
+        place[...] = given
 
     def _hold_on(self) -> None:
         """Discard the inputs of the next interval, so that the current ones remain."""
@@ -296,17 +291,11 @@ class Plant:
             self._hold_on()
             where = f"plant of '{self.model.name}': u"
             raise checks.refused(where, "finite numbers", given)
-        lost: dict[int, tuple[Status, str]] = {}
-        while True:
-            stand = [b for b in np.flatnonzero(plants.why > 0).tolist() if b not in lost]
-            for b in stand:
-                why = self._help(b)
-                if why is not None:
-                    lost[b] = why
-            if len(lost) == np.count_nonzero(plants.why > 0):
-                break
-            self._advance(0)
-        self.failed = lost
+        self.failed = lost = dict[int, tuple[Status, str]]()
+        while stopped := [b for b in np.flatnonzero(plants.why > 0).tolist() if b not in lost]:
+            lost |= {b: why for b in stopped if (why := self._help(b)) is not None}
+            if len(lost) < np.count_nonzero(plants.why > 0):
+                self._advance(0)
         if lost:
             b, (status, message) = next(iter(lost.items()))
             which = "" if self._batch is None else f"plant {b}: "
@@ -386,12 +375,3 @@ class Plant:
         if system.timed:
             y[:, -1] = plants.begin[which]
         return y, values
-
-    def _suit(self, which: list[int], guesses: Array) -> None:
-        """Use pivots that are stable at the start of the first plant."""
-        if which:
-            d = self._plants.R[which[0], Given.d(self._integrator.system.nx)]
-            suited = self._own.suited([(guesses[0], d.copy())], SAMPLES * self.dt)
-            self._places = [(guesses[0], d.copy())]
-            if suited is not self._integrator:
-                self._use(suited)

@@ -18,19 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from symfric.foundation import checks
 from symfric.foundation.memory import remember
 from symfric.foundation.status import SolveError, Status
-from symfric.integrator.arguments import (
-    BACKENDS,
-    another,
-    check_flags,
-    check_model,
-    check_span,
-    check_times,
-    chosen,
-    result_times,
-    stopping,
-    tolerances,
-    warn_of_loose,
-)
+from symfric.integrator import arguments
 from symfric.integrator.derivatives.path import Path, seeds
 from symfric.integrator.derivatives.sensitivity import Differentiated
 from symfric.integrator.equations.initial import first_guess
@@ -87,7 +75,7 @@ def settings(model: Model, asked: tuple[Any, ...]) -> Settings:
         return _checked(model, *asked)  # scalar arrays and expressions are numbers but not keys
     found = known.get(key)
     if found is not None:
-        warn_of_loose("simulate", found.allowed.rtol, stacklevel=4)
+        arguments.warn_of_loose("simulate", found.allowed.rtol, stacklevel=4)
         return found
     found = _checked(model, *asked)
     if found.times.size <= MOST_TIMES:
@@ -107,11 +95,12 @@ def _checked(
     max_steps: int | None,
     max_step: float | None,
 ) -> Settings:
-    t_start, t_end, rtol = check_span("simulate", model, t_start, t_end, rtol, stacklevel=6)
-    formula = chosen("simulate", method, rtol)
-    times = result_times("simulate", t_start, t_end, None, samples)
-    nominal = model.nominal("x")
-    allowed = tolerances("simulate", rtol, atol, nominal, event_tolerance, max_steps, max_step)
+    where = "simulate"
+    t_start, t_end, rtol = arguments.check_span(where, model, t_start, t_end, rtol, stacklevel=6)
+    formula = arguments.chosen(where, method, rtol)
+    times = arguments.result_times(where, t_start, t_end, None, samples)
+    limits = model.nominal("x"), event_tolerance, max_steps, max_step
+    allowed = arguments.tolerances(where, rtol, atol, *limits)
     return Settings(t_start, t_end, formula, allowed, times)
 
 
@@ -270,12 +259,12 @@ def simulate(
             relax. The run is still returned; its `doubts` give the contact and the time.
         EnergyWarning: friction adds energy to the motion, for example a law with the wrong sign.
     """
-    check_model("simulate", model)
-    check_flags("simulate", progress, measure_error=measure_error, throw=throw)
+    arguments.check_model("simulate", model)
+    arguments.check_flags("simulate", progress, measure_error=measure_error, throw=throw)
     limits = event_tolerance, max_steps, max_step
     asked = settings(model, (t_start, t_end, rtol, atol, samples, method, *limits))
     t_start, t_end, formula, allowed = asked.t_start, asked.t_end, asked.formula, asked.allowed
-    checks.choice("simulate: backend", backend, BACKENDS)
+    checks.choice("simulate: backend", backend, arguments.BACKENDS)
     if sensitivities != ():
         sensitivities = checks.names("simulate: sensitivities", sensitivities)
         if method == "auto":
@@ -283,10 +272,10 @@ def simulate(
     if t_eval is None:
         looks = asked.times.copy()
     else:
-        looks = check_times("simulate", t_start, t_end, t_eval)
+        looks = arguments.check_times("simulate", t_start, t_end, t_eval)
     begin = perf_counter()
     inputs = paced(input_data(model, u, t_start, t_end), model)
-    inputs = stopping("simulate", inputs, times, t_start, t_end)
+    inputs = arguments.stopping("simulate", inputs, times, t_start, t_end)
     integrator, fresh = built(model, inputs, formula)
     build_time = perf_counter() - begin if fresh else 0.0
     which = seeds(model, sensitivities, x0, p, t_start) if sensitivities else None
@@ -320,7 +309,7 @@ def simulate(
         finer = simulate(
             model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(allowed.rtol / 100, 1e-13),
             atol=None if atol is None else atol / 100, event_tolerance=event_tolerance,
-            t_eval=trajectory.t, method=another(formula), backend=backend,
+            t_eval=trajectory.t, method=arguments.another(formula), backend=backend,
             max_step=run.extent.longest / 2, times=times, sensitivities=sensitivities,
         )  # fmt: skip
         off = difference(model, trajectory, finer)

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from symfric.foundation import checks
-from symfric.integrator.arguments import BACKENDS, check_span, chosen, tolerances
+from symfric.integrator import arguments
 from symfric.integrator.equations.initial import first_guess, smallest_step
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.manifold import Manifold
@@ -15,9 +15,8 @@ from symfric.integrator.methods.method import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.plant import Numbers, Plant
 from symfric.integrator.running.crossings import Memory
-from symfric.integrator.running.integrator import Integrator, built
+from symfric.integrator.running.integrator import built
 from symfric.integrator.running.plants import SAMPLES, Plants
-from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.attempt import State, build_fixed
 from symfric.model import Model, check_model
 
@@ -76,38 +75,29 @@ def stepper(
     check_model(where, model)
     dt = checks.number(f"{where}: dt", dt, unit="s", above=0.0)
     t_start = checks.number(f"{where}: t_start", t_start, unit="s")
-    _, t_end, rtol = check_span(where, model, t_start, t_start + dt, rtol)
-    formula = chosen(where, method, rtol)
-    checks.choice(f"{where}: backend", backend, BACKENDS)
+    _, t_end, rtol = arguments.check_span(where, model, t_start, t_start + dt, rtol)
+    formula = arguments.chosen(where, method, rtol)
+    checks.choice(f"{where}: backend", backend, arguments.BACKENDS)
     members = 1 if batch is None else checks.count(f"{where}: batch", batch)
     # constant inputs have one entry each in the run data
     inputs = input_data(model, {v.name: float(v.start) for v in model.u}, t_start, t_end)
     integrator, _ = built(model, inputs, formula)
-    allowed = tolerances(
+    allowed = arguments.tolerances(
         where, rtol, atol, integrator.system.nominal, event_tolerance, max_steps, max_step
     )
-    plants = _plants(integrator, members, dt, t_start, allowed)
-    plant = Plant(integrator, plants, backend, batch, allowed.event)
-    plant.reset(x0, p)
-    return plant
-
-
-def _plants(
-    integrator: Integrator, members: int, dt: float, t_start: float, allowed: Tolerances
-) -> Plants:
-    """Return plants whose start values are not yet set."""
-    model, system = integrator.model, integrator.system
     u = np.tile(model.values("u"), (members, 1))
     d = np.hstack([np.tile(model.values("p"), (members, 1)), u])
-    begin = np.full(members, t_start)
+    start = State.at(t_start, dt, np.zeros((members, integrator.system.n)))
+    S, R = (np.ascontiguousarray(rows) for rows in (start, allowed.given(t_start, d)))
     count, ready, why, made = (np.zeros(members, dtype=np.int64) for _ in range(4))
-    columns = (State.at(t_start, dt, np.zeros((members, system.n))), allowed.given(t_start, d))
-    S, R = (np.ascontiguousarray(rows) for rows in columns)
-    return Plants(
-        S, R, u, begin, count, ready, why, made,
+    plants = Plants(
+        S, R, u, np.full(members, t_start), count, ready, why, made,
         dt, allowed.max_steps, smallest_step(SAMPLES * dt),
         np.tile(Memory.new(len(model.events), allowed.event), (members, 1)),
     )  # fmt: skip
+    plant = Plant(integrator, plants, backend, batch, allowed.event)
+    plant.reset(x0, p)
+    return plant
 
 
 def flow(model: Model, *, steps: int = 20, method: str = "rodas5p") -> ca.Function:

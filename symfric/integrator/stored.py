@@ -156,26 +156,14 @@ class Stored:
             return built(self.model, self.inputs, METHODS[self.method])[0]
 
         made = trajectory_of(
-            self.model, integrator, self.inputs, run, self.p, lambda: self.statistics, self.backend
-        )
-        names, known = list(self.model.signals), self.signals
-        by_name = dict(zip(names, known, strict=True))
-
-        def evaluate(at: Array) -> dict[str, Array]:
-            return dict(by_name) if at is made.t else made.evaluate(at)
-
-        def states(at: Array) -> dict[str, Array]:
-            if at is made.t:
-                return {v.name: by_name[v.name] for v in self.model.x}
-            return made.states(at)
+            self.model, integrator, self.inputs, run, self.p, lambda: self.statistics, self.backend,
+            dict(zip(self.model.signals, self.signals, strict=True)),
+        )  # fmt: skip
 
         def keep(_: Trajectory) -> Stored:
             return self
 
-        return replace(
-            made, evaluate=evaluate, states=states, keep=keep,
-            **self._derivatives(integrator, made.t),
-        )  # fmt: skip
+        return replace(made, keep=keep, **self._derivatives(integrator, made.t))
 
     def _derivatives(self, integrator: Callable[[], Integrator], t: Array) -> dict[str, Any]:
         """Return the derivative functions: values at `t` are stored, others use the steps."""
@@ -261,6 +249,7 @@ def trajectory_of(
     p: Array,
     count: Callable[[], Statistics],
     backend: str = "vm",
+    known: Mapping[str, Array] | None = None,
 ) -> Trajectory:
     """Return the trajectory of a run.
 
@@ -270,6 +259,7 @@ def trajectory_of(
         run: results; only output times that were reached are used.
         count: returns the statistics.
         backend: engine of the signals: "vm", otherwise the engine expected to be fastest.
+        known: signals at the output times, if they are stored.
 
     With third-party integrators the constraints of mechanisms drift, and the results show the
     drift. The methods of symfric satisfy them to the tolerance between steps, exactly in results.
@@ -283,6 +273,8 @@ def trajectory_of(
         return outputs.reached.copy() if at is times else run.at(at)
 
     def states(at: Array) -> dict[str, Array]:
+        if known is not None and at is times:
+            return {v.name: known[v.name] for v in model.x}
         y, columns = unknowns(at), None if drifts else integrator().states
         if columns is not None:
             y = columns([y.T, data(at)], backend=engine)[0].T
@@ -296,6 +288,8 @@ def trajectory_of(
         return np.ascontiguousarray(values.T)
 
     def evaluate(at: Array) -> dict[str, Array]:
+        if known is not None and at is times:
+            return dict(known)
         own = integrator()
         columns = own.plain_signal_columns if drifts else own.signal_columns
         return dict(zip(names, rows(columns, at), strict=True))

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.numeric import evaluate, evaluate_all
 from symfric.foundation.parameters import Variable
+from symfric.foundation.units import per_second
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model.contact import Contact, Variables
 from symfric.model.holonomic import Holonomic
 from symfric.model.parts import Event, Monitor, Output
 from symfric.model.sketch import Sketch
-
-PER_SECOND = {"m/s": "m/s^2", "rad/s": "rad/s^2", "1/s": "1/s^2"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -205,7 +204,6 @@ def accelerations(model: System) -> dict[str, Output]:
         if i is None and not alone:
             continue
         r = k if i is None else i
-        unit = model.x[r].unit
-        unit = PER_SECOND.get(unit, f"{unit}/s" if unit else "")
+        unit = model.x[r].unit and per_second(model.x[r].unit)
         found[f"{v.name}_acc"] = Output(model.ode[r], unit, f"acceleration of {v.name}")
     return found

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from symfric.multibody.forces import JointSpringDamper as JointSpringDamper
     from symfric.multibody.forces import SpringDamper as SpringDamper
     from symfric.multibody.forces import UserForce as UserForce
-    from symfric.multibody.functions import functions as functions
     from symfric.multibody.joint import Joint as Joint
     from symfric.multibody.joint import JointFriction as JointFriction
     from symfric.multibody.joints import ALL_JOINTS as ALL_JOINTS
@@ -38,6 +37,7 @@ if TYPE_CHECKING:
     from symfric.multibody.joints import Universal as Universal
     from symfric.multibody.kinematics import Kinematics as Kinematics
     from symfric.multibody.mechanism import Mechanism as Mechanism
+    from symfric.multibody.mechanism import functions as functions
     from symfric.multibody.spatial import GROUND as GROUND
     from symfric.multibody.spatial import Body as Body
     from symfric.multibody.spatial import Frame as Frame

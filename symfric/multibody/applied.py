@@ -330,12 +330,3 @@ def rests(where: str, made: Prepared, a0: Array) -> tuple[Rest, ...]:
             "the distribution of their forces is undetermined; use smooth laws in the others",
         )
     return tuple(sorted(found, key=lambda rest: rest.members))
-
-
-def applied_forces(groups: Sequence[Rest], levels: Sequence[ca.SX]) -> dict[int, ca.SX]:
-    """Return F_e of each contact by its number, given the static levels of all contacts [N]."""
-    found: dict[int, ca.SX] = {}
-    for rest in groups:
-        shares = rest.shares([levels[i] for i in rest.members])
-        found |= zip(rest.members, shares, strict=True)
-    return found

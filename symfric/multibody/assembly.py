@@ -11,9 +11,8 @@ forces that depend on reactions.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import final
 
 import casadi as ca
 import numpy as np
@@ -39,23 +38,10 @@ Stick of such laws is exact up to rounding.
 """
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Machine:
-    """Data of a mechanism that do not depend on friction forces; `index` as in `Holonomic`."""
-
-    name: str
-    made: Prepared
-    multipliers: Variables
-    u: Variables
-    p: Variables
-    index: int
-
-
-def assemble(name: str, made: Prepared, u: Variables, index: int) -> Model:
-    """Return the model of a mechanism with the inputs `u`; `index` is that of `Holonomic`."""
+def assemble(name: str, made: Prepared, index: int) -> Model:
+    """Return the model of the mechanism `name`; `index` is that of `Holonomic`."""
     eq, cut = made.eq, with_cuts(made)
-    a0, lam0, N0 = without_friction(made, u)
+    a0, lam0, N0 = without_friction(made)
     groups = rests(f"mechanism '{name}'", made, a0)
     contacts = slips(eq, N0.tolist(), groups)
     units = eq.multipliers
@@ -63,24 +49,25 @@ def assemble(name: str, made: Prepared, u: Variables, index: int) -> Model:
         Variable(label, units[label], start=x, nominal=max(1.0, abs(x)), doc="multiplier")
         for label, x in zip(made.labels, lam0.tolist(), strict=True)
     )
-    machine = _Machine(name, made, multipliers, u, made.p, index)
     inner = None if cut is None else _inner(cut, eq, contacts)
     # balls are excluded: their slip is a vector
     frictional = tuple(_contact(s) for s in contacts if not isinstance(s.contact.law, SpatialSlip))
-    opening = partial(_open, machine, contacts, frictional)
-    return _model(machine, contacts, groups, inner, frictional, opening)
+    of = partial(_model, name, index, multipliers)
+    return of(made, contacts, groups, inner, frictional,
+              lambda: of(*_opened(made, contacts, frictional)))  # fmt: skip
 
 
 def _model(
-    machine: _Machine, contacts: Sequence[Slip], groups: Sequence[Rest], inner: Inner | None,
-    frictional: tuple[Contact, ...], opening: Callable[[], Model] | None,
+    name: str, index: int, multipliers: Variables, made: Prepared, contacts: Sequence[Slip],
+    groups: Sequence[Rest], inner: Inner | None, frictional: tuple[Contact, ...] = (),
+    opening: Callable[[], Model] | None = None,
 ) -> Model:  # fmt: skip
-    """Return the model of a machine with the given contacts."""
-    made, eq, p = machine.made, machine.made.eq, machine.p
+    """Return the model of a mechanism with the given contacts and groups of sticking contacts."""
+    eq, p = made.eq, made.p
     pressed, loops = [s for s in contacts if s.unknown], [v for r in groups for v in r.direction]
     states = [v for s in contacts for v in s.states]
     before = ca.vertcat(eq.lam, eq.F)
-    after = ca.vertcat(symbols_of(machine.multipliers), stacked(s.force for s in contacts))
+    after = ca.vertcat(symbols_of(multipliers), stacked(s.force for s in contacts))
     needed = stacked(rest.needed([contacts[i].force for i in rest.members]) for rest in groups)
     balance, normals, phi_ddot = ca.substitute(
         [eq.balance, stacked(s.normal - s.N for s in pressed), eq.phi_ddot], [before], [after]
@@ -88,7 +75,7 @@ def _model(
     rates = (*(t.rate for t in eq.turns), *(s.rate for s in contacts), *(0.0 for _ in loops))
     mechanics = Holonomic(
         eq.n, eq.phi, eq.a, ca.vertcat(balance, phi_ddot, needed, normals), stacked(rates),
-        partial(solve_mass, eq), eq.norms, machine.index, inner,
+        partial(solve_mass, eq), eq.norms, index, inner,
         *_pressing(contacts, ca.vertcat(eq.a, before)), applied=len(groups),
     )  # fmt: skip
 
@@ -102,16 +89,12 @@ def _model(
     closed = [s for s in contacts if s.force is not s.contact.F]
     watched = [s for s in closed if scales[s.contact.name].is_regular()]
     return Model(
-        name=machine.name,
+        name=name,
         x=(*made.q, *made.qd, *(t.angle for t in eq.turns), *states, *loops),
-        z=(
-            *machine.multipliers,
-            *(r.force for r in groups),
-            *(v for s in pressed for v in s.unknown),
-        ),
-        u=machine.u,
+        z=(*multipliers, *(r.force for r in groups), *(v for s in pressed for v in s.unknown)),
+        u=made.u,
         p=p,
-        outputs=_outputs(eq, contacts, put, [v.unit for v in machine.multipliers]),
+        outputs=_outputs(eq, contacts, put, [v.unit for v in multipliers]),
         monitors=tuple(
             Monitor(v, s.contact.friction.law.velocity_scale)
             for s in watched
@@ -136,34 +119,28 @@ def _contact(s: Slip) -> Contact:
     # a normal force that contains reactions is no expression of the model's symbols
     known = s.N is not s.normal or depends_on_load(contact.friction.law)
     return Contact(
-        contact.name,
-        contact.slip,
-        s.N if known else ca.SX(np.nan),
-        contact.friction.law,
-        given=s.inputs,
-        states=s.states,
-        force=contact.F,
-        turning=contact.friction.turning,
+        contact.name, contact.slip, s.N if known else ca.SX(np.nan), contact.friction.law,
+        given=s.inputs, states=s.states, force=contact.F, turning=contact.friction.turning,
         widths={"eps": width} if s.N is not s.normal else {},
-    )
+    )  # fmt: skip
 
 
-def _open(machine: _Machine, contacts: Sequence[Slip], frictional: tuple[Contact, ...]) -> Model:
-    """Return the model with the friction forces as inputs; balls keep their laws."""
+def _opened(
+    made: Prepared, contacts: Sequence[Slip], frictional: Sequence[Contact]
+) -> tuple[Prepared, list[Slip], tuple[Rest, ...], None]:
+    """Return the arguments of the model with friction forces as inputs; balls keep their laws."""
     eps: dict[str, Scalar] = {s.contact.pressed: s.contact.friction.eps for s in contacts}
     widths = {v.name: v for c in frictional for v in c.widths.values()}
     eps |= {name: widths[f"{name}_eps"].symbol for name in eps if f"{name}_eps" in widths}
-    normals = normals_with(machine.made.eq, eps)
     names = {c.name for c in frictional}
     free: list[Slip] = []
-    for s, normal in zip(contacts, normals, strict=True):
+    for s, normal in zip(contacts, normals_with(made.eq, eps), strict=True):
         own = s if s.N is s.normal else replace(s, normal=normal)
         if s.contact.name in names:
             own = replace(own, states=(), rate=ca.SX(0, 1), force=s.contact.F, inputs={})
         free.append(own)
-    u = (*machine.u, *(c.variable for c in frictional))
-    p = (*machine.p, *widths.values())
-    return _model(replace(machine, u=u, p=p), free, (), None, (), None)
+    u = (*made.u, *(c.variable for c in frictional))
+    return replace(made, u=u, p=(*made.p, *widths.values())), free, (), None
 
 
 def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip]) -> Inner | None:
@@ -221,8 +198,7 @@ def _advice(bristles: Sequence[Slip]) -> str:
     if not bristles:
         return ""
     laws = {type(s.contact.friction.law).__name__: s.contact.friction.law for s in bristles}
-    joints = dict.fromkeys(s.contact.joint for s in bristles)
-    name, law = next(iter(laws.items()))
+    joints, (name, law) = dict.fromkeys(s.contact.joint for s in bristles), next(iter(laws.items()))
     least = min(float(at_start(s.unknown[0].start, ())) for s in bristles)
     load = f"{float(f'{max(least, 1.0):.2g}'):g}"
     return (

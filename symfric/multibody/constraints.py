@@ -18,7 +18,7 @@ from typing import Any, ClassVar, NamedTuple, final
 import casadi as ca
 
 from symfric.foundation.checks import expression
-from symfric.foundation.numeric import Scalar, is_number, is_symbolic
+from symfric.foundation.numeric import Scalar, equals, is_symbolic
 from symfric.multibody.dynamics import numbered, twist_jacobian
 from symfric.multibody.forces import Axial, Load, Part
 from symfric.multibody.joint import Joint
@@ -123,15 +123,6 @@ class PrescribedMotion(Constraint):
     motion: Callable[[ca.SX], Scalar]
     direction: str = ""
 
-    def joints(self) -> Iterable[tuple[str, str]]:
-        """Return the driven joint and the direction of the motion."""
-        return ((self.joint, self.direction),)
-
-    def problems(self) -> Iterator[str]:
-        """Yield a message if the motion is not a function."""
-        if not callable(self.motion):
-            yield f"motion: expected a function of time, got {self.motion!r}; write lambda t: ..."
-
     def held(self, kin: Kinematics) -> Held:
         """Return motion(t) - s = 0."""
         what = "motion: expected a function of time that returns one expression"
@@ -164,14 +155,13 @@ class UserConstraint(Constraint):
 
     expression: Callable[[Kinematics], Scalar]
 
-    def problems(self) -> Iterator[str]:
-        """Yield a message if the expression is not a function."""
-        if not callable(self.expression):
-            yield f"expression: expected a function of the kinematics, got {self.expression!r}"
-
     def held(self, kin: Kinematics) -> Held:
         """Return the expressions, and the loads from their derivatives by the pose of each body."""
-        probe = _probe(kin)
+        # poses as symbols, by which the expression is differentiated
+        motion = {GROUND: kin.motion[GROUND]}
+        for name in (n for n in kin.motion if n != GROUND):
+            motion[name] = Motion(ca.SX.sym("R", 3, 3), *(ca.SX.sym(x, 3) for x in "pwvab"))
+        probe = replace(kin, motion=motion)
         given: Any = self.expression(probe)
         try:
             phi = ca.SX(ca.vertcat(*given) if isinstance(given, tuple | list) else given)
@@ -210,16 +200,6 @@ class UserConstraint(Constraint):
             return found
 
         return Held(ca.densify(value), numbered(self.name, value.numel()), loads)
-
-
-def _probe(kin: Kinematics) -> Kinematics:
-    """Return the kinematics with the motions of all bodies replaced by symbols."""
-    motion = {GROUND: kin.motion[GROUND]}
-    for name in kin.motion:
-        if name != GROUND:
-            R, (p, w, v, dw, dv) = ca.SX.sym("R", 3, 3), (ca.SX.sym(x, 3) for x in "pwvab")
-            motion[name] = Motion(R, p, w, v, dw, dv)
-    return replace(kin, motion=motion)
 
 
 TEETH = 1000
@@ -269,12 +249,10 @@ class Coupling(Constraint):
         return self._ends
 
     def problems(self) -> Iterator[str]:
-        """Yield messages about a zero ratio, invalid numbers, or identical displacements."""
-        for name, other in ((self.ratio_field, " other than 0"), ("offset", "")):
-            value = getattr(self, name)
-            number = is_number(value) and abs(value) < ca.inf and (value != 0 or not other)
-            if not is_symbolic(value) and not number:
-                yield f"{name}: expected a finite number{other}, got {value!r}"
+        """Yield messages about invalid numbers, a zero ratio, or identical displacements."""
+        yield from super().problems()
+        if equals(self._ratio, 0.0):
+            yield f"{self.ratio_field}: expected a finite number other than 0, got {self._ratio!r}"
         a, b = self._ends
         if a == b:
             yield f"expected two displacements, got {a[1]} of {a[0]} twice"

@@ -79,10 +79,6 @@ class Loop(NamedTuple):
         """Return the wrench on the child at its joint point, in the parent's joint frame."""
         return -self.C_v.T @ lam, -self.C_w.T @ lam
 
-    def on_child(self, reaction: Wrench) -> Wrench:
-        """Return the reaction in the child's joint frame."""
-        return self.relative.R.T @ reaction[0], self.relative.R.T @ reaction[1]
-
     def loads(self, kin: Kinematics, reaction: Wrench) -> tuple[Load, Load]:
         """Return the loads of the reaction on the child and on the parent."""
         R_WP, at = self.relative.R_WP, self.relative.p_WC

@@ -164,36 +164,22 @@ def equations(
     rows += along @ (every[phi.numel() - norms.numel() :, 0])
     pushed = along.T @ a + ca.jtimes(along.T @ qd, q, qd)
     rows += along @ (inertia * pushed)
-    reactions |= {loop.joint.name: loop.on_child(wrench) for loop, wrench in of_loops}
+    reactions |= {
+        loop.joint.name: (loop.relative.R.T @ F, loop.relative.R.T @ T) for loop, (F, T) in of_loops
+    }
     reactions = {name: reactions[name] for name in topology.joints}
     pressing = {loop.joint.name: wrench for loop, wrench in of_loops if loop.joint.closes}
     pressing = reactions | pressing
     phi = phi[independent, 0]
     phi_dot = ca.jtimes(phi, q, qd) + ca.jacobian(phi, t)
+    phi_ddot = ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t)
+    normals = tuple(_normal(kin, c, pressing) for c in contacts)
+    potential = sum((f.energy(kin) for f in forces), ca.SX(0))
     return Equations(
-        kin,
-        tuple(forces),
-        loops,
-        held,
-        tuple(turns.values()),
-        norms.numel(),
-        q,
-        qd,
-        a,
-        lam,
-        stacked(c.F for c in contacts),
-        ca.densify(phi),
-        phi_dot,
-        ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t),
-        ca.densify(rows),
-        contacts,
-        tuple(_normal(kin, c, pressing) for c in contacts),
-        kinetic_energy(kin),
-        sum((f.energy(kin) for f in forces), ca.SX(0)),
-        power,
-        reactions,
-        pressing,
-    )
+        kin, tuple(forces), loops, held, tuple(turns.values()), norms.numel(), q, qd, a, lam,
+        stacked(c.F for c in contacts), ca.densify(phi), phi_dot, phi_ddot, ca.densify(rows),
+        contacts, normals, kinetic_energy(kin), potential, power, reactions, pressing,
+    )  # fmt: skip
 
 
 def normals_with(eq: Equations, eps: Mapping[str, Scalar]) -> tuple[ca.SX, ...]:

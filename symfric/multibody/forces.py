@@ -72,6 +72,10 @@ class Axial(NamedTuple):
         )
 
 
+FUNCTION_OF = {"motion": ("time", "t"), "expression": ("the kinematics", "kin")}
+"""Argument of the functions in parts, in words and as a name, by field."""
+
+
 @dataclass(frozen=True, eq=False)
 class Part(Keywords, ABC):
     """Force or constraint of a mechanism."""
@@ -79,19 +83,30 @@ class Part(Keywords, ABC):
     kind: ClassVar[str] = "part"
     """Name of the type in messages."""
 
+    ends: ClassVar[tuple[str, ...]] = ()
+    """Fields that contain places, "body" or "body.frame"."""
+
     name: str
 
-    def places(self) -> Iterable[str]:
+    def places(self) -> list[str]:
         """Return the places, "body" or "body.frame", that the part refers to."""
-        return ()
+        return [getattr(self, end) for end in self.ends]
 
     def joints(self) -> Iterable[tuple[str, str]]:
         """Return the joints that the part refers to, each with a direction."""
-        return ()
+        own: dict[str, Any] = vars(self)
+        return ((own["joint"], own["direction"]),) if "direction" in own else ()
 
     def problems(self) -> Iterator[str]:
-        """Yield messages about invalid values."""
-        return iter(())
+        """Yield messages about numbers that are not finite and values that are not functions."""
+        for item in fields(self):
+            value, of = getattr(self, item.name), FUNCTION_OF.get(item.name)
+            good = is_symbolic(value) or (is_number(value) and abs(value) < ca.inf)
+            if item.type is Scalar and not good:
+                yield f"{item.name}: expected a finite number, got {value!r}"
+            if of is not None and not callable(value):
+                expected = f"expected a function of {of[0]}"
+                yield f"{item.name}: {expected}, got {value!r}; write lambda {of[1]}: ..."
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,14 +114,6 @@ class Force(Part):
     """Applied force on bodies."""
 
     kind: ClassVar[str] = "force"
-
-    def problems(self) -> Iterator[str]:
-        """Yield messages about numbers that are not finite."""
-        for item in fields(self):
-            value = getattr(self, item.name)
-            good = is_symbolic(value) or (is_number(value) and abs(value) < ca.inf)
-            if item.type is Scalar and not good:
-                yield f"{item.name}: expected a finite number, got {value!r}"
 
     @property
     def conservative(self) -> bool:
@@ -153,16 +160,14 @@ class SpringDamper(Force):
     and actuator are zero, so that f (p_b - p_a) / l = stiffness (p_b - p_a).
     """
 
+    ends = ("a", "b")
+
     a: str
     b: str
     stiffness: Scalar = 0.0
     free_length: Scalar = 0.0
     damping: Scalar = 0.0
     actuator: Scalar = 0.0
-
-    def places(self) -> Iterable[str]:
-        """Return the two places between which the force acts."""
-        return (self.a, self.b)
 
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield opposite forces on the line between the points."""
@@ -211,10 +216,6 @@ class JointSpringDamper(Force):
     damping: Scalar = 0.0
     actuator: Scalar = 0.0
 
-    def joints(self) -> Iterable[tuple[str, str]]:
-        """Return the joint and the direction in which the force acts."""
-        return ((self.joint, self.direction),)
-
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield the sum of spring, damper and actuator as one load of the joint."""
         joint = kin.topology.joints[self.joint]
@@ -245,6 +246,8 @@ class UserForce(Force):
     that counts full turns, and its rate. It returns force and moment in world components.
     """
 
+    ends = ("place",)
+
     place: str
     expression: Callable[[Kinematics], tuple[Vector, Vector]]
 
@@ -252,15 +255,6 @@ class UserForce(Force):
     def conservative(self) -> bool:
         """False, because the expression is arbitrary."""
         return False
-
-    def problems(self) -> Iterator[str]:
-        """Yield a message if the expression is not a function."""
-        if not callable(self.expression):
-            yield f"expression: expected a function of the kinematics, got {self.expression!r}"
-
-    def places(self) -> Iterable[str]:
-        """Return the place at which the force acts."""
-        return (self.place,)
 
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield force and moment of the user's expression."""

@@ -260,8 +260,6 @@ class Joint(Keywords, ABC):
 
     coordinates: ClassVar[tuple[tuple[str, str], ...]] = ()
     """Suffix and unit of each joint coordinate."""
-    constrains: ClassVar[int] = 0
-    """Number of constraints; the spanning tree prefers joints with more constraints."""
     closes: ClassVar[bool] = False
     """True if the joint has no coordinates and can only close loops."""
     rubs: ClassVar[tuple[str, ...]] = ()
@@ -295,6 +293,11 @@ class Joint(Keywords, ABC):
     @abstractmethod
     def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
         """Return expressions of R_PC and p_PC that must vanish, shape (m, 1)."""
+
+    @property
+    def constrains(self) -> int:
+        """Number of constraints of a joint with coordinates; a spanning tree prefers many."""
+        return 6 - len(self.coordinates) + (self.quaternion is not None)
 
     def problems(self) -> Iterator[str]:
         """Yield messages about invalid values."""
@@ -349,11 +352,9 @@ class Joint(Keywords, ABC):
         return _several(self.rate, len(self.coordinates), None)
 
 
-def _several(given: object, n: int, quaternion: int | None) -> tuple[Scalar, ...]:
+def _several(given: Any, n: int, quaternion: int | None) -> tuple[Scalar, ...]:
     if given is None:
         return tuple(1.0 if i == quaternion else 0.0 for i in range(n))
-    if isinstance(given, tuple):
-        return given
-    if n > 1 and isinstance(given, list | np.ndarray | ca.SX | ca.DM) and not is_number(given):
-        return tuple(given)  # type: ignore[arg-type]
-    return (given,)
+    several = n > 1 and isinstance(given, list | np.ndarray | ca.SX | ca.DM)
+    several = isinstance(given, tuple) or (several and not is_number(given))
+    return tuple(given) if several else (given,)

@@ -54,7 +54,6 @@ class Distance(Closing):
     The multiplier [N/m] times the length is the force in the rod, positive under tension.
     """
 
-    constrains = 1
     transmits = FORCE_NAMES
     symbol = Symbol(line="rod", anchored=True)
 
@@ -79,7 +78,6 @@ class PointOnLine(Closing):
     constraints, but friction of rotation; it models the pin that closes a planar loop.
     """
 
-    constrains = 2
     rubs = ("slide",)
     directions: ClassVar[Mapping[str, int]] = {"slide": 0}
     transmits = FORCE_NAMES
@@ -102,7 +100,6 @@ class PlanarRevolute(Closing):
     z is normal to the plane.
     """
 
-    constrains = 2
     rubs = ("turn",)
     directions: ClassVar[Mapping[str, int]] = {"turn": 0}
     plane = 2
@@ -122,7 +119,6 @@ class PlanarPrismatic(Closing):
     y is normal to the plane. With `JointFriction.length` the moment loads two bearing stations.
     """
 
-    constrains = 2
     rubs = ("slide",)
     directions: ClassVar[Mapping[str, int]] = {"slide": 0}
     plane = 1
@@ -142,7 +138,6 @@ class PinInSlot(Closing):
     y is normal to the plane. The pin may turn in the slot, without friction.
     """
 
-    constrains = 1
     rubs = ("slide",)
     directions: ClassVar[Mapping[str, int]] = {"slide": 0}
     plane = 1
@@ -169,7 +164,6 @@ class Revolute(Joint):
     """Hinge joint that turns about z; 5 constraints."""
 
     coordinates = (ANGLE,)
-    constrains = 5
     rubs = ("turn",)
     directions: ClassVar[Mapping[str, int]] = {"turn": 0}
     transmits = (*FORCE_NAMES, "Mx", "My")
@@ -194,7 +188,6 @@ class Prismatic(Joint):
     """Sliding joint that slides along z without turning; 5 constraints."""
 
     coordinates = (LENGTH,)
-    constrains = 5
     rubs = ("slide",)
     directions: ClassVar[Mapping[str, int]] = {"slide": 0}
     transmits = ("Fx", "Fy", "Mx", "My", "Mz")
@@ -219,7 +212,6 @@ class Cylindrical(Joint):
     """Cylindrical joint that slides along z and turns about z; 4 constraints."""
 
     coordinates = (("slide", "m"), ("angle", "rad"))
-    constrains = 4
     rubs = ("slide", "turn")
     directions: ClassVar[Mapping[str, int]] = {"slide": 0, "turn": 1}
     transmits = ("Fx", "Fy", "Mx", "My")
@@ -244,7 +236,6 @@ class Spherical(Joint):
     """Ball joint that turns about a point, with Euler parameters as coordinates; 3 constraints."""
 
     coordinates = EULER
-    constrains = 3
     rubs = ("ball",)
     quaternion = 0
     transmits = FORCE_NAMES
@@ -272,7 +263,6 @@ class Universal(Joint):
     """
 
     coordinates = (("x", "rad"), ("y", "rad"))
-    constrains = 4
     rubs = ("x", "y")
     directions: ClassVar[Mapping[str, int]] = {"x": 0, "y": 1}
     transmits = (*FORCE_NAMES, "Mx", "Mz")
@@ -312,7 +302,6 @@ class Planar(Joint):
     """Planar joint that moves in the plane x, y and turns about z; 3 constraints."""
 
     coordinates = (("x", "m"), ("y", "m"), ("angle", "rad"))
-    constrains = 3
     directions: ClassVar[Mapping[str, int]] = {"x": 0, "y": 1, "turn": 2}
     transmits = ("Fz", "Mx", "My")
     symbol = Symbol("D", plate=True)
@@ -335,7 +324,6 @@ class Planar(Joint):
 class Fixed(Joint):
     """Rigid connection of two bodies; 6 constraints."""
 
-    constrains = 6
     symbol = Symbol("s", anchored=True)
 
     def pose(self, q: ca.SX) -> Pair:

@@ -181,16 +181,10 @@ class Kinematics:
         R_WP = parent.R @ P.R
         p_WP, v_WP = parent.point(P.p)
         p_WC, v_WC = child.point(C.p)
-        arm = p_WC - p_WP
-        return Relative(
-            R_WP.T @ child.R @ C.R,
-            R_WP.T @ arm,
-            R_WP.T @ (child.w - parent.w),
-            R_WP.T @ (v_WC - v_WP - ca.cross(parent.w, arm)),
-            R_WP,
-            p_WP,
-            p_WC,
-        )
+        R, arm = R_WP.T @ child.R @ C.R, p_WC - p_WP
+        w = R_WP.T @ (child.w - parent.w)
+        v = R_WP.T @ (v_WC - v_WP - ca.cross(parent.w, arm))
+        return Relative(R, R_WP.T @ arm, w, v, R_WP, p_WP, p_WC)
 
     def rotation(self, joint: Joint) -> ca.SX:
         """Return R_PC of a joint."""
@@ -286,12 +280,7 @@ def _carried(base: Motion, link: Link, q: ca.SX, qd: ca.SX, qdd: ca.SX) -> Motio
     dw = R_BA @ base.dw_B + ca.cross(R_BA @ w_A, own_w) + R_BC @ (H_w @ qdd + drift_w)
     dv = R_BA @ (base.dv_B + ca.cross(base.dw_B, arm) + ca.cross(w_A, ca.cross(w_A, arm)))
     dv += 2 * ca.cross(R_BA @ w_A, own_v) + R_BP @ (H_v @ qdd + drift_v)
+    dv = dv + ca.cross(dw, to_body) + ca.cross(w, ca.cross(w, to_body))
+    v = R_BA @ (base.v_B + ca.cross(w_A, arm)) + own_v + ca.cross(w, to_body)
     R_WB = ca.sparsify(base.R @ R_BA.T)
-    return Motion(
-        R_WB,
-        base.p + base.R @ arm + R_WB @ to_body,
-        w,
-        R_BA @ (base.v_B + ca.cross(w_A, arm)) + own_v + ca.cross(w, to_body),
-        dw,
-        dv + ca.cross(dw, to_body) + ca.cross(w, ca.cross(w, to_body)),
-    )
+    return Motion(R_WB, base.p + base.R @ arm + R_WB @ to_body, w, v, dw, dv)

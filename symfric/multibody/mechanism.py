@@ -1,4 +1,4 @@
-"""Builder of mechanisms: it collects bodies, joints and forces, checks them and builds a model."""
+"""Builder of mechanisms, which returns a model, and their equations as named CasADi Functions."""
 
 from collections.abc import Iterable, Sequence
 from copy import copy
@@ -13,7 +13,7 @@ from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.shown import Showing, Shown, Table, among, counted, figure_of
 from symfric.foundation.symbolic import plain, with_symbols
-from symfric.foundation.variable import symbols_of
+from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Model, Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import assemble
@@ -31,6 +31,7 @@ from symfric.multibody.prepare import (
     written,
 )
 from symfric.multibody.results import sketch
+from symfric.multibody.slips import slips
 from symfric.multibody.spatial import GROUND, Body, Frame, Vector, is_vector
 from symfric.multibody.start import following, project
 from symfric.multibody.topology import Topology, spanning_tree
@@ -187,7 +188,7 @@ class Mechanism(packed.Portable, Showing):
         if index not in (None, 0, 1):
             raise ValueError(f"mechanism '{self.name}': index: expected 0 or 1, got {index!r}")
         chosen = (0 if formulation == "absolute" else 1) if index is None else index
-        return assemble(self.name, self.prepare(p, formulation), tuple(self.inputs), chosen)
+        return assemble(self.name, self.prepare(p, formulation), chosen)
 
     def prepare(self, p: Variables = (), formulation: str = "joint") -> Prepared:
         """Check the mechanism and return its equations of motion with their variables.
@@ -200,14 +201,15 @@ class Mechanism(packed.Portable, Showing):
         p = many(where, p, "variables")
         for variable in p:
             kind(where, variable, Variable, "variables made by Variable(...)")
-        made = written(self._tree(p), self.forces, self.constraints, p)
-        loose = undeclared_in_forces(made, tuple(self.inputs))
+        u = tuple(self.inputs)
+        made = replace(written(self._tree(p), self.forces, self.constraints, p), u=u)
+        loose = undeclared_in_forces(made)
         self._refuse([*made.problems, *made.misfits, *left_open(made), *loose])
         self._refuse(infinite(made))
         self._refuse(without_inertia(made))
         if formulation == "absolute":
             self._refuse(inseparable(made))
-            made = in_absolute_coordinates(made, self.constraints)
+            made = replace(in_absolute_coordinates(made, self.constraints), u=u)
             self._refuse([*made.problems, *left_open(made)])
         return made
 
@@ -279,16 +281,94 @@ class Mechanism(packed.Portable, Showing):
             near = made.q0
         _, J, phi_t = at(near)
         rates = following(J, made.qd0, phi_t)
-        links = made.eq.kin.topology.link_of
-        placed = copy(self)
-        placed.joints = [
-            replace(
-                joint,
-                start=tuple(near[links[joint.name].rows].tolist()),
-                rate=tuple(rates[links[joint.name].rows].tolist()),
-            )
-            if joint.name in links
-            else joint
-            for joint in self.joints
-        ]
+        placed, links = copy(self), made.eq.kin.topology.link_of
+        placed.joints = []
+        for joint in self.joints:
+            if (link := links.get(joint.name)) is not None:
+                start, rate = (tuple(x[link.rows].tolist()) for x in (near, rates))
+                placed.joints.append(replace(joint, start=start, rate=rate))
+            else:
+                placed.joints.append(joint)
         return placed
+
+
+def functions(
+    mechanism: Mechanism, p: Variables = (), formulation: str = "joint"
+) -> dict[str, ca.Function]:
+    """Return Functions of coordinates q, rates qd, accelerations a, inputs u and parameters p.
+
+    Functions that depend on time, through prescribed motion or forces, have a last argument t.
+
+    Args:
+        mechanism: the mechanism.
+        p: parameters, as for `Mechanism.build`.
+        formulation: "joint" or "absolute".
+
+    Returns:
+        mass: (q, p) -> M, shape (n, n).
+        bias: (q, qd, u, p) -> Coriolis forces minus applied forces, without friction: the negative
+            of M a + phi_q' lam.
+        constraints: (q, p) -> phi, shape (m, 1), and its Jacobian phi_q.
+        inverse_dynamics: (q, qd, a, lam, z, u, p) -> the additional generalised forces required for
+            the accelerations a, including friction, whose normal forces are explicit in a and lam.
+            z are the internal states of the laws.
+        energy: (q, qd, p) -> kinetic and potential energy [J].
+        poses: (q, p) -> [R_WB, p_WB] of every body, concatenated to shape (3, 4 bodies).
+
+    Raises:
+        ValueError: as `Mechanism.build`.
+
+    Limits: q does not contain the number of full turns of a joint that closes a loop; springs about
+    the axis of such a joint are evaluated at the equivalent angle that is nearest to the start.
+    """
+    eq = mechanism.prepare(p, formulation).eq
+    where = f"mechanism '{mechanism.name}'"
+    if applied := [c for c in eq.contacts if c.law.inputs]:
+        law = type(applied[0].friction.law).__name__
+        raise ValueError(
+            f"{where} > joint '{applied[0].joint}' > friction > law: expected one that needs only "
+            f"v and N, got {law}, whose force in stick depends on the motion; use `build`"
+        )
+    contacts = slips(eq, [1.0] * len(eq.contacts))
+    forces = stacked(c.force for c in contacts)
+    for c in contacts:
+        if c.N is not c.normal:
+            forces = ca.substitute(forces, c.N, c.normal)
+    if ca.depends_on(forces, eq.F):
+        pressed = (c.contact.joint for c in contacts if ca.depends_on(c.normal, eq.F))
+        names = ", ".join(f"'{name}'" for name in dict.fromkeys(pressed))
+        raise ValueError(
+            f"{where} > joint {names} > friction: expected a normal force that does not depend on "
+            "friction; use `build` for a model, or a constant normal force"
+        )
+    still = [ca.SX.zeros(x.numel()) for x in (eq.a, eq.lam, eq.F)]
+    (bias,) = ca.substitute([eq.balance], [eq.a, eq.lam, eq.F], still)
+    bodies = [m for name, m in eq.kin.motion.items() if name != GROUND]
+    poses = ca.horzcat(ca.SX(3, 0), *(ca.horzcat(m.R, m.p) for m in bodies))
+    u, parameters = (symbols_of(group) for group in (mechanism.inputs, p))
+    every = {
+        "q": eq.q, "qd": eq.qd, "a": eq.a, "lam": eq.lam,
+        "z": symbols_of(v for c in contacts for v in c.states), "u": u, "p": parameters,
+        "t": eq.kin.t,
+    }  # fmt: skip
+    turned = ca.densify(starts_of(turn.angle for turn in eq.turns))
+
+    def function(name: str, arguments: str, **results: ca.SX) -> ca.Function:
+        expressions = [ca.densify(result) for result in results.values()]
+        expressions = ca.substitute(expressions, [eq.angles], [turned])
+        named = arguments.split()
+        if ca.depends_on(ca.veccat(*expressions), eq.kin.t):
+            named.append("t")
+        symbols = [every[argument] for argument in named]
+        return ca.Function(name, symbols, expressions, named, list(results), {"cse": True})
+
+    moved = ca.substitute(eq.balance, eq.F, forces)
+    made = (
+        function("mass", "q p", M=eq.mass),
+        function("bias", "q qd u p", bias=bias),
+        function("constraints", "q p", phi=eq.phi, phi_q=eq.Phi_q),
+        function("inverse_dynamics", "q qd a lam z u p", missing=moved),
+        function("energy", "q qd p", kinetic=eq.kinetic, potential=eq.potential),
+        function("poses", "q p", poses=poses),
+    )
+    return {each.name(): each for each in made}

@@ -10,14 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.checks import shown
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import (
-    at_start,
-    stacked,
-    starts_of,
-    strays,
-    symbols_of,
-    undeclared,
-)
+from symfric.foundation.variable import at_start, stacked, starts_of, strays, symbols_of, undeclared
 from symfric.model import Variables, kinds
 from symfric.multibody import checks, start
 from symfric.multibody.constraints import Constraint
@@ -42,7 +35,7 @@ class Prepared:
 
     Attributes:
         eq: equations without redundant constraints.
-        p: parameters.
+        p, u: parameters and inputs.
         q, qd: coordinates and rates with consistent start values.
         q0, qd0: start values of q and qd as numbers.
         labels: names of the multipliers.
@@ -67,6 +60,7 @@ class Prepared:
     singular: bool = False
     problems: tuple[str, ...] = ()
     misfits: tuple[str, ...] = ()
+    u: Variables = ()
 
     def numbers(
         self, *expressions: ca.SX, others: Callable[[int], Array] = np.zeros
@@ -262,10 +256,10 @@ def left_open(made: Prepared) -> Iterator[str]:
         yield "start: expected independent constraints, got a singular position; start elsewhere"
 
 
-def undeclared_in_forces(made: Prepared, inputs: Variables) -> Iterator[str]:
+def undeclared_in_forces(made: Prepared) -> Iterator[str]:
     """Yield messages about undeclared symbols in forces."""
     eq = made.eq
-    known = ca.vertcat(eq.q, eq.qd, eq.angles, symbols_of((*made.p, *inputs)), eq.kin.t)
+    known = ca.vertcat(eq.q, eq.qd, eq.angles, symbols_of((*made.p, *made.u)), eq.kin.t)
     expected = "positions, velocities, time, parameters and inputs"
     for force in eq.forces:
         parts = [x for load in force.loads(eq.kin) for x in _parts(load)]
@@ -313,22 +307,17 @@ def inseparable(made: Prepared) -> Iterator[str]:
             )
 
 
-def without_friction(made: Prepared, u: Variables) -> tuple[Array, Array, Array]:
+def without_friction(made: Prepared) -> tuple[Array, Array, Array]:
     """Return the accelerations, multipliers and normal forces at the start without friction."""
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
     turned = ca.densify(starts_of(turn.angle for turn in eq.turns))
-    zero = [turned, ca.SX.zeros(eq.F.numel()), ca.SX(starts_of(u)), ca.SX(0)]
-    rows, normals = ca.substitute(
-        [ca.vertcat(eq.balance, eq.phi_ddot), stacked(eq.normals)],
-        [eq.angles, eq.F, symbols_of(u), eq.kin.t],
-        zero,
-    )
-    solve = ca.Function(
-        "start",
-        [unknowns, eq.q, eq.qd, symbols_of(made.p)],
-        [rows, ca.jacobian(rows, unknowns), normals],
-    )
+    symbols = [eq.angles, eq.F, symbols_of(made.u), eq.kin.t]
+    zero = [turned, ca.SX.zeros(eq.F.numel()), ca.SX(starts_of(made.u)), ca.SX(0)]
+    expressions = [ca.vertcat(eq.balance, eq.phi_ddot), stacked(eq.normals)]
+    rows, normals = ca.substitute(expressions, symbols, zero)
+    arguments = [unknowns, eq.q, eq.qd, symbols_of(made.p)]
+    solve = ca.Function("start", arguments, [rows, ca.jacobian(rows, unknowns), normals])
     at = made.q0, made.qd0, ca.DM(starts_of(made.p))
     right, matrix, _ = solve(0, *at)
     x = -np.linalg.lstsq(matrix.full(), right.full()[:, 0], rcond=None)[0]

@@ -31,11 +31,8 @@ def results(eq: Equations, undetermined: Sequence[str], p: ca.SX, put: Put) -> d
         p: symbols of the parameters.
         put: function that rewrites expressions in the symbols of the model.
     """
-    found = [
-        *_reactions(eq, undetermined),
-        *_centres(eq),
-        *_work(eq, ca.vertcat(eq.q, eq.angles, p)),
-    ]
+    still = ca.vertcat(eq.q, eq.angles, p)
+    found = [*_reactions(eq, undetermined), *_centres(eq), *_work(eq, still)]
     values = put([output.expression for _, output in found])
     own = {str(eq.q[i]) for i in range(eq.n)}
     return {

@@ -13,7 +13,7 @@ from symfric.laws.base import smooth
 from symfric.laws.base.families import FINEST, rests
 from symfric.laws.base.law import FORCE
 from symfric.model import Event, Variables, kinds
-from symfric.multibody.applied import Rest, applied_forces, capacity_of, forward, switches_at
+from symfric.multibody.applied import Rest, capacity_of, forward, switches_at
 from symfric.multibody.equations import Equations
 from symfric.multibody.joint import Contact
 
@@ -80,16 +80,16 @@ def slips(
         law, pressed = contact.friction.law, contact.pressed
         if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(law):
             doc = f"normal force of joint '{contact.joint}' with {type(law).__name__}"
-            unknowns.setdefault(
-                pressed,
-                Variable(f"{pressed}_N", "N", start=start, nominal=max(1.0, abs(start)), doc=doc,
-                         kind=kinds.NORMAL_FORCE),
-            )  # fmt: skip
-            normal = unknowns[pressed].symbol
+            size, kind = max(1.0, abs(start)), kinds.NORMAL_FORCE
+            new = Variable(f"{pressed}_N", "N", start=start, nominal=size, doc=doc, kind=kind)
+            normal = unknowns.setdefault(pressed, new).symbol
         pressing.append(normal)
     levels = [capacity_of(c.law, N) if groups else N
               for c, N in zip(eq.contacts, pressing, strict=True)]  # fmt: skip
-    applied = applied_forces(groups, levels)
+    applied: dict[int, ca.SX] = {}
+    for rest in groups:
+        shares = rest.shares([levels[i] for i in rest.members])
+        applied |= zip(rest.members, shares, strict=True)
     slides = [c.slip for c in eq.contacts]
     for rest in groups:
         for i, g in zip(rest.members, rest.along, strict=True) if rest.direction else ():
@@ -98,7 +98,8 @@ def slips(
     found: list[Slip] = []
     for i, contact in enumerate(eq.contacts):
         law, N = contact.law, pressing[i]
-        states = _states(contact, ca.SX(law.steady_state(slides[i], normal_at_start[i])))
+        begin = ca.SX(law.steady_state(slides[i], normal_at_start[i]))
+        states = tuple(_states(contact, begin))
         z, inputs = symbols_of(states), {FORCE: applied[i]} if i in applied else {}
         # dense, because these expressions replace the symbols of F
         rate, force = (
@@ -110,19 +111,12 @@ def slips(
     return tuple(found)
 
 
-def _states(contact: Contact, begin: ca.SX) -> Variables:
-    """Return the states of a law with their names in the model."""
-    return tuple(
-        Variable(
-            f"{contact.name}_{s.name}",
-            contact.unit(s.unit),
-            start=begin[i],
-            nominal=s.nominal,
-            doc=s.doc,
-            kind=kinds.MODE if s.whole else kinds.FRICTION_STATE,
-        )
-        for i, s in enumerate(contact.law.states)
-    )
+def _states(contact: Contact, begin: ca.SX) -> Iterator[Variable]:
+    """Yield the states of a law with their names in the model."""
+    for i, s in enumerate(contact.law.states):
+        name, unit = f"{contact.name}_{s.name}", contact.unit(s.unit)
+        kind = kinds.MODE if s.whole else kinds.FRICTION_STATE
+        yield Variable(name, unit, start=begin[i], nominal=s.nominal, doc=s.doc, kind=kind)
 
 
 def events(contacts: Sequence[Slip], groups: Sequence[Rest], rates: Variables) -> tuple[Event, ...]:

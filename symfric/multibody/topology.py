@@ -136,11 +136,10 @@ def absolute(
     Each body floats, with the frame of its coordinates at the centre of mass. `starts` are the
     positions and rates of each body.
     """
-    links = [
-        Link(GROUND, name, Floating(name, GROUND, name, *start), False, Frame(),
-             Frame(at=bodies[name].c))
-        for name, start in starts.items()
-    ]  # fmt: skip
+    links: list[Link] = []
+    for name, start in starts.items():
+        floating, centre = Floating(name, GROUND, name, *start), Frame(at=bodies[name].c)
+        links.append(Link(GROUND, name, floating, False, Frame(), centre))
     return _topology(bodies, joints, links, joints)
 
 

@@ -180,11 +180,8 @@ def carried(urdf: Urdf) -> dict[str, Carried]:
 
 def merged(urdf: Urdf, places: Mapping[str, Carried], body: str) -> Inertial:
     """Return the mass, centre of mass and inertia of a body, the sum over its links."""
-    parts = [
-        (at, part)
-        for link, at in places.items()
-        if at.body == body and (part := urdf.links[link]) is not None
-    ]
+    links = ((at, urdf.links[link]) for link, at in places.items() if at.body == body)
+    parts = [(at, part) for at, part in links if part is not None]
     mass = sum(part.mass for _, part in parts)
     moment = sum((part.mass * (at.p + at.R @ part.com) for at, part in parts), np.zeros(3))
     com = moment / mass if mass else moment

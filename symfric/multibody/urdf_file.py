@@ -293,36 +293,27 @@ def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
     length = float(np.linalg.norm(axis))
     if not length > 1e-12:
         notes.problems.append(f"{where} > axis: expected a direction, got '0 0 0'")
-    damping, friction = (
-        notes.number(f"{where} > dynamics", dynamics, key) for key in ("damping", "friction")
-    )
-    for key, value in (("damping", damping), ("friction", friction)):
-        if value < 0:
-            notes.problems.append(f"{where} > dynamics > {key}: expected >= 0, got {value:g}")
+    levels: list[float] = []
+    for key in ("damping", "friction"):
+        levels.append(notes.number(f"{where} > dynamics", dynamics, key))
+        if levels[-1] < 0:
+            notes.problems.append(f"{where} > dynamics > {key}: expected >= 0, got {levels[-1]:g}")
     ends: list[str] = []
     for key in ("parent", "child"):
         end = tag.find(key)
         ends.append("" if end is None else end.get("link", ""))
         if not ends[-1]:
             notes.problems.append(f"{where} > {key}: expected the name of a link, found none")
-    parent, child = ends
-    R, p = notes.pose(where, tag)
-    return UrdfJoint(
-        name, kind, parent, child, R, p, axis / (length or 1.0), damping, friction,
-        {key: notes.number(f"{where} > limit", limit, key) for key in LIMITS
-         if limit is not None and key in limit.attrib},
-        _mimic(where, mimic, notes),
-    )  # fmt: skip
-
-
-def _mimic(where: str, tag: ET.Element | None, notes: Notes) -> Mimic | None:
-    if tag is None:
-        return None
-    at = f"{where} > mimic"
-    return Mimic(
-        tag.get("joint", ""), notes.number(at, tag, "multiplier", "1"),
-        notes.number(at, tag, "offset"),
-    )  # fmt: skip
+    (parent, child), (R, p), (damping, friction) = ends, notes.pose(where, tag), levels
+    leader = None
+    if mimic is not None:
+        numbers = (("multiplier", "1"), ("offset", "0"))
+        ratio, offset = (notes.number(f"{where} > mimic", mimic, *number) for number in numbers)
+        leader = Mimic(mimic.get("joint", ""), ratio, offset)
+    given = {} if limit is None else limit.attrib
+    limits = {k: notes.number(f"{where} > limit", limit, k) for k in LIMITS if k in given}
+    axis = axis / (length or 1.0)
+    return UrdfJoint(name, kind, parent, child, R, p, axis, damping, friction, limits, leader)
 
 
 def _check_names(robot: ET.Element, notes: Notes) -> None:

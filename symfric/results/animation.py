@@ -139,7 +139,13 @@ def picture(
     title = figure.axes[0].set_title("", loc="left", fontsize="medium")
     factor = "" if abs(speed - 1) < 1e-9 else f"  ({speed:.3g} x)"
     if sticks:
-        _legend(figure)
+        entries = [
+            Line2D([], [], linestyle="", marker="o", color=EDGE, markerfacecolor=fill, label=label)
+            for fill, label in ((SLIDES, "slides"), (STICKS, "sticks"))
+        ]
+        side = "upper right" if figure.get_layout_engine() is None else "outside lower right"
+        figure.legend(handles=entries, loc=side, ncols=2, frameon=False, fontsize="small",
+                      handletextpad=0.2)  # fmt: skip
 
     def show(k: int) -> None:
         for put in drawn:
@@ -193,19 +199,6 @@ def _sticks(trajectory: Signals, sketch: Sketch, times: Array) -> dict[str, Flag
         mark.name: np.all([np.abs(slip[name]) < limit for name, limit in mark.slips], axis=0)
         for mark in marks
     }
-
-
-def _legend(figure: Figure) -> None:
-    """Add a legend for the fill colours of joints."""
-    entries = [
-        Line2D([], [], linestyle="", marker="o", color=EDGE, markerfacecolor=fill, label=label)
-        for fill, label in ((SLIDES, "slides"), (STICKS, "sticks"))
-    ]
-    flat = figure.get_layout_engine() is not None
-    figure.legend(
-        handles=entries, loc="outside lower right" if flat else "upper right", ncols=2,
-        frameon=False, fontsize="small", handletextpad=0.2,
-    )  # fmt: skip
 
 
 def _flat(view: View, size: float) -> tuple[Figure, Array]:

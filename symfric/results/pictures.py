@@ -69,7 +69,12 @@ def plot_trajectories(
     tall = max((len(g.names) for g in groups), default=1) > 1
     figure, axes = empty_panels(len(groups), width=8.5 if tall else 7.0, height=2.0)
     alone = all(len(g.names) == 1 for g in groups)
-    _check_log(log, groups, trajectories)
+    checks.check_names("plot: log", log, [name for group in groups for name in group.names])
+    for name in log:
+        top = max(float(run.at_looks(name).max()) for run in trajectories.values())
+        if not top > 0:
+            what = f"expected signals above zero somewhere, got {name}, at most {top:g}"
+            raise ValueError(f"plot: log: {what}")
     by_t, unit_t = clock([end for run in trajectories.values() for end in run.span])
     for axis, group in zip(axes, groups, strict=True):
         _panel(axis, group, trajectories, alone, by_t, not set(log).isdisjoint(group.names))
@@ -108,19 +113,6 @@ def split(groups: Sequence[Group]) -> list[Group]:
         for name in (list(group.names)[-1:] if group.title == ENERGY else group.names)
     ]
     return single if len(single) <= APART else list(groups)
-
-
-def _check_log(
-    log: Sequence[str], groups: Sequence[Group], trajectories: Mapping[str, Signals]
-) -> None:
-    """Check that signals with a logarithmic axis are plotted and positive at some time."""
-    checks.check_names("plot: log", log, [name for group in groups for name in group.names])
-    for name in log:
-        top = max(float(run.at_looks(name).max()) for run in trajectories.values())
-        if not top > 0:
-            raise ValueError(
-                f"plot: log: expected signals above zero somewhere, got {name}, at most {top:g}"
-            )
 
 
 def _panel(
@@ -175,27 +167,29 @@ def level(axis: Axes, values: Sequence[Array]) -> None:
         axis.set_ylim(middle - (0.2 * size or 1.0), middle + (0.2 * size or 1.0))
 
 
-def _small(count: int, height: float) -> tuple[Figure, list[Axes]]:
-    """Return a small figure with `count` panels in a column."""
+def _small(
+    curves: Sequence[tuple[str, Array, Array]], unit_t: str, height: float, **look: float
+) -> Figure:
+    """Return a small figure of curves (label, times, values), each in its own panel."""
     figure = Figure(figsize=(5.2, height), layout="constrained")
-    axes = list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
-    for axis in axes:
+    axes = list(figure.subplots(len(curves), 1, sharex=True, squeeze=False)[:, 0])
+    for axis, (label, t, values) in zip(axes, curves, strict=True):
+        axis.plot(t, values, color=COLOURS[0], **look)
+        axis.set_ylabel(label, fontsize=7)
         axis.tick_params(labelsize=7)
         axis.grid(alpha=0.3)
-    return figure, axes
+    axes[-1].set_xlabel(f"t [{unit_t}]", fontsize=7)
+    figure.align_ylabels(axes)
+    return figure
 
 
 def thumbnail(run: Signals) -> Figure:
     """Return a small plot of the first position, its rate and the first friction force."""
-    names, (by_t, unit_t) = _few(run), clock(run.span)
-    figure, axes = _small(len(names), 0.5 + 1.05 * len(names))
-    for axis, name in zip(axes, names, strict=True):
+    (by_t, unit_t), curves = clock(run.span), list[tuple[str, Array, Array]]()
+    for name in _few(run):
         t, values = _thinned(run.t, run[name])
-        axis.plot(by_t * t, values, linewidth=1.0, color=COLOURS[0])
-        axis.set_ylabel(f"{name} [{run.units[name]}]", fontsize=7)
-    axes[-1].set_xlabel(f"t [{unit_t}]", fontsize=7)
-    figure.align_ylabels(axes)
-    return figure
+        curves.append((f"{name} [{run.units[name]}]", by_t * t, values))
+    return _small(curves, unit_t, 0.5 + 1.05 * len(curves), linewidth=1.0)
 
 
 def _few(run: Signals) -> list[str]:
@@ -367,8 +361,4 @@ def _draw(axis: Axes, x: Array, y: Array, k: int, label: str) -> None:
 
 def thumbnail_of_many(t: Array, values: Array, label: str) -> Figure:
     """Return a small plot of the first members over time."""
-    figure, (axis,) = _small(1, 1.9)
-    axis.plot(t, np.asarray(values[:SMALL]).T, linewidth=0.6, color=COLOURS[0], alpha=0.4)
-    axis.set_xlabel("t [s]", fontsize=7)
-    axis.set_ylabel(label, fontsize=7)
-    return figure
+    return _small([(label, t, np.asarray(values[:SMALL]).T)], "s", 1.9, linewidth=0.6, alpha=0.4)

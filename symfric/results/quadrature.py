@@ -37,22 +37,22 @@ def extremes(times: Array, values: Mapping[str, Array], evaluate: Evaluate) -> d
 
     The search is refined between the `times`. Both values are NaN if a signal is NaN at any time.
     """
-    names = list(values)
-    best = np.array([[v.min(), v.max()] for v in values.values()])
-    found = np.array([[np.argmin(v), np.argmax(v)] for v in values.values()])
+    names, sense = list(values), np.array([1.0, -1.0])  # the largest is the smallest of -values
+    every = np.array([values[name] for name in names])[:, None] * sense[:, None]
+    found, best = every.argmin(axis=2), every.min(axis=2)
     low, high = times[np.maximum(found - 1, 0)], times[np.minimum(found + 1, times.size - 1)]
     for _ in range(ROUNDS):
         at = np.linspace(low, high, PARTS + 1)
-        every = evaluate(at.ravel())
-        looked = np.array([every[name].reshape(at.shape)[:, i] for i, name in enumerate(names)])
-        for i in range(len(names)):
-            for k, (pick, better) in enumerate(((np.argmin, np.less), (np.argmax, np.greater))):
-                row = looked[i, :, k]
-                j = int(pick(row))
-                low[i, k], high[i, k] = at[max(j - 1, 0), i, k], at[min(j + 1, PARTS), i, k]
-                if better(row[j], best[i, k]):
-                    best[i, k] = row[j]
-    return dict(zip(names, best, strict=True))
+        seen = evaluate(at.ravel())
+        rows = [seen[name].reshape(at.shape)[:, i] for i, name in enumerate(names)]
+        looked = np.stack(rows, axis=1) * sense
+        j = looked.argmin(axis=0)[None]
+        least = np.take_along_axis(looked, j, axis=0)[0]
+        best = np.where(least < best, least, best)
+        low, high = (
+            np.take_along_axis(at, np.clip(j + aside, 0, PARTS), axis=0)[0] for aside in (-1, 1)
+        )
+    return dict(zip(names, best * sense, strict=True))
 
 
 def integrals(ends: Array, of: Of, expression: ca.SX, times: Array) -> Array:

@@ -51,6 +51,8 @@ def report(
     Raises:
         ValueError: there is no run, or a value is not a run.
     """
+    from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
+
     if isinstance(runs, Trajectory):
         runs = {runs.scene: runs}
     if not isinstance(runs, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -60,8 +62,11 @@ def report(
         raise ValueError("report: expected at least one run, got none")
     for name, run in named.items():
         checks.kind(f"report: runs {name}", run, Trajectory, "a run of simulate")
+    source = data_uri(plot_trajectories(named), dpi=110)
+    drawing = f'<img src="{source}" alt="signals over time" style="max-width:100%">'
+    caption = "Signals over time, with every accepted step."
     parts = {
-        "motion": ("Motion", [_picture(named)]),
+        "motion": ("Motion", [html.figure(drawing, caption)]),
         "signals": ("Signals", [*_signals(named)]),
         "friction": ("Friction", [*_friction(named)]),
         "books": ("Accuracy", [*_books(named)]),
@@ -86,15 +91,6 @@ def _verdict(runs: Mapping[str, Trajectory]) -> str:
     messages = [f"{name}: {run.message}" for name, run in runs.items()]
     title = "Done" if good else "In doubt" if ended else "Not finished"
     return html.verdict("good" if good else "bad", title, messages)
-
-
-def _picture(runs: Mapping[str, Trajectory]) -> str:
-    """Return the figure of `plot`, embedded in the page."""
-    from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
-
-    source = data_uri(plot_trajectories(runs), dpi=110)
-    drawing = f'<img src="{source}" alt="signals over time" style="max-width:100%">'
-    return html.figure(drawing, "Signals over time, with every accepted step.")
 
 
 def _signals(runs: Mapping[str, Trajectory]) -> Iterator[str]:
@@ -137,7 +133,15 @@ def _friction(runs: Mapping[str, Trajectory]) -> Iterator[str]:
 
 def _books(runs: Mapping[str, Trajectory]) -> Iterator[str]:
     """Yield the table of errors, constraints, energy and cost, with an explanation."""
-    rows = [(name, *_accuracy(run)) for name, run in runs.items()]
+    rows: list[tuple[str, ...]] = []
+    for name, run in runs.items():
+        s, energy = run.statistics, np.nan
+        if is_mechanism(run.model) and run.status.ok:
+            energy = run.energy_balance().relative
+        held = [run[norm].max() for norm in norms(run.model)[:1]] or [np.nan]
+        errors = (f"{x:.1e}" if np.isfinite(x) else "–" for x in (s.error, energy, *held))
+        cost = f"{s.steps}", f"{s.rejections}", f"{s.method} ({s.backend})"
+        rows.append((name, *errors, *cost, f"{1e3 * s.run_time:.3g}"))
     header = ("run", "measured error", "energy unexplained", "constraints", "steps", "rejected")
     yield html.table("Error and cost", (*header, "method", "run [ms]"), rows, (1, 2, 3, 4, 5, 7))
     yield html.paragraph(
@@ -147,17 +151,6 @@ def _books(runs: Mapping[str, Trajectory]) -> Iterator[str]:
         "Constraints: largest violation, in m.",
         "soft",
     )
-
-
-def _accuracy(run: Trajectory) -> tuple[str, ...]:
-    s, energy, held = run.statistics, np.nan, np.nan
-    if is_mechanism(run.model) and run.status.ok:
-        energy = run.energy_balance().relative
-    for name in norms(run.model)[:1]:
-        held = run[name].max()
-    errors = (f"{x:.1e}" if np.isfinite(x) else "–" for x in (s.error, energy, held))
-    how = f"{s.method} ({s.backend})"
-    return (*errors, f"{s.steps}", f"{s.rejections}", how, f"{1e3 * s.run_time:.3g}")
 
 
 def _laws(runs: Mapping[str, Trajectory]) -> Iterator[str]:

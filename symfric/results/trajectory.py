@@ -173,8 +173,8 @@ class Trajectory(packed.Portable, Signals):
         """
         if "conserved" not in self.details:
             raise ValueError(
-                f"{self._where}: expected a mechanism, got a model that says nothing of its "
-                "energy; integral(name) integrates any of its signals"
+                f"{self._where}: expected a mechanism, got a model without an energy balance; "
+                "integral(name) integrates any of its signals"
             )
         model, at = self.model, np.concatenate([self.step_times[:1], self.t])
         powers = [name for name, output in model.further.items() if output.kind == WORK]
@@ -313,9 +313,7 @@ class Trajectory(packed.Portable, Signals):
     def to_dict(self) -> dict[str, Any]:
         """Return scene, status, statistics, units, times and signals as built-in types."""
         return {
-            "scene": self.scene,
-            "status": self.status.name,
-            "message": self.message,
+            **self._about,
             "statistics": self.statistics.to_dict(),
             "units": {"t": "s", **self.units},
             "t": self.t.tolist(),

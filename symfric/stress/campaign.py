@@ -4,17 +4,17 @@ import os
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import monotonic
 from typing import Any, final
 
 import numpy as np
 
+from symfric.foundation.workers import Crashed, TimedOut, outcomes
 from symfric.stress.cases import Case, draw
 from symfric.stress.judge import CLASSES, FAILING, Verdict, judge
 from symfric.stress.problem import WORK
-from symfric.stress.workers import Crashed, TimedOut, outcomes
 
 LIMIT = 120.0
 """Processor time [s] after which a case counts as a hang; the slowest cases need 10 s."""
@@ -86,7 +86,7 @@ class Report:
             "groups": self.groups,
             "errors_in_tolerances": self.errors(),
             "notable": [
-                {"case": draw(self.seed, n).to_dict(), "verdict": v.to_dict()}
+                {"case": draw(self.seed, n).to_dict(), "verdict": asdict(v)}
                 for n, v in sorted(self.verdicts.items())
                 if v.kind in NOTABLE
             ],
@@ -137,7 +137,7 @@ def campaign(
     def report() -> Report:
         return Report(seed, len(numbers), verdicts, monotonic() - began)
 
-    tasks = ((number, (draw(seed, number).to_dict(), work)) for number in numbers)
+    tasks = ((number, (draw(seed, number), work)) for number in numbers)
     size = min(workers or os.cpu_count() or 1, len(numbers))
     with closing(outcomes(_judged, tasks, size, limit)) as found:
         try:
@@ -152,13 +152,13 @@ def campaign(
 
 def rerun(case: Case, limit: float = LIMIT) -> Verdict:
     """Judge one case in a separate process, so that a crash is a verdict, too."""
-    ((_, outcome),) = outcomes(_judged, [(0, (case.to_dict(), WORK))], 1, limit)
+    ((_, outcome),) = outcomes(_judged, [(0, (case, WORK))], 1, limit)
     return _verdict(outcome)
 
 
-def _judged(task: tuple[dict[str, Any], int]) -> dict[str, Any]:
-    """Judge a case for a task (data of the case, limit of work)."""
-    return judge(Case.from_dict(task[0]), task[1]).to_dict()
+def _judged(task: tuple[Case, int]) -> Verdict:
+    """Judge a case for a task (case, limit of work)."""
+    return judge(*task)
 
 
 def _verdict(outcome: Any) -> Verdict:
@@ -166,4 +166,4 @@ def _verdict(outcome: Any) -> Verdict:
         return Verdict("crash", f"{outcome.how}: {outcome.last_line}", outcome.how)
     if isinstance(outcome, TimedOut):
         return Verdict("hang", f"not finished after {outcome.limit:g} s of processor time")
-    return Verdict.from_dict(outcome)
+    return outcome

@@ -12,9 +12,8 @@ add up; the error then decreases with rtol. A case that no reference decides is 
 "right". A run that reports too many steps is refused, and its partial result is compared.
 """
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
-from typing import Any, final
+from dataclasses import dataclass, replace
+from typing import final
 
 import numpy as np
 
@@ -94,15 +93,6 @@ class Verdict:
     error: float | None = None
     steps: int = 0
     by: str = "methods"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> "Verdict":
-        """Return the verdict for the output of `to_dict`."""
-        return cls(**data)
 
 
 def judge(case: Case, work: int = WORK) -> Verdict:

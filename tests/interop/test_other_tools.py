@@ -10,7 +10,7 @@ import pytest
 from ensembles import assert_same
 
 from symfric import LuGre, rabinowicz, simulate_many
-from symfric.bench.interop import LAWS, ROUTES, integrators, move
+from symfric.bench.interop import QUICK, integrators, move
 from symfric.bench.report import Row
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "interop"
@@ -25,8 +25,7 @@ def needs(tool: str) -> None:
 
 @pytest.fixture(scope="module")
 def opti() -> dict[tuple[str, str], Row]:
-    laws = ("brown_mcphee", "lugre", "elasto_plastic")
-    return {(law, route): move("opti", route, law) for law in laws for route in MISS}
+    return {(k, route): move("opti", route, k) for k in QUICK for route in MISS}
 
 
 def test_opti_takes_static_laws_and_bristles(opti: dict[tuple[str, str], Row]) -> None:
@@ -60,12 +59,7 @@ def test_other_tools_find_what_opti_finds(
     assert found["miss [m]"] == pytest.approx(opti["lugre", route]["miss [m]"], rel=0.2)
 
 
-def test_every_tool_has_both_routes() -> None:
-    assert {route for _, route in ROUTES} == {*MISS}
-    assert "gms" in LAWS
-
-
-@pytest.mark.parametrize("law", ["brown_mcphee", "lugre"])
+@pytest.mark.parametrize("law", QUICK)
 def test_casadis_integrators_take_the_model_and_agree(law: str) -> None:
     errors = {row["integrator"]: row["largest error [m]"] for _, row in integrators(law)}
     assert errors["symfric"] < 1e-5
@@ -102,11 +96,6 @@ def test_do_mpc_example(tmp_path: Path) -> None:
     needs("do_mpc")
     (miss,) = re.findall(r": ([-+][\d.]+) mm from", printed("do_mpc_drive", tmp_path))
     assert abs(float(miss)) < 0.05
-
-
-def test_examples_are_short() -> None:
-    for path in EXAMPLES.glob("*.py"):
-        assert len(path.read_text("utf-8").splitlines()) <= 100
 
 
 def test_executor_of_dask_gives_the_same() -> None:

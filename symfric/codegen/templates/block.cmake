@@ -1,6 +1,6 @@
-# The block @name: library @name, shared library @{name}_shared, @tests.
-# A core without an operating system gets the library alone; with CMAKE_CROSSCOMPILING_EMULATOR
-# the unit test, too.
+# Block @name: library @name, shared library @{name}_shared, @tests.
+# For a core without an operating system, only the library is built; with
+# CMAKE_CROSSCOMPILING_EMULATOR, the unit test as well.
 add_library(@name STATIC @sources)
 set(libraries @name)
 get_property(can_share GLOBAL PROPERTY TARGET_SUPPORTS_SHARED_LIBS)
@@ -13,7 +13,7 @@ foreach(library IN LISTS libraries)
     target_include_directories(${library} PUBLIC "${CMAKE_CURRENT_LIST_DIR}")
     set_target_properties(${library} PROPERTIES C_STANDARD 99 C_EXTENSIONS OFF)
     if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
-        # Without fused multiply-add the results are those of CasADi to the bit, in double.
+        # Without fused multiply-add, results in double have the same bits as in CasADi.
         target_compile_options(${library} PRIVATE -ffp-contract=off)
     endif()
     if(UNIX OR (NOT WIN32 AND CMAKE_C_COMPILER_ID MATCHES "^(GNU|Clang)$"))

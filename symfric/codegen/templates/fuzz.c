@@ -10,7 +10,7 @@
 
 typedef @real real;
 enum { STATES = @states, PARAMS = @params, INPUTS = @inputs, OUTPUTS = @outputs };
-enum { SIZE = @size }; /* which parameter is the step size */
+enum { SIZE = @size }; /* index of the parameter that is the step size, or -1 */
 @columns
 
 static uint64_t seed = 88172645463325252u;
@@ -28,7 +28,7 @@ static int one_in(unsigned n) { return bits() % n == 0u; }
 static double sign(void) { return one_in(2) ? 1.0 : -1.0; }
 static double tiny(void) { return @double ? 4.9406564584124654e-324 : 1.4012984643e-45; }
 
-static real typed(double x) /* without a cast that overflows */
+static real typed(double x) /* a cast that does not overflow */
 {
     const double most = @double ? DBL_MAX : (double)FLT_MAX;
     return x != x ? (real)NAN : x > most ? (real)INFINITY : x < -most ? -(real)INFINITY : (real)x;
@@ -60,7 +60,7 @@ static real valid(double low, double high, double nominal)
     }
     x = x < low ? low : x > high ? high : x;
     {
-        const real y = typed(x); /* rounding may lead out of the range */
+        const real y = typed(x); /* rounding may leave the range */
         return y < (real)low ? (real)low : y > (real)high ? (real)high : y;
     }
 }
@@ -79,7 +79,7 @@ static void bare(void)
     @step_bare
 }
 
-static int differs(const real *a, const real *b, int n) /* but for the sign of a zero */
+static int differs(const real *a, const real *b, int n) /* except for the sign of a zero */
 {
     for (int i = 0; i < n; i++) {
         if (!(a[i] == b[i] || (a[i] != a[i] && b[i] != b[i]))) { return 1; }
@@ -95,7 +95,7 @@ static int all_finite(const real *a, int n)
     return 1;
 }
 
-static unsigned int expected(void) /* the status that the numbers ask for */
+static unsigned int expected(void) /* the status that the numbers require */
 {
     unsigned int found = 0u;
     for (int i = 0; i < INPUTS; i++) {
@@ -120,7 +120,7 @@ int main(int argc, char **argv)
     for (long k = 0; k < steps; k++) {
         real before[STATES + 1], after[STATES + 1], shown[OUTPUTS + 1];
         unsigned int must;
-        int own = 0; /* whether a parameter is none of the default */
+        int own = 0; /* 1 if a parameter differs from its default */
         @default
         for (int i = 0; i < INPUTS; i++) {
             in[i] = valid((double)IN_LOW[i], (double)IN_HIGH[i], (double)IN_NOMINAL[i]);

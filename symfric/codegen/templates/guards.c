@@ -1,4 +1,4 @@
-/* Numbers are compared by their bits: as cheap, and NaN is found under -ffast-math, too. */
+/* Bits of a number. Comparing bits is as fast, and detects NaN under -ffast-math too. */
 static @whole @{name}_bits(@real x)
 {
     @whole found;
@@ -6,13 +6,13 @@ static @whole @{name}_bits(@real x)
     return found;
 }
 
-/* Whether |x| is above limit, infinite or NaN. */
+/* Returns true if |x| is above limit, infinite or NaN. */
 static bool @{name}_beyond(@real x, @real limit)
 {
     return (@{name}_bits(x) & @magnitude) > @{name}_bits(limit);
 }
 
-/* Whether x is outside low ... high, 0 <= low, or NaN; -0 is 0. */
+/* Returns true if x is outside low ... high, 0 <= low, or NaN; -0 is 0. */
 static bool @{name}_outside(@real x, @real low, @real high)
 {
     const @whole span = @{name}_bits(high) - @{name}_bits(low);
@@ -20,7 +20,7 @@ static bool @{name}_outside(@real x, @real low, @real high)
         && (@{name}_bits(x) | @{name}_bits(low)) != ~@magnitude;
 }
 
-/* x clamped to low ... high, or safe where it is not finite; says so by bits of the status. */
+/* Returns x clamped to low ... high, or safe if x is not finite; sets bits of the status. */
 static @real @{name}_mended(
     @real x, @real low, @real high, @real safe,
     unsigned int clamped, unsigned int not_finite, unsigned int *status)

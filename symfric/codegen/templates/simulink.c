@@ -1,12 +1,12 @@
 @head
  *
- * S-function of level 2 in plain C. In MATLAB:
+ * Level-2 S-function in C. Compile it in MATLAB:
  *     mex @{name}_sfun.c @stem.c
- * and in the block S-Function the name @{name}_sfun with the arguments h, []. For a
- * build for a target (dSPACE, Speedgoat) add @stem to its S-function modules: sources are
+ * Enter the name @{name}_sfun and the arguments h, [] in an S-Function block. To build for
+ * a target (dSPACE, Speedgoat), add @stem to the S-function modules; the sources are
  * sufficient.
  * Arguments: sample time [s].@fixed
- *     Parameters, [] for the defaults, tunable, in the order @order.
+ *     Tunable parameters in the order @order; [] for the defaults.
  * Inputs: @ports.
  * Outputs: @shown. States are discrete states of the block.
  */
@@ -18,7 +18,7 @@
 
 #include <math.h>
 
-#define PARAMETERS @parameters /* numbers in the second argument, in the order of the struct */
+#define PARAMETERS @parameters /* length of the second argument, in the order of the struct */
 
 static void mdlInitializeSizes(SimStruct *S)
 {
@@ -57,7 +57,7 @@ static void mdlInitializeSizes(SimStruct *S)
         ssSetOutputPortWidth(S, i, 1);
     }
     ssSetNumSampleTimes(S, 1);
-    ssSetNumRWork(S, @states); /* the states after the step */
+    ssSetNumRWork(S, @states); /* states after the step */
     ssSetOptions(S, SS_OPTION_EXCEPTION_FREE_CODE);
 }
 

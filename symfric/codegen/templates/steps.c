@@ -3,8 +3,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Makes steps on numbers of standard input; `own` says that parameters precede the inputs of each.
-   Returns 0 if it ends too early. */
+/* Makes steps with numbers from standard input; if `own` is not 0, the parameters of each step
+   precede its inputs. Returns 0 if the numbers end too early. */
 static int @{name}_run(long steps, int own)
 {
     enum { STATES = @states, PARAMS = @params, INPUTS = @inputs, OUTPUTS = @outputs };

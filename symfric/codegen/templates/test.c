@@ -12,10 +12,10 @@
 #include <stdio.h>
 #endif
 
-/* The number of wrong results; 0 if all are right. */
+/* Returns the number of wrong results. */
 int @{name}_test(void);
 
-/* Whether a number is wrong; NaN is. */
+/* Returns 1 if a number is wrong or NaN. */
 static int @{name}_wrong(@real got, @real wanted, @real tolerance)
 {
     return !(fabs@letter(got - wanted) <= tolerance);

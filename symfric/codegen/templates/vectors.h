@@ -1,14 +1,14 @@
 @head
  *
- * Independent steps: the states before, the inputs, one parameter that is changed (by
- * @share of its default) or none, and the states after and the outputs.
+ * Each row is an independent step: states before the step, inputs, at most one parameter that is
+ * changed by @share of its default, states after the step, and outputs.
  * States: @states.
  *
- * A number passes if it differs from the result of CasADi in double precision by no more than its
- * tolerance: @base of the peak of its signal over all rows, for the rounding of a few operations,
- * of the functions of math.h and of fused multiply-add, which differ between compilers and targets; or
- * @roundings times what rounding to this type changes in nine of ten rows, where that is more,
- * as in differences of large numbers.
+ * A number passes if it differs from the result of CasADi in double precision by at most its
+ * tolerance. The tolerance is the larger of two numbers: @base of the peak of the signal over all
+ * rows, which covers rounding, functions of math.h and fused multiply-add, since these differ
+ * between compilers and targets; and @roundings times the change that rounding to this type causes
+ * in nine of ten rows, which is larger for differences of large numbers.
  */
 #ifndef @{macro}_VECTORS_H
 #define @{macro}_VECTORS_H

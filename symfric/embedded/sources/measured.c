@@ -3,7 +3,7 @@
 @include
 #define STEPS @steps
 #define PAINT 0xDEADBEEFu
-#define DEPTH 16384 /* words of the stack that are watched */
+#define DEPTH 16384 /* number of words of the stack that are examined */
 #define IDLE 400
 #define SYST_CSR (*(volatile uint32_t *)0xE000E010u)
 #define SYST_RVR (*(volatile uint32_t *)0xE000E014u)
@@ -25,7 +25,7 @@ static __attribute__((noinline)) void one(int k) { @step }
 static __attribute__((noinline)) void nothing(int k) { (void)k; __asm__ volatile(""); }
 static void keep(int k) { @keep }
 
-/* An instruction takes 3.2 ticks: a step that begins anywhere in one is known in the mean. */
+/* An instruction takes 3.2 ticks; random delays before each step remove the error in the mean. */
 static __attribute__((noinline)) void wait(void)
 {
     static uint32_t dice = 1u;
@@ -38,7 +38,7 @@ static __attribute__((noinline)) uint32_t ticks(void (*what)(int), int k)
 {
     const uint32_t before = SYST_CVR;
     what(k);
-    return (before - SYST_CVR) & 0xFFFFFFu; /* it counts down, in 24 bits */
+    return (before - SYST_CVR) & 0xFFFFFFu; /* the timer counts down in 24 bits */
 }
 
 static __attribute__((noinline)) uint32_t stack(void)

@@ -39,7 +39,7 @@ void Reset_Handler(void)
 {
     uint32_t *from = &_data_source, *to = &_data;
 #if defined(__ARM_FP)
-    *(volatile uint32_t *)0xE000ED88u |= 0xFu << 20; /* the FPU, off after a reset */
+    *(volatile uint32_t *)0xE000ED88u |= 0xFu << 20; /* enable the FPU, which is off after a reset */
     __asm__ volatile("dsb\n isb");
 #endif
     while (to < &_data_end) { *to++ = *from++; }

@@ -1,9 +1,9 @@
-/* Steps with error control. A step may lead beyond the communication point as long as nothing
-   jumps: the values there are those of its polynomial, and no step is cut. Where something does
-   jump, what lies beyond is forgotten and the last step is made again, up to there. */
+/* Steps with error control. While no input jumps, a step may pass the communication point, and its
+   polynomial defines the values there. After a jump, the last step is repeated up to the point of
+   the jump. */
 
 #if CROSSINGS
-/* Events that have happened by the start have values as if just before it. */
+/* Give events that have occurred by the start the values just before them. */
 static void before_start(Memory *m)
 {
     double now[CROSSINGS];
@@ -19,7 +19,7 @@ static void before_start(Memory *m)
 }
 #endif
 
-/* The accepted step from m->S to `next` is noted, and searched for events. */
+/* Record the accepted step from m->S to `next`, and search it for events. */
 static void noted(Memory *m, double *next, const double *dense)
 {
     memcpy(m->base, m->S, sizeof m->base);
@@ -35,7 +35,7 @@ static void noted(Memory *m, double *next, const double *dense)
 #endif
 }
 
-/* Steps up to `end` or beyond; what stopped them before, 0 if nothing. */
+/* Make steps up to `end` or beyond; return the reason of an earlier stop, or 0. */
 static int steps_to(Memory *m, double end)
 {
     double next[MEMORY + N], dense[ROWS * N];
@@ -64,7 +64,7 @@ static int steps_to(Memory *m, double end)
     return m->stopped && m->S[AT_T] <= end ? m->stopped : 0;
 }
 
-/* Unknowns at the communication point. */
+/* Compute the unknowns at the communication point. */
 static void unknowns(const Memory *m, double *y)
 {
     const double *row = m->row;
@@ -82,7 +82,7 @@ static void unknowns(const Memory *m, double *y)
     }
 }
 
-/* Back from beyond the communication point, with what drove the model until there. */
+/* Return to the communication point, with the inputs and parameters used so far. */
 static int returned(Memory *m)
 {
     m->quiet = 0;

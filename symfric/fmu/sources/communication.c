@@ -1,6 +1,6 @@
-/* Co-simulation: communication steps over which inputs are held. */
+/* Co-simulation: communication steps with inputs held. */
 
-/* Inputs or parameters that were set come into force at the communication point. */
+/* Apply the inputs and parameters that were set, at the communication point. */
 static const char *jumped(Memory *m)
 {
     const int moved = memcmp(m->set, m->R + DATA, NP * sizeof(double)) != 0;
@@ -11,7 +11,7 @@ static const char *jumped(Memory *m)
     return consistent(m->S + MEMORY, m->R + DATA, moved);
 }
 
-/* Inputs held over a communication step from `from` to `from` + `size` [s]. */
+/* Make a communication step from `from` to `from` + `size` [s] with inputs held. */
 static Outcome advance(Instance *unit, double from, double size)
 {
     Memory *m = &unit->m;

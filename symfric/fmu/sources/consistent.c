@@ -1,8 +1,8 @@
-/* Unknowns that satisfy the algebraic equations: at the start, and behind a jump of what drives
-   the model. See symfric.integrator.equations.initial and .following. */
+/* Unknowns that satisfy the algebraic equations at the start and after a jump of inputs or
+   parameters. See symfric.integrator.equations.initial and .following. */
 
 #if EQUATIONS
-/* How far the residual moves when the last digits of all numbers do. */
+/* Return the change of the residual when the last digits of all numbers change. */
 static double rounding(const double *y, const double *d)
 {
     double g[EQUATIONS], moved[EQUATIONS], J[EQUATIONS * EQUATIONS], yy[N], dd[ND + 1], most = 0.0;
@@ -28,7 +28,7 @@ static double rounding(const double *y, const double *d)
     return most;
 }
 
-/* A step of Newton's method in y, and the residual; 0 where the derivatives are singular. */
+/* Compute a step of Newton's method in y and the residual; return 0 if the matrix is singular. */
 static int newton_step(const double *y, const double *d, double *change, double *residual)
 {
     double g[EQUATIONS], J[EQUATIONS * EQUATIONS];
@@ -43,7 +43,7 @@ static int newton_step(const double *y, const double *d, double *change, double 
     return 1;
 }
 
-/* Damped Newton from the guess in y; 0 where it finds nothing, and y is as it was. */
+/* Solve by damped Newton from the guess in y; return 0 and leave y unchanged on failure. */
 static int searched(double *y, const double *d)
 {
     double now[N], change[N], trial[N], g[EQUATIONS], J[EQUATIONS * EQUATIONS], residual;
@@ -81,7 +81,7 @@ static int searched(double *y, const double *d)
     return 0;
 }
 
-/* Whether the equations forbid this solution: friction has jammed, or a bearing pulls. */
+/* Return 1 if the solution is not physical: friction jams, or a bearing pulls. */
 static int jams(const double *y, const double *d)
 {
     double after[N], look[3];
@@ -91,7 +91,7 @@ static int jams(const double *y, const double *d)
 #endif
 
 #if CONSTRAINTS
-/* Positions and velocities of a mechanism onto its constraints; 0 where none are near. */
+/* Project positions and velocities onto the constraints; return 0 on failure. */
 static int assembled(double *y, const double *d)
 {
     double defect[2 * CONSTRAINTS], after[N];
@@ -107,8 +107,8 @@ static int assembled(double *y, const double *d)
 }
 #endif
 
-/* All unknowns of y consistent, states of a mechanism included where `moved`. What is missing is
-   said; empty where nothing is. */
+/* Make all unknowns in y consistent, with `moved` also the states of a mechanism. Return an error
+   message, empty on success. */
 static const char *consistent(double *y, const double *d, int moved)
 {
 #if CONSTRAINTS

@@ -1,5 +1,5 @@
-/* Directional derivatives of rates and signals by states, inputs and parameters, with algebraic
-   variables following: g(y, d) = 0 stays true along (dy, dd). */
+/* Directional derivatives of rates and signals with respect to states, inputs and parameters;
+   algebraic variables satisfy g(y, d) = 0 along (dy, dd). */
 
 #if CONSTRAINTS
 static int directional(Instance *unit, const unsigned int *unknown, size_t n_unknown,
@@ -12,12 +12,12 @@ static int directional(Instance *unit, const unsigned int *unknown, size_t n_unk
     (void)n_known;
     (void)seeds;
     (void)values;
-    say(unit, "directional derivatives: not provided where loops are closed");
+    say(unit, "directional derivatives: not provided for mechanisms with loops");
     return 0;
 }
 #else
-/* Place of a known among the unknowns of the equations, or N and more: among parameters and inputs;
-   -1 where it is neither. */
+/* Return the index of a known among the unknowns of the equations, or N plus its index among
+   parameters and inputs; -1 for other references. */
 static int place_of_known(unsigned int reference)
 {
     const int place = reference < REFERENCES ? (int)reference : 0;
@@ -27,7 +27,7 @@ static int place_of_known(unsigned int reference)
     return u >= 0 && u < NU ? N + NP + u : -1;
 }
 
-/* Values along the seeds; 0 where there is no such derivative. */
+/* Compute the derivatives along the seeds; return 0 on failure. */
 static int directional(Instance *unit, const unsigned int *unknown, size_t n_unknown,
                        const unsigned int *known, size_t n_known, const double *seeds,
                        double *values)

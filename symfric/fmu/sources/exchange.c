@@ -1,24 +1,24 @@
-/* Model exchange: rates of the states at any state and time; algebraic variables are solved for
-   inside. States of a mechanism may leave its constraints: rates are those at the nearest state on
-   them, and pull there,
+/* Model exchange: rates of the states at any state and time, with the algebraic equations solved.
+   States of a mechanism may leave its constraints; rates are those at the nearest closed state and
+   lead to it,
 
        x' = f(P x) + (P x - x) / PULL
 
-   with the same solution where the constraints hold. */
+   with the same solution as the equations if the constraints hold. */
 
 #define PULL 0.02
 #define SURELY 1e-9
-/* How far an event indicator lies beyond its expression, so that one that has changed its sign
-   leaves no doubt about the event. */
+/* Offset of an event indicator from its expression, so that the event has certainly occurred when
+   the indicator changes its sign. */
 
-/* Unknowns at the present time. */
+/* Return the unknowns at the present time. */
 static void unknowns(const Memory *m, double *y)
 {
     memcpy(y, m->S + MEMORY, N * sizeof(double));
 }
 
 #if CROSSINGS
-/* Events that have happened by the start have values as if just before it. */
+/* Give events that have occurred by the start the values just before them. */
 static void before_start(Memory *m)
 {
     int i;
@@ -34,7 +34,7 @@ static int passed(double before, double after, int direction)
         || (before > 0.0 && after <= 0.0 && direction <= 0);
 }
 
-/* Which events have happened since they were looked at last; how many. */
+/* Find the events that have occurred since the last update; return their number. */
 static int happened(const Memory *m, const double *now, int surely, int *which)
 {
     int i, count = 0;
@@ -45,8 +45,8 @@ static int happened(const Memory *m, const double *now, int surely, int *which)
     return count;
 }
 
-/* Values from which the next events are told; an event that took part keeps none while its
-   expression is zero. */
+/* Store the values that detect the next events; the value of an event that has occurred is kept
+   while its expression is zero. */
 static void looked_at(Memory *m, const double *now)
 {
     int i;

@@ -1,4 +1,4 @@
-/* Equal steps of a constant length, and shorter ones where a communication step is no multiple. */
+/* Equal steps of at most the constant length, into which a communication step is divided. */
 
 static int steps_to(Memory *m, double end)
 {
@@ -17,13 +17,13 @@ static int steps_to(Memory *m, double end)
     return 0;
 }
 
-/* Unknowns at the communication point. */
+/* Return the unknowns at the communication point. */
 static void unknowns(const Memory *m, double *y)
 {
     memcpy(y, m->S + MEMORY, N * sizeof(double));
 }
 
-/* Nothing ever lies beyond the communication point. */
+/* Fixed steps never pass the communication point. */
 static int returned(Memory *m)
 {
     m->quiet = 0;

@@ -1,14 +1,14 @@
-/* FMI 2.0: what co-simulation and model exchange have in common. */
+/* FMI 2.0: functions shared by co-simulation and model exchange. */
 
-/* A call of the standard has arguments that not every unit looks at. */
+/* Functions of the standard have arguments that some units do not use. */
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
 static Instance *unit_of(fmi2Component c) { return (Instance *)c; }
 
-/* Tell the importer what was said, which is errors and refusals only, in any case; a message is a
-   format there, and # marks a variable. */
+/* Report the last message, always an error or a refusal, to the importer. The message is a format
+   string there, and # marks a variable. */
 static fmi2Status told(Instance *unit, fmi2Status status, const char *category)
 {
     const fmi2CallbackFunctions *functions = (const fmi2CallbackFunctions *)unit->callbacks;
@@ -35,7 +35,7 @@ static fmi2Status refused(Instance *unit)
     return told(unit, fmi2Discard, "logStatusDiscard");
 }
 
-/* Whether a call is allowed in this phase; says so where it is not. */
+/* Return 1 if a call is allowed in this phase; otherwise report an error. */
 static int allowed(Instance *unit, const char *call, Phase first, Phase last)
 {
     if (!unit) return 0;
@@ -142,7 +142,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], s
     return worst;
 }
 
-/* There are real variables only. */
+/* All variables are real. */
 #define NONE_OF(type)                                                                             \
     fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference references[], size_t n,    \
                              fmi2##type values[])                                                 \

@@ -13,9 +13,9 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
     return n ? fmi2Error : fmi2OK;
 }
 
-/* Discard where nothing was done, for a communication step that cannot be one, and where an event
-   of the model ended it early: fmi2Terminated. Where steps fail it is an error. How far it came is
-   fmi2LastSuccessfulTime in any case. */
+/* Return fmi2Discard for an invalid communication step, which has no effect, and if a terminal
+   event ended it early (fmi2Terminated); return an error if steps fail. fmi2LastSuccessfulTime is
+   the time reached in each case. */
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_return)
 {
     Instance *unit = unit_of(c);

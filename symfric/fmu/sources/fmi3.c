@@ -1,13 +1,13 @@
-/* FMI 3.0: what co-simulation and model exchange have in common. */
+/* FMI 3.0: functions shared by co-simulation and model exchange. */
 
-/* A call of the standard has arguments that not every unit looks at. */
+/* Functions of the standard have arguments that some units do not use. */
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
 static Instance *unit_of(fmi3Instance c) { return (Instance *)c; }
 
-/* Tell the importer what was said, which is errors and refusals only, in any case. */
+/* Report the last message, always an error or a refusal, to the importer. */
 static fmi3Status told(Instance *unit, fmi3Status status, const char *category)
 {
     if (unit->logger) {
@@ -26,7 +26,7 @@ static fmi3Status refused(Instance *unit)
     return told(unit, fmi3Discard, "logStatusDiscard");
 }
 
-/* Whether a call is allowed in this phase; says so where it is not. */
+/* Return 1 if a call is allowed in this phase; otherwise report an error. */
 static int allowed(Instance *unit, const char *call, Phase first, Phase last)
 {
     if (!unit) return 0;
@@ -36,7 +36,7 @@ static int allowed(Instance *unit, const char *call, Phase first, Phase last)
     return 0;
 }
 
-/* A new instance; none where the description belongs to another binary. */
+/* Create an instance; return NULL if the description belongs to another binary. */
 static fmi3Instance made(fmi3String name, fmi3String token, fmi3Boolean on,
                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback log)
 {

@@ -1,5 +1,5 @@
-/* FMI 3.0: what no unit has: variables of other types, clocks, configurations, adjoint derivatives,
-   dependencies that change. */
+/* FMI 3.0: functions without support in any unit: other types of variables, clocks, configurations,
+   adjoint derivatives, variable dependencies. */
 
 #define NONE_OF(type)                                                                             \
     fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference references[], size_t n,     \

@@ -9,8 +9,8 @@ fmi3Instance fmi3InstantiateCoSimulation(
     return made(name, token, on, environment, log);
 }
 
-/* Discard where nothing was done, for a communication step that cannot be one; an error where steps
-   fail; early and to be terminated where an event of the model ended it. */
+/* Return fmi3Discard for an invalid communication step, which has no effect, and an error if steps
+   fail; a terminal event sets `early` and `terminate`. */
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Boolean no_return,
                       fmi3Boolean *event, fmi3Boolean *terminate, fmi3Boolean *early,
                       fmi3Float64 *reached)

@@ -1,4 +1,4 @@
-/* FMI 3.0: calls of co-simulation, which model exchange does not have. */
+/* FMI 3.0: functions of co-simulation, without support in model exchange. */
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String
     resources, fmi3Boolean visible, fmi3Boolean on, fmi3Boolean event_mode, fmi3Boolean

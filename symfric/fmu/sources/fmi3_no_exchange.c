@@ -1,4 +1,4 @@
-/* FMI 3.0: calls of model exchange and event mode, which co-simulation does not have. */
+/* FMI 3.0: functions of model exchange and event mode, without support in co-simulation. */
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
                                           fmi3Boolean visible, fmi3Boolean on,

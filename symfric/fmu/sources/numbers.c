@@ -1,4 +1,4 @@
-/* Linear algebra of small dense matrices, column by column. */
+/* Linear algebra of small dense matrices, stored by columns. */
 
 #if CONSTRAINTS
 static double largest(const double *a, int n)
@@ -34,7 +34,7 @@ static double norm_of(const double *a, int n)
 #endif
 
 #if EQUATIONS
-/* A x = b by Gauss with pivots of a column; A is lost, x takes the place of b. 0 if singular. */
+/* Solve A x = b by Gaussian elimination with pivoting; overwrite A, and b by x. 0 if singular. */
 static int solved(int n, double *A, double *b)
 {
     int i, j, k;
@@ -71,8 +71,8 @@ static int solved(int n, double *A, double *b)
 #endif
 
 #if BASIS
-/* An orthonormal basis V (n, n - m) of the null space of A (m, n), by Householder's reflections of
-   the transpose: the trailing columns of their product. */
+/* Compute an orthonormal basis V (n, n - m) of the null space of A (m, n): the trailing columns of
+   the product of Householder reflections of its transpose. */
 static void null_space(int m, int n, const double *A, double *V)
 {
     double Q[COORDINATES * CONSTRAINTS], beta[CONSTRAINTS];

@@ -1,7 +1,7 @@
-/* Model exchange: what the importer's integrator calls. */
+/* Model exchange: functions that the integrator of the importer calls. */
 
-/* Rates and event indicators at the present state, time and inputs; 0 where algebraic variables
-   have no solution. */
+/* Compute rates and event indicators at the present state, time and inputs; return 0 if algebraic
+   variables have no solution. */
 static int rated(Instance *unit)
 {
     Memory *m = &unit->m;
@@ -24,7 +24,7 @@ static int rated(Instance *unit)
         explain(unit, TINY);
         return 0;
     }
-    for (i = NX; i < N - TIMED; ++i) y[i] = at[i]; /* where the next search begins */
+    for (i = NX; i < N - TIMED; ++i) y[i] = at[i]; /* initial guess of the next search */
     for (i = 0; i < NX; ++i) m->rates[i] = f[i] + (at[i] - y[i]) / PULL;
 #if CROSSINGS
     model_events(&m->t, at, m->R + DATA, m->rates + NX);
@@ -38,7 +38,7 @@ static int rated(Instance *unit)
     return 1;
 }
 
-/* Another time of the importer. */
+/* Set the time. */
 static int at_time(Instance *unit, double t)
 {
     Memory *m = &unit->m;
@@ -54,7 +54,7 @@ static int at_time(Instance *unit, double t)
     return 1;
 }
 
-/* Another state of the importer. */
+/* Set the states. */
 static int at_state(Instance *unit, const double *x, size_t n)
 {
     Memory *m = &unit->m;
@@ -67,7 +67,7 @@ static int at_state(Instance *unit, const double *x, size_t n)
     return 1;
 }
 
-/* Whether an event has happened since the last look, in a step that the importer has completed. */
+/* Return 1 if an event has occurred in the step that the importer has completed. */
 static int completed(Instance *unit)
 {
 #if CROSSINGS
@@ -84,8 +84,8 @@ static int completed(Instance *unit)
     return 0;
 }
 
-/* The events that have happened are carried out, all at once; others may follow from that. DONE,
-   OVER behind a terminal one, FAILED where algebraic variables have no solution. */
+/* Apply all events that have occurred; others may follow. Return DONE, OVER after a terminal event,
+   or FAILED if algebraic variables have no solution. */
 static Outcome carried_out(Instance *unit, int *again, int *moved)
 {
     *again = *moved = 0;
@@ -116,7 +116,7 @@ static Outcome carried_out(Instance *unit, int *again, int *moved)
             if (which[i]) m->events[i] = (double)NAN;
         }
         m->seen = m->rated = 0;
-        m->stopped = 1; /* other rounds at this time end: no event takes part in two of them */
+        m->stopped = 1; /* no event occurs twice at the same time */
         if (over) return OVER;
         missing = *moved ? consistent(y, m->R + DATA, CLOSES) : "";
         if (*missing) {

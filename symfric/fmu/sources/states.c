@@ -1,4 +1,4 @@
-/* States that an importer keeps: the whole memory of an instance, and as bytes. */
+/* States that an importer stores: the memory of an instance, also as bytes. */
 
 static int of_this_model(const void *bytes)
 {
@@ -7,7 +7,7 @@ static int of_this_model(const void *bytes)
     return kind == MODEL_KIND;
 }
 
-/* Put a state into a place, a new one where there is none yet; 0 where there is no memory. */
+/* Copy a state to a place, allocated if it is NULL; return 0 without memory. */
 static int kept(const void *state, void **place)
 {
     if (!*place) *place = malloc(sizeof(Memory));
@@ -15,7 +15,7 @@ static int kept(const void *state, void **place)
     return *place != NULL;
 }
 
-/* The state in an instance that goes on from it; 0 where it is of another model. */
+/* Restore a state; return 0 if it belongs to another model. */
 static int put_back(Instance *unit, const void *state)
 {
     if (!of_this_model(state)) return 0;
@@ -23,7 +23,7 @@ static int put_back(Instance *unit, const void *state)
     return 1;
 }
 
-/* The state that bytes hold; 0, and why, where they hold none. */
+/* Read a state from bytes; return 0 and set a message on failure. */
 static int unpacked(Instance *unit, const void *bytes, size_t size, void **place)
 {
     if (size != sizeof(Memory) || !of_this_model(bytes)) {

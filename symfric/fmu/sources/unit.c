@@ -1,6 +1,6 @@
-/* The unit behind both versions of the interface: its variables and its initialisation.
-   Value references: 0 time, then all signals, parameters, rtol, attempts; in model exchange rates
-   of the states and event indicators behind these. */
+/* Variables and initialisation of the unit, for both versions of the interface. Value references:
+   0 time, then all signals, parameters, rtol, attempts; in model exchange also rates of the states
+   and event indicators. */
 
 enum { OF_SIGNALS = 1, OF_P = OF_SIGNALS + NS, OF_RTOL = OF_P + NP, OF_ATTEMPTS, OF_RATES };
 enum { OF_INDICATORS = OF_RATES + EXCHANGE * NX, REFERENCES = OF_INDICATORS + EXCHANGE * CROSSINGS };
@@ -8,11 +8,11 @@ enum { OF_INDICATORS = OF_RATES + EXCHANGE * NX, REFERENCES = OF_INDICATORS + EX
 static void say(Instance *unit, const char *text) { snprintf(unit->said, SAID, "%s", text); }
 
 static const char *const phase_names[] = {
-    "before the initialisation", "in the initialisation", "in a simulation under way",
-    "behind its end", "after an error"
+    "before the initialisation", "in the initialisation", "during a simulation",
+    "after its end", "after an error"
 };
 
-/* Events of a model may ask for a tighter tolerance than the one set. */
+/* Set the tolerance; events of a model may limit it. */
 static void tolerance(Memory *m, double rtol)
 {
     int i;
@@ -21,7 +21,7 @@ static void tolerance(Memory *m, double rtol)
     for (i = 0; i < NX; ++i) m->R[FIXED + i] = ATOL * rtol * model_nominal[i];
 }
 
-/* The instance as it was made. */
+/* Reset an instance. */
 static void fresh(Memory *m)
 {
     memset(m, 0, sizeof *m);
@@ -39,7 +39,7 @@ static double first_step(const Memory *m)
     return FIRST_STEP > least ? FIRST_STEP : least;
 }
 
-/* Start values: those set, else those of the model, which may follow them and the parameters. */
+/* Compute the start from the values that were set and those of the model, which may follow them. */
 static const char *start(Memory *m)
 {
     double *y = m->S + MEMORY, data[ND + 1];
@@ -62,7 +62,7 @@ static const char *start(Memory *m)
 #endif
         missing = consistent(y, m->R + DATA, 1);
 #if EQUATIONS
-        if (*missing) { /* once more, from the unknowns of the model's own start */
+        if (*missing) { /* again, from the unknowns at the start of the model */
             for (i = NX; i < N - TIMED; ++i) y[i] = model_start_values[i];
             missing = consistent(y, m->R + DATA, 1);
         }
@@ -79,7 +79,7 @@ static const char *start(Memory *m)
     return missing;
 }
 
-/* Begin to initialise at a time, up to an end where there is one. 0 where that cannot be. */
+/* Begin the initialisation at a time, with an optional end; return 0 for bad arguments. */
 static int initialise(Instance *unit, double begin, int limited, double stop, double rtol)
 {
     Memory *m = &unit->m;
@@ -96,7 +96,7 @@ static int initialise(Instance *unit, double begin, int limited, double stop, do
     return 1;
 }
 
-/* Whether the start values are consistent; looks for consistent ones where they are not. */
+/* Make the start values consistent; return 0 on failure. */
 static int settled(Instance *unit)
 {
     Memory *m = &unit->m;
@@ -112,8 +112,8 @@ static int driven_otherwise(const Memory *m)
     return memcmp(m->set, m->R + DATA, ND * sizeof(double)) != 0;
 }
 
-/* All signals at the communication point, with inputs and parameters as they are set; 0 where
-   algebraic variables have no solution with these. */
+/* Compute all signals at the communication point with the inputs and parameters that are set; return
+   0 if algebraic variables have no solution. */
 static int look(Instance *unit)
 {
     Memory *m = &unit->m;
@@ -135,7 +135,7 @@ static int look(Instance *unit)
 static int rated(Instance *unit);
 #endif
 
-/* The value of a variable; 0 where there is no such one, or no consistent start. */
+/* Get the value of a variable; return 0 for an unknown reference or an inconsistent start. */
 static int get(Instance *unit, unsigned int reference, double *value)
 {
     Memory *m = &unit->m;
@@ -162,12 +162,12 @@ static int get(Instance *unit, unsigned int reference, double *value)
     return 1;
 }
 
-/* Refuse a value that is no number, or outside the range of its variable. */
+/* Return 1 if a value is finite and within the range of its variable; else set a message. */
 static int within(Instance *unit, const char *name, double value, double lower, double upper)
 {
     if (isfinite(value) && value >= lower && value <= upper) return 1;
-    snprintf(unit->said, SAID, "set %s: expected a finite number from %g to %g, got %g; it stays as "
-             "it was", name, lower, upper, value);
+    snprintf(unit->said, SAID, "set %s: expected a finite number from %g to %g, got %g; the value is "
+             "unchanged", name, lower, upper, value);
     return 0;
 }
 
@@ -208,7 +208,7 @@ static Outcome set(Instance *unit, unsigned int reference, double value)
     return DONE;
 }
 
-/* The first event of those that happened last, by name. */
+/* Return the name of the last event, the first of several at the same time. */
 static const char *last_event(const Memory *m)
 {
 #if CROSSINGS
@@ -221,7 +221,7 @@ static const char *last_event(const Memory *m)
     return "";
 }
 
-/* Why steps ended before the communication point, in a sentence. */
+/* Set the message about steps that ended before the communication point. */
 static void explain(Instance *unit, int why)
 {
     Memory *m = &unit->m;
@@ -241,7 +241,7 @@ static void explain(Instance *unit, int why)
                  "step; loosen rtol or look for a discontinuity", MODEL_NAME, t,
                  (double)MOST_ATTEMPTS);
     } else if (why == UNSOLVED) {
-        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: behind the event %s the algebraic "
+        snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: after the event %s the algebraic "
                  "equations have no solution near their last one, or friction jams", MODEL_NAME, t,
                  last_event(m));
     } else if (why == STORM) {

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from symfric import ExactCoulomb, SolveError, Trajectory, simulate
 from symfric.gallery.selection.laws import FORMS, forms, small_multiples
+from symfric.gallery.self_tuning.machines import Machine, size, solve
 from symfric.gallery.shared import acceleration, largest, rms, spread
 from symfric.scenes import PendulumBox
 
@@ -46,25 +47,14 @@ def balance(phi: ca.SX, v: ca.SX, w: ca.SX, unknown: ca.SX) -> ca.SX:
     )
 
 
-def size(f: ca.SX) -> ca.SX:
-    """Return the magnitude of a force, smoothed at zero as in the library."""
-    return ca.sqrt(ca.sumsqr(f) + 1e-8) - 1e-4
-
-
-def smooth_coulomb(times: Array) -> dict[str, Array]:
-    """Return positions, velocities and accelerations at `times` [s], accurate to ten digits."""
+def smooth_coulomb() -> Machine:
+    """Return the machine; the signals are positions, velocities and accelerations."""
     x, phi, v, w = (ca.SX.sym(name) for name in ("x", "phi", "v", "w"))
     unknown = ca.SX.sym("unknown", 4)
     y, rates = ca.vertcat(x, phi, v, w), ca.vertcat(v, w, unknown[:2])
-    alg = balance(phi, v, w, unknown)
-    start, guess = [0.0, np.pi / 6, 0.0, 0.0], [0.0, 0.0, (M_BOX + M) * G, M * G]
-    find = ca.rootfinder("find", "newton", {"x": unknown, "p": y, "g": alg})
-    dae = {"x": y, "z": unknown, "ode": rates, "alg": alg}
-    options = {"reltol": 1e-10, "abstol": 1e-11, "max_num_steps": 400_000}
-    run = ca.integrator("run", "idas", dae, 0.0, list(times), options)
-    found = run(x0=start, z0=find(guess, start))
-    values = np.vstack([np.array(found["xf"]), np.array(found["zf"])[:2]])
-    return dict(zip(("x", "phi", "x'", "phi'", "x''", "phi''"), values, strict=True))
+    names = ("x", "phi", "x'", "phi'", "x''", "phi''")
+    shown, start = ca.vertcat(y, unknown[:2]), [0.0, np.pi / 6, 0.0, 0.0]
+    return Machine(y, rates, unknown, balance(phi, v, w, unknown), names, shown, start)
 
 
 def at_start() -> tuple[float, float]:
@@ -76,17 +66,17 @@ def at_start() -> tuple[float, float]:
 
 
 Array = NDArray[np.float64]
-Machine = tuple[float, float]
+Variant = tuple[float, float]
 """Inertia about the mass [kg m^2] and radius of the hinge [m]."""
-DRAWN: Machine = (J, R)
-MACHINES: tuple[Machine, ...] = (DRAWN, (J, 0.1), (1e-9, 0.003), (1e-9, 0.1))
+DRAWN: Variant = (J, R)
+MACHINES: tuple[Variant, ...] = (DRAWN, (J, 0.1), (1e-9, 0.003), (1e-9, 0.1))
 """Both interpretations of the inertia, with radii of 3 to 100 mm."""
 T_END = 15.0
 EXACT = "exact dry friction"
 
 
 @cache
-def run(name: str, t_end: float = T_END, at: Machine = DRAWN, rtol: float = 1e-7) -> Trajectory:
+def run(name: str, t_end: float = T_END, at: Variant = DRAWN, rtol: float = 1e-7) -> Trajectory:
     """Return a run with a law or exact dry friction in floor and hinge, sampled every ms."""
     law = ExactCoulomb() if name == EXACT else FORMS[name]
     model = PendulumBox.preset("jing_mi_table_7", law, J=at[0], R=at[1]).model()
@@ -98,7 +88,7 @@ def run(name: str, t_end: float = T_END, at: Machine = DRAWN, rtol: float = 1e-7
 
 
 @cache
-def signal(name: str, what: str, t_end: float, at: Machine = DRAWN) -> Array:
+def signal(name: str, what: str, t_end: float, at: Variant = DRAWN) -> Array:
     """Return x, x', x'' of the box or phi, phi', phi'' of the pendulum."""
     one, joint = run(name, t_end, at), what.rstrip("'")
     ending = what.removeprefix(joint)
@@ -107,7 +97,7 @@ def signal(name: str, what: str, t_end: float, at: Machine = DRAWN) -> Array:
     return one[f"{joint}_rate"] if ending else one[joint]
 
 
-def off(name: str, what: str, t_end: float, at: Machine = DRAWN) -> Array:
+def off(name: str, what: str, t_end: float, at: Variant = DRAWN) -> Array:
     """Return the difference of a signal from that of exact dry friction."""
     return signal(name, what, t_end, at) - signal(EXACT, what, t_end, at)
 
@@ -115,7 +105,7 @@ def off(name: str, what: str, t_end: float, at: Machine = DRAWN) -> Array:
 @cache
 def by_hand(t_end: float) -> dict[str, Array]:
     """Return the motion with the smooth Coulomb law in both joints, by equations by hand."""
-    return smooth_coulomb(run("Smooth", t_end).t)
+    return solve(smooth_coulomb(), run("Smooth", t_end).t)
 
 
 def distance(what: str, t_end: float) -> float:
@@ -132,7 +122,7 @@ def picture(
     return small_multiples(curves, (t, signal(EXACT, what, t_end)), label, -limit, limit)
 
 
-def last_swing(name: str, what: str, t_end: float, at: Machine = DRAWN) -> float:
+def last_swing(name: str, what: str, t_end: float, at: Variant = DRAWN) -> float:
     """Return half the range of a signal in the last two seconds."""
     return float(np.ptp(signal(name, what, t_end, at)[-2000:])) / 2
 
@@ -162,7 +152,7 @@ def end_of_motion(what: str, numbers: dict[str, float], t_end: float) -> dict[st
     return _said_of_the_end(found) | _fixed_hinge(what, numbers)
 
 
-def _late(name: str, what: str, t_end: float, at: Machine = DRAWN) -> float:
+def _late(name: str, what: str, t_end: float, at: Variant = DRAWN) -> float:
     return rms(off(name, what, t_end, at)[-2000:])
 
 

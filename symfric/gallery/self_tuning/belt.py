@@ -5,7 +5,7 @@ The table of data of the belt is lost. The figures use the numbers of the LuGre 
 unit.
 """
 
-from functools import cache
+from functools import cache, partial
 
 import casadi as ca
 import numpy as np
@@ -16,6 +16,7 @@ from symfric import BrownMcPhee, Law, SelfTuning, Trajectory, simulate, symbolis
 from symfric.foundation.panels import grid, panels
 from symfric.foundation.style import line
 from symfric.gallery.plate import Drawn, plate
+from symfric.gallery.self_tuning import both_laws
 from symfric.gallery.shared import REFERENCE, Belt, largest, legend_below, rms
 from symfric.scenes import Rabinowicz
 
@@ -195,11 +196,7 @@ LAWS = ("self-tuning, equal peak", "Brown-McPhee")
 BLOCK = {"m": 1.0, "k": 2.0, "v_belt": 0.1, "g": 10.0}
 
 
-def law(label: str, v_t: float) -> Law:
-    """Return one of `LAWS` with its peak at `v_t` [m/s]."""
-    if label.startswith("self"):
-        return SelfTuning.from_peak_velocity(v_t, **MU)
-    return BrownMcPhee(v_t=v_t, **MU)
+law = partial(both_laws.law, mu=MU)
 
 
 @cache

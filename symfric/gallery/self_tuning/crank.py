@@ -5,54 +5,29 @@ used, since the paper's table is lost: 120 rad/s at the start, friction in the b
 both laws with their peak at 10 mm/s.
 """
 
-from functools import cache
-
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric import BrownMcPhee, SelfTuning, simulate
+from symfric import BrownMcPhee
 from symfric.foundation.panels import panels
 from symfric.foundation.style import line
 from symfric.gallery.plate import Drawn, plate
-from symfric.gallery.self_tuning.machines import brown_mcphee, self_tuning, slider_crank, solve
-from symfric.gallery.shared import REFERENCE, acceleration, largest, legend_below
+from symfric.gallery.self_tuning import both_laws, machines
+from symfric.gallery.self_tuning.both_laws import LAWS, Both
+from symfric.gallery.shared import REFERENCE, largest, legend_below
 from symfric.scenes import SliderCrank
 
 Array = NDArray[np.float64]
 MU = {"mu_s": 0.1, "mu_d": 0.08}
 V_T = 0.01  # m/s
-LAWS = {
-    "self-tuning": SelfTuning.from_peak_velocity(V_T, **MU),
-    "Brown-McPhee": BrownMcPhee(v_t=V_T, **MU),
-}
-MACHINES = {
-    "self-tuning": slider_crank(self_tuning(**MU, v_t=V_T)),
-    "Brown-McPhee": slider_crank(brown_mcphee(**MU, v_t=V_T)),
-}
+MORE = ("energy", "constraint_position")
+BOTH = Both(SliderCrank, machines.slider_crank, MU, V_T, 4000, ("crank", "slider"), MORE)
+apart = BOTH.apart
 
 
-@cache
 def run(law: str, t_end: float) -> dict[str, Array]:
-    """Return time, crank [rad], slider [m], rates, accelerations, energy [J], constraint norm."""
-    model = SliderCrank(LAWS[law]).model()
-    times = np.linspace(0.0, t_end, round(4000 * t_end) + 1)
-    found = simulate(model, t_end, rtol=1e-8, t_eval=times)
-    signals = {"t": times, "energy": found["energy"], "constraint": found["constraint_position"]}
-    for name in ("crank", "slider"):
-        signals[name], signals[f"{name}'"] = found[name], found[f"{name}_rate"]
-        signals[f"{name}''"] = acceleration(found, f"{name}_rate")
-    return signals
-
-
-@cache
-def oracle(law: str, t_end: float) -> dict[str, Array]:
-    """Return the same in the angle of the crank, by equations written by hand and SUNDIALS."""
-    return solve(MACHINES[law], run(law, t_end)["t"])
-
-
-def apart(signal: str, t_end: float) -> Array:
-    """Return the difference of a signal between both laws over time."""
-    return run("self-tuning", t_end)[signal] - run("Brown-McPhee", t_end)[signal]
+    """Return the signals with a law."""
+    return both_laws.run(BOTH, law, V_T, t_end)
 
 
 def drawn(
@@ -69,7 +44,7 @@ def drawn(
     what = signal.rstrip("'") + (" position", " velocity", " acceleration")[order]
     figure, (above, below) = panels(2, height=2.0)
     t, unit = run("Brown-McPhee", t_end)["t"], unit.replace("^2", "²")
-    reference = oracle("Brown-McPhee", t_end)[signal]
+    reference = both_laws.oracle(BOTH, "Brown-McPhee", V_T, t_end)[signal]
     above.plot(t, reference, label="Brown-McPhee, by hand", **REFERENCE)
     for k, law in enumerate(LAWS):
         above.plot(t, run(law, t_end)[signal], label=law, **line(k))
@@ -78,8 +53,7 @@ def drawn(
     below.set(xlabel="time [s]", ylabel=f"self-tuning minus\nBrown-McPhee [{small}{unit}]")
     figure.align_ylabels([above, below])
     legend_below(figure, above)
-    hand = (largest(run(law, t_end)[signal] - oracle(law, t_end)[signal]) for law in LAWS)
-    return figure, max(hand), numbers, claims
+    return figure, BOTH.distance([signal], t_end), numbers, claims
 
 
 @plate("rad/s^2", within=(6e-6, 1.5e-4), like=drawn)
@@ -98,7 +72,7 @@ def fig_17_crank_acceleration(quick: bool) -> Drawn:
     slowest = min(float(run(law, t_end)["crank'"].min()) for law in LAWS)
     numbers["slowest slip in the bearing / velocity of the peak [1]"] = 0.1 * slowest / V_T
     numbers["largest norm of the constraints [m]"] = max(
-        largest(run(law, t_end)["constraint"]) for law in LAWS
+        largest(run(law, t_end)["constraint_position"]) for law in LAWS
     )
     greatest = largest(run("Brown-McPhee", t_end)["crank''"])
     numbers["greatest acceleration [rad/s^2]"] = greatest

@@ -1,33 +1,29 @@
 """Four-mass system of figures 13 to 16: both laws, and the same machine computed in another way.
 
 Haug's example has the numbers of the paper, 22 constraints and two degrees of freedom. Its data are
-used, since the paper's table is lost. `TUNED` is the law of the paper, whose B depends on load and
-mu_s - mu_d by the reconstructed function; `LAWS` have their peaks at the same velocity.
+used, since the paper's table is lost. `LAWS` have their peaks at the same velocity.
 """
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from symfric import BrittleSelfTuning, BrownMcPhee, Law, SelfTuning, simulate
 from symfric.foundation.panels import grid, panels
 from symfric.foundation.style import QUIET, colour, line
 from symfric.gallery.plate import Drawn, plate
-from symfric.gallery.self_tuning import machines
-from symfric.gallery.self_tuning.machines import fastest, fixed_steps, solve
-from symfric.gallery.shared import REFERENCE, acceleration, largest, legend_below
+from symfric.gallery.self_tuning import both_laws, machines
+from symfric.gallery.self_tuning.both_laws import LAWS, TUNED, Both, Signals
+from symfric.gallery.self_tuning.machines import fastest, fixed_steps
+from symfric.gallery.shared import REFERENCE, largest, legend_below
 from symfric.scenes import FourMass
 
 Array = NDArray[np.float64]
-Signals = dict[str, Array]
 MU = {"mu_s": 0.12, "mu_d": 0.1}
 V_T = 0.01
 """Velocity of the peak [m/s], of Haug's example."""
 SLIDERS = ("x1", "y2", "z3", "x4")
-LAWS = ("self-tuning", "Brown-McPhee")
-TUNED = "self-tuning, own B"
 B_RANGE = (0.1e3, 0.2e3, 0.3e3, 0.5e3, 0.7e3, 1e3)
 """Values of B [s/m] in the sweep of figure 8, whose range contains B for any function."""
 PEAK = float(np.tan(np.pi / 2 / (2 - 2 / np.pi * np.arcsin(MU["mu_d"] / MU["mu_s"]))))
@@ -36,47 +32,14 @@ CONSTRAINTS = {
     "constraint_position": "m", "constraint_velocity": "m/s", "constraint_acceleration": "m/s^2",
 }  # fmt: skip
 """Norms of the constraint violations of joints and rods, with their units."""
-COEFFICIENTS = {
-    "self-tuning": machines.self_tuning,
-    "Brown-McPhee": machines.brown_mcphee,
-    TUNED: machines.own_stiffness,
-}
-
-
-def law(label: str, v_t: float) -> Law:
-    """Return one of `LAWS` with its peak at `v_t` [m/s], or `TUNED`, which determines its peak."""
-    if label == TUNED:
-        return BrittleSelfTuning(**MU)
-    if label == "self-tuning":
-        return SelfTuning.from_peak_velocity(v_t, **MU)
-    return BrownMcPhee(v_t=v_t, **MU)
-
-
-@cache
-def run(label: str, v_t: float, t_end: float) -> Signals:
-    """Return time, positions x1, rates x1' and accelerations x1'' of the sliders with a law."""
-    model = FourMass(law(label, v_t)).model()
-    times = np.linspace(0.0, t_end, round(1000 * t_end) + 1)
-    found = simulate(model, t_end, rtol=1e-8, t_eval=times)
-    signals: Signals = {"t": times, "energy": found["energy"]}
-    signals |= {name: found[name] for name in CONSTRAINTS}
-    for slider in SLIDERS:
-        signals[slider], signals[f"{slider}'"] = found[slider], found[f"{slider}_rate"]
-        signals[f"{slider}''"] = acceleration(found, f"{slider}_rate")
-    return signals
-
-
-@cache
-def oracle(label: str, v_t: float, t_end: float) -> Signals:
-    """Return the same by equations in two coordinates, written by hand, and SUNDIALS."""
-    machine = machines.four_mass(COEFFICIENTS[label](**MU, v_t=v_t))
-    return solve(machine, run(label, v_t, t_end)["t"])
+BOTH = Both(FourMass, machines.four_mass, MU, V_T, 1000, SLIDERS, ("energy", *CONSTRAINTS))
+run, oracle = partial(both_laws.run, BOTH), partial(both_laws.oracle, BOTH)
 
 
 @cache
 def stepped(label: str, v_t: float, t_end: float, h: float = 1e-3) -> Signals:
-    """Return the same by fixed explicit steps of `h` [s]."""
-    return fixed_steps(machines.four_mass(COEFFICIENTS[label](**MU, v_t=v_t)), h, t_end)
+    """Return the signals by fixed explicit steps of `h` [s]."""
+    return fixed_steps(BOTH.machine(label, v_t), h, t_end)
 
 
 def fastest_at(label: str, v_t: float, t_end: float, t: float) -> float:
@@ -84,7 +47,7 @@ def fastest_at(label: str, v_t: float, t_end: float, t: float) -> float:
     at = {name: values[round(1000 * t)] for name, values in run(label, v_t, t_end).items()}
     w = (at["x1"] * at["y2'"] - at["y2"] * at["x1'"]) / 25
     y = np.array([np.arctan2(at["y2"], at["x1"]), at["x4"], w, at["x4'"]])
-    return fastest(machines.four_mass(COEFFICIENTS[label](**MU, v_t=v_t)), y)
+    return fastest(BOTH.machine(label, v_t), y)
 
 
 def variation(signal: Array) -> float:
@@ -94,31 +57,25 @@ def variation(signal: Array) -> float:
 
 def distance(ending: str, t_end: float) -> float:
     """Return the largest difference of a signal from the oracle, over all sliders and laws."""
-    names = [slider + ending for slider in SLIDERS]
-    return max(
-        largest(run(one, V_T, t_end)[n] - oracle(one, V_T, t_end)[n]) for one in LAWS for n in names
-    )
+    return BOTH.distance([slider + ending for slider in SLIDERS], t_end)
 
 
 def apart(ending: str, t_end: float) -> dict[str, float]:
     """Return the largest difference between both laws for each slider."""
-    first, other = (run(one, V_T, t_end) for one in LAWS)
-    return {slider: largest(first[slider + ending] - other[slider + ending]) for slider in SLIDERS}
+    return {slider: largest(BOTH.apart(slider + ending, t_end)) for slider in SLIDERS}
 
 
 def picture(ending: str, label: str, t_end: float) -> Figure:
     """Return a picture with a panel per slider: both laws on the oracle, and their difference."""
     figure, axes = grid(3, 2, height=6.4, sharex=True)
-    first, other = (run(one, V_T, t_end) for one in LAWS)
+    t = run("Brown-McPhee", V_T, t_end)["t"]
     for axis, pair in zip(axes[2], (("x1", "x4"), ("y2", "z3")), strict=True):
         for k, slider in enumerate(pair, start=2):
-            apart_by = first[slider + ending] - other[slider + ending]
-            axis.plot(first["t"], apart_by, **line(k), label=f"mass {slider[1]}")
+            axis.plot(t, BOTH.apart(slider + ending, t_end), **line(k), label=f"mass {slider[1]}")
         axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, frameon=False)
         axis.set_xlabel("time [s]")
     axes[2][0].set_ylabel(f"self-tuning minus\nBrown-McPhee {label[label.index('[') :]}")
     for axis, slider in zip((a for row in axes[:2] for a in row), SLIDERS, strict=True):
-        t = run("Brown-McPhee", V_T, t_end)["t"]
         reference = oracle("Brown-McPhee", V_T, t_end)[slider + ending]
         axis.plot(t, reference, label="Brown-McPhee, by hand", **REFERENCE)
         for k, one in enumerate(LAWS):

@@ -87,9 +87,9 @@ def four_mass(mu: Coefficient) -> Machine:
     return Machine(y, rates, unknown, balance, names, shown, start)
 
 
-def slider_crank(mu: Coefficient, R: float = 0.1, a: float = 0.1) -> Machine:
+def slider_crank(mu: Coefficient) -> Machine:
     """Return crank and slider; the signals are angle [rad], position [m] and their rates."""
-    m_crank, m_slider, J, r, length, g = 0.5, 5.0, 0.2, 0.08, 0.3, 9.8
+    m_crank, m_slider, J, r, length, R, a, g = 0.5, 5.0, 0.2, 0.08, 0.3, 0.1, 0.1, 9.8
     th, w, alpha, rod, N = map(ca.SX.sym, ("th", "w", "alpha", "rod", "N"))
     c, s = ca.cos(th), ca.sin(th)
     py, pz = 0.1 - r * s, 0.1 + r * c

@@ -1,12 +1,120 @@
-"""Graphics processor: the functions of CuPy that a run needs."""
+"""Kernel of a graphics processor, one member per thread, and the functions of CuPy that it needs.
+
+The source is valid as C and as CUDA C++. For a graphics processor and for a host compiler only the
+lines before and after it differ, so the arithmetic is tested without a graphics processor.
+"""
 
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import Any, final
 
 import numpy as np
 
-from symfric.integrator.cuda.kernel import AFTER, BEFORE, NAME, Kernel
+from symfric.emitter.c99 import DOUBLE, Real
+from symfric.integrator.compiled.columns import densified
+from symfric.integrator.equations.blocks import DONE, ROUNDS
+from symfric.integrator.equations.initial import FLOOR
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.step.attempt import Given, State
+from symfric.integrator.step.pieces import in_c, macros
+
+NAME = "symfric_launch"
+DONE_IN_SINGLE = 1e-5
+"""Value of `blocks.DONE` in single precision; smaller changes are rounding errors."""
+
+BEFORE = """#define HUGE_VAL __longlong_as_double(0x7ff0000000000000LL)
+#define HUGE_VALF __int_as_float(0x7f800000)
+#define DEVICE __device__
+#define BESIDE __device__ __noinline__
+#define TICKET(count) atomicAdd(count, 1)
+"""
+"""Lines for NVRTC before the source; NVRTC has no headers, functions of math.h are built in."""
+
+AFTER = f"""
+extern "C" __global__ void {NAME}(const Many *all)
+{{
+    symfric_thread(all);
+}}
+"""
+"""Launch, without `__launch_bounds__`: with it, the assembler assigned only 32 of 255 registers to
+a six-joint arm.
+"""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """Source of a kernel and the sizes of its data.
+
+    Attributes:
+        text: source of functions and loop, without the machine-dependent part.
+        real: floating point type of all data except times.
+        rows: number of rows of S.
+        given: number of rows of R.
+        states: number of states whose least and greatest values are kept.
+        signals: number of signals of a result.
+        operations: number of operations of an attempt.
+    """
+
+    text: str
+    real: Real
+    rows: int
+    given: int
+    states: int
+    signals: int
+    operations: int
+
+
+def kernel_of(integrator: Integrator, between: bool = True, real: Real = DOUBLE) -> Kernel:
+    """Return the kernel of an integrator's attempt; written once, then cached in the integrator.
+
+    Args:
+        integrator: integrator of a model without events.
+        between: True if there are results between the ends of steps.
+        real: floating point type.
+
+    Raises:
+        ValueError: an operation that does not exist in C.
+    """
+    known: dict[tuple[bool, str], Kernel] = integrator.memory.setdefault("kernels", {})
+    key = between, real.name
+    if key not in known:
+        known[key] = _written(integrator, between, real)
+    return known[key]
+
+
+def _written(integrator: Integrator, between: bool, real: Real) -> Kernel:
+    step, signals, system = integrator.step, densified(integrator.signals), integrator.system
+    n, follow, head = system.n, integrator.follow if integrator.follows else None, "static DEVICE "
+    names = ("next", "D" if between else "")
+    functions = [
+        in_c(step, "symfric_attempt", ("S", "R"), names, real, head),
+        in_c(signals, "symfric_values", ("t", "y", "d"), ("out",), real, head),
+    ]
+    sizes: dict[str, object] = {
+        "N": n, "NX": system.nx, "MEMORY": State.MEMORY, "T": State.T, "H": State.H,
+        "SIZE_R": step.numel_in(1), "T_END": Given.T_END, "N_D": signals.numel_in(2),
+        "ROWS": step.numel_out(1) // n if between else 0, "SIGNALS": signals.numel_out(0),
+        "FLOOR": repr(FLOOR), "OWN_TIME": int(real.size < 8), "TIMED": int(system.timed),
+        "FOLLOWS": 0 if not integrator.follows else 1 if follow is None else 2,
+    }  # fmt: skip
+    if follow is not None:
+        done = DONE if real.size == 8 else DONE_IN_SINGLE
+        sizes |= {
+            "ROUNDS": ROUNDS, "DONE": real.literal(done),
+            "CONTRACTION": real.literal(follow.contraction),
+        }  # fmt: skip
+        places = ("y", "d"), ("after", "look")
+        functions.append(in_c(follow.round, "symfric_round", *places, real, head))
+    written = "\n".join(one.text for one in functions)
+    defined = "".join(f"#define {name} {value}\n" for name, value in sizes.items())
+    loop = Path(__file__).with_name("members.h").read_text(encoding="utf-8")
+    # define sizes after the written functions, whose arguments may have the same names
+    text = f"typedef {real.name} real;\n{macros(functions, real)}\n{written}\n{defined}\n{loop}"
+    numbers = step.numel_in(0), step.numel_in(1), system.nx, signals.numel_out(0)
+    return Kernel(text, real, *numbers, functions[0].operations)
+
 
 BLOCK = 64
 """Number of threads of a block; small, since each thread holds hundreds of numbers."""

@@ -1,7 +1,7 @@
 """Members of an ensemble on a graphics processor: the task of the chunks, and the launches."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any, final
 
@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from symfric.emitter.c99 import REALS
-from symfric.integrator.cuda.device import Device, Loaded
-from symfric.integrator.cuda.kernel import Kernel, kernel_of
+from symfric.integrator.cuda.device import Device, Kernel, Loaded, kernel_of
 from symfric.integrator.many.chunk import Chunk, Job, Solved
 from symfric.integrator.many.member_data import MemberData
-from symfric.integrator.many.members import Advanced, Counts, Stretch, struct
-from symfric.integrator.many.program import Program, with_code
+from symfric.integrator.many.members import Advanced, Counts, Program, Stretch, struct, with_code
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import State
@@ -154,7 +152,7 @@ class OnDevice:
             pick = slice(first, min(first + most, count))
             try:
                 columns = S[pick], R[pick], made[pick], reach[pick]
-                self._run(columns, stretch[pick], found[pick], reason[pick])
+                self._run(columns, part_of(stretch, pick), found[pick], reason[pick])
             except MemoryError:
                 if most == 1:
                     raise
@@ -217,6 +215,13 @@ class OnDevice:
         """Set the budget of the next launch; the previous one took `spent` seconds."""
         factor = LAUNCH / max(spent, LAUNCH / FASTER)
         self.budget = max(1, int(self.budget * min(factor, FASTER)))
+
+
+def part_of(stretch: Stretch, pick: slice) -> Stretch:
+    """Return the stretch of some of its members."""
+    data, times = (a[pick] if a.shape[0] > 1 else a for a in (stretch.data, stretch.times))
+    ends, h_min = stretch.ends[pick], stretch.h_min[pick]
+    return replace(stretch, data=data, times=times, ends=ends, h_min=h_min)
 
 
 def member_bytes(kernel: Kernel, stretch: Stretch) -> int:

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_step
 from symfric.integrator.equations.inputs import InputData
-from symfric.integrator.many.members import Runner, Stretch
-from symfric.integrator.many.program import Program, with_code
+from symfric.integrator.many.members import Program, Runner, Stretch, with_code
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator, built
@@ -192,12 +191,12 @@ class Job:
         self, chunk: Chunk, S: Array, members: Indices, interval: int, failed: dict[int, str]
     ) -> Indices:
         """Make algebraic unknowns consistent at an interval; return the successful members."""
-        equations, together = self.program.equations, self.program.constraints
-        if equations is None or together is None:
+        equations = self.program.equations
+        if equations is None:
             return members
         d = _data(chunk, members, interval, self.program.nx)
         S[members, State.Y], refused = consistent_many(
-            equations, together, self.program.where, S[members, State.Y], d
+            equations, self.program.constraints, self.program.where, S[members, State.Y], d
         )
         failed |= {int(members[m]): message for m, message in refused.items()}
         return np.delete(members, list(refused))

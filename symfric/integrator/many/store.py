@@ -10,7 +10,7 @@ from functools import cached_property
 from hashlib import sha256
 from math import prod
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,10 +91,8 @@ class Store:
         try:
             with mark.open("rb") as file:
                 saved = storable.arrays(file)
-            attempts, reached, reach = (saved[n] for n in ("attempts", "reached", "reach"))
-            failed = dict(zip(saved["failed"].tolist(), saved["why"].tolist(), strict=True))
-            if str(saved["checksum"]) == self._checksum(first, attempts.size):
-                self._note(first, attempts, reached, reach, failed)
+            if str(saved.pop("checksum")) == self._checksum(first, saved["attempts"].size):
+                self._note(first, saved)
                 return True
         except (OSError, ValueError, KeyError):
             pass  # the marker file is damaged
@@ -108,7 +106,12 @@ class Store:
             ValueError: the results cannot be written; complete chunks are kept.
         """
         size, mark = result.attempts.size, self._mark(first)
-        self._note(first, result.attempts, result.reached, result.reach, result.failed)
+        outcome: dict[str, Any] = {
+            name: getattr(result, name) for name in ("attempts", "reached", "reach")
+        }
+        outcome["failed"] = np.array(list(result.failed), dtype=np.int64)
+        outcome["why"] = np.array(list(result.failed.values()), dtype=np.str_)
+        self._note(first, outcome)
         if mark is None:
             for i, values in enumerate(self.signals.values()):
                 values[first : first + size] = result.signals[:, :, i]
@@ -117,15 +120,7 @@ class Store:
             for i, file in enumerate(self._files):
                 file.write(first, result.signals[:, :, i])
             with written(mark) as temporary, temporary.open("wb") as marker:
-                np.savez(
-                    marker,
-                    attempts=result.attempts,
-                    reached=result.reached,
-                    reach=result.reach,
-                    failed=np.array(list(result.failed), dtype=np.int64),
-                    why=np.array(list(result.failed.values()), dtype=np.str_),
-                    checksum=np.array(self._checksum(first, size)),
-                )
+                np.savez(marker, **outcome, checksum=np.array(self._checksum(first, size)))
         except (OSError, ValueError) as error:
             raise ValueError(
                 f"simulate_many: out: expected disk space for members from {first} on in "
@@ -140,14 +135,13 @@ class Store:
             total.update(np.ascontiguousarray(values[first : first + size]).tobytes())
         return total.hexdigest()
 
-    def _note(
-        self, first: int, attempts: NDArray[np.int64], reached: Array, reach: Array,
-        failed: dict[int, str],
-    ) -> None:  # fmt: skip
-        self.attempts[first : first + attempts.size] = attempts
-        self.reached[first : first + attempts.size] = reached
-        self.reach[first : first + attempts.size] = reach
-        self.failed |= {first + m: why for m, why in failed.items()}
+    def _note(self, first: int, outcome: dict[str, NDArray[Any]]) -> None:
+        """Take over the arrays of the members from `first` on, and the messages of failed ones."""
+        failed = zip(outcome["failed"].tolist(), outcome["why"].tolist(), strict=True)
+        pick = slice(first, first + outcome["attempts"].size)
+        for name in ("attempts", "reached", "reach"):
+            getattr(self, name)[pick] = outcome[name]
+        self.failed |= {first + m: why for m, why in failed}
 
 
 def _reason(error: OSError | ValueError) -> str:
@@ -190,7 +184,7 @@ class _ArrayFile:
         if not missing and self._is_whole():
             return
         row = np.full(self.shape[1:], np.nan).tobytes()
-        rows = max(1, BLOCK // max(1, len(row)))
+        rows = max(1, BLOCK // len(row))
         try:
             with suppress(FileExistsError), written(self.path) as temporary:
                 with temporary.open("wb") as file:

@@ -3,9 +3,9 @@
 The C has the operations of the Function in the same order; `lanes.h` defines functions like exp.
 """
 
+import tomllib
 from collections import deque
 from collections.abc import Iterator
-from math import isinf, isnan
 from pathlib import Path
 from typing import final
 
@@ -18,27 +18,17 @@ PART = 1000
 and keep fewer values in registers.
 """
 
-MASKS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
-LOGIC = {ca.OP_AND: "{} & {}", ca.OP_OR: "{} | {}", ca.OP_NOT: "~{}"}
-PLAIN = {
-    ca.OP_ADD: "{} + {}", ca.OP_SUB: "{} - {}", ca.OP_MUL: "{} * {}", ca.OP_DIV: "{} / {}",
-    ca.OP_NEG: "-{}", ca.OP_SQ: "{0} * {0}", ca.OP_TWICE: "2. * {}", ca.OP_INV: "1. / {}",
-}  # fmt: skip
-CALLS = {
-    ca.OP_SQRT: "sqrt", ca.OP_FABS: "fabs", ca.OP_SIGN: "sign", ca.OP_FMIN: "fmin",
-    ca.OP_FMAX: "fmax", ca.OP_COPYSIGN: "copysign", ca.OP_FLOOR: "floor", ca.OP_CEIL: "ceil",
-    ca.OP_EXP: "exp", ca.OP_EXPM1: "expm1", ca.OP_LOG: "log", ca.OP_LOG1P: "log1p",
-    ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow", ca.OP_TAN: "tan", ca.OP_ASIN: "asin",
-    ca.OP_ACOS: "acos", ca.OP_ATAN: "atan", ca.OP_ATAN2: "atan2", ca.OP_SINH: "sinh",
-    ca.OP_COSH: "cosh", ca.OP_TANH: "tanh", ca.OP_ASINH: "asinh", ca.OP_ACOSH: "acosh",
-    ca.OP_ATANH: "atanh", ca.OP_ERF: "erf", ca.OP_HYPOT: "hypot", ca.OP_FMOD: "fmod",
-    ca.OP_REMAINDER: "remainder",
-}  # fmt: skip
-
 
 def c_text(name: str) -> str:
-    """Return the text of a C file of this folder."""
+    """Return the text of a file of this folder."""
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
+
+
+MASKS, LOGIC, PLAIN, CALLS = (
+    {getattr(ca, f"OP_{name}"): text for name, text in table.items()}
+    for table in tomllib.loads(c_text("operations.toml")).values()
+)
+"""CasADi operation -> its C: comparisons, operations on masks, operators, functions."""
 
 
 def lanes_header(lanes: int = 0) -> str:
@@ -103,16 +93,15 @@ class _Parts:
                 free.append(slot.pop(i))
             for i in part:
                 if self.last.get(i, k) > k:
-                    slot[i] = free.popleft() if free else self._more()
+                    if not free:
+                        free.append(self.slots)
+                        self.slots += 1
+                    slot[i] = free.popleft()
                     body.lines.append(f"w@[{slot[i]}] = {body.number(i)};")
             each = (line.replace("@", str(g)) for line in body.lines for g in self.groups)
             lines = "".join(f"  {line}\n" for line in each)
             noinline = "" if len(self.cuts) == 1 else "__attribute__((noinline)) "
             yield f"{noinline}{_head(self.names[-1], self.groups)}\n{{\n{lines}}}\n\n"
-
-    def _more(self) -> int:
-        self.slots += 1
-        return self.slots - 1
 
 
 @final
@@ -193,8 +182,5 @@ def _is_mask(node: Node) -> bool:
 
 
 def _literal(value: float) -> str:
-    if isnan(value):
-        return "NAN"
-    if isinf(value):
-        return "-INFINITY" if value < 0 else "INFINITY"
-    return f"({value!r})"
+    named = {"nan": "NAN", "inf": "INFINITY", "-inf": "-INFINITY"}
+    return named.get(repr(value), f"({value!r})")

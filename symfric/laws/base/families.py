@@ -87,9 +87,9 @@ class Sticking(Law):
     mu_s: Scalar = fields.MU_S(0.15)
 
     @property
-    @abstractmethod
     def has_mode(self) -> bool:
-        """True if stick is a mode, False if stick is a band of velocities."""
+        """True if stick is a mode, as in form = "event"; False if it is a band of velocities."""
+        return getattr(self, "form", "event") == "event"
 
     @property
     def states(self) -> tuple[State, ...]:

@@ -14,7 +14,6 @@ import numpy as np
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, empty, equals, is_casadi, is_number, is_symbolic
 from symfric.foundation.parameters import Parametric, parameters, parametric
-from symfric.foundation.style import COLOURS
 from symfric.foundation.symbolic import plain
 from symfric.foundation.vector import Rows
 from symfric.laws.base import smooth
@@ -297,7 +296,7 @@ class Law(Parametric, ABC):
 
     def thumbnail(self) -> "Figure | None":
         """Return a small figure of the force in steady sliding at N = 1 N; None with symbols."""
-        from matplotlib.figure import Figure  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.foundation.panels import blank, dressed  # noqa: PLC0415  (it is slow to import)
 
         if any(is_symbolic(p.value) for p in parameters(self).values()):
             return None
@@ -308,13 +307,12 @@ class Law(Parametric, ABC):
         inputs = {i.name: i.steady * ahead for i in self.inputs}
         with np.errstate(all="ignore"):
             force = self.force(v, 1.0, self.steady_state(v, 1.0), **inputs)
-        figure = Figure(figsize=(4.2, 1.9), layout="constrained")
-        axis = figure.subplots()
-        axis.plot(1e3 * v, np.broadcast_to(force, v.shape), linewidth=1.2, color=COLOURS[0])
+        figure = blank(4.2, 1.9)
+        axis = dressed(figure.subplots())
+        axis.plot(1e3 * v, np.broadcast_to(force, v.shape), linewidth=1.2)
         axis.set_xlabel("v [mm/s], steady", fontsize=7)
         axis.set_ylabel("F [N] under 1 N", fontsize=7)
         axis.tick_params(labelsize=7)
-        axis.grid(alpha=0.3)
         return figure
 
 

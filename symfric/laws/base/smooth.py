@@ -104,7 +104,7 @@ def clip(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
     if isinstance(x, Vector):
         if is_number(low) and equals(high, -low):
             return hold(x, high, 0.0)
-        raise NotIsotropicError("clips what has a direction")
+        raise NotIsotropicError("clips a vector")
     if is_casadi(x, low, high):
         return ca.fmin(ca.fmax(x, low), high)
     return np.minimum(np.maximum(x, low), high)
@@ -159,7 +159,7 @@ def choose(condition: Scalar, yes: Scalar, no: Scalar) -> Scalar:
 
 def _chosen(condition: Scalar, yes: Vectors, no: Vectors) -> Vector:
     if not (isinstance(yes, Vector) and isinstance(no, Vector)):
-        raise NotIsotropicError("chooses between a number and what has a direction")
+        raise NotIsotropicError("chooses between a number and a vector")
     pairs = zip(yes.parts, no.parts, strict=True)
     return Vector([choose(condition, a, b) for a, b in pairs], yes.turn)
 

@@ -52,11 +52,6 @@ class Karnopp(Sticking):
     form: str = option("smooth", choices=WITH_MODES, doc="window, hard switch, or exact with mode")
 
     @property
-    def has_mode(self) -> bool:
-        """True in the event form."""
-        return self.form == "event"
-
-    @property
     def states(self) -> tuple[State, ...]:
         """Mode, and a state that is 1 while the body leaves the band; none without modes."""
         leaving = State("leaving", "1", 1.0, True, "1 while it leaves the band", whole=True)
@@ -189,11 +184,6 @@ class LeineSwitch(Sticking):
     eta: Scalar = fields.BAND(1e-6, doc="half width of the band of rest", lower=1e-15)
     c: Scalar = fields.SIGMA_1(10.0, doc="pull to the middle, original form")
     form: str = option("smooth", choices=WITH_MODES, doc="arctangent, switch, or exact with mode")
-
-    @property
-    def has_mode(self) -> bool:
-        """True in the event form."""
-        return self.form == "event"
 
     @property
     def inputs(self) -> tuple[Input, ...]:

@@ -8,6 +8,7 @@ its sliding velocity passes through zero or its load exceeds mu_s N.
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from math import pi, sin, tanh
 from typing import Any
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.stress.referee.laws import LAWS, STATES
+from symfric.stress.referee.laws import DYNAMIC, LAWS
 from symfric.stress.referee.scenes import SCENES, Force, Scene
 
 Array = NDArray[np.float64]
@@ -109,9 +110,10 @@ class Motion:
     """Equations between two kinks: rates of all states, with friction from the laws."""
 
     def __init__(self, asked: Question, a: float, b: float) -> None:
-        law, force = LAWS[asked.law], asked.signal.between(a, b)
+        force = asked.signal.between(a, b)
         self.scene: Scene = SCENES[asked.scene](asked.p, force, (a + b) / 2)
-        self.rub, self.count = law(asked.p, asked.forms), STATES[asked.law]
+        self.rub = partial(LAWS[asked.law], asked.p, asked.forms)
+        self.count = int(asked.law in DYNAMIC)
         self.by_modes = asked.law == "exact_coulomb"
         self.loads = [(0.0, 0.0)] * len(self.scene.slides)
         self.calls = 0

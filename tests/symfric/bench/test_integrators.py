@@ -9,7 +9,7 @@ from fake_cupy import FakeCupy
 
 from symfric import BrownMcPhee, Model, simulate
 from symfric.bench import calls, ensemble, integrator, multibody
-from symfric.bench.contenders import MECHANISMS, by_hand, casadi, compiled, scipy
+from symfric.bench.contenders import MECHANISMS, by_hand, casadi, scipy
 from symfric.bench.integrator import ERRORS, RUNS
 from symfric.bench.multibody import CASES
 from symfric.bench.report import RATIOS, Report, Row, ratios, time_at
@@ -49,15 +49,6 @@ def test_solvers_without_a_compiler_find_the_block() -> None:
         found, count = contender.solve(v=0.03)
         assert np.abs(found - [exact["v"], exact["x"]]).max() < 1e-5
         assert count() > 20
-
-
-@needs_compiler
-def test_generated_code_returns_what_the_function_returns(model: Model) -> None:
-    function = model.function("ode")
-    generated, seconds = compiled(function)
-    z, x = [v.start for v in model.z], model.initial_state()
-    assert generated(0, x, z, [], []).full() == pytest.approx(function(0, x, z, [], []).full())
-    assert seconds > 0
 
 
 @needs_compiler

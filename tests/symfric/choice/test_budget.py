@@ -154,14 +154,6 @@ def test_where_only_the_finest_run_keeps_the_accuracy_its_own_error_is_that_of_t
     assert found.own > 1e-3  # not zero, the difference from itself
 
 
-def test_a_fine_run_that_would_take_too_much_is_not_begun() -> None:
-    held = Written(lambda _, rtol: 2 * rtol, lambda _, rtol: 10**9 if rtol < 1e-6 else 9_000)
-    level = Smoothed(1.0, 1e-6, 9_000, 1e-6)
-    found = at_equal_error(budget(held), 1.0, TRUTH, GOAL, level, whole=True)
-    assert all(rtol >= 1e-6 for _, rtol in held.asked)
-    assert found.rtol == pytest.approx(10**-3.5)
-
-
 @pytest.mark.parametrize(
     ("tight", "status", "kept"),
     [(1e-4, Status.SOLVER_FAILED, True), (0.5, Status.SOLVER_FAILED, False),

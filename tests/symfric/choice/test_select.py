@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 from dataclasses import replace
 from functools import partial
 from math import log2
@@ -189,6 +190,16 @@ def test_what_a_law_may_cost_is_counted() -> None:
     assert (found.standing, found.spent, found.rank) == ("inaccurate", True, 1)
     assert found.work <= RUN
     assert "nothing damps its bristle" in found.reason
+
+
+def test_a_process_that_ends_is_a_row() -> None:
+    def deadly(law: Law) -> Model:
+        return press(law) if law.states or isinstance(law, BrownMcPhee) else os._exit(3)
+
+    laws = ["stribeck", "lugre"]
+    found = select(deadly, laws, accuracy=0.2, t_end=0.2, workers=2, fixed_steps=False)
+    assert found["stribeck"].reason == "its process ended with exit status 3"
+    assert found["lugre"].attempts > 0
 
 
 def test_laws_left_out_stand_by_the_reason(choice: Choice) -> None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from symfric.cli import main
-from symfric.codegen import verification
+from symfric.codegen import runner, verification
 
 MINE = """
 import casadi as ca
@@ -56,6 +56,7 @@ Call = Callable[..., Said]
 
 @pytest.fixture(autouse=True)
 def few_steps_verified(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runner, "FLAGS", ("-std=c99", "-O0", "-ffp-contract=off"))
     monkeypatch.setattr(verification, "STEPS", 1000)
     monkeypatch.setattr(verification, "FEWER", 200)
 

@@ -20,9 +20,9 @@ import symfric as package
 from symfric.cli import main, output
 from symfric.cli.app import (
     COMMANDS,
+    TEXTS,
     Commands,
     arguments,
-    forms,
     is_option,
     prose_and_examples,
     sentence,
@@ -58,7 +58,7 @@ def test_help_fits_80_columns_with_examples_that_the_command_takes(name: str, sy
 
 
 def test_an_option_has_one_form_in_all_commands_and_all_texts_are_used() -> None:
-    texts, used = forms(), set[str]()
+    texts, used = TEXTS, set[str]()
     found = defaultdict[str, set[str]](set)
     for name, command in EVERY.items():
         own = {p.name for p in command.params} - {"help"}

@@ -52,10 +52,13 @@ def test_one_law_shows_equation_source_and_parameters(
         assert parameter.doc.split()[0] in row
 
 
-def test_parameters_and_options_are_set_and_shown(symfric) -> None:
+def test_parameters_options_and_warnings_are_those_of_the_numbers(symfric) -> None:
     law = symfric("laws lugre --set mu_s=0.3 --json -").json
     mu_s = law["parameters"]["mu_s"]
     assert (mu_s["value"], mu_s["unit"], mu_s["lower"], mu_s["upper"]) == (0.3, "1", 0.0, None)
+    assert "sigma_2 = 0 is below" in law["warnings"][0]
+    assert symfric("laws lugre --set sigma_2=100 --json -").json["warnings"] == []
+    assert "Warning: not passive from v to F" in symfric("laws lugre").out
     law = symfric("laws coulomb --set shape=atan --set mu_d=0.3 --json -").json
     assert law["options"]["shape"]["value"] == "atan"
     assert law["parameters"]["mu_d"]["value"] == 0.3
@@ -68,12 +71,6 @@ def test_parameters_and_options_are_set_and_shown(symfric) -> None:
     out = symfric("laws karnopp").out
     assert "F_e" in out[out.index("input ") :]
     assert "smooth, original, event" in out[out.index("option ") :]
-
-
-def test_warnings_concern_the_numbers(symfric) -> None:
-    assert "sigma_2 = 0 is below" in symfric("laws lugre --json -").json["warnings"][0]
-    assert symfric("laws lugre --set sigma_2=100 --json -").json["warnings"] == []
-    assert "Warning: not passive from v to F" in symfric("laws lugre").out
 
 
 def test_pictures_are_drawn_with_the_load(symfric, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,8 +4,9 @@ import json
 
 import casadi as ca
 import pytest
+from tables import table
 
-from symfric import BrownMcPhee, LuGre, Output, Variable, Viscous, law_from_text, parameters
+from symfric import BrownMcPhee, LuGre, Output, Variable, Viscous, law_from_text
 from symfric.codegen import Block, generate, law_block
 from symfric.codegen.blocks.block import Elements
 from symfric.codegen.layout import CBlock
@@ -81,53 +82,9 @@ def test_the_manifest_counts_operations_calls_and_bytes(both, tmp_path, monkeypa
     assert "measured" not in bare.manifest["real"]["float"]
 
 
-def test_block_and_law_give_the_same_code(tmp_path):
-    free = tuple(parameters(LuGre()))
-    direct = generate(LuGre(), tmp_path / "a", free=free, kit=False)
-    block = generate(law_block(LuGre(), free=free), tmp_path / "b", kit=False)
-    assert direct.manifest == block.manifest
-    x, u = Variable("x", "m"), Variable("u", "m/s")
-    euler = Block("integrator", states=(x,), inputs=(u,), next=x.symbol + 1e-3 * u.symbol)
-    made = generate(euler, tmp_path / "c", real="double", kit=False)
-    assert "state->x = x + 0.001 * u;" in made.source("double").read_text()
-
-
-@pytest.mark.parametrize(
-    ("law", "options", "message"),
-    [
-        (LuGre(), {"real": "half"}, "expected one of double, float, got half"),
-        (LuGre(), {"real": ()}, "expected double, float or both, got none"),
-        (LuGre(), {"free": ("mu",)}, "got mu"),
-        (GMS(), {}, "have circular dependencies"),
-        (LuGre(mu_s=0.3), {"free": (), "h": 1e-60}, "would become 0"),
-        (Block("b", outputs={"y": Output(1.0, "m")}), {"h": 1e-3}, "with a law only, got a block"),
-        (LUGRE, {"turning": True}, "turning: expected with a law only"),
-    ],
-)
-def test_bad_input_writes_nothing(tmp_path, law, options, message):
-    with pytest.raises(ValueError, match=message):
-        generate(law, tmp_path / "c", **options)
-    assert not (tmp_path / "c").exists()
-    (tmp_path / "c").write_text("")
-    with pytest.raises(ValueError, match="expected a folder, got the file"):
-        generate(LuGre(), tmp_path / "c", kit=False)
-
-
 def test_a_law_with_states_has_a_data_sheet_structs_and_a_step():
     text = header(CBlock(LUGRE, DOUBLE))
-    for part in (
-        "    double mu_s;    /* static friction coefficient [1], default 0.15, ",
-        "    double z; /* mean bristle deflection [m], start 0 */\n",
-        "extern const lugre_f64_state_t lugre_f64_start;",
-        "extern const lugre_f64_param_t lugre_f64_default;",
-        "void lugre_f64_reset(lugre_f64_state_t *state);\n",
-        "dz/dt = v - sigma_0 |v| z / g",
-        "    delta = 2  Stribeck exponent [1]\n",
-        "SPDX-License-Identifier: MIT-0",
-        "h, a parameter, 0.001 s by default",
-        "Inputs outside their range are clamped to it",
-        "A step size outside its range is clamped to it.",
-    ):
+    for part in table(__file__)["header"]["parts"]:
         assert part in text
     turning = header(CBlock(law_block(LuGre(), turning=True), DOUBLE))
     assert all(f"[{unit}]" in turning for unit in ("rad/s", "N m", "N m/rad", "N m s/rad", "rad"))
@@ -161,22 +118,19 @@ def test_a_static_law_is_a_function_of_scalars():
 def test_ranges_of_members_are_common_and_defaults_of_an_array_are_its_ends():
     a, b = Variable("a", "1"), Variable("b", "1", nominal=10.0)
     for variables, group, guards, text in (
-        ([a, b], "param", True, "+-1e+06"),
-        ([a, b], "param", False, ""),
+        ([a, b], "param", True, "+-1e+06"), ([a, b], "param", False, ""),
         ([Variable("c", "1", lower=0.5)], "in", False, ">= 0.5"),
         ([Variable("c", "1", lower=0.5)], "in", True, "0.5 to 1e+06"),
         ([Variable("d", "1", upper=2.0)], "state", True, "<= 2"),
-        ([Variable("e", "1", lower=-2.0, upper=2.0)], "in", True, "+-2"),
-    ):
+    ):  # fmt: skip
         assert interval(variables, group, guards) == text
     k = GMS(form="event").elements
     text = header(CBlock(law_block(GMS(form="event")), DOUBLE))
     assert f"default {k[0].k:g} ... {k[-1].k:g}, " in text
     x = [Variable(f"x_{i}", "m", doc="place" if i < 3 else "end") for i in (1, 2, 3)]
     for size, doc in ((2, "place, of each element"), (3, "of each element")):
-        arrays = (Elements("in", "x", 0, size),)
-        y = {"y": Output(x[0].symbol, "m"), "z": Output(x[1].symbol, "m")}
-        made = Block("b", inputs=tuple(x), outputs=y, arrays=arrays)
+        y = {n: Output(x[0].symbol, "m") for n in "yz"}
+        made = Block("b", inputs=tuple(x), outputs=y, arrays=(Elements("in", "x", 0, size),))
         assert made.members["in"][0].doc == doc
 
 

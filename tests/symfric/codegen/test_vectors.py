@@ -43,8 +43,8 @@ def test_rows_are_steps_of_the_block_from_numbers_of_the_type(found, real):
     assert N.max() > 5 * N.min() > 0
 
 
-def test_each_outcome_of_a_comparison_is_there():
-    """A comparison that is true in one step of eight hundred, and a sign of a difference."""
+def test_rows_contain_each_outcome_of_a_comparison():
+    """A comparison that is true in one step of 800, and the sign of a difference."""
     x, u = Variable("x", "1"), Variable("u", "1")
     rare = (x.symbol > 399.5) * (x.symbol < 400.5)
     for output in (rare * u.symbol, ca.fmax(400.5 - ca.fabs(x.symbol - 400.0), x.symbol - 799.5)):
@@ -66,13 +66,10 @@ def test_every_parameter_is_changed_where_it_matters(law):
         steps = rows.steps.chosen(changed)
         steps.changed[:] = -1
         effect = (np.abs(rows.results[changed] - made(c, steps)) / rows.tolerance).max()
-        assert effect > 100 or v.name == "v_eps"  # 1e-15 m/s: nothing but rest is slower
-
-
-def test_a_changed_value_stays_within_the_bounds():
-    assert changed_value(Variable("p", "1", start=2.0)) == 2.5
-    assert changed_value(Variable("p", "1", start=2.0, upper=2.1)) == 1.5
-    assert changed_value(Variable("p", "1", start=0.0, nominal=4.0)) == 1.0
+        assert effect > 100 or v.name == "v_eps"  # 1e-15 m/s, which only rest is below
+    for bounds, changed in (({"start": 2.0}, 2.5), ({"start": 2.0, "upper": 2.1}, 1.5),
+                            ({"nominal": 4.0}, 1.0)):  # fmt: skip
+        assert changed_value(Variable("p", "1", **bounds)) == changed
 
 
 def test_guards_add_a_row_for_each_number_that_is_bad(found):
@@ -101,11 +98,11 @@ def test_tolerance_is_relative_to_the_peak_or_to_what_rounding_changes(found):
     )  # fmt: skip
     tolerance = vectors(CBlock(difference, FLOAT, guards=False)).tolerance
     assert tolerance[1] == pytest.approx(BASE[4] * 2.0, rel=0.5)
-    assert 1e-5 < tolerance[0] < 1e-2  # a last digit of 1000, of a number of 2e-3
+    assert 1e-5 < tolerance[0] < 1e-2  # the last digit of 1000 relative to 2e-3
 
 
-def test_rows_that_rounding_decides_or_that_are_not_finite_are_left_out():
-    """The input is exactly at the edge in some rows, and not a last digit from it in any."""
+def test_rows_that_rounding_decides_or_that_are_not_finite_are_omitted():
+    """The input is exactly at the edge in some rows, and one last digit from it in none."""
     b, edge = Variable("b", "1"), float(np.float32(0.1))
     outputs = {"y": Output(ca.if_else(ca.eq(b.symbol, edge), 1.0, 0.0), "1")}
     jump = Block("jump", inputs=(b,), outputs=outputs)

@@ -1,4 +1,4 @@
-"""The C of compensators in the loop of a drive whose friction is another one than theirs."""
+"""Compensators in the closed loop of a drive with another friction law."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from symfric.compensation import (
     sine,
     step,
 )
-from symfric.scenes import Drive, rabinowicz
+from symfric.scenes import Drive
 
 CURVE = {"mu_s": 6.0, "mu_d": 4.0, "v_s": 5e-3, "sigma_2": 20.0}
 """With N = 1 N the coefficients are newtons."""
@@ -40,7 +40,7 @@ EACH = [pytest.param(name, marks=() if name == "bristles" else pytest.mark.slow)
 BLOCK = compensator(
     BELIEVED, v_blend=0.02, error_gain=20.0, scales={"coulomb": 1.0, "stribeck": 0.0}
 )
-"""Without the excess of break-away over sliding, which is what makes an axis jump."""
+"""Compensator without the Stribeck term, which makes an axis jump."""
 
 
 def compared(name: str, reference: Reference, block=BLOCK, **settings) -> Comparison:
@@ -58,8 +58,8 @@ def test_the_rms_tracking_error_is_more_than_nine_times_smaller(name: str) -> No
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_a_limit_cycle_of_a_millimetre_is_gone(name: str) -> None:
-    """After a step of 1 cm the integrator hunts for ever, 1000 counts to and fro; then not one."""
+def test_a_limit_cycle_of_a_millimetre_vanishes(name: str) -> None:
+    """After a step of 1 cm the axis hunts by 1000 counts; with compensation by less than one."""
     found = compared(name, step(0.01, 20.0 if name == "springs" else 12.0))
     assert found["without"].hunting > 1000 * SOFT.count
     assert found["compensated"].hunting < SOFT.count
@@ -113,7 +113,7 @@ def test_the_vm_gives_the_bits_of_the_c_and_float_is_near(compiler) -> None:
     assert (single.added != c.added).any()
 
 
-def test_a_function_of_velocities_is_a_block_too(compiler) -> None:
+def test_a_compensator_without_states_is_a_function(compiler) -> None:
     """A law without states and without a ramp is one C function of scalars."""
     del compiler
     block = compensator(Stribeck(v_eps=1e-3, **CURVE), ramp=None)
@@ -145,7 +145,7 @@ def test_a_drive_that_turns_has_its_units(tmp_path) -> None:
     assert "added (compensated) [N m]" in lines[0]
 
 
-def test_ctrl_c_keeps_what_there_is(monkeypatch) -> None:
+def test_ctrl_c_returns_the_results_so_far(monkeypatch) -> None:
     from symfric.compensation import loop  # noqa: PLC0415
 
     calls = []
@@ -164,28 +164,6 @@ def test_ctrl_c_keeps_what_there_is(monkeypatch) -> None:
     assert np.isnan(found["compensated"].hunting)
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"block": 3}, "blocks: expected a sequence of blocks, got 3"),
-        ({"block": [3]}, "expected a block, such as compensator(LuGre())"),
-        ({"block": compensator(BELIEVED, h=2e-3)}, "give h = 0.001"),
-        ({"controller": 3}, "expected a controller, Cascade()"),
-        ({"reference": sine(0.01, 1.0, 1.0, h=2e-3)}, "expected the sample time of the controller"),
-        ({"cases": {"a": {"scale_columb": 1.0}}}, "did you mean scale_coulomb?"),
-        ({"delay": -1}, "delay: expected a whole number >= 0"),
-        ({"noise": np.nan}, "noise: expected a number >= 0"),
-        ({"real": "half"}, "real: expected one of"),
-        ({"position": "y"}, "expected one of x, v, z, got y"),
-    ],
-)
-def test_bad_input_is_refused(given, words) -> None:
-    settings = {"reference": sine(0.01, 1.0, 1.0)} | given
-    with pytest.raises(ValueError) as caught:
-        compared("bristles", **settings)
-    assert words in str(caught.value)
-
-
 def test_references_are_smooth_and_rest() -> None:
     found = moves([0.01, 0.0], 0.5, 1.0)
     assert found.x[500] == 0.01
@@ -193,7 +171,3 @@ def test_references_are_smooth_and_rest() -> None:
     assert np.abs(np.diff(found.x) / found.h - found.v[:-1]).max() < found.h * np.abs(found.a).max()
     assert found.rest == slice((2000 + 3000) // 2, None)
     assert sine(0.01, 1.0, 1.0).rest is None
-    with pytest.raises(ValueError, match="of one length"):
-        Reference(np.zeros(3), np.zeros(2), np.zeros(3))
-    with pytest.raises(ValueError, match="expected one input, the force, got none"):
-        close_loop(rabinowicz(LuGre()), sine(0.01, 1.0, 1.0), BLOCK)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from one_program import along
 
-from symfric import GMS, LuGre, LuGreNormalised, LuGrePassive, Stribeck
+from symfric import GMS, LuGre, LuGreNormalised, LuGrePassive
 from symfric.codegen import Block, law_block
 from symfric.compensation import disturbance_observer, gms_observer, lugre_observer
 
@@ -104,7 +104,7 @@ def slowest(ratio: float, b: float, delay: int, order: int) -> float:
 
 
 def test_the_disturbance_observer_is_stable_up_to_twice_the_mass() -> None:
-    """For every bandwidth, step and delay, as its docstring says; beyond, not for all."""
+    """It is stable for every bandwidth, step and delay; beyond twice the mass, not for all."""
     for ratio, wh, delay, order in product(
         (0.01, 0.5, 1.0, 1.5, 1.99), (1e-3, 0.1, 1.0, 10.0), (0, 1, 3, 10), (1, 2)
     ):
@@ -113,21 +113,3 @@ def test_the_disturbance_observer_is_stable_up_to_twice_the_mass() -> None:
     block = disturbance_observer(1.0, 100.0, turning=True)
     assert {v.name: v.unit for v in block.parameters}["m"] == "kg m^2"
     assert block.outputs["F"].unit == "N m"
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: lugre_observer(Stribeck(), 1.0), "lugre_observer: expected a law such as LuGre"),
-        (lambda: lugre_observer(LuGre(), -1.0), "gain: expected a number >= 0"),
-        (lambda: lugre_observer(LuGre(), 1.0, ramp=0.0), "ramp: expected a number > 0"),
-        (lambda: gms_observer(GMS(), 1.0), "form: expected 'event'"),
-        (lambda: disturbance_observer(0.0, 1.0), "mass: expected a number > 0"),
-        (lambda: disturbance_observer(1.0, 1.0, order=3), "order: expected a whole number"),
-        (lambda: disturbance_observer(1.0, 1.0, limit=-1.0), "limit: expected a number >= 0"),
-    ],
-)
-def test_bad_input_is_refused(make, words: str) -> None:
-    with pytest.raises(ValueError) as caught:
-        make()
-    assert words in str(caught.value)

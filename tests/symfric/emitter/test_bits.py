@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from one_program import OneProgram
+from tables import Names, table
 
 from symfric import Output, Variable
 from symfric.codegen import Block
@@ -27,51 +28,14 @@ UNARY = (
     *("acosh", "atanh", "exp", "expm1", "log", "log1p", "erf", "fabs", "sign", "floor", "ceil"),
 )
 BINARY = ("atan2", "hypot", "fmod", "remainder", "copysign", "fmin", "fmax")
+NAMES = Names(globals())
 OPERATIONS = {
     **{name: getattr(ca, name)(x) for name in UNARY},
     **{name: getattr(ca, name)(x, y) for name in BINARY},
-    "add": x + y,
-    "sub": x - y,
-    "mul": x * y,
-    "div": x / y,
-    "neg": -x,
-    "sq": x * x,
-    "twice": 2 * x,
-    "inv": 1 / x,
-    "pow": x**y,
-    "constpow": x**1.7,
-    "lt": less,
-    "le": x <= y,
-    "eq": equal,
-    "ne": x != y,
-    "not": ca.logic_not(x),
-    "and": ca.logic_and(less, y < 2),
-    "or": ca.logic_or(less, y < 0),
-    "if_else": ca.if_else(less, x, y),
-    "if_else_zero": ca.if_else(less, x, 0),
-    "if_number": ca.if_else(x, x + 1, y),
-    "nested logic": ca.logic_or(ca.logic_and(less, x < 1), ca.logic_not(equal)),
-    "bool as number": 2 * less - equal,
-    "nested if_else": ca.if_else(less, ca.if_else(x < 0, y, x), ca.if_else(y < 0, x, -y)),
-    "sign of a sum": ca.sign(x + y),
-    "minus a negative constant": x - ca.SX(-3) * y + ca.cos(-x),
-    "clip": ca.fmin(ca.fmax(x, -0.7), 1.2),
-    "clip from above": ca.fmax(ca.fmin(x, 1.2), -0.7),
-    "clip with bounds": ca.fmax(-1, ca.fmin(x, 3 - ca.fabs(ca.fmin(y, 2)))),
-    "cut at zero": ca.fmax(0, x),
-    "clip of a clip": ca.fmin(ca.fmax(ca.fmin(x, 2), y), 1),
-    "logic as number": ca.fmax(less, y < 2) + ca.fmin(x < 1, equal) * ca.if_else(less, equal, 1),
-    "number as logic": ca.if_else(ca.if_else(less, x < 0, 0) * 1, y, ca.if_else(equal, 0, less)),
-    "logic of signs": ca.if_else(ca.sign(x) == 0, y, ca.if_else(ca.sign(y) < 0, x, -y)),
-    "opposite against zero": (-ca.sin(x) < 0) + 2 * (ca.fabs(y - 1) <= 0),
-    "negated": ca.logic_not(ca.logic_and(ca.logic_not(equal), ca.logic_or(less, x < 1))),
-    "negated order": ca.if_else(ca.logic_not(less), x, ca.if_else(ca.logic_not(x <= 2), y, 3)),
-    "branch": ca.if_else(less, ca.sin(x) / y, ca.if_else(y < 0, ca.exp(-x * x), ca.cos(y))),
-    "derivative of fmin": ca.jacobian(ca.fmin(x * x, y) + ca.fmax(x, 0.5), x),
-    "infinity": ca.fmin(x, ca.SX.inf()),
+    **{name: NAMES.value(text) for name, text in table(__file__)["operations"].items()},
 }
 OTHER_AT_NAN = {"fmin", "fmax", "clip with bounds", "derivative of fmin"}
-"""See `logic`: what is not a number stays that in fmin and fmax of two variables."""
+"""Operations with another result for NaN, see `logic`."""
 SPECIAL = [0.0, -0.0, 1.0, -1.0, 0.5, -2.5, 3.0, 1e-300, 1e300, np.inf, -np.inf, np.nan]
 PAIRS = np.array([(p, q) for p in SPECIAL for q in SPECIAL])
 INPUTS = np.vstack([PAIRS, np.random.default_rng(2).standard_normal((1000, 2)) * [2.0, 3.0]])
@@ -84,7 +48,7 @@ def as_block(expressions: dict[str, ca.SX]) -> Block:
 
 
 def trees(count: int, depth: int) -> dict[str, ca.SX]:
-    """Sums, differences, products and quotients nested at random: parentheses must be right."""
+    """Randomly nested sums, differences, products and quotients, to test parentheses."""
     random = np.random.default_rng(0)
 
     def tree(level: int) -> ca.SX:
@@ -97,7 +61,7 @@ def trees(count: int, depth: int) -> dict[str, ca.SX]:
 
 
 def places() -> Block:
-    """States that change places, in branches that read both."""
+    """States that swap their values, in branches that read both."""
     p, q, u = Variable("p", "1", start=0.3), Variable("q", "1", start=-0.4), Variable("u", "1")
     both = ca.vertcat(q.symbol + ca.sin(u.symbol), p.symbol)
     swapped = ca.if_else(u.symbol > 0, both, ca.vertcat(p.symbol, -q.symbol))
@@ -118,7 +82,7 @@ ONE: list[Callable[[ca.SX, ca.SX], ca.SX]] = [
     lambda x, u: -x,
     lambda x, u: x * x,
 ]
-"""Of an input, too, where a compiler would round the function of a constant better than math.h."""
+"""Functions include an input, since compilers evaluate functions of constants more precisely."""
 TWO = [add, sub, mul, lambda x, y: x / (1 + y * y), ca.fmin, ca.fmax, ca.hypot]
 COMPARED = [ca.lt, ca.le, ca.eq, ca.ne]
 
@@ -132,7 +96,7 @@ def nested(seed: int, operations: int) -> Block:
     conditions = [numbers[0] < numbers[2], numbers[3] <= 0]
 
     def one_of(pool: list, recent: int = 12):
-        """Mostly a recent one, so that graphs grow deep."""
+        """Return mostly a recent one, for deep graphs."""
         some = pool[-recent:] if random.random() < 0.7 else pool
         return some[random.integers(len(some))]
 
@@ -171,7 +135,7 @@ STEPS = (
 
 
 def elements(seed: int, odd: bool) -> Block:
-    """Arrays whose elements all make the same random steps, but one if it is odd.
+    """Arrays whose elements make the same random steps, except one if `odd`.
 
     An element takes its own numbers, those of its neighbours, the first or the last, inputs,
     constants and a sum over all; its results are states, and terms of sums.

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from one_program import block_of
+from tables import Names, table
 
 from symfric import LuGre, VelocityBased
 from symfric.codegen.layout import CBlock
@@ -44,83 +45,28 @@ def lines(*results: ca.SX, **options) -> list[str]:
     return list(code(*results, **options).lines)
 
 
-FORMULAS = [
-    (x - (y - 1), "x - (y - 1.0)"), (x + (y + 1), "x + (y + 1.0)"), ((x + y) * 3, "3.0 * (x + y)"),
-    (x / (y * 2), "x / (2.0 * y)"), (ca.exp(-(x + y)), "SF_EXP(-(x + y))"), (ca.fabs(x), "fabs(x)"),
-    (choose(less, x, 2.5), "x < y ? x : 2.5"), (y * (2 * (0.5 / x)), "y * (1.0 / x)"),
-    (both(less, y < 2), "x < y && y < 2.0 ? 1.0 : 0.0"), (flag, "x < y ? 1.0 : 0.0"),
-    (choose(flag != 0, x, y), "x < y ? x : y"), (choose(flag == 0, x, y), "x < y ? y : x"),
-    (choose(flag > 0.5, x, y), "x < y ? x : y"), (choose(invert(less), x, y), "x < y ? y : x"),
-    (invert(equal), "x != y ? 1.0 : 0.0"), (invert(less), "!(x < y) ? 1.0 : 0.0"),
-    (invert(either(equal, y < 2)), "x != y && !(y < 2.0) ? 1.0 : 0.0"),
-    (invert(both(less, y < 2)), "!(x < y && y < 2.0) ? 1.0 : 0.0"),
-    (choose(less, y < 2, 0), "x < y && y < 2.0 ? 1.0 : 0.0"),
-    (choose(less, 1, equal), "x < y || x == y ? 1.0 : 0.0"),
-    (choose(equal, y < 2, 1), "x != y || y < 2.0 ? 1.0 : 0.0"),
-    (choose(equal, 0, y < 2), "x != y && y < 2.0 ? 1.0 : 0.0"),
-    (choose(choose(less, 2, 3) == 3, x, y), "x < y ? y : x"),
-    (choose(ca.sign(x) == 0, y, 3), "x == 0.0 ? y : 3.0"),
-    (choose(ca.sign(x) > 0, y, 3), "x > 0.0 ? y : 3.0"), (choose(-x, y, 3), "x != 0.0 ? y : 3.0"),
-    (choose(x, y, 3), "x != 0.0 ? y : 3.0"), (both(x, y), "x != 0.0 && y != 0.0 ? 1.0 : 0.0"),
-    (choose(less, choose(less, x, 2), y), "x < y ? x : y"), (both(less, invert(less)), "0.0"),
-    (either(less, invert(less)), "1.0"), (x > 2, "x > 2.0 ? 1.0 : 0.0"),
-    (x >= 2, "x >= 2.0 ? 1.0 : 0.0"), (ca.fmin(x, y), "y < x ? y : x"),
-    (ca.fmax(x, y), "x < y ? y : x"), (ca.fmin(x, 2), "x < 2.0 ? x : 2.0"),
-    (ca.fmin(2, x), "x < 2.0 ? x : 2.0"), (ca.fmax(-1, x), "x > -1.0 ? x : -1.0"),
-    (ca.fmin(ca.fmax(x, -1), 1), "x > -1.0 ? (x < 1.0 ? x : 1.0) : -1.0"),
-    (ca.fmax(ca.fmin(x, 1), -1), "x < 1.0 ? (x > -1.0 ? x : -1.0) : 1.0"),
-    (ca.jacobian(ca.fmax(x, y), x), "y <= x ? (x <= y ? 0.5 : 1.0) : 0.0"),
-    (choose(less, x * z + y, 2), "x < y ? x * z + y : 2.0"),
-    (choose(less, x + 1, y * z), "x < y ? x + 1.0 : y * z"),
-]  # fmt: skip
+CASES = table(__file__)
 
 
-@pytest.mark.parametrize(("expression", "expected"), FORMULAS, ids=[text for _, text in FORMULAS])
-def test_formulas_are_short_conditions_bools_and_extremes_comparisons(expression, expected):
-    assert lines(expression) == [f"r0 = {expected};"]
+def test_formulas_are_short_conditions_bools_and_extremes_comparisons():
+    for expression, expected in CASES["formulas"].items():
+        assert lines(NAMES.value(expression)) == [f"r0 = {expected};"], expression
 
 
 s, near = ca.sin(x), ca.fabs(x) < 0.1
 inner = choose(y < z, ca.exp(y), ca.cos(z))
 first = choose(less, ca.exp(x), ca.sin(y))
-STATEMENTS = {
-    "the branch taken": ([choose(less, ca.sin(x), ca.exp(y) / z)],
-                         "if (x < y) {|    r0 = SF_SIN(x);|} else {|    r0 = SF_EXP(y) / z;|}"),
-    "shared outside": ([choose(less, s * ca.exp(y), 2.0), s],
-                       "const double t1 = SF_SIN(x);|if (x < y) {|    r0 = t1 * SF_EXP(y);|"
-                       "} else {|    r0 = 2.0;|}|r1 = t1;"),
-    "one branch of two": ([choose(less, ca.exp(x), ca.sin(y)),
-                           choose(less, ca.exp(x) ** 2, z)],
-                          "if (x < y) {|    const double t1 = SF_EXP(x);|    r0 = t1;|"
-                          "    r1 = t1 * t1;|} else {|    r1 = z;|    r0 = SF_SIN(y);|}"),
-    "one branch in turn": ([first, choose(less, first * 3, first + ca.cos(y))],
-                           "double t1;|if (x < y) {|    t1 = SF_EXP(x);|    r1 = 3.0 * t1;|"
-                           "} else {|    t1 = SF_SIN(y);|    r1 = t1 + SF_COS(y);|}|r0 = t1;"),
-    "chain": ([choose(less, ca.sin(x), inner)],
-              "if (x < y) {|    r0 = SF_SIN(x);|} else if (y < z) {|    r0 = SF_EXP(y);|} else {|"
-              "    r0 = SF_COS(z);|}"),
-    "guard in its branch": ([choose(near, 1 + x / 2, ca.expm1(x) / choose(near, 1, x))],
-                            "if (fabs(x) < 0.1) {|    r0 = 1.0 + x / 2.0;|} else {|"
-                            "    r0 = SF_EXPM1(x) / x;|}"),
-    "shared": ([s * y + s], "const double t1 = SF_SIN(x);|r0 = t1 * y + t1;"),
-    "written twice": ([s**2], "const double t1 = SF_SIN(x);|r0 = t1 * t1;"),
-    "either order": ([ca.sin(x + y) * ca.cos(y + x)],
-                     "const double t1 = x + y;|r0 = SF_SIN(t1) * SF_COS(t1);"),
-    "bool": ([choose(less, x, y) * choose(less, 1, y)],
-             "const bool t1 = x < y;|r0 = (t1 ? x : y) * (t1 ? 1.0 : y);"),
-    "clip of a constant": ([ca.fmin(ca.fmax(x, 2), 1)],
-                           "const double t1 = x > 2.0 ? x : 2.0;|r0 = t1 < 1.0 ? t1 : 1.0;"),
-}  # fmt: skip
+NAMES = Names(globals())
 
 
-@pytest.mark.parametrize("name", STATEMENTS)
+@pytest.mark.parametrize("name", CASES["statements"])
 def test_statements_are_where_they_are_needed(name):
-    results, expected = STATEMENTS[name]
-    assert "|".join(lines(*results)) == expected
+    case = CASES["statements"][name]
+    assert "\n".join(lines(*NAMES.value(case["results"]))) == case["text"]
 
 
 def test_branches_that_cannot_be_one_are_two_and_nesting_ends():
-    between = first + z  # needed outside: one branch cannot hold both selects
+    between = first + z  # it is used outside, so that one branch cannot contain both selects
     found = lines(choose(less, ca.tan(between), ca.cos(between)), between)
     assert sum("if (" in line for line in found) == 2
     found = lines(choose(less, s, inner), choose(less, z, inner * inner))
@@ -157,13 +103,13 @@ def test_states_may_be_results():
         assert found == [f"if ({shown}) {{", "    s->x = SF_SIN(y);", "}"]
     found = lines(choose(less, ca.sin(x) * z, y), loads={(2, 0): "param->z"})
     assert found[1] == "    const double z = param->z;"
-    found = lines(  # places without a name, which may be those of the results, are written last
+    found = lines(  # results are written last if places have no name
         y, choose(less, ca.sin(x), z), names="a[0] a[1] a[2]", targets=["r[0] = {};", "r[1] = {};"]
     )
     assert found[-2:] == ["r[0] = a[1];", "r[1] = t1;"]
 
 
-def test_conditions_come_in_and_go_out_as_bools():
+def test_arguments_and_results_may_be_bools():
     found = code(
         choose(x, y, 2), either(x, y < 0), 1 - x, names="b y z", conditions=[0], truths=[1],
         targets=["r = {};", "const bool u = {};", "s = {};"],
@@ -254,32 +200,18 @@ def values(source: Graph, points: np.ndarray) -> np.ndarray:
 
 
 a, b = x < y, y < z
-KNOWN = {
-    "a guarded quotient": (smooth.phi1(x), 1),
-    "the same condition in its branch": (choose(a, choose(a, x, y), z), 1),
-    "and in its other branch": (choose(a, x, y / choose(a, z, 3)), 1),
-    "a part of both": (choose(both(a, b), choose(b, x, y), z), 1),
-    "a part of neither": (choose(either(a, b), x, choose(b, y, z)), 1),
-    "the opposite": (choose(invert(a), x, choose(a, y, z)), 1),
-    "a whole of its part": (choose(a, choose(either(a, b), x, y), z), 1),
-    "behind a condition": (choose(both(a, choose(a, y, z)), x, y), 1),
-    "used on both sides": (choose(a, choose(a, x, y) * 2, choose(a, x, y)), 2),
-    "another condition": (choose(a, choose(b, x, y), z), 2),
-    "either is not both": (choose(either(a, b), choose(b, x, y), z), 2),
-    "in a condition": (choose(choose(a, x, y) > z, x, choose(b, x, y)), 3),
-    "used in two places": (choose(a, x, 0) * choose(b, x, 0), 2),
-    "a value or zero": (choose(a, choose(a, x, 0) + y, z), 1),
-}
 
 
-def test_selects_whose_condition_is_known_are_gone():
+def test_selects_whose_condition_is_known_are_removed():
     points = np.random.default_rng(0).integers(-2, 3, (400, 3)).astype(float)
-    for name, (expression, left) in KNOWN.items():
+    names = Names(globals(), smooth=smooth)
+    for text, left in CASES["known_conditions"].items():
+        expression = names.value(text)
         source = settled(of(expression))
-        assert selects(source) == left, name
+        assert selects(source) == left, text
         assert np.array_equal(values(source, points), values(of(expression), points))
     known = choose(a, x, y)
-    assert selects(settled(of(choose(a, known * 2, z), known))) == 2  # a result of its own
+    assert selects(settled(of(choose(a, known * 2, z), known))) == 2  # it is also a result
     once = simplified(of(ca.fmin(x, y), choose(flag, y, ca.fmax(x, 0)), invert(less)))
     assert not {node.op for node in once.nodes} & LOWERED
     assert simplified(once) == once

@@ -5,28 +5,16 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from symfric import (
-    ALL_LAWS,
-    GMS,
-    Coulomb,
-    LuGre,
-    QuarterCarGeneral,
-    figure,
-    law_from_text,
-    rabinowicz,
-    simulate,
-    with_values,
-)
-from symfric.figures import FIGURES, compare, phenomena
+import symfric as sf
+from symfric.figures import FIGURES, phenomena
 from symfric.figures.catalogue import in_scene, scene_figure
-from symfric.laws import GenericAsperity, RandomBristles
 from symfric.scenes import Pendulum
 
 pytestmark = pytest.mark.heavy
 
 NEEDS = {
-    "profile": set(ALL_LAWS),
-    "steady_state": set(ALL_LAWS),
+    "profile": set(sf.ALL_LAWS),
+    "steady_state": set(sf.ALL_LAWS),
     "sweep_b": {"self_tuning", "rui_wang"},
     "sweep_c": {"self_tuning", "rui_wang"},
     "sweep_e": {"self_tuning", "rui_wang"},
@@ -55,17 +43,17 @@ def shows(law: str, name: str) -> bool:
         return law in NEEDS[name]
     if name in ("drift", "break_away", "stiction") and law in OTHER_INPUTS | {"wojewoda"}:
         return False
-    return bool(SHOWN_WITH[name] & set(phenomena(law_from_text(law))))
+    return bool(SHOWN_WITH[name] & set(phenomena(sf.law_from_text(law))))
 
 
-@pytest.mark.parametrize("law", ALL_LAWS)
+@pytest.mark.parametrize("law", sf.ALL_LAWS)
 def test_every_figure_has_finite_columns_of_one_length_or_is_refused(law: str) -> None:
     names = [n for n in FIGURES if law in LED or n in STEADY or not shows(law, n)]
     every_figure_is_finite_or_refused(law, names)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", [law for law in ALL_LAWS if law not in LED])
+@pytest.mark.parametrize("law", [law for law in sf.ALL_LAWS if law not in LED])
 def test_motions_of_the_other_laws_are_finite(law: str) -> None:
     every_figure_is_finite_or_refused(law, [n for n in FIGURES if n not in STEADY])
 
@@ -74,9 +62,9 @@ def every_figure_is_finite_or_refused(law: str, names: Iterable[str]) -> None:
     for name in names:
         if not shows(law, name):
             with pytest.raises(ValueError, match=r"expected a law (that|with)"):
-                figure(law_from_text(law), name)
+                sf.figure(sf.law_from_text(law), name)
             continue
-        data = figure(law_from_text(law), name)
+        data = sf.figure(sf.law_from_text(law), name)
         assert data.name == name
         for curve in data.curves:
             assert len({values.shape for values in curve.columns.values()}) == 1
@@ -85,7 +73,10 @@ def every_figure_is_finite_or_refused(law: str, names: Iterable[str]) -> None:
             assert all(np.isfinite(values).all() for values in curve.columns.values())
 
 
-REFERENCES = {"generic_asperity": GenericAsperity(count=12), "random_bristles": RandomBristles()}
+REFERENCES = {
+    "generic_asperity": sf.GenericAsperity(count=12),
+    "random_bristles": sf.RandomBristles(),
+}
 SHORT = {(law, "hysteresis") for law in REFERENCES} | {("random_bristles", "stiction")}
 
 
@@ -103,15 +94,15 @@ def test_a_population_has_the_figures_of_its_phenomena(law: str, name: str) -> N
     needed = SHOWN_WITH.get(name)
     if needed and not needed & set(phenomena(reference)):
         with pytest.raises(ValueError, match="expected a law that"):
-            figure(reference, name)
+            sf.figure(reference, name)
         return
-    for curve in figure(reference, name).curves:
+    for curve in sf.figure(reference, name).curves:
         assert curve.law == law
         assert all(np.isfinite(values).all() for values in curve.columns.values())
 
 
 def test_a_composed_law_shows_what_its_parts_show_in_the_order_of_the_list() -> None:
-    assert phenomena(law_from_text("maxwell_slip+viscous")) == ["D", "V", "P", "M", "N"]
+    assert phenomena(sf.law_from_text("maxwell_slip+viscous")) == ["D", "V", "P", "M", "N"]
 
 
 @pytest.mark.filterwarnings("ignore:invalid value encountered in arcsin")
@@ -119,11 +110,11 @@ def test_a_composed_law_shows_what_its_parts_show_in_the_order_of_the_list() -> 
 def test_a_force_that_is_no_number_anywhere_is_refused(name: str) -> None:
     """A strut of 4 mm does not reach where the figure slides it to."""
     with pytest.raises(ValueError, match=f"{name} of quarter_car_general: .* is none anywhere"):
-        figure(QuarterCarGeneral(L_d=0.004, k_s=2.89e6), name, 10.0)
+        sf.figure(sf.QuarterCarGeneral(L_d=0.004, k_s=2.89e6), name, 10.0)
 
 
 def test_all_laws_get_the_motion_of_the_first() -> None:
-    data = compare(["lugre", "maxwell_slip"], "hysteresis")
+    data = sf.compare(["lugre", "maxwell_slip"], "hysteresis")
     assert [curve.label for curve in data.curves] == [
         f"{law}, {speed}x" for law in ("lugre", "maxwell_slip") for speed in (1, 5, 20)
     ]
@@ -133,15 +124,15 @@ def test_all_laws_get_the_motion_of_the_first() -> None:
 
 
 def test_laws_of_one_kind_are_numbered_and_a_mapping_names_them() -> None:
-    strong = with_values(LuGre(), {"mu_s": 0.2})
-    assert [c.law for c in compare([LuGre(), strong]).curves] == ["lugre_1", "lugre_2"]
-    assert [c.law for c in compare({"weak": LuGre(), "strong": strong}).curves] == [
+    strong = sf.with_values(sf.LuGre(), {"mu_s": 0.2})
+    assert [c.law for c in sf.compare([sf.LuGre(), strong]).curves] == ["lugre_1", "lugre_2"]
+    assert [c.law for c in sf.compare({"weak": sf.LuGre(), "strong": strong}).curves] == [
         "weak", "strong",
     ]  # fmt: skip
 
 
 def test_a_scene_shows_the_signals_that_the_laws_share() -> None:
-    data = compare([LuGre(), "brown_mcphee"], "rabinowicz")
+    data = sf.compare([sf.LuGre(), "brown_mcphee"], "rabinowicz")
     assert [curve.law for curve in data.curves] == ["lugre", "brown_mcphee"]
     assert {"t", "x", "v", "friction"} <= set(data.units)
     assert "z" not in data.units  # a state of LuGre alone
@@ -150,36 +141,36 @@ def test_a_scene_shows_the_signals_that_the_laws_share() -> None:
 
 
 def test_a_law_that_cannot_show_it_is_left_out_and_the_note_says_why() -> None:
-    data = compare([LuGre(), Coulomb()], "hysteresis")
+    data = sf.compare([sf.LuGre(), sf.Coulomb()], "hysteresis")
     assert {curve.law for curve in data.curves} == {"lugre"}
     assert data.note == "without coulomb: expected a law that shows pre-sliding displacement"
     assert data.to_dict()["note"] == data.note
 
 
 def test_a_population_is_compared_by_name_and_as_an_instance() -> None:
-    data = compare(["dahl", RandomBristles(seed=3), "random_bristles"], "hysteresis")
+    data = sf.compare(["dahl", sf.RandomBristles(seed=3), "random_bristles"], "hysteresis")
     assert {c.law for c in data.curves} == {"dahl", "random_bristles_2", "random_bristles_3"}
 
 
 def test_a_population_is_left_out_of_a_scene() -> None:
-    data = compare(["coulomb", "generic_asperity"], "rabinowicz")
+    data = sf.compare(["coulomb", "generic_asperity"], "rabinowicz")
     assert {curve.law for curve in data.curves} == {"coulomb"}
     assert data.note == "without generic_asperity: expected a law with equations"
 
 
 def test_the_title_says_the_inputs_of_all_laws() -> None:
-    title = compare(["coulomb", "karnopp", "awrejcewicz", "bam"], "profile").title
+    title = sf.compare(["coulomb", "karnopp", "awrejcewicz", "bam"], "profile").title
     assert title.endswith("N = 7.848 N, F_e = 1 N, tau_m = 1 N m, tau_e = 0.5 N m")
-    assert compare(["karnopp", "lugre"], "rabinowicz").title == "rabinowicz"
+    assert sf.compare(["karnopp", "lugre"], "rabinowicz").title == "rabinowicz"
 
 
 def test_a_mechanism_is_drawn_by_position_friction_and_energy() -> None:
-    data = scene_figure("pendulum", {"LuGre": in_scene(LuGre(), "pendulum")})
+    data = scene_figure("pendulum", {"LuGre": in_scene(sf.LuGre(), "pendulum")})
     assert data.panels == (("t", "phi"), ("t", "phi_friction"), ("t", "energy"))
     assert data["LuGre"]["t"][-1] == Pendulum.t_end
 
 
 def test_a_law_of_many_states_does_not_push_its_friction_out() -> None:
-    data = scene_figure("rabinowicz", {"gms": simulate(rabinowicz(GMS()), 0.1)})
+    data = scene_figure("rabinowicz", {"gms": sf.simulate(sf.rabinowicz(sf.GMS()), 0.1)})
     assert data.panels == (("t", "x"), ("t", "friction"), ("t", "power"))
     assert {"F_1", "F_4"} <= set(data["gms"].columns)

@@ -9,10 +9,7 @@ import pytest
 from matplotlib.image import imread
 from refusing import not_refused
 
-import symfric
-import symfric.figures
-import symfric.laws
-import symfric.scenes
+import symfric as sf
 from symfric import BrownMcPhee, Law, LuGre, Model, law_from_text, simulate, symbolise
 from symfric.figures import Curve, FigureData, scales
 from symfric.figures.motion import fine, prescribed, pushed, shoved, slid, slides, through
@@ -34,7 +31,7 @@ def test_calls_that_cannot_be_are_refused() -> None:
     names = {"LAW": law, "symbolic": symbolise(law, "v_t")[0], "DATA": DATA, "broken": broken}
     functions = (prescribed, through, regularisation, machine_of)
     names |= {function.__name__: function for function in functions}
-    packages = symfric, symfric.laws, symfric.figures, symfric.scenes
+    packages = sf, sf.laws, sf.figures, sf.scenes
     assert not_refused(Path(__file__).with_name("refusals.toml"), *packages, **names) == []
 
 

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 
 from symfric import BrownMcPhee, Karnopp, LuGre, law_from_text, with_values
 from symfric.figures import compare, hysteresis
-from symfric.figures.data import Curve, FigureData
 from symfric.figures.pictures import behaviours, decades, plot_catalogue, plot_laws, window
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import steady_force
@@ -148,15 +147,6 @@ def test_one_colour_a_law_one_line_style_a_case() -> None:
     assert len({line.get_color() for line in lines}) == 2
     assert len({str(line._dash_pattern) for line in lines[:3]}) == 3  # type: ignore[attr-defined]
     assert drawn.axes[0].get_title(loc="left") == "not drawn: steady"
-
-
-def test_measured_levels_stand_above_zero() -> None:
-    data = FigureData("levels", "", {"rate": "N/s", "F": "N"}, (("rate", "F"),),
-                      (Curve("a", "", {"rate": np.array([1.0, 10.0]),
-                                       "F": np.array([1.0, 1.00001])}),),
-                      log=("rate",), dots=True)  # fmt: skip
-    axis = data.plot().axes[0]
-    assert axis.get_ylim() == pytest.approx((0.0, 1.1), rel=1e-3)
 
 
 def test_loops_of_several_laws_are_drawn_at_one_speed_and_the_picture_says_so() -> None:

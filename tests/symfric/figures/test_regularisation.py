@@ -7,65 +7,44 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from symfric import (
-    ALL_LAWS,
-    Asymmetric,
-    BlimanSorine,
-    BrownMcPhee,
-    Coulomb,
-    DuanSingh,
-    ElastoPlastic,
-    ExactCoulomb,
-    LuGre,
-    MaxwellSlip,
-    Recommendation,
-    SolveError,
-    Specker,
-    Status,
-    parameters,
-    rabinowicz,
-    recommended,
-    simulate,
-)
+import symfric as sf
 from symfric.bench.regularisation import last_cycle, peak
-from symfric.figures.data import FigureData
 from symfric.figures.regularisation import distance, machine_of, regularisation, sample
-from symfric.laws import Law
 from symfric.scenes import Drive, PendulumBox, Rabinowicz, SliderCrank
 
 
 @pytest.mark.parametrize(
     ("law", "names"),
     [
-        (BrownMcPhee(), ("v_t",)),
-        (Coulomb(), ("v_eps",)),
-        (Specker(), ("v_t",)),
-        (Asymmetric(BrownMcPhee(), BrownMcPhee()), ("v_t_pos", "v_t_neg", "v_blend")),
-        (LuGre(), ("sigma_0", "sigma_1")),
-        (LuGre(sigma_1=0.0), ("sigma_0",)),
-        (ElastoPlastic(), ("sigma_0", "sigma_1", "z_ba")),
-        (BlimanSorine(), ("s_f",)),
-        (MaxwellSlip(), ("k_1", "k_2", "k_3", "k_4")),
+        (sf.BrownMcPhee(), ("v_t",)),
+        (sf.Coulomb(), ("v_eps",)),
+        (sf.Specker(), ("v_t",)),
+        (sf.Asymmetric(sf.BrownMcPhee(), sf.BrownMcPhee()), ("v_t_pos", "v_t_neg", "v_blend")),
+        (sf.LuGre(), ("sigma_0", "sigma_1")),
+        (sf.LuGre(sigma_1=0.0), ("sigma_0",)),
+        (sf.ElastoPlastic(), ("sigma_0", "sigma_1", "z_ba")),
+        (sf.BlimanSorine(), ("s_f",)),
+        (sf.MaxwellSlip(), ("k_1", "k_2", "k_3", "k_4")),
     ],
 )
-def test_roles_say_what_makes_a_law_smooth(law: Law, names: tuple[str, ...]) -> None:
+def test_roles_say_what_makes_a_law_smooth(law: sf.Law, names: tuple[str, ...]) -> None:
     assert tuple(regularisation("here", law).powers) == names
 
 
 def test_stiffness_and_inverse_velocity_grow_where_widths_shrink() -> None:
-    soft = regularisation("here", LuGre(sigma_0=1e4, sigma_1=10.0))
-    wide = regularisation("here", BrownMcPhee())
-    slope = regularisation("here", DuanSingh(sigma=50.0), "sigma")
+    soft = regularisation("here", sf.LuGre(sigma_0=1e4, sigma_1=10.0))
+    wide = regularisation("here", sf.BrownMcPhee())
+    slope = regularisation("here", sf.DuanSingh(sigma=50.0), "sigma")
     assert soft.values(0.01) == pytest.approx({"sigma_0": 1e6, "sigma_1": 100.0})
     assert wide.values(0.1) == pytest.approx({"v_t": 1e-4})
     assert slope.values(0.5) == pytest.approx({"sigma": 100.0})
     for knob in (soft, wide, slope):
         name = next(iter(knob.powers))
-        assert parameters(knob.at(0.3))[name].value == knob.values(0.3)[name]
+        assert sf.parameters(knob.at(0.3))[name].value == knob.values(0.3)[name]
 
 
 def test_every_law_either_says_or_asks() -> None:
-    for law in ALL_LAWS.values():
+    for law in sf.ALL_LAWS.values():
         try:
             assert regularisation("here", law()).powers
         except ValueError as error:
@@ -74,8 +53,8 @@ def test_every_law_either_says_or_asks() -> None:
 
 
 def test_a_machine_is_a_scene_its_class_or_a_function() -> None:
-    law = BrownMcPhee()
-    for scene, t_end in ((Rabinowicz(law), None), (Rabinowicz, None), (rabinowicz, 20.0)):
+    law = sf.BrownMcPhee()
+    for scene, t_end in ((Rabinowicz(law), None), (Rabinowicz, None), (sf.rabinowicz, 20.0)):
         machine = machine_of("here", scene, t_end, None, None, law)
         assert machine.model(law).name == "rabinowicz"
         assert machine.t_end == 20.0
@@ -83,7 +62,7 @@ def test_a_machine_is_a_scene_its_class_or_a_function() -> None:
 
 
 def test_motions_are_compared_by_positions_relative_to_how_far_they_go() -> None:
-    wide, narrow = (BrownMcPhee(v_t=v_t) for v_t in (1e-2, 1e-3))
+    wide, narrow = (sf.BrownMcPhee(v_t=v_t) for v_t in (1e-2, 1e-3))
     machine = machine_of("here", PendulumBox, 1.0, None, None, wide)
     one, other = (sample(machine, law, 1e-6) for law in (wide, narrow))
     assert one.motion.shape[0] == 2
@@ -96,41 +75,41 @@ def test_motions_are_compared_by_positions_relative_to_how_far_they_go() -> None
     assert sample(last, wide, 1e-6).motion.shape == (1, 1)
 
 
-LAW = BrownMcPhee()
+LAW = sf.BrownMcPhee()
 
 
 @pytest.fixture(scope="module")
-def found() -> Recommendation:
-    return recommended(LAW, Rabinowicz, 0.01, of=["x"])
+def found() -> sf.Recommendation:
+    return sf.recommended(LAW, Rabinowicz, 0.01, of=["x"])
 
 
-def off_exact(law: Law, rtol: float) -> float:
+def off_exact(law: sf.Law, rtol: float) -> float:
     """Error of `law` on the belt against friction without regularisation."""
-    dry = ExactCoulomb(mu_s=peak(LAW), mu_d=LAW.mu_d)
-    exact, run = (simulate(rabinowicz(each), 20.0, rtol=rtol) for each in (dry, law))
+    dry = sf.ExactCoulomb(mu_s=peak(LAW), mu_d=LAW.mu_d)
+    exact, run = (sf.simulate(sf.rabinowicz(each), 20.0, rtol=rtol) for each in (dry, law))
     return float(np.abs(run["x"] - exact["x"]).max() / np.ptp(exact["x"]))
 
 
-def test_error_is_kept_against_friction_without_regularisation(found: Recommendation) -> None:
+def test_error_is_kept_against_friction_without_regularisation(found: sf.Recommendation) -> None:
     """The limit was found without that law; softer by half would not do."""
     assert off_exact(found.law, found.rtol) <= 0.01
     assert off_exact(found.law, found.rtol) == pytest.approx(found.error, abs=found.uncertain)
-    softer = BrownMcPhee(v_t=2 * found.values["v_t"])
+    softer = sf.BrownMcPhee(v_t=2 * found.values["v_t"])
     assert off_exact(softer, found.rtol) > 0.01
     assert found.uncertain <= 0.2 * found.wanted
     assert found.order == pytest.approx(2 / 3, abs=0.05)
 
 
-def test_it_says_what_was_set_and_what_it_costs(found: Recommendation) -> None:
-    assert parameters(found.law)["v_t"].value == found.values["v_t"]
-    run = simulate(rabinowicz(found.law), 20.0, rtol=found.rtol)
+def test_it_says_what_was_set_and_what_it_costs(found: sf.Recommendation) -> None:
+    assert sf.parameters(found.law)["v_t"].value == found.values["v_t"]
+    run = sf.simulate(sf.rabinowicz(found.law), 20.0, rtol=found.rtol)
     assert found.steps == run.statistics.steps
     assert found.attempts == run.statistics.steps + run.statistics.rejections
     assert str(found).startswith("BrownMcPhee: v_t = ")
     assert "(0.01 wanted) at rtol = 1e-06" in str(found)
 
 
-def test_curve_holds_the_runs_and_is_drawn(found: Recommendation, tmp_path: Path) -> None:
+def test_curve_holds_the_runs_and_is_drawn(found: sf.Recommendation, tmp_path: Path) -> None:
     curve = found.curve["BrownMcPhee"]
     assert (np.diff(curve["v_t"]) < 0).all()
     assert (np.diff(curve["error"]) < 0).all()
@@ -139,52 +118,54 @@ def test_curve_holds_the_runs_and_is_drawn(found: Recommendation, tmp_path: Path
 
 
 def test_a_law_that_is_too_dry_is_softened() -> None:
-    wide = recommended(BrownMcPhee(v_t=1e-5), Rabinowicz, 0.1)
+    wide = sf.recommended(sf.BrownMcPhee(v_t=1e-5), Rabinowicz, 0.1)
     assert 3e-5 < wide.values["v_t"] < 1e-3
     assert wide.error <= 0.1
 
 
 def test_bristles_get_stiffer_and_keep_their_part_of_critical_damping() -> None:
-    stiff = recommended(LuGre(), rabinowicz, 0.1, t_end=20.0)
+    stiff = sf.recommended(sf.LuGre(), sf.rabinowicz, 0.1, t_end=20.0)
     s = 1e5 / stiff.values["sigma_0"]
     assert s < 1.0
-    assert stiff.values["sigma_1"] == pytest.approx(parameters(LuGre())["sigma_1"].value / s**0.5)
+    assert stiff.values["sigma_1"] == pytest.approx(
+        sf.parameters(sf.LuGre())["sigma_1"].value / s**0.5
+    )
 
 
-def test_numbers_of_a_cycle_need_less_than_the_whole_way(found: Recommendation) -> None:
+def test_numbers_of_a_cycle_need_less_than_the_whole_way(found: sf.Recommendation) -> None:
     """An error of phase grows with every cycle, that of a period does not."""
-    cycle = recommended(LAW, Rabinowicz, 0.01, of=last_cycle)
+    cycle = sf.recommended(LAW, Rabinowicz, 0.01, of=last_cycle)
     assert cycle.values["v_t"] > 5 * found.values["v_t"]
 
 
 def test_a_scene_is_driven_as_it_is_or_as_told() -> None:
-    law = Coulomb(v_eps=1e-2)
-    as_it_is = recommended(law, Drive(law), 0.01, t_end=0.5)
-    gently = recommended(law, Drive(law), 0.01, t_end=0.5, u={"force": 1.0})
+    law = sf.Coulomb(v_eps=1e-2)
+    as_it_is = sf.recommended(law, Drive(law), 0.01, t_end=0.5)
+    gently = sf.recommended(law, Drive(law), 0.01, t_end=0.5, u={"force": 1.0})
     assert as_it_is.values != gently.values
 
 
 def test_another_law_as_the_truth_is_not_met_by_other_levels() -> None:
     """The peak of Brown-McPhee is 0.05 % short of mu_s, which no v_t mends."""
-    with pytest.raises(SolveError, match="do their levels differ") as error:
-        recommended(LAW, Rabinowicz, 1e-3, exact=ExactCoulomb(mu_s=0.15, mu_d=0.1))
-    assert error.value.status is Status.SOLVER_FAILED
-    assert isinstance(error.value.partial, FigureData)
+    with pytest.raises(sf.SolveError, match="do their levels differ") as error:
+        sf.recommended(LAW, Rabinowicz, 1e-3, exact=sf.ExactCoulomb(mu_s=0.15, mu_d=0.1))
+    assert error.value.status is sf.Status.SOLVER_FAILED
+    assert isinstance(error.value.partial, sf.FigureData)
     assert error.value.partial.curves[0]["error"].min() > 1e-3
-    same = ExactCoulomb(mu_s=peak(LAW), mu_d=LAW.mu_d)
-    told = recommended(LAW, Rabinowicz, 0.01, of=["x"], exact=same)
+    same = sf.ExactCoulomb(mu_s=peak(LAW), mu_d=LAW.mu_d)
+    told = sf.recommended(LAW, Rabinowicz, 0.01, of=["x"], exact=same)
     assert told.reference == "ExactCoulomb"
     assert told.error <= 0.01
 
 
 @pytest.mark.slow
 def test_what_the_integrator_adds_is_told_apart() -> None:
-    with pytest.raises(SolveError, match=r"with rtol = 1e-05 the run at v_t = .*tighten rtol"):
-        recommended(LAW, SliderCrank(LAW, omega=1.0), 1e-7, t_end=0.5, rtol=1e-5)
+    with pytest.raises(sf.SolveError, match=r"with rtol = 1e-05 the run at v_t = .*tighten rtol"):
+        sf.recommended(LAW, SliderCrank(LAW, omega=1.0), 1e-7, t_end=0.5, rtol=1e-5)
 
 
 def test_numbers_that_never_come_are_no_curve(monkeypatch: pytest.MonkeyPatch) -> None:
     """A block that only sticks has no cycle."""
     monkeypatch.setattr(import_module("symfric.figures.recommended"), "DRIEST", 3)
-    with pytest.raises(SolveError, match="has not settled"):
-        recommended(LAW, Rabinowicz(LAW), 0.1, t_end=0.5, of=last_cycle)
+    with pytest.raises(sf.SolveError, match="has not settled"):
+        sf.recommended(LAW, Rabinowicz(LAW), 0.1, t_end=0.5, of=last_cycle)

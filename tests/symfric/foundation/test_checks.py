@@ -1,6 +1,7 @@
-"""The checks every public door shares: what they accept, and the sentence they refuse with."""
+"""Checks of public functions, elementary functions, statuses."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
+from math import e, pi
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import LuGre
-from symfric.foundation import checks
+from symfric import LuGre, SolveError, Status
+from symfric.foundation import checks, numeric
+from symfric.foundation.memory import remember
 
 NUMBERS: list[Any] = [
     2, 2.0, np.float32(2), np.float64(2), np.int64(2), np.uint8(2), np.array(2.0), np.array(2),
@@ -75,7 +77,8 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: checks.array("w", [[1.0]]), r"got \[\[1.0\]\]"),
     (lambda: checks.array("w", 1.0), "expected a sequence of numbers, got 1.0"),
     (lambda: checks.array("w", [1.0, np.nan]), "expected finite numbers, got nan at 1"),
-    (lambda: checks.array("w", ca.SX.sym("a", 2)), "expected a sequence of numbers, got "),
+    (lambda: checks.array("w", ca.SX.sym("a", 2)), r"got the expression .* of shape \(2, 1\)$"),
+    (lambda: checks.number("w", ca.SX.sym("a")), "got the expression a$"),
     (lambda: checks.times("w", []), r"expected increasing times \[s\], got none"),
     (lambda: checks.times("w", [0, 1, 1]), "got 1 after 1 s"),
     (lambda: checks.times("w", [1, 1]), r"expected increasing times \[s\], got 1 after 1 s"),
@@ -113,24 +116,94 @@ def test_what_is_right_comes_back_in_one_type() -> None:
     assert checks.path("w", "a.csv") == Path("a.csv")
 
 
-def test_many_names_are_not_all_listed_and_the_closest_is_offered() -> None:
+def test_long_values_and_lists_are_cut_and_the_closest_name_is_offered() -> None:
     """An unknown law used to print all fifty-three before the suggestion."""
-    known = [f"law_{i}" for i in range(53)]
-    with pytest.raises(ValueError, match="one of 53 known names, got law_7x; did you mean law_7"):
-        checks.check_names("law 'law_7x'", ["law_7x"], known)
-    with pytest.raises(ValueError, match="one of 53 known names, got qqq; symfric laws lists them"):
-        checks.check_names("law 'qqq'", ["qqq"], known, "symfric laws lists them")
-
-
-def test_a_long_value_is_cut() -> None:
+    known, hint = [f"law_{i}" for i in range(53)], "symfric laws lists them"
+    for name, message in (("law_7x", "did you mean law_7"), ("qqq", hint)):
+        with pytest.raises(ValueError, match=f"one of 53 known names, got {name}; {message}"):
+            checks.check_names(f"law '{name}'", [name], known, hint)
     with pytest.raises(ValueError, match=r"got 'xxxxx.*\.\.\.$") as caught:
         checks.number("w", "x" * 10_000)
     assert len(str(caught.value)) < 120
 
 
 def test_integers_that_no_float_holds_are_refused_in_a_sentence() -> None:
-    huge = 10**5000
-    with pytest.raises(ValueError, match=r"LuGre\.force: N: expected a number .*16610 bits"):
-        LuGre().force(0.1, huge, [0.0])
-    with pytest.raises(ValueError, match=r"LuGre: mu_s: expected a finite number .*16610 bits"):
-        LuGre(mu_s=huge)
+    for call, where in (
+        (lambda: LuGre().force(0.1, 10**5000, [0.0]), r"LuGre\.force: N: expected a number"),
+        (lambda: LuGre(mu_s=10**5000), "LuGre: mu_s: expected a finite number"),
+    ):
+        with pytest.raises(ValueError, match=f"{where} .*16610 bits"):
+            call()
+
+
+FUNCTIONS = (
+    (numeric.exp, 1.0, e), (numeric.log, e, 1.0), (numeric.sqrt, 9.0, 3.0),
+    (numeric.sin, pi / 6, 0.5), (numeric.cos, pi / 3, 0.5), (numeric.tan, pi / 4, 1.0),
+    (numeric.atan, 1.0, pi / 4), (numeric.asin, 0.5, pi / 6), (numeric.expm1, 1e-20, 1e-20),
+    (numeric.tanh, 0.5, (e - 1) / (e + 1)), (numeric.erf, 0.5, 0.5204998778130465),
+)  # fmt: skip
+
+
+def test_functions_of_every_type() -> None:
+    for function, x, expected in FUNCTIONS:
+        assert function(x) == pytest.approx(expected, rel=1e-14)
+        many = function(np.full((2, 3), x))
+        assert isinstance(many, np.ndarray)
+        assert many.shape == (2, 3)
+        for kind in (ca.SX, ca.DM, ca.MX):
+            assert isinstance(function(kind(x)), kind)
+        assert float(function(ca.DM(x))) == pytest.approx(expected, rel=1e-14)
+
+
+def test_plain_numbers_and_symbols_are_told_apart() -> None:
+    numbers = (1.0, 2, np.float64(1.0), np.int64(3))
+    others = (True, np.ones(2), "1", None, ca.DM(1.0), ca.SX(1.0))
+    symbols = (ca.SX.sym("x"), ca.MX.sym("x"))
+    assert [numeric.is_number(x) for x in (*numbers, *others, *symbols)] == [True] * 4 + [False] * 8
+    assert [numeric.equals(x, 1.0) for x in (*numbers, *others)] == [True, False] * 2 + [False] * 6
+    assert [numeric.is_symbolic(x) for x in (*others, *symbols)] == [False] * 6 + [True] * 2
+
+
+def test_columns_of_floats_arrays_and_matrices() -> None:
+    assert numeric.column(1.0, 2.0).tolist() == [1.0, 2.0]
+    assert numeric.column(1.0, np.array([2.0, 3.0])).tolist() == [[1.0, 1.0], [2.0, 3.0]]
+    assert numeric.column(ca.SX.sym("x"), 1.0).shape == (2, 1)
+    assert numeric.column().shape == numeric.empty(1.0).shape == (0,)
+    assert numeric.empty(np.ones(4)).shape == (0, 4)
+    for kind in (ca.SX, ca.MX):  # joins without a trace
+        assert ca.vertcat(kind.sym("x"), numeric.empty(kind(1.0))).shape == (1, 1)
+
+
+def test_smallest_of_floats_arrays_and_symbols() -> None:
+    assert numeric.smallest(3.0, 1.0, 2.0) == 1.0
+    assert numeric.smallest(np.array([1.0, 5.0]), 3.0).tolist() == [1.0, 3.0]
+    s = ca.SX.sym("s")
+    least = ca.Function("least", [s], [numeric.smallest(2.0, s)])
+    assert [float(least(x)) for x in (1.0, 3.0)] == [1.0, 2.0]
+
+
+def test_the_first_remembered_stays_and_the_oldest_goes() -> None:
+    known: dict[Hashable, str] = {}
+    for key, made, kept in ((1, "a", "a"), (1, "b", "a"), (2, "c", "c"), (2, "d", "c")):
+        assert remember(known, key, made, 2) == kept
+    assert remember(known, 3, "e", 2) == "e"
+    assert known == {2: "c", 3: "e"}
+
+
+def test_values_are_sentences() -> None:
+    for status in Status:
+        assert status.value[0].isupper() and status.value.endswith(".") and len(status.value) < 160
+
+
+def test_results_that_met_their_tolerances_can_be_used_and_no_others() -> None:
+    good = {"SUCCESS", "TERMINATED", "SOLVED", "ACCEPTABLE", "DOUBTFUL"}
+    assert {status.name for status in Status if status.ok} == good
+    assert "time" not in Status.INTERRUPTED.value  # also said of fits
+
+
+def test_error_carries_message_status_and_what_there_is_so_far() -> None:
+    error = SolveError("stopped after t = 1 s", Status.NOT_FINITE, partial=[1, 2])
+    assert str(error) == "stopped after t = 1 s"
+    assert (error.status, error.partial) == (Status.NOT_FINITE, [1, 2])
+    assert isinstance(error, RuntimeError)
+    assert SolveError("x", Status.SINGULAR).partial is None

@@ -32,18 +32,18 @@ def fresh(code: str) -> str:
     return done.stdout.strip()
 
 
-@pytest.mark.parametrize("path", PACKAGES, ids=lambda path: str(path.parent.relative_to(ROOT)))
-def test_a_package_shows_the_names_that_checkers_see_and_no_other(path: Path) -> None:
-    (block,) = [n for n in ast.parse(path.read_text("utf-8")).body if isinstance(n, ast.If)]
-    lines = [n for n in block.body if isinstance(n, ast.ImportFrom)]
-    seen = {a.asname or a.name: str(line.module) for line in lines for a in line.names}
-    if (whole := seen.pop("*", "")) != "":
-        seen |= dict.fromkeys(importlib.import_module(whole).__all__, whole)
-    package = importlib.import_module(".".join(path.parent.relative_to(ROOT).parts))
-    for name, place in seen.items():
-        assert getattr(package, name) is getattr(importlib.import_module(place), name), name
-    assert [name for name in dir(package) if not name.startswith("__")] == sorted(seen)
-    assert sorted(package.__all__) == sorted(seen)
+def test_packages_show_the_names_that_checkers_see_and_no_other() -> None:
+    for path in PACKAGES:
+        (block,) = [n for n in ast.parse(path.read_text("utf-8")).body if isinstance(n, ast.If)]
+        lines = [n for n in block.body if isinstance(n, ast.ImportFrom)]
+        seen = {a.asname or a.name: str(line.module) for line in lines for a in line.names}
+        if (whole := seen.pop("*", "")) != "":
+            seen |= dict.fromkeys(importlib.import_module(whole).__all__, whole)
+        package = importlib.import_module(".".join(path.parent.relative_to(ROOT).parts))
+        for name, place in seen.items():
+            assert getattr(package, name) is getattr(importlib.import_module(place), name), name
+        assert [name for name in dir(package) if not name.startswith("__")] == sorted(seen)
+        assert sorted(package.__all__) == sorted(seen)
 
 
 def test_signatures_name_types_as_the_source_does() -> None:
@@ -69,29 +69,22 @@ def test_importing_loads_nothing_heavy(call: str) -> None:
     assert len([name for name in loaded if name.startswith("symfric")]) <= 10
 
 
-def test_version_and_help_load_no_command() -> None:
-    for option in ("--version", "--help"):
-        code = f"import sys, symfric.cli as c; c.main(['{option}']); print(*sys.modules)"
-        loaded = fresh(code).splitlines()[-1].split()
-        assert not [
-            n for n in loaded if n in ("casadi", "numpy", "symfric.cli.run", "symfric.laws.base")
-        ]
-
-
-def test_simulating_on_a_belt_loads_neither_mechanisms_nor_processes() -> None:
-    """And a room called as what it hands out, loaded before it, does not stand for it."""
-    code = (
-        "import symfric.integrator.simulate, symfric.scenes.blocks, sys, symfric as sf;"
-        "sf.integrator.simulate(sf.scenes.rabinowicz(sf.BrownMcPhee()), 0.1); print(*sys.modules)"
-    )
-    loaded = fresh(code).split()
-    slow = ("matplotlib", "scipy", "symfric.multibody", "symfric.figures", "concurrent.futures")
+@pytest.mark.parametrize(
+    ("code", "slow"),
+    [
+        ("import symfric.cli as c; c.main(['--version'])",
+         ("casadi", "numpy", "symfric.cli.run", "symfric.laws.base")),
+        # a package called as what it hands out, loaded before it, does not stand for it
+        ("import symfric.integrator.simulate, symfric.scenes.blocks, symfric as sf;"
+         "sf.integrator.simulate(sf.scenes.rabinowicz(sf.BrownMcPhee()), 0.1)",
+         ("matplotlib", "scipy", "symfric.multibody", "symfric.figures", "concurrent.futures")),
+        ("import symfric.cli.codegen", ("matplotlib",)),
+    ],
+    ids=["version", "belt", "C"],
+)  # fmt: skip
+def test_what_a_call_does_not_need_is_not_loaded(code: str, slow: tuple[str, ...]) -> None:
+    loaded = fresh(f"{code}; import sys; print(*sys.modules)").splitlines()[-1].split()
     assert not [name for name in slow if name in loaded]
-
-
-def test_writing_c_loads_no_pictures() -> None:
-    """Their library tells of its cache wherever it cannot write it."""
-    assert "matplotlib" not in fresh("import symfric.cli.codegen, sys; print(*sys.modules)").split()
 
 
 def test_names_pickle_star_and_rooms() -> None:

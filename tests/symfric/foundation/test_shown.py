@@ -5,7 +5,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-import pytest
 from pages import on_a_screen, parsed, shown
 
 from symfric.foundation.parameters import Variable
@@ -22,7 +21,7 @@ from symfric.foundation.shown import (
 )
 from symfric.integrator import Hold, Linear, simulate
 from symfric.laws import ALL_LAWS, BrownMcPhee, LuGre
-from symfric.model import Contact, Event, Model, Monitor, Output
+from symfric.model import Contact, Event, Monitor, Output
 from symfric.scenes import ALL_SCENES, FourBar, QuarterCar
 
 EVIL = '<script>alert("&")</script>'
@@ -52,58 +51,36 @@ def test_words_for_counts_and_values() -> None:
 
 def test_laws_show_parameters_and_a_picture() -> None:
     for name, law in ALL_LAWS.items():
-        figure = law().thumbnail()
-        assert figure is not None, name
-        (line,) = figure.axes[0].lines
+        (line,) = law().thumbnail().axes[0].lines
         assert np.isfinite(line.get_ydata()).all(), name
-    assert len(shown(ALL_LAWS["gms"]()).pictures) == 1
-    assert "static friction coefficient" in shown(LuGre()).words
+    page = shown(LuGre())
+    assert len(page.pictures) == 1
+    assert "static friction coefficient" in page.words
 
 
-def test_scenes_are_the_call_that_makes_them() -> None:
+def test_scenes_are_the_call_that_makes_them_and_models_show_no_expressions() -> None:
+    laws = vars(__import__("symfric.laws").laws)
     for kind in ALL_SCENES.values():
         scene = kind(LuGre())
-        assert on_a_screen(repr(scene))
-        assert repr(eval(repr(scene), {**vars(__import__("symfric.laws").laws), kind.__name__: kind,
-                                       "LuGre": LuGre})) == repr(scene)  # fmt: skip
+        text, model = repr(scene), scene.model()
+        assert repr(eval(text, {**laws, kind.__name__: kind, "LuGre": LuGre})) == text
+        said = repr(model)
+        assert on_a_screen(text) and on_a_screen(said)
+        assert "by LuGre" in said and "SX(" not in said and "@1" not in said
+        assert "further" not in model.__dict__, "showing must not write the details"
     assert "QuarterCar(law=LuGre(" in repr(QuarterCar(LuGre()))
     assert shown(QuarterCar(LuGre())).pictures
 
 
-def test_models_show_what_they_consist_of_without_expressions() -> None:
-    for kind in ALL_SCENES.values():
-        model = kind(LuGre()).model()
-        assert on_a_screen(repr(model))
-        assert "SX(" not in repr(model)
-        assert "@1" not in repr(model)
-        assert "by LuGre" in repr(model)
-        assert "further" not in model.__dict__, "showing must not write the details"
-
-
-def test_names_of_a_user_model_are_escaped() -> None:
-    with pytest.warns(UserWarning, match="expected a unit"):
-        x = Variable("x", EVIL, doc=EVIL)
-    model = Model(EVIL, x=(x,), ode=-x.symbol, outputs={"y": Output(2 * x.symbol, "m", EVIL)})
-    assert shown(model).words.count(EVIL) == 4
-
-
-@pytest.mark.parametrize(
-    ("thing", "words"),
-    [
-        (Variable("x", "m", doc="way"), "<variable 'x' [m], start 0: way>"),
-        (Output(1.0, "N"), "<output [N]>"),
+def test_parts_of_a_model_in_a_line() -> None:
+    v = Variable("v", "m/s", doc="rate")
+    for thing, words in (
+        (v, "<variable 'v' [m/s], start 0: rate>"), (Output(1.0, "N"), "<output [N]>"),
         (Monitor(1.0, 1e-3), "<monitor on the scale 0.001>"),
         (Event("hit", 1.0, -1, terminal=True), "<event 'hit', falling, ends the run>"),
-    ],
-)
-def test_parts_of_a_model_in_a_line(thing: object, words: str) -> None:
-    assert repr(thing) == words
-
-
-def test_a_contact_in_a_line() -> None:
-    v = Variable("v", "m/s")
-    made = Contact("belt", v.symbol, 1.0, LuGre(), bare=True)
-    assert repr(made) == "<contact 'belt' by LuGre, states z>"
+        (Contact("b", v.symbol, 1.0, LuGre(), bare=True), "<contact 'b' by LuGre, states z>"),
+    ):  # fmt: skip
+        assert repr(thing) == words
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,52 +34,42 @@ SI = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("text", SI)
-def test_units_of_the_si_are_one_and_written_as_they_are(text: str) -> None:
-    assert in_si(text) == 1.0
-    assert written(text) == text
+def test_units_of_the_si_are_one_and_written_as_they_are() -> None:
+    for text in SI:
+        assert (in_si(text), written(text)) == (1.0, text)
 
 
-@pytest.mark.parametrize(
-    ("text", "same"),
-    [
+def test_other_ways_to_write_a_unit_are_taken() -> None:
+    for text, same in (
         ("N*s/m", "N s/m"), ("kg·m²", "kg m^2"), ("Nm", "N m"), ("Nms/rad", "N m s/rad"),
         ("m/s2", "m/s^2"), ("kg.m2", "kg m^2"), ("N.m/rad", "N m/rad"), ("m·s⁻¹", "m s^-1"),
         ("m**2", "m^2"), ("µm", "um"), ("°C", "degC"), ("°/s", "deg/s"), ("V/√Hz", "V/Hz^0.5"),
         (" N  m / s ", "N m/s"), ("-", "1"), ("kgm^2", "kg m^2"), ("As", "A s"),
-    ],
-)  # fmt: skip
-def test_other_ways_to_write_a_unit_are_taken(text: str, same: str) -> None:
-    assert written(text) == same
-    assert in_si(text) == in_si(same) is not None
+    ):  # fmt: skip
+        assert written(text) == same
+        assert in_si(text) == in_si(same) is not None
 
 
-@pytest.mark.parametrize(
-    ("text", "size"),
-    [
+def test_sizes_are_those_of_the_prefixes() -> None:
+    for text, size in (
         ("mm/s", 1e-3), ("um", 1e-6), ("%", 0.01), ("rpm", pi / 30), ("deg/s^2", pi / 180),
         ("km/h", 1 / 3.6), ("N/mm^2", 1e6), ("m/s/ms", 1e3), ("1/min", 1 / 60), ("mol/L", 1e3),
         ("mN m", 1e-3), ("10 N", 10.0), ("1e-3 m", 1e-3), ("ms", 1e-3), ("min", 60.0),
         ("mm^(1/2)", sqrt(1e-3)), ("mm^(2/1)", 1e-6),
         ("u/min", pi / 30),
-    ],
-)  # fmt: skip
-def test_sizes_are_those_of_the_prefixes(text: str, size: float) -> None:
-    assert in_si(text) == pytest.approx(size, rel=1e-14)
+    ):  # fmt: skip
+        assert in_si(text) == pytest.approx(size, rel=1e-14), text
 
 
-@pytest.mark.parametrize(
-    ("text", "meant"),
-    [
+def test_what_is_no_unit_is_told_with_what_is_meant() -> None:
+    for text, meant in (
         ("m/sec", "m/s"), ("newton", "N"), ("Newton meters", "N m"), ("rad/sec", "rad/s"),
         ("meters per second", "m/s"), ("Kg", "kg"), ("N-m", "N m"), ("[m/s]", "m/s"), ("hz", "Hz"),
         ("degrees", "deg"), ("furlong", ""), ("m//s", ""), ("(m", ""), ("N/", ""), ("m,s", ""),
         ("m)", ""), ("N (mm/s)^d", ""),
-    ],
-)  # fmt: skip
-def test_what_is_no_unit_is_told_with_what_is_meant(text: str, meant: str) -> None:
-    assert in_si(text) is None
-    assert nearest(text) == meant
+    ):  # fmt: skip
+        assert in_si(text) is None
+        assert nearest(text) == meant
 
 
 SCIPY = {
@@ -90,9 +80,9 @@ SCIPY = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("text", [*SCIPY])
-def test_units_outside_the_si_are_as_large_as_scipy_has_them(text: str) -> None:
-    assert in_si(text) == pytest.approx(getattr(constants, SCIPY[text]), rel=1e-6)
+def test_units_outside_the_si_are_as_large_as_scipy_has_them() -> None:
+    for text, name in SCIPY.items():
+        assert in_si(text) == pytest.approx(getattr(constants, name), rel=1e-6), text
 
 
 def test_a_misspelt_unit_is_warned_of_once_in_the_line_that_has_it() -> None:

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from symfric.foundation.workers import Crashed, TimedOut
 from symfric.gallery import rendering
-from symfric.gallery.laminator_nips import studies
 from symfric.gallery.plate import (
     VERDICTS,
     Plate,
@@ -30,7 +30,6 @@ from symfric.gallery.plate import (
 from symfric.gallery.rendering import draw, index_page, read, render, together
 from symfric.gallery.shared import LOOKS, look
 from symfric.laws import ALL_LAWS, POPULATIONS
-from symfric.stress.workers import Crashed, TimedOut
 
 PLATES = plates()
 NAME = "self_tuning/fig_07_shape_factor"
@@ -162,36 +161,6 @@ def test_laws_of_one_picture_look_different() -> None:
     assert {*LOOKS} <= {*ALL_LAWS, *POPULATIONS}
     with pytest.raises(ValueError, match="did you mean lugre"):
         look("lugr")
-
-
-# ---- verdicts on the papers ----
-
-
-def test_gms_peaks_in_speeding_up_and_lugre_in_slowing_down() -> None:
-    numbers = quick("generalized_maxwell_slip/fig_07_transition").numbers
-    ratio = {
-        name: numbers[f"peak in speeding up over that in slowing down, {name}, 2 Hz [1]"]
-        for name in ("generic model", "GMS", "LuGre", "Leuven")
-    }
-    assert min(ratio["generic model"], ratio["GMS"]) > 1.05
-    assert max(ratio["LuGre"], ratio["Leuven"]) < 0.75
-
-
-def test_the_law_of_the_quarter_car_as_printed_holds_the_body_for_ever_and_drives_it() -> None:
-    body = quick("quarter_car_friction/fig_11_body").numbers
-    assert body["way of the body by equation 12 as printed [m]"] == 0.0
-    assert body["residual of x_rel in table 1 [m]"] > body["rms of x_rel itself [m]"]
-    over = "overshoot after the last ramp, "
-    assert body[f"{over}weakly viscous friction [m]"] > body[f"{over}without friction [m]"]
-    parts = quick("quarter_car_friction/fig_14_two_parts").numbers
-    assert parts["least power of Coulomb friction as printed [W]"] < -0.1
-
-
-def test_the_main_study_does_not_determine_the_viscous_part() -> None:
-    """With each of four noises the curve is the same; sigma_2 is nothing or too large."""
-    shares = studies.shares(studies.refitted("main", stable=True, count=4), "main")
-    assert min(shares["sigma_2"]) < 0.01
-    assert max(shares["sigma_2"]) > 10
 
 
 # ---- files ----

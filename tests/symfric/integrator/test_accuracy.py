@@ -81,26 +81,26 @@ def worst_break_away(model: Model, velocities: Array, span: float = SPAN, **run:
 
 
 @each_law
-@pytest.mark.parametrize("rtol", [1e-6, 1e-5])
 @pytest.mark.parametrize(
-    ("method", "count"),
+    ("rtol", "method", "count"),
     [
-        ("rodas5p", 8),
-        *(pytest.param(m, 200, marks=pytest.mark.slow) for m in ("rodas5p", "rodas4p", "rodas3")),
+        *((rtol, "rodas5p", 6) for rtol in (1e-4, 1e-5, 1e-6)),
+        *(
+            pytest.param(rtol, m, 200, marks=pytest.mark.slow)
+            for rtol in (1e-5, 1e-6) for m in ("rodas5p", "rodas4p", "rodas3")
+        ),
     ],
-)
+)  # fmt: skip
+@pytest.mark.filterwarnings("ignore:.*stick phases may be lost")
 def test_no_break_away_is_missed(name: str, rtol: float, method: str, count: int) -> None:
-    """A slip missed or mistimed shows as an error of 2 % and more; there is none of 0.1 %."""
+    """A slip missed or mistimed shows as an error of 2 % and more; there is none of 0.1 %.
+
+    At rtol = 1e-4, nearly every other integrator loses whole slips.
+    """
     velocities = np.linspace(-0.1, 0.1, count)
-    assert worst_break_away(MODELS[name], velocities, rtol=rtol, method=method) < 1e-3
-
-
-@each_law
-def test_no_break_away_is_missed_at_a_loose_tolerance(name: str) -> None:
-    """Nearly every other integrator loses whole slips there."""
-    velocities = np.linspace(-0.1, 0.1, 6)
-    with pytest.warns(UserWarning, match="stick phases may be lost"):
-        assert worst_break_away(MODELS[name], velocities, rtol=1e-4) < 0.02
+    given = {} if rtol > 1e-5 else {"method": method}
+    error = worst_break_away(MODELS[name], velocities, rtol=rtol, **given)
+    assert error < (0.02 if rtol > 1e-5 else 1e-3)
 
 
 STIFF_BRISTLES = {
@@ -126,23 +126,27 @@ def test_bristle_under_slowly_growing_load_breaks_away(case: int, rtol: float) -
     assert worst_break_away(model, start, span=60.0, rtol=rtol) < 2e-3
 
 
-@pytest.mark.parametrize("v_t", [1e-4, 1e-6])
-def test_transition_velocity_may_be_tiny(v_t: float) -> None:
+def stiff(sigma_0: float, v_eps: float) -> Law:
+    return LuGre(sigma_0=sigma_0, sigma_1=0.7 * 2 * np.sqrt(0.8 * sigma_0), v_eps=v_eps)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        BrownMcPhee(v_t=1e-4),
+        BrownMcPhee(v_t=1e-6),
+        stiff(1e5, 0.0),
+        stiff(1e8, 0.0),
+        stiff(1e8, 1e-9),
+    ],
+    ids=["narrow", "narrower", "kinked at 0", "stiff and kinked", "stiff"],
+)
+def test_widths_may_be_tiny_and_bristles_stiff(law: Law) -> None:
     """The steps hardly grow in number, and the limit is the stick-slip of Coulomb's law."""
-    model = rabinowicz(BrownMcPhee(v_t=v_t))
+    model = rabinowicz(law)
     run = simulate(model, SPAN)
     assert deviation(run["x"], simulate(model, SPAN, rtol=1e-9)["x"]) < 1e-5
-    assert run.statistics.steps < 700
-
-
-@pytest.mark.parametrize(("sigma_0", "v_eps"), [(1e5, 0.0), (1e8, 0.0), (1e8, 1e-9)])
-def test_bristles_may_be_stiff(sigma_0: float, v_eps: float) -> None:
-    """With the kink of |v| at zero, too."""
-    law = LuGre(sigma_0=sigma_0, sigma_1=0.7 * 2 * np.sqrt(0.8 * sigma_0), v_eps=v_eps)
-    run = simulate(rabinowicz(law), SPAN)
-    exact = simulate(rabinowicz(law), SPAN, rtol=1e-9)
-    assert deviation(run["x"], exact["x"]) < 1e-5
-    assert run.statistics.steps < 800
+    assert run.statistics.steps < (700 if isinstance(law, BrownMcPhee) else 800)
 
 
 @pytest.mark.parametrize(

@@ -73,9 +73,6 @@ def test_numbers_that_would_change_results_silently_are_refused_by_every_door() 
     doors = (simulate, simulate_many, simulate_by_peer)
     cases: list[tuple[tuple[object, ...], dict[str, object], str]] = [
         (doors[:2], {"event_tolerance": -1.0}, r"event_tolerance: expected a number > 0 \[s\]"),
-        (doors[:2], {"event_tolerance": np.nan}, r"event_tolerance: expected a number > 0"),
-        (doors[::2], {"atol": np.inf}, "atol: expected a number > 0, got inf"),
-        (doors[::2], {"atol": -1e-9}, "atol: expected a number > 0, got -1e-09"),
         (doors[::2], {"atol": 0.0}, "atol: expected a number > 0, got 0.0"),
         (doors, {"max_steps": 0}, "max_steps: expected a whole number >= 1, got 0"),
         (doors, {"p": {"m": -1.0}}, r"[.]m: expected a number >= .* \[kg\], got -1"),

@@ -40,7 +40,7 @@ def backward_gradient(of: Peer, count: int) -> np.ndarray:
     return ca.Function("J", [p], [ca.gradient(x, p)])(np.ones(count)).full().ravel()
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4, 6])
+@pytest.mark.parametrize("count", [1, 3, 6])
 @pytest.mark.parametrize(
     ("backend", "algebraic", "rtol", "error"),
     [
@@ -55,13 +55,7 @@ def test_gradients_by_our_options_are_right(
 ) -> None:
     of = problem(count, backend, algebraic, rtol)
     assert backward_gradient(of, count) == pytest.approx(np.full(count, 0.5), abs=error)
-
-
-def test_gradients_by_the_defaults_are_wrong_and_nothing_says_so() -> None:
-    """The reason for the option; the day this is skipped, it can go."""
-    of = problem(3, "sundials", algebraic=False, rtol=1e-10)
-    careless = replace(of, options={k: v for k, v in of.options.items() if k != "quad_err_con"})
-    wrong = np.abs(backward_gradient(careless, 3) - 0.5).max()
-    if wrong < 1e-6:
-        pytest.skip(f"CasADi {ca.__version__} has cured it")
-    assert wrong > 0.1
+    if (backend, algebraic, count) == ("sundials", False, 3):  # the reason for the option
+        careless = {k: v for k, v in of.options.items() if k != "quad_err_con"}
+        wrong = np.abs(backward_gradient(replace(of, options=careless), 3) - 0.5).max()
+        assert wrong > 0.1, "CasADi computes adjoints right now: drop the option"

@@ -25,40 +25,11 @@ from law_cases import (
 )
 from refusing import not_refused
 
-import symfric
-import symfric.laws
+import symfric as sf
 from docs.machine.items import MADE_OF_LAWS
-from symfric import (
-    ALL_LAWS,
-    BrownMcPhee,
-    Karnopp,
-    Law,
-    LuGre,
-    SelfTuning,
-    Stribeck,
-    parameters,
-    symbolise,
-    with_values,
-)
 from symfric.foundation.parameters import ROLES
-from symfric.laws import (
-    BAM,
-    PHENOMENA,
-    POPULATIONS,
-    Asymmetric,
-    Element,
-    GenericAsperity,
-    Lagged,
-    LoadDependent,
-    LoadNormalised,
-    PlanarSlip,
-    Slider,
-    Table,
-    TemperatureDependent,
-    steady_force,
-    steady_inputs,
-)
-from symfric.laws.base.law import CONFIDENCE, Facts
+from symfric.laws.base.law import CONFIDENCE
+from symfric.laws.catalogue import WRAPPERS
 from symfric.scenes import ALL_SCENES, Robot
 
 COUNT = 4 * settings().max_examples
@@ -71,22 +42,22 @@ BLOCK = 7.848
 """Normal force of `symbolic` [N]."""
 
 
-def mirrored(law: Law, z: np.ndarray) -> np.ndarray:
+def mirrored(law: sf.Law, z: np.ndarray) -> np.ndarray:
     """Return the internal states of the mirrored motion."""
     return np.array([[1.0 if state.even else -1.0] for state in law.states]).reshape(-1, 1) * z
 
 
-def stretched(law: Law, N: float, shares: Iterable[float]) -> np.ndarray:
+def stretched(law: sf.Law, N: float, shares: Iterable[float]) -> np.ndarray:
     """Return internal states at shares of what steady sliding gives, one column each."""
     return np.asarray(law.steady_state(1.0, N)).reshape(-1, 1) * np.array([*shares])
 
 
-def level(law: Law, which: str) -> float:
+def level(law: sf.Law, which: str) -> float:
     """Return the sum of the given friction coefficient over the terms of a law."""
-    return sum(float(p.value) for n, p in parameters(law).items() if n.startswith(which))
+    return sum(float(p.value) for n, p in sf.parameters(law).items() if n.startswith(which))
 
 
-def sliding(law: Law, v: np.ndarray, N: np.ndarray) -> np.ndarray:
+def sliding(law: sf.Law, v: np.ndarray, N: np.ndarray) -> np.ndarray:
     """Return the force of steady sliding at pairs of velocity and load."""
     pairs = zip(v, N, strict=True)
     return np.array([float(law.force(x, L, law.steady_state(x, L))) for x, L in pairs])
@@ -100,7 +71,7 @@ def test_force_and_rate_are_odd() -> None:
         assert (forwards[0].full() == -backwards[0].full()).all(), name
         assert (mirrored(law, forwards[1].full()) == backwards[1].full()).all(), name
         v = np.array([-1e-2, -3e-4, 3e-4, 1e-2])
-        found = steady_force(law, v, BLOCK)
+        found = sf.steady_force(law, v, BLOCK)
         assert found == pytest.approx(-found[::-1], rel=1e-12), name
 
 
@@ -112,14 +83,14 @@ def test_steady_sliding_takes_power() -> None:
             assert (np.asarray(law.force(v, 5.0)) * v >= 0).all(), name
 
 
-LEVELS = [n for n in STATIC if {"mu_s", "mu_d"} & set(parameters(SYMMETRIC[n]))]
+LEVELS = [n for n in STATIC if {"mu_s", "mu_d"} & set(sf.parameters(SYMMETRIC[n]))]
 
 
 def test_static_force_stays_below_static_level_plus_viscous() -> None:
     for name, (mu_s, ratio) in product(LEVELS, [(1e-3, 0.7), (0.4, 0.5), (2.0, 1.0), (0.9, 0.98)]):
-        known = parameters(SYMMETRIC[name])
+        known = sf.parameters(SYMMETRIC[name])
         chosen = {"mu_s": mu_s, "mu_d": mu_s * ratio if "mu_s" in known else mu_s}
-        law = with_values(SYMMETRIC[name], {n: x for n, x in chosen.items() if n in known})
+        law = sf.with_values(SYMMETRIC[name], {n: x for n, x in chosen.items() if n in known})
         top = level(law, "mu_s") or level(law, "mu_d")
         viscous = level(law, "sigma_2") + level(law, "mu_v") * np.maximum(LOADS, 1.0)
         bound = top * LOADS + (viscous + level(law, "kappa") * LOADS * np.abs(V)) * np.abs(V)
@@ -130,7 +101,7 @@ def test_static_force_stays_below_static_level_plus_viscous() -> None:
 
 def test_bristle_never_grows_beyond_its_limit() -> None:
     for name in ("dahl", "dahl, n 2", "dahl, n 0.5", "lugre"):
-        law = with_values(CASES[name], {"v_eps": 0.0})
+        law = sf.with_values(CASES[name], {"v_eps": 0.0})
         limit = (level(law, "mu_s") or level(law, "mu_d")) * LOADS / level(law, "sigma_0")
         rate = np.asarray(law.rate(V, LOADS, (np.sign(V) * limit)[None, :]))[0]
         assert (-rate * np.sign(V) >= -1e-12 * np.abs(V)).all(), name
@@ -143,7 +114,7 @@ SETTLED = {"gonthier": 6e-3, "bristle_2d": 1e-6, "bristle_2d, kappa 0.2": 1e-6}
 def test_rate_vanishes_in_steady_sliding() -> None:
     for name in BRISTLE:
         law = SYMMETRIC[name]
-        smoothing = [float(p.value) for n, p in parameters(law).items() if n.startswith("v_eps")]
+        smoothing = [float(p.value) for n, p in sf.parameters(law).items() if n.startswith("v_eps")]
         slowest = SETTLED.get(name, 0.0) + 20 * max(smoothing, default=0.0)
         for v, N in zip(V + np.sign(V) * slowest, LOADS, strict=True):
             z = law.steady_state(v, N)
@@ -153,7 +124,7 @@ def test_rate_vanishes_in_steady_sliding() -> None:
 
 def test_force_follows_the_load_as_the_law_says() -> None:
     factor = 10 ** (2 * SHARES / 1.5)
-    for name, kind in ALL_LAWS.items():
+    for name, kind in sf.ALL_LAWS.items():
         law, w = kind(), given_inputs(kind())
         if law.states:
             continue
@@ -164,7 +135,7 @@ def test_force_follows_the_load_as_the_law_says() -> None:
             plain = np.asarray(law.force(V, LOADS))
             assert law.force(V, factor * LOADS) == pytest.approx(factor * plain, rel=1e-14), name
     for name in ("dahl", "lugre"):
-        law = with_values(CASES[name], {"v_eps": 0.0})
+        law = sf.with_values(CASES[name], {"v_eps": 0.0})
         expected = factor * sliding(law, V, LOADS)
         assert sliding(law, V, factor * LOADS) == pytest.approx(expected, rel=1e-9), name
     for name in STATIC:
@@ -280,31 +251,33 @@ def test_default_expressions_use_no_nonsmooth_primitive() -> None:
 
 def test_steady_force_takes_the_states_and_the_inputs_of_steady_sliding() -> None:
     v = np.array([-1e-2, -3e-4, 3e-4, 1e-2])
-    expected = Stribeck(v_eps=1e-9).force(v, BLOCK)
-    assert steady_force(LuGre(), v, BLOCK) == pytest.approx(expected, rel=1e-12)
-    found = steady_force(Karnopp(), np.array([-1e-9, 1e-9]), BLOCK)
+    expected = sf.Stribeck(v_eps=1e-9).force(v, BLOCK)
+    assert sf.steady_force(sf.LuGre(), v, BLOCK) == pytest.approx(expected, rel=1e-12)
+    found = sf.steady_force(sf.Karnopp(), np.array([-1e-9, 1e-9]), BLOCK)
     assert found == pytest.approx([-1.0, 1.0])
-    titles = [steady_inputs(law) for law in (Karnopp(), BAM(), LuGre(), GenericAsperity())]
+    titles = [
+        sf.steady_inputs(law) for law in (sf.Karnopp(), sf.BAM(), sf.LuGre(), sf.GenericAsperity())
+    ]
     assert titles == [", F_e = 1 N", ", tau_m = 1 N m, tau_e = 0.5 N m", "", ""]
 
 
 def test_docstring_states_equation_limits_and_source() -> None:
-    for name, kind in ALL_LAWS.items():
+    for name, kind in sf.ALL_LAWS.items():
         text = getdoc(kind) or ""
         assert "Limits:" in text, name
         assert re.search(r"\n {4,}F ", text), "the equation of the force, indented"
         facts = kind.facts
         assert facts.phenomena, name
-        assert set(facts.phenomena) <= set(PHENOMENA), name
+        assert set(facts.phenomena) <= set(sf.PHENOMENA), name
         assert facts.smoothness, name
         assert facts.source, name
         assert f"Source: {facts.source}" in " ".join(text.split()), name
-        assert getattr(symfric, kind.__name__) is kind
+        assert getattr(sf, kind.__name__) is kind
 
 
 def test_facts_say_what_the_formula_was_compared_with() -> None:
-    for kind in (ALL_LAWS | POPULATIONS | MADE_OF_LAWS).values():
-        facts: Facts | None = getattr(kind, "facts", None)
+    for kind in (sf.ALL_LAWS | sf.POPULATIONS | MADE_OF_LAWS).values():
+        facts: sf.Facts | None = getattr(kind, "facts", None)
         if facts is None:
             continue
         assert CONFIDENCE[facts.confidence] in facts.formula, kind
@@ -318,11 +291,11 @@ def test_facts_say_what_the_formula_was_compared_with() -> None:
 
 
 def test_every_parameter_carries_unit_text_bounds_and_refuses_values_beyond_them() -> None:
-    for kind in ALL_LAWS.values():
-        found = parameters(kind())
+    for kind in sf.ALL_LAWS.values():
+        found = sf.parameters(kind())
         own = [item.name for item in fields(kind) if "unit" in item.metadata]
         assert [name for name in found if name in own] == own
-        _, variables = symbolise(kind(), *found)
+        _, variables = sf.symbolise(kind(), *found)
         for p, variable in zip(found.values(), variables, strict=True):
             assert p.unit, (kind, p.name)
             assert p.doc, (kind, p.name)
@@ -333,22 +306,22 @@ def test_every_parameter_carries_unit_text_bounds_and_refuses_values_beyond_them
             where = f"{kind.__name__}: {p.name}" if p.name in own else p.name.rpartition("_")[0]
             for value in filter(isfinite, (p.lower - 1, p.upper + 1)):
                 with pytest.raises(ValueError, match=rf"{where}: expected .* got {value:g}"):
-                    with_values(kind(), {p.name: value})
-    for kind in (Stribeck, BrownMcPhee, SelfTuning, LuGre):
+                    sf.with_values(kind(), {p.name: value})
+    for kind in (sf.Stribeck, sf.BrownMcPhee, sf.SelfTuning, sf.LuGre):
         with pytest.raises(ValueError, match=r"mu_d <= mu_s, got mu_d = 0.3 and mu_s = 0.2"):
             kind(mu_s=0.2, mu_d=0.3)
 
 
 def test_wrong_parameters_states_and_texts_are_refused() -> None:
-    assert not_refused(Path(__file__).with_name("refusals.toml"), symfric.laws) == []
+    assert not_refused(Path(__file__).with_name("refusals.toml"), sf.laws) == []
 
 
 def test_every_parameter_of_every_law_and_scene_says_what_it_is_for() -> None:
     """Roles are data: identification, temperature and code generation read them, not texts."""
     wrappers = (
-        Asymmetric, LoadDependent, LoadNormalised, Lagged, TemperatureDependent, PlanarSlip, Table,
+        *WRAPPERS.values(), sf.PlanarSlip, sf.Table, sf.Element, sf.Slider,
     )  # fmt: skip
-    parts = (*ALL_LAWS.values(), *POPULATIONS.values(), *wrappers, Element, Slider)
+    parts = (*sf.ALL_LAWS.values(), *sf.POPULATIONS.values(), *wrappers)
     for kind in (*parts, *ALL_SCENES.values(), Robot):
         for item in fields(kind):
             if "unit" in item.metadata:

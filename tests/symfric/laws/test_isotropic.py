@@ -9,28 +9,16 @@ import numpy as np
 import pytest
 from law_cases import CASES, EXAMPLE_INPUTS
 
-from symfric import ALL_LAWS, Coulomb, Dahl, Law, LuGre, Sum, Viscous
-from symfric.laws import (
-    GMS,
-    Ambrosio,
-    BoucWen,
-    Lagged,
-    Leuven,
-    MaxwellSlip,
-    PlanarSlip,
-    Slider,
-    SpatialSlip,
-    StaticLaw,
-)
+import symfric as sf
 from symfric.laws.composed.isotropic import Isotropic, anisotropy
 
 pytestmark = pytest.mark.heavy
 
 N = 7.848
-SUMS: dict[str, Law] = {
-    "lugre+ambrosio": Sum((LuGre(), Ambrosio())),
-    "lagged(ambrosio)": Lagged(Ambrosio()),
-    "dahl+gms+viscous": Sum((Dahl(n=1.5), GMS(), Viscous())),
+SUMS: dict[str, sf.Law] = {
+    "lugre+ambrosio": sf.Sum((sf.LuGre(), sf.Ambrosio())),
+    "lagged(ambrosio)": sf.Lagged(sf.Ambrosio()),
+    "dahl+gms+viscous": sf.Sum((sf.Dahl(n=1.5), sf.GMS(), sf.Viscous())),
 }
 LAWS = {name: law for name, law in (CASES | SUMS).items() if not anisotropy(law)}
 DYNAMIC = [name for name, law in LAWS.items() if law.states and "," not in name]
@@ -41,7 +29,7 @@ def turn(angle: float) -> np.ndarray:
     return np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
 
 
-def directed(law: Law) -> list[bool]:
+def directed(law: sf.Law) -> list[bool]:
     return [not state.even for state in law.states]
 
 
@@ -53,7 +41,7 @@ def bent(law: Isotropic, *directions: np.ndarray) -> np.ndarray:
     return np.concatenate([vectors.T.ravel(), 0.7 * typical[[not x for x in odd]]])
 
 
-def given_inputs(law: Law, direction: np.ndarray) -> dict[str, np.ndarray]:
+def given_inputs(law: sf.Law, direction: np.ndarray) -> dict[str, np.ndarray]:
     return {i.name: EXAMPLE_INPUTS[i.name] * direction for i in law.inputs}
 
 
@@ -66,7 +54,7 @@ def turned(law: Isotropic, R: np.ndarray, z: np.ndarray) -> np.ndarray:
 def test_turned_slip_turns_force_and_rate() -> None:
     for name, scale in product(LAWS, (1.0, 1e-4)):
         v, a, b = RNG.uniform(-1.0, 1.0, (3, 2))
-        law, v, R = PlanarSlip(LAWS[name]), scale * v, turn(RNG.uniform(0.0, 2 * pi))
+        law, v, R = sf.PlanarSlip(LAWS[name]), scale * v, turn(RNG.uniform(0.0, 2 * pi))
         z = bent(law, a, b)
         w, w_turned = given_inputs(law.law, b), given_inputs(law.law, R @ b)
         F, rate = law.force(v, N, z, **w), law.rate(v, N, z, **w)
@@ -85,7 +73,7 @@ STEP, COUNT = 1e-5, 2000
 def steps_of(name: str, axes: int) -> ca.Function:
     """COUNT Runge-Kutta steps (z, [v at 0, h/2, h]) -> (z, F), of the law itself for axes = 0."""
     one = LAWS[name]
-    law = {0: one, 2: PlanarSlip(one), 3: SpatialSlip(one)}[axes]
+    law = {0: one, 2: sf.PlanarSlip(one), 3: sf.SpatialSlip(one)}[axes]
     z, v = ca.SX.sym("z", len(law.states)), ca.SX.sym("v", max(axes, 1), 3)
     at = [v[:, k] for k in range(3)]
     k_1 = law.rate(at[0], N, z)
@@ -105,7 +93,7 @@ def along_path(name: str, axes: int, z: np.ndarray, v: np.ndarray) -> tuple[np.n
     return tuple(x.full() for x in result)
 
 
-def at_rest(law: Law) -> np.ndarray:
+def at_rest(law: sf.Law) -> np.ndarray:
     return np.zeros(len(law.states)) + [0.5 if s.even else 0.0 for s in law.states]
 
 
@@ -117,7 +105,7 @@ def test_straight_slip_with_reversals_is_the_law_itself() -> None:
     in_space = product(("lugre", "gms", "bouc_wen"), ((2 / 3, -1 / 3, 2 / 3),))
     for name, direction in (*product(DYNAMIC, ((0.6, -0.8),)), *in_space):
         one, e = LAWS[name], np.array(direction)
-        law = PlanarSlip(one) if len(e) == 2 else SpatialSlip(one)
+        law = sf.PlanarSlip(one) if len(e) == 2 else sf.SpatialSlip(one)
         z, F, _ = along_path(name, 0, at_rest(one), REVERSING[None, :])
         states, forces, _ = along_path(name, len(e), at_rest(law), e[:, None] * REVERSING)
         assert np.isfinite(F).all(), name
@@ -133,7 +121,7 @@ def test_straight_slip_of_a_memoryless_law_is_the_law_itself() -> None:
     for name, v in product([n for n in LAWS if not LAWS[n].states], (0.0, 2e-5, -3e-3, 0.7)):
         one, e = LAWS[name], turn(RNG.uniform(0.0, 2 * pi))[0]
         inputs = {n: x[0] for n, x in given_inputs(one, np.ones(1)).items()}
-        found = PlanarSlip(one, v_eps=1e-12).force(v * e, N, **given_inputs(one, e))
+        found = sf.PlanarSlip(one, v_eps=1e-12).force(v * e, N, **given_inputs(one, e))
         expected = e * one.force(v, N, **inputs)
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-9), name
 
@@ -145,14 +133,14 @@ def test_a_closed_circle_takes_energy() -> None:
     """The second of two turns at 100 Hz, of a size below and far above the break-away path."""
     for name, radius in product(DYNAMIC, (1e-6, 4e-5)):
         v = 2 * pi * 100 * radius * np.array([np.cos(ANGLES), np.sin(ANGLES)])
-        _, F, work = along_path(name, 2, at_rest(PlanarSlip(LAWS[name])), v)
+        _, F, work = along_path(name, 2, at_rest(sf.PlanarSlip(LAWS[name])), v)
         assert np.isfinite(F).all(), name
         assert work[0, COUNT // 2 :].sum() >= 0.0, name
 
 
-def limits(law: Law) -> np.ndarray:
+def limits(law: sf.Law) -> np.ndarray:
     """The largest size of each vector state in straight slip."""
-    if isinstance(law, Leuven):
+    if isinstance(law, sf.Leuven):
         return np.array([e.mu * N for e in law.elements])
     found = [np.abs(np.asarray(law.steady_state(v, N)).ravel()) for v in np.logspace(-7, 0, 200)]
     return np.max(found, axis=0)[directed(law)]
@@ -160,7 +148,7 @@ def limits(law: Law) -> np.ndarray:
 
 def test_states_never_leave_the_ball_of_their_limit_in_curved_slip() -> None:
     for name in DYNAMIC:
-        law = PlanarSlip(LAWS[name])
+        law = sf.PlanarSlip(LAWS[name])
         speed = 8e-3 * np.abs(np.sin(2 * pi * RNG.uniform(20, 120) * TIMES))
         waves = (RNG.uniform(0, 3) * np.sin(2 * pi * f * TIMES + f) for f in (30.0, 110.0, 270.0))
         angle = sum(waves, start=0.0)
@@ -173,7 +161,7 @@ def test_states_never_leave_the_ball_of_their_limit_in_curved_slip() -> None:
 
 def test_value_gradient_and_hessian_are_finite_and_rest_has_no_force() -> None:
     for name in LAWS:
-        law, v = PlanarSlip(LAWS[name]), ca.SX.sym("v", 2)
+        law, v = sf.PlanarSlip(LAWS[name]), ca.SX.sym("v", 2)
         assert np.abs(law.force((0.0, 0.0), N, at_rest(law))).max() == 0.0, name
         z, w = ca.SX.sym("z", len(law.states)), ca.SX.sym("w", 2)
         inputs = {i.name: EXAMPLE_INPUTS[i.name] * w for i in law.inputs}
@@ -192,7 +180,7 @@ def test_value_gradient_and_hessian_are_finite_and_rest_has_no_force() -> None:
 def test_all_number_types_give_the_same() -> None:
     v, e = np.array([3e-4, -2e-3]), np.array([0.6, 0.8])
     for name, one in LAWS.items():
-        law = PlanarSlip(one)
+        law = sf.PlanarSlip(one)
         z, w = bent(law, 0.7 * e, turn(1.0)[0]), given_inputs(one, e)
         expected = np.append(law.force(v, N, z, **w), law.rate(v, N, z, **w))
         for kind in (ca.SX, ca.MX):
@@ -207,7 +195,7 @@ def test_all_number_types_give_the_same() -> None:
 def test_slip_in_a_plane_of_space_is_slip_in_the_plane() -> None:
     for k, name in enumerate(LAWS):
         plane = ((0, 1), (1, 2), (2, 0))[k % 3]
-        flat, law = PlanarSlip(LAWS[name]), SpatialSlip(LAWS[name])
+        flat, law = sf.PlanarSlip(LAWS[name]), sf.SpatialSlip(LAWS[name])
         P = np.eye(3)[:, [*plane]]
         v, a, b = np.array([0.03, -0.04]), np.array([0.5, 0.2]), np.array([0.1, -0.6])
         n = sum(directed(flat.law))
@@ -221,18 +209,10 @@ def test_slip_in_a_plane_of_space_is_slip_in_the_plane() -> None:
         assert rate == pytest.approx(whole, rel=1e-9, abs=1e-12)
 
 
-def test_sideways_slip_lowers_the_resistance_along() -> None:
-    """Coulomb's cone: while sliding fast across, a slow push along meets viscous friction only."""
-    law = PlanarSlip(Coulomb(mu_d=0.1, v_eps=1e-3))
-    F = law.force((0.01, 1.0), N)
-    assert F[1] == pytest.approx(0.1 * N, rel=1e-4)
-    assert F[0] == pytest.approx(0.1 * N * 0.01, rel=1e-3)
-
-
 def test_sliding_points_against_the_motion_with_the_force_of_the_law() -> None:
     e = np.array([0.6, -0.8])
     for name in DYNAMIC:
-        one, law = LAWS[name], PlanarSlip(LAWS[name])
+        one, law = LAWS[name], sf.PlanarSlip(LAWS[name])
         expected = one.force(0.1, N, one.steady_state(0.1, N)) * e
         force = law.force(0.1 * e, N, law.steady_state(0.1 * e, N))
         assert force == pytest.approx(expected, rel=1e-9), name
@@ -241,7 +221,7 @@ def test_sliding_points_against_the_motion_with_the_force_of_the_law() -> None:
 def test_lugre_on_a_circle_lags_by_the_angle_of_its_linear_equation() -> None:
     """dz/dt = v - lambda z with turning v: z = v/(lambda + i omega)."""
     speed, omega = 4e-3, 2 * pi * 100
-    law = PlanarSlip(LuGre(mu_s=0.1, sigma_1=0.0))
+    law = sf.PlanarSlip(sf.LuGre(mu_s=0.1, sigma_1=0.0))
     pull = 1e5 * speed / (0.1 * N)
     z = (speed / (pull + 1j * omega)) * np.exp(0.3j)
     v = speed * np.array([cos(0.3), sin(0.3)])
@@ -252,7 +232,7 @@ def test_lugre_on_a_circle_lags_by_the_angle_of_its_linear_equation() -> None:
 
 def test_bouc_wen_is_the_biaxial_element() -> None:
     """Of Park, Wen, Ang with n = 2 and one product for both axes; loads along z only."""
-    law = PlanarSlip(BoucWen(n=2.0, A=1.2), turn=1e-9)
+    law = sf.PlanarSlip(sf.BoucWen(n=2.0, A=1.2), turn=1e-9)
     for v, z in RNG.uniform(-1.0, 1.0, (30, 2, 2)):
         rate, power = law.rate(v, N, z) * 0.1 * N / 1e5, v @ z
         assert rate == pytest.approx(1.2 * v - 0.5 * z * (abs(power) + power), abs=1e-6)
@@ -260,8 +240,8 @@ def test_bouc_wen_is_the_biaxial_element() -> None:
 
 def test_sharp_maxwell_slip_is_radial_return() -> None:
     """Against steps of perfect plasticity: a spring returned to the disc after each."""
-    slider = Slider(k=1e5, mu=0.1)
-    law, limit = PlanarSlip(MaxwellSlip(elements=(slider,), n=300.0), turn=1e-4), 0.1 * N
+    slider = sf.Slider(k=1e5, mu=0.1)
+    law, limit = sf.PlanarSlip(sf.MaxwellSlip(elements=(slider,), n=300.0), turn=1e-4), 0.1 * N
     t = np.linspace(0.0, 1.0, 20_001)
     x = 3e-5 * np.array([np.sin(2 * pi * t), np.sin(6 * pi * t + 1.0) * np.cos(3 * t)])
     v = np.diff(x) / np.diff(t)
@@ -278,21 +258,21 @@ def test_sharp_maxwell_slip_is_radial_return() -> None:
     assert worst < 0.02 * limit
 
 
-class Crooked(StaticLaw):
+class Crooked(sf.StaticLaw):
     """A law of a user who adds to v in the argument of a product."""
 
-    facts = LuGre.facts
+    facts = sf.LuGre.facts
     velocity_scale = 1.0
-    states = LuGre().states
+    states = sf.LuGre().states
 
     def force(self, v, N, z=()):
         return z[0] * (1 + v) - z[0] * (1 - v)
 
 
 def test_expressions_without_vectors_are_refused_by_what_they_do() -> None:
-    assert anisotropy(Crooked()) == "it adds a number to what has a direction"
+    assert anisotropy(Crooked()) == "it adds a number to a vector"
 
 
 def test_every_law_without_sides_and_modes_has_a_vector_form() -> None:
-    missing = {name for name, kind in ALL_LAWS.items() if anisotropy(kind())}
+    missing = {name for name, kind in sf.ALL_LAWS.items() if anisotropy(kind())}
     assert missing == {"capstan", "quarter_car_general", "exact_coulomb"}

@@ -2,36 +2,25 @@
 
 from dataclasses import replace
 from itertools import product
-from math import degrees, exp, pi, radians, sin
+from math import degrees, pi, radians, sin
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import Coulomb, Law, Stribeck, rabinowicz, simulate, with_values
-from symfric.integrator import Trajectory
-from symfric.laws import (
-    BAM,
-    Awrejcewicz,
-    Bittencourt,
-    Karnopp,
-    LeineSwitch,
-    QuarterCarGeneral,
-    QuarterCarSimple,
-    Wojewoda,
-)
+import symfric as sf
 from symfric.laws.static.machines import tilt
-from symfric.scenes import Pendulum, drive
+from symfric.scenes import Pendulum
 
 N = 5.0
 V = np.linspace(-0.1, 0.1, 41)
 LEVELS = {"mu_s": 0.3, "mu_d": 0.2}
 STICKING = [
-    Karnopp(**LEVELS),
-    Karnopp(**LEVELS, form="original"),
-    Awrejcewicz(**LEVELS),
-    Awrejcewicz(**LEVELS, form="original"),
-    LeineSwitch(0.3, form="original"),
+    sf.Karnopp(**LEVELS),
+    sf.Karnopp(**LEVELS, form="original"),
+    sf.Awrejcewicz(**LEVELS),
+    sf.Awrejcewicz(**LEVELS, form="original"),
+    sf.LeineSwitch(0.3, form="original"),
 ]
 SMOOTH = STICKING[0], STICKING[2]
 
@@ -52,22 +41,22 @@ def test_contact_at_rest_carries_the_applied_force_up_to_the_static_level() -> N
 
 def test_body_at_rest_stays_below_break_away_and_leaves_above() -> None:
     for law in SMOOTH:
-        model = drive(law, m=1.0, N=N)
-        below, above = (simulate(model, 1.0, u={"force": F}).final["v"] for F in (1.49, 1.55))
+        model = sf.drive(law, m=1.0, N=N)
+        below, above = (sf.simulate(model, 1.0, u={"force": F}).final["v"] for F in (1.49, 1.55))
         assert below == 0.0
         assert above > 0.3
-    model = drive(SMOOTH[0], m=1.0, N=N)
-    at = [simulate(model, t, x0={"v": 0.1}, rtol=1e-9).final["v"] for t in (20.0, 80.0)]
+    model = sf.drive(SMOOTH[0], m=1.0, N=N)
+    at = [sf.simulate(model, t, x0={"v": 0.1}, rtol=1e-9).final["v"] for t in (20.0, 80.0)]
     assert at[0] / at[1] == pytest.approx(2.0, rel=0.05), "v ~ 1/sqrt(t) inside the band"
 
 
 LEVEL = 0.15 * N
-BAND: dict[str, tuple[Law, float, float]] = {
-    "karnopp": (Karnopp(), 1e-3, -0.274 * LEVEL * 1e-3),
-    "karnopp, original": (Karnopp(form="original"), 1e-3, -LEVEL * 1e-3),
-    "awrejcewicz": (Awrejcewicz(), 1e-3, -0.204 * LEVEL * 1e-3),
-    "awrejcewicz, original": (Awrejcewicz(form="original"), 1e-3, -0.204 * LEVEL * 1e-3),
-    "leine_switch, original": (LeineSwitch(form="original"), 1e-6, -LEVEL * 1e-6),
+BAND: dict[str, tuple[sf.Law, float, float]] = {
+    "karnopp": (sf.Karnopp(), 1e-3, -0.274 * LEVEL * 1e-3),
+    "karnopp, original": (sf.Karnopp(form="original"), 1e-3, -LEVEL * 1e-3),
+    "awrejcewicz": (sf.Awrejcewicz(), 1e-3, -0.204 * LEVEL * 1e-3),
+    "awrejcewicz, original": (sf.Awrejcewicz(form="original"), 1e-3, -0.204 * LEVEL * 1e-3),
+    "leine_switch, original": (sf.LeineSwitch(form="original"), 1e-6, -LEVEL * 1e-6),
 }
 """Laws that hold what is applied in a band: the law, the band's half width, least power [W]."""
 
@@ -80,13 +69,13 @@ def test_friction_in_a_band_of_rest_drives_as_far_as_it_says() -> None:
         assert power[:, np.abs(v) > width].min() > 0
     for name, least in (("karnopp", -0.274), ("awrejcewicz", -0.204)):
         law, width, _ = BAND[name]
-        run = simulate(Pendulum(law).model(), 2.0)
+        run = sf.simulate(Pendulum(law).model(), 2.0)
         load = np.abs(run["phi_N"]).max()
         lowest, highest = run.extremes["phi_power"]
         assert least * 0.15 * load * width <= lowest < 0 < highest
 
 
-def settled(run: Trajectory, since: float) -> tuple[float, float]:
+def settled(run: sf.Trajectory, since: float) -> tuple[float, float]:
     """Return period and largest position."""
     late, x = run.t > since, run["x"] - 0.5
     falling = np.flatnonzero((x[:-1] > 0) & (x[1:] <= 0) & late[1:])
@@ -97,53 +86,40 @@ def settled(run: Trajectory, since: float) -> tuple[float, float]:
 
 def test_smooth_switch_model_has_the_published_stick_slip() -> None:
     for v_eps, period, x_max in ((1e-3, 11.298, 1.0671), (1e-2, 9.7097, None)):
-        law = LeineSwitch(mu_s=1.0, delta=3.0, v_eps=v_eps)
-        model = rabinowicz(law, m=1.0, k=1.0, v_belt=0.2, g=1.0)
-        found = settled(simulate(model, 60.0, rtol=1e-9, samples=60_001), 30.0)
+        law = sf.LeineSwitch(mu_s=1.0, delta=3.0, v_eps=v_eps)
+        model = sf.rabinowicz(law, m=1.0, k=1.0, v_belt=0.2, g=1.0)
+        found = settled(sf.simulate(model, 60.0, rtol=1e-9, samples=60_001), 30.0)
         assert found[0] == pytest.approx(period, abs=1e-3)
         assert x_max is None or found[1] == pytest.approx(x_max, abs=2e-4)
 
 
 def test_wojewoda_is_coulomb_without_acceleration_and_opposes_the_motion() -> None:
-    expected = Coulomb(0.2, v_eps=1e-4).force(V, N)
-    assert Wojewoda(**LEVELS).force(V, N, dv=0.0) == pytest.approx(expected, rel=1e-14, abs=1e-300)
+    expected = sf.Coulomb(0.2, v_eps=1e-4).force(V, N)
+    assert sf.Wojewoda(**LEVELS).force(V, N, dv=0.0) == pytest.approx(
+        expected, rel=1e-14, abs=1e-300
+    )
     v, dv = np.meshgrid(np.geomspace(1e-6, 1.0, 20), np.linspace(-100.0, 100.0, 41))
-    assert (np.asarray(Wojewoda(mu_s=0.2, mu_d=0.1).force(v, N, dv=dv)) >= 0).all()
+    assert (np.asarray(sf.Wojewoda(mu_s=0.2, mu_d=0.1).force(v, N, dv=dv)) >= 0).all()
 
 
-def test_bittencourt_is_two_stribeck_curves_and_depends_on_temperature() -> None:
-    loaded = Stribeck(mu_s=0.149, mu_d=0.023, v_s=9.2, delta=1.3, v_eps=0.1)
-    free = Stribeck(mu_s=0.07, mu_d=0.031, v_s=15.0, delta=1.3, v_eps=0.1)
-    v = 1e3 * V
-    for load in (0.0, 2.0):
-        viscous = (1.3e-3 + 1.3e-3 * exp(-40 / 20.7)) * v
-        expected = loaded.force(v, load) + free.force(v, 1.0) + viscous
-        found = Bittencourt(T=40.0, F_eps=0.0).force(v, load)
-        assert found == pytest.approx(expected, rel=1e-13, abs=1e-300)
-    cold = Bittencourt(T=5.0, v_s0=10.0, F_eps=0.0)
-    assert cold.force(0.1, 0.0) == with_values(cold, {"F_s0": 0.0, "F_sT": 0.0}).force(0.1, 0.0)
-    assert Bittencourt(T=5.0, v_s0=10.0).force(0.1, 0.0) >= cold.force(0.1, 0.0)
+def test_bittencourt_depends_on_temperature() -> None:
+    """Its formula is compared with the printed equation."""
+    cold = sf.Bittencourt(T=5.0, v_s0=10.0, F_eps=0.0)
+    assert cold.force(0.1, 0.0) == sf.with_values(cold, {"F_s0": 0.0, "F_sT": 0.0}).force(0.1, 0.0)
+    assert sf.Bittencourt(T=5.0, v_s0=10.0).force(0.1, 0.0) >= cold.force(0.1, 0.0)
     T = ca.SX.sym("T")
-    slope = ca.Function("slope", [T], [ca.gradient(Bittencourt(T=T).force(50.0, 1.0), T)])
-    step = (Bittencourt(T=31.0).force(50.0, 1.0) - Bittencourt(T=29.0).force(50.0, 1.0)) / 2
+    slope = ca.Function("slope", [T], [ca.gradient(sf.Bittencourt(T=T).force(50.0, 1.0), T)])
+    step = (sf.Bittencourt(T=31.0).force(50.0, 1.0) - sf.Bittencourt(T=29.0).force(50.0, 1.0)) / 2
     assert float(slope(30.0)) == pytest.approx(step, rel=1e-3)
 
 
-def test_terms_of_bam_act_as_switched_on() -> None:
+def test_bam_has_the_inputs_of_its_terms() -> None:
+    """Its formula is compared with the printed equation."""
     unloaded = {"K_e": 0.0, "K_m": 0.0, "K_es": 0.0, "K_ms": 0.0}
-    same = Stribeck(mu_s=0.1, mu_d=0.05, v_s=0.2, delta=1.35, v_eps=0.01, sigma_2=0.1)
-    expected = same.force(50 * V, 1.0)
-    assert BAM(**unloaded).force(50 * V, 99.0) == pytest.approx(expected, rel=1e-13, abs=1e-300)
-    assert BAM(**unloaded).inputs == ()
-    assert [i.name for i in BAM(**{**unloaded, "K_m": 0.1}).inputs] == ["tau_m", "tau_e"]
-    assert BAM(**unloaded, K_s=ca.SX.sym("K_s")).inputs == ()
-    plain, full = BAM(tau_eps=1e-4), BAM(Q_e=0.01, Q_m=0.02, tau_eps=1e-4)
-    for tau_m, tau_e in product((0.9, 0.3), (-0.4, 0.4)):  # quadratic while the torques oppose
-        forces = [law.force(0.1, 1.0, tau_m=tau_m, tau_e=tau_e) for law in (plain, full)]
-        opposed = 0.01 * tau_e**2 if tau_m > abs(tau_e) else 0.02 * tau_m**2
-        extra = (forces[1] - forces[0]) / exp(-(0.5**1.35))
-        assert extra == pytest.approx(opposed if tau_e < 0 else 0.0, rel=0.05, abs=1e-12)
-    law = BAM(tau_eps=1e-9)  # equal coefficients see the torque through the gear alone
+    assert sf.BAM(**unloaded).inputs == ()
+    assert [i.name for i in sf.BAM(**{**unloaded, "K_m": 0.1}).inputs] == ["tau_m", "tau_e"]
+    assert sf.BAM(**unloaded, K_s=ca.SX.sym("K_s")).inputs == ()
+    law = sf.BAM(tau_eps=1e-9)  # equal coefficients see the torque through the gear alone
     one = law.force(0.5, 1.0, tau_m=0.7, tau_e=0.2)
     assert one == pytest.approx(law.force(0.5, 1.0, tau_m=0.1, tau_e=-0.4), rel=1e-12)
 
@@ -158,14 +134,14 @@ def test_linkage_of_a_quarter_car_turns_by_its_angle() -> None:
 
 
 def test_quarter_car_holds_at_rest_and_drives_as_printed_only() -> None:
-    law, printed = QuarterCarGeneral(), QuarterCarGeneral(form="as_printed")
+    law, printed = sf.QuarterCarGeneral(), sf.QuarterCarGeneral(form="as_printed")
     x = np.linspace(-0.0066, 0.0066, 21)
     assert (law.force(0.0, 0.0, x_rel=x) == 28900.0 * x).all()
     for sign in (1.0, -1.0):
         assert law.force(0.0, 0.0, x_rel=sign * 0.01) == pytest.approx(sign * 193.8)
         assert printed.force(0.0, 0.0, x_rel=sign * 0.01) == pytest.approx(sign * 289.0)
-    simple = QuarterCarSimple(v_eps=0.0).force(V, 0.0)
-    plain = QuarterCarGeneral(mu=0.0).force(V, 0.0, x_rel=0.02)
+    simple = sf.QuarterCarSimple(v_eps=0.0).force(V, 0.0)
+    plain = sf.QuarterCarGeneral(mu=0.0).force(V, 0.0, x_rel=0.02)
     moving = np.abs(V) > 2e-3
     assert plain[moving] == pytest.approx(simple[moving], rel=1e-13)
     v, x = np.meshgrid(np.linspace(-1.0, 1.0, 200), np.linspace(-0.05, 0.05, 21))

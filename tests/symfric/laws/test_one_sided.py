@@ -7,20 +7,7 @@ import numpy as np
 import pytest
 from law_cases import CASES, given_inputs
 
-from symfric import (
-    Asymmetric,
-    BrownMcPhee,
-    Coulomb,
-    Karnopp,
-    Law,
-    SelfTuning,
-    Stribeck,
-    Sum,
-    Viscous,
-    parameters,
-    with_values,
-)
-from symfric.laws import Capstan, Exudyn, Hollars, MakkarDixon, QuarterCarGeneral
+import symfric as sf
 from symfric.laws.base.law import FORCE
 
 N = 7.848
@@ -44,13 +31,13 @@ HELD = {
 """Static levels of dynamic laws that are not mu_s N, or mu_d N where there is no mu_s."""
 
 
-def narrowed(law: Law, share: float) -> Law:
+def narrowed(law: sf.Law, share: float) -> sf.Law:
     """Return the law with layers that are `share` of what they were."""
-    known = parameters(law)
-    return with_values(law, {n: known[n].value * share**e for n, e in law.widths.items()})
+    known = sf.parameters(law)
+    return sf.with_values(law, {n: known[n].value * share**e for n, e in law.widths.items()})
 
 
-def further(law: Law) -> dict[str, float]:
+def further(law: sf.Law) -> dict[str, float]:
     """Return further inputs but the applied force."""
     return {n: x for n, x in given_inputs(law).items() if n != FORCE}
 
@@ -87,8 +74,8 @@ def test_static_level_is_the_top_of_a_thin_layer() -> None:
     for (name, law), side in product(LIMITED.items(), (1, -1)):
         if law.states or not law.widths:
             continue
-        rounded = {n: 0.0 for n in ("u_eps",) if n in parameters(law)}
-        thin = narrowed(with_values(law, rounded), 1e-7)
+        rounded = {n: 0.0 for n in ("u_eps",) if n in sf.parameters(law)}
+        thin = narrowed(sf.with_values(law, rounded), 1e-7)
         v = side * np.concatenate([np.geomspace(1e-16, 1e-6, 20001), [0.0]])
         pull = {FORCE: side * 1e3} if FORCE in given_inputs(law) else {}
         F = thin.force(v, N, thin.steady_state(v, N), **{**given_inputs(law), **pull})
@@ -102,17 +89,17 @@ def test_static_level_is_the_top_of_a_thin_layer() -> None:
 def test_static_level_of_a_law_with_states() -> None:
     for name, law in LIMITED.items():
         if law.states:
-            known = parameters(law)
+            known = sf.parameters(law)
             mu = next((known[n].value for n in ("mu_s", "mu_s_pos", "mu_d") if n in known), 0.0)
             assert float(law.static_level(N)) == pytest.approx(HELD.get(name, mu * N)), name
     assert CASES["bouc_wen"].static_level(N) == CASES["bouc_wen"].sliding(1.0, N, 1)
 
 
 def test_laws_without_the_limit_say_why() -> None:
-    class Own(Viscous):  # pyright: ignore[reportGeneralTypeIssues]
-        outside = Law.outside
+    class Own(sf.Viscous):  # pyright: ignore[reportGeneralTypeIssues]
+        outside = sf.Law.outside
 
-    for law in (*(CASES[name] for name in REFUSED), QuarterCarGeneral(form="as_printed"), Own()):
+    for law in (*(CASES[name] for name in REFUSED), sf.QuarterCarGeneral(form="as_printed"), Own()):
         for ask in (lambda law=law: law.sliding(0.1, N, -1), lambda law=law: law.static_level(N)):
             with pytest.raises(
                 ValueError, match=f"{type(law).__name__}: expected .* got"
@@ -124,28 +111,32 @@ def test_laws_without_the_limit_say_why() -> None:
 
 def test_widths_have_flat_names_and_no_zeros() -> None:
     widths = {
-        BrownMcPhee(): {"v_t": 1},
-        SelfTuning(): {"B": -1},
-        Stribeck(v_eps=0.0): {},
-        Karnopp(): {"D_v": 1},
-        Sum((Coulomb(), Stribeck(), Viscous())): {"v_eps_1": 1, "v_eps_2": 1},
-        Asymmetric(Stribeck(), Stribeck(mu_s=0.3)): {"v_blend": 1, "v_eps_pos": 1, "v_eps_neg": 1},
+        sf.BrownMcPhee(): {"v_t": 1},
+        sf.SelfTuning(): {"B": -1},
+        sf.Stribeck(v_eps=0.0): {},
+        sf.Karnopp(): {"D_v": 1},
+        sf.Sum((sf.Coulomb(), sf.Stribeck(), sf.Viscous())): {"v_eps_1": 1, "v_eps_2": 1},
+        sf.Asymmetric(sf.Stribeck(), sf.Stribeck(mu_s=0.3)): {
+            "v_blend": 1,
+            "v_eps_pos": 1,
+            "v_eps_neg": 1,
+        },
     }
     assert {law: law.widths for law in widths} == widths
 
 
 def test_levels_and_curves_of_both_sides() -> None:
-    pair = Asymmetric(Stribeck(), Stribeck(mu_s=0.3))
+    pair = sf.Asymmetric(sf.Stribeck(), sf.Stribeck(mu_s=0.3))
     assert (pair.static_level(10.0), pair.static_level(10.0, -1)) == (1.5, 3.0)
     assert pair.sliding(0.0, 10.0, -1) == -3.0
-    belt = Capstan(mu_d=0.1, beta=1.0)
+    belt = sf.Capstan(mu_d=0.1, beta=1.0)
     assert belt.static_level(1.0) == pytest.approx(np.exp(0.1) - 1)
     assert belt.static_level(1.0, -1) == pytest.approx(1 - np.exp(-0.1))
     assert belt.sliding(-1.0, 1.0, -1) == pytest.approx(np.exp(-0.1) - 1)
     # velocities that are no widths stay
-    assert Stribeck(v_s=0.1).sliding(0.1, 1.0, 1) == pytest.approx(0.1 + 0.05 * np.exp(-1))
-    steep = MakkarDixon(gamma_3=10.0).sliding(-0.1, 1.0, -1)
+    assert sf.Stribeck(v_s=0.1).sliding(0.1, 1.0, 1) == pytest.approx(0.1 + 0.05 * np.exp(-1))
+    steep = sf.MakkarDixon(gamma_3=10.0).sliding(-0.1, 1.0, -1)
     assert steep == pytest.approx(-(0.5 * (1 - np.tanh(1.0)) + 1.0))
-    for kind in (Hollars, Exudyn):  # rounding a peak takes what the docstring says
+    for kind in (sf.Hollars, sf.Exudyn):  # rounding a peak takes what the docstring says
         v = np.geomspace(1e-4, 1e-1, 20001)
         assert 0.02 < 1 - np.max(kind().force(v, 1.0)) / kind().static_level(1.0) < 0.06

@@ -8,49 +8,24 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from symfric import BrownMcPhee, Coulomb, Law, LuGre, SelfTuning, Stribeck, Viscous, symbolise
-from symfric.laws import (
-    Ambrosio,
-    Andersson,
-    BengisuAkay,
-    Benson,
-    BrittleSelfTuning,
-    Capstan,
-    DuanSingh,
-    Exudyn,
-    Hollars,
-    Lorentzian,
-    MakkarDixon,
-    ModifiedThrelfall,
-    PoppStelter,
-    PowerLawViscous,
-    RuiWang,
-    SimscapeBreakaway,
-    Specker,
-    SteadyStateLuGre,
-    Step5,
-    Table,
-    Threlfall,
-    Tustin,
-    VelocityBased,
-)
+import symfric as sf
 from symfric.laws.static.self_tuning import brittleness, shape_factor
 
 N = 5.0
 V = np.concatenate([np.linspace(-0.1, 0.1, 41), np.geomspace(1e-7, 1.0, 60)])
 LEVELS = {"mu_s": 0.3, "mu_d": 0.2}
 BOTH = {"mu_s": 1.5, "mu_d": 1.0}
-TUNED = SelfTuning(**LEVELS, B=500.0, E=-0.4)
-STRIBECK = Stribeck(**LEVELS, v_s=2e-3, delta=1.0, v_eps=2e-4, sigma_2=0.4)
-SAME: list[tuple[Law, Law, float]] = [
-    (Tustin(**LEVELS, v_s=2e-3, v_eps=2e-4, sigma_2=0.4), STRIBECK, 1e-11),
-    (Andersson(**LEVELS, v_s=2e-3, p=1.0, k_t=5e3, sigma_2=0.4), STRIBECK, 1e-11),
-    (DuanSingh(mu_s=0.2, mu_d=0.2, sigma=1e3), Coulomb(0.2, v_eps=1e-3), 1e-14),
-    (BrownMcPhee(mu_s=0.2, mu_d=0.2, v_t=4e-3), Coulomb(0.2, v_eps=1e-3), 1e-14),
-    (Ambrosio(0.3, 0.0, 2e-3, "original"), Coulomb(0.3, 2e-3, "saturation"), 1e-14),
-    (PowerLawViscous(0.4, d=1.0), Viscous(0.4), 0.0),
-    (RuiWang(D=1.5, C=TUNED.C, B=500.0, E=-0.4), TUNED, 1e-13),
-    (Capstan(0.3, beta=1e-6), Coulomb(0.3e-6), 1e-6),
+TUNED = sf.SelfTuning(**LEVELS, B=500.0, E=-0.4)
+STRIBECK = sf.Stribeck(**LEVELS, v_s=2e-3, delta=1.0, v_eps=2e-4, sigma_2=0.4)
+SAME: list[tuple[sf.Law, sf.Law, float]] = [
+    (sf.Tustin(**LEVELS, v_s=2e-3, v_eps=2e-4, sigma_2=0.4), STRIBECK, 1e-11),
+    (sf.Andersson(**LEVELS, v_s=2e-3, p=1.0, k_t=5e3, sigma_2=0.4), STRIBECK, 1e-11),
+    (sf.DuanSingh(mu_s=0.2, mu_d=0.2, sigma=1e3), sf.Coulomb(0.2, v_eps=1e-3), 1e-14),
+    (sf.BrownMcPhee(mu_s=0.2, mu_d=0.2, v_t=4e-3), sf.Coulomb(0.2, v_eps=1e-3), 1e-14),
+    (sf.Ambrosio(0.3, 0.0, 2e-3, "original"), sf.Coulomb(0.3, 2e-3, "saturation"), 1e-14),
+    (sf.PowerLawViscous(0.4, d=1.0), sf.Viscous(0.4), 0.0),
+    (sf.RuiWang(D=1.5, C=TUNED.C, B=500.0, E=-0.4), TUNED, 1e-13),
+    (sf.Capstan(0.3, beta=1e-6), sf.Coulomb(0.3e-6), 1e-6),
 ]
 """A law, the law that it is with these numbers, and the relative rounding."""
 
@@ -59,38 +34,38 @@ def test_laws_are_the_limits_of_each_other() -> None:
     for one, other, rounding in SAME:
         expected = np.asarray(other.force(V, N))
         assert one.force(V, N) == pytest.approx(expected, rel=rounding, abs=1e-15), one
-    one, other = Specker(**BOTH, v_sp=1e-3, v_t=1e-4), SimscapeBreakaway(**BOTH)
+    one, other = sf.Specker(**BOTH, v_sp=1e-3, v_t=1e-4), sf.SimscapeBreakaway(**BOTH)
     assert one.force(V, 1.0) == pytest.approx(other.force(V, 1.0), abs=4.2e-9)
-    bristle = LuGre(**LEVELS, v_s=2e-3, delta=3.2, sigma_2=0.4, v_eps=0.0)
-    steady = SteadyStateLuGre(F_S=1.5, F_C=1.0, v_s=2e-3, sigma_2=0.4, delta=3.2, v_eps=0.0)
+    bristle = sf.LuGre(**LEVELS, v_s=2e-3, delta=3.2, sigma_2=0.4, v_eps=0.0)
+    steady = sf.SteadyStateLuGre(F_S=1.5, F_C=1.0, v_s=2e-3, sigma_2=0.4, delta=3.2, v_eps=0.0)
     for v in (-0.1, -1e-5, 2e-4, 0.03):
         force = bristle.force(v, N, bristle.steady_state(v, N))
         assert steady.force(v, 0.0) == pytest.approx(force)
 
 
-VALUES: list[tuple[Law, float, float, float, float]] = [
-    *((Viscous(sigma_2=3.0), -0.5, load, -1.5, 0.0) for load in (0.0, 1.0, 1e3)),
-    (Lorentzian(mu_s=0.3, mu_d=0.1, v_s=2e-3, v_eps=0.0), -2e-3, N, -1.0, 1e-14),
-    (PoppStelter(mu_s=0.3, eta=0.4, d=1e6, v_eps=0.0), 1e3, N, 0.6, 1e-8),
-    (BrownMcPhee(**BOTH, v_t=0.02), 0.02, 1.0, 1.5 - 6.7e-4, 2e-6),
-    (BrownMcPhee(**BOTH, v_t=1e-3), 0.1, 1.0, 1.0 + 8e-6, 1e-8),
-    (BrownMcPhee(**BOTH, v_t=1e-3, mu_v=0.4, N_t=2.0), 10.0, 0.5, 0.5 + 4 * tanh(1.0), 1e-9),
-    (SimscapeBreakaway(**BOTH), 1e-2, 1.0, 1.0, 1e-15),
-    (Specker(**BOTH, v_sp=1e-3, v_t=5e-4, sigma_2=100.0), 1e-3, 2.0, 3.0, 1e-15),
-    (MakkarDixon(gamma_4=2.0, gamma_6=0.3), 10.0, 1.0, 5.0, 1e-15),
-    *((RuiWang(D=2.0, C=C), 1e9, 1.0, 2.0 * sin(C * pi / 2), 1e-9) for C in (0.5, 1.0, 1.7)),
-    (Threlfall(1.0, form="original"), 1.000001e-3, 1.0, 0.95, 0.0),
-    *((Hollars(**BOTH, u_eps=u), 1e-2, 2.0, 3 - 0.5625 * u, 1e-14) for u in (0.0, 0.1, 0.4)),
+VALUES: list[tuple[sf.Law, float, float, float, float]] = [
+    *((sf.Viscous(sigma_2=3.0), -0.5, load, -1.5, 0.0) for load in (0.0, 1.0, 1e3)),
+    (sf.Lorentzian(mu_s=0.3, mu_d=0.1, v_s=2e-3, v_eps=0.0), -2e-3, N, -1.0, 1e-14),
+    (sf.PoppStelter(mu_s=0.3, eta=0.4, d=1e6, v_eps=0.0), 1e3, N, 0.6, 1e-8),
+    (sf.BrownMcPhee(**BOTH, v_t=0.02), 0.02, 1.0, 1.5 - 6.7e-4, 2e-6),
+    (sf.BrownMcPhee(**BOTH, v_t=1e-3), 0.1, 1.0, 1.0 + 8e-6, 1e-8),
+    (sf.BrownMcPhee(**BOTH, v_t=1e-3, mu_v=0.4, N_t=2.0), 10.0, 0.5, 0.5 + 4 * tanh(1.0), 1e-9),
+    (sf.SimscapeBreakaway(**BOTH), 1e-2, 1.0, 1.0, 1e-15),
+    (sf.Specker(**BOTH, v_sp=1e-3, v_t=5e-4, sigma_2=100.0), 1e-3, 2.0, 3.0, 1e-15),
+    (sf.MakkarDixon(gamma_4=2.0, gamma_6=0.3), 10.0, 1.0, 5.0, 1e-15),
+    *((sf.RuiWang(D=2.0, C=C), 1e9, 1.0, 2.0 * sin(C * pi / 2), 1e-9) for C in (0.5, 1.0, 1.7)),
+    (sf.Threlfall(1.0, form="original"), 1.000001e-3, 1.0, 0.95, 0.0),
+    *((sf.Hollars(**BOTH, u_eps=u), 1e-2, 2.0, 3 - 0.5625 * u, 1e-14) for u in (0.0, 0.1, 0.4)),
     *(
-        (Exudyn(**BOTH, u_eps=u), 1e-3, 2.0, (2 + exp(-0.1875 * u)) * (1 - 0.1875 * u), 1e-14)
+        (sf.Exudyn(**BOTH, u_eps=u), 1e-3, 2.0, (2 + exp(-0.1875 * u)) * (1 - 0.1875 * u), 1e-14)
         for u in (0.1, 0.4)
     ),
     *(
-        (Capstan(0.3, beta=2 * pi, v_eps=0.0), s, 50.0, 50.0 * expm1(s * 0.6 * pi), 1e-13)
+        (sf.Capstan(0.3, beta=2 * pi, v_eps=0.0), s, 50.0, 50.0 * expm1(s * 0.6 * pi), 1e-13)
         for s in (1.0, -1.0)
     ),
     *(
-        (PowerLawViscous(0.4, d=d, v_eps=1e-4), v, 1.0,
+        (sf.PowerLawViscous(0.4, d=d, v_eps=1e-4), v, 1.0,
          0.4 * np.copysign(abs(v) ** d, v) * (1 + (d - 1) / 2 * (1e-4 / v) ** 2), 1e-8)
         for d in (0.5, 1.5, 3.0) for v in (-0.1, 1e-2)
     ),
@@ -103,13 +78,13 @@ def test_forces_at_marked_velocities_are_the_closed_forms() -> None:
         assert law.force(v, load) == pytest.approx(F, rel=rounding, abs=1e-300), (law, v)
 
 
-PEAKS: list[tuple[Law, float, float, float, float]] = [
-    (BrownMcPhee(**BOTH, v_t=1.0), 1.0068, 5e-5, 1.5 * 0.99957, 1e-5),
-    (SimscapeBreakaway(**BOTH), 1e-3, 2e-8, 1.5 - 4.1e-9, 4e-10),
-    (Stribeck(**BOTH, v_eps=1e-4), 2.7227e-4, 1e-8, 0.968 * 1.5, 7.5e-4),
-    (Andersson(**BOTH, k_t=1e4), 2.7227e-4, 1e-8, 0.968 * 1.5, 7.5e-4),
-    (MakkarDixon(), 2.415e-4, 1e-7, 0.905 * 1.5, 7.5e-4),
-    (BengisuAkay(**BOTH), 1e-3, 1e-8, 1.5, 0.0),
+PEAKS: list[tuple[sf.Law, float, float, float, float]] = [
+    (sf.BrownMcPhee(**BOTH, v_t=1.0), 1.0068, 5e-5, 1.5 * 0.99957, 1e-5),
+    (sf.SimscapeBreakaway(**BOTH), 1e-3, 2e-8, 1.5 - 4.1e-9, 4e-10),
+    (sf.Stribeck(**BOTH, v_eps=1e-4), 2.7227e-4, 1e-8, 0.968 * 1.5, 7.5e-4),
+    (sf.Andersson(**BOTH, k_t=1e4), 2.7227e-4, 1e-8, 0.968 * 1.5, 7.5e-4),
+    (sf.MakkarDixon(), 2.415e-4, 1e-7, 0.905 * 1.5, 7.5e-4),
+    (sf.BengisuAkay(**BOTH), 1e-3, 1e-8, 1.5, 0.0),
 ]
 """Law, velocity of its peak [m/s] and its error, force there under 1 N and its error."""
 
@@ -121,41 +96,41 @@ def test_peaks_have_their_stated_place_and_height() -> None:
         assert v[F.argmax()] == pytest.approx(place, abs=near), law
         assert F.max() == pytest.approx(height, abs=error), law
     v = np.geomspace(1e-9, 1e-2, 20001)
-    short = [1.5 - Stribeck(**BOTH, v_eps=w).force(v, 1.0).max() for w in (1e-4, 1e-5, 1e-6)]
+    short = [1.5 - sf.Stribeck(**BOTH, v_eps=w).force(v, 1.0).max() for w in (1e-4, 1e-5, 1e-6)]
     assert short[0] > 10 * short[1] > 100 * short[2] > 0
-    slow, middle, fast = Stribeck(**BOTH, sigma_2=5.0).force(np.array([3e-4, 3e-3, 0.1]), 1.0)
+    slow, middle, fast = sf.Stribeck(**BOTH, sigma_2=5.0).force(np.array([3e-4, 3e-3, 0.1]), 1.0)
     assert slow > middle < fast
     v = np.linspace(10, 800, 79_001) / 60000
     for law, speed, least in (
-        (SteadyStateLuGre.pilot(), 129, 3.1224), (SteadyStateLuGre.main(), 532, 2.6527)
+        (sf.SteadyStateLuGre.pilot(), 129, 3.1224), (sf.SteadyStateLuGre.main(), 532, 2.6527)
     ):  # fmt: skip
         F = np.asarray(law.force(v, 1.0))
         assert v[F.argmin()] * 60000 == pytest.approx(speed, abs=0.6)
         assert F.min() == pytest.approx(least, abs=5.1e-5)
 
 
-def slope(law: Law, v: float = 0.0, load: float = 1.0) -> float:
+def slope(law: sf.Law, v: float = 0.0, load: float = 1.0) -> float:
     x = ca.SX.sym("x")
     return float(ca.Function("slope", [x], [ca.gradient(law.force(x, load), x)])(v))
 
 
-OLD_THRELFALL = Threlfall(0.2, v_r=2e-3, form="original")
-SLOPES: list[tuple[Law, float]] = [
-    (BrownMcPhee(**BOTH, v_t=1e-3), (4 + 16 / 9 * 0.5) / 1e-3),
-    (SimscapeBreakaway(**BOTH), (sqrt(e) * 0.5 + 10 * 1.0) / 1e-3),
+OLD_THRELFALL = sf.Threlfall(0.2, v_r=2e-3, form="original")
+SLOPES: list[tuple[sf.Law, float]] = [
+    (sf.BrownMcPhee(**BOTH, v_t=1e-3), (4 + 16 / 9 * 0.5) / 1e-3),
+    (sf.SimscapeBreakaway(**BOTH), (sqrt(e) * 0.5 + 10 * 1.0) / 1e-3),
     (OLD_THRELFALL, 3.0 * 0.2 / 2e-3),
-    (ModifiedThrelfall(0.2, 2e-3, "original"), 3.0 / (1 - exp(-3)) * 0.2 / 2e-3),
-    (Threlfall(0.2, v_r=2e-3), 3.0 * 0.2 / 2e-3),
-    (BengisuAkay(**BOTH), 2 * 1.5 / 1e-3),
-    (BengisuAkay(**BOTH, form="original"), 2 * 1.5 / 1e-3),
-    (VelocityBased(**BOTH, v_d=4e-3, form="original"), 1.5 * 1.5 / 1e-3),
-    (VelocityBased(**BOTH, v_d=4e-3), 1.875 * 1.5 / 1e-3),
-    (Ambrosio(0.3, v_0=0.0, v_1=2e-3, form="original"), 0.3 / 2e-3),
-    (Hollars(**BOTH), (2 * 1.5 - 1.0) / 1e-2),
-    (Exudyn(**BOTH), 1.5 / 1e-3),
-    (Step5(**BOTH), 0.0),
+    (sf.ModifiedThrelfall(0.2, 2e-3, "original"), 3.0 / (1 - exp(-3)) * 0.2 / 2e-3),
+    (sf.Threlfall(0.2, v_r=2e-3), 3.0 * 0.2 / 2e-3),
+    (sf.BengisuAkay(**BOTH), 2 * 1.5 / 1e-3),
+    (sf.BengisuAkay(**BOTH, form="original"), 2 * 1.5 / 1e-3),
+    (sf.VelocityBased(**BOTH, v_d=4e-3, form="original"), 1.5 * 1.5 / 1e-3),
+    (sf.VelocityBased(**BOTH, v_d=4e-3), 1.875 * 1.5 / 1e-3),
+    (sf.Ambrosio(0.3, v_0=0.0, v_1=2e-3, form="original"), 0.3 / 2e-3),
+    (sf.Hollars(**BOTH), (2 * 1.5 - 1.0) / 1e-2),
+    (sf.Exudyn(**BOTH), 1.5 / 1e-3),
+    (sf.Step5(**BOTH), 0.0),
     *(
-        (Coulomb(0.2, v_eps=1e-3, shape=shape), steepness * 0.2 / 1e-3)
+        (sf.Coulomb(0.2, v_eps=1e-3, shape=shape), steepness * 0.2 / 1e-3)
         for shape, steepness in {
             "tanh": 1.0, "atan": 2 / pi, "erf": 2 / sqrt(pi), "sqrt": 1.0, "saturation": 1.0,
             "quadratic": 2.0,
@@ -169,13 +144,13 @@ def test_slopes_are_exact_although_equations_have_a_modulus() -> None:
     for law, expected in SLOPES:
         assert slope(law) == pytest.approx(expected, rel=1e-12), law
     behind = 1e-3 * (1 + 1e-9)
-    assert slope(BengisuAkay(**BOTH, form="original"), behind) == pytest.approx(-500.0, rel=1e-6)
-    assert slope(BengisuAkay(**BOTH), behind) == pytest.approx(0.0, abs=1e-2)
+    assert slope(sf.BengisuAkay(**BOTH, form="original"), behind) == pytest.approx(-500.0, rel=1e-6)
+    assert slope(sf.BengisuAkay(**BOTH), behind) == pytest.approx(0.0, abs=1e-2)
 
 
 def test_smoothed_laws_tend_to_their_originals() -> None:
-    for law in (Tustin(**LEVELS), Benson(**LEVELS), SteadyStateLuGre(delta=0.78), Coulomb(0.2),
-                Stribeck(**LEVELS)):  # fmt: skip
+    falling = (kind(**LEVELS) for kind in (sf.Tustin, sf.Benson, sf.Stribeck))
+    for law in (*falling, sf.SteadyStateLuGre(delta=0.78), sf.Coulomb(0.2)):
         original = replace(law, v_eps=0.0)
         assert original.force(0.0, N) == 0.0
         for v in (-3e-3, 1e-4, 5e-4, 2e-3):
@@ -187,7 +162,7 @@ def test_smoothed_laws_tend_to_their_originals() -> None:
             assert errors[0] > 0 or abs(v) > 1e-3, law
             assert errors[2] < 5e-4, law
     for shape in ("tanh", "atan", "quadratic"):
-        law = Coulomb(0.2, v_eps=0.0, shape=shape)
+        law = sf.Coulomb(0.2, v_eps=0.0, shape=shape)
         assert [law.force(v, N) for v in (-1e-300, 0.0, 1e-9, 7.0)] == [-1.0, 0.0, 1.0, 1.0]
         assert law.velocity_scale == inf
 
@@ -197,7 +172,7 @@ MU = (0.15, 0.16, 0.12, 0.1, 0.1, 0.2)
 
 
 def test_table_is_the_monotone_cubic_of_its_points_and_constant_beyond() -> None:
-    law = Table(SPEEDS, MU, v_eps=1e-6)
+    law = sf.Table(SPEEDS, MU, v_eps=1e-6)
     slopes = PchipInterpolator(SPEEDS, MU).derivative()(SPEEDS)
     slopes[[0, -1]] = 0.0
     v = np.linspace(1e-3, 0.1, 1001)
@@ -207,31 +182,31 @@ def test_table_is_the_monotone_cubic_of_its_points_and_constant_beyond() -> None
     assert law.force(7.0, N) == pytest.approx(1.0, rel=1e-14)
     assert law.force(0.0, N) == 0.0
     for knot in SPEEDS[1:]:
-        sides = [slope(Table(SPEEDS, MU), knot * (1 + s)) for s in (-1e-9, 0.0, 1e-9)]
+        sides = [slope(sf.Table(SPEEDS, MU), knot * (1 + s)) for s in (-1e-9, 0.0, 1e-9)]
         assert sides == pytest.approx([sides[1]] * 3, abs=1e-4)
 
 
 RATIOS = (0.0, 0.3, 0.55, 0.8, 0.95)
 
 
-def rest_slope(law: SelfTuning, load: float = N) -> float:
+def rest_slope(law: sf.SelfTuning, load: float = N) -> float:
     return float(law.force(1e-12, load)) / 1e-12
 
 
 def test_peak_is_the_static_level_and_the_asymptote_the_dynamic_one() -> None:
     for ratio in RATIOS[1:]:
         for B, E in ((1.0, -5.0), (200.0, 0.0), (1e4, 0.5)):
-            law = SelfTuning(mu_s=0.4, mu_d=0.4 * ratio, B=B, E=E)
+            law = sf.SelfTuning(mu_s=0.4, mu_d=0.4 * ratio, B=B, E=E)
             peak = np.max(law.force(np.geomspace(1e-3, 1e3, 40_001) / B, N))
             assert 2.0 * (1 - 1e-6) <= peak <= 2.0
             assert law.force(1e12 / B, N) == pytest.approx(2.0 * ratio, rel=1e-9)
             assert rest_slope(law) == pytest.approx(2.0 * B * law.C, rel=1e-6)
-            brittle = BrittleSelfTuning(mu_s=0.4, mu_d=0.4 * ratio, E=E)
+            brittle = sf.BrittleSelfTuning(mu_s=0.4, mu_d=0.4 * ratio, E=E)
             for load in (1e-9, N, 1e4):
                 F = brittle.force(np.geomspace(1e-6, 1.0, 20_001), load)
                 assert np.max(F) == pytest.approx(0.4 * load, rel=1e-6)
                 assert brittle.force(1e12, load) == pytest.approx(0.4 * ratio * load, rel=1e-6)
-    F = SelfTuning(mu_s=0.2, mu_d=0.2).force(np.geomspace(1e-6, 1e3, 1001), N)
+    F = sf.SelfTuning(mu_s=0.2, mu_d=0.2).force(np.geomspace(1e-6, 1e3, 1001), N)
     assert (np.diff(F) > 0).all(), "equal levels have no peak"
     assert F[-1] < 1.0
 
@@ -240,31 +215,31 @@ def test_peak_and_slope_are_the_chosen_ones() -> None:
     for ratio in RATIOS:
         for v_p in (1e-5, 3e-3, 1.0):
             for E in (-5.0, 0.0, 0.9) if ratio else (0.0,):
-                law = SelfTuning.from_peak_velocity(v_p, mu_s=0.4, mu_d=0.4 * ratio, E=E)
+                law = sf.SelfTuning.from_peak_velocity(v_p, mu_s=0.4, mu_d=0.4 * ratio, E=E)
                 near = [float(law.force(share * v_p, N)) for share in (0.99, 1.0, 1.01)]
                 assert near[1] == pytest.approx(2.0, rel=1e-14)
                 assert near[0] < near[1] > near[2]
         for E in (0.0, 0.5, -2.0):
-            law = SelfTuning.from_slope(3e3, N, mu_s=0.4, mu_d=0.4 * ratio, E=E)
+            law = sf.SelfTuning.from_slope(3e3, N, mu_s=0.4, mu_d=0.4 * ratio, E=E)
             assert rest_slope(law) == pytest.approx(3e3, rel=1e-6)
     for rho, stiffness in ((0.5, 1.376), (0.8, 2.036), (0.9, 2.736)):  # as published
-        found = SelfTuning.from_peak_velocity(1.0, mu_s=1.0, mu_d=rho).B
+        found = sf.SelfTuning.from_peak_velocity(1.0, mu_s=1.0, mu_d=rho).B
         assert found == pytest.approx(stiffness, abs=5.1e-4)
     for ratio, y_p in ((0.1, 1.2), (0.5, 1.1), (0.5, 1.5), (0.9, 2.95)):
         # stiffness and peak velocity given: E = (B v_p - tan(pi/2C)) / (B v_p - atan(B v_p))
         E = (y_p - tan(pi / (2 * shape_factor(ratio)))) / (y_p - atan(y_p))
-        law = SelfTuning(mu_s=0.4, mu_d=0.4 * ratio, B=200.0, E=E)
+        law = sf.SelfTuning(mu_s=0.4, mu_d=0.4 * ratio, B=200.0, E=E)
         assert law.force(y_p / 200.0, N) == pytest.approx(2.0, rel=1e-14)
 
 
 def test_symbols_give_stiffnesses_except_of_a_curved_peak() -> None:
     mu_s, load = ca.SX.sym("mu_s"), ca.SX.sym("N")
-    assert isinstance(SelfTuning.from_slope(3e3, N, mu_s=mu_s).B, ca.SX)
-    assert isinstance(SelfTuning.from_peak_velocity(1e-3, mu_s=mu_s).B, ca.SX)
-    brittle = SelfTuning(B=brittleness(load, 0.05))
+    assert isinstance(sf.SelfTuning.from_slope(3e3, N, mu_s=mu_s).B, ca.SX)
+    assert isinstance(sf.SelfTuning.from_peak_velocity(1e-3, mu_s=mu_s).B, ca.SX)
+    brittle = sf.SelfTuning(B=brittleness(load, 0.05))
     v_p = ca.Function("peak", [load], [tan(pi / (2 * brittle.C)) / brittle.B])
     assert float(v_p(200.0)) < float(v_p(N))
-    law, (mu_d,) = symbolise(SelfTuning(mu_s=0.2, mu_d=0.1), "mu_d")
+    law, (mu_d,) = sf.symbolise(sf.SelfTuning(mu_s=0.2, mu_d=0.1), "mu_d")
     slope = ca.Function("slope", [mu_d.symbol], [ca.gradient(law.C, mu_d.symbol)])
     assert float(slope(0.2)) == -inf, "where the levels meet"
 
@@ -272,12 +247,12 @@ def test_symbols_give_stiffnesses_except_of_a_curved_peak() -> None:
 def test_shape_factor_has_known_values() -> None:
     for rho, C in ((0.0, 2.0), (2 / 3, 1.5354), (0.8, 1.4097), (1.0, 1.0)):
         assert shape_factor(rho) == pytest.approx(C, abs=5e-5)
-        assert pytest.approx(C, abs=5e-5) == SelfTuning(mu_s=0.3, mu_d=0.3 * rho).C
+        assert pytest.approx(C, abs=5e-5) == sf.SelfTuning(mu_s=0.3, mu_d=0.3 * rho).C
 
 
 def test_brittleness_has_the_tabulated_values() -> None:
     for load, B in ((5.0, 186), (10.0, 263), (50.0, 669), (200.0, 984)):
         assert brittleness(load, 0.05) == pytest.approx(B, abs=0.51)
-        law = BrittleSelfTuning(mu_s=0.15, mu_d=0.1)
-        same = SelfTuning(mu_s=0.15, mu_d=0.1, B=brittleness(load, 0.05))
+        law = sf.BrittleSelfTuning(mu_s=0.15, mu_d=0.1)
+        same = sf.SelfTuning(mu_s=0.15, mu_d=0.1, B=brittleness(load, 0.05))
         assert law.force(1e-3, load) == pytest.approx(same.force(1e-3, load), rel=1e-12)

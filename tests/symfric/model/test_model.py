@@ -10,31 +10,20 @@ import numpy as np
 import pytest
 from refusing import not_refused
 
-import symfric
-import symfric.laws
-import symfric.model
-from symfric import (
-    BrownMcPhee,
-    LuGre,
-    Model,
-    Output,
-    RateAndState,
-    Variable,
-    contact,
-    rabinowicz,
-    simulate,
-    simulate_many,
-)
-from symfric.laws import Armstrong
+import symfric as sf
 from symfric.scenes import ALL_SCENES, Arm, FourBar
 
-x, y = Variable("x", "m", start=1.0, nominal=0.1), Variable("y", "m/s")
-w, u, k = Variable("w", "N"), Variable("u", "N", start=2.0), Variable("k", "N/m", start=3.0)
+x, y = sf.Variable("x", "m", start=1.0, nominal=0.1), sf.Variable("y", "m/s")
+w, u, k = (
+    sf.Variable("w", "N"),
+    sf.Variable("u", "N", start=2.0),
+    sf.Variable("k", "N/m", start=3.0),
+)
 
 
-def oscillator() -> Model:
+def oscillator() -> sf.Model:
     """x' = y, y' = w, 0 = w + k x - u."""
-    return Model(
+    return sf.Model(
         "oscillator",
         x=(x, y),
         z=(w,),
@@ -42,7 +31,7 @@ def oscillator() -> Model:
         p=(k,),
         ode=ca.vertcat(y.symbol, w.symbol),
         alg=w.symbol + k.symbol * x.symbol - u.symbol,
-        outputs={"energy": Output(k.symbol * x.symbol**2 / 2, "J")},
+        outputs={"energy": sf.Output(k.symbol * x.symbol**2 / 2, "J")},
     )
 
 
@@ -64,7 +53,7 @@ def test_functions_have_named_arguments_and_the_values_of_the_equations() -> Non
 
 
 def test_absent_groups_are_columns_without_rows() -> None:
-    model = Model("decay", x=(x,), ode=-x.symbol)
+    model = sf.Model("decay", x=(x,), ode=-x.symbol)
     assert [model.vector(letter).shape for letter in "xzup"] == [(1, 1), (0, 1), (0, 1), (0, 1)]
     assert model.function("ode").size_in("u") == (0, 1)
     assert model.nominal("x").tolist() == [0.1]
@@ -72,10 +61,10 @@ def test_absent_groups_are_columns_without_rows() -> None:
 
 
 def test_start_values_may_depend_on_states_and_parameters() -> None:
-    a = Variable("a", "1", start=2.0)
-    b = Variable("b", "1", start=a.symbol * k.symbol)
-    c = Variable("c", "1", start=b.symbol + 1)
-    model = Model("chain", x=(c, a, b), p=(k,), ode=ca.SX(3, 1))
+    a = sf.Variable("a", "1", start=2.0)
+    b = sf.Variable("b", "1", start=a.symbol * k.symbol)
+    c = sf.Variable("c", "1", start=b.symbol + 1)
+    model = sf.Model("chain", x=(c, a, b), p=(k,), ode=ca.SX(3, 1))
     assert model.initial_state().tolist() == [7.0, 2.0, 6.0]
     assert model.initial_state({"a": 1.0}, {"k": 5.0}).tolist() == [6.0, 1.0, 5.0]
     assert model.initial_state({"b": 0.0}).tolist() == [1.0, 2.0, 0.0]
@@ -83,7 +72,7 @@ def test_start_values_may_depend_on_states_and_parameters() -> None:
 
 def test_implicit_model_has_a_residual_and_no_ode() -> None:
     xdot = ca.SX.sym("xdot")
-    model = Model("implicit", x=(x,), xdot=xdot, residual=xdot**3 + x.symbol)
+    model = sf.Model("implicit", x=(x,), xdot=xdot, residual=xdot**3 + x.symbol)
     assert model.ode is None
     assert float(model.function("residual")(0, 2.0, 1.0, [], [], [])) == 9.0
     with pytest.raises(ValueError, match=r"model 'implicit': expected one of alg, .*got ode"):
@@ -92,19 +81,19 @@ def test_implicit_model_has_a_residual_and_no_ode() -> None:
 
 def test_inconsistent_models_and_bad_values_are_refused() -> None:
     names = {"x": x, "y": y, "k": k, "s": ca.SX.sym("s"), "replace": replace}
-    names |= {"m": oscillator(), "d": symfric.drive(symfric.Karnopp())}
-    packages = symfric, symfric.laws, symfric.model
+    names |= {"m": oscillator(), "d": sf.drive(sf.Karnopp())}
+    packages = sf, sf.laws, sf.model
     assert not_refused(Path(__file__).with_name("refusals.toml"), *packages, **names) == []
 
 
 def test_details_are_written_when_asked_for_and_once() -> None:
-    x, calls = Variable("x", "m"), []
+    x, calls = sf.Variable("x", "m"), []
 
-    def more() -> dict[str, Output]:
+    def more() -> dict[str, sf.Output]:
         calls.append("written")
-        return {"twice": Output(2 * x.symbol, "m")}
+        return {"twice": sf.Output(2 * x.symbol, "m")}
 
-    model = Model("m", x=(x,), ode=-x.symbol, details=more)
+    model = sf.Model("m", x=(x,), ode=-x.symbol, details=more)
     assert float(model.function("ode")(0, 3, [], [], [])) == -3
     assert not calls
     assert float(model.function("twice")(0, 3, [], [], [])) == 6
@@ -116,16 +105,16 @@ def test_details_are_written_when_asked_for_and_once() -> None:
 
 
 def test_model_without_states_is_solved() -> None:
-    z, t = Variable("z", "1", start=1.0), ca.SX.sym("t")
+    z, t = sf.Variable("z", "1", start=1.0), ca.SX.sym("t")
     for given in ({"alg": z.symbol**3 - t - 1}, {"residual": z.symbol**3 - t - 1}):
-        run = simulate(Model("root", z=(z,), t=t, **given), 1.0)
+        run = sf.simulate(sf.Model("root", z=(z,), t=t, **given), 1.0)
         assert run.final["z"] == pytest.approx(2 ** (1 / 3), abs=1e-6)
 
 
 def test_a_copy_and_a_pickle_have_the_same_symbols() -> None:
-    machine = Arm(BrownMcPhee()).mechanism()
-    model = rabinowicz(BrownMcPhee())
-    run = simulate(model, 0.1)
+    machine = Arm(sf.BrownMcPhee()).mechanism()
+    model = sf.rabinowicz(sf.BrownMcPhee())
+    run = sf.simulate(model, 0.1)
     assert len(copy(machine).build().u) == 6  # its forces know the inputs
     assert ca.is_equal(copy(model).x[0].symbol, model.x[0].symbol)
     assert copy(run).model is model
@@ -136,10 +125,10 @@ def test_a_copy_and_a_pickle_have_the_same_symbols() -> None:
 def test_scenes_have_the_accelerations_of_their_positions() -> None:
     """Differences of the dense rates: of second order in h, and rounded by 1e-16 / h."""
     for name in ("rabinowicz", "drill_string", "nip", "clutch", "pendulum_box", "slider_crank"):
-        scene = ALL_SCENES[name](BrownMcPhee())
+        scene = ALL_SCENES[name](sf.BrownMcPhee())
         given = {n: g.function for n, g in scene.inputs.items()}
         model = scene.model()
-        run = simulate(model, 0.2, u=given, rtol=1e-8, samples=5)
+        run = sf.simulate(model, 0.2, u=given, rtol=1e-8, samples=5)
         found = [n for n in run.details if n.endswith("_acc")]
         moves = {v.unit for v in model.x} & {"m/s", "rad/s"}
         assert bool(found) is bool(moves), name
@@ -160,50 +149,50 @@ def test_scenes_have_the_accelerations_of_their_positions() -> None:
 
 
 def test_the_acceleration_of_the_block_is_what_newton_says() -> None:
-    run = simulate(rabinowicz(LuGre()), 3.0, samples=301)
+    run = sf.simulate(sf.rabinowicz(sf.LuGre()), 3.0, samples=301)
     np.testing.assert_allclose(run["x_acc"], (-2.1 * run["x"] - run["friction"]) / 0.8, atol=1e-12)
     assert run.unit("x_acc") == "m/s^2"
 
 
 def test_a_velocity_that_a_law_keeps_has_no_acceleration() -> None:
-    model = rabinowicz(Armstrong())
+    model = sf.rabinowicz(sf.Armstrong())
     assert [v.unit for v in model.x if v.name == "w"] == ["m/s"]
     assert [*model.further] == ["x_acc"]
 
 
 def test_accelerations_cost_nothing_until_they_are_asked_for() -> None:
-    model = FourBar(BrownMcPhee()).model()
-    run = simulate(model, 0.05, samples=3)
+    model = FourBar(sf.BrownMcPhee()).model()
+    run = sf.simulate(model, 0.05, samples=3)
     assert "further" not in model.__dict__
     assert not any(n.endswith("_acc") for n in run.units)
     assert "theta_crank_acc" in run.details
 
 
 def test_only_rates_that_are_states_have_accelerations_and_names_are_not_taken_twice() -> None:
-    x, v, w = Variable("x", "m"), Variable("v", "m/s"), Variable("w", "V")
-    model = Model(
+    x, v, w = sf.Variable("x", "m"), sf.Variable("v", "m/s"), sf.Variable("w", "V")
+    model = sf.Model(
         "own", x=(x, v, w), ode=ca.vertcat(v.symbol, -x.symbol, 2 * v.symbol),
-        details=lambda: {"x_acc": Output(7.0, "m")},
+        details=lambda: {"x_acc": sf.Output(7.0, "m")},
     )  # fmt: skip
     assert list(model.further) == ["x_acc"]
     assert model.further["x_acc"].unit == "m"
     rate = ca.SX.sym("rate")
-    implicit = Model("rc", x=(w,), xdot=rate, residual=rate + w.symbol)
+    implicit = sf.Model("rc", x=(w,), xdot=rate, residual=rate + w.symbol)
     assert implicit.further == {}
-    volts = Model("volts", x=(w, x), ode=ca.vertcat(x.symbol, w.symbol))
+    volts = sf.Model("volts", x=(w, x), ode=ca.vertcat(x.symbol, w.symbol))
     assert {n: o.unit for n, o in volts.further.items()} == {"w_acc": "m/s", "x_acc": "V/s"}
 
 
-LAW = RateAndState(mu_0=0.6, a=0.01, b=0.015, v_0=1e-6, D_c=1e-3)
+LAW = sf.RateAndState(mu_0=0.6, a=0.01, b=0.015, v_0=1e-6, D_c=1e-3)
 PLATE, STRESS, ETA = 1e-9, 50e6, 5e6
 
 
-def fault() -> Model:
+def fault() -> sf.Model:
     """A patch without mass: its velocity is an algebraic variable."""
-    load = Variable("load", "Pa", start=3.2e7, nominal=1e7)
-    v = Variable("v", "m/s", start=PLATE, nominal=PLATE)
-    rock = contact("fault", LAW, v.symbol, STRESS)
-    return Model(
+    load = sf.Variable("load", "Pa", start=3.2e7, nominal=1e7)
+    v = sf.Variable("v", "m/s", start=PLATE, nominal=PLATE)
+    rock = sf.contact("fault", LAW, v.symbol, STRESS)
+    return sf.Model(
         "fault",
         x=(load,),
         z=(v,),
@@ -224,26 +213,26 @@ def test_a_law_starts_by_the_start_value_of_an_algebraic_velocity() -> None:
 
 
 def test_a_fault_without_mass_comes_to_creep_where_the_rock_is_stiff() -> None:
-    end = simulate(fault(), 3e8).final  # 3e8 Pa/m is above (b - a) STRESS / D_c
+    end = sf.simulate(fault(), 3e8).final  # 3e8 Pa/m is above (b - a) STRESS / D_c
     assert end["v"] == pytest.approx(PLATE, rel=1e-3)
     mu = 0.6 + (0.01 - 0.015) * np.log(PLATE / 1e-6)
     assert end["load"] == pytest.approx(mu * STRESS, rel=1e-3)
 
 
-def under_varying_load(law: LuGre) -> Model:
-    x, v, t = Variable("x", "m"), Variable("v", "m/s", start=0.3), ca.SX.sym("t")
-    floor = contact("floor", law, v, 5 + ca.sin(t))
-    return Model("varying", x=(x, v), ode=ca.vertcat(v, 1 - floor.force), contacts=(floor,), t=t)
+def under_varying_load(law: sf.LuGre) -> sf.Model:
+    x, v, t = sf.Variable("x", "m"), sf.Variable("v", "m/s", start=0.3), ca.SX.sym("t")
+    floor = sf.contact("floor", law, v, 5 + ca.sin(t))
+    return sf.Model("varying", x=(x, v), ode=ca.vertcat(v, 1 - floor.force), contacts=(floor,), t=t)
 
 
 def test_a_bristle_under_a_load_that_varies_starts_at_its_steady_state() -> None:
-    law = LuGre()
+    law = sf.LuGre()
     model = under_varying_load(law)
     for begin in (0.0, 1.5):
         steady = float(law.steady_state(0.3, 5 + np.sin(begin))[0])
         assert model.initial_state(t=begin)[2] == pytest.approx(steady, rel=1e-14)
-        run = simulate(model, begin + 0.5, t_start=begin, samples=3, sensitivities=["x0.v"])
-        many = simulate_many(
+        run = sf.simulate(model, begin + 0.5, t_start=begin, samples=3, sensitivities=["x0.v"])
+        many = sf.simulate_many(
             model, begin + 0.5, t_start=begin, x0={"v": [0.3, 0.4]}, backend="vm", executor="serial"
         )
         assert run["z"][0] == pytest.approx(steady, rel=1e-14)

@@ -1,11 +1,12 @@
 """Normal forces of bearings from reactions, and what friction asks of a joint."""
 
 from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from chains import chain, solve
+from chains import attach, in_joint_coordinates_first
 
 from symfric import (
     Asymmetric,
@@ -20,21 +21,12 @@ from symfric import (
     Viscous,
     simulate,
 )
-from symfric.laws import (
-    GMS,
-    Gonthier,
-    Karnopp,
-    Law,
-    LuGreNormalised,
-    QuarterCarGeneral,
-)
+from symfric.laws import GMS, Gonthier, Karnopp, Law, LuGreNormalised, QuarterCarGeneral
 from symfric.multibody import JointFriction, Mechanism, Revolute, Spherical, Universal
-from symfric.scenes import FourBar, SliderCrank
-from symfric.scenes.linkages import MechanismScene
+from symfric.scenes import SliderCrank
 
 pytestmark = pytest.mark.heavy
 
-in_both = pytest.mark.parametrize("formulation", ["joint", "absolute"])
 
 LAW = BrownMcPhee()
 F, T = ca.SX([3.0, -4.0, 5.0]), ca.SX([0.6, -0.8, 0.2])
@@ -65,14 +57,6 @@ def test_bearings_press_at_two_stations_or_as_they_are_given() -> None:
     assert load(JointFriction(LAW, normal=2.5), SLIDE) == 2.5
 
 
-def test_an_unloaded_bearing_does_not_press_and_has_a_slope() -> None:
-    f = ca.SX.sym("f", 3)
-    N = JointFriction(LAW, radius=0.1).normal_force(TURN, f, ca.SX(3, 1))
-    value, slope = ca.Function("N", [f], [N, ca.gradient(N, f)]).call([[0.0, 0.0, 0.0]])
-    assert float(value) == 0.0
-    assert slope.full() == pytest.approx(0.0)
-
-
 WRONG = [
     (JointFriction(LAW), TURN, "radius: expected the bearing's radius"),
     (JointFriction(Karnopp(), radius=0.1), ("ball",), "Karnopp, which also needs F_e; a ball has"),
@@ -94,23 +78,24 @@ def test_bad_bearings_are_described() -> None:
 
 KINETIC = BrownMcPhee(mu_s=0.2, mu_d=0.2, mu_v=0.0, v_t=1e-3)
 """0.2 N at any speed well above a millimetre per second."""
-
-
-def rotor(formulation: str, law: Law = KINETIC, **friction: float) -> Trajectory:
-    """A rotor of J = 0.05 kg m^2 on a ball of 2 cm, pressed by 20 N, spinning about a skew axis."""
-    m = Mechanism("rotor", gravity=(0.0, 0.0, -10.0))
-    m.body("wheel", 2.0, (0.05, 0.05, 0.05))
-    bearing = JointFriction(law, radius=0.02, **friction)
-    rate = tuple(0.5 * w for w in SPIN)
-    m.joint(Spherical("ball", "ground", "wheel", rate=(0.0, *rate), friction=bearing))
-    return simulate(m.build(formulation=formulation), 2.0, rtol=1e-7, samples=201)
-
-
 SPIN = np.array([1.0, -4.0, 8.0])
 """9 rad/s."""
 
 
-@in_both
+def ball(law: Law, **friction: Any) -> Mechanism:
+    """A rotor of J = 0.05 kg m^2 on a ball of 2 cm, pressed by 20 N, spinning about a skew axis."""
+    m = Mechanism("rotor", gravity=(0.0, 0.0, -10.0))
+    bearing = JointFriction(law, radius=0.02, **friction)
+    rate = (0.0, *(0.5 * SPIN).tolist())
+    attach(m, Spherical, "ball", "wheel", mass=2.0, J=0.05, rate=rate, friction=bearing)
+    return m
+
+
+def rotor(formulation: str, law: Law = KINETIC) -> Trajectory:
+    return simulate(ball(law).build(formulation=formulation), 2.0, rtol=1e-7, samples=101)
+
+
+@in_joint_coordinates_first
 def test_a_spinning_ball_slows_down_linearly(formulation: str) -> None:
     """J w' = -R mu N: from 9 rad/s with 1.6 rad/s^2."""
     run = rotor(formulation)
@@ -121,32 +106,27 @@ def test_a_spinning_ball_slows_down_linearly(formulation: str) -> None:
     assert run["friction_work_rate"] == pytest.approx(-run["ball_power"])
 
 
-def test_bristles_of_a_ball_are_vectors() -> None:
-    """LuGre slows the rotor down as Coulomb, once its bristles lie against the motion."""
-    law = LuGre(mu_s=0.2, mu_d=0.2, sigma_2=0.0)
-    run = rotor("joint", law)
-    assert run["ball_slip"][-1] == pytest.approx(0.02 * (9.0 - 1.6 * 2), rel=1e-3)
-    bristles = np.array([run[f"ball_z_{axis}"][-1] for axis in "xyz"])
-    assert bristles / np.linalg.norm(bristles) == pytest.approx(SPIN / 9.0, abs=1e-6)
-    other = rotor("absolute", law)
-    assert other["ball_slip"] == pytest.approx(run["ball_slip"], rel=1e-4)
-
-
 @pytest.mark.parametrize(
-    "law", [GMS(mu_s=0.2, mu_d=0.2), Dahl(mu_d=0.2, n=1.5), Gonthier(mu_s=0.2, mu_d=0.2)],
-    ids=lambda law: type(law).__name__,
+    ("law", "formulation"),
+    [(LuGre(mu_s=0.2, mu_d=0.2, sigma_2=0.0), "absolute"), (GMS(mu_s=0.2, mu_d=0.2), "joint"),
+     (Dahl(mu_d=0.2, n=1.5), "joint"), (Gonthier(mu_s=0.2, mu_d=0.2), "joint")],
 )  # fmt: skip
-def test_elements_that_yield_slow_a_ball_down_as_coulomb(law: Law) -> None:
-    assert rotor("joint", law)["ball_slip"][-1] == pytest.approx(0.02 * (9.0 - 1.6 * 2), rel=1e-3)
+def test_bristles_of_a_ball_are_vectors(law: Law, formulation: str) -> None:
+    """They slow the rotor down as Coulomb, once they lie against the motion."""
+    run = rotor(formulation, law)
+    assert run["ball_slip"][-1] == pytest.approx(0.02 * (9.0 - 1.6 * 2), rel=1e-3)
+    if isinstance(law, LuGre):
+        bristles = np.array([run[f"ball_z_{axis}"][-1] for axis in "xyz"])
+        assert bristles / np.linalg.norm(bristles) == pytest.approx(SPIN / 9.0, abs=1e-6)
 
 
 def test_a_ball_that_sticks_stays_where_it_is() -> None:
     """A pendulum tilted by 0.1 rad; up to 0.2 rad friction holds what hangs 10 cm below."""
     m = Mechanism("held", gravity=(0.0, 0.0, -10.0))
-    m.body("bob", 2.0, (0.05, 0.05, 0.05), com=(0.0, 0.0, -0.1))
     tilt = (np.cos(0.05), 0.6 * np.sin(0.05), 0.8 * np.sin(0.05), 0.0)
     bearing = JointFriction(LuGre(mu_s=0.2, mu_d=0.15), radius=0.1)
-    m.joint(Spherical("ball", "ground", "bob", start=tilt, friction=bearing))
+    attach(m, Spherical, "ball", "bob", mass=2.0, J=0.05, com=(0.0, 0.0, -0.1), start=tilt,
+           friction=bearing)  # fmt: skip
     run = simulate(m.build(), 3.0, rtol=1e-6, samples=50)
     assert run["ball_e1"] == pytest.approx(tilt[1], rel=1e-2)  # bristles bend by 0.03 mm
     assert np.ptp(run["ball_e1"][25:]) < 1e-8
@@ -155,13 +135,12 @@ def test_a_ball_that_sticks_stays_where_it_is() -> None:
     assert run["ball_friction"][-1] == pytest.approx(20.0 * np.sin(0.1), rel=1e-2)
 
 
-@in_both
+@in_joint_coordinates_first
 def test_a_shaft_on_a_cross_slows_down_linearly(formulation: str) -> None:
     """It turns about the horizontal x; both of its bearings carry 20 N across their axes."""
     m = Mechanism("cross", gravity=(0.0, 0.0, -10.0))
-    m.body("shaft", 2.0, (0.05, 0.05, 0.05))
-    bearing = JointFriction(KINETIC, radius=0.02)
-    m.joint(Universal("cross", "ground", "shaft", rate=(9.0, 0.0), friction=bearing))
+    attach(m, Universal, "cross", "shaft", mass=2.0, J=0.05, rate=(9.0, 0.0),
+           friction=JointFriction(KINETIC, radius=0.02))  # fmt: skip
     run = simulate(m.build(formulation=formulation), 2.0, rtol=1e-7, samples=101)
     assert run["cross_x_slip"] == pytest.approx(0.02 * (9.0 - 1.6 * run.t), rel=2e-5)
     assert run["cross_y_slip"] == pytest.approx(0.0, abs=1e-9)
@@ -185,22 +164,7 @@ def test_bearings_of_a_cross_feel_what_it_transmits() -> None:
     assert loads["y"] == pytest.approx(np.hypot(3, 1 + 4) + 4 + 2, rel=1e-6)
 
 
-@pytest.mark.parametrize("reverse", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_friction_in_all_joints_is_the_same_in_both_formulations(reverse: bool) -> None:
-    m = chain(reverse)
-    law = BrownMcPhee(mu_s=0.03, mu_d=0.02, v_t=0.5)
-    bearing = JointFriction(law, radius=0.05, length=0.5, width=0.5)
-    m.joints = [replace(j, friction=bearing if j.rubs else None) for j in m.joints]
-    made = [m.prepare(formulation=f) for f in ("joint", "absolute")]
-    tree, whole = (solve(one.eq, one.q0, one.qd0) for one in made)
-    names = [c.name for c in made[0].eq.contacts]
-    assert names == ["j0", "j1", "j2_slide", "j2_turn", "j3_x", "j3_y", "j5"]
-    assert pytest.approx(whole.N, rel=1e-12) == tree.N
-    for body, motion in tree.bodies.items():
-        assert motion == pytest.approx(whole.bodies[body], rel=1e-10, abs=1e-10), body
-
-
-@pytest.mark.parametrize("formulation", ["joint", pytest.param("absolute", marks=pytest.mark.slow)])
+@in_joint_coordinates_first
 def test_friction_in_balls_and_crosses_takes_energy(formulation: str) -> None:
     """A double pendulum in space: what is missing is what friction took."""
     m = Mechanism("double")
@@ -218,31 +182,22 @@ def test_friction_in_balls_and_crosses_takes_energy(formulation: str) -> None:
     assert taken > 0.5
 
 
-@pytest.mark.parametrize(
-    "law",
-    [GMS(form="event"), Asymmetric(LuGre(), LuGre(mu_s=0.3))],
-    ids=lambda law: type(law).__name__,
-)
-def test_laws_without_a_form_for_vectors_are_refused_in_a_ball_by_name(law: Law) -> None:
-    m = Mechanism("rotor")
-    m.body("wheel", 2.0, (0.05, 0.05, 0.05))
-    m.joint(Spherical("ball", "ground", "wheel", friction=JointFriction(law, radius=0.1)))
-    path = "mechanism 'rotor' > joint 'ball' > friction: law: expected an isotropic one"
-    with pytest.raises(ValueError, match=path) as caught:
-        m.build()
-    assert f"got {type(law).__name__}" in str(caught.value)
+def test_laws_without_a_form_for_vectors_are_refused_in_a_ball_by_name() -> None:
+    for law in (GMS(form="event"), Asymmetric(LuGre(), LuGre(mu_s=0.3))):
+        path = "mechanism 'rotor' > joint 'ball' > friction: law: expected an isotropic one, got "
+        with pytest.raises(ValueError, match=path + type(law).__name__):
+            ball(law).build()
 
 
 def brake(formulation: str = "joint") -> Mechanism:
     """A disc on a shaft, pressed by an input."""
     m = Mechanism("brake", gravity=(0.0, 0.0, 0.0))
-    m.body("disc", 1.0, (0.1, 0.1, 0.1))
     clamp = JointFriction(KINETIC, radius=0.1, normal=m.input("clamp", "N", start=10.0))
-    m.joint(Revolute("shaft", "ground", "disc", rate=20.0, friction=clamp))
+    attach(m, Revolute, "shaft", "disc", J=0.1, rate=20.0, friction=clamp)
     return m
 
 
-@in_both
+@in_joint_coordinates_first
 def test_a_brake_that_pulls_is_an_error_at_its_time(formulation: str) -> None:
     """The clamp falls through zero at 2 s; friction would drive the disc from then on."""
     model = brake().build(formulation=formulation)
@@ -259,43 +214,25 @@ def test_a_brake_that_pulls_is_an_error_at_its_time(formulation: str) -> None:
 
 def test_a_negative_preload_is_an_error_where_it_outweighs_the_reaction() -> None:
     preload = Variable("preload", "N", start=0.0)
-    m = Mechanism("m", gravity=(0.0, 0.0, -10.0))
-    m.body("wheel", 2.0, (0.05, 0.05, 0.05))
-    friction = JointFriction(KINETIC, radius=0.02, preload=preload.symbol)
-    m.joint(Spherical("ball", "ground", "wheel", friction=friction))
-    model = m.build((preload,))
+    model = ball(KINETIC, preload=preload.symbol).build((preload,))
     assert simulate(model, 0.1, p={"preload": -19.0})["ball_N"][-1] == pytest.approx(1.0, abs=1e-3)
     with pytest.raises(ValueError, match="force of joint 'ball' with BrownMcPhee falls below"):
         simulate(model, 0.1, p={"preload": -25.0})
 
 
-@pytest.mark.parametrize("scene", [SliderCrank(LuGre()), FourBar(LuGre())], ids=["crank", "bar"])
-def test_bristles_that_keep_the_deflection_of_another_load_are_named(scene: MechanismScene) -> None:
+def test_bristles_that_keep_the_deflection_of_another_load_are_named() -> None:
     """Their damping makes the reaction loop singular; what to take instead stands in the error."""
+    scene = SliderCrank(LuGre())
     with pytest.raises(SolveError, match=r"bristles of LuGre in joints? [a-z_]*crank.* keep") as e:
         simulate(scene.model(), 0.5)
     assert "write LoadNormalised(LuGre(...), N_0=" in str(e.value)
     assert simulate(replace(scene, law=LuGreNormalised()).model(), 0.1).t[-1] == 0.1
-
-
-def test_laws_whose_deflection_follows_no_load_need_no_advice() -> None:
     for law in (LuGreNormalised(), Karnopp(), ExactCoulomb(), KINETIC):
-        mechanics = SliderCrank(law).model().holonomic
-        assert mechanics is not None
-        assert mechanics.advice == ""
+        assert SliderCrank(law).model().holonomic.advice == ""  # type: ignore[union-attr]
 
 
 def test_normal_forces_that_cannot_be_negative_are_not_watched() -> None:
-    watched = {}
-    for name, friction in {
-        "constant": JointFriction(KINETIC, radius=0.02, normal=5.0),
-        "reaction": JointFriction(KINETIC, radius=0.02),
-        "viscous": JointFriction(Viscous(), radius=0.02),
-    }.items():
-        m = Mechanism("m")
-        m.body("wheel", 2.0, (0.05, 0.05, 0.05))
-        m.joint(Revolute("pin", "ground", "wheel", friction=friction))
-        mechanics = m.build().holonomic
-        assert mechanics is not None
-        watched[name] = mechanics.pressing.numel()
-    assert watched == {"constant": 0, "reaction": 0, "viscous": 0}
+    for law, more in ((KINETIC, {"normal": 5.0}), (KINETIC, {}), (Viscous(), {})):
+        m, bearing = Mechanism("m"), JointFriction(law, radius=0.02, **more)
+        attach(m, Revolute, "pin", "wheel", friction=bearing)
+        assert m.build().holonomic.pressing.numel() == 0  # type: ignore[union-attr]

@@ -1,27 +1,38 @@
-"""Every joint: pose, motion subspace and constraints fit each other."""
+"""Rotations, joints and trees: pose, motion subspace and constraints fit each other."""
 
 from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from symfric import multibody as mb
 from symfric.model.sketch import Symbol
-from symfric.multibody import ALL_JOINTS, Joint, Mechanism
 from symfric.multibody.joint import COMPONENTS, Pair, unit
-from symfric.multibody.spatial import rotation_y, rotation_z, skew
+from symfric.multibody.spatial import (
+    euler_e,
+    euler_g,
+    euler_parameters,
+    rotation,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+    skew,
+)
+from symfric.multibody.topology import absolute, spanning_tree
 from symfric.results.kinds import kinds
 
-MOVING = [kind for kind in ALL_JOINTS if not kind.closes]
-each_joint = pytest.mark.parametrize("kind", ALL_JOINTS, ids=lambda kind: kind.__name__)
+MOVING = [kind for kind in mb.ALL_JOINTS if not kind.closes]
+each_joint = pytest.mark.parametrize("kind", mb.ALL_JOINTS, ids=lambda kind: kind.__name__)
 each_moving = pytest.mark.parametrize("kind", MOVING, ids=lambda kind: kind.__name__)
 
 
-def joint(kind: type[Joint]) -> Joint:
+def joint(kind: type[mb.Joint]) -> mb.Joint:
     return kind("j", "a", "b")
 
 
-def coordinates(kind: type[Joint], seed: int = 0) -> np.ndarray:
+def coordinates(kind: type[mb.Joint], seed: int = 0) -> np.ndarray:
     q = np.random.default_rng(seed).normal(size=len(kind.coordinates))
     if kind.quaternion is not None:
         q[kind.quaternion :] /= np.linalg.norm(q[kind.quaternion :])
@@ -29,39 +40,29 @@ def coordinates(kind: type[Joint], seed: int = 0) -> np.ndarray:
 
 
 @each_moving
-def test_motion_subspace_is_the_derivative_of_the_pose(kind: type[Joint]) -> None:
+def test_pose_motion_subspace_and_constraints_fit_each_other(kind: type[mb.Joint]) -> None:
+    """The subspace is the derivative of the pose; constraints vanish, and do no work in it."""
     n = len(kind.coordinates)
     q, qd = ca.SX.sym("q", n), ca.SX.sym("qd", n)
     R, p = joint(kind).pose(q)
     H_w, H_v = joint(kind).subspace(q)
     R_dot = ca.reshape(ca.jtimes(ca.vec(ca.densify(R)), q, qd), 3, 3)
     p_dot = ca.jtimes(ca.densify(p), q, qd)
-    both = ca.Function("both", [q, qd], [R_dot - R @ skew(H_w @ qd), p_dot - H_v @ qd])
-    rates = np.random.default_rng(1).normal(size=n)
+    zero = R_dot - R @ skew(H_w @ qd), p_dot - H_v @ qd, joint(kind).constraints(R, p)
+    values = ca.Function("v", [q, qd], [ca.densify(x) for x in (*zero, R, p, H_v, R @ H_w)])
+    at, rates = coordinates(kind), np.random.default_rng(1).normal(size=n)
     if kind.quaternion is not None:
-        unit = coordinates(kind)[kind.quaternion :]
+        unit = at[kind.quaternion :]
         rates[kind.quaternion :] -= unit * (unit @ rates[kind.quaternion :])
-    for left in both.call([coordinates(kind), rates]):
-        assert left.full() == pytest.approx(np.zeros(left.shape), abs=1e-14)
+    *zero, R, p, v, w = (m.full() for m in values.call([at, rates]))
+    zero.append(twist_derivatives(kind, R, p) @ np.vstack([v, w]))
+    for left in zero:
+        assert left == pytest.approx(np.zeros(left.shape), abs=1e-14)
+    freedoms = np.linalg.matrix_rank(np.vstack([v, w])) if n else 0
+    assert freedoms + joint(kind).constrains == 6
 
 
-@each_moving
-def test_constraints_vanish_wherever_the_joint_goes(kind: type[Joint]) -> None:
-    q = ca.SX.sym("q", len(kind.coordinates))
-    phi = ca.densify(joint(kind).constraints(*joint(kind).pose(q)))
-    value = ca.Function("phi", [q], [phi])(coordinates(kind)).full()
-    assert value == pytest.approx(np.zeros((kind.constrains, 1)), abs=1e-15)
-
-
-@each_moving
-def test_constraints_and_freedoms_make_six(kind: type[Joint]) -> None:
-    q = ca.SX.sym("q", len(kind.coordinates))
-    H = ca.Function("H", [q], [ca.densify(ca.vertcat(*joint(kind).subspace(q)))])
-    freedoms = np.linalg.matrix_rank(H(coordinates(kind)).full()) if kind.coordinates else 0
-    assert freedoms + kind.constrains == 6
-
-
-def twist_derivatives(kind: type[Joint], R: np.ndarray, p: np.ndarray) -> np.ndarray:
+def twist_derivatives(kind: type[mb.Joint], R: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Constraint rows along relative velocity and angular velocity."""
     R_s, p_s, w = ca.SX.sym("R", 3, 3), ca.SX.sym("p", 3), ca.SX.sym("w", 3)
     phi = ca.densify(joint(kind).constraints(R_s, p_s))
@@ -71,32 +72,18 @@ def twist_derivatives(kind: type[Joint], R: np.ndarray, p: np.ndarray) -> np.nda
 
 
 @each_joint
-def test_constraints_are_independent(kind: type[Joint]) -> None:
+def test_constraints_are_independent_and_hold_what_joints_transmit(
+    kind: type[mb.Joint],
+) -> None:
     apart = np.array([0.0, 0.0, 1.0]) if kind.closes else np.zeros(3)
     C = twist_derivatives(kind, np.eye(3), apart)
-    assert C.shape[0] == kind.constrains
-    assert np.linalg.matrix_rank(C) == kind.constrains
-
-
-@each_moving
-def test_motion_subspace_does_no_work_against_the_constraints(kind: type[Joint]) -> None:
-    q = ca.SX.sym("q", len(kind.coordinates))
-    R, p = joint(kind).pose(q)
-    H_w, H_v = joint(kind).subspace(q)
-    made = ca.Function("m", [q], [ca.densify(x) for x in (R, p, H_v, R @ H_w)])
-    R0, p0, v, w = (m.full() for m in made.call([coordinates(kind)]))
-    work = twist_derivatives(kind, R0, p0) @ np.vstack([v, w])
-    assert work == pytest.approx(np.zeros(work.shape), abs=1e-14)
-
-
-@each_joint
-def test_what_a_joint_transmits_is_what_its_constraints_hold(kind: type[Joint]) -> None:
+    assert C.shape[0] == np.linalg.matrix_rank(C)
+    assert kind.closes or C.shape[0] == joint(kind).constrains
     q = ca.SX.sym("q", len(kind.coordinates))
     if kind.closes:
         R, p = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0], np.ones(3)
         if kind.plane is not None:
-            R = {1: rotation_y, 2: rotation_z}[kind.plane](ca.SX(0.3))
-            R = ca.DM(R).full()
+            R = ca.DM({1: rotation_y, 2: rotation_z}[kind.plane](ca.SX(0.3))).full()
     else:
         pose = ca.Function("pose", [q], [ca.densify(x) for x in joint(kind).pose(q)])
         R, p = (m.full() for m in pose.call([coordinates(kind)]))
@@ -108,11 +95,10 @@ def test_what_a_joint_transmits_is_what_its_constraints_hold(kind: type[Joint]) 
 def test_a_new_joint_is_a_class_and_nothing_else() -> None:
     """Results, pictures and tables ask the class, not a list of names."""
 
-    class PinInSlot(Joint):
+    class PinInSlot(mb.Joint):
         """Slides along x and turns about z."""
 
         coordinates = (("slide", "m"), ("angle", "rad"))
-        constrains = 4
         directions: ClassVar = {"x": 0, "turn": 1}
         transmits = ("Fy", "Fz", "Mx", "My")
         symbol = Symbol("o", axes=(("a", 2),))
@@ -126,7 +112,7 @@ def test_a_new_joint_is_a_class_and_nothing_else() -> None:
         def constraints(self, R: ca.SX, p: ca.SX) -> ca.SX:
             return ca.vertcat(p[1], p[2], R[0, 2], R[1, 2])
 
-    m = Mechanism("slotted", gravity=(0.0, -9.81, 0.0))
+    m = mb.Mechanism("slotted", gravity=(0.0, -9.81, 0.0))
     m.body("bob", 1.0, (0.1, 0.1, 0.1))
     m.joint(PinInSlot("pin", "ground", "bob", rate=(1.0, 2.0)))
     for formulation in ("joint", "absolute"):
@@ -140,24 +126,111 @@ def test_a_new_joint_is_a_class_and_nothing_else() -> None:
 
 
 def test_distance_measures_from_point_to_point() -> None:
-    (rod,) = (k for k in ALL_JOINTS if k.__name__ == "Distance")
-    made = rod("rod", "a", "b", length=5.0)  # type: ignore[call-arg]
-    assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, 0.0])))) == 0.0
-    assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, 1.0])))) == 0.5
+    made = mb.Distance("rod", "a", "b", length=5.0)
+    for z, expected in ((0.0, 0.0), (1.0, 0.5)):
+        assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, z])))) == expected
 
 
-@pytest.mark.parametrize(
-    ("kind", "start", "expected"),
-    [
-        ("Revolute", 0.3, (0.3,)),
-        ("Revolute", None, (0.0,)),
-        ("Cylindrical", (1.0, 2.0), (1.0, 2.0)),
-        ("Spherical", None, (1.0, 0.0, 0.0, 0.0)),
-        ("Floating", None, (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)),
-    ],
-)
-def test_a_joint_starts_where_it_is_told_or_without_displacement(
-    kind: str, start: object, expected: tuple[float, ...]
-) -> None:
-    (made,) = (k for k in ALL_JOINTS if k.__name__ == kind)
-    assert made("j", "a", "b", start=start).starts == expected
+def test_a_joint_starts_where_it_is_told_or_without_displacement() -> None:
+    for kind, start, expected in (
+        (mb.Revolute, 0.3, (0.3,)), (mb.Revolute, None, (0,)), (mb.Cylindrical, (1.0, 2.0), (1, 2)),
+        (mb.Spherical, None, (1, 0, 0, 0)), (mb.Floating, None, (0, 0, 0, 1, 0, 0, 0)),
+    ):  # fmt: skip
+        assert kind("j", "a", "b", start=start).starts == expected
+
+
+def unit_four(seed: int) -> np.ndarray:
+    p = np.random.default_rng(seed).normal(size=4)
+    return p / np.linalg.norm(p)
+
+
+def full(expression: ca.SX) -> np.ndarray:
+    return ca.DM(expression).full()
+
+
+def test_turns_about_an_axis_agree_with_scipy() -> None:
+    for turn, axis in ((rotation_x, "x"), (rotation_y, "y"), (rotation_z, "z")):
+        expected = Rotation.from_euler(axis, 0.7).as_matrix()
+        assert full(turn(ca.SX(0.7))) == pytest.approx(expected)
+    a, b = np.random.default_rng(0).normal(size=(2, 3))
+    assert full(skew(ca.SX(a))) @ b == pytest.approx(np.cross(a, b))
+
+
+def test_euler_parameters_agree_with_scipy_and_come_back() -> None:
+    for p in (*map(unit_four, range(4)), *np.eye(4)[1:]):  # half turns, too
+        R = full(rotation(ca.SX(p)))
+        assert pytest.approx(Rotation.from_quat([*p[1:], p[0]]).as_matrix()) == R
+        back = euler_parameters(ca.DM(R)).full().ravel()
+        assert back * np.sign(back @ p) == pytest.approx(p)
+        assert back[0] >= 0.0
+
+
+def test_identities_of_e_and_g() -> None:
+    p = unit_four(0)
+    E, G, R = (full(f(ca.SX(p))) for f in (euler_e, euler_g, rotation))
+    assert pytest.approx(R) == E @ G.T
+    assert E @ p == pytest.approx(np.zeros(3))
+    assert pytest.approx(np.eye(3)) == E @ E.T
+    assert pytest.approx(np.eye(4) - np.outer(p, p)) == E.T @ E
+
+
+def test_rates_of_euler_parameters_give_both_angular_velocities() -> None:
+    p, pd = ca.SX(unit_four(1)), np.random.default_rng(5).normal(size=4)
+    pd = ca.SX(pd - unit_four(1) * (unit_four(1) @ pd))
+    symbol = ca.SX.sym("p", 4)
+    R_dot = ca.jtimes(ca.vec(rotation(symbol)), symbol, pd)
+    R_dot = full(ca.reshape(ca.substitute(R_dot, symbol, p), 3, 3))
+    R = full(rotation(p))
+    assert full(skew(2 * euler_e(p) @ pd)) @ R == pytest.approx(R_dot)
+    assert R @ full(skew(2 * euler_g(p) @ pd)) == pytest.approx(R_dot)
+
+
+def test_axes_of_a_frame_are_right_handed_and_z_is_kept() -> None:
+    R = full(mb.Frame(z=(0.0, 3.0, 4.0), x=(1.0, 1.0, 0.0)).R)
+    assert pytest.approx(np.eye(3)) == R.T @ R
+    assert np.linalg.det(R) == pytest.approx(1.0)
+    assert R[:, 2] == pytest.approx([0.0, 0.6, 0.8])
+    for more, message in (
+        ({"z": (0, 0, 0)}, "z: expected three numbers that are not all zero, got (0, 0, 0)"),
+        ({"z": (1, 0)}, "z: expected three numbers that are not all zero, got (1, 0)"),
+        ({"x": (0, 0, 2)}, "x: expected a direction not parallel to z, got (0, 0, 2)"),
+        ({"at": (1.0, 2.0)}, "frame: at: expected three numbers"),
+    ):
+        with pytest.raises(ValueError) as caught:
+            mb.Frame(**more)  # type: ignore[arg-type]
+        assert message in str(caught.value)
+
+
+BODIES = {name: mb.Body(name, 1.0, (1.0, 1.0, 1.0)) for name in (mb.GROUND, "a", "b", "c")}
+
+
+GROUND = mb.GROUND
+
+
+def test_the_joints_with_fewest_constraints_are_cut_and_bodies_hang_near_the_ground() -> None:
+    ball = mb.Spherical("ball", GROUND, "a")
+    for joints, tree, loops in (
+        ((mb.Revolute("1", GROUND, "a"), mb.Prismatic("2", "a", "b"), mb.Spherical("3", "b", "c")),
+         ["1", "2", "3"], []),
+        ((ball, mb.Cylindrical("tube", "a", "b"), mb.Revolute("hinge", "b", "c"),
+          mb.Fixed("weld", "c", GROUND)), ["weld", "hinge", "tube"], ["ball"]),
+        ((mb.Distance("rod", GROUND, "a"), ball), ["ball"], ["rod"]),
+        ((mb.Revolute("1", GROUND, "a"), mb.Revolute("2", "a", "b"), mb.Revolute("3", GROUND, "b"),
+          mb.Revolute("4", "b", "c")), ["1", "3", "4"], ["2"]),
+    ):  # fmt: skip
+        topology = spanning_tree(BODIES, joints)
+        assert [link.joint.name for link in topology.links] == tree
+        assert [joint.name for joint in topology.loops] == loops
+
+
+def test_a_joint_whose_child_is_nearer_to_the_ground_is_turned_round() -> None:
+    (link,) = spanning_tree(BODIES, [mb.Revolute("1", "a", mb.GROUND)]).links
+    assert (link.base, link.body, link.reverse) == (mb.GROUND, "a", True)
+
+
+def test_absolute_coordinates_cut_every_joint() -> None:
+    joints = mb.Revolute("1", mb.GROUND, "a"), mb.Revolute("2", "a", "b")
+    topology = absolute(BODIES, joints, {"a": (), "b": ()})
+    assert topology.n == 14
+    assert [j.name for j in topology.loops] == ["1", "2"]
+    assert [link.rows for link in topology.links] == [slice(0, 7), slice(7, 14)]

@@ -1,23 +1,19 @@
 """The builder: one error for all mistakes, each with its path; starts, redundancy, sizes."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
-from chains import X, Y, Z, rod
+from chains import X, Y, Z, attach, in_both, rod
 
 from symfric import BrownMcPhee, LuGre, SolveError, Viscous, simulate
+from symfric import multibody as mb
+from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
-from symfric.multibody import (
-    Distance,
-    Floating,
-    JointFriction,
-    JointSpringDamper,
-    Mechanism,
-    PointOnLine,
-    Prismatic,
-    Revolute,
-)
 from symfric.multibody.start import following
 
 LAW = BrownMcPhee()
@@ -28,17 +24,23 @@ def test_wrong_masses_loose_bodies_and_open_loops_come_at_once() -> None:
     for m in (loose, open_loop):
         m.bodies[1] = replace(m.bodies[1], mass=0.0)
     loose.body("bob", 1.0, (1.0, 1.0, 1.0))
-    with pytest.raises(ValueError, match=r"block_x' > mass(.|\n)*body 'bob': expected joints"):
-        loose.build()
-    with pytest.raises(ValueError, match=r"block_x' > mass(.|\n)*near it x = 0\.832"):
-        open_loop.build()
+    for build, message in (
+        (loose.build, r"block_x' > mass(.|\n)*body 'bob': expected joints"),
+        (open_loop.build, r"block_x' > mass(.|\n)*near it x = 0\.832"),
+        (open_loop.assembled, r"block_x' > mass: [^\n]*$"),  # an open loop is what it is for
+        (slider_on_a_rod(start=0.9).build, r"satisfy rod_lambda.*x = 0\.832.*z = 0\.554"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            build()
+    x, z, *_ = slider_on_a_rod(start=0.9).assembled().build().initial_state()
+    assert (x, z) == pytest.approx(np.array([0.9, 0.6]) / np.hypot(0.9, 0.6), abs=1e-12)
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+@in_both
 def test_a_rod_that_holds_what_is_held_already_is_redundant(formulation: str) -> None:
     m = rod()
     m.frame("ground.beside", at=(0.0, 1.0, 0.0))
-    m.joint(Distance("stay", "ground.beside", "rod.hinge", length=1.0))
+    m.joint(mb.Distance("stay", "ground.beside", "rod.hinge", length=1.0))
     made = m.prepare(formulation=formulation)
     assert made.redundant == ("stay_lambda",)
     alone = simulate(rod().build(), 0.5, rtol=1e-9)
@@ -49,42 +51,20 @@ def test_a_rod_that_holds_what_is_held_already_is_redundant(formulation: str) ->
 
 def test_loops_close_for_a_length_that_is_a_parameter() -> None:
     length = Variable("length", "m", start=1.2)
-    m = slider_on_a_rod()
-    m.joints[-1] = Distance("rod", "block_x", "block_z", length=length.symbol)
+    m = slider_on_a_rod(length=length.symbol)
     with pytest.raises(ValueError, match=r"near it x = 0\.96, z = 0\.72"):
         m.build((length,))
     x, z, *_ = m.assembled((length,)).build((length,)).initial_state()
     assert (x, z) == pytest.approx((0.96, 0.72))
 
 
-def slider_on_a_rod(start: float = 0.8, rate: float = 0.0) -> Mechanism:
+def slider_on_a_rod(start: float = 0.8, length: Scalar = 1.0) -> mb.Mechanism:
     """Two slides at a right angle and a rod of 1 m: x^2 + z^2 = 1."""
-    m = Mechanism("ladder")
-    for name, axis in (("x", X), ("z", Z)):
-        m.body(f"block_{name}", 1.0, (0.1, 0.1, 0.1))
-        m.frame(f"ground.{name}", z=axis)
-        m.frame(f"block_{name}.{name}", z=axis)
-    m.joint(Prismatic("x", "ground.x", "block_x.x", start=start, rate=rate))
-    m.joint(Prismatic("z", "ground.z", "block_z.z", start=0.6))
-    m.joint(Distance("rod", "block_x", "block_z", length=1.0))
+    m = mb.Mechanism("ladder")
+    attach(m, mb.Prismatic, "x", "block_x", z=X, start=start)
+    attach(m, mb.Prismatic, "z", "block_z", z=Z, start=0.6)
+    m.joint(mb.Distance("rod", "block_x", "block_z", length=length))
     return m
-
-
-def test_an_open_loop_is_refused_and_the_nearest_closed_one_offered() -> None:
-    with pytest.raises(ValueError, match=r"start: expected positions that satisfy rod_lambda") as e:
-        slider_on_a_rod(start=0.9).build()
-    assert "x = 0.832" in str(e.value)
-    assert "z = 0.554" in str(e.value)
-    heavy = slider_on_a_rod(start=0.9)
-    heavy.body("rotor", -1.0, (0.1, 0.1, 0.1))
-    heavy.joint(Revolute("turn", "ground", "rotor"))
-    with pytest.raises(ValueError, match="body 'rotor' > mass") as e:
-        heavy.assembled()
-    assert "start" not in str(e.value)  # it is what is asked for
-    assembled = slider_on_a_rod(start=0.9).assembled().build()
-    x, z, *_ = assembled.initial_state()
-    assert x**2 + z**2 == pytest.approx(1.0, abs=1e-12)
-    assert (x, z) == pytest.approx(np.array([0.9, 0.6]) / np.hypot(0.9, 0.6), abs=1e-12)
 
 
 def test_rates_that_cannot_stay_move_to_the_nearest() -> None:
@@ -99,7 +79,7 @@ def test_rates_that_cannot_stay_move_to_the_nearest() -> None:
 
 def test_loops_that_cannot_be_closed_are_refused() -> None:
     m = slider_on_a_rod()
-    m.joint(Distance("long", "ground", "block_x", length=3.0))
+    m.joint(mb.Distance("long", "ground", "block_x", length=3.0))
     with pytest.raises(ValueError, match="no position near it satisfies them"):
         m.build()
     with pytest.raises(ValueError, match="from which the loops can be closed"):
@@ -107,42 +87,36 @@ def test_loops_that_cannot_be_closed_are_refused() -> None:
 
 
 def four_bar(
-    last: type[Revolute] | type[PointOnLine], friction: JointFriction | None = None
-) -> Mechanism:
+    last: type[mb.Revolute] | type[mb.PointOnLine], friction: mb.JointFriction | None = None
+) -> mb.Mechanism:
     """A parallelogram that stands slanted, its last joint a hinge or a pin."""
-    m = Mechanism("four_bar")
-    up = (0.6, 0.0, 0.8)
-    for name, far in (("left", up), ("right", up), ("top", (2.0, 0.0, 0.0))):
-        m.body(name, 1.0, (0.1, 0.1, 0.1))
-        m.frame(f"{name}.near", z=Y)
-        m.frame(f"{name}.far", at=far, z=Y)
-    m.frame("ground.left", z=Y)
-    m.frame("ground.right", at=(2.0, 0.0, 0.0), z=Y)
-    m.joint(Revolute("a", "ground.left", "left.near", friction=friction))
-    m.joint(Revolute("b", "ground.right", "right.near"))
-    m.joint(Revolute("c", "left.far", "top.near"))
-    m.joint(last("d", "top.far", "right.far"))
+    m, up, over = mb.Mechanism("four_bar"), (0.6, 0.0, 0.8), (2.0, 0.0, 0.0)
+    attach(m, mb.Revolute, "a", "left", J=0.1, z=Y, friction=friction)
+    attach(m, mb.Revolute, "b", "right", J=0.1, at=over, z=Y)
+    attach(m, mb.Revolute, "c", "top", "left", J=0.1, at=up, z=Y)
+    attach(m, last, "d", "right", "top", at=over, to=up, z=Y)
     return m
 
 
 def test_redundant_constraints_are_left_out_and_named() -> None:
-    hinged, pinned = (four_bar(kind).prepare() for kind in (Revolute, PointOnLine))
+    hinged, pinned = (four_bar(kind).prepare() for kind in (mb.Revolute, mb.PointOnLine))
     assert len(hinged.redundant) == 3
     assert all(name.startswith("d_lambda") for name in hinged.redundant)
     assert (len(pinned.labels), pinned.redundant) == (2, ())
-    runs = [simulate(four_bar(kind).build(), 0.5, rtol=1e-9) for kind in (Revolute, PointOnLine)]
+    runs = [
+        simulate(four_bar(kind).build(), 0.5, rtol=1e-9) for kind in (mb.Revolute, mb.PointOnLine)
+    ]
     assert runs[0]["a"] == pytest.approx(runs[1]["a"], abs=1e-7)
 
 
 def test_friction_from_reactions_that_are_not_unique_is_refused() -> None:
-    friction = JointFriction(LAW, radius=0.02, length=0.1)
-    with pytest.raises(
-        ValueError, match="joint 'a' > friction: expected reactions that the motion"
-    ):
-        four_bar(Revolute, friction).build()
-    assert four_bar(PointOnLine, friction).build().z
-    constant = JointFriction(LAW, radius=0.02, normal=50.0)
-    assert four_bar(Revolute, constant).build().name == "four_bar"
+    friction = mb.JointFriction(LAW, radius=0.02, length=0.1)
+    message = "joint 'a' > friction: expected reactions that the motion"
+    with pytest.raises(ValueError, match=message):
+        four_bar(mb.Revolute, friction).build()
+    assert four_bar(mb.PointOnLine, friction).build().z
+    constant = mb.JointFriction(LAW, radius=0.02, normal=50.0)
+    assert four_bar(mb.Revolute, constant).build().name == "four_bar"
 
 
 def test_a_dead_centre_is_refused_as_a_start() -> None:
@@ -150,57 +124,45 @@ def test_a_dead_centre_is_refused_as_a_start() -> None:
         dead_centre().build()
 
 
-def dead_centre() -> Mechanism:
+def dead_centre() -> mb.Mechanism:
     """Slides at a right angle, the rod lying along one of them: z cannot be told from x."""
-    m = Mechanism("dead")
-    for name in ("a", "b"):
-        m.body(name, 1.0, (0.1, 0.1, 0.1))
-        m.frame(f"{name}.slide", z=X)
-    m.frame("ground.slide", z=X)
-    m.frame("ground.side", at=(1.0, 0.0, 0.0), z=Y)
-    m.frame("b.side", z=Y)
-    m.joint(Prismatic("x", "ground.slide", "a.slide"))
-    m.joint(Prismatic("y", "ground.side", "b.side"))
-    m.joint(Distance("rod", "a", "b", length=1.0))
-    m.joint(Distance("stay", "ground", "b", length=1.0))
+    m = mb.Mechanism("dead")
+    attach(m, mb.Prismatic, "x", "a", z=X)
+    attach(m, mb.Prismatic, "y", "b", at=(1.0, 0.0, 0.0), z=Y)
+    m.joint(mb.Distance("rod", "a", "b", length=1.0))
+    m.joint(mb.Distance("stay", "ground", "b", length=1.0))
     return m
 
 
-def sizes(friction: JointFriction | None) -> tuple[int, int, int]:
-    model = rod(friction).build()
-    return len(model.x), len(model.z), model.function("ode").n_instructions()
-
-
 def test_what_a_joint_does_not_need_is_not_there() -> None:
-    none = sizes(None)
-    viscous = sizes(JointFriction(Viscous(), radius=0.1))
-    constant = sizes(JointFriction(LAW, radius=0.1, normal=20.0))
-    reaction = sizes(JointFriction(LAW, radius=0.1))
-    bristle = sizes(JointFriction(LuGre(), radius=0.1, normal=20.0))
-    assert none[:2] == viscous[:2] == constant[:2] == (2, 0)
-    assert reaction[:2] == (2, 1)
-    assert bristle[:2] == (3, 0)
-    assert none[2] < viscous[2] < constant[2]
+    sizes, costs = [], list[int]()
+    for friction in (
+        None, mb.JointFriction(Viscous(), radius=0.1), mb.JointFriction(LAW, radius=0.1, normal=20),
+        mb.JointFriction(LAW, radius=0.1), mb.JointFriction(LuGre(), radius=0.1, normal=20.0),
+    ):  # fmt: skip
+        model = rod(friction).build()
+        sizes.append((len(model.x), len(model.z)))
+        costs.append(model.function("ode").n_instructions())
+    assert sizes == [(2, 0), (2, 0), (2, 0), (2, 1), (3, 0)]
+    assert costs[0] < costs[1] < costs[2]
 
 
 def test_inputs_and_parameters_enter_forces_and_bodies() -> None:
     mass = Variable("mass", "kg", start=2.0)
-    m = Mechanism("m", gravity=(0.0, 0.0, 0.0))
-    m.body("block", mass.symbol, (0.1, 0.1, 0.1))
-    m.joint(Prismatic("x", "ground", "block"))
-    m.force(JointSpringDamper("motor", "x", "slide", actuator=m.input("force", "N")))
-    model = m.build((mass,))
-    run = simulate(model, 2.0, u={"force": 6.0}, p={"mass": 3.0}, rtol=1e-9)
+    m = mb.Mechanism("m", gravity=(0.0, 0.0, 0.0))
+    attach(m, mb.Prismatic, "x", "block", mass=mass.symbol)
+    m.force(mb.JointSpringDamper("motor", "x", actuator=m.input("force", "N")))
+    run = simulate(m.build((mass,)), 2.0, u={"force": 6.0}, p={"mass": 3.0}, rtol=1e-9)
     assert run["x"][-1] == pytest.approx(0.5 * 2.0 * 4.0)
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+@in_both
 def test_a_free_body_spins_as_it_must(formulation: str) -> None:
     """Momentum and energy of a tumbling body without forces."""
-    m = Mechanism("m", gravity=(0.0, 0.0, 0.0))
+    m = mb.Mechanism("m", gravity=(0.0, 0.0, 0.0))
     m.body("stone", 2.0, (1.0, 2.0, 2.5))
     rate = tuple(0.5 * w for w in (0.3, 2.0, 0.1))
-    m.joint(Floating("pose", "ground", "stone", rate=(1.0, 0.0, 0.0, 0.0, *rate)))
+    m.joint(mb.Floating("pose", "ground", "stone", rate=(1.0, 0.0, 0.0, 0.0, *rate)))
     run = simulate(m.build(formulation=formulation), 5.0, rtol=1e-9)
     assert np.ptp(run["kinetic"]) < 1e-7
     assert run["constraint_position"].max() < 1e-12
@@ -211,4 +173,172 @@ def test_a_free_body_spins_as_it_must(formulation: str) -> None:
 def test_a_mechanism_that_falls_into_a_dead_centre_says_so() -> None:
     """All links of the parallelogram in one line: it may go on as one or folded."""
     with pytest.raises(SolveError, match="the configuration is singular: constraints depend"):
-        simulate(four_bar(PointOnLine).build(), 1.0, rtol=1e-9)
+        simulate(four_bar(mb.PointOnLine).build(), 1.0, rtol=1e-9)
+
+
+J = (1.0, 1.0, 1.0)
+Change = Callable[[mb.Mechanism], object]
+
+
+def body(*numbers: Any, **more: Any) -> Change:
+    return lambda m: m.body("bob", *numbers, **more)
+
+
+def joint(kind: Any, *given: Any, **more: Any) -> Change:
+    return lambda m: m.joint(kind(*given, **more))
+
+
+def force(kind: Any, *given: Any, **more: Any) -> Change:
+    return lambda m: m.force(kind(*given, **more))
+
+
+def of_bob(kind: Any, name: str, parent: str = "rod", **more: Any) -> Change:
+    return lambda m: (m.body("bob", 1.0, J), m.joint(kind(name, parent, "bob", **more)))
+
+
+def drive(name: str, *given: Any) -> Change:
+    return lambda m: m.constraint(mb.PrescribedMotion(name, *given))
+
+
+def coupled(kind: Any, *given: Any) -> Change:
+    return lambda m: m.constraint(kind("c", *given))
+
+
+def held(expression: Callable[[Any], Any]) -> Change:
+    return lambda m: m.constraint(mb.UserConstraint("held", expression))
+
+
+pushed = partial(force, mb.UserForce, "push", "rod")
+PUSH, HELD = "'push' > expression: expected a force and", "'held' > expression: expected one or a"
+PIN, BOB, POSITIONS = ("pin", "rod", "ground"), "> body 'bob'", "expected positions only, got velo"
+
+MISTAKES: list[tuple[Change, str]] = [
+    (body(0.0, J), f"{BOB} > mass: expected > 0 kg, got 0"),
+    (body("1", J), f"{BOB} > mass: expected a number [kg], got '1'"),
+    (body(10**400, J), f"{BOB} > mass"),
+    (body(np.inf, J), f"{BOB} > mass"),
+    (body(ca.SX.sym("load"), J), f"{BOB}: expected only declared parameters, got load; pass the"),
+    (body(1.0, (0, 0, 0)), f"{BOB} > inertia: expected positive principal moments, got 0, 0, 0"),
+    (body(1.0, (1, 1, 1, 2, 0, 0)), "> inertia: expected positive principal moments, got -1, 1, 3"),
+    (body(1.0, (1, 1, 3)), "largest principal moment to be at most the sum of the others, got 1, "),
+    (body(1.0, (1, 1)), "> inertia: expected 3 or 6 numbers [kg m^2], got 2; write (Jxx, Jyy, Jzz"),
+    (body(1.0, np.eye(3)), f"{BOB} > inertia: expected 3 or 6 numbers"),
+    (body(1.0, (np.inf,) * 3), f"{BOB} > inertia"),
+    (body(1.0, J), f"{BOB}: expected joints with coordinates up to the ground, found none; "
+                   "a Floating joint lets it move freely"),
+    (lambda m: m.body("the bob", 1.0, J), "body 'the bob': expected a name that is a C identifier"),
+    (lambda m: m.body("hinge", 1.0, J), "> joint 'hinge': expected every name once"),
+    (lambda m: [m.body("bob", 1.0, J) for _ in "ab"], f"{BOB}: expected every name once"),
+    (lambda m: m.input("hinge", "N"), "> input 'hinge': expected every name once"),
+    (lambda m: m.frame("bob.tip"), "> frame 'bob.tip': expected 'body.frame' of a known body"),
+    (lambda m: m.frame("rod.tip", z=(0, 0, 0)), "'rod.tip' > z: expected three numbers that are"),
+    (lambda m: m.frame("rod.hinge", z=X), "> frame 'rod.hinge': expected every name once"),
+    (lambda m: m.joint("hinge"), "> joint: expected a Joint of symfric.multibody, got 'hinge'"),
+    (joint(mb.Fixed, "weld", "rodd", "ground"), "or 'body.frame', got rodd; did you mean rod?"),
+    (joint(mb.Fixed, "weld", "rod.tip", "ground"), "expected one of the frames hinge, got rod."),
+    (joint(mb.Fixed, "weld", "rod", "rod.hinge"), "'weld': expected two bodies, got rod twice"),
+    (joint(mb.Fixed, "weld", "", "ground"), "> joint 'weld': expected a body or 'body.frame', go"),
+    (joint(mb.Revolute, *PIN, axis=X), "got axis; the axis of a joint is the z"),
+    (joint(mb.Revolute, *PIN, friction=LAW), "expected JointFriction(law, radius=...), got Brown"),
+    (joint(mb.Revolute, *PIN, friction=mb.JointFriction(LAW, radius=ca.SX.sym("R"))),
+     "> joint 'pin' > friction: expected only declared parameters and inputs, got R"),
+    (joint(mb.Distance, "stay", "ground", "rod", length=0.0), "'stay' > length: expected > 0 m,"),
+    (joint(mb.Distance, "stay", "ground.hinge", "rod.hinge", length=2.0),
+     "> start: expected positions that satisfy stay_lambda, got -2; no position near it satis"),
+    (of_bob(mb.Floating, "pose", friction=mb.JointFriction(LAW)),
+     "> joint 'pose' > friction: expected a joint with friction"),
+    (of_bob(mb.Spherical, "ball", start=(1.0, 0.0)), "'ball' > start: expected 4 numbers, got 2"),
+    (of_bob(mb.Revolute, "pin", rate=np.nan), "'pin' > rate: expected finite numbers, got nan"),
+    (force(mb.SpringDamper, "s", "ground", "bob"), "'s': expected a body or 'body.frame', got bob"),
+    (force(mb.SpringDamper, "s", "ground", "rod", np.nan), "> stiffness: expected a finite number"),
+    (force(mb.SpringDamper, "s", "ground.hinge", "rod.hinge", 1.0, 0.1),
+     "> force 's': expected a finite force at the start, got nan; do its places coincide"),
+    (force(mb.JointSpringDamper, "motor", "hing"), "> force 'motor': expected a joint, got hing"),
+    (force(mb.JointSpringDamper, "motor", "hinge", actuator=ca.SX.sym("torque")),
+     "> force 'motor': expected only declared positions, velocities, time, parameters and inputs, "
+     "got torque"),
+    (force(mb.JointSpringDamper, "e", "hinge", "slide"), "> direction: expected turn, got slide"),
+    (lambda m: (of_bob(mb.Universal, "u", "ground")(m), m.force(mb.JointSpringDamper("e", "u"))),
+     "> force 'e' > direction: expected x or y, got none"),
+    (drive("d", "hinge", 0.3), "> drive 'd' > motion: expected a function of time, got 0.3"),
+    (drive("d", "y", lambda t: t), "> drive 'd': expected a joint, got y"),
+    (drive("d", "hinge", lambda t: t, "slide"), "'d' > direction: expected turn, got slide"),
+    (drive("d", "hinge", lambda t: ca.vertcat(t, t)), "> motion: expected one expression, got 2"),
+    (drive("d", "hinge", lambda t: ca.SX.sym("w") * t),
+     "> drive 'd': expected an expression of positions, time and parameters, got w; the two deriv"),
+    (drive("d", "hinge", ca.sqrt), "start: expected a finite velocity of d_moment"),
+    (drive("hinge", "hinge", lambda t: t), "> drive 'hinge': expected every name once"),
+    (lambda m: (u := m.input("wish", "m"), drive("d", "hinge", lambda t: u)(m)),
+     "got wish; the two derivatives of an input are unknown"),
+    (lambda m: m.constraint(mb.Screw("j", "a", 0.1, friction=None)),  # type: ignore[call-arg]
+     "expected name, joint, lead, offset, got fric"),
+    (coupled(mb.Gear, "hinge", "r9", 2.0), "'c': expected a joint, got r9"),
+    (coupled(mb.Gear, "hinge", "r1", 0.0), "'c' > ratio: expected a finite number other than 0"),
+    (coupled(mb.Rolling, "hinge", "hinge", 1.0), "'c' > direction: expected turn, got slide"),
+    (coupled(mb.Rolling, "hinge", "r1", np.nan), "'c' > radius: expected a finite number"),
+    (coupled(mb.Screw, "hinge", 1.0), "'c' > direction: expected turn, got slide"),
+    (coupled(mb.Gear, "hinge", "hinge", 1.0, np.inf), "'c' > offset: expected a finite"),
+    (coupled(mb.Gear, "hinge", "hinge", 2.0), "'c' > expected two displacements, got turn of hin"),
+    (pushed(lambda kin: None), PUSH),
+    (pushed(lambda kin: (0, 0, 0)), PUSH),
+    (pushed(lambda kin: ((0, 0), (0, 0, 0))), PUSH),
+    (pushed(lambda kin: ("abc", "def")), PUSH),
+    (pushed(lambda kin: ((np.nan, 0, 0), (0, 0, 0))), PUSH),
+    (pushed(lambda kin: (kin.point("c.x")[0], (0, 0, 0))), "expected a place 'body.frame', got c"),
+    (held(lambda kin: None), HELD),
+    (held(lambda kin: "z"), HELD),
+    (held(lambda kin: kin.motion["rod"].R), HELD),
+    (held(lambda kin: ca.SX(0, 1)), HELD),
+    (held(lambda kin: kin.point("rod")[1][0]), f"constraint 'held' > expression: {POSITIONS}"),
+]  # fmt: skip
+
+
+def test_mistakes_are_described_with_their_path() -> None:
+    for change, message in MISTAKES:
+        m = rod()
+        with pytest.raises(ValueError) as caught:
+            change(m)
+            m.build()
+        assert message in str(caught.value)
+        assert "mechanism 'rod' > " in str(caught.value) or not message.startswith(">")
+
+
+def test_mistakes_of_a_mechanism_as_a_whole() -> None:
+    for m, message in (
+        *(
+            (mb.Mechanism(name), "> name: expected a C identifier")
+            for name in ("a crank", "", "4bar")
+        ),
+        (mb.Mechanism("m", gravity=(0.0, -9.81)), "> gravity: expected three numbers [m/s^2]"),
+        (mb.Mechanism("m", gravity=(0.0, 0.0, 0.0)), "expected bodies that can move, got none"),
+    ):
+        m.body("stone", 1.0, J)
+        m.joint(mb.Fixed("foot", "ground", "stone"))
+        with pytest.raises(ValueError) as caught:
+            m.build()
+        assert message in str(caught.value)
+
+
+def test_all_mistakes_come_at_once_and_each_once() -> None:
+    m = mb.Mechanism("crank")
+    m.body("a", -1.0, J)
+    m.body("b", 1.0, (0.0, 1.0, 1.0))
+    m.joint(mb.Revolute("slider", "ground", "a", friction=mb.JointFriction(LAW)))
+    m.joint(mb.Prismatic("slide", "a", "c"))
+    with pytest.raises(ValueError) as caught:
+        m.build()
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 4
+    assert all(line.startswith("mechanism 'crank' > ") for line in lines)
+    assert any("joint 'slider' > friction" in line for line in lines)
+
+
+def test_a_list_of_expressions_is_a_column() -> None:
+    m = mb.Mechanism("one")
+    m.body("b", 1.0, J)
+    m.joint(mb.Floating("j", "ground", "b"))
+    held(lambda kin: [kin.point("b")[0][1], kin.point("b")[0][2]])(m)
+    assert [v.name for v in m.build().z] == ["held_lambda_1", "held_lambda_2", "j_norm"]
+    m.bodies[1] = replace(m.bodies[1], mass=0.0)
+    with pytest.raises(ValueError, match="formulation: expected one of joint, absolute, got abs"):
+        m.build(formulation="abs")

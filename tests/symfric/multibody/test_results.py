@@ -1,4 +1,4 @@
-"""Results on request: reactions, centres of mass, powers, against statics and closed forms."""
+"""Results on request, and sketches, against statics and closed forms."""
 
 from dataclasses import replace
 from math import cos, sin
@@ -6,31 +6,21 @@ from math import cos, sin
 import casadi as ca
 import numpy as np
 import pytest
-from chains import TREE, chain, solve, state
+from chains import TREE, X, Y, Z, attach, chain, in_both, solve, state
 
 from symfric import BrownMcPhee, simulate
+from symfric import multibody as mb
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.model import Model
-from symfric.multibody import (
-    Distance,
-    Fixed,
-    JointFriction,
-    JointSpringDamper,
-    Mechanism,
-    Prismatic,
-    Revolute,
-    SpringDamper,
-    UserForce,
-)
-from symfric.multibody.joint import COMPONENTS, Joint
+from symfric.model.sketch import Sketch
+from symfric.multibody.joint import COMPONENTS
 from symfric.multibody.results import constraint_units
-from symfric.scenes import MECHANISMS, FourBar, FourMass, SliderCrank
+from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, SliderCrank
 
 pytestmark = pytest.mark.heavy
 
-Y = (0.0, 1.0, 0.0)
 LAW = BrownMcPhee(v_t=0.5)
 
 
@@ -52,16 +42,14 @@ def at_start(model: Model) -> dict[str, float]:
     return dict(zip(names, found.full().ravel().tolist(), strict=True))
 
 
-def pendulum(angle: float, rate: float) -> Mechanism:
-    m = Mechanism("pendulum")
-    m.body("bob", 2.0, (0.1, 0.2, 0.3))
-    m.frame("ground.pivot", z=Y, x=(0.0, 0.0, -1.0))
-    m.frame("bob.pivot", at=(0.0, 0.0, 0.4), z=Y, x=(0.0, 0.0, -1.0))
-    m.joint(Revolute("hinge", "ground.pivot", "bob.pivot", start=angle, rate=rate))
+def pendulum(angle: float, rate: float) -> mb.Mechanism:
+    m = mb.Mechanism("pendulum")
+    attach(m, mb.Revolute, "hinge", "bob", mass=2.0, J=(0.1, 0.2, 0.3), to=(0.0, 0.0, 0.4), z=Y,
+           x=(0.0, 0.0, -1.0), start=angle, rate=rate)  # fmt: skip
     return m
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.7, -2.0])
+@pytest.mark.parametrize("angle", [0.7, -2.0])
 def test_hinge_of_a_pendulum_pulls_with_weight_and_centrifugal_force(angle: float) -> None:
     """Along the rod m g cos + m L w^2, across it the weight that does not accelerate the bob."""
     m, L, J, g, w = 2.0, 0.4, 0.2, 9.81, 3.0
@@ -71,18 +59,18 @@ def test_hinge_of_a_pendulum_pulls_with_weight_and_centrifugal_force(angle: floa
     assert abs(found["hinge_Fy"]) == pytest.approx(abs(m * L * alpha + m * g * sin(angle)))
     assert [found[f"hinge_{c}"] for c in ("Fz", "Mx", "My")] == pytest.approx([0, 0, 0], abs=1e-9)
     assert "hinge_Mz" not in found
+    assert [found["bob_x"], found["bob_z"]] == pytest.approx([-L * sin(angle), -L * cos(angle)])
+    velocity = [-L * w * cos(angle), 0.0, L * w * sin(angle)]
+    assert [found[f"bob_v{axis}"] for axis in "xyz"] == pytest.approx(velocity)
 
 
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
+@in_both
 def test_clamped_beam_carries_weight_and_moment(formulation: str) -> None:
     """A cantilever of 3 kg that reaches 0.5 m beyond its clamp, pushed sideways with 7 N."""
-    m = Mechanism("beam")
-    m.body("beam", 3.0, (0.1, 0.1, 0.1))
-    m.frame("beam.root", at=(-0.5, 0.0, 0.0))
-    m.joint(Fixed("clamp", "ground", "beam.root"))
-    m.force(UserForce("push", "beam", lambda kin: ((0.0, 7.0, 0.0), (0.0, 0.0, 0.0))))
-    m.body("weight", 1.0, (0.1, 0.1, 0.1))  # something that moves
-    m.joint(Prismatic("lift", "ground", "weight"))
+    m = mb.Mechanism("beam")
+    attach(m, mb.Fixed, "clamp", "beam", mass=3.0, to=(-0.5, 0.0, 0.0))
+    m.force(mb.UserForce("push", "beam", lambda kin: ((0.0, 7.0, 0.0), (0.0, 0.0, 0.0))))
+    attach(m, mb.Prismatic, "lift", "weight")  # something that moves
     found = at_start(m.build(formulation=formulation))
     wrench = [found[f"clamp_{c}"] for c in COMPONENTS]
     expected = [0.0, -7.0, 3 * 9.81, 0.0, -0.5 * 3 * 9.81, -0.5 * 7.0]
@@ -91,13 +79,10 @@ def test_clamped_beam_carries_weight_and_moment(formulation: str) -> None:
 
 def test_guide_takes_what_does_not_point_along_it() -> None:
     """A slider on x under its weight and a force that acts 0.2 m above the guide."""
-    m = Mechanism("guide")
-    for place in ("ground.rail", "slider.rail"):
-        m.frame(place, z=(1.0, 0.0, 0.0), x=(0.0, 0.0, 1.0))
-    m.body("slider", 4.0, (0.1, 0.1, 0.1))
+    m = mb.Mechanism("guide")
+    attach(m, mb.Prismatic, "x", "slider", mass=4.0, z=X, x=Z)
     m.frame("slider.top", at=(0.0, 0.0, 0.2))
-    m.joint(Prismatic("x", "ground.rail", "slider.rail"))
-    m.force(UserForce("pull", "slider.top", lambda kin: ((8.0, 3.0, 0.0), (0.0, 0.0, 0.0))))
+    m.force(mb.UserForce("pull", "slider.top", lambda kin: ((8.0, 3.0, 0.0), (0.0, 0.0, 0.0))))
     found = at_start(m.build())
     # frame: x up, y = z x x = -y of the world
     assert found["x_Fx"] == pytest.approx(4 * 9.81)
@@ -107,49 +92,23 @@ def test_guide_takes_what_does_not_point_along_it() -> None:
     assert found["x_Mz"] == pytest.approx(0.2 * 3.0)
 
 
-@pytest.mark.parametrize(("start", "tension"), [(-1.5, 19.62), (1.5, -19.62)])
-def test_rod_is_pulled_or_pressed(start: float, tension: float) -> None:
-    m = Mechanism("rod")
-    m.body("bob", 2.0, (0.1, 0.1, 0.1))
-    m.joint(Prismatic("lift", "ground", "bob", start=start))
-    m.joint(Distance("rod", "ground", "bob", length=1.5))
-    found = at_start(m.build())
-    assert found["rod_tension"] == pytest.approx(tension)
-    assert [found[f"rod_F{c}"] for c in "xyz"] == pytest.approx([0, 0, 2 * 9.81])
+def test_rod_is_pulled_or_pressed() -> None:
+    for start, tension in ((-1.5, 19.62), (1.5, -19.62)):
+        m = mb.Mechanism("rod")
+        attach(m, mb.Prismatic, "lift", "bob", mass=2.0, start=start)
+        m.joint(mb.Distance("rod", "ground", "bob", length=1.5))
+        found = at_start(m.build())
+        assert found["rod_tension"] == pytest.approx(tension)
+        assert [found[f"rod_F{c}"] for c in "xyz"] == pytest.approx([0, 0, 2 * 9.81])
 
 
-@pytest.mark.parametrize("kind", TREE, ids=lambda kind: kind.__name__)
-def test_components_left_out_are_those_a_joint_cannot_transmit(kind: type[Joint]) -> None:
+def test_components_left_out_are_those_a_joint_cannot_transmit() -> None:
     made = chain().prepare()
-    eq, name = made.eq, f"j{TREE.index(kind)}"
-    q, qd = state(made)
-    values = solve(eq, q, qd).reactions[name]
-    given = kind.transmits
-    for component, value in zip(COMPONENTS, values, strict=True):
-        if component in given:
-            assert abs(value) > 1e-6, component
-        else:
-            assert abs(value) < 1e-9 * np.abs(values).max(initial=1.0), component
-
-
-@pytest.mark.parametrize("name", ["four_bar", "four_mass", "pendulum_box"])
-def test_both_formulations_give_the_same_details(name: str) -> None:
-    mechanism = MECHANISMS[name](LAW).mechanism()
-    ours, expected = (at_start(mechanism.build(formulation=f)) for f in ("joint", "absolute"))
-    largest = max(abs(x) for x in ours.values())
-    for detail, value in ours.items():
-        if detail in expected:  # absolute coordinates are centres of mass already
-            assert value == pytest.approx(expected[detail], rel=1e-12, abs=1e-12 * largest), detail
-    left = {d for d in ours if d not in expected and not d.endswith("_acc")}
-    bodies = [b.name for b in mechanism.bodies]
-    assert left == {f"{b}_{axis}" for b in bodies[1:] for axis in "xyz"}
-
-
-def test_centres_of_mass_move_as_the_angle_says() -> None:
-    found = at_start(pendulum(0.3, 2.0).build())
-    assert [found["bob_x"], found["bob_z"]] == pytest.approx([-0.4 * sin(0.3), -0.4 * cos(0.3)])
-    velocity = [-0.8 * cos(0.3), 0.0, 0.8 * sin(0.3)]
-    assert [found[f"bob_v{axis}"] for axis in "xyz"] == pytest.approx(velocity)
+    reactions = solve(made.eq, *state(made)).reactions
+    for i, kind in enumerate(TREE):
+        values, given = reactions[f"j{i}"], [c in kind.transmits for c in COMPONENTS]
+        large = np.abs(values) > 1e-9 * np.abs(values).max(initial=1.0)
+        assert large.tolist() == given, kind
 
 
 def test_details_cost_the_model_nothing_until_they_are_asked_for(
@@ -167,40 +126,32 @@ def test_details_cost_the_model_nothing_until_they_are_asked_for(
 
 def test_reactions_that_redundant_constraints_leave_open_are_not_given() -> None:
     """A door on two hinges: who carries how much is not determined."""
-    m = Mechanism("door")
-    m.body("door", 10.0, (1.0, 1.0, 1.0))
+    m = mb.Mechanism("door")
     for name, height in (("low", 0.2), ("high", 1.8)):
-        m.frame(f"ground.{name}", at=(0.0, 0.0, height))
-        m.frame(f"door.{name}", at=(-0.4, 0.0, height))
-        m.joint(Revolute(name, f"ground.{name}", f"door.{name}"))
-    m.body("bob", 1.0, (0.1, 0.1, 0.1))
-    m.joint(Revolute("own", "ground", "bob"))
+        ends = {"at": (0.0, 0.0, height), "to": (-0.4, 0.0, height)}
+        attach(m, mb.Revolute, name, "door", mass=10.0, **ends)
+    attach(m, mb.Revolute, "own", "bob")
     found = at_start(m.build())
     assert [n for n in found if n.startswith(("low_", "high_"))] == ["low_acc"]
     assert found["own_Fz"] == pytest.approx(9.81)
 
 
-def powers(m: Mechanism) -> set[str]:
+def powers(m: mb.Mechanism) -> set[str]:
     names = m.build().further
     return {n.removesuffix("_work_rate") for n in names if n.endswith("_work_rate")}
 
 
 def test_only_what_is_not_conserved_has_a_power() -> None:
     m = pendulum(0.3, 0.0)
-    m.force(JointSpringDamper("torsion", "hinge", stiffness=3.0))
-    m.force(SpringDamper("spring", "ground", "bob", stiffness=2.0, free_length=0.1))
+    m.force(mb.JointSpringDamper("torsion", "hinge", stiffness=3.0))
+    m.force(mb.SpringDamper("spring", "ground", "bob", stiffness=2.0, free_length=0.1))
     assert powers(m) == set()
-    m.force(JointSpringDamper("damper", "hinge", damping=0.1))
-    m.force(SpringDamper("winch", "ground", "bob", actuator=m.input("pull", "N")))
-    m.joints[0] = replace(m.joints[0], friction=JointFriction(LAW, radius=0.1))
-    assert powers(m) == {"damper", "winch", "friction"}
-
-
-def test_a_spring_whose_rest_is_an_input_does_work() -> None:
-    """Who winds it up is not in the model, so that its potential is none."""
-    m = pendulum(0.3, 0.0)
-    m.force(JointSpringDamper("wound", "hinge", stiffness=3.0, rest=m.input("rest", "rad")))
-    assert powers(m) == {"wound"}
+    m.force(mb.JointSpringDamper("damper", "hinge", damping=0.1))
+    m.force(mb.SpringDamper("winch", "ground", "bob", actuator=m.input("pull", "N")))
+    m.joints[0] = replace(m.joints[0], friction=mb.JointFriction(LAW, radius=0.1))
+    # who winds a spring up is not in the model, so that its potential is none
+    m.force(mb.JointSpringDamper("wound", "hinge", stiffness=3.0, rest=m.input("rest", "rad")))
+    assert powers(m) == {"damper", "winch", "friction", "wound"}
 
 
 def test_multipliers_have_the_unit_of_what_they_do() -> None:
@@ -219,5 +170,75 @@ def test_multipliers_have_the_unit_of_what_they_do() -> None:
 
 def test_constraints_of_several_kinds_have_a_norm_without_unit() -> None:
     assert constraint_units(["N m", "N m"]) == ("rad", "rad/s", "rad/s^2")
-    assert constraint_units(["N", "N m"]) == ("", "", "")
-    assert constraint_units([""]) == constraint_units([]) == ("", "", "")
+    for units in (["N", "N m"], [""], []):
+        assert constraint_units(units) == ("", "", "")
+
+
+SLOW = BrownMcPhee(v_t=0.05)
+
+
+def sketch(m: mb.Mechanism) -> Sketch:
+    made = m.build().sketch
+    assert made is not None
+    return made()
+
+
+def test_every_body_and_joint_is_in_it() -> None:
+    for scene in MECHANISMS.values():
+        mechanism = scene(SLOW).mechanism()
+        drawn = sketch(mechanism)
+        assert {part.name for part in drawn.parts} == {b.name for b in mechanism.bodies}
+        springs = [f.name for f in mechanism.forces if isinstance(f, mb.SpringDamper)]
+        assert [mark.name for mark in drawn.marks] == [
+            *(j.name for j in mechanism.joints),
+            *springs,
+        ]
+        assert drawn.places.shape[0] == 12
+
+
+def test_places_follow_the_motion_and_the_parameters_of_the_run() -> None:
+    """The hinge stays, the bob is where angle and length say."""
+    model = Pendulum(SLOW).model(["L"])
+    run = simulate(model, 1.0, p={"L": 0.7}, samples=5)
+    assert model.sketch is not None
+    drawn = model.sketch()
+    rod = next(part for part in drawn.parts if part.name == "rod")
+    bob = run.of(drawn.places[9:, rod.centre])
+    angle = run["phi"]
+    expected = np.stack([0.7 * np.sin(angle), 0 * angle, -0.7 * np.cos(angle)])
+    assert bob == pytest.approx(expected)
+    assert run.of(drawn.places[9:, drawn.marks[0].b]) == pytest.approx(np.zeros((3, 5)))
+    axes = run.of(drawn.places[:9, drawn.marks[0].b]).T.reshape(-1, 3, 3)
+    assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(3), (5, 1, 1)))
+
+
+def test_ends_of_springs_alone_are_told_from_frames_and_contacts_have_a_scale() -> None:
+    drawn = sketch(FourMass(SLOW).mechanism())
+    parts, marks = ({one.name: one for one in group} for group in (drawn.parts, drawn.marks))
+    assert (len(parts["slider_4"].ends), parts["slider_1"].ends) == (1, ())
+    assert parts["ground"].fixed and not parts["slider_1"].fixed
+    assert marks["y2"].slips == (("y2_slip", 0.05),)
+    assert marks["rod_12"].slips == ()
+
+
+def test_springs_dampers_and_rods_are_told_apart() -> None:
+    m = mb.Mechanism("m")
+    m.body("bob", 1.0, (0.1, 0.1, 0.1))
+    m.frame("ground.wall", at=(1.0, 0.0, 0.0))
+    m.joint(mb.Planar("plane", "ground", "bob", start=(0.0, 0.3, 0.0)))
+    m.joint(mb.Distance("rod", "ground", "bob", length=0.3))
+    m.force(mb.SpringDamper("spring", "ground.wall", "bob", stiffness=1.0))
+    m.force(mb.SpringDamper("oil", "ground.wall", "bob", damping=1.0))
+    lines = {mark.name: mark.symbol.line for mark in sketch(m).marks}
+    assert lines == {"plane": "", "rod": "rod", "spring": "spring", "oil": "damper"}
+
+
+def test_joints_on_the_ground_are_known_whichever_way_they_are_written() -> None:
+    m = mb.Mechanism("m")
+    for name, ends in (("one", ("ground", "one")), ("two", ("two", "ground"))):
+        m.body(name, 1.0, (0.1, 0.1, 0.1))
+        m.joint(mb.Revolute(f"of_{name}", *ends))
+    drawn = sketch(m)
+    assert [mark.grounded for mark in drawn.marks] == [True, True]
+    fixed = next(part for part in drawn.parts if part.fixed)
+    assert {mark.a for mark in drawn.marks} <= {*fixed.corners}

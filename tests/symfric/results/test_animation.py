@@ -1,13 +1,16 @@
-"""Moving pictures in every format, whole or not at all."""
+"""Moving pictures in every format, whole or not at all, and their geometry."""
 
 from base64 import b64decode
 from pathlib import Path
 
+import casadi as ca
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from chains import attach
 from matplotlib.animation import FFMpegWriter
 from matplotlib.colors import to_hex
+from numpy.typing import NDArray
 from PIL import Image
 
 from symfric import (
@@ -20,8 +23,11 @@ from symfric import (
     rabinowicz,
     simulate,
 )
-from symfric.multibody import Mechanism, Prismatic
-from symfric.results.animation import SLIDES, STICKS, check_format, frame_times, picture
+from symfric.model.sketch import Mark, Part, Sketch, Symbol
+from symfric.multibody import Distance, Mechanism, PinInSlot, Prismatic, Revolute, Spherical
+from symfric.multibody.results import SPRING
+from symfric.results.animation import SLIDES, STICKS, frame_times, picture
+from symfric.results.strokes import Poses, Stroke, View, look, strokes
 from symfric.scenes import MECHANISMS, DrillString, Pendulum, Prescribed
 
 
@@ -32,76 +38,59 @@ def runs() -> dict[str, Trajectory]:
     return {n: simulate(MECHANISMS[n](law).model(), 0.2, samples=5, backend="vm") for n in names}
 
 
-def test_gif_has_a_picture_per_frame_that_differ(
+def test_films_have_a_picture_per_frame_and_need_nothing_from_elsewhere(
     runs: dict[str, Trajectory], tmp_path: Path
 ) -> None:
     told: list[float] = []
     path, open_before = tmp_path / "new" / "motion.gif", plt.get_fignums()
-    runs["four_mass"].animate(path, fps=10, speed=0.5, progress=told.append)
+    runs["pendulum"].animate(path, fps=10, speed=0.5, progress=told.append)
     with Image.open(path) as film:
-        assert film.n_frames == 5  # 0.2 s at half speed
-        assert film.info["duration"] == 100
+        assert (film.n_frames, film.info["duration"]) == (5, 100)  # 0.2 s at half speed
         first = np.asarray(film.convert("RGB"))
         film.seek(film.n_frames - 1)
         last = np.asarray(film.convert("RGB"))
     assert first.shape == last.shape
     assert (first != last).any()
     assert told == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
-    assert [p.name for p in path.parent.iterdir()] == ["motion.gif"]
-    assert plt.get_fignums() == open_before
-
-
-def test_html_holds_its_pictures_and_needs_nothing_from_elsewhere(
-    runs: dict[str, Trajectory], tmp_path: Path
-) -> None:
-    runs["pendulum"].animate(tmp_path / "motion.html", fps=10, speed=0.5)
-    text = (tmp_path / "motion.html").read_text()
+    runs["pendulum"].animate(path.with_suffix(".html"), fps=10, speed=0.5)
+    text = path.with_suffix(".html").read_text()
     pictures = text.split("data:image/png;base64,")[1:]
     assert len(pictures) == 5
     assert b64decode(pictures[0].split('"')[0]).startswith(b"\x89PNG")
     assert "http" not in text.replace(pictures[0], "")[:2000]
     assert 'max="4"' in text
-
-
-def test_a_failed_film_leaves_nothing_behind(runs: dict[str, Trajectory], tmp_path: Path) -> None:
-    open_before = plt.get_fignums()
-
-    def stop(done: float) -> None:
-        raise KeyboardInterrupt
-
-    for ending in ("gif", "html"):
-        with pytest.raises(KeyboardInterrupt):
-            runs["pendulum"].animate(tmp_path / f"x.{ending}", fps=5, progress=stop)
-    assert list(tmp_path.iterdir()) == []
+    assert sorted(p.name for p in path.parent.iterdir()) == ["motion.gif", "motion.html"]
     assert plt.get_fignums() == open_before
 
 
-def test_mp4_without_its_program_names_what_needs_none(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("ending", ["gif", "html"])
+def test_a_failed_film_leaves_nothing_behind(
+    runs: dict[str, Trajectory], tmp_path: Path, ending: str
+) -> None:
+    def stop(done: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        runs["pendulum"].animate(tmp_path / f"x.{ending}", fps=5, progress=stop)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_cannot_be_filmed_is_refused_before_any_work(
+    runs: dict[str, Trajectory], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
-    with pytest.raises(ValueError, match=r"expected the program ffmpeg for \.mp4, got none; "
-                                         r"write \.gif or \.html"):  # fmt: skip
-        check_format("x.mp4")
-
-
-@pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="needs the program ffmpeg")
-def test_mp4_is_written(runs: dict[str, Trajectory], tmp_path: Path) -> None:
-    runs["pendulum"].animate(tmp_path / "x.mp4", fps=5)
-    assert b"ftyp" in (tmp_path / "x.mp4").read_bytes()[:16]
-
-
-def test_other_endings_are_refused_before_any_work(runs: dict[str, Trajectory]) -> None:
-    with pytest.raises(ValueError, match=r"ending in \.gif, \.html, \.mp4, got '\.avi'"):
-        runs["pendulum"].animate("x.avi")
-    for bad in ({"fps": 0.0}, {"speed": -1.0}, {"fps": np.nan}):
-        with pytest.raises(ValueError, match=r"animation: (fps|speed): expected a number > 0"):
-            runs["pendulum"].animate("x.gif", **bad)
-
-
-def test_a_model_without_a_sketch_is_refused(tmp_path: Path) -> None:
     x = Variable("x", "m", start=1.0)
-    run = simulate(Model("decay", x=(x,), ode=-x.symbol), 0.1)
-    with pytest.raises(ValueError, match="'decay': expected a machine with places"):
-        run.animate(tmp_path / "x.gif")
+    decay = simulate(Model("decay", x=(x,), ode=-x.symbol), 0.1)
+    speed = r"animation: (fps|speed): expected a number > 0"
+    for run, ending, how, message in (
+        (runs["pendulum"], "avi", {}, r"ending in \.gif, \.html, \.mp4, got '\.avi'"),
+        (runs["pendulum"], "mp4", {}, r"ffmpeg for \.mp4, got none; write \.gif or \.html"),
+        *((runs["pendulum"], "gif", bad, speed)
+          for bad in ({"fps": 0.0}, {"speed": -1.0}, {"fps": np.nan})),
+        (decay, "gif", {}, "'decay': expected a machine with places"),
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=message):
+            run.animate(tmp_path / f"x.{ending}", **how)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -118,42 +107,31 @@ def test_a_block_on_a_belt_is_seen_from_aside_with_its_spring_and_its_stick() ->
         fills.append(to_hex(joint.get_markerfacecolor()))
         assert joint.get_xdata()[0] == pytest.approx(run.at(t)["x"][0])
     assert fills == [to_hex(fill) for fill in (SLIDES, STICKS, SLIDES)]
-
-
-def test_marks_of_the_belt_move_with_it() -> None:
-    run = simulate(rabinowicz(BrownMcPhee()), 2.0)
-    figure, show = picture(run, np.array([0.0, 1.0]))
-    ticks = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
-    at = []
+    # marks of the belt move with it
+    ticks = [line for line in axis.lines if line.get_marker() == "|"]
+    length, at = 3 * 0.15 * 0.8 * 9.81 / 2.1, list[list[float]]()
     for k in range(2):
         show(k)
         at.append([line.get_xdata()[0] for line in ticks])
-    moved = np.subtract(at[1], at[0])
-    length = 3 * 0.15 * 0.8 * 9.81 / 2.1
-    assert np.mod(moved, length) == pytest.approx(np.full(9, 0.1))
+    assert np.mod(np.subtract(at[1], at[0]), length) == pytest.approx(np.full(9, 0.3))
+    small = simulate(Prescribed(BrownMcPhee()).model(), 1.0, u={"v": 1e-3})
+    assert picture(small, np.array([0.0, 1.0]))[0].axes[0].get_xlabel() == "x [mm]"
 
 
 @pytest.mark.parametrize("along", ["x", "y", "z"])
 def test_a_slider_alone_is_drawn_in_a_plane(along: str) -> None:
     machine = Mechanism("slider", gravity=(0.0, 0.0, 0.0))
-    machine.body("block", mass=1.0, inertia=(1.0, 1.0, 1.0))
-    for place in ("ground.rail", "block.rail"):
-        machine.frame(place, z=tuple(float(along == other) for other in "xyz"))
-    machine.joint(Prismatic("s", "ground.rail", "block.rail", rate=1.0))
+    axis = tuple(float(along == other) for other in "xyz")
+    attach(machine, Prismatic, "s", "block", z=axis, rate=1.0)
     figure, _ = picture(simulate(machine.build(), 0.1), np.array([0.0, 0.1]))
     assert figure.axes[0].name == "rectilinear"
     assert along in figure.axes[0].get_xlabel() + figure.axes[0].get_ylabel()
 
 
-@pytest.mark.parametrize(("end", "speed", "frames"), [(4.0, 1.0, 81), (0.25, 0.25 / 6, 121),
-                                                      (60.0, 10.0, 121)])  # fmt: skip
-def test_what_is_too_fast_or_too_slow_is_shown_in_six_seconds(
-    end: float, speed: float, frames: int
-) -> None:
-    times, found = frame_times(0.0, end, 20.0, None)
-    assert found == pytest.approx(speed)
-    assert times.size == frames
-    assert (times[0], times[-1]) == (0.0, end)
+def test_what_is_too_fast_or_too_slow_is_shown_in_six_seconds() -> None:
+    for end, speed, frames in ((4.0, 1.0, 81), (0.25, 0.25 / 6, 121), (60.0, 10.0, 121)):
+        times, found = frame_times(0.0, end, 20.0, None)
+        assert (found, times.size, times[0], times[-1]) == (pytest.approx(speed), frames, 0.0, end)
 
 
 def test_spatial_mechanisms_have_one_scale_on_three_axes(runs: dict[str, Trajectory]) -> None:
@@ -195,11 +173,114 @@ def test_the_hands_of_a_drill_string_turn_and_its_bit_sticks_at_first() -> None:
     assert np.abs(tips - np.sin(angle)).min() < 1e-9  # the hand of the top drive
 
 
-def test_small_machines_are_drawn_in_small_units() -> None:
-    run = simulate(Prescribed(BrownMcPhee()).model(), 1.0, u={"v": 1e-3})
-    figure, show = picture(run, np.array([0.0, 1.0]))
-    show(1)
-    (axis,) = figure.axes
-    assert axis.get_xlabel() == "x [mm]"
-    block = next(line for line in axis.lines if line.get_marker() == "s")
-    assert block.get_xdata()[0] == pytest.approx(1.0)
+Array = NDArray[np.float64]
+FRAMES = 7
+
+
+def turned(axis: int, angles: Array) -> Array:
+    """Axes of a frame that turns about a world axis, shape (axis, component, pictures)."""
+    c, s = np.cos(angles), np.sin(angles)
+    R = np.zeros((3, 3, angles.size))
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R[axis, axis], R[i, i], R[j, j], R[j, i], R[i, j] = 1, c, c, s, -s
+    return R.transpose(1, 0, 2)
+
+
+def arm(normal: int, length: float = 2.0, lift: float = 0.0) -> tuple[Sketch, Poses]:
+    """A rod on the ground that turns about a world axis, its centre at the far end."""
+    angles = np.linspace(0.2, 1.9, FRAMES)
+    axes = turned(normal, angles)
+    first = axes[(normal + 1) % 3]
+    far = length * first + lift * np.outer(np.eye(3)[normal], angles)
+    ground = np.repeat(np.eye(3)[:, :, None], FRAMES, axis=2)
+    hinge = np.roll(ground, 2 - normal, axis=0), np.roll(axes, 2 - normal, axis=0)
+    at = np.stack([np.zeros((3, FRAMES)), np.zeros((3, FRAMES)), np.zeros((3, FRAMES)), far])
+    parts = (Part("ground", 2, (0,), fixed=True), Part("rod", 3, (1,)))
+    marks = (Mark("hinge", Revolute.symbol, 0, 1, grounded=True),)
+    poses = Poses(np.stack([*hinge, ground, axes]), at, np.stack([0 * far, far]))
+    return Sketch(ca.SX(12, 4), parts, marks), poses
+
+
+def test_planar_motion_is_seen_along_its_normal_and_holds_all_places() -> None:
+    for normal, right, up in ((0, "y", "z"), (1, "x", "z"), (2, "x", "y")):
+        sketch, poses = arm(normal)
+        view = look(sketch, poses)
+        assert view.planar
+        assert view.right == pytest.approx(np.eye(3)["xyz".index(right)])
+        assert view.up == pytest.approx(np.eye(3)["xyz".index(up)])
+        assert np.cross(view.right, view.up) == pytest.approx(view.eye)
+        assert (view.low < poses.at.min(axis=(0, 2))).all()
+        assert (view.high > poses.paths.max(axis=(0, 2))).all()
+        assert view.size == pytest.approx(0.02 * np.ptp(poses.at, axis=(0, 2)).max())
+    spatial = look(*arm(1, lift=1e-3))
+    assert not spatial.planar
+    assert np.linalg.norm(spatial.eye) == pytest.approx(1.0)
+
+
+def test_a_mechanism_at_rest_is_seen_along_its_hinges() -> None:
+    sketch, poses = arm(1)
+    still = Poses(*(np.repeat(a[..., :1], FRAMES, axis=-1) for a in (poses.axes, poses.at)),
+                  poses.paths[..., :1])  # fmt: skip
+    view = look(sketch, still)
+    assert view.planar
+    assert abs(view.eye[1]) == pytest.approx(1.0)
+
+
+def drawn(symbol: Symbol, a: Array, b: Array, **more: object) -> dict[str, Stroke]:
+    """Strokes by role of one mark between two places that stand still."""
+    axes = np.tile(np.eye(3)[None, :, :, None], (3, 1, 1, 1))
+    poses = Poses(axes, np.stack([a, b, b])[:, :, None], b[None, :, None])
+    sketch = Sketch(ca.SX(12, 3), (Part("body", 2, (1,)),), (Mark("it", symbol, 0, 1, **more),))  # type: ignore[arg-type]
+    view = View(a, b, np.array([0.0, -1.0, 0.0]), True, 0.1)
+    sticks = {"it": np.array([True])} if more.get("slips") else {}
+    return {s.role: s for s in strokes(sketch, poses, view, sticks)}
+
+
+A, B = np.zeros(3), np.array([3.0, 0.0, 4.0])
+
+
+def test_a_spring_runs_from_end_to_end_and_swings_in_the_picture() -> None:
+    points = drawn(SPRING, A, B)["spring"].points[:, :, 0]
+    assert points[0] == pytest.approx(A)
+    assert points[-1] == pytest.approx(B)
+    along = points @ B / 5
+    assert (np.diff(along) > 0).all()
+    off = points - np.outer(along, B / 5)
+    assert np.abs(off[:, 1]).max() == pytest.approx(0.0, abs=1e-12)
+    assert np.linalg.norm(off, axis=1).max() == pytest.approx(0.1)
+    towards_the_eye = drawn(SPRING, A, np.array([0.0, 2.0, 0.0]))["spring"].points
+    assert np.isfinite(towards_the_eye).all()
+
+
+def test_a_block_has_the_twelve_edges_of_a_cube() -> None:
+    points = drawn(Spherical.symbol, A, B)["block"].points[:, :, 0].reshape(12, 3, 3)
+    assert np.isnan(points[:, 2]).all()
+    lengths = np.linalg.norm(points[:, 0] - points[:, 1], axis=1)
+    assert lengths == pytest.approx(np.full(12, 0.24))
+    assert np.mean(points[:, :2], axis=(0, 1)) == pytest.approx(B)
+
+
+def test_a_guide_reaches_beyond_the_slide_on_the_axis_of_its_parent() -> None:
+    found = drawn(Prismatic.symbol, A, np.array([0.0, 0.0, 2.0]), grounded=True)
+    assert found["ground"].points[:, :, 0] == pytest.approx(np.array([[0, 0, 1.7], [0, 0, 2.3]]))
+    assert "anchor" not in found
+    assert "guide" in drawn(Prismatic.symbol, A, B)
+
+
+def test_a_slot_reaches_from_its_body_to_beyond_the_pin() -> None:
+    found = drawn(PinInSlot.symbol, A, np.array([0.0, 0.0, 2.0]))
+    assert found["guide"].points[:, :, 0] == pytest.approx(np.array([[0, 0, -0.3], [0, 0, 2.3]]))
+    assert found["joint"].points[0, :, 0] == pytest.approx(np.array([0.0, 0.0, 2.0]))
+    assert not PinInSlot.symbol.turnable  # the slot stays that of its body
+
+
+def test_joints_show_the_ground_what_their_contacts_do_and_rods_a_line() -> None:
+    bare = drawn(Revolute.symbol, A, A)
+    assert "anchor" not in bare and bare["joint"].sticks is None
+    anchor = drawn(Revolute.symbol, A, A, grounded=True)["anchor"]
+    assert anchor.points[0, :, 0] == pytest.approx(A)
+    joint = drawn(Revolute.symbol, A, A, slips=(("it_slip", 0.1),))["joint"]
+    assert joint.sticks is not None and joint.sticks.all()
+    rod = drawn(Distance.symbol, A, B)
+    assert rod["rod"].points[:, :, 0] == pytest.approx(np.stack([A, B]))
+    assert "joint" not in rod

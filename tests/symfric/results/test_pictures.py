@@ -1,5 +1,6 @@
 """Pictures of runs: what they show by default, with which names, units and line styles."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,9 @@ from matplotlib.image import imread
 
 from symfric import BrownMcPhee, LuGre, Model, Trajectory, Variable, rabinowicz, simulate
 from symfric.foundation.style import line
-from symfric.results.kinds import shortened
+from symfric.results.kinds import friction_laws, is_mechanism, kinds, norms, shortened
 from symfric.results.pictures import level, plot_trajectories
-from symfric.scenes import CoupledBlocks, Drive, FourMass, QuarterCar, Scene
+from symfric.scenes import CoupledBlocks, Drive, FourMass, Pendulum, QuarterCar
 
 
 @pytest.fixture(scope="module")
@@ -50,23 +51,24 @@ def test_a_run_shows_positions_friction_and_power_and_names_its_law(
     assert line_.get_ydata() == pytest.approx(1e3 * runs["lugre"].at_looks("x"))
 
 
-def test_all_signals_have_a_panel_each_where_they_are_few(runs: dict[str, Trajectory]) -> None:
-    figure = runs["lugre"].plot(panels="all")
-    assert labels(figure) == ["x [mm]", "v [m/s]", "z [µm]", "v_rel [m/s]", "friction [N]",
-                              "power [mW]"]  # fmt: skip
-
-
-def test_other_choices_and_signals_are_refused(runs: dict[str, Trajectory]) -> None:
-    with pytest.raises(ValueError, match=r"plot: panels: expected one of main, all, got some"):
-        runs["lugre"].plot(panels="some")
-    with pytest.raises(ValueError, match=r"got frction; did you mean friction"):
-        runs["lugre"].plot("frction")
-
-
-def test_chosen_signals_in_the_chosen_order(runs: dict[str, Trajectory]) -> None:
-    figure = runs["lugre"].plot("friction", "x", label="LuGre")
+def test_chosen_signals_in_the_chosen_order_all_of_them_or_none(
+    runs: dict[str, Trajectory], tmp_path: Path
+) -> None:
+    run, path = runs["lugre"], tmp_path / "new" / "x.png"
+    figure = run.plot("friction", "x", label="LuGre", path=path)
     assert labels(figure) == ["friction [N]", "x [mm]"]
     assert figure.axes[0].lines[0].get_label() == "LuGre"
+    assert imread(path).shape[2] == 4
+    assert plt.get_fignums() == []
+    assert [p.name for p in path.parent.iterdir()] == ["x.png"]
+    every = ["x [mm]", "v [m/s]", "z [µm]", "v_rel [m/s]", "friction [N]", "power [mW]"]
+    assert labels(run.plot(panels="all")) == every
+    for names, panels, message in (
+        ((), "some", "plot: panels: expected one of main, all, got some"),
+        (("frction",), "main", "got frction; did you mean friction"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            run.plot(*names, panels=panels)
 
 
 def test_runs_differ_by_colour_and_line_style_and_stand_in_a_legend_below(
@@ -113,14 +115,6 @@ def test_of_compared_mechanisms_energy_is_the_sum(four_mass: Trajectory) -> None
     assert (first.is_dashed(), second.is_dashed()) == (False, True)
 
 
-def test_a_model_of_its_own_kind_shows_all_of_it() -> None:
-    a = Variable("concentration", "mol/m^3", start=1.0)
-    run = simulate(Model("decay", x=(a,), ode=-a.symbol), 1.0, samples=5)
-    figure = run.plot()
-    assert labels(figure) == ["concentration [mol/m^3]"]
-    assert figure.axes[0].get_title(loc="left") == "decay"
-
-
 def test_a_constant_is_a_level_line_and_no_offset_is_written() -> None:
     x, c = Variable("x", "m", start=1.0), Variable("c", "m", start=7.8e-6)
     still = Model("still", x=(x, c), ode=ca.SX([1.0, 0.0]))
@@ -131,15 +125,12 @@ def test_a_constant_is_a_level_line_and_no_offset_is_written() -> None:
     assert axis.yaxis.get_offset_text().get_text() == ""
 
 
-@pytest.mark.parametrize(("values", "limits"), [([0.0, 0.0], (-1.0, 1.0)),
-                                                ([5.0, 5.0 + 1e-9], (4.0, 6.0))])  # fmt: skip
-def test_what_hardly_changes_is_not_magnified(
-    values: list[float], limits: tuple[float, float]
-) -> None:
-    axis: Any = Figure().subplots()
-    axis.plot(values)
-    level(axis, [np.array(values), np.array([np.nan])])
-    assert axis.get_ylim() == pytest.approx(limits)
+def test_what_hardly_changes_is_not_magnified() -> None:
+    for values, limits in (([0.0, 0.0], (-1.0, 1.0)), ([5.0, 5.0 + 1e-9], (4.0, 6.0))):
+        axis: Any = Figure().subplots()
+        axis.plot(values)
+        level(axis, [np.array(values), np.array([np.nan])])
+        assert axis.get_ylim() == pytest.approx(limits)
 
 
 def test_names_lose_the_ending_that_all_share_and_stay_short() -> None:
@@ -150,26 +141,18 @@ def test_names_lose_the_ending_that_all_share_and_stay_short() -> None:
     assert (len(long), long[:3], long[-3:]) == (28, "aaa", "bbb")
 
 
-def test_picture_is_written_and_pyplot_keeps_none(
-    runs: dict[str, Trajectory], tmp_path: Path
-) -> None:
-    runs["lugre"].plot("x", path=tmp_path / "new" / "x.png")
-    assert imread(tmp_path / "new" / "x.png").shape[2] == 4
-    assert plt.get_fignums() == []
-    assert [p.name for p in (tmp_path / "new").iterdir()] == ["x.png"]
-
-
-@pytest.mark.parametrize(
-    ("scene", "shown"),
-    [
-        (CoupledBlocks, ["position [m]", "friction [N]", "power of friction [W]"]),
-        (Drive, ["x [m]", "friction [N]", "power [W]"]),
-    ],
-)
-def test_scenes_without_joints_show_the_same_kinds(scene: type[Scene], shown: list[str]) -> None:
-    inputs = {name: given.function for name, given in scene.inputs.items()}
-    run = simulate(scene(BrownMcPhee()).model(), 1.0, u=inputs, samples=11)
-    assert labels(run.plot()) == shown
+def test_scenes_without_joints_show_the_same_kinds_and_others_all_they_have() -> None:
+    a = Variable("concentration", "mol/m^3", start=1.0)
+    decay = Model("decay", x=(a,), ode=-a.symbol)
+    blocks, drive = (scene(BrownMcPhee()) for scene in (CoupledBlocks, Drive))
+    for model, scene, expected in (
+        (blocks.model(), blocks, ["position [m]", "friction [N]", "power of friction [W]"]),
+        (drive.model(), drive, ["x [m]", "friction [N]", "power [W]"]),
+        (decay, None, ["concentration [mol/m^3]"]),
+    ):
+        inputs = {name: given.function for name, given in scene.inputs.items()} if scene else {}
+        run = simulate(model, 1.0, u=inputs, samples=11)
+        assert labels(run.plot()) == expected
 
 
 def test_a_signal_over_decades_has_a_logarithmic_axis_and_years_below_it() -> None:
@@ -179,11 +162,8 @@ def test_a_signal_over_decades_has_a_logarithmic_axis_and_years_below_it() -> No
     run = simulate(growing, 20 * year)
     figure = run.plot("x", log=["x"])
     (axis,) = figure.axes
-    assert (axis.get_yscale(), axis.get_ylabel(), axis.get_xlabel()) == (
-        "log",
-        "x [m]",
-        "t [years]",
-    )
+    drawn = axis.get_yscale(), axis.get_ylabel(), axis.get_xlabel()
+    assert drawn == ("log", "x [m]", "t [years]")
     (curve,) = axis.lines
     years, x_drawn = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
     assert x_drawn == pytest.approx(1e-9 * np.exp(years), rel=1e-4)
@@ -193,3 +173,22 @@ def test_a_signal_over_decades_has_a_logarithmic_axis_and_years_below_it() -> No
     sunk = simulate(growing, 3.0, x0={"x": -1.0})
     with pytest.raises(ValueError, match="log: expected signals above zero somewhere, got x"):
         sunk.plot("x", log="x")
+
+
+def test_every_kind_of_a_mechanism_with_loops_and_bristles() -> None:
+    model = FourMass(LuGre()).model()
+    found = kinds(model)
+    assert Counter(found.values()) == {
+        "position": 4, "rate": 4, "state of friction": 4, "normal force": 4, "friction": 8,
+        "energy": 3, "constraints": 3,
+    }  # fmt: skip
+    slips = {f"{name}_slip" for name in ("x1", "y2", "z3", "x4")}
+    assert set(model.signals) - set(found) == {"rod_12_lambda", "rod_23_lambda"} | slips
+
+
+def test_mechanisms_without_loops_have_no_norms_of_constraints() -> None:
+    model = Pendulum(BrownMcPhee()).model()
+    assert norms(model) == ()
+    assert friction_laws(model) == "BrownMcPhee"
+    assert is_mechanism(model)
+    assert not is_mechanism(rabinowicz(BrownMcPhee()))

@@ -15,17 +15,7 @@ from mechanics import (
 from scipy.integrate import solve_ivp
 from stored import stored
 
-from symfric import (
-    BrownMcPhee,
-    Coulomb,
-    Law,
-    Model,
-    SelfTuning,
-    Trajectory,
-    Viscous,
-    simulate,
-)
-from symfric.laws import LuGreNormalised
+import symfric as sf
 from symfric.scenes import (
     Arm,
     DoublePendulum,
@@ -38,7 +28,7 @@ from symfric.scenes import (
 
 pytestmark = pytest.mark.heavy
 
-SMOOTH = Viscous(sigma_2=0.0)
+SMOOTH = sf.Viscous(sigma_2=0.0)
 """No friction at all: a float zero leaves no term."""
 
 
@@ -55,7 +45,7 @@ def reference(name: str, rates: Rates, y0: list[float], times: np.ndarray) -> np
     return stored(name, compute)
 
 
-def constraints(run: Trajectory) -> tuple[float, float, float]:
+def constraints(run: sf.Trajectory) -> tuple[float, float, float]:
     """Largest violation on position, velocity and acceleration level."""
     return tuple(
         float(run[name].max())
@@ -67,7 +57,7 @@ def test_pendulum_swings_with_the_elliptic_period() -> None:
     for amplitude in (0.1, 1.0, 3.0):
         period = pendulum_period(np.sqrt(9.81 * 0.5 / (1 / 12 + 0.25)), amplitude)
         model = Pendulum(SMOOTH, phi_0=amplitude).model()
-        run = simulate(model, 2 * period, rtol=1e-10, t_eval=[period, 2 * period])
+        run = sf.simulate(model, 2 * period, rtol=1e-10, t_eval=[period, 2 * period])
         assert run["phi"] == pytest.approx([amplitude, amplitude], abs=1e-8)
         assert run["phi_rate"] == pytest.approx([0.0, 0.0], abs=1e-7)
 
@@ -77,14 +67,14 @@ def test_double_pendulum_agrees_with_the_textbook() -> None:
     a, b, *_ = reference(
         "double_pendulum", double_pendulum(1.0, 1.0, 9.81), [2.0, 2.0, 0.0, 0.0], times
     )
-    run = simulate(DoublePendulum(SMOOTH).model(), 4.0, rtol=1e-10, t_eval=times)
+    run = sf.simulate(DoublePendulum(SMOOTH).model(), 4.0, rtol=1e-10, t_eval=times)
     assert run["phi_1"] == pytest.approx(a, abs=2e-6)
     assert run["phi_1"] + run["phi_2"] == pytest.approx(b, abs=2e-6)
     assert np.ptp(run["energy"]) < 1e-7
 
 
 def test_pendulum_on_a_box_agrees_with_newtons_laws() -> None:
-    law = BrownMcPhee(mu_s=0.03, mu_d=0.02, v_t=0.02)
+    law = sf.BrownMcPhee(mu_s=0.03, mu_d=0.02, v_t=0.02)
     times = np.linspace(0.1, 5.0, 25)
 
     def mu(v: float) -> float:
@@ -92,21 +82,21 @@ def test_pendulum_on_a_box_agrees_with_newtons_laws() -> None:
 
     start, rates = [0, np.pi / 6, 0, 0], pendulum_box(6.0, 20.0, 0.3, 0.05, 9.81, mu)
     expected = reference("pendulum_box", rates, start, times)
-    run = simulate(PendulumBox(law, R=0.05).model(), 5.0, rtol=1e-9, t_eval=times)
+    run = sf.simulate(PendulumBox(law, R=0.05).model(), 5.0, rtol=1e-9, t_eval=times)
     for name, values in zip(("x", "phi", "x_rate", "phi_rate"), expected, strict=True):
         assert run[name] == pytest.approx(values, abs=1e-6), name
 
 
-def four_mass_model(law: Law | None) -> Model:
+def four_mass_model(law: sf.Law | None) -> sf.Model:
     return FourMass(SMOOTH if law is None else law).model()
 
 
-PEAK = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
+PEAK = sf.BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 
 
 def test_frictionless_four_mass_meets_the_published_positions() -> None:
     """Section 5a of the reference: energy 387.936521 J."""
-    run = simulate(four_mass_model(None), 4.0, rtol=1e-11, t_eval=[4.0])
+    run = sf.simulate(four_mass_model(None), 4.0, rtol=1e-11, t_eval=[4.0])
     found = [run[name][0] for name in ("x1", "y2", "z3", "x4")]
     assert found == pytest.approx([-0.54021178, 4.97073146, 4.92867414, -2.15971352], abs=1e-8)
     assert run["energy"][0] == pytest.approx(387.936521, abs=1e-6)
@@ -114,9 +104,9 @@ def test_frictionless_four_mass_meets_the_published_positions() -> None:
 
 
 def test_four_mass_with_the_self_tuning_law_meets_the_published_positions() -> None:
-    law = SelfTuning.from_peak_velocity(0.01, mu_s=0.12, mu_d=0.1)
+    law = sf.SelfTuning.from_peak_velocity(0.01, mu_s=0.12, mu_d=0.1)
     assert pytest.approx(1.37286, abs=1e-5) == law.C
-    run = simulate(four_mass_model(law), 4.0, rtol=1e-9, t_eval=[2.0, 4.0])
+    run = sf.simulate(four_mass_model(law), 4.0, rtol=1e-9, t_eval=[2.0, 4.0])
     found = np.array([run[name] for name in ("x1", "y2", "z3", "x4")])
     assert found[:, 0] == pytest.approx([0.753115, 4.942956, 4.956529, 2.497415], abs=1e-5)
     assert found[:, 1] == pytest.approx([-0.135846, 4.998154, 4.900863, 0.207150], abs=1e-5)
@@ -124,8 +114,8 @@ def test_four_mass_with_the_self_tuning_law_meets_the_published_positions() -> N
 
 
 def test_slider_crank_with_the_self_tuning_law_meets_the_published_numbers() -> None:
-    law = SelfTuning.from_peak_velocity(0.01, mu_s=0.1, mu_d=0.08)
-    run = simulate(SliderCrank(law).model(), 0.25, rtol=1e-10)
+    law = sf.SelfTuning.from_peak_velocity(0.01, mu_s=0.1, mu_d=0.08)
+    run = sf.simulate(SliderCrank(law).model(), 0.25, rtol=1e-10)
     assert [run["crank_rate"][-1], run["crank"][-1]] == pytest.approx([84.3534, 25.2698], abs=1e-4)
     assert run["energy"][-1] == pytest.approx(741.108, abs=1e-2)
 
@@ -137,7 +127,7 @@ def test_four_mass_agrees_with_minimal_coordinates_and_published_positions() -> 
         return brown_mcphee(v, 0.12, 0.1, 0.01)
 
     th, x4, *_ = reference("four_mass", four_mass(mu), [np.arctan2(3, 4), 5.0, 0.0, -1.0], times)
-    run = simulate(four_mass_model(PEAK), 4.0, rtol=1e-9, t_eval=times)
+    run = sf.simulate(four_mass_model(PEAK), 4.0, rtol=1e-9, t_eval=times)
     found = np.array([run[name] for name in ("x1", "y2", "z3", "x4")])[:, [19, 39]]  # as published
     assert found[:, 0] == pytest.approx([0.765030, 4.941126, 4.958354, 2.484775], abs=1e-5)
     assert found[:, 1] == pytest.approx([-0.134542, 4.998190, 4.900827, 0.212878], abs=1e-5)
@@ -153,7 +143,7 @@ def test_four_mass_agrees_with_minimal_coordinates_and_published_positions() -> 
 
 
 def test_frictionless_slider_crank_keeps_its_energy_and_meets_the_published_numbers() -> None:
-    run = simulate(SliderCrank(SMOOTH).model(), 0.25, rtol=1e-11)
+    run = sf.simulate(SliderCrank(SMOOTH).model(), 0.25, rtol=1e-11)
     last = [run[name][-1] for name in ("crank_rate", "crank", "slider")]
     assert last == pytest.approx([120.8896, 30.1022, 0.20990], abs=5e-5)
     th = run["crank"]
@@ -165,7 +155,7 @@ def test_frictionless_slider_crank_keeps_its_energy_and_meets_the_published_numb
     assert run["crank_rate"] == pytest.approx(closed, abs=1e-6)
 
 
-CRANK = BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01)
+CRANK = sf.BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01)
 
 
 def test_slider_crank_agrees_with_the_crank_angle_alone_and_published_numbers() -> None:
@@ -175,7 +165,7 @@ def test_slider_crank_agrees_with_the_crank_angle_alone_and_published_numbers() 
         return brown_mcphee(v, 0.1, 0.08, 0.01)
 
     th, w = reference("slider_crank", slider_crank(mu), [0.0, 120.0], times)
-    run = simulate(SliderCrank(CRANK).model(), 0.25, rtol=1e-10, t_eval=[0.0, *times])
+    run = sf.simulate(SliderCrank(CRANK).model(), 0.25, rtol=1e-10, t_eval=[0.0, *times])
     assert run["crank"][1:] == pytest.approx(th, abs=1e-6)
     assert run["crank_rate"][1:] == pytest.approx(w, abs=1e-4)
     assert run["crank_N"][0] == pytest.approx(4724.36, abs=5e-3)
@@ -186,8 +176,8 @@ def test_slider_crank_agrees_with_the_crank_angle_alone_and_published_numbers() 
 
 
 def test_four_bar_closes_as_freudenstein_says() -> None:
-    scene = FourBar(Coulomb(v_eps=0.02))
-    run = simulate(scene.model(), 3.0, rtol=1e-8)
+    scene = FourBar(sf.Coulomb(v_eps=0.02))
+    run = sf.simulate(scene.model(), 3.0, rtol=1e-8)
     expected = [rocker_angle(0.1, 0.35, 0.3, 0.4, th) for th in run["theta_crank"]]
     off = np.abs(np.exp(1j * run["theta_rocker"]) - np.exp(1j * np.array(expected)))
     assert off.max() < 1e-11
@@ -195,9 +185,9 @@ def test_four_bar_closes_as_freudenstein_says() -> None:
 
 
 def test_arm_loses_what_friction_takes() -> None:
-    model = Arm(LuGreNormalised()).model()
+    model = Arm(sf.LuGreNormalised()).model()
     assert (len(model.x), len(model.z)) == (18, 6)
-    run = simulate(model, 0.1, rtol=1e-8, samples=4001)
+    run = sf.simulate(model, 0.1, rtol=1e-8, samples=4001)
     dissipated = sum(run[f"q{i}_power"] for i in range(1, 7))
     work = np.trapezoid(dissipated, run.t)
     assert run["energy"][0] - run["energy"][-1] == pytest.approx(work, rel=1e-5)
@@ -207,6 +197,6 @@ def test_arm_loses_what_friction_takes() -> None:
 def test_another_parameter_closes_the_loop_again() -> None:
     """A longer rod than the model was written for: the start is assembled."""
     model = SliderCrank(CRANK).model(["l"])
-    run = simulate(model, 0.01, p={"l": 0.35}, rtol=1e-8)
+    run = sf.simulate(model, 0.01, p={"l": 0.35}, rtol=1e-8)
     assert run["constraint_position"].max() < 1e-12
     assert run["slider"][0] == pytest.approx(np.sqrt(0.35**2 - 0.1**2 - 0.18**2))

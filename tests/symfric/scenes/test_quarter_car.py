@@ -12,21 +12,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from stored import stored
 
-from symfric import (
-    BrownMcPhee,
-    Coulomb,
-    Law,
-    LuGre,
-    SolveError,
-    Status,
-    Sum,
-    Viscous,
-    parameters,
-    simulate,
-)
-from symfric.foundation.parameters import with_values
-from symfric.laws import MakkarDixon, QuarterCarGeneral, QuarterCarSimple
-from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prismatic, UserForce
+import symfric as sf
+from symfric.multibody import JointFriction, JointSpringDamper, Prismatic, UserForce
 from symfric.multibody.kinematics import Kinematics
 from symfric.scenes import QuarterCar
 
@@ -89,26 +76,26 @@ def loaded(v: float, x_rel: float, v_rel: float) -> float:
     return (1093.0 + sqrt(side * side + 1.0) - 1.0) * brown_mcphee(v, 0.15, 0.1, 0.01)
 
 
-LAWS: list[tuple[Law, Friction, float]] = [
-    (QuarterCarGeneral(F_eps=1e-3, sigma_v=50.0), general, 0.03),
-    (QuarterCarSimple(sigma_v=50.0), simple, 0.07),
-    (BrownMcPhee(v_t=0.01), loaded, 0.05),
+LAWS: list[tuple[sf.Law, Friction, float]] = [
+    (sf.QuarterCarGeneral(F_eps=1e-3, sigma_v=50.0), general, 0.03),
+    (sf.QuarterCarSimple(sigma_v=50.0), simple, 0.07),
+    (sf.BrownMcPhee(v_t=0.01), loaded, 0.05),
 ]
 
 
 @pytest.mark.parametrize(("law", "friction", "amplitude"), LAWS)
-def test_rig_agrees_with_newtons_laws(law: Law, friction: Friction, amplitude: float) -> None:
+def test_rig_agrees_with_newtons_laws(law: sf.Law, friction: Friction, amplitude: float) -> None:
     times = np.linspace(0.1, 10.0, 100)
     case = f"quarter_car_{friction.__name__}_{1e3 * amplitude:.0f}_mm"
     expected = stored(case, lambda: rig(friction, amplitude, times))
-    run = simulate(QuarterCar(law, amplitude=amplitude).model(), 10.0, rtol=1e-8, t_eval=times)
+    run = sf.simulate(QuarterCar(law, amplitude=amplitude).model(), 10.0, rtol=1e-8, t_eval=times)
     for name, values in zip(("X_b", "X_w", "v_b", "v_w"), expected, strict=True):
         assert run[name] == pytest.approx(values, abs=2e-6), name
 
 
 def test_body_sticks_while_the_wheel_is_an_oscillator_of_one_degree_of_freedom() -> None:
     """Closed form of M_w x'' + (b_d + b_t) x' + (k_s + k_t) x = (k_t t + b_t) V from rest."""
-    run = simulate(QuarterCar(QuarterCarGeneral()).model(), 0.57, t_start=0.5, rtol=1e-9)
+    run = sf.simulate(QuarterCar(sf.QuarterCarGeneral()).model(), 0.57, t_start=0.5, rtol=1e-9)
     t, V, b, k = run.t - 0.5, 0.085, B_D + B_T, K_S + K_T
     decay, steady = b / (2 * M_W), K_T * V / k
     lag = (B_T * V - b * steady) / k
@@ -124,7 +111,7 @@ def test_body_breaks_away_and_rests_at_the_published_stages() -> None:
 
     The stages are off by what the break-away force holds of the spring.
     """
-    stuck = simulate(QuarterCar(QuarterCarGeneral()).model(), 10.0, rtol=1e-8, samples=20001)
+    stuck = sf.simulate(QuarterCar(sf.QuarterCarGeneral()).model(), 10.0, rtol=1e-8, samples=20001)
     moving = int(np.argmax(stuck["v_b"] > 1e-6))
     assert stuck["friction"][: moving + 1].max() == pytest.approx(193.8, abs=1.5)
     assert 5.5e-3 < stuck["x_rel"][:moving].max() < 6.9e-3
@@ -137,9 +124,9 @@ def test_body_breaks_away_and_rests_at_the_published_stages() -> None:
         assert abs(at["X_b"] - stage) <= 193.8 * (1 / K_S + 1 / K_T)
 
 
-@pytest.mark.parametrize("law", [QuarterCarGeneral(), LuGre(sigma_0=1e3, sigma_1=10.0)])
-def test_work_of_the_road_goes_into_springs_dampers_and_friction(law: Law) -> None:
-    run = simulate(QuarterCar(law).model(), 10.0, rtol=1e-9, samples=100001)
+@pytest.mark.parametrize("law", [sf.QuarterCarGeneral(), sf.LuGre(sigma_0=1e3, sigma_1=10.0)])
+def test_work_of_the_road_goes_into_springs_dampers_and_friction(law: sf.Law) -> None:
+    run = sf.simulate(QuarterCar(law).model(), 10.0, rtol=1e-9, samples=100001)
     rise = np.gradient(run["X_r"], run.t)
     v_rel, v_tyre = run["v_w"] - run["v_b"], rise - run["v_w"]
     energy = (M_B * run["v_b"] ** 2 + M_W * run["v_w"] ** 2) / 2
@@ -150,12 +137,12 @@ def test_work_of_the_road_goes_into_springs_dampers_and_friction(law: Law) -> No
     assert np.trapezoid(run["power"], run.t) > 0.1 * work
 
 
-def mechanism() -> Mechanism:
+def mechanism() -> sf.Mechanism:
     """Body and wheel on two guides of the ground, the strut's whole force between them."""
-    m = Mechanism("rig", gravity=(0.0, 0.0, 0.0))
+    m = sf.Mechanism("rig", gravity=(0.0, 0.0, 0.0))
     for name, mass in (("body", M_B), ("wheel", M_W)):
         m.body(name, mass, (1.0, 1.0, 1.0))
-    preload = JointFriction(BrownMcPhee(v_t=0.01), preload=1093.0, eps=1.0)
+    preload = JointFriction(sf.BrownMcPhee(v_t=0.01), preload=1093.0, eps=1.0)
     m.joint(Prismatic("X_b", "ground", "body", start=0.01, rate=0.1, friction=preload))
     m.joint(Prismatic("X_w", "ground", "wheel", start=-0.005, rate=-0.2))
     m.force(JointSpringDamper("tyre", "X_w", "slide", stiffness=K_T, damping=B_T))
@@ -176,9 +163,9 @@ def mechanism() -> Mechanism:
 def test_mechanism_with_two_guides_moves_alike_and_its_guide_carries_the_same_force() -> None:
     times = np.linspace(0.0, 2.0, 41)
     start = {"X_b": 0.01, "v_b": 0.1, "X_w": -0.005, "v_w": -0.2}
-    scene = QuarterCar(BrownMcPhee(v_t=0.01), middle=0.0, amplitude=0.0)
-    run = simulate(scene.model(), 2.0, x0=start, rtol=1e-9, t_eval=times)
-    other = simulate(mechanism().build(), 2.0, rtol=1e-9, t_eval=times)
+    scene = QuarterCar(sf.BrownMcPhee(v_t=0.01), middle=0.0, amplitude=0.0)
+    run = sf.simulate(scene.model(), 2.0, x0=start, rtol=1e-9, t_eval=times)
+    other = sf.simulate(mechanism().build(), 2.0, rtol=1e-9, t_eval=times)
     names = {
         "X_b": "X_b",
         "X_w": "X_w",
@@ -192,22 +179,22 @@ def test_mechanism_with_two_guides_moves_alike_and_its_guide_carries_the_same_fo
 
 
 def test_law_takes_the_linkage_of_the_rig() -> None:
-    for law in (QuarterCarGeneral(), Sum((QuarterCarGeneral(), Viscous()))):
-        inside = parameters(with_values(QuarterCar(law), {"k_s": 30000.0, "L_d": 0.5}).law)
+    for law in (sf.QuarterCarGeneral(), sf.Sum((sf.QuarterCarGeneral(), sf.Viscous()))):
+        inside = sf.parameters(sf.with_values(QuarterCar(law), {"k_s": 30000.0, "L_d": 0.5}).law)
         assert (inside["k_s"].value, inside["L_d"].value) == (30000.0, 0.5)
-    f = QuarterCar(QuarterCarGeneral()).model(["k_s"]).function("signals")
+    f = QuarterCar(sf.QuarterCarGeneral()).model(["k_s"]).function("signals")
     held = f(0.0, [0.0, 1e-3, 0.0, 0.0], [], [], [30000.0]).full().ravel()
     assert 30.0 in held.round(9)
 
 
-@pytest.mark.parametrize("law", [Coulomb(), MakkarDixon()], ids=["loaded", "not loaded"])
-def test_a_rig_stops_where_its_strut_cannot_reach_under_any_law(law: Law) -> None:
+@pytest.mark.parametrize("law", [sf.Coulomb(), sf.MakkarDixon()], ids=["loaded", "not loaded"])
+def test_a_rig_stops_where_its_strut_cannot_reach_under_any_law(law: sf.Law) -> None:
     """A law that does without N went on with N = NaN in the result."""
     rig = QuarterCar(law, k_s=636.0, k_t=159000.0, M_w=13.5, middle=1.62)
-    with pytest.raises(SolveError) as caught:
-        simulate(rig.model(), 2.0)
+    with pytest.raises(sf.SolveError) as caught:
+        sf.simulate(rig.model(), 2.0)
     partial = caught.value.partial
-    assert caught.value.status is Status.NOT_FINITE
+    assert caught.value.status is sf.Status.NOT_FINITE
     assert np.isfinite(partial["N"]).all()
     assert abs(partial.final["x_rel"]) < 0.2844
 
@@ -215,11 +202,11 @@ def test_a_rig_stops_where_its_strut_cannot_reach_under_any_law(law: Law) -> Non
 def test_friction_lessens_the_overshoot_of_the_body() -> None:
     """The paper's main statement; with the former defaults 14.8 mm, 9.5 without friction."""
 
-    def overshoot(law: Law) -> float:
-        run = simulate(QuarterCar(law).model(), 3.5, samples=3501)
+    def overshoot(law: sf.Law) -> float:
+        run = sf.simulate(QuarterCar(law).model(), 3.5, samples=3501)
         return float(run["X_b"].max()) - 0.085
 
-    free = overshoot(Viscous(sigma_2=0.0))
+    free = overshoot(sf.Viscous(sigma_2=0.0))
     assert free == pytest.approx(9.5e-3, abs=1e-4)
-    for law in (QuarterCarGeneral(), QuarterCarSimple()):
+    for law in (sf.QuarterCarGeneral(), sf.QuarterCarSimple()):
         assert overshoot(law) < 0.5 * free

@@ -10,12 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from symfric.stress import Case, Signal, draw, workers
+from symfric.foundation import workers
+from symfric.foundation.workers import Crashed, TimedOut
+from symfric.stress import Case, Signal, draw
 from symfric.stress.campaign import Report, campaign, rerun
 from symfric.stress.cases import Draws
 from symfric.stress.judge import CLASSES, FAILING, Verdict, judge
 from symfric.stress.problem import problem, signal
-from symfric.stress.workers import Crashed, TimedOut
 
 COSTLY = ("arm", "four_bar", "double_pendulum")
 """Scenes of which the suite takes no case."""

@@ -1,7 +1,7 @@
 """Mechanisms at the edge: each run equals an oracle or states why it stops, and is finite."""
 
 from functools import cache, partial
-from math import atan, exp, sqrt
+from math import atan, sqrt
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,6 @@ from symfric.scenes import (
     MECHANISMS,
     DoublePendulum,
     FourBar,
-    MechanismScene,
     Pendulum,
     PendulumBox,
     SliderCrank,
@@ -51,12 +50,6 @@ def sound(run: Trajectory) -> None:
 # ---- narrow transitions and strong friction, beside a solver of SciPy ----
 
 
-def law(mu_s: float, v_t: float) -> tuple[Law, Any]:
-    """Brown-McPhee friction, and its coefficient in plain Python."""
-    mu = partial(brown_mcphee, mu_s=mu_s, mu_d=0.8 * mu_s, v_t=v_t)
-    return BrownMcPhee(mu_s=mu_s, mu_d=0.8 * mu_s, v_t=v_t), mu
-
-
 ORACLES: dict[str, tuple[Any, list[float], float, Any]] = {
     "pendulum_box": (
         partial(pendulum_box, 6.0, 20.0, 0.3, 0.01, G), [0, np.pi / 6, 0, 0], 3.0,
@@ -71,6 +64,7 @@ ORACLES: dict[str, tuple[Any, list[float], float, Any]] = {
 """Scene -> equations by hand, start, end time [s], and signals of the states."""
 NARROW = [(0.12, 10.0**-k) for k in range(2, 6)]
 STRONG = [(mu, 1e-2) for mu in (0.3, 0.7, 1.0, 1.5)]
+"""Static levels and transition velocities."""
 
 
 @slow
@@ -79,12 +73,12 @@ STRONG = [(mu, 1e-2) for mu in (0.3, 0.7, 1.0, 1.5)]
 def test_narrow_and_strong_friction_is_that_of_equations_by_hand(name: str) -> None:
     equations, start, t_end, signals = ORACLES[name]
     times = np.linspace(t_end / 20, t_end, 20)
-    for levels in NARROW + STRONG:
-        friction, mu = law(*levels)
-        found = solve_ivp(
-            equations(mu), (0.0, t_end), start, "Radau", rtol=1e-8, atol=1e-10, t_eval=times
-        )
-        run = simulate(MECHANISMS[name](friction).model(), t_end, rtol=1e-9, t_eval=times)
+    for mu_s, v_t in NARROW + STRONG:
+        levels = {"mu_s": mu_s, "mu_d": 0.8 * mu_s, "v_t": v_t}
+        rates, span = equations(partial(brown_mcphee, **levels)), (0.0, t_end)
+        found = solve_ivp(rates, span, start, "Radau", rtol=1e-8, atol=1e-10, t_eval=times)
+        model = MECHANISMS[name](BrownMcPhee(**levels)).model()
+        run = simulate(model, t_end, rtol=1e-9, t_eval=times)
         sound(run)
         for signal, expected in signals(found.y).items():
             assert run[signal] == pytest.approx(expected, rel=1e-6, abs=5e-6), levels
@@ -95,15 +89,12 @@ def test_narrow_and_strong_friction_is_that_of_equations_by_hand(name: str) -> N
 MU, MASS = 0.12, 20.0
 
 
-def light_box(ratio: float) -> MechanismScene:
-    """A box of `ratio` times the mass of its pendulum, without friction in the hinge."""
-    friction = BrownMcPhee(mu_s=MU, mu_d=MU, v_t=1e-3)
-    return PendulumBox(friction, hinge=SMOOTH, m_box=MASS * ratio)
-
-
 @cache
 def light_model(ratio: float, formulation: str, index: int) -> Model:
-    return light_box(ratio).mechanism().build(formulation=formulation, index=index)
+    """A box of `ratio` times the mass of its pendulum, without friction in the hinge."""
+    friction = BrownMcPhee(mu_s=MU, mu_d=MU, v_t=1e-3)
+    scene = PendulumBox(friction, hinge=SMOOTH, m_box=MASS * ratio)
+    return scene.mechanism().build(formulation=formulation, index=index)
 
 
 def reserve(phi: Array, ratio: float) -> Array:
@@ -176,75 +167,55 @@ def test_machines_with_strong_friction_are_far_from_jamming(name: str) -> None:
 
 
 @slow
-@pytest.mark.parametrize("formulation", ["joint", "absolute"])
-def test_a_weight_under_a_box_without_mass_falls_freely(formulation: str) -> None:
-    """Without friction the rod carries nothing: L (cos phi - cos phi_0) = g t^2 / 2."""
-    scene = PendulumBox(SMOOTH, hinge=SMOOTH, m_box=20e-6)
+def test_a_box_without_mass_and_a_box_as_heavy_as_a_wall() -> None:
+    """Without mass and friction the rod carries nothing: L (cos phi - cos phi_0) = g t^2 / 2."""
     times = np.linspace(0.01, 0.08, 8)
-    run = simulate(scene.mechanism().build(formulation=formulation), 0.08, rtol=1e-9, t_eval=times)
-    fallen = run["potential"] / (20 * G)
-    assert fallen - fallen[0] == pytest.approx(-G * (times**2 - times[0] ** 2) / 2, abs=1e-6)
-
-
-@slow
-def test_a_box_of_a_million_pendulums_is_a_wall() -> None:
+    light = PendulumBox(SMOOTH, hinge=SMOOTH, m_box=20e-6).mechanism()
+    for formulation in ("joint", "absolute"):
+        run = simulate(light.build(formulation=formulation), 0.08, rtol=1e-9, t_eval=times)
+        fallen = run["potential"] / (20 * G)
+        assert fallen - fallen[0] == pytest.approx(-G * (times**2 - times[0] ** 2) / 2, abs=1e-6)
     period = pendulum_period(sqrt(G / 0.3), np.pi / 6)
-    model = PendulumBox(SMOOTH, hinge=SMOOTH, m_box=20e6).model()
-    assert simulate(model, period, rtol=1e-10).final["phi"] == pytest.approx(np.pi / 6, abs=1e-5)
-
-
-def uneven(ratio: float) -> Mechanism:
-    """The double pendulum, its lower rod `ratio` times as heavy."""
-    m = DoublePendulum(SMOOTH).mechanism()
-    heavy = Mechanism(m.name)
-    heavy.forces, heavy.frames, heavy.joints = m.forces, m.frames, m.joints
-    for body in m.bodies[1:]:
-        by = ratio if body.name == "lower" else 1.0
-        heavy.body(body.name, by * body.mass, tuple(by * J for J in body.inertia))
-    return heavy
+    wall = PendulumBox(SMOOTH, hinge=SMOOTH, m_box=20e6).model()
+    assert simulate(wall, period, rtol=1e-10).final["phi"] == pytest.approx(np.pi / 6, abs=1e-5)
 
 
 @slow
 @pytest.mark.parametrize("ratio", [1e-6, 1e-3, 1e3, 1e6])
 def test_uneven_pendulums_keep_their_energy_in_both_formulations(ratio: float) -> None:
-    runs = [
-        simulate(uneven(ratio).build(formulation=f), 0.5, rtol=1e-9) for f in ("joint", "absolute")
-    ]
-    for run in runs:
+    """The lower rod is `ratio` times as heavy as usual."""
+    m, uneven = DoublePendulum(SMOOTH).mechanism(), Mechanism("uneven")
+    uneven.forces, uneven.frames, uneven.joints = m.forces, m.frames, m.joints
+    for body in m.bodies[1:]:
+        by = ratio if body.name == "lower" else 1.0
+        uneven.body(body.name, by * body.mass, tuple(by * J for J in body.inertia))
+    kinetic = list[Array]()
+    for formulation in ("joint", "absolute"):
+        run = simulate(uneven.build(formulation=formulation), 0.5, rtol=1e-9)
         assert np.ptp(run["energy"]) < 1e-6 * run["kinetic"].max()
-    kinetic = [run["kinetic"] / run["kinetic"].max() for run in runs]
+        kinetic.append(run["kinetic"] / run["kinetic"].max())
     assert kinetic[0] == pytest.approx(kinetic[1], abs=1e-6)
 
 
 @slow
-@pytest.mark.parametrize("length", [0.2215, 0.22143, 0.2214214])
-def test_slider_crank_near_its_dead_point_keeps_energy_and_closed_form(length: float) -> None:
-    """The rod just reaches over: slider^2 falls to a few parts in a million of l^2."""
-    scene = SliderCrank(SMOOTH, l=length)
-    run = simulate(scene.model(), 0.25, rtol=1e-9)
+@pytest.mark.parametrize("length", [0.22, 0.2214214, 0.22143, 0.2215])
+def test_slider_crank_near_its_dead_point_keeps_energy_and_closed_form_or_jams(
+    length: float,
+) -> None:
+    """From 0.2214214 m on the rod just reaches over: slider^2 falls to a few millionths of l^2."""
+    run = simulate(SliderCrank(SMOOTH, l=length).model(), 0.25, rtol=1e-9)
     th = run["crank"]
     square = length**2 - (0.1 - 0.08 * np.sin(th)) ** 2 - (0.1 + 0.08 * np.cos(th)) ** 2
     assert run["slider"] ** 2 == pytest.approx(square, abs=1e-13)
-    assert run["slider"].min() < 0.03 * length
+    assert run["slider"].min() < (-0.2 if length == 0.22 else 0.03 * length)
+    assert (np.ptp(th) < 2 * np.pi) == (length == 0.22)
     assert np.ptp(run["energy"]) < 1e-7 * run["energy"][0]
-
-
-@slow
-def test_slider_crank_swings_through_the_dead_point_it_cannot_turn_over() -> None:
-    run = simulate(SliderCrank(SMOOTH, l=0.22).model(), 0.25, rtol=1e-9)
-    assert run["slider"].min() < -0.2
-    assert np.ptp(run["crank"]) < 2 * np.pi
-    assert np.ptp(run["energy"]) < 1e-7 * run["energy"][0]
-
-
-@slow
-@pytest.mark.parametrize("length", [0.22143, 0.2214214])
-def test_slider_crank_with_friction_jams_near_its_dead_point_and_says_so(length: float) -> None:
-    scene = SliderCrank(BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01), l=length)
-    with pytest.raises(SolveError, match=r"friction jams.*joint 'crank' with BrownMcPhee") as e:
-        simulate(scene.model(), 0.25, rtol=1e-8)
-    assert isinstance(e.value.partial, Trajectory)
-    sound(e.value.partial)
+    if length in (0.2214214, 0.22143):
+        rough = SliderCrank(BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01), l=length).model()
+        with pytest.raises(SolveError, match=r"friction jams.*joint 'crank' with Brown") as caught:
+            simulate(rough, 0.25, rtol=1e-8)
+        assert isinstance(caught.value.partial, Trajectory)
+        sound(caught.value.partial)
 
 
 @slow
@@ -270,7 +241,7 @@ def test_an_exact_parallelogram_stops_where_its_links_are_in_line(
 @slow
 @pytest.mark.parametrize("excess", [1e-8, 1e-4, 1e-2])
 def test_near_parallelograms_go_through_on_their_own_branch(excess: float) -> None:
-    """Energy and loop closed; beyond the line the rocker turns against the crank."""
+    """Beyond the line the rocker turns against the crank."""
     scene = FourBar(SMOOTH, crank=0.2, coupler=0.4, rocker=0.2 * (1 + excess), base=0.4)
     run = simulate(scene.model(), 3.0, rtol=1e-8)
     assert run["constraint_position"].max() < 1e-12
@@ -281,38 +252,34 @@ def test_near_parallelograms_go_through_on_their_own_branch(excess: float) -> No
 @slow
 @pytest.mark.parametrize(("v_t", "t_end"), [(1e-6, 1e3), (1e-7, 1e4), (1e-8, 1e5)])
 def test_a_velocity_law_creeps_as_its_slope_at_rest_says(v_t: float, t_end: float) -> None:
-    """phi' = -phi m g L / (R^2 N mu'(0)): no static law holds for ever, for 1e5 s neither."""
+    """phi' = -phi m g L / (R^2 N mu'(0)): a static law does not hold, for 1e5 s neither."""
     mu_s, mu_d, R, L = 0.15, 0.12, 0.02, 0.5
     slope = (4 * mu_d + (mu_s - mu_d) / 0.75**2) / v_t
-    run = simulate(
-        Pendulum(BrownMcPhee(mu_s=mu_s, mu_d=mu_d, v_t=v_t), phi_0=1e-4).model(), t_end, rtol=1e-8
-    )
+    scene = Pendulum(BrownMcPhee(mu_s=mu_s, mu_d=mu_d, v_t=v_t), phi_0=1e-4)
+    run = simulate(scene.model(), t_end, rtol=1e-8)
     sound(run)
     expected = 1e-4 * np.exp(-run.t * L / (R * R * slope))
     assert run["phi"][1:] == pytest.approx(expected[1:], rel=1e-4)
-    assert expected[-1] / 1e-4 == pytest.approx(exp(-t_end * L / (R * R * slope)))
 
 
 @slow
 @pytest.mark.parametrize("friction", [LuGre(), LuGreNormalised()], ids=["lugre", "normalised"])
 def test_bristles_hold_a_pendulum_for_a_day(friction: Law) -> None:
     """At rest weight and bristles balance, and nothing moves between an hour and 1e5 s."""
-    run = simulate(
-        Pendulum(friction, phi_0=0.002).model(), 1e5, rtol=1e-8, t_eval=[100.0, 3600.0, 1e5]
-    )
+    model = Pendulum(friction, phi_0=0.002).model()
+    run = simulate(model, 1e5, rtol=1e-8, t_eval=[100.0, 3600.0, 1e5])
     phi = run["phi"]
     assert np.ptp(phi) < 1e-9
     assert abs(phi[-1]) > 1e-4
     assert 0.5 * G * np.sin(phi) == pytest.approx(-0.02 * run["phi_friction"], rel=1e-5)
-    short = simulate(Pendulum(friction, phi_0=0.002).model(), 100.0, rtol=1e-9)["phi"][-1]
+    short = simulate(model, 100.0, rtol=1e-9)["phi"][-1]
     assert phi[-1] == pytest.approx(short, abs=1e-7)
 
 
-LONG = ("pendulum", "pendulum_box", "four_mass", "slider_crank", "four_bar", "arm")
-
-
 @slow
-@pytest.mark.parametrize("name", LONG)
+@pytest.mark.parametrize(
+    "name", ["pendulum", "pendulum_box", "four_mass", "slider_crank", "four_bar", "arm"]
+)
 @pytest.mark.parametrize(
     "friction", [BrownMcPhee(), LuGreNormalised(), LuGre()], ids=lambda law: type(law).__name__
 )

@@ -1,61 +1,30 @@
-"""Parameters, texts and refusals of blocks of laws, and contacts of populations."""
+"""Parameters and texts of blocks of laws, and contacts of populations."""
 
 import casadi as ca
 import numpy as np
 import pytest
+from tables import Names, table
 
 from symfric import (
-    Dahl,
     GenericAsperity,
     LuGre,
     RandomBristles,
     Stribeck,
-    Sum,
     law_from_text,
     parameters,
 )
-from symfric.codegen import contact_block, generate, law_block
+from symfric.codegen import contact_block, law_block
 from symfric.foundation.graph import graph
-from symfric.laws import (
-    GMS,
-    Asymmetric,
-    BrownMcPhee,
-    ExactCoulomb,
-    Karnopp,
-    Leuven,
-    SelfTuning,
-)
 
 
 def names_of(law, **options):
     return [p.name for p in law_block(law, **options).parameters]
 
 
-@pytest.mark.parametrize(
-    ("law", "constants"),
-    [
-        (law_from_text("coulomb"), set()),
-        (law_from_text("coulomb+coulomb"), set()),
-        (BrownMcPhee(), {"mu_v", "N_t"}),
-        (BrownMcPhee(mu_v=0.4), set()),
-        (BrownMcPhee(mu_s=0.1, mu_d=0.1), {"mu_v", "N_t"}),
-        (SelfTuning(), {"E"}),
-        (SelfTuning(E=0.5), set()),
-        (Stribeck(), {"delta"}),
-        (Stribeck(delta=0.78), set()),
-        (LuGre(mu_s=0.1, mu_d=0.1), {"delta"}),
-        (LuGre(delta=1.5), set()),
-        (LuGre(delta=1.5, v_eps=0.0), {"v_eps"}),
-        (Dahl(), {"n", "rho_eps"}),
-        (law_from_text("load_dependent(lugre)"), {"delta"}),
-        (law_from_text("asymmetric(lugre)"), {"delta_pos", "delta_neg"}),
-        (Asymmetric(Stribeck(), Stribeck(delta=1.5)), set()),
-        (law_from_text("lugre+lugre"), {"delta_1", "delta_2"}),
-    ],
-    ids=lambda value: str(sorted(value) if isinstance(value, set) else value),
-)
-def test_only_values_that_save_a_function_call_or_have_no_effect_become_constants(law, constants):
-    assert set(parameters(law)) - set(names_of(law)) == constants
+@pytest.mark.parametrize("text", table(__file__)["constants"])
+def test_only_values_that_save_a_function_call_or_have_no_effect_become_constants(text):
+    law = Names().value(text)
+    assert {*parameters(law)} - {*names_of(law)} == {*table(__file__)["constants"][text]}
 
 
 def test_free_and_fold_choose_parameters_and_constants_save_operations():
@@ -114,30 +83,3 @@ def test_contacts_in_a_loop_are_the_population_of_numpy():
     assert (other.constants["count"], other.constants["h"]) == (25.0, 1e-3)
     assert [v.name for v in other.inputs] == ["v", "N", "r"]
     assert [v.name for v in contact_block(law, name="one").parameters] == ["h"]
-
-
-@pytest.mark.parametrize(
-    ("law", "options", "message"),
-    [
-        (GMS(), {}, "gms.*states that have circular dependencies; gms with form = 'event'"),
-        (Sum((LuGre(), Leuven())), {}, "have circular dependencies"),
-        (ExactCoulomb(), {}, "modes follow zero crossings within the step; karnopp and leine"),
-        (Sum((LuGre(), ExactCoulomb())), {}, "modes follow zero crossings"),
-        (Karnopp(form="event"), {}, "got one whose modes follow zero crossings"),
-        (Dahl(), {"free": ("rho_eps",)}, "free: expected parameters that have an effect"),
-        (LuGre(), {"free": ("mu_x",)}, "got mu_x; did you mean mu_"),
-        (LuGre(), {"free": ("mu_s", "mu_s")}, "every name once"),
-        (LuGre(v_eps=0.0), {"free": ("v_eps",)}, "finite force at rest"),
-        (LuGre(mu_s=ca.SX.sym("mu_s")), {}, "numbers as parameters, got symbols .'mu_s'"),
-        (LuGre(), {"name": "my law"}, "C identifier, got 'my law'"),
-        (LuGre(), {"free": ("mu_s",), "fold": True}, "fold: expected none with free"),
-        (LuGre(), {"fold": False}, "expected True, names, or None for the default, got False"),
-        (Stribeck(), {"h": 1e-3, "fold": ("a",)}, "fold: expected one of.*; h: expected none"),
-        (GenericAsperity(), {"h": 0.0}, "h: expected a number > 0"),
-        (GenericAsperity(), {"free": ("k",)}, "with a law only, got a popul"),
-        (GenericAsperity(), {"name": "a b"}, "C identifier"),
-    ],
-)
-def test_bad_laws_and_options_are_refused(law, options, message, tmp_path):
-    with pytest.raises(ValueError, match=message):
-        generate(law, tmp_path, **options, kit=False)

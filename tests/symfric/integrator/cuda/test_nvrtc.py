@@ -12,8 +12,7 @@ from differentiable import pendulum, switched
 
 from symfric import BrownMcPhee, LuGre, Model, rabinowicz
 from symfric.emitter.c99 import REALS
-from symfric.integrator.cuda.device import OPTIONS
-from symfric.integrator.cuda.kernel import AFTER, BEFORE, NAME, kernel_of
+from symfric.integrator.cuda.device import AFTER, BEFORE, NAME, OPTIONS, kernel_of
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator

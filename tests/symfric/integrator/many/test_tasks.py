@@ -12,16 +12,19 @@ import pytest
 from differentiable import oscillator, switched
 
 import symfric.integrator.compiled.compiler as compiler
-import symfric.integrator.many.program as module
+import symfric.integrator.many.members as module
 import symfric.integrator.running.integrator as built
-from symfric import Hold, Model, simulate, simulate_many
+from symfric import BrownMcPhee, Hold, Model, simulate, simulate_many
 from symfric.foundation.programs import Compiler
+from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import Input, input_data
+from symfric.integrator.equations.system import system
 from symfric.integrator.many.chunk import Chunk, Job, digest
-from symfric.integrator.many.program import program
+from symfric.integrator.many.members import Assembly, program
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import Given, State
+from symfric.scenes import Pendulum
 
 
 def task(model: Model, start: list[float], u: dict[str, Input] | None = None) -> tuple[Job, Chunk]:
@@ -115,3 +118,19 @@ def test_another_call_builds_writes_and_compiles_nothing(
     del model
     gc.collect()
     assert gone() is None  # programs die with their model
+
+
+def test_each_member_has_the_charts_of_its_own_start() -> None:
+    """Bases of the tangent space of a pendulum in absolute coordinates."""
+    model = Pendulum(BrownMcPhee()).mechanism().build(formulation="absolute")
+    whole = system(model, input_data(model, None, 0.0, 1.0))
+    manifold, d = whole.manifold, np.tile(model.values("p"), (3, 1))
+    assert manifold is not None and manifold.charted
+    guess = first_guess(whole, model, model.initial_state(None, None, 0.0), 0.0)
+    y, closed = Assembly(manifold, whole.nx)(np.outer([1.0, 1.01, 0.99], guess), d)
+    assert closed.all()
+    n, m = manifold.n, manifold.m
+    for row in y:
+        slope, V = manifold.slope(row, d[0]).full(), row[manifold.basis].reshape(n - m, n)
+        assert pytest.approx(np.eye(n - m), abs=1e-12) == V @ V.T
+        assert slope[n : n + m, :n] @ V.T == pytest.approx(np.zeros((m, n - m)), abs=1e-12)

@@ -44,25 +44,13 @@ def test_numbers_of_links_and_joints_are_read() -> None:
     assert (urdf.root, urdf.links["world"]) == ("world", None)
 
 
-@pytest.mark.parametrize(
-    ("angles", "x", "z"),
-    [
-        ((pi / 2, 0, 0), (1, 0, 0), (0, -1, 0)),
-        ((0, pi / 2, 0), (0, 0, -1), (1, 0, 0)),
-        ((0, 0, pi / 2), (0, 1, 0), (0, 0, 1)),
-        ((pi / 2, 0, pi / 2), (0, 1, 0), (1, 0, 0)),
-    ],
-)
-def test_angles_turn_about_fixed_axes_and_quarter_turns_are_exact(
-    angles: tuple[float, float, float], x: tuple[int, ...], z: tuple[int, ...]
-) -> None:
-    R = rotation(*angles)
-    assert (R[:, 0].tolist(), R[:, 2].tolist()) == ([*x], [*z])
-
-
-def test_inertia_is_turned_into_the_axes_of_the_link() -> None:
-    text = SMALL.replace('xyz="0 0 -0.25"', f'rpy="0 {pi / 2} 0"')
-    arm = parse(text).links["arm"]
+def test_angles_turn_about_fixed_axes_and_quarter_turns_are_exact() -> None:
+    for angles, x, z in (
+        ((pi / 2, 0, 0), [1, 0, 0], [0, -1, 0]), ((0, pi / 2, 0), [0, 0, -1], [1, 0, 0]),
+        ((0, 0, pi / 2), [0, 1, 0], [0, 0, 1]), ((pi / 2, 0, pi / 2), [0, 1, 0], [1, 0, 0]),
+    ):  # fmt: skip
+        assert rotation(*angles)[:, [0, 2]].T.tolist() == [x, z]
+    arm = parse(SMALL.replace('xyz="0 0 -0.25"', f'rpy="0 {pi / 2} 0"')).links["arm"]
     assert arm is not None
     assert np.diag(arm.J) == pytest.approx([0.01, 0.1, 0.1])
 
@@ -82,49 +70,53 @@ def test_appearance_is_passed_over_and_everything_else_is_named() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("<robot", r"^urdf: expected XML, got unclosed token: line 1, column 0"),
-        ("<sdf/>", r"^urdf: expected <robot> as its outermost tag, got <sdf>"),
-        ('<robot name="a"/>', r"urdf 'a' > link: expected at least one, got none"),
-        (small(LINK), r"expected one link that no joint carries, got world, tip"),
-        (small(joint()), r"joint 'wrist' > child: expected a link, got 'tip'"),
-        (small(LINK, joint(), joint(name="other")),
-         r"link 'tip': expected one joint that carries it, got wrist, other"),
-        (small(LINK, joint(name="hinge")), r"joint 'hinge': expected every name once"),
-        (small(LINK, LINK, joint()), r"link 'tip': expected every name once"),
-        (small(LINK, joint(name="")), r"joint: expected a name, found none"),
-        (small(LINK, joint(kind="ball")),
-         r"joint 'wrist' > type: expected one of revolute, .*, planar, got 'ball'"),
-        (small(LINK, joint('<axis xyz="0 1"/>')),
-         r"urdf 'small' > joint 'wrist' > axis: expected 3 numbers in xyz, got '0 1'"),
-        (small(LINK, joint('<axis xyz="0 0 0"/>')), r"joint 'wrist' > axis: expected a direction"),
-        (small(LINK, joint('<origin rpy="0 0 nan"/>')),
-         r"joint 'wrist' > origin: expected 3 numbers in rpy, got '0 0 nan'"),
-        (small(LINK, joint('<dynamics damping="-1"/>')),
-         r"joint 'wrist' > dynamics > damping: expected >= 0, got -1"),
-        (small(LINK, joint('<limit lower="low"/>')),
-         r"joint 'wrist' > limit: expected a number in lower, got 'low'"),
-        (small(LINK, joint('<mimic joint="wrist"/>')), r"joint 'wrist' > mimic: .* got 'wrist'"),
-        (small(LINK, joint('<mimic joint="hinge"/>', kind="planar")), r"joint 'wrist' > mimic"),
-        (small(LINK, joint().replace('<child link="tip"/>', "")),
-         r"joint 'wrist' > child: expected the name of a link, found none"),
-        (small(LINK.replace('<mass value="1"/>', ""), joint()),
-         r"link 'tip' > inertial > mass: expected a tag, found none"),
-        (small(LINK.replace('value="1"', 'value="-1"'), joint()),
-         r"link 'tip' > inertial > mass: expected >= 0 kg, got -1"),
-        (small('<link name="a"/><link name="b"/>',
-               joint(name="ab").replace("arm", "a").replace("tip", "b"),
-               joint(name="ba").replace("arm", "b").replace("tip", "a")),
-         r"link 'a': expected joints that lead to 'world', got a closed loop"),
-        (small('<xacro:property name="a"/>'),
-         r"<xacro>: expected plain URDF; expand the file with xacro"),
-    ],
-)  # fmt: skip
-def test_bad_files_are_refused_with_the_path_of_the_mistake(text: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        parse(text)
+BAD = [
+    ("<robot", r"^urdf: expected XML, got unclosed token: line 1, column 0"),
+    ("<sdf/>", r"^urdf: expected <robot> as its outermost tag, got <sdf>"),
+    ('<robot name="a"/>', r"urdf 'a' > link: expected at least one, got none"),
+    (small(LINK), r"expected one link that no joint carries, got world, tip"),
+    (small(joint()), r"joint 'wrist' > child: expected a link, got 'tip'"),
+    (small(LINK, joint(), joint(name="other")),
+     r"link 'tip': expected one joint that carries it, got wrist, other"),
+    (small(LINK, joint(name="hinge")), r"joint 'hinge': expected every name once"),
+    (small(LINK, LINK, joint()), r"link 'tip': expected every name once"),
+    (small(LINK, joint(name="")), r"joint: expected a name, found none"),
+    (small(LINK, joint(kind="ball")),
+     r"joint 'wrist' > type: expected one of revolute, .*, planar, got 'ball'"),
+    (small(LINK, joint('<axis xyz="0 1"/>')),
+     r"urdf 'small' > joint 'wrist' > axis: expected 3 numbers in xyz, got '0 1'"),
+    (small(LINK, joint('<axis xyz="0 0 0"/>')), r"joint 'wrist' > axis: expected a direction"),
+    (small(LINK, joint('<origin rpy="0 0 nan"/>')),
+     r"joint 'wrist' > origin: expected 3 numbers in rpy, got '0 0 nan'"),
+    (small(LINK, joint('<dynamics damping="-1"/>')),
+     r"joint 'wrist' > dynamics > damping: expected >= 0, got -1"),
+    (small(LINK, joint('<limit lower="low"/>')),
+     r"joint 'wrist' > limit: expected a number in lower, got 'low'"),
+    (small(LINK, joint('<mimic joint="wrist"/>')), r"joint 'wrist' > mimic: .* got 'wrist'"),
+    (small(LINK, joint('<mimic joint="hinge"/>', kind="planar")), r"joint 'wrist' > mimic"),
+    (small(LINK, joint().replace('<child link="tip"/>', "")),
+     r"joint 'wrist' > child: expected the name of a link, found none"),
+    (small(LINK.replace('<mass value="1"/>', ""), joint()),
+     r"link 'tip' > inertial > mass: expected a tag, found none"),
+    (small(LINK.replace('value="1"', 'value="-1"'), joint()),
+     r"link 'tip' > inertial > mass: expected >= 0 kg, got -1"),
+    (small('<link name="a"/><link name="b"/>',
+           joint(name="ab").replace("arm", "a").replace("tip", "b"),
+           joint(name="ba").replace("arm", "b").replace("tip", "a")),
+     r"link 'a': expected joints that lead to 'world', got a closed loop"),
+    (small('<xacro:property name="a"/>'),
+     r"<xacro>: expected plain URDF; expand the file with xacro"),
+]  # fmt: skip
+
+
+def test_bad_files_are_refused_with_the_path_of_the_mistake() -> None:
+    for text, message in BAD:
+        with pytest.raises(ValueError, match=message):
+            parse(text)
+    several = LINK.replace('value="1"', 'value="-1"'), joint('<axis xyz="0 1"/>', kind="ball")
+    with pytest.raises(ValueError, match="mass") as caught:
+        parse(small(*several))
+    assert len(str(caught.value).splitlines()) == 3
 
 
 def test_joints_without_an_axis_may_have_one_of_zeros() -> None:
@@ -149,27 +141,19 @@ def test_rounding_of_an_inertia_is_zero() -> None:
         assert (tip.mass, tip.J.any(), urdf.doubts) == (1.3, False, ())
 
 
-@pytest.mark.parametrize(
-    ("mass", "entries", "doubt"),
-    [
-        (1, 'ixx="-0.1" iyy="1" izz="1"', "inertia: expected no negative principal moment, got"),
-        (1, 'ixx="1" iyy="1" izz="3"', "inertia: expected the largest principal moment to be at"),
-        (0, 'ixx="1" iyy="1" izz="1"', "mass: expected > 0 kg, because there is an inertia, got 0"),
-    ],
-)
-def test_inertia_of_no_body_is_kept_and_named_or_refused(
-    mass: float, entries: str, doubt: str
-) -> None:
-    text = inertia(mass, entries)
-    urdf = parse(text)
-    tip = urdf.links["tip"]
-    assert tip is not None
-    assert entries.split() == [
-        f'{key}="{x:g}"' for key, x in zip(("ixx", "iyy", "izz"), np.diag(tip.J), strict=True)
-    ]
-    assert [d.startswith(f"link 'tip' > inertial > {doubt}") for d in urdf.doubts] == [True]
-    with pytest.raises(ValueError, match=f"urdf 'small' > link 'tip' > inertial > {doubt}"):
-        parse(text, strict=True)
+def test_inertia_of_no_body_is_kept_and_named_or_refused() -> None:
+    for mass, numbers, doubt in (
+        (1, (-0.1, 1, 1), "inertia: expected no negative principal moment, got"),
+        (1, (1, 1, 3), "inertia: expected the largest principal moment to be at"),
+        (0, (1, 1, 1), "mass: expected > 0 kg, because there is an inertia, got 0"),
+    ):
+        text = inertia(mass, 'ixx="{}" iyy="{}" izz="{}"'.format(*numbers))
+        urdf, doubt = parse(text), f"link 'tip' > inertial > {doubt}"
+        assert urdf.links["tip"] is not None
+        assert np.diag(urdf.links["tip"].J).tolist() == list(numbers)
+        assert [d.startswith(doubt) for d in urdf.doubts] == [True]
+        with pytest.raises(ValueError, match=f"urdf 'small' > {doubt}"):
+            parse(text, strict=True)
 
 
 def test_joint_whose_leader_is_missing_moves_on_its_own_or_is_refused() -> None:
@@ -179,13 +163,6 @@ def test_joint_whose_leader_is_missing_moves_on_its_own_or_is_refused() -> None:
     assert (urdf.joints[1].mimic, urdf.doubts) == (None, (doubt,))
     with pytest.raises(ValueError, match=doubt):
         parse(text, strict=True)
-
-
-def test_all_mistakes_are_told_at_once() -> None:
-    text = small(LINK.replace('value="1"', 'value="-1"'), joint('<axis xyz="0 1"/>', kind="ball"))
-    with pytest.raises(ValueError, match="mass") as caught:
-        parse(text)
-    assert len(str(caught.value).splitlines()) == 3
 
 
 def test_mistakes_in_a_file_name_the_file(tmp_path: Path) -> None:

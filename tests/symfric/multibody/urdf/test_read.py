@@ -1,7 +1,6 @@
 """Mechanisms from URDF files against closed forms, and what the file says."""
 
 import warnings
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -11,7 +10,12 @@ from robots import SMALL, rod
 from symfric import Coulomb, LuGre, Sum, Viscous, parameters, simulate
 from symfric.laws import Stribeck
 from symfric.multibody import JointFriction, Mechanism, Universal, functions
-from symfric.multibody.urdf import read_urdf, relative, tag_friction
+from symfric.multibody.urdf import (
+    holding,
+    read_urdf,
+    relative,
+    tag_friction,
+)  # fmt: skip
 from symfric.multibody.urdf_file import parse
 
 
@@ -42,17 +46,18 @@ def test_another_law_gets_the_friction_tag_as_its_normal_force() -> None:
     assert rate < -0.5
     # sliding at mu_d/mu_s = 1/1.5 of the level, and the damping of the file
     assert run["hinge_friction"][-1] == pytest.approx(0.3 * rate - 0.2 / 1.5, rel=1e-6)
-
-
-def test_relative_law_breaks_away_at_its_normal_force() -> None:
-    law = relative(Stribeck(mu_s=0.6, mu_d=0.15, sigma_2=0.7))
-    values = {name: p.value for name, p in parameters(law).items()}
-    assert (values["mu_s"], values["mu_d"], values["sigma_2"]) == (1.0, 0.25, 0.7)
+    values = parameters(relative(Stribeck(mu_s=0.6, mu_d=0.15, sigma_2=0.7)))
+    assert [values[n].value for n in ("mu_s", "mu_d", "sigma_2")] == [1.0, 0.25, 0.7]
     assert relative(viscous := Viscous()) is viscous
+    with pytest.warns(UserWarning, match="left out: LuGre, because no joint has <dynamics fric"):
+        read_urdf(rod(**{' friction="0.2"': ""}), law=LuGre())
 
 
 def test_bearings_replace_what_the_file_says_by_friction_of_the_reactions() -> None:
     bearing = JointFriction(Coulomb(), radius=0.01)
+    for text, name, known in ((SMALL, "elbow", "hinge"), (WELDED, "weld", "spin")):
+        with pytest.raises(ValueError, match=f"bearings: expected one of {known}, got {name}"):
+            read_urdf(text, bearings={name: bearing})
     model = read_urdf(SMALL, bearings={"hinge": bearing}).build()
     assert [v.name for v in model.z] == ["hinge_N"]
     weight = simulate(model, 1e-3, rtol=1e-8)["hinge_N"][0]
@@ -87,12 +92,8 @@ def test_links_held_by_fixed_joints_are_one_body() -> None:
     assert [float(x) for x in body.inertia] == pytest.approx(expected, abs=1e-12)
     places = {place: frame for place, frame in m.frames}
     assert ca.DM(places["left.right"].p).full().ravel() == pytest.approx([-1.0, 0.0, 0.0])
-
-
-def test_quarter_turns_leave_zeros() -> None:
-    with pytest.warns(UserWarning, match="hub_0"):
-        m = read_urdf(WELDED)
-    assert m.bodies[1].J.nnz() == 5
+    # quarter turns leave zeros
+    assert body.J.nnz() == 5
     assert functions(m)["mass"].n_instructions() <= 3
 
 
@@ -146,11 +147,6 @@ def test_all_that_is_left_out_is_said_once() -> None:
     assert message == f"urdf 'small': left out: {expected}"
 
 
-def test_law_that_no_joint_uses_is_said() -> None:
-    with pytest.warns(UserWarning, match="left out: LuGre, because no joint has <dynamics fric"):
-        read_urdf(rod(**{' friction="0.2"': ""}), law=LuGre())
-
-
 def test_names_are_kept_apart() -> None:
     """A link and its joint of one name, and a link called ground."""
     text = rod(arm="ground", hinge="ground").replace("world", "1 base")
@@ -180,34 +176,16 @@ def test_what_cannot_be_a_mechanism_is_refused(changes: dict[str, str], message:
         read_urdf(rod(**changes))
 
 
-def test_unknown_bearing_is_refused_with_the_joints_there_are() -> None:
-    friction = JointFriction(Coulomb(), radius=0.01)
-    with pytest.raises(ValueError, match="urdf 'small' bearings: expected one of hinge, got elbow"):
-        read_urdf(SMALL, bearings={"elbow": friction})
-
-
-def test_file_is_read_by_its_path(tmp_path: Path) -> None:
-    path = tmp_path / "small.urdf"
-    path.write_text(f'<?xml version="1.0" encoding="utf-8"?>\n<!-- ä -->{SMALL}', encoding="utf-8")
-    assert read_urdf(path).name == read_urdf(str(path)).name == "small"
-
-
 def test_inertia_that_no_body_has_is_used_with_a_warning_or_refused() -> None:
-    text = rod(**{'izz="0.01"': 'izz="0.5"'})
-    with pytest.warns(
-        UserWarning, match="accepted unchanged: link 'arm' > inertial > inertia: expect"
-    ):
+    text, named = rod(**{'izz="0.01"': 'izz="0.5"'}), "link 'arm' > inertial > inertia: expect"
+    with pytest.warns(UserWarning, match=f"accepted unchanged: {named}"):
         m = read_urdf(text)
     assert [float(x) for x in m.bodies[1].inertia] == [0.1, 0.1, 0.5, 0, 0, 0]
     assert float(functions(m)["mass"](0, [])) == pytest.approx(0.1 + 2 * 0.25**2)
-    with pytest.raises(
-        ValueError, match="urdf 'small' > link 'arm' > inertial > inertia: expected"
-    ):
+    with pytest.raises(ValueError, match=f"urdf 'small' > {named}"):
         read_urdf(text, strict=True)
-    with (
-        pytest.warns(UserWarning, match="link 'arm'"),
-        pytest.raises(ValueError, match="positive definite, got one that is not in hinge: the"),
-    ):
+    message = "positive definite, got one that is not in hinge: the"
+    with pytest.warns(UserWarning, match="link 'arm'"), pytest.raises(ValueError, match=message):
         read_urdf(text.replace('iyy="0.1"', 'iyy="-0.5"')).build()
 
 
@@ -314,6 +292,12 @@ def test_mass_matrix_may_have_zeros_on_one_side_only() -> None:
     assert found[2:] == pytest.approx(np.linalg.solve(M, -bias), rel=1e-12)
 
 
-def test_bearing_of_a_fixed_joint_is_refused() -> None:
-    with pytest.raises(ValueError, match="'dumb bell' bearings: expected one of spin, got weld"):
-        read_urdf(WELDED, bearings={"weld": JointFriction(Coulomb(), radius=0.01)})
+TIP = '<joint name="tip" type="{}"><parent link="arm"/><child link="hand"/></joint>{}</robot>'
+HAND = '<link name="hand"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+
+
+def test_massless_tips_are_held() -> None:
+    for link, held in (('<link name="hand"/>', ("tip",)), (f"{HAND}</link>", ())):
+        urdf, names = holding(parse(SMALL.replace("</robot>", TIP.format("continuous", link))))
+        assert names == held
+        assert urdf.joints[1].kind == ("fixed" if held else "continuous")

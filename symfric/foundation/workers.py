@@ -4,6 +4,7 @@ import os
 import signal
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
+from math import inf, isfinite
 from multiprocessing import get_context
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -44,12 +45,11 @@ class _Running:
 
 
 def outcomes(
-    work: Work, tasks: Iterable[Task], size: int, limit: float
+    work: Work, tasks: Iterable[Task], size: int, limit: float = inf, *, start: str = "forkserver"
 ) -> Generator[tuple[int, Any]]:
     """Yield number and result (or `Crashed` or `TimedOut`) of the tasks in order of completion.
 
-    Each task runs in a separate process, forked from one that has imported the module of `work`.
-    Closing the iterator ends all processes.
+    Each task runs in a separate process. Closing the iterator ends all processes.
 
     Args:
         work: function of a module, called with the argument of a task.
@@ -57,9 +57,12 @@ def outcomes(
         size: number of simultaneous processes.
         limit: processor time of a task [s], which does not depend on the load of the machine; wall
             time is limited to `WALL` times this value.
+        start: "forkserver" forks processes from one that has imported the module of `work`; "fork"
+            forks this process, for functions that cannot be pickled.
     """
-    context = get_context("forkserver")
-    context.set_forkserver_preload(["__main__", work.__module__])
+    context: Any = get_context(start)
+    if start == "forkserver":
+        context.set_forkserver_preload(["__main__", work.__module__])
     waiting, running = iter(tasks), dict[Any, _Running]()
     with TemporaryDirectory(prefix="symfric-") as folder:
         try:
@@ -113,10 +116,11 @@ def _run(work: Work, argument: Any, pipe: Any, log: str, limit: float) -> None:
     The timer counts processor time and ends the process with SIGPROF, also inside compiled code.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # only the parent handles Ctrl-C
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     with open(log, "w", encoding="utf-8") as output:
         os.dup2(output.fileno(), 1)
         os.dup2(output.fileno(), 2)
-    signal.setitimer(signal.ITIMER_PROF, limit)
+    signal.setitimer(signal.ITIMER_PROF, limit if isfinite(limit) else 0.0)
     result = work(argument)
     signal.setitimer(signal.ITIMER_PROF, 0.0)
     pipe.send(result)

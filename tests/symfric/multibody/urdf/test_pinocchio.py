@@ -1,6 +1,10 @@
-"""Imported robots beside Pinocchio: mass, bias, inverse and forward dynamics, frames, energies."""
+"""Robots, random and of others, beside Pinocchio: dynamics, frames, energies, motion."""
 
+import re
+import warnings
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -9,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from robots import MOVING, random_robot, rod
 
-from symfric import Coulomb, Law
+from symfric import Coulomb, Law, simulate
 from symfric.multibody import Mechanism, functions
 from symfric.multibody.spatial import euler_g, rotation
 from symfric.multibody.urdf import read_urdf
@@ -38,6 +42,15 @@ class Twin:
     qd_there: Array
 
 
+def place(model: Any, name: str, angle: float, rate: float, q: Array, qd: Array) -> int:
+    """Put angle and rate of a joint of one coordinate into q and qd of Pinocchio."""
+    joint = model.joints[model.getJointId(name)]
+    at = slice(joint.idx_q, joint.idx_q + joint.nq)
+    q[at] = angle if joint.nq == 1 else (np.cos(angle), np.sin(angle))
+    qd[joint.idx_v] = rate
+    return joint.idx_v
+
+
 def twin(text: str, seed: int, g: float = 9.81, law: Law | None = None) -> Twin:
     model = pin.buildModelFromXML(text.replace("</joint>", LIMIT))  # it demands limits
     model.gravity.linear = np.array([0.0, 0.0, -g])
@@ -45,16 +58,9 @@ def twin(text: str, seed: int, g: float = 9.81, law: Law | None = None) -> Twin:
     names = [v.name for v in mechanism.prepare().q]
     q, qd = np.random.default_rng(seed + 1000).normal(size=(2, len(names)))
     q_there, qd_there = np.zeros(model.nq), np.zeros(model.nv)
-    rows: list[int] = []
-    for i, name in enumerate(names):
-        joint = model.joints[model.getJointId(name)]
-        at = slice(joint.idx_q, joint.idx_q + joint.nq)
-        q_there[at] = q[i] if joint.nq == 1 else (np.cos(q[i]), np.sin(q[i]))
-        qd_there[joint.idx_v] = qd[i]
-        rows.append(joint.idx_v)
-    return Twin(
-        model, model.createData(), mechanism, names, rows, q, qd, q_there, qd_there
-    )  # fmt: skip
+    moved = zip(names, q, qd, strict=True)
+    rows = [place(model, *each, q_there, qd_there) for each in moved]
+    return Twin(model, model.createData(), mechanism, names, rows, q, qd, q_there, qd_there)
 
 
 def robot(seed: int) -> str:
@@ -115,14 +121,6 @@ def test_every_link_is_where_pinocchio_puts_it(seed: int) -> None:
         assert expected.translation == pytest.approx(p.ravel(), abs=1e-12), link
 
 
-def test_random_robots_have_branches_and_every_kind_of_joint() -> None:
-    every = [joint for seed in range(6) for joint in parse(robot(seed)).joints]
-    assert {joint.kind for joint in every} == {*MOVING, "fixed"}
-    assert any(j.damping and j.friction for j in every)
-    parents = [j.parent for j in parse(robot(8)).joints]
-    assert len(set(parents)) < len(parents) - 2
-
-
 def test_floating_joints_move_as_pinocchio_says() -> None:
     """Energies, and the accelerations of the joints that turn and slide."""
     text = random_robot(7, 5, ("floating", *MOVING))
@@ -137,9 +135,9 @@ def test_floating_joints_move_as_pinocchio_says() -> None:
     for joint in parse(text).joints:
         if joint.kind == "fixed":
             continue
-        j = there.joints[there.getJointId(joint.name)]
-        at, at_v = j.idx_q, j.idx_v
         if joint.kind == "floating":
+            j = there.joints[there.getJointId(joint.name)]
+            at, at_v = j.idx_q, j.idx_v
             p, e, v, w = (rng.normal(size=n) for n in (3, 4, 3, 3))
             e /= np.linalg.norm(e)
             here = slice(columns[f"{joint.name}_x"], columns[f"{joint.name}_x"] + 7)
@@ -149,11 +147,9 @@ def test_floating_joints_move_as_pinocchio_says() -> None:
             q_there[at : at + 7] = [*p, *e[1:], e[0]]
             qd_there[at_v : at_v + 6] = [*v, *w]
             continue
-        angle, rate = rng.normal(size=2)
-        q[columns[joint.name]], qd[columns[joint.name]] = angle, rate
-        q_there[at : at + j.nq] = angle if j.nq == 1 else (np.cos(angle), np.sin(angle))
-        qd_there[at_v] = rate
-        rows[columns[joint.name]] = at_v
+        k, angle, rate = columns[joint.name], *rng.normal(size=2)
+        q[k], qd[k] = angle, rate
+        rows[k] = place(there, joint.name, angle, rate, q_there, qd_there)
     data = there.createData()
     kinetic, potential = (float(x) for x in f["energy"].call([q, qd, []]))
     assert kinetic == pytest.approx(pin.computeKineticEnergy(there, data, q_there, qd_there))
@@ -182,3 +178,97 @@ def test_planar_joint_has_the_energies_of_pinocchio() -> None:
     potential = pin.computePotentialEnergy(there, there.createData(), q)
     found = functions(read_urdf(text))["energy"].call([[0.3, -0.2, 0.7], [0.5, 0.4, -0.9], []])
     assert [float(x) for x in found] == pytest.approx([kinetic, potential], rel=1e-12)
+
+
+WITHOUT_A_MACHINE = ("quadrotor_base", "iris_simple", "ur3")
+"""Single bodies that only `floating=True` moves, and a file without a link."""
+FEW = ("TwoDofs", "finger_edu", "so101")
+
+
+def files() -> list[Path]:
+    try:
+        found = distribution("example-robot-data")
+    except PackageNotFoundError:
+        pytest.skip("needs example-robot-data (extra urdf-check)")
+    share = Path(str(found.locate_file("cmeel.prefix/share/example-robot-data/robots")))
+    return sorted(share.rglob("*.urdf"))
+
+
+def without_friction(path: Path) -> str:
+    text = path.read_text(encoding="utf-8", errors="replace")
+    return re.sub(r"<dynamics[^>]*?/>|<\?xml[^>]*\?>", "", text)
+
+
+def away(found: Array, expected: Array) -> float:
+    """Largest difference, relative to the largest entry."""
+    return float(np.abs(found - expected).max() / max(np.abs(expected).max(), 1e-9))
+
+
+def differences(path: Path) -> list[float]:
+    """Mass matrix, gravity and inverse dynamics against Pinocchio, at random positions."""
+    mechanism = read_urdf(without_friction(path))
+    model = pin.buildModelFromUrdf(str(path))
+    data, q_there = model.createData(), pin.neutral(model)
+    index = {re.sub(r"\W", "_", n, flags=re.ASCII): i for i, n in enumerate(model.names) if i}
+    names = [v.name for v in mechanism.prepare().q]
+    joints = [model.joints[index[name]] for name in names]
+    q, v, a = np.random.default_rng(1).uniform(-1, 1, (3, len(names)))
+    v_there, a_there = np.zeros((2, model.nv))
+    rows = [joint.idx_v for joint in joints]
+    v_there[rows], a_there[rows] = v, a
+    for joint, angle in zip(joints, q, strict=True):
+        at = slice(joint.idx_q, joint.idx_q + joint.nq)
+        q_there[at] = angle if joint.nq == 1 else (np.cos(angle), np.sin(angle))
+    f, still, u = functions(mechanism), np.zeros(len(names)), np.zeros(len(mechanism.inputs))
+    M = pin.crba(model, data, q_there)
+    M = np.triu(M) + np.triu(M, 1).T
+    # what is held at zero moves no mass
+    assert not np.delete(M, rows, axis=0).any()
+    gravity = pin.computeGeneralizedGravity(model, data, q_there)[rows]
+    forces = pin.rnea(model, data, q_there, v_there, a_there)[rows]
+    multipliers = np.zeros(f["inverse_dynamics"].size1_in(3))
+    return [
+        away(f["mass"](q, []).full(), M[np.ix_(rows, rows)]),
+        away(f["bias"](q, still, u, []).full().ravel(), gravity),
+        away(f["inverse_dynamics"](q, v, a, multipliers, [], u, []).full().ravel(), forces),
+    ]
+
+
+def gain(path: Path) -> float:
+    """Energy gained in 0.1 s without motors, relative to the largest kinetic energy."""
+    run = simulate(read_urdf(path).build(), 0.1, backend="vm", samples=11)
+    energy = run["energy"] - run["energy"][0]
+    return float(energy.max() / max(run["kinetic"].max(), 1e-9))
+
+
+def check(paths: list[Path]) -> None:
+    wrong: dict[str, object] = {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # limits are left out, doubts are taken as they are
+        for path in paths:
+            found = [*differences(path), gain(path)]
+            if max(found[:3]) > 1e-12 or found[3] > 1e-5:
+                wrong[path.name] = found
+    assert not wrong
+
+
+def test_a_few_are_those_of_pinocchio_and_move() -> None:
+    check([path for path in files() if path.stem in FEW])
+
+
+@pytest.mark.slow
+def test_all_are_those_of_pinocchio_and_move() -> None:
+    every = files()
+    assert len(every) >= 69
+    check([path for path in every if path.stem not in WITHOUT_A_MACHINE])
+
+
+def test_what_holds_no_machine_is_refused_in_a_sentence() -> None:
+    for path in files():
+        if path.stem in WITHOUT_A_MACHINE:
+            with (
+                warnings.catch_warnings(),
+                pytest.raises(ValueError, match=r"expected (bodies that can move|at least one)"),
+            ):
+                warnings.simplefilter("ignore")
+                read_urdf(path).build()

@@ -1,0 +1,28 @@
+"""Tables of cases in TOML files, whose texts are Python expressions of public names."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import symfric
+from symfric import codegen, compensation, embedded, laws, scenes
+
+
+def table(test: str, name: str = "cases") -> dict[str, Any]:
+    """The TOML file `name` in the folder of a test, given by its __file__."""
+    return tomllib.loads(Path(test).with_name(f"{name}.toml").read_text(encoding="utf-8"))
+
+
+class Names(dict[str, Any]):
+    """Names of expressions: those given, and all public names of the packages."""
+
+    def __missing__(self, name: str) -> object:
+        packages = (laws, codegen, compensation, embedded, scenes, symfric)
+        found = [getattr(package, name) for package in packages if hasattr(package, name)]
+        if not found:
+            raise KeyError(name)
+        return found[0]
+
+    def value(self, text: str) -> Any:
+        """The value of an expression."""
+        return eval(text, {}, self)
