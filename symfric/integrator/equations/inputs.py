@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from hashlib import sha256
 from typing import Any, NamedTuple, final
 
@@ -22,6 +23,8 @@ from symfric.model import Model
 Array = NDArray[np.float64]
 RAMP = "linear"
 """Structure of an input that is linear in time on each interval."""
+NO_ROWS = ca.SX(0, 1)
+"""Empty column, created once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +153,8 @@ def input_data(
     Raises:
         ValueError: unknown name, or a value of an unsupported type.
     """
+    if not model.u and not given:
+        return _undriven(t_start, t_end)
     signals = model.named("u", given)
     breaks = np.array([t_start, t_end])
     if times := [np.asarray(s.t) for s in signals.values() if isinstance(s, Sampled)]:
@@ -189,6 +194,12 @@ def paced(inputs: InputData, model: Model) -> InputData:
         model.memory["rows of time"] = rows
     times = [t for row in rows for t in pieces(row, *inputs.span).onsets]
     return inputs.stopping_at(times) if times else inputs
+
+
+@lru_cache
+def _undriven(t_start: float, t_end: float) -> InputData:
+    """Return the input data of a model without inputs."""
+    return InputData(NO_ROWS, NO_ROWS, np.array([t_start, t_end]), np.zeros((0, 1)), ())
 
 
 class _Part(NamedTuple):
