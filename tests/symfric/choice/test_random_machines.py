@@ -1,7 +1,7 @@
-"""What a choice says holds away from the defaults: random machines, parameters over decades.
+"""Choices on random machines with parameters over decades.
 
-Judged by runs of exact dry friction and of the ranked law itself at a hundredth of its tolerance,
-which `select` has no part in.
+The references are runs of exact dry friction and of the ranked law at a hundredth of its
+tolerance, computed without `select`.
 """
 
 import warnings
@@ -18,10 +18,10 @@ from symfric.laws import ALL_LAWS
 from symfric.scenes import Rabinowicz
 
 LAWS = ("stribeck", "brown_mcphee", "lugre", "elasto_plastic")
-"""Laws that all tend to dry friction: to none of them may another motion be ascribed."""
+"""Laws that tend to dry friction; `select` must not report another motion for them."""
 ACCURACY = 1e-3
 STILL = 1e-9
-"""A signal that moves by less, in nominal values, is at rest: the box may never slide."""
+"""A signal that moves by less, in nominal values, is at rest."""
 Random = np.random.Generator
 Made = tuple[Callable[[Law], Model], float]
 

@@ -1,4 +1,4 @@
-"""Figures by name: of every law finite or refused in a sentence, of several laws, of a scene."""
+"""Figures by name, of one law, of several laws and of a scene: finite or refused."""
 
 from collections.abc import Iterable
 
