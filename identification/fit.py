@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from time import perf_counter
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 
@@ -222,9 +222,7 @@ class Fit:
         return task(residuals, unknowns, self.noise, self.loss, found.guard)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Prepared:
+class Prepared(NamedTuple):
     """Complete definition of a fit before its solution.
 
     Attributes:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -239,9 +239,7 @@ RANK = 1e-7
 """Smallest singular value of the scaled regressors taken as nonzero, relative to the largest."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class LinearFit:
+class LinearFit(NamedTuple):
     """Estimated parameters with standard errors, and the remaining force error.
 
     Attributes:

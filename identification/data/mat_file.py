@@ -190,7 +190,12 @@ def read_variables(file: Path, variable: str | None) -> Record | list[Raw]:
     where, data = f"read '{file.name}'", file.read_bytes()
     such = "MATLAB file" if file.suffix.lower() == ".mat" else "NumPy file of numbers"
     try:
-        content = variables(data) if such == "MATLAB file" else _numpy(data)
+        if such == "MATLAB file":
+            content = variables(data)
+        else:
+            loaded: Any = np.load(BytesIO(data), allow_pickle=False)
+            held = {"array": loaded} if isinstance(loaded, np.ndarray) else loaded
+            content = {name: node(held[name]) for name in held}
     except NotImplementedError:
         raise ValueError(
             f"{where}: expected a MATLAB file of version 7 or older, got version 7.3 "
@@ -205,30 +210,17 @@ def read_variables(file: Path, variable: str | None) -> Record | list[Raw]:
         return _emps(where, file.name, content)
     if variable is not None:
         return list(_records(where, file.name, _found(where, content, variable), variable))
-    return _raws(where, file.name, content)
-
-
-def _numpy(data: bytes) -> dict[str, Node]:
-    loaded: Any = np.load(BytesIO(data), allow_pickle=False)
-    held = {"array": loaded} if isinstance(loaded, np.ndarray) else loaded
-    return {name: node(held[name]) for name in held}
-
-
-def _raws(where: str, name: str, content: Mapping[str, Node]) -> list[Raw]:
-    """Return the records contained in all variables of a file."""
     if sum(map(_is_vector, content.values())) > 1:
-        return [_raw(where, name, content)]
+        return [_raw(where, file.name, content)]
     tables = {k: v for k, v in content.items() if _is_matrix(v) or isinstance(v, dict | list)}
     fields = {frozenset(v) if isinstance(v, dict) else None for v in tables.values()}
-    if len(tables) > 1 and len(fields) == 1 and None not in fields:
-        return [r for k, v in tables.items() for r in _records(where, f"{name}: {k}", v, k)]
-    if len(tables) != 1:
+    if (len(tables) > 1 and (len(fields) > 1 or None in fields)) or not tables:
         raise ValueError(
             f"{where}: expected one struct or matrix, or vectors of one length, got "
             f"{_described(content) or 'no variables'}; name one with variable="
         )
-    ((key, value),) = tables.items()
-    return list(_records(where, name, value, key))
+    names = {k: f"{file.name}: {k}" if len(tables) > 1 else file.name for k in tables}
+    return [raw for k, v in tables.items() for raw in _records(where, names[k], v, k)]
 
 
 def _described(content: Mapping[str, Node]) -> str:

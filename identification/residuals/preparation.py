@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, final
 
 import casadi as ca
@@ -61,9 +62,17 @@ class Preparation:
         self.inputs = self._inputs()
         self.channels = {n: c for n, c in self.inputs.items() if isinstance(c, str)}
         self.others = {n: c for n, c in self.inputs.items() if not isinstance(c, str)}
-        self.timeless = self._timeless()
-        self._check_x0()
         self.own = list[Unknown]()
+        given = {} if isinstance(kind.x0, str) else kind.x0
+        for name, value in checks.named("Shooting: x0", given, self.states).items():
+            where = f"Shooting: x0: {name}"
+            if isinstance(value, str):
+                checks.choice(where, value, ("estimate",))
+            elif not np.ndim(value):
+                checks.number(where, value)
+            elif (size := checks.array(where, value).size) != (n := len(self.records)):
+                such = f"a number for each of the {n} records"
+                raise ValueError(f"{where}: expected {such}, got {size}")
 
     def shots(self) -> Shots:
         """Return the residuals of all records, cut into windows."""
@@ -165,8 +174,9 @@ class Preparation:
             self._same_unit(where, name, units[name], source)
         return found
 
-    def _timeless(self) -> bool:
-        """Return True if the motion does not depend on the origin of time.
+    @cached_property
+    def timeless(self) -> bool:
+        """True if the motion does not depend on the origin of time.
 
         Windows then start near t = 0, because steps are not resolved at times such as 1e9 s.
         """
@@ -187,18 +197,6 @@ class Preparation:
                     f"{where}: expected samples over {first:g} ... {last:g} s, the time of "
                     f"'{record.name}', got {t[0]:g} ... {t[-1]:g} s"
                 )
-
-    def _check_x0(self) -> None:
-        given = {} if isinstance(self.kind.x0, str) else self.kind.x0
-        for name, value in checks.named("Shooting: x0", given, self.states).items():
-            where = f"Shooting: x0: {name}"
-            if isinstance(value, str):
-                checks.choice(where, value, ("estimate",))
-            elif not np.ndim(value):
-                checks.number(where, value)
-            elif (size := checks.array(where, value).size) != (n := len(self.records)):
-                such = f"a number for each of the {n} records"
-                raise ValueError(f"{where}: expected {such}, got {size}")
 
     # ---- windows of records
 
@@ -281,7 +279,13 @@ class Preparation:
         This is the smallest number of steps with a tolerable error.
         """
         engine = self.kind.engine
-        why = "" if engine == "simulate" else self._why_not_sampled()
+        others = ", ".join(name for name in self.signals if name not in self.states)
+        odd = ", ".join(n for n, given in self.others.items() if not is_number(given))
+        why = "" if engine == "simulate" else why_not_sampled(self.model)
+        if others and not why:
+            why = f"expected signals among the states {', '.join(self.states)}, got {others}"
+        elif odd and not why:
+            why = f"expected inputs that are channels or numbers, got another type for {odd}"
         if engine == "sampled" and why:
             raise ValueError(f"Shooting: engine: model '{self.model.name}': {why}")
         wanted = self.kind.rtol is None and bool(self.model.contacts)
@@ -302,15 +306,6 @@ class Preparation:
                 return substeps
             coarse = fine
         return 0 if engine == "auto" else SUBSTEPS[-1]
-
-    def _why_not_sampled(self) -> str:
-        """Return why the sampled engine does not support the windows; "" if it does."""
-        if why := why_not_sampled(self.model):
-            return why
-        if others := ", ".join(name for name in self.signals if name not in self.states):
-            return f"expected signals among the states {', '.join(self.states)}, got {others}"
-        odd = ", ".join(n for n, given in self.others.items() if not is_number(given))
-        return odd and f"expected inputs that are channels or numbers, got another type for {odd}"
 
 
 def _rtol(shots: Shots, values: NDArray[np.float64]) -> float:

@@ -224,11 +224,10 @@ class _Along:
         nz, ny = self.nz, self.ny
         for _ in range(self.rounds):
             old = self.y
-            why = self.solve() if ny else ""
-            if why:
+            if ny and (why := self.solve()):
                 return why
             if nz:
-                self.z = self.states()
+                self.z = self.chained("step", self.first()[0])
             if self.rounds == 1 or _settled(old, self.y):
                 break
         else:
@@ -281,10 +280,6 @@ class _Along:
         here = np.hstack([self.w, self.y])
         rows = [here[:-1], here[1:], self.h, *given, _same(self.p, self.n - 1)]
         return np.vstack([first[None, :], self.of.run(name, rows, first)[0]])
-
-    def states(self) -> Array:
-        """Return the states of the laws along the record, (n, nz)."""
-        return self.chained("step", self.first()[0])
 
     def tangents(self) -> tuple[Array, Array]:
         """Return derivatives of states (n, nz, n_p) and unknowns (n, ny, n_p) by the parameters."""

@@ -10,8 +10,7 @@ Source: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003 (elements from a hysteres
 Rizos and Fassois, Chaos 14(2), 2004 (regression on Maxwell-slip elements).
 """
 
-from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +32,7 @@ STEPS = 40
 """Largest number of evaluations to refine the radii."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Elements:
+class Elements(NamedTuple):
     """Maxwell-slip elements in the order in which they slip.
 
     Attributes:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import log
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,9 +105,7 @@ APART = 2.0
 """Smallest ratio of loading rates for which their effect is evaluated."""
 
 
-@final
-@dataclass(frozen=True)
-class BreakAway:
+class BreakAway(NamedTuple):
     """A break-away event.
 
     Attributes:
@@ -123,9 +121,7 @@ class BreakAway:
     side: int
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class BreakAways:
+class BreakAways(NamedTuple):
     """Break-away events of a data set.
 
     Attributes:
@@ -219,9 +215,7 @@ PART = 0.3
 """Least force at both ends of a branch, relative to the typical force."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Branch:
+class Branch(NamedTuple):
     """Force as a function of path between two consecutive reversals.
 
     Attributes:
@@ -242,9 +236,7 @@ class Branch:
     damping: float
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Hysteresis:
+class Hysteresis(NamedTuple):
     """Pre-sliding stiffness and damping, medians over all `branches`.
 
     Attributes:

@@ -15,8 +15,7 @@ Source: A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, se
 Olsson, Control Systems with Friction, PhD thesis, Lund 1996.
 """
 
-from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,9 +34,7 @@ LEAST = 4
 """Least number of speeds in one direction for a curve."""
 
 
-@final
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """Step of the procedure with number, meaning, number of points used, and values."""
 
     number: int
@@ -50,9 +47,7 @@ class Step:
         return f"{self.number}  {self.what:<44} {self.points:4d} points   {shown}"
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class SixSteps:
+class SixSteps(NamedTuple):
     """Result of the six-step procedure.
 
     Attributes:
@@ -143,13 +138,21 @@ def six_steps(v: Array, F: Array, *, unstable: float = 0.0) -> SixSteps:
         error = found.force(speed) - force
         noise = float(np.sqrt(np.sum(error**2) / max(error.size - len(NAMES), 1)))
         errors = standard_errors(found, speed, noise)
-        doubts = (*_doubts(found, curve, low, count, unstable), *_undetermined(errors))
+        doubts = [
+            *_doubts(found, curve, low, count, unstable),
+            *(
+                f"{name} is not determined by these points: standard error "
+                + (f"{100 * error:.0f} %" if error < 100 else "larger than any value")
+                for name, error in errors.items()
+                if error > LOOSE
+            ),
+        ]
     else:
         error, errors = F_C + sigma_2 * speed - force, {name: np.inf for name in NAMES}
-        doubts = (_no_fall(curve, top, low), *_of_line(curve, low))
+        doubts = [_no_fall(curve, top, low), *_of_line(curve, low)]
     rms = 100 * float(np.sqrt(np.mean(error**2)) / force.mean())
     numbered = tuple(Step(number, *step) for number, step in enumerate(steps, start=1))
-    return SixSteps(numbered, values, errors, rms, curve, doubts)
+    return SixSteps(numbered, values, errors, rms, curve, tuple(doubts))
 
 
 def standard_errors(curve: StribeckCurve, speed: Array, noise: float) -> dict[str, float]:
@@ -247,12 +250,3 @@ def _no_fall(curve: Curve, top: int, low: int) -> str:
         f"{v[top]:.3g} m/s, and the smallest, {F[low]:.3g} N at {v[low]:.3g} m/s, shows how it "
         "falls; scatter may hide it: add points at these speeds, or use Fit with all points"
     )
-
-
-def _undetermined(errors: dict[str, float]) -> list[str]:
-    return [
-        f"{name} is not determined by these points: standard error "
-        + (f"{100 * error:.0f} %" if error < 100 else "larger than any value")
-        for name, error in errors.items()
-        if error > LOOSE
-    ]

@@ -1,9 +1,9 @@
 """Roles of law parameters: which parameters are fitted, and why others are held."""
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from math import floor, log10
-from typing import final
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -101,9 +101,7 @@ def velocity(parameter: Parameter, scale: float) -> float:
     return scale if parameter.unit in VELOCITIES else 1 / scale
 
 
-@final
-@dataclass(frozen=True)
-class Speeds:
+class Speeds(NamedTuple):
     """Largest and smallest speed in the data [m/s or rad/s]; 0 if unknown."""
 
     largest: float = 0.0
@@ -220,10 +218,10 @@ def _effects(
     by_name = {x.name: x for x in variables}
     p = ca.vertcat(*(by_name[n].symbol for n in mine), *(by_name[n].symbol for n in around), N)
     state = z if bristle else ca.SX(law.steady_state(v, N))
-    found = ca.SX(law.force(v, N, state if law.states else ca.SX(0, 1)))
+    effects = ca.SX(law.force(v, N, state if law.states else ca.SX(0, 1)))
     if bristle and law.states:
-        found = ca.vertcat(found, ca.SX(law.rate(v, N, z)))
-    slope = ca.jacobian(found, p)[:, : len(mine)]
+        effects = ca.vertcat(effects, ca.SX(law.rate(v, N, z)))
+    slope = ca.jacobian(effects, p)[:, : len(mine)]
     usual = [float(by_name[n].start) or 0.1 for n in (*mine, *around)]
     speeds = np.concatenate([side * np.geomspace(1e-7, 1e2, 200) for side in (-1, 1)])
     rng = np.random.default_rng(0)
@@ -234,15 +232,12 @@ def _effects(
     here *= 1 + 0.1 * rng.random(here.size)
     apart = 0.3 * (np.arange(here.size) >= len(mine))
     places = [here, *(here * (1 + apart * rng.random(here.size)) for _ in range(3))]
-    return [_by_parameter(slopes(speeds[None, :], states, at), len(mine)) for at in places]
-
-
-def _by_parameter(slopes: ca.DM, count: int) -> Array:
-    """Return mapped derivatives as scaled columns, one for each of `count` parameters."""
-    outputs = slopes.shape[0] // count
-    values = slopes.full().reshape(count, outputs, -1)
-    size = np.abs(values).max(axis=(0, 2), where=np.isfinite(values), initial=1e-300)
-    return (values / size[None, :, None]).reshape(count, -1).T
+    found = list[Array]()
+    for at in places:  # scaled columns, one for each parameter
+        values = slopes(speeds[None, :], states, at).full().reshape(len(mine), -1, speeds.size)
+        size = np.abs(values).max(axis=(0, 2), where=np.isfinite(values), initial=1e-300)
+        found.append((values / size[None, :, None]).reshape(len(mine), -1).T)
+    return found
 
 
 def _same_effect(columns: Array, kept: Sequence[int], i: int) -> list[int] | None:

@@ -17,7 +17,7 @@ and Box, Biometrika 65(2), 1978; moments of quadratic forms as in Durbin and Wat
 
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +35,7 @@ NEAR_ONE = 0.9995
 """Largest partial autocorrelation; at one, noise is a random walk without finite variance."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Colour:
+class Colour(NamedTuple):
     """Autoregressive model of the residuals of one channel.
 
     Attributes:

@@ -13,7 +13,7 @@ interval.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,7 @@ FAR = 3.0
 """Ratio of a level's force to the largest friction force above which it is not identifiable."""
 
 
-@final
-@dataclass(frozen=True)
-class Levels:
+class Levels(NamedTuple):
     """Friction levels among the values, and the largest force in the data.
 
     Attributes:

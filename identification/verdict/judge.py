@@ -201,8 +201,7 @@ def judge(found: Minimum, findings: Findings | None = None) -> Verdict:
     tests += _explained(found)
     errors = () if findings is None else tuple(e.sentence for e in findings.errors)
     nonsense = (*errors, *_unexplained(found, effective), *_no_mass(found))
-    at = _at_bound(found)
-    bounds = [f"Values at a bound: {', '.join(at)}."] if at else []
+    bounds = [f"Values at a bound: {', '.join(at)}."] if (at := _at_bound(found)) else []
     failed = [t for t in tests if not t.passed]
     failed.sort(key=lambda t: (not t.decides, t.p))
     messages = (*nonsense, *beginnings(found), *(t.sentence for t in failed), *bounds)

@@ -183,7 +183,7 @@ class _Walk:
                 why = "its bound"
                 break
             try:
-                found = held_at(self.task, w, self.index, self.own, c)
+                found = self.held_at(w, c)
             except KeyboardInterrupt:
                 why = "an interruption"
                 break
@@ -213,60 +213,60 @@ class _Walk:
             return float(last * (value / last) ** share)
         return last + share * (value - last)
 
+    def held_at(self, w: Array, c: float) -> Point | str:
+        """Minimise over the other values with the value held at c; return a message on failure.
 
-def held_at(task: Task, w: Array, index: int, own: int, c: float) -> Point | str:
-    """Minimise over the other values with value `index` held at c; return a message on failure.
+        The search starts at `w`. The coordinate of the value is eliminated: w_own solves
+        value(w) = c.
+        The derivatives become J_j - J_own (dvalue/dw_j) / (dvalue/dw_own).
+        """
+        optimize: Any = import_module("scipy.optimize")  # slow to import
+        box, own = self.task.unknowns, self.own
+        others = np.arange(w.size) != own
+        best: list[Point] = []
+        why = ""
 
-    The search starts at `w`. The coordinate of the value is eliminated: w_own solves value(w) = c.
-    The derivatives become J_j - J_own (dvalue/dw_j) / (dvalue/dw_own).
-    """
-    optimize: Any = import_module("scipy.optimize")  # slow to import
-    box, others = task.unknowns, np.arange(w.size) != own
-    best: list[Point] = []
-    why = ""
+        def at(rest: Array) -> Point | None:
+            nonlocal why
+            whole = w.copy()
+            whole[others] = rest
+            there = self.solved(whole, c)
+            found = f"{box.fitted[own]} = {c:.4g} is outside its order or its bounds"
+            if there is not None:
+                found = self.task.at(there)
+            if isinstance(found, str):
+                why = found
+                return None
+            if not best or found.cost < best[0].cost:
+                best[:] = [found]
+            return found
 
-    def at(rest: Array) -> Point | None:
-        nonlocal why
-        whole = w.copy()
-        whole[others] = rest
-        there = _solved(task, whole, index, own, c)
-        found = f"{box.fitted[own]} = {c:.4g} is outside its order or its bounds"
-        if there is not None:
-            found = task.at(there)
-        if isinstance(found, str):
-            why = found
-            return None
-        if not best or found.cost < best[0].cost:
-            best[:] = [found]
-        return found
+        def residuals(rest: Array) -> Array:
+            found = at(rest)
+            return np.full(len(box.names) + 1, inf) if found is None else found.reduced[0]
 
-    def residuals(rest: Array) -> Array:
-        found = at(rest)
-        return np.full(len(box.names) + 1, inf) if found is None else found.reduced[0]
+        def slopes(rest: Array) -> Array:
+            found = at(rest)
+            if found is None:
+                raise ArithmeticError(why)
+            J, slope = found.reduced[1], found.slope[self.index]
+            return J[:, others] - J[:, [own]] * (slope[others] / slope[own])
 
-    def slopes(rest: Array) -> Array:
-        found = at(rest)
-        if found is None:
-            raise ArithmeticError(why)
-        J, slope = found.reduced[1], found.slope[index]
-        return J[:, others] - J[:, [own]] * (slope[others] / slope[own])
+        low, high = box.lower[others], box.upper[others]
+        start = np.clip(w[others], low, high)
+        if at(start) is not None and others.any():
+            optimize.least_squares(
+                residuals, start, slopes, bounds=(low, high), x_scale="jac",
+                ftol=1e-7, xtol=1e-7, gtol=1e-12, max_nfev=EVALUATIONS,
+            )  # fmt: skip
+        return best[0] if best else why
 
-    low, high = box.lower[others], box.upper[others]
-    start = np.clip(w[others], low, high)
-    if at(start) is not None and others.any():
-        optimize.least_squares(
-            residuals, start, slopes, bounds=(low, high), x_scale="jac",
-            ftol=1e-7, xtol=1e-7, gtol=1e-12, max_nfev=EVALUATIONS,
-        )  # fmt: skip
-    return best[0] if best else why
-
-
-def _solved(task: Task, near: Array, index: int, own: int, c: float) -> Array | None:
-    """Return `near` with coordinate `own` solved for the value c; None if outside its bounds."""
-    box, w = task.unknowns, near.copy()
-    for _ in range(30):
-        miss = c - float(box.values(w)[index])
-        if abs(miss) <= 1e-10 * max(abs(c), 1e-300):
-            break
-        w[own] += max(-1e3, min(1e3, miss / float(box.slope(w)[index, own])))
-    return w if box.lower[own] <= w[own] <= box.upper[own] else None
+    def solved(self, near: Array, c: float) -> Array | None:
+        """Return `near` with its coordinate solved for the value c; None if outside its bounds."""
+        box, own, w = self.task.unknowns, self.own, near.copy()
+        for _ in range(30):
+            miss = c - float(box.values(w)[self.index])
+            if abs(miss) <= 1e-10 * max(abs(c), 1e-300):
+                break
+            w[own] += max(-1e3, min(1e3, miss / float(box.slope(w)[self.index, own])))
+        return w if box.lower[own] <= w[own] <= box.upper[own] else None

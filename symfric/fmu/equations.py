@@ -298,14 +298,9 @@ def _strings(name: str, values: Iterable[str]) -> str:
 
 
 def _wrapped(head: str, texts: list[str]) -> str:
-    """Return the entries of an array in lines of up to 96 columns."""
-    lines, line = [head], "   "
-    for text in texts:
-        if len(line) + len(text) > 94 and line.strip():
-            lines.append(line)
-            line = "   "
-        line += f" {text},"
-    return "\n".join([*lines, line, "};"]) + "\n"
+    """Return the entries of an array in lines of up to eight."""
+    rows = (texts[i : i + 8] for i in range(0, len(texts), 8))
+    return "\n".join([head, *(f"    {', '.join(row)}," for row in rows), "};"]) + "\n"
 
 
 def _quoted(text: str) -> str:

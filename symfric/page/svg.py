@@ -94,9 +94,11 @@ class Axis:
         ]
 
 
-def around(
-    name: str, unit: str, values: Iterable[Array], margin: float = 0.05, logarithmic: bool = False
-) -> Axis:
+MARGIN = 0.05
+"""Margin of an axis around its numbers, relative to their range."""
+
+
+def around(name: str, unit: str, values: Iterable[Array], logarithmic: bool = False) -> Axis:
     """Return an axis that contains all finite numbers in `values`, with a margin."""
     kept = [y[np.isfinite(y) & ((y > 0) | (not logarithmic))] for y in values]
     every = np.concatenate([*kept, np.zeros(0)])
@@ -104,14 +106,16 @@ def around(
         return Axis(name, unit, 0.1 if logarithmic else 0.0, 1.0, logarithmic)
     low, high = float(every.min()), float(every.max())
     if logarithmic:
-        share = max(margin * log10(high / low), 0.05)
+        share = max(MARGIN * log10(high / low), 0.05)
         return Axis(name, unit, low / 10**share, high * 10**share, True)
     width = high - low
     if not (isfinite(width) and width > 1e-12 * max(abs(low), abs(high))):
         width = abs(high) or 1.0
-    return Axis(name, unit, low - margin * width, high + margin * width)
+    return Axis(name, unit, low - MARGIN * width, high + MARGIN * width)
 
 
+WIDTH = 920.0
+"""Width of a chart [px]."""
 LEFT, RIGHT, TOP, BOTTOM = 68.0, 14.0, 24.0, 40.0
 """Margins around the frame, for labels [px]."""
 LETTER = 6.6
@@ -230,7 +234,6 @@ def chart(
     x: Axis,
     y: Axis,
     marks: Sequence[Mark],
-    width: float = 920.0,
     height: float = 230.0,
     says: str = "",
 ) -> str:
@@ -240,16 +243,16 @@ def chart(
         title: text above the chart, also for screen readers.
         x, y: axes.
         marks: marks from back to front.
-        width, height: size of the whole chart [px], which the page scales.
+        height: height of the whole chart [px], which the page scales.
         says: description for screen readers.
     """
-    w, h = width - LEFT - RIGHT, height - TOP - BOTTOM
+    w, h = WIDTH - LEFT - RIGHT, height - TOP - BOTTOM
     inside = "".join(mark.draw(Frame(x, y, w, h)) for mark in marks)
     return (
-        f'<svg class="chart" role="img" viewBox="0 0 {width:g} {height:g}">'
+        f'<svg class="chart" role="img" viewBox="0 0 {WIDTH:g} {height:g}">'
         f"<title>{escape(title)}</title><desc>{escape(says or title)}</desc>"
         f'<text class="title" x="{LEFT:g}" y="15">{escape(title)}</text>'
-        f"{_legend(marks, width)}"
+        f"{_legend(marks)}"
         f"{_ticks(x, y, w, h)}"
         f'<svg x="{LEFT:g}" y="{TOP:g}" width="{w:g}" height="{h:g}">{inside}</svg>'
         f'<rect class="frame" x="{LEFT:g}" y="{TOP:g}" width="{w:g}" height="{h:g}"/>'
@@ -275,10 +278,10 @@ def _ticks(x: Axis, y: Axis, w: float, h: float) -> str:
     return "".join(text)
 
 
-def _legend(marks: Sequence[Mark], width: float) -> str:
+def _legend(marks: Sequence[Mark]) -> str:
     """Return the entries of the legend, at the right of the line of the title."""
     text: list[str] = []
-    at = width - RIGHT
+    at = WIDTH - RIGHT
     for mark in reversed([m for m in marks if isinstance(m, Points) and m.entry]):
         at -= LETTER * len(mark.entry)
         text.append(f'<text class="entry" x="{at:.1f}" y="15">{escape(mark.entry)}</text>')

@@ -3,107 +3,91 @@
 from collections.abc import Iterator
 from typing import Any
 
+import bad_values as bad
 import numpy as np
-from bad_values import (
-    INF,
-    NAN,
-    Door,
-    Thing,
-    choice,
-    count,
-    every_door_refuses,
-    flag,
-    function,
-    number,
-    thing,
-    values,
-)
+from bad_values import INF, NAN, Door, Thing
 
-from identification import (
-    ClosedLoop,
-    Dataset,
-    Filter,
-    Fit,
-    InverseDynamics,
-    Points,
-    Record,
-    Shooting,
-    above,
-    binned,
-    linear,
-    log,
-    six_steps,
-    synthetic_drive_data,
-    tied,
-)
+import identification as own
 from symfric.laws import Coulomb
 
 
 def doors_of_fits() -> Iterator[Door]:
     v = np.linspace(-0.1, 0.1, 60)
-    data = Dataset.of(v=v, F=np.sign(v) + v, points=True)
-    right = {"kind": Points(), "what": "coulomb+viscous", "data": data}
+    data = own.Dataset.of(v=v, F=np.sign(v) + v, points=True)
+    right = {"kind": own.Points(), "what": "coulomb+viscous", "data": data}
     specs = ["log", (2.0, 1.0), (1.0, 2.0, 3.0), NAN]
-    specs += [above("nonsense"), above("mu_d"), tied("mu_d"), tied("nonsense")]
+    specs += [
+        own.above("nonsense"),
+        own.above("mu_d"),
+        own.tied("mu_d"),
+        own.tied("nonsense"),
+    ]
     names: list[Any] = [3, "mu_d", ["nonsense"], [3], Thing(), {"x0": "estimate"}]
 
     def fitted(**given: Any) -> Any:
-        return Fit(**given).prepared()
+        return own.Fit(**given).prepared()
 
-    bad = {
-        "kind": [*thing(Points), "inverse"],
-        "what": [*thing(Coulomb), "", "nonsense", "coulomb+"],
-        "data": thing(Dataset, np.zeros((100, 3)), "run.csv"),
-        "free": [*names, *({"mu_d": spec} for spec in specs), {3: log(1.0, 2.0)}],
-        "fixed": [*values("mu_d")[1:], {"mu_d": -1.0}],
-        "normal_force": number(0.0, -1.0),
-        "noise": [3, "nonsense", {"nonsense": 1.0}, *({"F": x} for x in number(0.0))],
-        "loss": choice(), "starts": count(), "seed": [*number(), -1, 1.5], "evaluations": count(1),
-        "start": [*choice()[1:], {"nonsense": 1.0}, *({"mu_d": x} for x in number())],
+    wrong = {
+        "kind": [*bad.thing(own.Points), "inverse"],
+        "what": [*bad.thing(Coulomb), "", "nonsense", "coulomb+"],
+        "data": bad.thing(own.Dataset, np.zeros((100, 3)), "run.csv"),
+        "free": [*names, *({"mu_d": spec} for spec in specs), {3: own.log(1.0, 2.0)}],
+        "fixed": [*bad.values("mu_d")[1:], {"mu_d": -1.0}],
+        "normal_force": bad.number(0.0, -1.0),
+        "noise": [3, "nonsense", {"nonsense": 1.0}, *({"F": x} for x in bad.number(0.0))],
+        "loss": bad.choice(), "starts": bad.count(), "seed": [*bad.number(), -1, 1.5],
+        "evaluations": bad.count(1),
+        "start": [*bad.choice()[1:], {"nonsense": 1.0}, *({"mu_d": x} for x in bad.number())],
     }  # fmt: skip
-    yield Door("Fit", fitted, right, bad)
-    solve = Fit(Points(), "viscous", data).solve
-    yield Door("Fit.solve", solve, {}, {"throw": flag(), "progress": function()})
+    yield Door("Fit", fitted, right, wrong)
+    solve = own.Fit(own.Points(), "viscous", data).solve
+    yield Door("Fit.solve", solve, {}, {"throw": bad.flag(), "progress": bad.function()})
     one: list[Any] = [None, 3, Thing()]
     box = {"lower": 1.0, "upper": 2.0}
-    yield Door("log", log, box, {"lower": number(0.0, 3.0), "upper": number(0.5)})
-    yield Door("linear", linear, box, {"lower": [NAN, "a", 3.0, Thing()]})
-    yield Door("above", above, {"name": "mu_d"}, {"name": one})
-    yield Door("tied", tied, {"to": "mu_d"}, {"to": one, "factor": number()})
+    yield Door("log", own.log, box, {"lower": bad.number(0.0, 3.0), "upper": bad.number(0.5)})
+    yield Door("linear", own.linear, box, {"lower": [NAN, "a", 3.0, Thing()]})
+    yield Door("above", own.above, {"name": "mu_d"}, {"name": one})
+    yield Door("tied", own.tied, {"to": "mu_d"}, {"to": one, "factor": bad.number()})
 
 
 def doors_of_kinds() -> Iterator[Door]:
     name = [None, 3, "", [], Thing(), True]
     seconds = [NAN, INF, -1.0, 0.0, [1.0], Thing(), True]
     inverse = {
-        "force": name, "x": name, "v": name[1:], "filter": thing(Filter)[1:],
+        "force": name, "x": name, "v": name[1:], "filter": bad.thing(own.Filter)[1:],
         "dead_time": [3, "a", (1.0,), (2.0, 1.0), (0.0, NAN), Thing(), (None, 1.0)],
     }  # fmt: skip
     points = {
         "v": name, "F": name, "N": [-1.0, NAN, [], Thing(), True], "weight": name[1:],
-        "states": choice(), "offset": flag(),
+        "states": bad.choice(), "offset": bad.flag(),
     }  # fmt: skip
     shooting = {
         "signals": [3, [3], Thing(), True, {3: "x"}, {"x": 3}],
         "windows": [*seconds, "nonsense", ""],
         "x0": [None, 3, "nonsense", [], Thing()],
         "inputs": [3, "force", [], Thing(), {3: "force"}],
-        "interpolation": choice(), "every": count(), "rtol": number(0.0, -1.0, 1.0, optional=True),
+        "interpolation": bad.choice(), "every": bad.count(),
+        "rtol": bad.number(0.0, -1.0, 1.0, optional=True),
         "dead_time": [None, "a", -1.0, NAN, (2.0, 1.0), (1.0,), Thing()],
     }  # fmt: skip
-    yield Door("InverseDynamics", InverseDynamics, {}, inverse)
-    yield Door("Points", Points, {}, points)
-    yield Door("Shooting", Shooting, {}, shooting)
-    yield Door("ClosedLoop", ClosedLoop, {}, {"loop": thing(ClosedLoop)[1:]})
+    yield Door("InverseDynamics", own.InverseDynamics, {}, inverse)
+    yield Door("Points", own.Points, {}, points)
+    yield Door("Shooting", own.Shooting, {}, shooting)
+    yield Door(
+        "ClosedLoop",
+        own.ClosedLoop,
+        {},
+        {"loop": bad.thing(own.ClosedLoop)[1:]},
+    )
 
 
 def doors_of_identification() -> Iterator[Door]:
-    data = synthetic_drive_data(speeds=(0.01,), dwell=0.1)
+    data = own.synthetic_drive_data(speeds=(0.01,), dwell=0.1)
     one = data[0]
-    x, step = one["x"], number(0.0, -1.0, optional=True)
-    bad = [None, 3.0, "abc", [], {}, Thing(), [[1.0]], x[:-1], x * NAN, 1j]
+    x, step = one["x"], bad.number(0.0, -1.0, optional=True)
+    odd = [None, 3.0, "abc", [], {}, Thing(), [[1.0]], x[:-1], x * NAN, 1j]
     columns = {
-        "t": [*bad[1:], one.time[::-1], one.time * 0], "x": bad, "force": bad, "step": step,
+        "t": [*odd[1:], one.time[::-1], one.time * 0], "x": odd, "force": odd, "step": step,
         "units": [3, "nonsense", ["m"], {"x": 3}, {"x": "parsec"}, {"nonsense": "m"}, Thing()],
         "name": [None, 3, Thing()],
     }  # fmt: skip
@@ -112,8 +96,8 @@ def doors_of_identification() -> Iterator[Door]:
         "units": [3, "m", {"x": 3}, {"nonsense": "m"}, Thing()],
     }
     filters = {
-        "cutoff": number(0.0, -1.0), "decimation": count(), "order": count(),
-        "v_min": number(-1.0, optional=True),
+        "cutoff": bad.number(0.0, -1.0), "decimation": bad.count(), "order": bad.count(),
+        "v_min": bad.number(-1.0, optional=True),
     }  # fmt: skip
     read = {
         "paths": [None, 3, "", b"x", Thing(), [], "nothing.csv", ".", "a\0b", "*.csv"],
@@ -121,22 +105,37 @@ def doors_of_identification() -> Iterator[Door]:
     }
     right = {"name": "r", "t": one.t, "signals": {"x": x}, "units": {"x": "m"}}
     points = {"v": np.geomspace(1e-3, 1.0, 60), "F": np.ones(60)}
-    yield Door("Dataset.of", Dataset.of, {"t": one.t, "x": x, "force": one["force"]}, columns)
-    yield Door("Record", Record, right, record)
-    yield Door("Dataset", Dataset, {"records": (one,)}, {"records": [3, "a", (), (3,), Thing()]})
-    yield Door("Filter", Filter, {"cutoff": 10.0}, filters)
+    yield Door(
+        "Dataset.of",
+        own.Dataset.of,
+        {"t": one.t, "x": x, "force": one["force"]},
+        columns,
+    )
+    yield Door("Record", own.Record, right, record)
+    yield Door(
+        "Dataset",
+        own.Dataset,
+        {"records": (one,)},
+        {"records": [3, "a", (), (3,), Thing()]},
+    )
+    yield Door("Filter", own.Filter, {"cutoff": 10.0}, filters)
     yield Door("Dataset.resampled", data.resampled, {}, {"step": step})
-    yield Door("Dataset.split", data.split, {}, {"share": number(0.0, -1.0, 1.0)})
-    yield Door("Dataset.thinned", data.thinned, {}, {"every": count()})
+    yield Door("Dataset.split", data.split, {}, {"share": bad.number(0.0, -1.0, 1.0)})
+    yield Door("Dataset.thinned", data.thinned, {}, {"every": bad.count()})
     yield Door("Dataset.renamed", data.renamed, {}, {"names": [3, {"nonsense": "y"}, {"x": 3}]})
-    yield Door("Dataset.delayed", data.delayed, {}, {"delays": values("x")})
-    ends = {"begin": number(0.3), "end": number(0.05)}
+    yield Door("Dataset.delayed", data.delayed, {}, {"delays": bad.values("x")})
+    ends = {"begin": bad.number(0.3), "end": bad.number(0.05)}
     yield Door("Dataset.between", data.between, {"begin": 0.1, "end": 0.2}, ends)
-    yield Door("Dataset.read", Dataset.read, {"paths": "a.csv"}, read)
-    yield Door("binned", binned, points, {"v": bad, "F": bad})
-    yield Door("six_steps", six_steps, points, {"v": bad, "F": bad, "unstable": number(-1.0)})
+    yield Door("Dataset.read", own.Dataset.read, {"paths": "a.csv"}, read)
+    yield Door("binned", own.binned, points, {"v": odd, "F": odd})
+    yield Door(
+        "six_steps",
+        own.six_steps,
+        points,
+        {"v": odd, "F": odd, "unstable": bad.number(-1.0)},
+    )
 
 
-test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(
+test_every_door_refuses_bad_input_in_a_sentence = bad.every_door_refuses(
     {"fits": doors_of_fits, "kinds": doors_of_kinds, "data": doors_of_identification}
 )

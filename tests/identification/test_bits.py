@@ -8,7 +8,7 @@ import pytest
 
 SCRIPT = """
 from identification import Fit, InverseDynamics, synthetic_drive_data
-fit = Fit(InverseDynamics(), "lugre", synthetic_drive_data(speeds=(0.02, 0.08)), starts=2)
+fit = Fit(InverseDynamics(), "lugre", synthetic_drive_data(speeds=(0.05,), dwell=0.4), starts=1)
 fit = fit.solve(throw=False)
 print(" ".join(e.value.hex() for e in fit.parameters.values()))
 print(" ".join((e.standard_error or 0.0).hex() for e in fit.parameters.values()))

@@ -127,7 +127,9 @@ def test_outliers_that_the_loss_allows_for_do_not_make_given_noise_too_small() -
 
 
 def test_who_fits_bristles_at_the_measured_velocity_is_told_to_simulate() -> None:
-    data = synthetic_drive_data(seed=1, rate=500.0)  # of a law without states, with a peak
+    data = synthetic_drive_data(
+        seed=1, rate=500.0, speeds=(0.01, 0.05)
+    )  # of a law without states, with a peak
     fit = Fit(InverseDynamics(), Dahl(), data, free=["mu_d"]).solve(throw=False)
     assert fit.status is Status.DOUBTFUL
     assert "The states of Dahl follow the measured velocity" in fit.message

@@ -51,11 +51,9 @@ def test_pendulum_of_others(shared_data: Path) -> None:
     silent(data, "irregular", "excitation", "clipping", "delay")
 
 
-@pytest.mark.parametrize(
-    "law", ["coulomb+viscous", "asymmetric(coulomb+viscous)", "viscous", "makkar_dixon"]
-)
+@pytest.mark.parametrize("law", ["asymmetric(coulomb+viscous)", "viscous", "makkar_dixon"])
 def test_laws(law: str) -> None:
-    silent(synthetic_drive_data(law_from_text(law), normal_force=20.0, speeds=(0.004, 0.02, 0.08)))
+    silent(synthetic_drive_data(law_from_text(law), normal_force=20.0, speeds=(0.01, 0.08)))
 
 
 @pytest.mark.slow
@@ -72,28 +70,24 @@ def test_sensors(seed: int) -> None:
 
 
 def motions() -> Iterator[tuple[str, Dataset, tuple[str, ...]]]:
-    t = np.arange(0.0, 12.0, 2e-3)
+    t, turning = np.arange(0.0, 12.0, 2e-3), "rad, N m"
     for size in (0.05, 0.001):
         x = size * (2 * np.abs((t / 2) % 2 - 1) - 1)
         v = np.gradient(x, t)
         force = noisy(20 * np.sign(v) + 50 * v + 2 * np.gradient(v, t), 0.5)
-        yield (
-            "triangle",
-            Dataset.of(t=t, x=1e-6 * np.round(x / 1e-6), force=force),
-            ("speeds", "excitation"),
-        )
+        data = Dataset.of(t=t, x=1e-6 * np.round(x / 1e-6), force=force)
+        yield "triangle", data, ("speeds", "excitation")
     x = 0.01 * np.sin(2 * np.pi * t)
     v = np.gradient(x, t)
     force = noisy(20 * np.tanh(v / 1e-3) + 10 * np.gradient(v, t), 0.5)
     yield "sine", Dataset.of(t=t, x=noisy(x, 1e-7), force=force), ("excitation",)
     v = np.convolve(np.repeat(np.linspace(0.5, 10, 12), 500), np.ones(30) / 30, "same")
     x, force = np.cumsum(v) * 2e-3, noisy(7e-3 + 1e-3 * v + 2e-4 * np.gradient(v, t), 1e-3)
-    kinds = ("one-way", "excitation")
-    yield "staircase", Dataset.of(t=t, x=x, force=force, units="rad, N m"), kinds
+    yield "staircase", Dataset.of(t=t, x=x, force=force, units=turning), ("one-way", "excitation")
     rest = np.concatenate([np.zeros(2000), x - x[0], np.full(2000, x[-1] - x[0])])
     push = noisy(np.concatenate([np.zeros(2000), force, np.zeros(2000)]), 1e-3)
-    still = {"x": noisy(rest, 1e-5), "force": push}
-    data = Dataset.of(still, t=2e-3 * np.arange(rest.size), units="rad, N m")
+    still = {"t": 2e-3 * np.arange(rest.size), "x": noisy(rest, 1e-5), "force": push}
+    data = Dataset.of(still, units=turning)
     yield "at rest in part", data, ("one-way", "excitation", "spikes")
     block = simulate(rabinowicz(BrownMcPhee()), t_end=40.0)
     times = np.arange(0.0, 40.0, 5e-3)
@@ -101,15 +95,11 @@ def motions() -> Iterator[tuple[str, Dataset, tuple[str, ...]]]:
     for every in (1, 20):
         data = Dataset.of(t=times[::every], x=noisy(x, 1e-6)[::every], force=-2.1 * x[::every])
         yield "stick-slip", data, ("excitation", "one-way", "sign", "unrelated")
-    swing = 2.0 * np.exp(-0.1 * t) * np.cos(4 * t)
     count = 2 * np.pi / 4096
-    turned = Dataset.of(t=t, x=count * np.round(swing / count), units="rad, N m")
-    yield "free swing", turned, ()
-    yield (
-        "free swing without drive",
-        Dataset.of(t=t, x=count * np.round(swing / count), force=0 * t, units="rad, N m"),
-        ("constant",),
-    )
+    swing = count * np.round(2.0 * np.exp(-0.1 * t) * np.cos(4 * t) / count)
+    yield "free swing", Dataset.of(t=t, x=swing, units=turning), ()
+    data = Dataset.of(t=t, x=swing, force=0 * t, units=turning)
+    yield "free swing without drive", data, ("constant",)
 
 
 def test_motions() -> None:
@@ -136,11 +126,8 @@ def shaken(frequency: float, slow: float = 0.0, hum: float = 0.0) -> Dataset:
     return Dataset.of(t=t, x=noisy(x, 1e-9), force=noisy(force, 0.01))
 
 
-@pytest.mark.parametrize(("frequency", "slow"), [(8.0, 0.0), (8.0, 2.0), (20.0, 0.0)])
-def test_an_excitation_is_no_hum(frequency: float, slow: float) -> None:
-    assert "hum" not in shaken(frequency, slow).check().kinds
-
-
-def test_a_hum_beside_an_excitation_is_told() -> None:
+def test_an_excitation_is_no_hum_and_a_hum_beside_it_is_told() -> None:
+    for frequency, slow in ((8.0, 0.0), (8.0, 2.0), (20.0, 0.0)):
+        assert "hum" not in shaken(frequency, slow).check().kinds
     (hum,) = (f for f in shaken(20.0, hum=5.0).check() if f.kind == "hum")
     assert "49.9 Hz" in hum.sentence

@@ -85,10 +85,8 @@ def test_gaps_split_a_record_and_are_never_bridged() -> None:
     whole = np.delete(np.arange(200), slice(80, 130))
     data = Dataset.of(t=T[whole], x=np.sin(T[whole]), force=np.cos(T[whole]))
     pieces = data.resampled()
-    assert [(r.time[0], r.time[-1]) for r in pieces] == [
-        pytest.approx((0.0, 0.79)),
-        pytest.approx((1.30, 1.99)),
-    ]
+    ends = [(r.time[0], r.time[-1]) for r in pieces]
+    assert np.ravel(ends) == pytest.approx([0.0, 0.79, 1.30, 1.99])
     one_missing = np.delete(np.arange(200), 80)
     assert len(Dataset.of(t=T[one_missing], x=T[one_missing]).resampled(gap="refuse")) == 1
 

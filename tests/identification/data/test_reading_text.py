@@ -28,13 +28,6 @@ def read(folder: Path, content: str | bytes, name: str = "log.csv", **said: obje
     return Dataset.read(folder / name, **said)  # pyright: ignore[reportArgumentType]
 
 
-def same(data: Dataset) -> None:
-    record = data[0]
-    np.testing.assert_allclose(record.time, T, rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(record["x"], np.sin(T), rtol=1e-12)
-    np.testing.assert_allclose(record["force"], np.cos(T), rtol=1e-12)
-
-
 SEMICOLON = text(";".join(HEADER), ";", ",")
 DIALECTS = {
     "comma": text(",".join(HEADER)),
@@ -64,36 +57,38 @@ DIALECTS = {
     "trailing delimiter": text(",".join(HEADER)).replace("\n", ",\n"),
     "leading spaces": text("t_s x_m F_N", "   ").replace("\n", "\n   "),
 }
+ENCODER = text("clock [s],enc_3 [mm],u [N]", table=TABLE * np.array([1, 1e3, 1]))
+CALLS: dict[str, tuple[str | bytes, dict[str, object]]] = {
+    **{name: (content, {}) for name, content in DIALECTS.items()},
+    "units of the call": (text("time,x,force"), {"units": "m, N"}),
+    "units by channel": (text("time [s],x,force"), {"units": {"x": "m", "force": "N"}}),
+    "names of the call": (text("", " "), {"columns": ["t", "x", "force"], "units": "m, N"}),
+    "names with units": (text(""), {"columns": HEADER}),
+    "step of the call": (text("x [m],force [N]", table=TABLE[:, 1:]), {"step": 0.01}),
+    "columns by name": (ENCODER, {"columns": {"t": "clock", "x": "enc_3", "force": "u [N]"}}),
+}
 
 
-@pytest.mark.parametrize("name", DIALECTS)
-def test_dialects_give_the_same_record(tmp_path: Path, name: str) -> None:
-    same(read(tmp_path, DIALECTS[name]))
+@pytest.mark.parametrize("name", CALLS)
+def test_dialects_and_calls_give_the_same_record(tmp_path: Path, name: str) -> None:
+    content, said = CALLS[name]
+    record = read(tmp_path, content, **said)[0]
+    np.testing.assert_allclose(record.time, T, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(record["x"], np.sin(T), rtol=1e-12)
+    np.testing.assert_allclose(record["force"], np.cos(T), rtol=1e-12)
+    if name == "columns by name":
+        np.testing.assert_array_equal(record["enc_3"], record["x"])
 
 
-def test_units_come_from_the_call_where_the_file_has_none(tmp_path: Path) -> None:
-    same(read(tmp_path, text("time,x,force"), units="m, N"))
-    same(read(tmp_path, text("time [s],x,force"), units={"x": "m", "force": "N"}))
+def test_units_and_names_of_the_call(tmp_path: Path) -> None:
     data = read(tmp_path, text("time,angle,torque"), units="deg, N mm")
     np.testing.assert_allclose(data[0]["x"], np.sin(T) * np.pi / 180, rtol=1e-12)
     np.testing.assert_allclose(data[0]["force"], 1e-3 * np.cos(T), rtol=1e-12)
     assert data.rotary and data[0].unit("force") == "N m"
-
-
-def test_a_mapping_of_units_overrules_the_file_and_the_short_form_does_not(tmp_path: Path) -> None:
-    content = text("t [s],x [mm],force [N]")
+    content = text("t [s],x [mm],force [N]")  # a mapping overrules the file
     np.testing.assert_allclose(read(tmp_path, content, units={"x": "m"})[0]["x"], np.sin(T))
-
-
-def test_headerless_files_are_named_by_the_call(tmp_path: Path) -> None:
-    same(read(tmp_path, text("", " "), columns=["t", "x", "force"], units="m, N"))
-    same(read(tmp_path, text(""), columns=["t [s]", "x [m]", "force [N]"]))
     data = read(tmp_path, text("", ";", ","), columns=["t", "-", "force"], units="m, N")
     assert list(data[0].signals) == ["force"]
-
-
-def test_time_comes_from_the_step_where_there_is_none(tmp_path: Path) -> None:
-    same(read(tmp_path, text("x [m],force [N]", table=TABLE[:, 1:]), step=0.01))
 
 
 def test_points_need_no_time(tmp_path: Path) -> None:
@@ -101,13 +96,6 @@ def test_points_need_no_time(tmp_path: Path) -> None:
     assert record.t is None
     np.testing.assert_allclose(record["v"], np.array([1, 3]) * np.pi / 30)
     np.testing.assert_array_equal(record["F"], [2, 5])
-
-
-def test_columns_are_found_by_the_names_of_the_call(tmp_path: Path) -> None:
-    content = text("clock [s],enc_3 [mm],u [N]", table=TABLE * np.array([1, 1e3, 1]))
-    data = read(tmp_path, content, columns={"t": "clock", "x": "enc_3", "force": "u [N]"})
-    same(data)
-    np.testing.assert_array_equal(data[0]["enc_3"], data[0]["x"])
 
 
 def test_other_columns_keep_their_names_and_text_is_left_out_with_its_reason(

@@ -1,7 +1,6 @@
 """Linear regression on EMPS and known motions; position and velocity as one velocity."""
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,33 +16,21 @@ from identification.data.differentiate import (
 from identification.data.filters import Filter, Velocity, lowpass
 from identification.data.record import Record
 from identification.data.synthetic import synthetic_drive_data
-from symfric import law_from_text
-from symfric.foundation.parameters import with_values
-from symfric.laws import Coulomb
+from symfric.laws import Coulomb, Sum, Viscous
 
 PUBLISHED = {
-    "m": (95.1089, 0.1085),
-    "F_v": (203.5034, 1.1460),
-    "F_c": (20.3935, 0.1012),
+    "m": (95.1089, 0.1085), "F_v": (203.5034, 1.1460), "F_c": (20.3935, 0.1012),
     "offset": (-3.1648, 0.0444),
-}
+}  # fmt: skip
 DIRECTIONS = {
-    "m": (95.154, 0.083),
-    "F_v_pos": (166.71, 1.23),
-    "F_c_pos": (20.144, 0.109),
-    "F_v_neg": (240.42, 1.23),
-    "F_c_neg": (20.628, 0.109),
-}
-
-
-EMPS = Path(__file__).resolve().parents[4] / "shared" / "data" / "EMPS" / "DATA_EMPS.mat"
+    "m": (95.154, 0.083), "F_v_pos": (166.71, 1.23), "F_c_pos": (20.144, 0.109),
+    "F_v_neg": (240.42, 1.23), "F_c_neg": (20.628, 0.109),
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
-def emps() -> Record:
-    if not EMPS.is_file():
-        pytest.skip("the EMPS record is not on this machine (../shared/data/EMPS)")
-    return Dataset.read(EMPS).records[0]
+def emps(emps_files: Dataset) -> Record:
+    return emps_files[0]
 
 
 def published_procedure(data: Record) -> tuple[np.ndarray, np.ndarray, float]:
@@ -80,25 +67,20 @@ def test_emps_within_a_published_standard_error(
     assert found.force_relative == pytest.approx(3.112 if directions else 4.083, rel=0.06)
 
 
-def smooth_motion() -> LinearFit:
-    t = np.arange(20_000) * 1e-3
-    w1, w2 = 2 * np.pi * 0.7, 2 * np.pi * 0.31
-    x = 0.1 * np.sin(w1 * t) + 0.2 * np.cos(w2 * t)
-    v = 0.1 * w1 * np.cos(w1 * t) - 0.2 * w2 * np.sin(w2 * t)
-    a = -0.1 * w1**2 * np.sin(w1 * t) - 0.2 * w2**2 * np.cos(w2 * t)
-    force = 3 * a + 11 * v + 7 * np.sign(v) - 2
-    return linear_regression(differentiate(drive_record(t, x, force), Filter(100.0, 10)))
-
-
-def drive_record(t: np.ndarray, x: np.ndarray, force: np.ndarray) -> Record:
-    return Record("motion", t, {"x": x, "force": force}, {"x": "m", "force": "N"})
+def regression(x: np.ndarray, force: np.ndarray, filter: Filter, *more: Record) -> LinearFit:
+    units = {"x": "m", "force": "N"}
+    record = Record("motion", 1e-3 * np.arange(x.size), {"x": x, "force": force}, units)
+    return linear_regression([differentiate(r, filter) for r in (record, *more)])
 
 
 def test_parameters_of_a_known_motion_come_back() -> None:
-    found = smooth_motion()
+    t, w1, w2 = np.arange(20_000) * 1e-3, 2 * np.pi * 0.7, 2 * np.pi * 0.31
+    x = 0.1 * np.sin(w1 * t) + 0.2 * np.cos(w2 * t)
+    v = 0.1 * w1 * np.cos(w1 * t) - 0.2 * w2 * np.sin(w2 * t)
+    a = -0.1 * w1**2 * np.sin(w1 * t) - 0.2 * w2**2 * np.cos(w2 * t)
+    found = regression(x, 3 * a + 11 * v + 7 * np.sign(v) - 2, Filter(100.0, 10))
     expected = {"m": 3.0, "F_v": 11.0, "F_c": 7.0, "offset": -2.0}
-    for name, value in expected.items():
-        assert found.values[name] == pytest.approx(value, rel=1e-4), name
+    assert found.values == pytest.approx(expected, rel=1e-4)
 
 
 def test_equations_at_reversals_would_bend_the_mass() -> None:
@@ -116,25 +98,16 @@ def test_equations_at_reversals_would_bend_the_mass() -> None:
 
 def test_two_records_are_one_regression() -> None:
     t = np.arange(4_000) * 1e-3
-    signals = [
-        differentiate(drive_record(t, np.sin(w * t), -2 * w**2 * np.sin(w * t)), Filter(50.0, 5))
-        for w in (3.0, 7.0)
-    ]
-    both = linear_regression(signals)
+    slow = Dataset.of(t=t, x=np.sin(3 * t), force=-18 * np.sin(3 * t))[0]
+    both = regression(np.sin(7 * t), -98 * np.sin(7 * t), Filter(50.0, 5), slow)
     assert both.values["m"] == pytest.approx(2.0, rel=1e-3)
-    with pytest.raises(KeyError):
-        both.values["F_v_pos"]
 
 
 def test_one_direction_tells_no_coulomb_force_from_the_offset() -> None:
     t = np.arange(5_000) * 1e-3
-    x = t + 0.02 * np.sin(9 * t)
-    found = linear_regression(
-        differentiate(drive_record(t, x, 5 + np.cos(9 * t)), Filter(100.0, 10))
-    )
-    assert found.standard_errors["F_c"] is None
-    assert found.standard_errors["offset"] is None
-    assert found.standard_errors["m"] is not None
+    found = regression(t + 0.02 * np.sin(9 * t), 5 + np.cos(9 * t), Filter(100.0, 10))
+    unknown = {n for n, error in found.standard_errors.items() if error is None}
+    assert unknown == {"F_c", "offset"}
     assert found.values["F_c"] == pytest.approx(found.values["offset"], rel=1e-6)
 
 
@@ -213,24 +186,22 @@ def test_velocity_alone() -> None:
 
 
 @cache
-def masses(position: float, velocity: float | None, seeds: int = 8) -> tuple[Array, float]:
+def silent() -> Record:
+    law = Sum((Coulomb(mu_d=20.0, v_eps=1e-4), Viscous(sigma_2=200.0)))
+    return synthetic_drive_data(law, force_noise=0.0, position_noise=0.0)[0]
+
+
+@cache
+def masses(position: float, velocity: float | None, seeds: int = 6) -> tuple[Array, float]:
     """Estimates of a mass of 95 kg, and their standard error."""
-    law = with_values(
-        law_from_text("coulomb+viscous"), {"mu_d": 20.0, "sigma_2": 200.0, "v_eps": 1e-4}
-    )
-    clean = synthetic_drive_data(law, force_noise=0.0, position_noise=0.0)[0]
-    rate = np.gradient(clean["x"], clean.step)
-    found: list[float] = []
-    errors: list[float] = []
+    clean, rate = silent(), np.gradient(silent()["x"], silent().step)
+    found, errors = list[float](), list[float]()
     for seed in range(seeds):
-        random = np.random.default_rng(seed)
-        x, force, v = random.standard_normal((3, clean.size))
+        x, force, v = np.random.default_rng(seed).standard_normal((3, clean.size))
         signals = {"x": clean["x"] + position * x, "force": clean["force"] + 0.5 * force}
         if velocity is not None:
             signals["v"] = rate + velocity * v
-        units = {"x": "m", "force": "N", "v": "m/s"}
-        record = Record("drive", clean.t, signals, {n: units[n] for n in signals})
-        fit = linear_regression(differentiate(record))
+        fit = linear_regression(differentiate(Dataset.of(signals, t=clean.t)[0]))
         found.append(fit.values["m"])
         errors.append(fit.standard_errors["m"] or 0.0)
     return np.array(found), float(np.mean(errors))

@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -16,13 +18,15 @@ def test_reference_returns_and_reaches_its_speeds() -> None:
 
 
 def test_drive_follows_its_reference() -> None:
-    record = synthetic_drive_data(speeds=(0.02, 0.05))[0]
+    record = synthetic_drive_data(speeds=(0.02,), dwell=0.2)[0]
     error = record["x"] - record.loop.reference
     assert np.abs(error).max() < 0.2 * np.ptp(record["x"])
 
 
 def test_a_turning_drive_has_the_same_numbers() -> None:
-    slides, turns = (synthetic_drive_data(speeds=(0.02,), turning=turns) for turns in (False, True))
+    slides, turns = (
+        synthetic_drive_data(speeds=(0.02,), dwell=0.1, turning=turns) for turns in (False, True)
+    )
     np.testing.assert_array_equal(slides[0]["x"], turns[0]["x"])
     assert (turns[0].unit("x"), turns[0].unit("force")) == ("rad", "N m")
     assert turns.rotary and not slides.rotary
@@ -30,17 +34,18 @@ def test_a_turning_drive_has_the_same_numbers() -> None:
 
 def test_noise_is_seeded_and_of_the_size_asked_for() -> None:
     def record(seed: int, noise: float = 0.5) -> np.ndarray:
-        return synthetic_drive_data(speeds=(0.05,), seed=seed, force_noise=noise)[0]["force"]
+        short: Any = {"speeds": (0.05,), "dwell": 0.2, "ramp": 0.1}
+        return synthetic_drive_data(seed=seed, force_noise=noise, **short)[0]["force"]
 
     np.testing.assert_array_equal(record(3), record(3))
     difference = record(3) - record(3, 0.0)
-    assert difference.std() == pytest.approx(0.5, rel=0.05)
+    assert difference.std() == pytest.approx(0.5, rel=0.1)
     assert np.abs(record(3) - record(4)).max() > 0.5
 
 
 def test_forces_of_a_sensor_are_means_of_commands() -> None:
     sensor, command = (
-        synthetic_drive_data(speeds=(0.05,), force_noise=0.0, force=force)[0]["force"]
+        synthetic_drive_data(speeds=(0.05,), dwell=0.1, force_noise=0.0, force=force)[0]["force"]
         for force in ("sensor", "command")
     )
     np.testing.assert_array_equal(sensor[1:], (command[1:] + command[:-1]) / 2)
@@ -65,9 +70,8 @@ def test_motion_is_that_of_the_recorded_command(law: str) -> None:
 
 def test_controller_sees_the_motion() -> None:
     """The command is that of `PositionLoop` for the recorded positions."""
-    record = synthetic_drive_data(
-        speeds=(0.05,), force="command", position_noise=0.0, force_noise=0.0
-    )[0]
+    quiet: Any = {"position_noise": 0.0, "force_noise": 0.0}
+    record = synthetic_drive_data(speeds=(0.05,), dwell=0.1, force="command", **quiet)[0]
     loop, x = record.loop, record["x"]
     mean = (x + np.append(0.0, x[:-1])) / 2
     rate = np.diff(mean, prepend=0.0) / record.step

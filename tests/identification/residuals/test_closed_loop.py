@@ -14,7 +14,7 @@ from identification.solving.descent import descend
 from identification.solving.task import task
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
-from symfric import Coulomb, Stribeck, Sum, Viscous
+from symfric import Coulomb, Sum, Viscous
 from symfric.scenes import Drive
 
 N, STEP = 1500, 1e-3
@@ -121,20 +121,17 @@ def test_a_fit_finds_the_drive_of_the_other_simulation(rows: LoopRows, drive: Su
 
 
 def test_a_controller_of_ones_own_is_the_same_loop(data: Dataset, drive: Subject) -> None:
-    s, x, r = ca.SX.sym("s", 2), ca.SX.sym("x"), ca.SX.sym("r")
+    s, x, r, xv = (ca.SX.sym(name, n) for name, n in (("s", 2), ("x", 1), ("r", 1), ("xv", 2)))
     mean = (x + s[0]) / 2
     command = LOOP.kp * LOOP.kv * (r - x) - LOOP.kv * (mean - s[1]) / STEP
     command = ca.fmin(ca.fmax(command, -LOOP.limit), LOOP.limit)
     step = ca.Function("mine", [s, x, r], [ca.vertcat(x, mean), command])
-    xv = ca.SX.sym("xv", 2)
     before = ca.vertcat(xv[0] - STEP * xv[1], xv[0] - 1.5 * STEP * xv[1])
     start = ca.Function("start", [xv], [before])
     controller = Controller(step, ("goal",), "pulse", gain=LOOP.gain, start=start)
     signals = {**data[0].signals, "goal": REFERENCE, "pulse": PULSE}
-    units = {**data[0].units, "goal": "m", "pulse": "1"}
-    mine = Dataset((Record("mine", T, signals, units),), "mine")
-    rows = ClosedLoop(controller).prepare(drive, mine)
-    known = ClosedLoop().prepare(drive, data)
+    mine = Dataset((Record("mine", T, signals, {**data[0].units, "goal": "m", "pulse": "1"}),))
+    rows, known = ClosedLoop(controller).prepare(drive, mine), ClosedLoop().prepare(drive, data)
     found, other = (evaluated(r, of(TRUE, r.names)) for r in (rows, known))
     np.testing.assert_allclose(found.r, other.r, atol=1e-12)
     np.testing.assert_allclose(found.J, other.J, atol=1e-9)
@@ -146,13 +143,8 @@ def test_residuals_go_to_other_processes(rows: LoopRows) -> None:
     np.testing.assert_array_equal(one.J, two.J)
 
 
-def test_a_motion_that_is_not_finite_is_said(data: Dataset) -> None:
-    machine = subject(Drive(Stribeck(mu_s=22.0, mu_d=20.0), m=95.0, N=1.0))
-    rows = ClosedLoop().prepare(machine, data)
-    values = np.full(len(rows.names), np.nan)
-    found = rows.at(values)
-    assert isinstance(found, str)
-    assert found.startswith("data 'hand': ")
+def test_a_motion_that_is_not_finite_is_said(rows: LoopRows) -> None:
+    assert rows.at(np.full(len(rows.names), np.nan)).startswith("data 'hand': ")
 
 
 def test_every_record_has_its_own_start(data: Dataset, drive: Subject) -> None:

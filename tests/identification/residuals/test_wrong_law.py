@@ -13,18 +13,14 @@ from symfric.foundation.status import Status
 from symfric.scenes import Drive
 
 
-def test_the_law_that_made_the_data_is_believed() -> None:
-    data = synthetic_drive_data(speeds=(0.01, 0.05), force="command")
+def test_the_law_that_made_the_data_is_believed_and_another_one_is_not() -> None:
+    data = synthetic_drive_data(speeds=(0.01, 0.05), dwell=0.4, force="command")
     fit = Fit(ClosedLoop(), "stribeck", data, starts=1, fixed={"v_eps": 1e-4}).solve()
     mass = fit.parameters["m"]
     assert fit.status is Status.SOLVED
     assert abs(mass.value - 95.0) < mass.standard_error < 0.02
-
-
-def test_another_law_is_doubtful() -> None:
-    data = synthetic_drive_data(speeds=(0.01, 0.05), force="command")
-    fit = Fit(ClosedLoop(), "coulomb+viscous", data, starts=1).solve(throw=False)
-    assert fit.status is Status.DOUBTFUL
+    other = Fit(ClosedLoop(), "coulomb+viscous", data, starts=1).solve(throw=False)
+    assert other.status is Status.DOUBTFUL
 
 
 @pytest.mark.slow

@@ -38,11 +38,7 @@ def test_what_is_held_says_why_and_what_belongs_to_records_is_apart(good: Fitted
     held = {n: e for n, e in good.parameters.items() if e.fixed}
     assert held.keys() == {"delta", "v_eps"}
     assert all(e.note and e.low is None for e in held.values())
-    assert [n for n, e in good.parameters.items() if e.nuisance] == [
-        "bias[0]",
-        "bias[1]",
-        "bias[2]",
-    ]
+    assert [n for n, e in good.parameters.items() if e.nuisance] == [f"bias[{k}]" for k in range(3)]
     assert good.values["delta"] == 2.0
     assert len(good.names) == 7
     assert good.correlation.shape == (7, 7)
@@ -64,15 +60,11 @@ def test_law_and_model_hold_the_numbers(good: Fitted) -> None:
 def test_errors_are_those_of_the_residuals(good: Fitted) -> None:
     r = good.live.point.evaluation.r
     for k in range(3):
-        e = good.errors[f"run {k + 1}", "force"]
-        mine = r[1500 * k : 1500 * (k + 1)]
-        measured = record(k + 1)[0]["force"]
-        assert e.rms == pytest.approx(float(np.sqrt(np.mean(mine**2))))
-        assert e.relative == pytest.approx(
-            100 * float(np.linalg.norm(mine) / np.linalg.norm(measured))
-        )
-        assert e.largest == np.abs(mine).max()
-        assert (e.rows, e.unit) == (1500, "N")
+        e, mine = good.errors[f"run {k + 1}", "force"], r[1500 * k : 1500 * (k + 1)]
+        size = np.linalg.norm(record(k + 1)[0]["force"])
+        assert e.rms == pytest.approx(np.sqrt(np.mean(mine**2)))
+        assert e.relative == pytest.approx(100 * np.linalg.norm(mine) / size)
+        assert (e.largest, e.rows, e.unit) == (np.abs(mine).max(), 1500, "N")
         assert e.effective > 1000
 
 
@@ -102,10 +94,8 @@ def test_the_text_fits_80_columns_and_holds_every_number(good: Fitted, wrong: Fi
         text = text_of(fit)
         assert max(map(len, text.splitlines())) <= 80
         for name, e in fit.parameters.items():
-            assert any(
-                line.split()[:2] == [name, rounded(e.value, e.standard_error)]
-                for line in text.splitlines()
-            )
+            row = [name, rounded(e.value, e.standard_error)]
+            assert any(line.split()[:2] == row for line in text.splitlines())
 
 
 def test_what_is_not_told_has_no_interval() -> None:
@@ -114,17 +104,10 @@ def test_what_is_not_told_has_no_interval() -> None:
     assert percent(e.relative_error) == "> 10000 %"
 
 
-@pytest.mark.parametrize(
-    ("value", "error", "text"),
-    [
-        (95.10893, 0.1085, "95.11"),
-        (0.00123456, 3e-6, "0.0012346"),
-        (27.9, 300.0, "28"),
-        (-1234.567, 0.5, "-1234.57"),
-        (0.0, 0.1, "0"),
-        (2.0, None, "2"),
-    ],
-)
+@pytest.mark.parametrize(("value", "error", "text"), [
+    (95.10893, 0.1085, "95.11"), (0.00123456, 3e-6, "0.0012346"), (27.9, 300.0, "28"),
+    (-1234.567, 0.5, "-1234.57"), (0.0, 0.1, "0"), (2.0, None, "2"),
+])  # fmt: skip
 def test_numbers_have_the_digits_that_their_error_leaves(
     value: float, error: float | None, text: str
 ) -> None:

@@ -47,12 +47,9 @@ def test_the_page_has_every_part_and_needs_nothing_from_elsewhere(fit: Fitted) -
     assert "http" not in page
     assert page.count("&lt;img src=x") == 3
     assert "Stribeck(mu_s=" in page
-
-
-def test_tables_have_captions_and_heads(fit: Fitted) -> None:
-    found = tags(page := page_of(fit))
+    found = tags(plain := page_of(fit))
     assert found.count("caption") == found.count("table") == found.count("thead")
-    assert "Ranking of laws" not in page
+    assert "Ranking of laws" not in plain
 
 
 def test_errors_in_the_data_stand_first() -> None:

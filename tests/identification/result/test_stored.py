@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from fits import make
 
+import symfric as sf
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
@@ -20,21 +21,7 @@ from identification.result.page import page_of
 from identification.result.series import Error, Errors, Line
 from identification.result.stored import from_data, plain, revived
 from identification.unknowns.spec import above, linear, log, tied
-from symfric import (
-    ALL_LAWS,
-    GMS,
-    Asymmetric,
-    Coulomb,
-    Element,
-    Law,
-    Linear,
-    LuGre,
-    Stribeck,
-    Sum,
-    Table,
-    Viscous,
-    rabinowicz,
-)
+from symfric import LuGre
 from symfric.foundation.parameters import parameters, with_values
 from symfric.laws.catalogue import law_from_text
 from symfric.scenes import Drive, Rabinowicz
@@ -87,7 +74,7 @@ def test_a_damaged_part_is_refused(key: str, file: Path) -> None:
 
 
 def test_a_fit_of_another_machine_is_stored_with_its_law(fit: Fitted, tmp_path: Path) -> None:
-    other = replace(fit, machine=Rabinowicz(Stribeck()), live=None)
+    other = replace(fit, machine=Rabinowicz(sf.Stribeck()), live=None)
     other.to_json(tmp_path / "other.json")
     back = Fitted.from_json(tmp_path / "other.json")
     assert back.machine is None
@@ -111,21 +98,21 @@ def test_numbers_keep_all_digits_also_where_json_has_none() -> None:
     assert isnan(back.effective)
     line = revived(Line, plain(Line(np.array([1 / 3, nan, -inf]), np.zeros(0))))
     np.testing.assert_array_equal(line.t, [0.333333, nan, -inf])  # lines are only drawn
-    for bad in (object(), with_values(Stribeck(), {"mu_s": ca.SX.sym("mu")})):
+    for bad in (object(), with_values(sf.Stribeck(), {"mu_s": ca.SX.sym("mu")})):
         with pytest.raises(TypeError, match="expected plain data, got"):
             plain(bad)
 
 
-LAWS: list[Law | Drive] = [
-    *(kind() for kind in ALL_LAWS.values()),
-    GMS(elements=tuple(Element(1e4 * k, 0.1 * k) for k in range(1, 11)), form="event"),
-    Asymmetric(Stribeck(mu_s=0.3), Stribeck(mu_s=0.2)),
-    Sum((Coulomb(mu_d=0.123456789012345), Viscous(sigma_2=1e-17))),
+LAWS: list[sf.Law | Drive] = [
+    *(kind() for kind in sf.ALL_LAWS.values()),
+    sf.GMS(elements=tuple(sf.Element(1e4 * k, 0.1 * k) for k in range(1, 11)), form="event"),
+    sf.Asymmetric(sf.Stribeck(mu_s=0.3), sf.Stribeck(mu_s=0.2)),
+    sf.Sum((sf.Coulomb(mu_d=0.123456789012345), sf.Viscous(sigma_2=1e-17))),
     law_from_text("lagged(stribeck)"),
     law_from_text("load_dependent(lugre)"),
     law_from_text("temperature_dependent(coulomb+viscous)"),
-    Table(speeds=(0.0, 0.1, 0.3), coefficients=(0.3, 0.2, 0.25)),
-    Drive(GMS(elements=(Element(3e4, 0.5),) * 3), m=3.0, N=1.0, offset=-2.0, turning=True),
+    sf.Table(speeds=(0.0, 0.1, 0.3), coefficients=(0.3, 0.2, 0.25)),
+    Drive(sf.GMS(elements=(sf.Element(3e4, 0.5),) * 3), m=3.0, N=1.0, offset=-2.0, turning=True),
 ]
 
 
@@ -139,8 +126,8 @@ def test_every_law_comes_back_bit_for_bit() -> None:
 
 
 def test_a_law_of_ones_own_comes_back_where_its_class_is_given() -> None:
-    Mine = type("Mine", (Coulomb,), {})
-    data = plain(Sum((Mine(mu_d=0.25), Viscous())))
+    Mine = type("Mine", (sf.Coulomb,), {})
+    data = plain(sf.Sum((Mine(mu_d=0.25), sf.Viscous())))
     with pytest.raises(ValueError, match="Mine"):
         from_data(data)
     back = from_data(data, {"Mine": Mine})
@@ -171,9 +158,9 @@ def test_what_is_written_is_what_was_called(text: str) -> None:
 
 
 def test_arrays_models_and_functions_are_written_in_short() -> None:
-    kind = Shooting(inputs={"force": Linear(np.arange(50.0), np.zeros(50))})
+    kind = Shooting(inputs={"force": sf.Linear(np.arange(50.0), np.zeros(50))})
     assert written(kind) == "Shooting(inputs={'force': Linear(..., ...)})"
-    whole = written(Fit(InverseDynamics(), rabinowicz(LuGre()), DATA))
+    whole = written(Fit(InverseDynamics(), sf.rabinowicz(LuGre()), DATA))
     assert whole.startswith("Fit(InverseDynamics(), rabinowicz, data")
     assert "tied(<lambda>)" in written({"m": tied(lambda p: p["a"])})
     assert eval(written(LuGre(sigma_0=3e4)), {"LuGre": LuGre}).sigma_0 == 3e4

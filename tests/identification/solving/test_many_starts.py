@@ -1,8 +1,10 @@
 """Weighted least squares from many starts against closed forms, counts and other processes."""
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from identification.residuals.evaluation import Channel, Evaluation
-from identification.solving.descent import descend
+from identification.solving.descent import Start, descend
 from identification.solving.many_starts import best_of, is_white, many_starts
 from identification.solving.task import THRESHOLD, Task, objective, shaped, task, triangle
 from identification.unknowns.spec import Unknown
@@ -89,6 +91,15 @@ def starts(at: Task, count: int = 6) -> list[Array]:
     return [first, *(first + rng.uniform(-2, 2, 3) for _ in range(count - 1))]
 
 
+def down(at: Task, **how: Any) -> Start:
+    return descend(at, at.unknowns.start, **how)
+
+
+def made(names: tuple[str, ...], channel: Channel, at: Callable[..., object]) -> Any:
+    """Residuals of a function."""
+    return SimpleNamespace(names=names, own=(), channels=(channel,), at=at)
+
+
 def test_the_triangle_has_the_cost_and_the_normal_equations_of_all_rows() -> None:
     rng = np.random.default_rng(0)
     for rows, k in ((5000, 7), (3, 7), (900, 60)):
@@ -134,34 +145,27 @@ def test_one_signal_is_fitted_as_by_linear_algebra_at_its_minimum() -> None:
 
 
 def test_a_noisy_signal_never_makes_the_estimate_worse() -> None:
-    alone, both = np.zeros((2, 20, 3))
-    for seed in range(20):
+    alone, both = np.zeros((2, 12, 3))
+    for seed in range(12):
         one, two = decay(seed), decay(seed, other=3.0)
         two.y = one.y
         for found, data in ((alone, one), (both, two)):
             at = problem(data)
-            found[seed] = at.unknowns.values(descend(at, at.unknowns.start).w) - TRUTH
+            found[seed] = at.unknowns.values(down(at).w) - TRUTH
     worse = np.sqrt((both**2).mean(axis=0) / (alone**2).mean(axis=0))
     assert worse.max() < 1.1
 
 
-def test_noise_levels_of_signals_are_those_of_the_data() -> None:
-    at = problem(decay(other=1.0))
-    noise = descend(at, at.unknowns.start).noise
-    assert noise["y"] == pytest.approx(0.01, rel=0.1)
-    assert noise["z"] == pytest.approx(1.0, rel=0.1)
-
-
-def test_given_noise_is_kept_and_the_rest_estimated() -> None:
-    at = problem(decay(other=1.0), noise={"z": 0.5})
-    end = descend(at, at.unknowns.start)
-    assert end.noise["z"] == 0.5
-    assert end.noise["y"] == pytest.approx(0.01, rel=0.1)
+@pytest.mark.parametrize(("given", "z"), [("estimate", 1.0), ({"z": 0.5}, 0.5)])
+def test_noise_levels_are_given_or_those_of_the_data(given: object, z: float) -> None:
+    end = down(problem(decay(other=1.0), noise=given))
+    assert end.noise == pytest.approx({"y": 0.01, "z": z}, rel=0.1)
+    assert end.noise["z"] == 0.5 or given == "estimate"
 
 
 def test_data_without_noise_are_fitted_to_rounding() -> None:
     at = problem(decay(noise=0.0))
-    end = descend(at, at.unknowns.start)
+    end = down(at)
     assert end.status is Status.SOLVED
     assert at.unknowns.values(end.w) == pytest.approx(TRUTH, rel=1e-7)
 
@@ -172,9 +176,9 @@ def test_outliers_hardly_move_a_robust_fit() -> None:
     errors = {}
     for loss in ("squares", "huber", "cauchy"):
         at = problem(data, loss=loss)
-        errors[loss] = np.abs(at.unknowns.values(descend(at, at.unknowns.start).w) - TRUTH).max()
+        errors[loss] = np.abs(at.unknowns.values(down(at).w) - TRUTH).max()
         if loss != "squares":
-            assert descend(at, at.unknowns.start).noise["y"] == pytest.approx(0.01, rel=0.2)
+            assert down(at).noise["y"] == pytest.approx(0.01, rel=0.2)
     assert errors["huber"] < errors["squares"] / 5
     assert errors["cauchy"] < errors["squares"] / 5
 
@@ -200,7 +204,7 @@ def test_a_start_without_residuals_is_said_and_others_go_on() -> None:
 def test_evaluations_are_counted_and_limited() -> None:
     data = decay()
     at = problem(data)
-    end = descend(at, at.unknowns.start, evaluations=3)
+    end = down(at, evaluations=3)
     assert end.status is Status.MAX_ITERATIONS
     assert end.evaluations == data.calls == 3
     (more,) = many_starts(at, [at.unknowns.start], evaluations=3)
@@ -253,12 +257,10 @@ def test_a_worker_that_dies_is_said() -> None:
 
 
 def test_white_residuals_end_the_starts_and_wrong_models_go_on() -> None:
-    at = problem(decay())
-    assert len(many_starts(at, starts(at))) == 1
-    wrong = decay()
-    wrong.y += 0.1 * np.sin(wrong.t)
-    at = problem(wrong)
-    assert len(many_starts(at, starts(at))) == 3
+    for wave, count in ((0.0, 1), (0.1, 3)):
+        data = decay()
+        data.y += wave * np.sin(data.t)
+        assert len(many_starts(problem(data), starts(problem(data)))) == count
 
 
 def test_residuals_that_exist_only_at_the_start_end_there(recwarn: pytest.WarningsRecorder) -> None:
@@ -267,61 +269,39 @@ def test_residuals_that_exist_only_at_the_start_end_there(recwarn: pytest.Warnin
     first = at.unknowns.start
     data.limit = float(at.unknowns.values(first)[1])  # every trial with a larger b fails
 
-    class Alone:
-        """Residuals at one place."""
+    calls = list[Array]()
 
-        names, own, channels = data.names, data.own, data.channels
-        calls = 0
+    def alone(values: Array) -> object:
+        calls.append(values)
+        here = np.array_equal(values, at.unknowns.values(first))
+        return data.at(values) if here else "nothing here"
 
-        def at(self, values: Array) -> Evaluation | str:
-            self.calls += 1
-            here = np.array_equal(values, at.unknowns.values(first))
-            return data.at(values) if here else "nothing here"
-
-    alone = Alone()
-    end = descend(task(alone, at.unknowns), first)
+    end = descend(task(made(data.names, data.channels[0], alone), at.unknowns), first)
     assert end.status is Status.NO_DESCENT and "nothing here" in end.message
-    assert alone.calls < 80
+    assert len(calls) < 80
     assert not recwarn.list
 
 
-@dataclass(eq=False)
-class Rigid:
-    """Residuals of 1 - 1 / k, of data that lie a little above one: the stiffer the better."""
-
-    y: Array
-
-    names: ClassVar[tuple[str, ...]] = ("k",)
-    own: ClassVar[tuple[Unknown, ...]] = ()
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        n = self.y.size
-        return (Channel(0, "x", "m", slice(0, n), 0.1 * np.arange(n), self.y, {}),)
-
-    def at(self, values: Array) -> Evaluation | str:
-        (k,) = values
-        return Evaluation(1 - 1 / k - self.y, np.full((self.y.size, 1), 1 / k**2))
-
-
 def test_a_value_that_drifts_off_ends_at_a_number_one_can_read() -> None:
-    data: Any = Rigid(1.002 + 0.01 * np.random.default_rng(1).standard_normal(200))
+    """1 - 1 / k of data that lie a little above one: the stiffer the better."""
+    y = 1.002 + 0.01 * np.random.default_rng(1).standard_normal(200)
+    channel = Channel(0, "x", "m", slice(0, 200), 0.1 * np.arange(200), y, {})
+    data = made(
+        ("k",), channel, lambda v: Evaluation(1 - 1 / v[0] - y, np.full((200, 1), v[0] ** -2.0))
+    )
     for upper, end in ((np.inf, 2e12), (1e10, 1e10)):
         k = Unknown("k", "1", 2.0, lower=0.0, upper=upper, logarithmic=True)
-        made = task(data, unknowns_of((k,), {}, data.names))
-        found = descend(made, made.unknowns.of({"k": 1e14}) + 300.0)
+        box = unknowns_of((k,), {}, data.names)
+        found = descend(task(data, box), box.of({"k": 1e14}) + 300.0)
         assert found.status is Status.SOLVED
-        assert made.unknowns.values(found.w)[0] == pytest.approx(end, rel=1e-5)
-        assert made.unknowns.values(found.w)[0] < upper
-        assert made.unknowns.at_bound(found.w).all()
+        assert box.values(found.w)[0] == pytest.approx(end, rel=1e-5)
+        assert box.values(found.w)[0] < upper
+        assert box.at_bound(found.w).all()
 
 
 def test_noise_levels_count_what_the_fit_has_taken() -> None:
     """Nine samples and three unknowns: without it the mean variance would be two thirds."""
-    found = list[float]()
-    for seed in range(60):
-        at = problem(decay(seed, n=9))
-        found.append(descend(at, at.unknowns.start).noise["y"])
+    found = [down(problem(decay(seed, n=9))).noise["y"] for seed in range(60)]
     assert np.mean(np.square(found)) == pytest.approx(1e-4, rel=0.15)
 
 
@@ -339,38 +319,29 @@ def test_noise_that_skips_its_neighbours_is_not_white() -> None:
         data, e = decay(), np.random.default_rng(1).standard_normal(410)
         data.y = data.y + 0.05 * (e[:400] + e[lag : 400 + lag])
         at = problem(data)
-        point = at.at(descend(at, at.unknowns.start).w)
+        point = at.at(down(at).w)
         assert not is_white(at, point)
 
 
 def test_at_a_bound_nothing_is_left_to_gain() -> None:
     box = [UNKNOWNS[0], UNKNOWNS[1], Unknown("c", "m", 0.0, -1.0, 0.2)]
     at = task(decay(), unknowns_of(box, {}, Decay.names))  # pyright: ignore[reportArgumentType]
-    end = descend(at, at.unknowns.start)
+    end = down(at)
     assert end.status is Status.SOLVED
     assert at.unknowns.at_bound(end.w).tolist() == [False, False, True]
 
 
-@dataclass(eq=False)
-class Wells:
-    """(p^2 - 1, p - 1) over twenty times, with a wave that nothing explains: minima near -1, 1."""
-
-    names: ClassVar[tuple[str, ...]] = ("p",)
-    own: ClassVar[tuple[Unknown, ...]] = ()
-    wave: ClassVar[Array] = 0.3 * np.sin(np.arange(40.0))
-    channels: ClassVar[tuple[Channel, ...]] = (
-        Channel(0, "y", "m", slice(0, 40), np.arange(40.0), wave, {}),
-    )
-
-    def at(self, values: Array) -> Evaluation | str:
-        (p,) = values
-        first, one = np.arange(40) < 20, np.ones(40)
-        r = np.where(first, p**2 - 1, 0.2 * (p - 1)) - self.wave
-        return Evaluation(r, np.where(first, 2 * p * one, 0.2 * one)[:, None])
-
-
 def test_only_starts_that_end_in_the_lowest_minimum_agree() -> None:
-    at = task(Wells(), unknowns_of([Unknown("p", "m", 2.0)], {}, ("p",)), {"y": 0.1})  # pyright: ignore[reportArgumentType]
+    """(p^2 - 1, p - 1) over twenty times, with a wave that nothing explains: minima near -1, 1."""
+    t, wave = np.arange(40.0), 0.3 * np.sin(np.arange(40.0))
+
+    def wells(values: Array) -> Evaluation:
+        (p,), first = values, t < 20
+        r = np.where(first, p**2 - 1, 0.2 * (p - 1)) - wave
+        return Evaluation(r, np.where(first, 2 * p, 0.2)[:, None])
+
+    data = made(("p",), Channel(0, "y", "m", slice(0, 40), t, wave, {}), wells)
+    at = task(data, unknowns_of([Unknown("p", "m", 2.0)], {}, ("p",)), {"y": 0.1})
     done = many_starts(at, [np.array([p]) for p in (-2.0, 2.0, -2.0, 2.0, 2.0, 2.0)])
     assert [s.status for s in done] == [Status.SOLVED] * 5
     assert [bool(s.w[0] > 0) for s in done] == [False, True, False, True, True]

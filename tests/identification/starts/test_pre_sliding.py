@@ -25,19 +25,12 @@ def test_turning_points_ignore_what_is_within_the_dead_band() -> None:
     assert turning_points(x, 0.1) == [3, 6]
 
 
-def test_stiffness_of_a_bristle() -> None:
+def test_stiffness_of_a_bristle_and_of_an_elastic_element_with_noise() -> None:
     found = hysteresis(Measured(V, dahl(X, 2e5, 1.0), X, T))
     assert abs(found.bristle / 2e5 - 1) < 0.05
-
-
-def test_stiffness_of_an_elastic_element_with_noise() -> None:
     noise = 0.02 * np.random.default_rng(0).standard_normal(T.size)
     F = stretches(X, np.array([2e-6]))[0] @ np.array([3e5]) + noise
-    found = hysteresis(Measured(V, F, X, T))
-    assert abs(found.elastic / 3e5 - 1) < 0.1
-
-
-def test_nothing_is_said_of_points_without_a_path() -> None:
+    assert abs(hysteresis(Measured(V, F, X, T)).elastic / 3e5 - 1) < 0.1
     assert hysteresis(Measured(V, np.sign(V))) is None
 
 
@@ -80,16 +73,11 @@ def ramps(rates: list[float], level: float, per_decade: float) -> Measured:
 
 def test_break_away_of_ramps_and_how_it_depends_on_their_rate() -> None:
     found = break_away(ramps([1.0, 3.0, 10.0, 30.0], 2.0, -0.2))
-    assert len(found.events) == 4
-    assert np.allclose([e.rate for e in found.events], [1, 3, 10, 30], rtol=1e-6)
-    assert abs(found.per_decade + 0.2) < 1e-9
+    assert [e.rate for e in found.events] == pytest.approx([1, 3, 10, 30], rel=1e-6)
+    assert found.per_decade == pytest.approx(-0.2, abs=1e-9)
     assert "decreases" in found.note
-
-
-def test_ramps_of_one_rate_say_nothing_about_it() -> None:
-    found = break_away(ramps([2.0, 2.0, 2.0], 2.0, 0.0))
-    assert found.per_decade is None
-    assert abs(found.level - 2.0) < 1e-12
+    same = break_away(ramps([2.0, 2.0, 2.0], 2.0, 0.0))
+    assert same.per_decade is None and same.level == pytest.approx(2.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("loaded", [1, -1])

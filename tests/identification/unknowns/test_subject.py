@@ -22,6 +22,10 @@ def coordinates(found: Subject) -> Unknowns:
     return unknowns_of(found.unknowns, found.ties, found.names, found.held)
 
 
+def named(what: object, **given: object) -> dict[str, Unknown]:
+    return {u.name: u for u in subject(what, **given).unknowns}  # pyright: ignore
+
+
 @pytest.mark.parametrize("name", sorted(ALL_LAWS.keys() - NEED_MORE))
 def test_every_point_of_the_box_is_a_law_that_can_be_constructed(name: str) -> None:
     found = subject(ALL_LAWS[name](), v_max=0.15)
@@ -69,42 +73,33 @@ def test_roles_say_what_is_fitted_and_why_not() -> None:
 
 
 def test_widths_follow_the_speeds_unless_the_user_chose_them() -> None:
-    assert subject("stribeck", v_max=0.3).held["v_eps"] == pytest.approx(3e-4)
-    assert subject(Stribeck(v_eps=1e-5), v_max=0.3).held["v_eps"] == 1e-5
-    assert subject("stribeck").held["v_eps"] == 1e-4
+    for what, v_max, width in (("stribeck", 0.3, 3e-4), (Stribeck(v_eps=1e-5), 0.3, 1e-5),
+                               ("stribeck", 0.0, 1e-4)):  # fmt: skip
+        assert subject(what, v_max=v_max).held["v_eps"] == pytest.approx(width)
 
 
 def test_a_drive_that_turns_has_units_that_turn() -> None:
-    found = subject("stribeck", turning=True)
-    units = {u.name: u.unit for u in found.unknowns}
+    units = {n: u.unit for n, u in named("stribeck", turning=True).items()}
     assert units["m"] == "kg m^2" and units["v_s"] == "rad/s" and units["sigma_2"] == "N m s/rad"
-    assert found.drive is not None and found.drive.turning
+    assert subject("stribeck", turning=True).drive.turning
 
 
 def test_specs_bound_tie_and_order() -> None:
-    found = subject(
-        "lugre",
-        free={
-            "sigma_0": log(1e3, 1e7),
-            "sigma_1": tied(lambda p: 2 * p["sigma_0"] ** 0.5),
-            "offset": linear(-1, 1),
-            "v_s": (1e-4, 1e-2),
-            "m": 2.5,
-        },
-    )
-    at = coordinates(found)
-    assert "sigma_1" in found.names and "sigma_1" not in at.fitted
+    free = {
+        "sigma_0": log(1e3, 1e7), "sigma_1": tied(lambda p: 2 * p["sigma_0"] ** 0.5),
+        "offset": linear(-1, 1), "v_s": (1e-4, 1e-2), "m": 2.5,
+    }  # fmt: skip
+    at = coordinates(subject("lugre", free=free))
+    assert "sigma_1" in at.names and "sigma_1" not in at.fitted
     values = at.named(at.start)
     assert values["sigma_1"] == pytest.approx(2 * values["sigma_0"] ** 0.5)
     assert values["m"] == pytest.approx(2.5)
-    by_name = {u.name: u for u in at.unknowns}
+    by_name = named("lugre", free=free)
     assert (by_name["sigma_0"].lower, by_name["sigma_0"].upper) == (1e3, 1e7)
-    other = subject("lugre", free={"offset": log(1e-3, 10), "sigma_0": linear(1.0, 1e7)})
-    scales = {u.name: u.logarithmic for u in other.unknowns}
-    assert scales["offset"] and not scales["sigma_0"]
     assert by_name["mu_s"].above == "mu_d"
-    ordered = subject("lugre", free={"sigma_1": above("sigma_2")})
-    assert {u.name: u.above for u in ordered.unknowns}["sigma_1"] == "sigma_2"
+    other = named("lugre", free={"offset": log(1e-3, 10), "sigma_0": linear(1.0, 1e7)})
+    assert other["offset"].logarithmic and not other["sigma_0"].logarithmic
+    assert named("lugre", free={"sigma_1": above("sigma_2")})["sigma_1"].above == "sigma_2"
 
 
 def test_a_tied_value_is_a_multiple_of_its_partner() -> None:
@@ -132,32 +127,19 @@ def test_bounds_of_the_upper_one_of_a_pair_leave_the_lower_one_its_range() -> No
 
 
 def test_a_fixed_partner_of_an_order_becomes_a_bound() -> None:
-    low = {u.name: u.lower for u in subject("stribeck", fixed={"mu_d": 3.0}).unknowns}
-    assert low["mu_s"] == 3.0
-    high = {u.name: u.upper for u in subject("stribeck", fixed={"mu_s": 3.0}).unknowns}
-    assert high["mu_d"] == 3.0
-
-
-def test_nothing_else_is_fitted_where_the_others_are_fixed() -> None:
-    found = subject("stribeck", free=["mu_d"], fixed="others")
-    assert found.names == ("mu_d",)
+    assert named("stribeck", fixed={"mu_d": 3.0})["mu_s"].lower == 3.0
+    assert named("stribeck", fixed={"mu_s": 3.0})["mu_d"].upper == 3.0
+    assert [*named("stribeck", free=["mu_d"], fixed="others")] == ["mu_d"]
 
 
 def test_a_model_keeps_orders_and_gives_its_law() -> None:
     model = Rabinowicz(LuGre()).model(free=["mu_s", "mu_d", "sigma_0"])
     found = subject(model, fixed={"sigma_0": 2e5})
-    at = coordinates(found)
-    assert {u.name: u.above for u in at.unknowns} == {"mu_s": "mu_d", "mu_d": ""}
-    closed = found.close({"mu_s": 0.4, "mu_d": 0.3})
-    assert isinstance(closed.law, LuGre)
-    assert (closed.law.mu_s, closed.law.sigma_0) == (0.4, 2e5)
-    assert [v.start for v in closed.model.p] == [0.4, 0.3, 2e5]
-
-
-def test_an_opened_model_starts_at_what_was_found_too() -> None:
-    found = subject(Rabinowicz(LuGre()).model(free=["mu_s", "mu_d"]))
-    model = found.close({"mu_s": 0.4, "mu_d": 0.3}).model
-    assert [v.start for v in model.open.p if v.name in found.names] == [0.4, 0.3]
+    assert {u.name: u.above for u in found.unknowns} == {"mu_s": "mu_d", "mu_d": ""}
+    law, _, closed = found.close({"mu_s": 0.4, "mu_d": 0.3})
+    assert isinstance(law, LuGre) and (law.mu_s, law.sigma_0) == (0.4, 2e5)
+    for one in (closed, closed.open):
+        assert [v.start for v in one.p] == [0.4, 0.3, 2e5]
 
 
 def test_what_processes_need_pickles() -> None:
@@ -169,46 +151,39 @@ def test_what_processes_need_pickles() -> None:
 
 
 def test_bounds_of_the_lower_level_take_the_upper_one_along() -> None:
-    starts = {u.name: u.start for u in subject("stribeck", free={"mu_d": (5.0, 15.0)}).unknowns}
-    assert 5.0 <= starts["mu_d"] <= 15.0
-    assert starts["mu_s"] > starts["mu_d"]
+    found = named("stribeck", free={"mu_d": (5.0, 15.0)})
+    assert 5.0 <= found["mu_d"].start <= 15.0
+    assert found["mu_s"].start > found["mu_d"].start
 
 
-def test_a_logarithmic_value_that_wants_to_be_nothing_is_at_its_bound() -> None:
-    both = (Unknown("b", "1", 0.05, 0.0, logarithmic=True), Unknown("c", "1", 0.05))
-    made = unknowns_of(both, {}, ("b", "c"))
+def box(*unknowns: Unknown) -> Unknowns:
+    return unknowns_of(unknowns, {}, [u.name for u in unknowns])
+
+
+def test_values_that_want_to_be_nothing_or_infinite_are_at_their_bound() -> None:
+    k = Unknown("k", "N/m", 2.0, 0.0, logarithmic=True)
+    mu_d, mu_s = Unknown("mu_d", "1", 0.3), Unknown("mu_s", "1", 0.4, above="mu_d", scale=0.1)
+    made = box(k, mu_d)
     gone = np.array([-700.0, 0.0])
     assert made.at_bound(gone).tolist() == [True, False]
     there = np.maximum(gone, made.limits[0])
-    assert made.values(there)[0] == pytest.approx(0.05e-12)
+    assert made.values(there)[0] == pytest.approx(2e-12)
     assert np.linalg.det(made.slope(there)) > 0
-    assert not made.at_bound(made.start).any()
-
-
-def test_a_value_that_wants_to_be_infinite_is_at_its_bound() -> None:
-    three = (
-        Unknown("k", "N/m", 2.0, 0.0, logarithmic=True),
-        Unknown("mu_d", "1", 0.3),
-        Unknown("mu_s", "1", 0.4, above="mu_d", scale=0.1),
-    )
-    made = unknowns_of(three, {}, ("k", "mu_d", "mu_s"))
+    made = box(k, mu_d, mu_s)
     far = np.array([700.0, 1e9, 300.0])
     assert made.at_bound(far).tolist() == [True, False, True]
-    there = np.minimum(far, made.limits[1])
-    k, mu_d, mu_s = made.values(there)
-    assert (k, mu_s - mu_d) == pytest.approx((2e12, 0.2e12), rel=1e-3)
+    stiff, low, high = made.values(np.minimum(far, made.limits[1]))
+    assert (stiff, high - low) == pytest.approx((2e12, 0.2e12), rel=1e-3)
     assert not made.at_bound(made.start).any()
 
 
 def test_a_value_goes_back_to_the_far_bound_that_its_law_has() -> None:
-    v_s = Unknown("v_s", "m/s", 1e-3, lower=1e-12, upper=1e6, logarithmic=True)
-    made = unknowns_of((v_s,), {}, ("v_s",))
-    low, high = made.values(made.limits[0])[0], made.values(made.limits[1])[0]
-    assert 1e-12 < low < 1.001e-12
-    assert 0.999e6 < high < 1e6
+    made = box(Unknown("v_s", "m/s", 1e-3, lower=1e-12, upper=1e6, logarithmic=True))
+    low, high = (made.values(limit)[0] for limit in made.limits)
+    assert 1e-12 < low < 1.001e-12 and 0.999e6 < high < 1e6
 
 
 def test_both_ends_of_a_box_are_bounds() -> None:
-    made = unknowns_of((Unknown("a", "m", 2.0, 1.0, 3.0), Unknown("b", "m", 0.0)), {}, ("a", "b"))
+    made = box(Unknown("a", "m", 2.0, 1.0, 3.0), Unknown("b", "m", 0.0))
     for value, there in ((1.0, True), (2.0, False), (3.0, True)):
         assert made.at_bound(np.array([value, 0.0])).tolist() == [there, False]

@@ -18,7 +18,7 @@ from symfric.scenes import ALL_SCENES, Drive
 
 LAWS = [name for name in CASES if name not in NO_STEP]
 STEEP = "lagged(stribeck)"
-"""A filtered velocity of 2 m/s in float is known to 1e-7 m/s, a thousandth of the law's width."""
+"""A filtered velocity of 2 m/s in float is known to 1e-7 m/s, 1/1000 of the width of the law."""
 FEW = (
     *("stribeck", "brown_mcphee", "self_tuning", "lugre", "dahl, n 0.5", "maxwell_slip"),
     *("bouc_wen", "lagged(stribeck)", "asymmetric(lugre)", "haessig_friedland, event"),

@@ -29,7 +29,9 @@ def test_ranges_are_the_bounds_or_a_million_times_the_nominal_value() -> None:
     assert range_of(Variable("u", "V", lower=1.0)) == (1.0, 1e6, 1.0)
     assert range_of(Variable("u", "V", start=3e6)) == (-1e6, 3e6, 3e6)
     assert range_of(Variable("u", "V", upper=-2e6)) == (-2e6, -2e6, -2e6)
-    assert range_of(Variable("w", "m/s", nominal=1e28)).high == 1e30  # half of it has a square
+    assert (
+        range_of(Variable("w", "m/s", nominal=1e28)).high == 1e30
+    )  # half of it has a finite square
     small = parameter_range(Variable("v_eps", "m/s", start=1e-15, nominal=1e-15, lower=0.0))
     assert small == (0.0, pytest.approx(1e6), 1e-15)
     assert parameter_range(Variable("k", "1", nominal=50.0)).high == pytest.approx(5e7)
@@ -40,7 +42,7 @@ def test_ranges_are_the_bounds_or_a_million_times_the_nominal_value() -> None:
 
 
 def bench() -> Block:
-    """Ranges of every shape, eight alike states and parameters, and a result that may have none."""
+    """Block with ranges of every shape, two arrays, and an output that may be undefined."""
     valve = Variable("valve", "V", start=2.0, lower=1.0, upper=5.0)
     lever = Variable("lever", "1", lower=-1.0, upper=3.0)
     big = Variable("big", "1", start=1e4)

@@ -1,4 +1,4 @@
-"""Packages: unit tests pass on generated C and on no changed one; wrappers have CasADi's bits."""
+"""Packages: unit tests pass on generated C and fail on changed C; wrappers have CasADi's bits."""
 
 import csv
 import importlib.util
@@ -58,7 +58,7 @@ class UnitTests:
         return [int(line.split()[1]) for line in done.stdout.splitlines() if line[0] == "t"]
 
 
-def test_unit_tests_pass_on_what_was_generated(compiler, tmp_path):
+def test_unit_tests_of_generated_c_pass(compiler, tmp_path):
     tests = UnitTests()
     for block in (LUGRE, block_of(BrownMcPhee())):
         for real, guards in ((DOUBLE, True), (FLOAT, True), (FLOAT, False)):
@@ -81,7 +81,7 @@ def test_unit_tests_of_all_laws_and_scenes_pass_also_with_fused_operations(compi
 
 
 def changed_lines(text: str) -> dict[str, str]:
-    """Lines of arithmetic, and the source in which one is wrong by a thousandth."""
+    """Sources in which one line of arithmetic is wrong by a thousandth, by line."""
     found, lines = dict[str, str](), text.splitlines(keepends=True)
     begin = next(i for i, line in enumerate(lines) if line.startswith("{"))
     for i, line in enumerate(lines[begin:], start=begin):
@@ -111,7 +111,11 @@ def test_unit_tests_fail_if_any_line_is_wrong(compiler, tmp_path):
         what += [*changes, *wrong]
     found = tests.wrong(tmp_path, compiler)
     alive = [line.strip() for line, number in zip(what, found, strict=True) if not number]
-    assert alive == ["state->z = 0.0;", "out->F = t1;", "out->F_end = t1;"]  # of a contact unloaded
+    assert alive == [
+        "state->z = 0.0;",
+        "out->F = t1;",
+        "out->F_end = t1;",
+    ]  # without load
 
 
 def test_a_unit_test_prints_what_is_wrong_and_the_table_holds_its_rows(compiler, tmp_path):
@@ -183,7 +187,7 @@ def loaded(made):
 
 @pytest.fixture(scope="module")
 def from_python(compiler, tmp_path_factory):
-    """Class of LuGre in both types."""
+    """Loader class of LuGre in both types."""
     return loaded(generate(LuGre(), tmp_path_factory.mktemp("python")))
 
 
@@ -269,7 +273,11 @@ def s_function(made, compiler, folder):
     (folder / "simstruc.h").write_text(simstruc)
     (folder / "cg_sfun.h").write_text(driver)
     files = [str(folder / f"{made.block.name}_sfun.c"), str(made.source(made.reals[0]))]
-    flags = [*STRICT, "-Wno-unused-value", f"-I{folder}"]  # unused values of the stand-in's macros
+    flags = [
+        *STRICT,
+        "-Wno-unused-value",
+        f"-I{folder}",
+    ]  # of its macros
     compiler.run(*flags, *files, "-o", str(folder / "sfun"), "-lm")
 
     def ran(h, parameters, inputs):

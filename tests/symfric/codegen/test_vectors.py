@@ -43,8 +43,8 @@ def test_rows_are_steps_of_the_block_from_numbers_of_the_type(found, real):
     assert N.max() > 5 * N.min() > 0
 
 
-def test_each_outcome_of_a_comparison_is_there():
-    """A comparison that is true in one step of eight hundred, and a sign of a difference."""
+def test_rows_contain_each_outcome_of_a_comparison():
+    """A comparison that is true in one step of 800, and the sign of a difference."""
     x, u = Variable("x", "1"), Variable("u", "1")
     rare = (x.symbol > 399.5) * (x.symbol < 400.5)
     for output in (rare * u.symbol, ca.fmax(400.5 - ca.fabs(x.symbol - 400.0), x.symbol - 799.5)):
@@ -98,11 +98,11 @@ def test_tolerance_is_relative_to_the_peak_or_to_what_rounding_changes(found):
     )  # fmt: skip
     tolerance = vectors(CBlock(difference, FLOAT, guards=False)).tolerance
     assert tolerance[1] == pytest.approx(BASE[4] * 2.0, rel=0.5)
-    assert 1e-5 < tolerance[0] < 1e-2  # a last digit of 1000, of a number of 2e-3
+    assert 1e-5 < tolerance[0] < 1e-2  # the last digit of 1000 relative to 2e-3
 
 
-def test_rows_that_rounding_decides_or_that_are_not_finite_are_left_out():
-    """The input is exactly at the edge in some rows, and not a last digit from it in any."""
+def test_rows_that_rounding_decides_or_that_are_not_finite_are_omitted():
+    """The input is exactly at the edge in some rows, and one last digit from it in none."""
     b, edge = Variable("b", "1"), float(np.float32(0.1))
     outputs = {"y": Output(ca.if_else(ca.eq(b.symbol, edge), 1.0, 0.0), "1")}
     jump = Block("jump", inputs=(b,), outputs=outputs)

@@ -78,7 +78,7 @@ def test_without_a_compiler_or_an_object_nothing_is_verified(compiler, tmp_path,
     assert found.table() == f"lugre: not verified: {none}"
 
 
-def test_a_verified_law_goes_to_json_and_to_a_table(compiler, tmp_path):
+def test_verification_results_convert_to_json_and_a_table(compiler, tmp_path):
     found = verify(generate(law_from_text("coulomb+viscous"), tmp_path, kit=False))
     content = json.loads(json.dumps(found.to_dict()))
     assert content["ok"] is True
@@ -110,7 +110,7 @@ def test_inputs_are_of_every_kind():
 A, B = Variable("a", "1"), Variable("b", "1")
 LARGE = 1e6
 LEFT = (A.symbol + B.symbol) - LARGE
-"""2, of a = 2 and b = 1e6."""
+"""Its value is 2 for a = 2 and b = 1e6."""
 
 
 def test_a_difference_has_the_magnitude_of_its_larger_term():
@@ -160,7 +160,7 @@ def test_the_worst_signal_is_the_one_with_the_largest_error_relative_to_its_magn
     assert 0.0 < run.rounding < 1e-7
 
 
-def test_rounding_is_told_from_a_wrong_formula(compiler, tmp_path):
+def test_rounding_is_distinguished_from_a_wrong_formula(compiler, tmp_path):
     """A belt at 1 m/s and a contact that changes over 1 um/s: the last bit of v is 0.06 of it."""
     v, N = Variable("v", "m/s"), Variable("N", "N", lower=0.0, upper=10.0)
     x = Variable("x", "m/s", start=1.0)
@@ -214,7 +214,7 @@ PULLS = ["p_1", "p_2", "p_3", "p_4"]
         (compensator(LuGre(), hold=(1e-5, 1e-3)), ["hold"]),
     ],
 )  # fmt: skip
-def test_modes_are_what_only_decisions_choose(block, wanted):
+def test_modes_are_determined_by_decisions_alone(block, wanted):
     names = CBlock(block, DOUBLE, guards=False).signals
     found = [n for n, mode in zip(names, modes(block), strict=True) if mode]
     assert found == wanted + [f"{reset}.{n}" for reset in block.resets for n in wanted]
@@ -245,7 +245,7 @@ def test_a_mode_that_ties_is_counted_and_a_wrong_mode_or_force_is_an_error(compi
         assert wrong.error > 0.1
         assert wrong.worst == worst
     many = in_float(tie(), np.random.default_rng(0).uniform(size=(1000, 1)))
-    assert many.error == 1.0  # of a tenth, not of one in a hundred
+    assert many.error == 1.0  # more than one step in a hundred differs
     assert not many.tied.any()
     found = verify(generate(tie(1.9), tmp_path, kit=False, real="float"))
     (check,) = found.checks

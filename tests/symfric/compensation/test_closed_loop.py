@@ -1,4 +1,4 @@
-"""The C of compensators in the loop of a drive whose friction is another one than theirs."""
+"""Compensators in the closed loop of a drive with another friction law."""
 
 from dataclasses import replace
 
@@ -40,7 +40,7 @@ EACH = [pytest.param(name, marks=() if name == "bristles" else pytest.mark.slow)
 BLOCK = compensator(
     BELIEVED, v_blend=0.02, error_gain=20.0, scales={"coulomb": 1.0, "stribeck": 0.0}
 )
-"""Without the excess of break-away over sliding, which is what makes an axis jump."""
+"""Compensator without the Stribeck term, which makes an axis jump."""
 
 
 def compared(name: str, reference: Reference, block=BLOCK, **settings) -> Comparison:
@@ -58,8 +58,8 @@ def test_the_rms_tracking_error_is_more_than_nine_times_smaller(name: str) -> No
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_a_limit_cycle_of_a_millimetre_is_gone(name: str) -> None:
-    """After a step of 1 cm the integrator hunts for ever, 1000 counts to and fro; then not one."""
+def test_a_limit_cycle_of_a_millimetre_vanishes(name: str) -> None:
+    """After a step of 1 cm the axis hunts by 1000 counts; with compensation by less than one."""
     found = compared(name, step(0.01, 20.0 if name == "springs" else 12.0))
     assert found["without"].hunting > 1000 * SOFT.count
     assert found["compensated"].hunting < SOFT.count
@@ -113,7 +113,7 @@ def test_the_vm_gives_the_bits_of_the_c_and_float_is_near(compiler) -> None:
     assert (single.added != c.added).any()
 
 
-def test_a_function_of_velocities_is_a_block_too(compiler) -> None:
+def test_a_compensator_without_states_is_a_function(compiler) -> None:
     """A law without states and without a ramp is one C function of scalars."""
     del compiler
     block = compensator(Stribeck(v_eps=1e-3, **CURVE), ramp=None)
@@ -145,7 +145,7 @@ def test_a_drive_that_turns_has_its_units(tmp_path) -> None:
     assert "added (compensated) [N m]" in lines[0]
 
 
-def test_ctrl_c_keeps_what_there_is(monkeypatch) -> None:
+def test_ctrl_c_returns_the_results_so_far(monkeypatch) -> None:
     from symfric.compensation import loop  # noqa: PLC0415
 
     calls = []

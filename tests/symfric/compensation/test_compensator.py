@@ -1,4 +1,4 @@
-"""Friction compensators as blocks: stage by stage, and what is refused."""
+"""Friction compensators as blocks, stage by stage."""
 
 from math import exp, inf, pi
 
@@ -34,7 +34,7 @@ STEP = Stribeck(v_eps=1e-9, **CURVE)
 
 
 class Machine(Stepper):
-    """Stepper that is enabled and returns the force."""
+    """Stepper with `enable` = 1 that returns the force."""
 
     def __call__(self, **inputs: float) -> float:
         self.found = super().__call__(**({"enable": 1.0} | inputs))
@@ -52,7 +52,7 @@ def force(law: Law, inputs: dict[str, float], steps: int = 1, **settings: object
 
 
 VISCOUS = Stribeck(mu_s=0.0, mu_d=0.0, sigma_2=1.0, v_eps=1e-3)
-"""Law whose force is its velocity."""
+"""Law whose force equals its velocity."""
 
 
 @pytest.mark.parametrize("law", [STEP, LuGre(), GMS(form="event"), Dahl(), BrownMcPhee()])
@@ -115,7 +115,7 @@ EACH = [pytest.param(n, marks=[pytest.mark.slow] * (k % 4 > 0)) for k, n in enum
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("name", EACH)
-def test_all_terms_of_every_law_make_the_whole_and_none_nothing(name: str) -> None:
+def test_the_terms_of_every_law_add_up_to_its_force(name: str) -> None:
     law = CASES[name]
     try:
         alone = block_of(law)
@@ -170,7 +170,7 @@ def test_the_velocity_of_the_law_is_desired_near_rest_and_measured_beyond() -> N
         assert force(VISCOUS, {"v_ref": v}, dead_zone=1e-3) == pytest.approx(wanted)
 
 
-def test_friction_builds_up_over_a_way_and_remembers_short_reversals() -> None:
+def test_friction_builds_up_over_a_travel_and_remembers_short_reversals() -> None:
     """From -4 N to 4 N over 0.1 mm in steps of 1 um, as in a Maxwell element."""
     go = machine(Coulomb(mu_d=4.0), build_up=1e-4)
     forth = [go(v_ref=1e-3) for _ in range(200)]
@@ -195,7 +195,7 @@ def test_friction_builds_up_over_a_way_and_remembers_short_reversals() -> None:
         assert [go(v_ref=v) for _ in range(300)][-1] == pytest.approx(wanted)
 
 
-def test_a_stuck_axis_receives_a_further_force_until_it_moves() -> None:
+def test_a_stuck_axis_receives_an_additional_force_until_it_moves() -> None:
     go, between = (machine(VISCOUS, stick=(2.0, 0.1, 1e-3)) for _ in range(2))
     stuck = [go(v_ref=0.1) - 0.1 for _ in range(150)]
     assert stuck[49] == pytest.approx(1.0)

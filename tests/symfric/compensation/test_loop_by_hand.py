@@ -11,7 +11,7 @@ from symfric.compensation import Cascade, Reference, close_loop
 
 H, STEPS = 1e-3, 40
 STILL = Cascade(h=H, kp=0.0, kv=0.0, ki=0.0, inertia=1.0, limit=2.0)
-"""Commands a_ref times its inertia, whatever is measured."""
+"""Controller that commands a_ref times its inertia."""
 
 
 def mass() -> Model:
@@ -37,7 +37,7 @@ def closed(a: np.ndarray, blocks: object, **how: object):
 
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
-def test_a_force_acts_as_many_samples_later_as_it_is_delayed(delay: int) -> None:
+def test_a_force_acts_after_its_delay(delay: int) -> None:
     a = np.random.default_rng(0).uniform(-1.0, 1.0, STEPS)
     found = closed(a, push("push", 0.5), delay=delay)
     for name, extra in (("without", 0.0), ("compensated", 0.5)):
@@ -59,18 +59,18 @@ def test_all_forces_together_stay_within_the_limit_of_the_drive() -> None:
 
 
 def test_an_observer_of_forces_sees_its_own_force_but_not_that_of_others() -> None:
-    """A block that returns the u that it is given: what acted, less what others added to it."""
+    """The input u is the force that acted minus the forces of other blocks."""
     u = Variable("u", "N")
     echo = Block("echo", inputs=(u,), outputs={"F": Output(0.5 * u.symbol + 0.1, "N")})
     found = closed(np.full(STEPS, 0.3), [push("push", 0.4), echo])["compensated"]
-    own = [0.1, 0.1]  # what acts is one sample late, and seen one sample later
+    own = [0.1, 0.1]  # a force acts one sample later, and is observed one sample after that
     for _ in range(STEPS - 2):
         own.append(0.5 * (0.3 + own[-2]) + 0.1)
     assert found.added == pytest.approx(0.4 + np.array(own))
 
 
 def test_a_block_holds_the_integrator_of_the_controller() -> None:
-    """From the sample on that follows; what the first one added stays."""
+    """The hold acts from the next sample; the integral of the first sample remains."""
     own = Cascade(h=H, kp=0.0, kv=1.0, ki=10.0, inertia=0.0, count=1e-15, share=1.0)
     rest = Reference(np.zeros(STEPS), np.full(STEPS, 0.5), np.zeros(STEPS), H)
     runs = [

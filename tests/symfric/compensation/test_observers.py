@@ -104,7 +104,7 @@ def slowest(ratio: float, b: float, delay: int, order: int) -> float:
 
 
 def test_the_disturbance_observer_is_stable_up_to_twice_the_mass() -> None:
-    """For every bandwidth, step and delay, as its docstring says; beyond, not for all."""
+    """It is stable for every bandwidth, step and delay; beyond twice the mass, not for all."""
     for ratio, wh, delay, order in product(
         (0.01, 0.5, 1.0, 1.5, 1.99), (1e-3, 0.1, 1.0, 10.0), (0, 1, 3, 10), (1, 2)
     ):

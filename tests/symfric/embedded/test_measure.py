@@ -34,7 +34,7 @@ def test_instructions_are_counted_one_by_one():
 @on_target
 @pytest.mark.heavy
 @pytest.mark.parametrize("core", CORES)
-def test_every_core_gives_what_the_host_gives(core):
+def test_every_core_agrees_with_the_host(core):
     found = measure(law_block(VelocityBased()), core=core, steps=100)
     assert found.ok
     assert found.error < 1e-6
@@ -76,7 +76,7 @@ def test_absent_tools_are_named(monkeypatch):
     assert "gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm" in missing.advice
 
 
-def test_a_day_has_steps_of_the_load():
+def test_the_measured_inputs_contain_jumps_of_the_load():
     v, N = day(law_block(LuGre()), 400).T
     assert (v == 0).sum() == 80
     assert N.max() / N.min() > 80
@@ -94,7 +94,7 @@ def test_a_kit_passes_its_own_test(real, core, tmp_path):
 
 @on_target
 @pytest.mark.heavy
-def test_what_is_wrong_is_counted(tmp_path):
+def test_wrong_results_are_counted(tmp_path):
     made = generate(BrownMcPhee(), tmp_path, real="float")
     file = made.source("float")
     text = file.read_text(encoding="utf-8")

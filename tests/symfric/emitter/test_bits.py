@@ -35,7 +35,7 @@ OPERATIONS = {
     **{name: NAMES.value(text) for name, text in table(__file__)["operations"].items()},
 }
 OTHER_AT_NAN = {"fmin", "fmax", "clip with bounds", "derivative of fmin"}
-"""See `logic`: what is not a number stays that in fmin and fmax of two variables."""
+"""Operations with another result for NaN, see `logic`."""
 SPECIAL = [0.0, -0.0, 1.0, -1.0, 0.5, -2.5, 3.0, 1e-300, 1e300, np.inf, -np.inf, np.nan]
 PAIRS = np.array([(p, q) for p in SPECIAL for q in SPECIAL])
 INPUTS = np.vstack([PAIRS, np.random.default_rng(2).standard_normal((1000, 2)) * [2.0, 3.0]])
@@ -48,7 +48,7 @@ def as_block(expressions: dict[str, ca.SX]) -> Block:
 
 
 def trees(count: int, depth: int) -> dict[str, ca.SX]:
-    """Sums, differences, products and quotients nested at random: parentheses must be right."""
+    """Randomly nested sums, differences, products and quotients, to test parentheses."""
     random = np.random.default_rng(0)
 
     def tree(level: int) -> ca.SX:
@@ -61,7 +61,7 @@ def trees(count: int, depth: int) -> dict[str, ca.SX]:
 
 
 def places() -> Block:
-    """States that change places, in branches that read both."""
+    """States that swap their values, in branches that read both."""
     p, q, u = Variable("p", "1", start=0.3), Variable("q", "1", start=-0.4), Variable("u", "1")
     both = ca.vertcat(q.symbol + ca.sin(u.symbol), p.symbol)
     swapped = ca.if_else(u.symbol > 0, both, ca.vertcat(p.symbol, -q.symbol))
@@ -82,7 +82,7 @@ ONE: list[Callable[[ca.SX, ca.SX], ca.SX]] = [
     lambda x, u: -x,
     lambda x, u: x * x,
 ]
-"""Of an input, too, where a compiler would round the function of a constant better than math.h."""
+"""Functions include an input, since compilers evaluate functions of constants more precisely."""
 TWO = [add, sub, mul, lambda x, y: x / (1 + y * y), ca.fmin, ca.fmax, ca.hypot]
 COMPARED = [ca.lt, ca.le, ca.eq, ca.ne]
 
@@ -96,7 +96,7 @@ def nested(seed: int, operations: int) -> Block:
     conditions = [numbers[0] < numbers[2], numbers[3] <= 0]
 
     def one_of(pool: list, recent: int = 12):
-        """Mostly a recent one, so that graphs grow deep."""
+        """Return mostly a recent one, for deep graphs."""
         some = pool[-recent:] if random.random() < 0.7 else pool
         return some[random.integers(len(some))]
 
@@ -135,7 +135,7 @@ STEPS = (
 
 
 def elements(seed: int, odd: bool) -> Block:
-    """Arrays whose elements all make the same random steps, but one if it is odd.
+    """Arrays whose elements make the same random steps, except one if `odd`.
 
     An element takes its own numbers, those of its neighbours, the first or the last, inputs,
     constants and a sum over all; its results are states, and terms of sums.

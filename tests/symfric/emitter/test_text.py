@@ -66,7 +66,7 @@ def test_statements_are_where_they_are_needed(name):
 
 
 def test_branches_that_cannot_be_one_are_two_and_nesting_ends():
-    between = first + z  # needed outside: one branch cannot hold both selects
+    between = first + z  # it is used outside, so that one branch cannot contain both selects
     found = lines(choose(less, ca.tan(between), ca.cos(between)), between)
     assert sum("if (" in line for line in found) == 2
     found = lines(choose(less, s, inner), choose(less, z, inner * inner))
@@ -103,13 +103,13 @@ def test_states_may_be_results():
         assert found == [f"if ({shown}) {{", "    s->x = SF_SIN(y);", "}"]
     found = lines(choose(less, ca.sin(x) * z, y), loads={(2, 0): "param->z"})
     assert found[1] == "    const double z = param->z;"
-    found = lines(  # places without a name, which may be those of the results, are written last
+    found = lines(  # results are written last if places have no name
         y, choose(less, ca.sin(x), z), names="a[0] a[1] a[2]", targets=["r[0] = {};", "r[1] = {};"]
     )
     assert found[-2:] == ["r[0] = a[1];", "r[1] = t1;"]
 
 
-def test_conditions_come_in_and_go_out_as_bools():
+def test_arguments_and_results_may_be_bools():
     found = code(
         choose(x, y, 2), either(x, y < 0), 1 - x, names="b y z", conditions=[0], truths=[1],
         targets=["r = {};", "const bool u = {};", "s = {};"],
@@ -202,7 +202,7 @@ def values(source: Graph, points: np.ndarray) -> np.ndarray:
 a, b = x < y, y < z
 
 
-def test_selects_whose_condition_is_known_are_gone():
+def test_selects_whose_condition_is_known_are_removed():
     points = np.random.default_rng(0).integers(-2, 3, (400, 3)).astype(float)
     names = Names(globals(), smooth=smooth)
     for text, left in CASES["known_conditions"].items():
@@ -211,7 +211,7 @@ def test_selects_whose_condition_is_known_are_gone():
         assert selects(source) == left, text
         assert np.array_equal(values(source, points), values(of(expression), points))
     known = choose(a, x, y)
-    assert selects(settled(of(choose(a, known * 2, z), known))) == 2  # a result of its own
+    assert selects(settled(of(choose(a, known * 2, z), known))) == 2  # it is also a result
     once = simplified(of(ca.fmin(x, y), choose(flag, y, ca.fmax(x, 0)), invert(less)))
     assert not {node.op for node in once.nodes} & LOWERED
     assert simplified(once) == once

@@ -104,7 +104,7 @@ def test_every_chart_is_xml_with_a_title_and_a_description() -> None:
     assert f"{NASTY} [s]" in texts
 
 
-def test_points_that_fall_together_are_left_out() -> None:
+def test_coincident_points_are_omitted() -> None:
     x = np.linspace(0, 1, 100_000)
     frame = Frame(Axis("x", "", 0, 1), Axis("y", "", -1, 1), 600, 200)
     line, dots = (kind("a", x, np.zeros(x.size)).draw(frame) for kind in (Path, Dots))
@@ -129,7 +129,7 @@ def test_a_page_is_one_document_with_escaped_text() -> None:
     assert page.count("&lt;script&gt;") == 17
 
 
-def test_nothing_of_nothing() -> None:
+def test_empty_parts_give_empty_texts() -> None:
     assert html.table("", ["a"], []) == ""
     assert html.section("a", "b", "", "") == ""
     assert html.bullets([]) == html.paragraph("") == html.triangle("", ["a"], [[1.0]]) == ""

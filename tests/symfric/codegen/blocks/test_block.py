@@ -1,4 +1,4 @@
-"""Blocks: functions, fingerprint, refusals; identical elements as arrays and their loops in C."""
+"""Blocks: functions, fingerprint; identical elements as arrays and their loops in C."""
 
 import casadi as ca
 import numpy as np

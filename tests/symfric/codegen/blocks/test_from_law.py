@@ -126,7 +126,7 @@ def test_no_step_leaves_the_bounds_of_the_states(text):
     for h in (1e-6, 1e-3, 1.0, 1e3):
         states, _ = rolled(law, velocities, h)
         limits = np.abs(np.ravel(law.steady_state(1e-7, LOAD)))
-        if isinstance(law, Armstrong):  # the level of its spring, the filtered velocity, a share
+        if isinstance(law, Armstrong):  # level of its spring, filtered velocity, a fraction
             limits = np.array([0.15 * LOAD / 1e5, np.abs(velocities).max(), 1.0])
             assert (states[:, 2] >= 0).all()
         assert (np.abs(states) <= limits * (1 + 1e-6)).all()
@@ -196,7 +196,7 @@ def test_affine_states_are_exact_in_end_mean_and_rate():
     assert end_rate == pytest.approx([3 - 2 * end[0], -5 * end[1]], rel=1e-13)
     assert kinds == {"exact"}
     end, *_, kinds = stepped(ca.vertcat(z2[1], -z2[1]), [0.0, 1.0], 2.0, [0.0, 0.0])
-    assert end == pytest.approx([1 - exp(-2.0), exp(-2.0)], rel=1e-12)  # the mean of the second
+    assert end == pytest.approx([1 - exp(-2.0), exp(-2.0)], rel=1e-12)  # by its mean
     assert kinds == {"exact", "second order"}
     with pytest.raises(ValueError, match=r"here: .* states that depend on others"):
         held_step(ca.vertcat(z2[1] - z2[0] ** 3, -z2[1]), z2, 0.1, ca.SX([0.0, 0.0]), "here")
@@ -213,7 +213,7 @@ def test_a_step_ends_at_the_equilibrium_even_if_growth_overflows():
         assert np.isfinite([mean[0], mean_rate[0]]).all()
         assert mean_of_first is None or mean[0] == pytest.approx(mean_of_first)
     end, *_ = stepped(ca.vertcat(-(z2[0] ** 2), z2[1]), [1.0, 0.0], 0.1, [2.0, 0.0])
-    assert end[0] < 1.0  # away from it
+    assert end[0] < 1.0  # it moves away from the equilibrium
     at_mean = ca.vertcat(5 * (1 - (z2[0] / z2[1]) ** 30), 0 * z2[0] + 2)
     end, *_ = stepped(at_mean, [0.0, 1.0], 1.0, ca.vertcat(z2[1], z2[1]), each=True)
     assert end == pytest.approx([2.0, 3.0], rel=1e-12)
@@ -263,11 +263,11 @@ def test_the_errors_of_both_forces_are_those_of_the_docstring():
 
 
 STEPS, AWAY = 240, slice(60, 120)
-"""Steps without load: sliding to and fro, at rest, and sliding again."""
+"""Steps without load: oscillating, at rest, and oscillating again."""
 
 
 def swung(law, first=0):
-    """States and forces over sliding to and fro, a while of it without load."""
+    """States and forces of an oscillation, part of it without load."""
     block, k = block_of(law), np.arange(first, STEPS)
     u = np.zeros((len(k), len(block.inputs)))
     u[:, 0] = np.where((k >= 90) & (k < 110), 0.0, 0.01 * np.sin(0.3 * k))

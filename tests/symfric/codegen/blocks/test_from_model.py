@@ -48,7 +48,7 @@ def advanced(block: Block, steps: int, *inputs: float) -> dict[str, float]:
     return dict(zip(names, [*state, *shown], strict=True))
 
 
-def test_double_is_equal_to_the_bit_by_every_method(compiler: Compiler, tmp_path) -> None:
+def test_every_method_has_the_bits_of_casadi(compiler: Compiler, tmp_path) -> None:
     blocks = [plant_block(LEAK if METHODS[method].dae else PLANT, h=1e-4, method=method)
               for method in METHODS]  # fmt: skip
     blocks += [plant_block(DoublePendulum(BrownMcPhee(v_t=0.05)).model(), h=1e-3),
@@ -65,7 +65,7 @@ def test_double_is_equal_to_the_bit_by_every_method(compiler: Compiler, tmp_path
     [(DoublePendulum, ("phi_1", "phi_2")),
      pytest.param(Arm, [f"q{k}" for k in range(1, 7)], marks=pytest.mark.slow)],
 )  # fmt: skip
-def test_joints_that_rub_by_their_reactions_follow_simulate(scene, coordinates) -> None:
+def test_bearing_friction_from_reactions_follows_simulate(scene, coordinates) -> None:
     model = scene(BrownMcPhee(v_t=0.05)).model()
     block = plant_block(model, h=1e-3)
     assert sum(v.name.endswith("_N") for v in block.states) == len(coordinates)

@@ -1,4 +1,4 @@
-"""Parameters, texts and refusals of blocks of laws, and contacts of populations."""
+"""Parameters and texts of blocks of laws, and contacts of populations."""
 
 import casadi as ca
 import numpy as np
