@@ -14,14 +14,14 @@ or a simulated one if there is none.
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.points import Points
-from symfric import GMS, Element, LuGre
+from symfric import GMS, Element, Hold, LuGre, simulate
+from symfric.scenes import Prescribed
 
 MEASURED = Path(__file__).parents[2] / "shared" / "data" / "franka_low_speed" / "case4_slow.csv"
 COLUMNS = {"t": "time", "x": "q7", "F": "q7_tau_J_compensate"}
@@ -35,13 +35,8 @@ def made_up(path: Path) -> Path:
     elements = (Element(2e4, 0.4), Element(900.0, 0.4), Element(4.0, 0.2))
     law = GMS(elements=elements, mu_s=0.24, mu_d=0.17, v_s=0.15, C=20.0, form="event")
     v = np.diff(q) / np.diff(t)
-    z: Any = law.steady_state(float(v[0]), 1.0)
-    torque = [law.force(float(v[0]), 1.0, z)]
-    for speed in v.tolist():
-        step: Any = law.held_step(speed, 1.0, z, 0.005)
-        z = np.asarray(step[0], float).ravel()
-        torque.append(law.force(speed, 1.0, z))
-    F = np.array(torque, float) - 0.2 + 0.03 * np.random.default_rng(0).standard_normal(t.size)
+    run = simulate(Prescribed(law, N=1.0).model(), t[-1], u={"v": Hold(t[:-1], v)}, t_eval=t)
+    F = run["friction"] - 0.2 + 0.03 * np.random.default_rng(0).standard_normal(t.size)
     rows = "\n".join(f"{a:.4f},{b:.6f},{c:.5f}" for a, b, c in zip(t, q, F, strict=True))
     path.write_text(f"time,q7,q7_tau_J_compensate\n{rows}\n")
     return path

@@ -16,7 +16,6 @@ Source of levels, lag and Stribeck velocity: Lampaert, Al-Bender, Swevers, Phys.
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +23,9 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.points import Points
-from symfric import GMS, Element
+from symfric import GMS, Element, Hold, simulate
 from symfric.laws import Law
+from symfric.scenes import Prescribed
 
 Array = NDArray[np.float64]
 
@@ -45,13 +45,11 @@ def true_law() -> GMS:
 def forces(law: Law, t: Array, x: Array) -> Array:
     """Return the force along a path of straight pieces between samples, after sliding."""
     v = np.diff(x) / np.diff(t)
-    z: Any = law.steady_state(float(v[0]), 1.0)
-    found = [law.force(float(v[0]), 1.0, z)]
-    for speed, h in zip(v.tolist(), np.diff(t).tolist(), strict=True):
-        step: Any = law.held_step(speed, 1.0, z, h)
-        z = np.asarray(step[0], float).ravel()
-        found.append(law.force(speed, 1.0, z))
-    return np.array(found, float)
+    model = Prescribed(law, N=1.0).model()
+    sliding = np.ravel(law.steady_state(float(v[0]), 1.0))
+    start = dict(zip((state.name for state in model.x[1:]), sliding, strict=True))
+    run = simulate(model, float(t[-1]), x0=start, u={"v": Hold(t[:-1], v)}, t_eval=t)
+    return run["friction"]
 
 
 def slow(*turns: tuple[float, float]) -> tuple[Array, Array]:

@@ -7,10 +7,9 @@ use the data of their sources, so that optima can be compared digit by digit.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from math import pi
-from typing import TypeVar, final
+from typing import NamedTuple, TypeVar
 
 import casadi as ca
 
@@ -25,9 +24,7 @@ from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prism
 from symfric.scenes.blocks import drive
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Ready:
+class Ready(NamedTuple):
     """Predefined problem that `symfric ocp NAME` solves and `symfric bench ocp` measures.
 
     Attributes:
@@ -111,12 +108,8 @@ def pendulum(v_t: float = V_T) -> Problem:
     made.joint(Revolute("phi", "ground.h", "bob.h", start=0.0, friction=bearing))
     torque = made.input("torque", "N m", nominal=1.0)
     made.force(JointSpringDamper("motor", "phi", actuator=torque))
-    up = Phase(
-        made.build(),
-        T=5.0,
-        start={"phi": 0.0, "phi_rate": 0.0},
-        end={"phi": pi, "phi_rate": 0.0},
-    )
+    down = {"phi": 0.0, "phi_rate": 0.0}
+    up = Phase(made.build(), T=5.0, start=down, end=down | {"phi": pi})
     return Problem(up, integral(lambda s: s.torque**2), bounds={"torque": (-3.0, 3.0)})
 
 
@@ -130,8 +123,8 @@ def cart_pendulum(v_t: float = V_T) -> Problem:
     made = Mechanism("cart_pendulum", gravity=(0.0, 0.0, -GRAVITY))
     made.body("cart", 1.0, (1e-9, 1e-9, 1e-9))
     made.body("bob", 0.3, (1e-9, 1e-9, 1e-9))
-    made.frame("ground.rail", z=(1.0, 0.0, 0.0), x=(0.0, 0.0, 1.0))
-    made.frame("cart.rail", z=(1.0, 0.0, 0.0), x=(0.0, 0.0, 1.0))
+    for frame in ("ground.rail", "cart.rail"):
+        made.frame(frame, z=(1.0, 0.0, 0.0), x=(0.0, 0.0, 1.0))
     made.frame("cart.h", z=(0.0, -1.0, 0.0), x=(0.0, 0.0, -1.0))
     made.frame("bob.h", at=(0.0, 0.0, 0.5), z=(0.0, -1.0, 0.0), x=(0.0, 0.0, -1.0))
     rail = JointFriction(law, normal=1.0)
@@ -139,12 +132,8 @@ def cart_pendulum(v_t: float = V_T) -> Problem:
     made.joint(Revolute("theta", "cart.h", "bob.h"))
     force = made.input("force", "N", nominal=10.0)
     made.force(JointSpringDamper("motor", "x", "slide", actuator=force))
-    up = Phase(
-        made.build(),
-        T=2.0,
-        start={"x": 0.0, "x_rate": 0.0, "theta": 0.0, "theta_rate": 0.0},
-        end={"x": 0.8, "x_rate": 0.0, "theta": pi, "theta_rate": 0.0},
-    )
+    down = {"x": 0.0, "x_rate": 0.0, "theta": 0.0, "theta_rate": 0.0}
+    up = Phase(made.build(), T=2.0, start=down, end=down | {"x": 0.8, "theta": pi})
     return Problem(up, FORCE, bounds={"force": (-20.0, 20.0), "x": (-2.0, 2.0)})
 
 
@@ -163,18 +152,9 @@ def _coupled(name: str, v_t: float, share: float) -> Model:
     if share:
         motor = Contact("motor", v_motor.symbol, share, guide(v_t))
         contacts, under_motor = (motor, load), motor.force
-    return Model(
-        name,
-        x=(x_motor, x, v_motor, v),
-        u=(force,),
-        ode=ca.vertcat(
-            v_motor.symbol,
-            v.symbol,
-            (force.symbol - spring - under_motor) / 0.5,
-            (spring - load.force) / 1.0,
-        ),
-        contacts=contacts,
-    )
+    motor_acc, acc = (force.symbol - spring - under_motor) / 0.5, (spring - load.force) / 1.0
+    ode = ca.vertcat(v_motor.symbol, v.symbol, motor_acc, acc)
+    return Model(name, x=(x_motor, x, v_motor, v), u=(force,), ode=ode, contacts=contacts)
 
 
 def _there_and_back(model: Model) -> Problem:
@@ -219,13 +199,8 @@ def parcel_on_tray(v_t: float = V_T) -> Problem:
     law = BrownMcPhee(mu_s=0.4, mu_d=0.3, v_t=v_t)
     sole = Contact("sole", v.symbol, N, law)
     along = x.symbol * w.symbol**2 - GRAVITY * ca.sin(tilt.symbol) - sole.force / m
-    model = Model(
-        "parcel_on_tray",
-        x=(x, v, tilt, w),
-        u=(torque,),
-        ode=ca.vertcat(v.symbol, along, w.symbol, (torque.symbol - x.symbol * N) / J),
-        contacts=(sole,),
-    )
+    ode = ca.vertcat(v.symbol, along, w.symbol, (torque.symbol - x.symbol * N) / J)
+    model = Model("parcel_on_tray", x=(x, v, tilt, w), u=(torque,), ode=ode, contacts=(sole,))
     level = {"v": 0.0, "tilt": 0.0, "tilt_rate": 0.0}
     move = Phase(model, T=1.5, start={"x": 0.3, **level}, end={"x": 0.0, **level})
     bounds = {"torque": (-15.0, 15.0), "tilt": (-1.2, 1.2)}
@@ -261,11 +236,8 @@ def bryson_denham(wall: float = 1.0 / 9.0) -> Problem:
     x, v = Variable("x", "m", nominal=wall), Variable("v", "m/s", start=1.0)
     a = Variable("a", "m/s^2", nominal=10.0)
     cart = Model("bryson_denham", x=(x, v), u=(a,), ode=ca.vertcat(v.symbol, a.symbol))
-    return Problem(
-        Phase(cart, 1.0, end={"x": 0.0, "v": -1.0}),
-        integral(lambda s: 0.5 * s.a**2),
-        bounds={"x": (None, wall)},
-    )
+    turn = Phase(cart, 1.0, end={"x": 0.0, "v": -1.0})
+    return Problem(turn, integral(lambda s: 0.5 * s.a**2), bounds={"x": (None, wall)})
 
 
 @ready(
@@ -290,11 +262,8 @@ def goddard() -> Problem:
     rise = (thrust.symbol - drag) / m.symbol - 1.0 / h.symbol**2
     ode = ca.vertcat(v.symbol, rise, -thrust.symbol / 0.5)
     rocket = Model("goddard", x=(h, v, m), u=(thrust,), ode=ode)
-    return Problem(
-        Phase(rocket, Free(0.05, 1.0), end={"m": 0.6}),
-        -1.0 * at_end(lambda s: s.h),
-        bounds={"h": (1.0, None)},
-    )
+    flight = Phase(rocket, Free(0.05, 1.0), end={"m": 0.6})
+    return Problem(flight, -1.0 * at_end(lambda s: s.h), bounds={"h": (1.0, None)})
 
 
 @ready(
@@ -318,19 +287,15 @@ def hang_glider() -> Problem:
     speed = ca.sqrt(vx.symbol**2 + sink**2)
     L = 0.5 * lift.symbol * density * area * speed
     D = 0.5 * (0.034 + 0.069662 * lift.symbol**2) * density * area * speed
-    ode = ca.vertcat(
-        vx.symbol,
-        vy.symbol,
-        (-L * sink - D * vx.symbol) / mass,
-        (L * vx.symbol - D * sink) / mass - g,
-    )
+    along, up = (-L * sink - D * vx.symbol) / mass, (L * vx.symbol - D * sink) / mass - g
+    ode = ca.vertcat(vx.symbol, vy.symbol, along, up)
     glider = Model("hang_glider", x=(x, y, vx, vy), u=(lift,), ode=ode)
     end = {"y": 900.0, "vx": 13.227567500, "vy": -1.2875005200}
-    return Problem(
+    flight, bounds = (
         Phase(glider, Free(50.0, 200.0), end=end),
-        -1.0 * at_end(lambda s: s.x),
-        bounds={"x": (0.0, None), "vx": (0.0, None)},
+        {"x": (0.0, None), "vx": (0.0, None)},
     )
+    return Problem(flight, -1.0 * at_end(lambda s: s.x), bounds=bounds)
 
 
 @ready(2030.85609, 1e-5, "Betts, Practical Methods for Optimal Control and Estimation, 2010, 6.14")
@@ -361,10 +326,8 @@ def alp_rider() -> Problem:
     square = a**2 + b**2 + c**2 + d**2
     outputs = {"clearance": Output(square - alps, "1")}
     rider = Model("alp_rider", x=tuple(y), u=tuple(u), t=t, ode=ode, outputs=outputs)
-    return Problem(
-        Phase(rider, 20.0, end={"y1": 2.0, "y2": 3.0, "y3": 1.0, "y4": -2.0}),
-        integral(
-            lambda s: 100.0 * (s.y1**2 + s.y2**2 + s.y3**2 + s.y4**2) + 0.01 * (s.u1**2 + s.u2**2)
-        ),
-        bounds={"clearance": (0.0, None)},
+    ride = Phase(rider, 20.0, end={"y1": 2.0, "y2": 3.0, "y3": 1.0, "y4": -2.0})
+    cost = integral(
+        lambda s: 100.0 * (s.y1**2 + s.y2**2 + s.y3**2 + s.y4**2) + 0.01 * (s.u1**2 + s.u2**2)
     )
+    return Problem(ride, cost, bounds={"clearance": (0.0, None)})

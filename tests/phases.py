@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import casadi as ca
 from motions import double_integrator, stage
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
@@ -14,7 +15,7 @@ from ocp.solving.solution import Solution
 from ocp.solving.starts import Start
 from ocp.transcription.program import Report
 from ocp.transcription.schemes import Scheme, make_meshes
-from symfric import BrownMcPhee, Model
+from symfric import BrownMcPhee, Model, Variable
 from symfric.multibody import JointSpringDamper
 from symfric.scenes import SliderCrank
 
@@ -27,6 +28,14 @@ def unit_move(**more: Any) -> Problem:
     cost = phase.pop("cost", integral(lambda s: s.a**2))
     problem = {k: phase.pop(k) for k in ("scenarios", "shared", "choose") if k in phase}
     return Problem(Phase(phase.pop("model", UNIT), **phase), cost, **problem)
+
+
+def algebraic_move() -> Model:
+    """x' = z with 0 = z - v, for `unit_move`."""
+    x, v, z = Variable("x", "m"), Variable("v", "m/s"), Variable("z", "m/s")
+    a = Variable("a", "m/s^2")
+    ode, alg = ca.vertcat(z.symbol, a.symbol), z.symbol - v.symbol
+    return Model("dae", x=(x, v), z=(z,), u=(a,), ode=ode, alg=alg)
 
 
 def there_and_back(**more: Any) -> Problem:

@@ -38,14 +38,9 @@ def local_errors(arcs: Sequence[Arc], rtol: float = RTOL) -> tuple[Array, ...]:
 
 
 def cut_meshes(
-    meshes: Sequence[Array],
-    errors: Sequence[Array],
-    phases: int,
-    allowed: float,
-    *,
-    order: int,
+    meshes: Sequence[Array], errors: Sequence[Array], phases: int, allowed: float, *, order: int,
     most: int,
-) -> list[Array] | None:
+) -> list[Array] | None:  # fmt: skip
     """Return `meshes` with inaccurate intervals divided, or None if no error exceeds `allowed`.
 
     An interval is divided into (error / allowed)^(1/order) parts, at least 2 and at most `most`.
@@ -75,16 +70,10 @@ def _ends(arc: Arc, rtol: float) -> Array:
     t_end: Any = np.diff(arc.times)
     if local is not model:
         p |= {local.p[-1].name: arc.times[:-1]}
-    run = simulate_many(
-        local,
-        t_end,
-        x0={v.name: row[:-1] for v, row in zip(model.x, arc.nodes, strict=True)},
-        p=p,
-        u={v.name: row for v, row in zip(model.u, arc.u, strict=True)},
-        rtol=rtol,
-        backend="vm",  # compilation takes longer than all passes together
-        executor="serial",
-    )
+    x0 = {v.name: row[:-1] for v, row in zip(model.x, arc.nodes, strict=True)}
+    u = {v.name: row for v, row in zip(model.u, arc.u, strict=True)}
+    # compilation takes longer than all passes together
+    run = simulate_many(local, t_end, x0=x0, p=p, u=u, rtol=rtol, backend="vm", executor="serial")
     ends = np.array([run[v.name][:, 0] for v in model.x]).reshape(len(model.x), N)
     return np.where(np.isfinite(ends), ends, np.inf)
 

@@ -310,25 +310,17 @@ def finer_meshes(
     if outside is not None and not any(bool(mask.any()) for mask in outside):
         return (), now
     errors: list[MeshErrors] = []
-    for phase in range(phases):  # all scenarios have the same mesh
-        of = range(phase, len(arcs), phases)
-        errors.append(
-            MeshErrors(
-                np.max([local[k] for k in of], axis=0),
-                now.trust * np.sum([losses[k] for k in of], axis=0),
-                np.any([outside[k] for k in of], axis=0) if outside else None,
-            )
-        )
+    for k in range(phases):  # all scenarios have the same mesh
+        largest, loss = np.max(local[k::phases], axis=0), np.sum(losses[k::phases], axis=0)
+        beyond = np.any(outside[k::phases], axis=0) if outside else None
+        errors.append(MeshErrors(largest, now.trust * loss, beyond))
+    meshes = solution.meshes[:phases]
+    keep = [tuple(span.nodes) for span in problem.spans[:phases]]
     new = refined(
-        solution.meshes[:phases],
-        errors,
-        [tuple(span.nodes) for span in problem.spans[:phases]],
-        local=goals.local,
-        loss=0.8 * allowed,
+        meshes, errors, keep, local=goals.local, loss=0.8 * allowed, most=goals.most,
         order=4 if isinstance(made.scheme, Shooting) else made.scheme.order,
-        most=goals.most,
-        for_loss=spare * sum(mesh.size - 1 for mesh in solution.meshes[:phases]),
-    )
+        for_loss=spare * sum(mesh.size - 1 for mesh in meshes),
+    )  # fmt: skip
     return new * (len(arcs) // phases), now
 
 

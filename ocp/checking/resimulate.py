@@ -190,15 +190,10 @@ def resimulated(
 def run_from(arc: Arc, node: int, start: Mapping[str, float], rtol: float = RTOL) -> Run:
     """Simulate the model from a node to the end of the arc."""
     times, model = arc.times[node:], arc.span.model
+    u = {v.name: Hold(times[:-1], row[node:]) for v, row in zip(model.u, arc.u, strict=True)}
+    begin, end = float(times[0]), float(times[-1])
     trajectory = simulate(
-        model,
-        float(times[-1]),
-        t_start=float(times[0]),
-        x0=dict(start),
-        u={v.name: Hold(times[:-1], row[node:]) for v, row in zip(model.u, arc.u, strict=True)},
-        p=arc.parameters(),
-        rtol=rtol,
-        times=times[1:-1],
-        throw=False,
-    )
-    return Run(arc, trajectory, float(times[-1]))
+        model, end, t_start=begin, x0=dict(start), u=u, p=arc.parameters(), rtol=rtol,
+        times=times[1:-1], throw=False,
+    )  # fmt: skip
+    return Run(arc, trajectory, end)

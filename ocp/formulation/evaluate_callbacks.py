@@ -8,14 +8,8 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from ocp.formulation.expressions import (
-    MissingError,
-    Signals,
-    arguments,
-    comparisons,
-    fresh_symbols,
-    value_of,
-)
+from ocp.formulation import expressions
+from ocp.formulation.expressions import MissingError, Signals, arguments
 from ocp.formulation.phase import Join, Link, Row
 from ocp.formulation.statement import Setting, Statement
 from symfric.foundation.variable import strays
@@ -106,7 +100,7 @@ def _path(
             label = _label("path condition", number, condition)
             with collected(problems, f"{setting.where}{label}: "):
                 try:
-                    rows = comparisons(condition, signals)
+                    rows = expressions.comparisons(condition, signals)
                 except MissingError:
                     if everywhere:
                         continue  # `_missing` checks whether any phase has the names
@@ -136,7 +130,7 @@ def _missing(condition: Callable[..., object], settings: Sequence[Setting]) -> s
     errors: list[MissingError] = []
     for setting in settings:
         try:
-            comparisons(condition, Signals(setting.model))
+            expressions.comparisons(condition, Signals(setting.model))
         except MissingError as error:
             errors.append(error)
         except ValueError:
@@ -153,7 +147,9 @@ def _links(setting: Setting, before: Model, problems: list[str]) -> Iterator[Lin
         if start is None:
             continue
         with collected(problems, f"{setting.where}link of {v.name}: "):
-            expression = value_of(start if callable(start) else itemgetter(start), signals)
+            expression = expressions.value_of(
+                start if callable(start) else itemgetter(start), signals
+            )
             _check_known(expression, before)
             yield Link(v.name, expression)
 
@@ -162,13 +158,13 @@ def _joins(setting: Setting, before: Model, problems: list[str]) -> Iterator[Joi
     """Yield conditions between the end of the previous phase and the start of this one."""
     if not setting.phase.joins:
         return
-    left, ending = fresh_symbols(before, "before")
-    right, starting = fresh_symbols(setting.model, "after")
+    left, ending = expressions.fresh_symbols(before, "before")
+    right, starting = expressions.fresh_symbols(setting.model, "after")
     symbols = [*left, *right]
     for number, condition in enumerate(setting.phase.joins):
         name = _label("join", number, condition)
         with collected(problems, f"{setting.where}{name}: "):
-            for expression, low, high in comparisons(condition, ending, starting):
+            for expression, low, high in expressions.comparisons(condition, ending, starting):
                 if stray := strays(expression, ca.vertcat(*symbols)):
                     raise ValueError(f"expected only signals, got {', '.join(stray)}")
                 _check_possible(expression, low, high, ca.vertcat(*symbols))

@@ -12,17 +12,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ocp.formulation import statement
 from ocp.formulation.evaluate_callbacks import Evaluated, collected, evaluated
 from ocp.formulation.phase import FREE, Box, Free, Link, Row, Span, as_box, fixed, meet
-from ocp.formulation.statement import (
-    Choice,
-    Setting,
-    Statement,
-    chosen_of,
-    rate_name,
-    settings_of,
-    with_outputs,
-)
+from ocp.formulation.statement import Choice, Setting, Statement
 from ocp.formulation.validate import input_problems, type_problems
 from symfric.foundation.variable import stacked
 from symfric.model import Model
@@ -40,10 +33,10 @@ def resolved(problem: Statement) -> tuple[Span, ...]:
             if there are none, contradictory values. All problems of a stage are reported at once.
     """
     _refuse(problem, [*type_problems(problem)])
-    problems, settings = [*input_problems(problem)], settings_of(problem)
+    problems, settings = [*input_problems(problem)], statement.settings_of(problem)
     results = evaluated(problem, settings, problems)
     _refuse(problem, problems)
-    chosen = chosen_of(problem, settings)
+    chosen = statement.chosen_of(problem, settings)
     bare = [_span(*pair, chosen) for pair in zip(settings, results, strict=True)]
     spans: list[Span] = []
     for number, (name, values) in enumerate((problem.scenarios or {"": {}}).items()):
@@ -88,7 +81,7 @@ def _span(setting: Setting, result: Evaluated, chosen: Sequence[Choice]) -> Span
     given = dict(sorted(given.items()))
     named = (*setting.bounds, *(name for at in given.values() for name in at))
     details = dict.fromkeys(n for n in (*named, *result.details) if n not in setting.model.signals)
-    model = with_outputs(setting.model, tuple(details))
+    model = statement.with_outputs(setting.model, tuple(details))
     variables = [v.name for group in (model.x, model.z, model.u) for v in group]
     boxes = {name: _box_of(setting, name) for name in variables}
     parameters = {v.name for v in model.p}
@@ -209,7 +202,7 @@ def _start_of(
     symbols, inputs = {v.name: v.symbol for v in model.x}, {v.name for v in model.u}
     named = {v.name: as_box(given[v.name]) for v in model.x if v.name in given}
     for v in model.x:
-        if v.name not in given and (v.name in periodic or rate_name(v.name) in inputs):
+        if v.name not in given and (v.name in periodic or statement.rate_name(v.name) in inputs):
             named[v.name] = FREE
     ranged = [name for name, box in named.items() if not fixed(box)]
     for v in model.x:

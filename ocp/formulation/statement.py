@@ -111,7 +111,7 @@ def settings_of(problem: Statement) -> tuple[Setting, ...]:
         sizes = {n: size_of(as_box(r), inputs[n].nominal) for n, r in rates.items()}
         costs = costs_of(problem, phase)
         model = with_rates(phase.model, sizes)
-        model = with_parameters(model, dict.fromkeys(references_of(phase.model, costs), ""))
+        model = with_parameters(model, dict.fromkeys(references_of(problem, phase), ""))
         bounds = only(problem.bounds, names_of(model, problem.bounds)) | dict(phase.bounds)
         bounds |= {rate_name(name): value for name, value in rates.items()}
         p = only(problem.p, [v.name for v in model.p]) | dict(phase.p)
@@ -124,8 +124,9 @@ def only(values: Mapping[str, T], names: Iterable[str]) -> dict[str, T]:
     return {name: value for name, value in values.items() if name in names}
 
 
-def references_of(model: Model, costs: Iterable[Cost]) -> tuple[str, ...]:
-    """Return references of `costs` that `model` lacks and that become parameters."""
+def references_of(problem: Statement, phase: Phase) -> tuple[str, ...]:
+    """Return references of the costs that the model lacks and that become parameters."""
+    model, costs = phase.model, costs_of(problem, phase)
     wanted = dict.fromkeys(name for cost in costs for name in cost.references)
     known = {*model.signals, *(v.name for v in model.p), "t"}
     return tuple(name for name in wanted if name not in known and name not in model.further)
@@ -231,14 +232,10 @@ def with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
         model: the model.
         nominal: input -> typical magnitude of its rate.
     """
-    states = tuple(v for v in model.u if v.name in nominal)
-    rates = {
-        v.name: Variable(
-            rate_name(v.name), f"{v.unit}/s", nominal=nominal[v.name],
-            doc=f"rate of {v.doc or v.name}",
-        )
-        for v in states
-    }  # fmt: skip
+    states, rates = tuple(v for v in model.u if v.name in nominal), dict[str, Variable]()
+    for v in states:
+        doc, size = f"rate of {v.doc or v.name}", nominal[v.name]
+        rates[v.name] = Variable(rate_name(v.name), f"{v.unit}/s", nominal=size, doc=doc)
     inputs = tuple(rates.get(v.name, v) for v in model.u)
     changes = further_states(model, states, symbols_of(rates[v.name] for v in states))
     return rebuilt(model, lambda other: with_rates(other, nominal), u=inputs, **changes)

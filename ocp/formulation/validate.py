@@ -8,17 +8,10 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from math import inf, isfinite
 from typing import Any, cast
 
+from ocp.formulation import statement
 from ocp.formulation.expressions import Cost
 from ocp.formulation.phase import RANGE, Chain, Free, Phase, as_box, is_range, limits
-from ocp.formulation.statement import (
-    Statement,
-    costs_of,
-    labelled_phases,
-    names_of,
-    rate_name,
-    references_of,
-    settings_of,
-)
+from ocp.formulation.statement import Statement
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
 from symfric.foundation.variable import Variable
@@ -62,9 +55,8 @@ def type_problems(problem: Statement) -> Iterator[str]:
     if problem.shared is not None:
         yield message(checks.names, "shared", problem.shared)
     yield message(_sums, problem.durations)
-    for where, phase in labelled_phases(problem):
-        for text in _phase_fields(phase):
-            yield f"{where}{text}" if text else ""
+    for where, phase in statement.labelled_phases(problem):
+        yield from (f"{where}{text}" for text in _phase_fields(phase) if text)
 
 
 def _phase_fields(phase: Phase) -> Iterator[str]:
@@ -115,9 +107,8 @@ def _sums(durations: object) -> None:
 
 def input_problems(problem: Statement) -> Iterator[str]:
     """Yield messages about unknown names, invalid ranges and impossible durations."""
-    for number, (where, phase) in enumerate(labelled_phases(problem)):
-        for text in _phase(problem, number, phase):
-            yield f"{where}{text}" if text else ""
+    for number, (where, phase) in enumerate(statement.labelled_phases(problem)):
+        yield from (f"{where}{text}" for text in _phase(problem, number, phase) if text)
     for name, count in Counter(phase.name for phase in problem.chain if phase.name).items():
         if count > 1:
             yield f"phases: expected every name once, got '{name}' {count} times"
@@ -138,7 +129,7 @@ def _phase(problem: Statement, number: int, phase: Phase) -> Iterator[str]:
     yield duration_problem(phase.T)
     rated = [n for n in inputs if n in phase.rates or n in problem.rates]
     yield _unknown("rates", phase.rates, inputs, _not_rated(model, phase.rates))
-    taken = {*model.signals, *(v.name for v in model.p)} & set(map(rate_name, rated))
+    taken = {*model.signals, *(v.name for v in model.p)} & set(map(statement.rate_name, rated))
     if taken:
         yield f"rates: expected new names for the rates, got {', '.join(sorted(taken))}"
     groups: list[tuple[str, Mapping[str, Any], list[str]]] = [
@@ -148,14 +139,14 @@ def _phase(problem: Statement, number: int, phase: Phase) -> Iterator[str]:
         ("bounds", phase.bounds, []),
     ]
     for where, values, excluded in groups:
-        known = [n for n in names_of(model, values) if n not in excluded or n in rated]
+        known = [n for n in statement.names_of(model, values) if n not in excluded or n in rated]
         yield _unknown(where, values, known, _no_signal(model, values, excluded))
         yield from range_problems(where, values)
     yield from _rate_problems(phase.rates)
     for fraction in phase.via:
         if not 0 < fraction < 1:
             yield f"via: expected fractions of T between 0 and 1, got {fraction:g}"
-    known = [*(v.name for v in model.p), *references_of(model, costs_of(problem, phase))]
+    known = [*(v.name for v in model.p), *statement.references_of(problem, phase)]
     yield from _parameter_problems("p", phase.p, known)
     if number == 0 and (phase.link or phase.joins):
         what = "link" if phase.link else "joins"
@@ -243,7 +234,7 @@ def _parameters(problem: Statement) -> list[str]:
     names = dict[str, None]()
     for phase in problem.chain:
         names |= dict.fromkeys(v.name for v in phase.model.p)
-        names |= dict.fromkeys(references_of(phase.model, costs_of(problem, phase)))
+        names |= dict.fromkeys(statement.references_of(problem, phase))
     return list(names)
 
 
@@ -251,7 +242,7 @@ def _for_all_phases(problem: Statement) -> Iterator[str]:
     """Yield messages about fields of the problem whose names must exist in some phase."""
     models = [phase.model for phase in problem.chain]
     inputs = list(dict.fromkeys(v.name for model in models for v in model.u))
-    signals = list(dict.fromkeys(n for m in models for n in names_of(m, problem.bounds)))
+    signals = list(dict.fromkeys(n for m in models for n in statement.names_of(m, problem.bounds)))
     hint = next((h for m in models if (h := _no_signal(m, problem.bounds, ()))), "")
     yield _unknown("bounds", problem.bounds, signals, hint)
     yield from range_problems("bounds", problem.bounds)
@@ -323,10 +314,10 @@ def _cost_problems(problem: Statement) -> Iterator[str]:
     if problem.cost is None and all(phase.cost is None for phase in problem.chain):
         yield f"expected {COST}, got None"
     values = {*problem.p, *(name for values in problem.scenarios.values() for name in values)}
-    for where, phase in labelled_phases(problem):
+    for where, phase in statement.labelled_phases(problem):
         if phase.cost is not None and phase.cost.largest:
             yield f"{where}cost: expected worst(...) in the cost of the problem, got it in a phase"
-        for name in references_of(phase.model, costs_of(problem, phase)):
+        for name in statement.references_of(problem, phase):
             if name not in values and name not in phase.p:
                 known = [*phase.model.signals, *(v.name for v in phase.model.p)]
                 text = _unknown(f"{where}track", [name], known)
@@ -343,7 +334,7 @@ def doubts(problem: Statement) -> str:
 
 
 def _doubtful(problem: Statement) -> Iterator[str]:
-    for one in settings_of(problem):
+    for one in statement.settings_of(problem):
         inputs = {v.name: v for v in one.model.u}
         known = {v.name: v for v in (*one.model.x, *one.model.z)} | inputs
         for place, ranges in (("start", one.phase.start), ("end", one.phase.end)):

@@ -237,20 +237,16 @@ def reassemble(
     if motion.t.size == detailed.t.size:
         signals = {n: detailed.signals.get(n, row) for n, row in motion.signals.items()}
         motion = replace(motion, signals=signals)
-    return Solution(
+    return replace(
+        solved.solution,
         problem=problem,
-        status=outcome.status,
         message=f"ocp '{problem.name}': modes {shown(solved.legs)}: {outcome.sentence}",
-        cost=outcome.cost,
         motions=(motion,),
-        chosen=dict(points.chosen),
         statistics=reduce(SolverStatistics.then, statistics),
-        scheme=t.scheme,
         meshes=tuple(meshes),
         points=points,
         iterate=Iterate.cold(np.zeros(0), 0),  # multipliers do not apply to the user's problem
         modes={contact: modes_of(runs) for contact, runs in tracks_of(solved.legs).items()},
-        cause=outcome.cause,
     )
 
 

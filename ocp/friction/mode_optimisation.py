@@ -79,28 +79,24 @@ MOST = 800
 
 def rests_inside(solved: SolvedSequence) -> Legs | None:
     """Return the sequence with stick where slips touch zero, or None if none does."""
-    arcs, legs, shift = flat(solved.legs), solved.legs, 0
-    times, slips = list[Array](), list[dict[str, Array]]()
-    for number, (span, arc) in enumerate(
-        zip(solved.transcription.problem.spans, arcs, strict=True)
-    ):
-        model, t = span.model, arc.begin + solved.transcription.fractions(number) * arc.duration
+    arcs, legs, transcription = flat(solved.legs), solved.legs, solved.transcription
+    times, slips, largest = list[Array](), list[dict[str, Array]](), dict[str, float]()
+    for number, (span, arc) in enumerate(zip(transcription.problem.spans, arcs, strict=True)):
+        t = arc.begin + transcription.fractions(number) * arc.duration
+        columns = {n: span.model.expression(f"{n}_slip") for n in arc.modes}
+        own = {n: solved.known.along(span.model, slip, t)[0] for n, slip in columns.items()}
         times.append(t)
-        slips.append(
-            {n: solved.known.along(model, model.expression(f"{n}_slip"), t)[0] for n in arc.modes}
-        )
-    largest: dict[str, float] = {}
-    for own in slips:
-        for contact, values in own.items():
-            largest[contact] = max(largest.get(contact, 0.0), float(np.abs(values).max()))
-    for number, (arc, t, own) in enumerate(zip(arcs, times, slips, strict=True)):
-        for contact, mode in arc.modes.items():
+        slips.append(own)
+        largest |= {n: max(largest.get(n, 0.0), float(np.abs(v).max())) for n, v in own.items()}
+    for number in reversed(range(len(arcs))):  # later arcs first, which keeps the numbers of others
+        t = times[number]
+        for contact, mode in arcs[number].modes.items():
             # points inside the arc at which the slip is almost zero
-            near = np.flatnonzero(np.abs(own[contact][1:-1]) < TOUCH * largest[contact]) + 1
+            size = np.abs(slips[number][contact][1:-1])
+            near = np.flatnonzero(size < TOUCH * largest[contact]) + 1
             if mode and near.size:
-                before, window = len(flat(legs)), (float(t[near[0] - 1]), float(t[near[-1] + 1]))
-                legs = inserted(legs, number + shift, contact, 0, *window)
-                shift += len(flat(legs)) - before
+                window = float(t[near[0] - 1]), float(t[near[-1] + 1])
+                legs = inserted(legs, number, contact, 0, *window)
                 break
     return pruned(legs, 0.0) if legs is not solved.legs else None
 
@@ -154,12 +150,10 @@ def optimise_modes(
     whole, first = known.motion.T, max(MARGIN, margin)
     reader = Reader(problem, known)
     at_rest = reader.starts_at_rest(widths)
+    rules = Rules(problem, reader.sizes(), at_rest, SHORTEST * whole, first)
+    first_solver = solver.with_options(max_iter=limits[0])
     modes_solver = ModeSolver(
-        rules=Rules(problem, reader.sizes(), at_rest, SHORTEST * whole, first),
-        solver=solver.with_options(max_iter=limits[0]),
-        scheme=scheme or Radau(3),
-        kick=KICK * whole,
-        supervisor=supervisor or Supervisor(),
+        rules, first_solver, scheme or Radau(3), KICK * whole, supervisor or Supervisor()
     )
     best: SolvedSequence | None = None
     with suppress(StoppedError):

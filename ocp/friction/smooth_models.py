@@ -1,9 +1,9 @@
 """Models with smooth friction, and their smoothing widths relative to sliding velocities."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import isfinite
-from typing import Any, NamedTuple, final
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -26,9 +26,7 @@ LEAST = 0.1
 """Smallest ratio of the scale of a contact to its previous scale, for contacts that barely move."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Width:
+class Width(NamedTuple):
     """Parameter of a smooth model that determines the smoothing width around v = 0.
 
     Attributes:
@@ -244,11 +242,6 @@ def guessed(problem: Problem, scales: Sequence[Scales]) -> Scales:
     }
 
 
-def _all_widths(problem: Problem) -> Iterator[Width]:
-    for phase in problem.chain:
-        yield from widths(phase.model)
-
-
 def widths_at(problem: Problem, scales: Scales, level: float) -> dict[str, float]:
     """Return parameter -> value for widths of `level` times the scales.
 
@@ -258,7 +251,8 @@ def widths_at(problem: Problem, scales: Scales, level: float) -> dict[str, float
         w.parameter: max(w.number, level * scales[w.contact].load)
         if w.layer is None
         else w.at(max(w.least, level * scales[w.contact].speed))
-        for w in _all_widths(problem)
+        for phase in problem.chain
+        for w in widths(phase.model)
     }
 
 
@@ -266,7 +260,8 @@ def speeds_at(problem: Problem, scales: Scales, level: float) -> dict[str, float
     """Return contact -> smoothing width [m/s or rad/s] at `level`."""
     return {
         w.contact: max(w.least, level * scales[w.contact].speed)
-        for w in _all_widths(problem)
+        for phase in problem.chain
+        for w in widths(phase.model)
         if w.layer is not None
     }
 
@@ -278,7 +273,8 @@ def own_level(problem: Problem, scales: Scales) -> float:
     """
     found = [
         w.least / scales[w.contact].speed
-        for w in _all_widths(problem)
+        for phase in problem.chain
+        for w in widths(phase.model)
         if w.least > 0.0 and scales[w.contact].speed > 0.0
     ]
     return min(found, default=0.0)

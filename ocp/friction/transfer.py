@@ -67,13 +67,9 @@ class Known(NamedTuple):
 
     def along(self, model: Model, expression: ca.SX, t: Array) -> Array:
         """Return the values of an expression in the symbols of `model`, shape (n, times)."""
+        rows = ((model.x, self.signal), (model.z, self.signal), (model.u, self.held))
         groups = [
-            np.array([take(v.name, t) for v in group]).reshape(-1, t.size)
-            for group, take in (
-                (model.x, self.signal),
-                (model.z, self.signal),
-                (model.u, self.held),
-            )
+            np.array([take(v.name, t) for v in group]).reshape(-1, t.size) for group, take in rows
         ]
         p = model.values("p", {v.name: self.p[v.name] for v in model.p if v.name in self.p})
         function = ca.Function("along", arguments(model), [expression]).map(t.size)

@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from re import fullmatch
 from tempfile import TemporaryDirectory
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ocp.formulation.problem import Problem
 from ocp.mpc.closed_loop import SLACK, ClosedLoopRun, Optimality, Reference, run_closed_loop
 from ocp.mpc.design import Control, CycleData, CycleStatus, Design, Settings
 from ocp.mpc.horizon import Horizon
-from ocp.mpc.session import BACKENDS, Session
+from ocp.mpc.session import Session
 from ocp.mpc.source import header, source, timed
 from symfric.codegen.blocks.block import KEYWORDS
 from symfric.codegen.runner import compile_object, needed_symbols
@@ -24,6 +24,7 @@ from symfric.emitter.c99 import TRANSCENDENTAL
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.programs import CompileError, find_compiler
+from symfric.foundation.variable import Variable
 from symfric.model import Model
 
 ALLOWED = frozenset(TRANSCENDENTAL.values()) | {
@@ -35,9 +36,7 @@ ALLOWED = frozenset(TRANSCENDENTAL.values()) | {
 TINY = float(np.finfo(float).tiny)
 
 
-@final
-@dataclass(frozen=True)
-class ControllerCheck:
+class ControllerCheck(NamedTuple):
     """Result of checking generated C.
 
     Attributes:
@@ -63,9 +62,7 @@ class ControllerCheck:
         return self.status == "verified"
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class GeneratedController:
+class GeneratedController(NamedTuple):
     """Files written by `Controller.to_c`.
 
     Attributes:
@@ -182,16 +179,12 @@ class Controller:
         """Name in C -> value of each bound."""
         return dict(zip(self.design.bound_names, self.design.bounds.tolist(), strict=True))
 
-    def start(self, backend: str = "auto") -> Session:
-        """Return a running controller, without a plan.
-
-        Args:
-            backend: "auto" or "compiled", which both compile the C of `to_c` for this machine.
+    def start(self) -> Session:
+        """Return a running controller, without a plan; it runs the C of `to_c`.
 
         Raises:
             CompileError: there is no compiler (install gcc or clang, or set $CC), or it failed.
         """
-        checks.choice("start: backend", backend, BACKENDS)
         if find_compiler() is None:
             raise CompileError(
                 "start: expected a C compiler ($CC, gcc, clang or cc), found none; a controller "
@@ -211,7 +204,6 @@ class Controller:
         noise: Mapping[str, float] | None = None,
         seed: int = 0,
         check: bool = True,
-        backend: str = "auto",
     ) -> ClosedLoopRun:
         """Simulate the controller on a plant, whose equations may differ from its model.
 
@@ -227,7 +219,6 @@ class Controller:
             noise: standard deviations of measured states by name.
             seed: seed of the noise.
             check: compute an independent residual for each cycle, which takes some milliseconds.
-            backend: see `start`.
 
         Raises:
             ValueError: unknown names or bad numbers.
@@ -235,7 +226,7 @@ class Controller:
             CompileError: see `start`.
         """
         return run_closed_loop(
-            self.start(backend), plant, t_end, references or {},
+            self.start(), plant, t_end, references or {},
             x0=x0, p=p, plant_p=plant_p, noise=noise, seed=seed, check=check,
         )  # fmt: skip
 
@@ -307,10 +298,8 @@ def controller_of(
     be arbitrarily sharp.
     """
     h = Horizon(problem, step, method=method, steps=steps)
-    settings = Settings(
-        checks.number("to_mpc: tolerance", tolerance, above=0.0),
-        checks.count("to_mpc: iterations", iterations, most=1000),
-    )
+    tolerance = checks.number("to_mpc: tolerance", tolerance, above=0.0)
+    settings = Settings(tolerance, checks.count("to_mpc: iterations", iterations, most=1000))
     own, span = problem.chain[0].model, problem.spans[0]
     states, inputs = [v.name for v in h.model.x], [v.name for v in h.model.u]
     measurable = [name for name in states if name not in {v.name for v in own.u}]
@@ -319,22 +308,19 @@ def controller_of(
     bounds = {limit.name: i for i, limit in enumerate(h.limits)}
     boxes = np.array([span.boxes.get(name, (-np.inf, np.inf)) for name in inputs])
     parameters = dict(zip((v.name for v in span.model.p), span.p.tolist(), strict=True))
+
+    def control(v: Variable) -> Control:
+        lower, upper = (bounds.get(f"{side} bound on {v.name}") for side in ("lower", "upper"))
+        rated = v.name not in inputs
+        place = (states if rated else inputs).index(v.name)
+        return Control(v.name, v.unit, place, rated, lower, upper)
+
     design = Design(
         name=name or f"{own.name}_mpc",
         horizon=h,
         settings=settings,
         measured=tuple(i for i, state in enumerate(states) if state in measurable),
-        controls=tuple(
-            Control(
-                v.name,
-                v.unit,
-                place=(inputs if v.name in inputs else states).index(v.name),
-                rated=v.name not in inputs,
-                lower=bounds.get(f"lower bound on {v.name}"),
-                upper=bounds.get(f"upper bound on {v.name}"),
-            )
-            for v in own.u
-        ),
+        controls=tuple(map(control, own.u)),
         x0=h.model.initial_state(p=parameters),
         u0=np.clip(h.model.values("u"), *boxes.T),
         p0=np.array([parameters[name] for name in h.parameters]),

@@ -37,9 +37,7 @@ class CycleStatus(IntEnum):
         }[int(self)]
 
 
-@final
-@dataclass(frozen=True)
-class Settings:
+class Settings(NamedTuple):
     """Limits of the work in one cycle.
 
     Attributes:
@@ -87,9 +85,7 @@ class Prices(NamedTuple):
     soft: NDArray[np.bool_]
 
 
-@final
-@dataclass(frozen=True)
-class Control:
+class Control(NamedTuple):
     """Output of a controller: an input, or the mean over an interval of an input with bounded rate.
 
     Attributes:

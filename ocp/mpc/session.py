@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter, thread_time
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +18,6 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import address
 from symfric.integrator.compiled.compiler import FLAGS, library, opened
 
-BACKENDS = ("auto", "compiled")
 SCALAR = (*FLAGS, "-fno-tree-vectorize")
 """Compiler flags. A few AVX vector instructions between calls of libm, whose tanh uses SSE, would
 make a cycle seven times longer (measured: 1.1 -> 7.9 ms)."""
@@ -28,9 +26,7 @@ WRAPPER = Path(__file__).with_name("wrapper.c").read_text(encoding="utf-8")
 """C code between ctypes and a controller with the name NAME."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Action:
+class Action(NamedTuple):
     """Result of a controller in one cycle.
 
     Attributes:

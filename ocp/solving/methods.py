@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ocp.formulation.phase import Array
 from ocp.solving.prepared import (
-    LEAN,
-    OVERDETERMINED,
+    OPTIONS,
+    TABLES,
     Built,
     Option,
     Prepared,
@@ -51,14 +51,9 @@ def lagrangian(program: Program) -> ca.Function:
     """Return (x, p, lam_f, lam_g) -> gradient and Hessian of lam_f f + lam_g' g, for fatrop."""
     x, p, lam_f, lam_g = _symbols(program)
     slope = lam_f * program.gradient(x, p)[1] + program.jacobian(x, p)[1].T @ lam_g
-    hessian = symmetric(program.hessian(x, p, lam_f, lam_g))
-    return ca.Function(
-        "nlp_hess_l",
-        [x, p, lam_f, lam_g],
-        [ca.densify(slope), hessian],
-        MULTIPLIERS,
-        ["grad_gamma_x", "hess_gamma_x_x"],
-    )
+    results = [ca.densify(slope), symmetric(program.hessian(x, p, lam_f, lam_g))]
+    names = ["grad_gamma_x", "hess_gamma_x_x"]
+    return ca.Function("nlp_hess_l", [x, p, lam_f, lam_g], results, MULTIPLIERS, names)
 
 
 def gradients(program: Program) -> ca.Function:
@@ -113,8 +108,8 @@ class Convexified(Shaped):
         self._hessian = program.hessian
         hubs = np.array([not np.isfinite(place.fraction) for place in program.unknowns])
         self._sizes, self._pattern = _plan(program.hessian.sparsity_out(0), hubs)
-        inputs = {name: program.hessian.sparsity_in(i) for i, name in enumerate(MULTIPLIERS)}
-        super().__init__("nlp_hess_l", inputs, "hess_gamma_x_x", self._pattern)
+        inputs = [program.hessian.sparsity_in(i) for i in range(len(MULTIPLIERS))]
+        super().__init__("nlp_hess_l", inputs, self._pattern)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:  # noqa: D102
         triangle = np.append(np.array(self._hessian(*arg).nonzeros()), 0.0)
@@ -171,59 +166,11 @@ def _groups(rows: Indices, columns: Indices, hubs: NDArray[np.bool_], n: int) ->
 
 
 ANSWERS: dict[str, dict[str, Status]] = {
-    "Ipopt": {
-        "Solve_Succeeded": Status.SOLVED,
-        "Feasible_Point_Found": Status.SOLVED,
-        "Solved_To_Acceptable_Level": Status.ACCEPTABLE,
-        "Infeasible_Problem_Detected": Status.INFEASIBLE,
-        OVERDETERMINED: Status.INFEASIBLE,
-        "Maximum_Iterations_Exceeded": Status.MAX_ITERATIONS,
-        "Maximum_CpuTime_Exceeded": Status.TIME_LIMIT,
-        "Maximum_WallTime_Exceeded": Status.TIME_LIMIT,
-        "User_Requested_Stop": Status.INTERRUPTED,
-        "Invalid_Number_Detected": Status.NOT_FINITE,
-        "Restoration_Failed": Status.NO_STEP,
-        "Search_Direction_Becomes_Too_Small": Status.NO_STEP,
-        "Error_In_Step_Computation": Status.NO_STEP,
-        "Diverging_Iterates": Status.UNBOUNDED,
-    },
-    "Fatrop": {  # in the order of its return flags
-        "Success": Status.SOLVED,
-        "Maximum_Iterations_Exceeded": Status.MAX_ITERATIONS,
-        "Stop_At_Tiny_Step": Status.NO_STEP,
-        "Stop_At_Acceptable_Point": Status.ACCEPTABLE,
-        "Local_Infeasibility": Status.INFEASIBLE,
-    },
-    "Sqp": {
-        "Solve_Succeeded": Status.SOLVED,
-        "Maximum_Iterations_Exceeded": Status.MAX_ITERATIONS,
-        "Search_Direction_Becomes_Too_Small": Status.NO_STEP,
-        "User_Requested_Stop": Status.INTERRUPTED,
-    },
+    solver: {code: Status[name] for code, name in codes.items()}
+    for solver, codes in TABLES["answers"].items()
 }
 """Solver -> return code -> status; other return codes have the status SOLVER_FAILED."""
-
-QUIET: dict[str, Option] = {"print_level": 0, "sb": "yes"}
-WARM: dict[str, Option] = {
-    "warm_start_init_point": "yes",
-    "mu_init": 1e-6,
-    "warm_start_bound_push": 1e-9,
-    "warm_start_bound_frac": 1e-9,
-    "warm_start_slack_bound_push": 1e-9,
-    "warm_start_slack_bound_frac": 1e-9,
-    "warm_start_mult_bound_push": 1e-9,
-}
-"""Options of Ipopt for a start with multipliers; the user's options take precedence."""
-SQP: dict[str, Option] = {
-    "print_header": False,
-    "print_iteration": False,
-    "print_status": False,
-    "max_iter": 300,
-}
-QP: dict[str, dict[str, Option]] = {
-    "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
-}
-"""QP solver -> options that suppress its output."""
+QUIET, WARM, SQP = (OPTIONS[name] for name in ("quiet", "warm", "sqp"))
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -266,7 +213,7 @@ class _Method(ABC):
         prefix = "" if self.plugin == "sqpmethod" else f"{self.plugin}."
         own = {f"{prefix}{name}": value for name, value in self.options.items()}
         try:
-            return ca.nlpsol("solver", self.plugin, program.nlp, LEAN | common | own)
+            return ca.nlpsol("solver", self.plugin, program.nlp, OPTIONS["lean"] | common | own)
         except (RuntimeError, NotImplementedError) as error:
             if not self.options:
                 raise
@@ -392,7 +339,7 @@ class Sqp(_Method):
         del warm
         hook, hessian = IterationHook(program), Convexified(program)
         solver = str(self.options.get("qpsol", "piqp"))
-        own = {"qpsol": solver, "qpsol_options": QP.get(solver, {}) | {"error_on_fail": False}}
+        own = {"qpsol": solver, "qpsol_options": OPTIONS.get(solver, {}) | {"error_on_fail": False}}
         derivatives = {"nlp_jac_fg": both(program), "nlp_hess_l": hessian}
         function = self._made(program, **SQP, **own, iteration_callback=hook, cache=derivatives)
         return Built(function, hook, (hessian,))

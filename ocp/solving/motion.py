@@ -120,21 +120,16 @@ def motions_of(
         points: values of all unknowns.
     """
     phases = len(problem.chain)
-    motions: list[Motion] = []
-    for k, name in enumerate(problem.scenario_names or ("",)):
-        numbers = range(k * phases, (k + 1) * phases)
-        motions.append(_motion(name, problem, numbers, meshes, scheme, points))
-    return tuple(motions)
+    return tuple(
+        _motion(name, problem, range(k * phases, (k + 1) * phases), meshes, scheme, points)
+        for k, name in enumerate(problem.scenario_names or ("",))
+    )
 
 
 def _motion(
-    name: str,
-    problem: Problem,
-    numbers: Sequence[int],
-    meshes: Sequence[Array],
-    scheme: Coefficients,
-    points: Points,
-) -> Motion:
+    name: str, problem: Problem, numbers: Sequence[int], meshes: Sequence[Array],
+    scheme: Coefficients, points: Points,
+) -> Motion:  # fmt: skip
     spans, own = [problem.spans[k] for k in numbers], [points.spans[k] for k in numbers]
     pieces: list[_Piece] = []
     phases: list[Stretch] = []
@@ -183,13 +178,9 @@ def _jumps(before: Span, old: SpanPoints, after: Span, new: SpanPoints) -> bool:
 
 
 def _piece(
-    span: Span,
-    points: SpanPoints,
-    mesh: Array,
-    scheme: Coefficients,
-    chosen: Mapping[str, float],
-    begin: float,
-) -> _Piece:
+    span: Span, points: SpanPoints, mesh: Array, scheme: Coefficients,
+    chosen: Mapping[str, float], begin: float,
+) -> _Piece:  # fmt: skip
     """Return the signals of one phase at its nodes and collocation points."""
     model, N, d = span.model, mesh.size - 1, scheme.degree
     inside = scheme.nodes[1:-1] if d and scheme.meets_end else scheme.nodes[1:]
@@ -211,16 +202,12 @@ def _piece(
     x, z = joined(points.nodes, points.inner), joined(z, points.z)
     held = points.u[:, np.minimum(np.arange(at.size) // (shown + 1), N - 1)]
     p = np.array([chosen.get(v.name, number) for v, number in zip(model.p, span.p, strict=True)])
-    values = model.function("signals").map(at.size)(
-        at[None, :], x, z, held, np.tile(p[:, None], (1, at.size))
-    )
-    return _Piece(
-        at,
-        np.arange(at.size) % (shown + 1) == 0,
-        dict(zip(model.signals, values.full(), strict=True)),
-        begin + points.T * mesh,
-        {v.name: row for v, row in zip(model.u, points.u, strict=True)},
-    )
+    signals, p = model.function("signals").map(at.size), np.tile(p[:, None], (1, at.size))
+    rows = signals(at[None, :], x, z, held, p).full()
+    values = dict(zip(model.signals, rows, strict=True))
+    controls = {v.name: row for v, row in zip(model.u, points.u, strict=True)}
+    nodes = np.arange(at.size) % (shown + 1) == 0
+    return _Piece(at, nodes, values, begin + points.T * mesh, controls)
 
 
 class SpanMotion(NamedTuple):

@@ -1,11 +1,10 @@
 """Figures of optimal motions: optimised points and simulated motion."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -32,9 +31,7 @@ CIRCLES = 60
 """Approximate number of nodes drawn for a motion."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Drawn:
+class Drawn(NamedTuple):
     """Motion in a plot.
 
     Attributes:

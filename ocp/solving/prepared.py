@@ -1,8 +1,10 @@
 """Solver prepared for a nonlinear program with any start and any parameters, and time limits."""
 
 import re
+import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple, final
 
@@ -10,53 +12,36 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Array
-from ocp.solving.watch import (
-    FAR,
-    At,
-    Hook,
-    Seen,
-    Watch,
-    as_fraction,
-    interrupts,
-    not_finite,
-    worst,
-)
+from ocp.solving.watch import FAR, FEASIBLE, Hook, Seen, Watch, interrupts
 from ocp.transcription.program import (
     Iterate,
     Outcome,
+    Place,
     Program,
     Report,
     SolverStatistics,
     in_stage,
+    outside,
     worst_of,
 )
 from ocp.transcription.transcribe import Transcription
 from symfric.foundation.status import Status
 
 Option = str | float | int
+Result = Mapping[str, ca.DM] | None
+"""Results of a solver by name; None if it failed without any."""
 LEAST = 1e-3
 """Smallest time limit of a solver [s], with which it stops at once."""
 OVERDETERMINED = "Not_Enough_Degrees_Of_Freedom"
 """Return code of Ipopt for a program with more equations than unknowns."""
-HINTS: dict[str, str] = {
-    OVERDETERMINED: (
-        "There are more equations than unknowns; use fewer end and via conditions, or more "
-        "intervals."
-    ),
-    "Insufficient_Memory": "The memory is exhausted; use fewer intervals.",
-}
+TABLES: dict[str, Any] = tomllib.loads(Path(__file__).with_name("solvers.toml").read_text("utf-8"))
+HINTS: dict[str, str] = TABLES["hints"]
 """Return code -> message, for codes that are more specific than the status."""
+OPTIONS: dict[str, dict[str, Option]] = TABLES["options"]
 TRIED = (
     "It happened at a point tried by the solver, not at an iterate; bound the states to where "
     "the equations are defined."
 )
-LEAN: dict[str, Any] = {
-    "print_time": False,
-    "show_eval_warnings": False,
-    "calc_lam_p": False,
-    "no_nlp_grad": True,
-}
-"""Options for no output and no unused derivatives."""
 
 
 class Built(NamedTuple):
@@ -81,6 +66,55 @@ def refused_options(solver: str, options: Mapping[str, Option], reason: str) -> 
     """Return an error for refused options, which names only those in `reason` if possible."""
     named = {name: value for name, value in options.items() if name in reason} or dict(options)
     return ValueError(f"{solver}: expected options of {solver}, got {named!r}; {reason}")
+
+
+At = Callable[[Array, Place], str]
+"""(w, place) -> text for the time of the place."""
+
+
+def worst(program: Program, point: Seen, at: At) -> str:
+    """Return a message about the most violated row or bound, or about the cost if feasible."""
+    far = point.violation
+    if far <= FEASIBLE:
+        return f"The best iterate satisfies all constraints, at a cost of {point.f:.6g}."
+    rows = outside(point.g, program.lower_g, program.upper_g)
+    if rows.max(initial=0.0) >= far:
+        place = program.rows[int(np.argmax(rows))]
+        name = place.name
+    else:
+        bounds = outside(point.w, program.lower_w, program.upper_w)
+        place = program.unknowns[int(np.argmax(bounds))]
+        name = f"the bound on {place.name}"
+    return f"Most violated is {name} {at(point.w, place)}, by {far:.3g} in scaled units."
+
+
+def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
+    """Return a message about an equation or derivative that is not finite at `w`, or ""."""
+    cost, slope = program.gradient(w, values)
+    g, jacobian = program.jacobian(w, values)
+    bad = ~np.isfinite(g.full().ravel())
+    if bad.any():
+        place = program.rows[int(np.argmax(bad))]
+        return f"It is {place.name} {at(w, place)}."
+    if not np.isfinite(float(cost)):
+        return "It is the cost."
+    bad = ~np.isfinite(np.array(jacobian.nonzeros()))
+    if bad.any():
+        rows, columns = jacobian.sparsity().get_triplet()
+        k = int(np.argmax(bad))
+        row, unknown = program.rows[rows[k]], program.unknowns[columns[k]]
+        return f"It is the derivative of {row.name} in {unknown.name} {at(w, row)}."
+    bad = ~np.isfinite(ca.densify(slope).full().ravel())
+    if bad.any():
+        unknown = program.unknowns[int(np.argmax(bad))]
+        return f"It is the derivative of the cost in {unknown.name} {at(w, unknown)}."
+    return ""
+
+
+def as_fraction(w: Array, place: Place) -> str:
+    """Return the time of a place as a fraction of the duration, which need not be known."""
+    del w
+    return f"at {place.fraction:.4g} of the duration"
 
 
 @final
@@ -176,7 +210,7 @@ class Prepared:
 
     def _called(
         self, solver: Built, watch: Watch, arguments: Mapping[str, Array]
-    ) -> tuple[Mapping[str, ca.DM] | None, str, Status]:
+    ) -> tuple[Result, str, Status]:
         """Return the result of the solver, its return code and its status."""
         solver.hook.watch = watch
         try:
@@ -199,14 +233,7 @@ class Prepared:
             raise refused_options(self.solver, self.options, reason)
         return result, answer, status
 
-    def _point(
-        self,
-        result: Mapping[str, ca.DM] | None,
-        watch: Watch,
-        status: Status,
-        w: Array,
-        values: Array,
-    ) -> Seen:
+    def _point(self, result: Result, watch: Watch, status: Status, w: Array, values: Array) -> Seen:
         """Return the solution, or the best known point of a failed solve."""
         program = self.program
         if status.ok and result is not None:

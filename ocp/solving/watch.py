@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from time import perf_counter
 from types import FrameType
@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Array
-from ocp.transcription.program import Place, Program, Progress, Report, outside, worst_of
+from ocp.transcription.program import Program, Progress, Report, worst_of
 from symfric.foundation.status import Status
 
 FEASIBLE = 1e-6
@@ -123,28 +123,16 @@ class Watch:
 class Shaped(ca.Callback):
     """CasADi function evaluated in Python, with arguments and one result of given shapes."""
 
-    def __init__(
-        self, name: str, inputs: Mapping[str, ca.Sparsity], output: str, shape: ca.Sparsity
-    ) -> None:
+    def __init__(self, name: str, inputs: Sequence[ca.Sparsity], shape: ca.Sparsity) -> None:
         super().__init__()
-        self._inputs, self._output, self._shape = [*inputs.items()], output, shape
+        self._inputs, self._shape = inputs, shape
         self.construct(name, {})
 
     def get_n_in(self) -> int:  # noqa: D102
         return len(self._inputs)
 
-    def get_n_out(self) -> int:  # noqa: D102
-        return 1
-
-    def get_name_in(self, i: int) -> str:  # noqa: D102
-        return self._inputs[i][0]
-
-    def get_name_out(self, i: int) -> str:  # noqa: D102
-        del i
-        return self._output
-
     def get_sparsity_in(self, i: int) -> ca.Sparsity:  # noqa: D102
-        return self._inputs[i][1]
+        return self._inputs[i]
 
     def get_sparsity_out(self, i: int) -> ca.Sparsity:  # noqa: D102
         del i
@@ -160,9 +148,8 @@ class IterationHook(Shaped):
         rows = {"x": n, "lam_x": n, "g": m, "lam_g": m, "f": 1, "lam_p": k}
         names = [ca.nlpsol_out(i) for i in range(ca.nlpsol_n_out())]
         self.watch: Watch | None = None
-        super().__init__(
-            "watch", {n: ca.Sparsity.dense(rows[n], 1) for n in names}, "stop", ca.Sparsity.dense(1)
-        )
+        columns = [ca.Sparsity.dense(rows[name], 1) for name in names]
+        super().__init__("watch", columns, ca.Sparsity.dense(1))
 
     def eval(self, arg: Sequence[ca.DM]) -> list[float]:  # noqa: D102
         if self.watch is None:
@@ -184,7 +171,7 @@ class GradientHook(Shaped):
         self._values = ca.Function("values", [program.w, program.p], [program.f, program.g])
         self.watch: Watch | None = None
         x, p = (ca.Sparsity.dense(part.numel(), 1) for part in (program.w, program.p))
-        super().__init__("nlp_grad_f", {"x": x, "p": p}, "grad_f_x", x)
+        super().__init__("nlp_grad_f", [x, p], x)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:  # noqa: D102
         slope = ca.densify(self._gradient(*arg)[1])
@@ -217,52 +204,3 @@ def interrupts(watch: Watch) -> Generator[None, None, None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-At = Callable[[Array, Place], str]
-"""(w, place) -> text for the time of the place."""
-
-
-def worst(program: Program, point: Seen, at: At) -> str:
-    """Return a message about the most violated row or bound, or about the cost if feasible."""
-    far = point.violation
-    if far <= FEASIBLE:
-        return f"The best iterate satisfies all constraints, at a cost of {point.f:.6g}."
-    rows = outside(point.g, program.lower_g, program.upper_g)
-    if rows.max(initial=0.0) >= far:
-        place = program.rows[int(np.argmax(rows))]
-        name = place.name
-    else:
-        bounds = outside(point.w, program.lower_w, program.upper_w)
-        place = program.unknowns[int(np.argmax(bounds))]
-        name = f"the bound on {place.name}"
-    return f"Most violated is {name} {at(point.w, place)}, by {far:.3g} in scaled units."
-
-
-def not_finite(program: Program, w: Array, values: Array, at: At) -> str:
-    """Return a message about an equation or derivative that is not finite at `w`, or ""."""
-    cost, slope = program.gradient(w, values)
-    g, jacobian = program.jacobian(w, values)
-    bad = ~np.isfinite(g.full().ravel())
-    if bad.any():
-        place = program.rows[int(np.argmax(bad))]
-        return f"It is {place.name} {at(w, place)}."
-    if not np.isfinite(float(cost)):
-        return "It is the cost."
-    bad = ~np.isfinite(np.array(jacobian.nonzeros()))
-    if bad.any():
-        rows, columns = jacobian.sparsity().get_triplet()
-        k = int(np.argmax(bad))
-        row, unknown = program.rows[rows[k]], program.unknowns[columns[k]]
-        return f"It is the derivative of {row.name} in {unknown.name} {at(w, row)}."
-    bad = ~np.isfinite(ca.densify(slope).full().ravel())
-    if bad.any():
-        unknown = program.unknowns[int(np.argmax(bad))]
-        return f"It is the derivative of the cost in {unknown.name} {at(w, unknown)}."
-    return ""
-
-
-def as_fraction(w: Array, place: Place) -> str:
-    """Return the time of a place as a fraction of the duration, which need not be known."""
-    del w
-    return f"at {place.fraction:.4g} of the duration"

@@ -13,7 +13,7 @@ Source: Griewank and Toint, Numerische Mathematik 39, 1982, 119-137 (partial sep
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple, final
+from typing import Any, ClassVar, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -50,9 +50,7 @@ class Entries:
         return np.setdiff1d(np.arange(self.rows.size), self.varying)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Block:
+class Block(NamedTuple):
     """Rows r (m, 1) and a share q of the cost as functions of (v, theta), with derivatives.
 
     Attributes:
@@ -174,10 +172,10 @@ class Linear(NamedTuple):
 
     @staticmethod
     def of(rows: Indices, columns: Indices, weights: Array) -> "Linear":
-        """Return entries in the same rows (terms,) of each place; others are (terms, places)."""
-        terms, places = columns.shape
-        at = np.tile(np.arange(places), terms)
-        return Linear(at, np.repeat(rows, places), columns.ravel(), weights.ravel())
+        """Return entries in the same `rows` (m,) of each place; others are (m, terms, places)."""
+        m, terms, places = columns.shape
+        at, factors = np.tile(np.arange(places), m * terms), np.broadcast_to(weights, columns.shape)
+        return Linear(at, np.repeat(rows, terms * places), columns.ravel(), factors.ravel())
 
 
 @final
@@ -242,6 +240,14 @@ class Piece:
     linear: Linear | None = None
     slot: int = 0
 
+    LAST: ClassVar[int] = 63
+    """Last number inside an interval; 0 is the gap to the next interval."""
+
+    @staticmethod
+    def order_of(span: int, interval: Indices | int, inside: Indices | int) -> Indices:
+        """Return the sort key of rows by phase, interval and number inside it, up to `LAST`."""
+        return (np.int64(span) << 40) + (np.asarray(interval, np.int64) << 6) + inside
+
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the rows of a place."""
@@ -268,14 +274,7 @@ def linear_piece(rows: Rows, columns: Indices, weights: Array, span: int, order:
         span=span,
         interval=np.zeros(1, np.int64),
         offset=np.zeros(1),
-        linear=Linear.of(numbers[kept], columns.ravel()[kept, None], weights.ravel()[kept, None]),
+        linear=Linear(
+            0 * numbers[kept], numbers[kept], columns.ravel()[kept], weights.ravel()[kept]
+        ),
     )
-
-
-LAST = 63
-"""Last number inside an interval; 0 is the gap to the next interval."""
-
-
-def order_of(span: int, interval: Indices | int, inside: Indices | int) -> Indices:
-    """Return the sort key of rows by phase, interval and number inside it, up to `LAST`."""
-    return (np.int64(span) << 40) + (np.asarray(interval, np.int64) << 6) + inside

@@ -15,14 +15,14 @@ levels); Ascher and Petzold, SIAM J. Numer. Anal. 28, 1991, 1097-1120 (projected
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Box, Span, fixed, initial, meet
-from ocp.transcription.blocks import Array, Block, Piece, Rows, block, order_of
+from ocp.transcription.blocks import Array, Block, Piece, Rows, block
 from ocp.transcription.unknowns import Grid, Local, SpanPoints
 from symfric.foundation.checks import listed
 from symfric.model.holonomic import Holonomic
@@ -161,9 +161,7 @@ class Known(NamedTuple):
     imposed: bool = True
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Closing:
+class Closing(NamedTuple):
     """Constraints of a phase.
 
     Attributes:
@@ -231,18 +229,26 @@ class Closing:
             interval, offset = np.maximum(at - 1, 0), np.minimum(at, 1).astype(float)
             z = np.tile(own.z[:, :1], (1, at.size))  # not in the constraints
             rows = Rows.zero([f"the {what} {i + 1}" for i in range(self.m)], self.loops.sizes)
-            columns, order = (own.nodes[:, at], z, own.u[:, interval]), order_of(number, at, 1)
+            columns, order = (
+                (own.nodes[:, at], z, own.u[:, interval]),
+                Piece.order_of(number, at, 1),
+            )
             place = interval, offset
             yield self.local.piece(grid, rows, self.levels[level], columns, place, order)
 
 
 def closing(
-    local: Local, before: Span | None, periodic: Sequence[str], named: Collection[str]
-) -> Closing | None:
-    """Return the constraints of a phase, or None if it has none.
+    local: Local,
+    mechanics: Holonomic,
+    before: Span | None,
+    periodic: Sequence[str],
+    named: Collection[str],
+) -> Closing:
+    """Return the constraints of a phase.
 
     Args:
         local: unknowns of the phase.
+        mechanics: equations of its mechanism, with constraints.
         before: previous phase in the same scenario; None for the first one.
         periodic: periodic states of the problem if this is the first phase.
         named: states with a start given by the user; others are released if constraints require it.
@@ -251,10 +257,7 @@ def closing(
         ValueError: named coordinates do not satisfy the constraints, or links prescribe more
             states than the constraints leave free.
     """
-    span, mechanics = local.span, local.span.model.holonomic
-    if mechanics is None or not mechanics.phi.numel():
-        return None
-    n, x = mechanics.n, span.model.vector("x")
+    span, n, x = local.span, mechanics.n, local.span.model.vector("x")
     slope = ca.jacobian(mechanics.phi, x[:n])
     rate = slope @ x[n : 2 * n] + ca.jacobian(mechanics.phi, span.model.t)
     phi, phi_dot, phi_q = ca.Function(
@@ -270,26 +273,17 @@ def closing(
         for k in (0, 1)
     ]
     rows = ca.vertcat(*moved, ca.SX(len(span.model.x) - 2 * n, 1))
-    return Closing(
-        local=local,
-        loops=loops,
-        correction=block("correction", ca.vertcat(local.v, multipliers), local.theta, rows),
-        levels=(
-            block("loops", local.v, local.theta, phi / size),
-            block("loop_rates", local.v, local.theta, phi_dot / size),
-        ),
-        known={at: _known(span, loops, at, before, periodic, named) for at in span.nodes},
-    )
+    correction = block("correction", ca.vertcat(local.v, multipliers), local.theta, rows)
+    positions = block("loops", local.v, local.theta, phi / size)
+    rates = block("loop_rates", local.v, local.theta, phi_dot / size)
+    known = {at: _known(span, loops, at, before, periodic, named) for at in span.nodes}
+    return Closing(local, loops, correction, (positions, rates), known)
 
 
 def _known(
-    span: Span,
-    loops: Loops,
-    at: float,
-    before: Span | None,
-    periodic: Sequence[str],
+    span: Span, loops: Loops, at: float, before: Span | None, periodic: Sequence[str],
     named: Collection[str],
-) -> tuple[Known, Known]:
+) -> tuple[Known, Known]:  # fmt: skip
     """Return the prescribed coordinates and the prescribed rates at the fraction `at` of T."""
     n, names = loops.n, [v.name for v in span.model.x]
     boxes = [span.nodes[at][name] for name in names]

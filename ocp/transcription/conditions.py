@@ -12,18 +12,7 @@ import numpy as np
 
 from ocp.formulation.phase import Free, Row, Span, limits
 from ocp.formulation.problem import Problem
-from ocp.transcription.blocks import (
-    LAST,
-    Array,
-    Block,
-    Indices,
-    Piece,
-    Rows,
-    block,
-    linear_piece,
-    order_of,
-    select,
-)
+from ocp.transcription.blocks import Array, Block, Indices, Piece, Rows, block, linear_piece, select
 from ocp.transcription.unknowns import Columns, Grid, Layout, Local, time_scale
 from symfric.foundation.variable import stacked
 
@@ -55,9 +44,11 @@ def _at_node(
     """
     node = grid.nodes[local.number][fraction]
     interval, columns = _columns_at(local, grid, node, inside)
-    stage, k = (interval, LAST - 1) if inside else (node, 1)
+    stage, k = (interval, Piece.LAST - 1) if inside else (node, 1)
     at = np.array([interval]), np.array([float(node > 0)])
-    return local.piece(grid, rows, made, columns, at, order_of(local.number, np.array([stage]), k))
+    return local.piece(
+        grid, rows, made, columns, at, Piece.order_of(local.number, np.array([stage]), k)
+    )
 
 
 def _columns_at(
@@ -101,7 +92,7 @@ def at_starts(local: Local, rows: Sequence[Row]) -> Maker:
         if not at.size:
             return None
         columns = span.nodes[:, at], span.z[:, at * grid.scheme.degree], span.u[:, at]
-        order = order_of(local.number, at, LAST - 1)
+        order = Piece.order_of(local.number, at, Piece.LAST - 1)
         return local.piece(grid, Rows.of(rows), made, columns, (at, np.zeros(at.size)), order)
 
     return piece
@@ -137,7 +128,7 @@ def between(before: Local, after: Local) -> Iterator[Maker]:
         rows = Rows.of(span.joins)
         values = [join.function.call([*before.values, *after.values])[0] for join in span.joins]
         made = block("join", v, theta, stacked(values) / ca.DM(rows.scale))
-        yield partial(_between, before, after, made, rows, LAST)
+        yield partial(_between, before, after, made, rows, Piece.LAST)
 
 
 def _between(
@@ -152,7 +143,7 @@ def _between(
     theta = grid.data[a].theta(np.array([N - 1]), one), grid.data[b].theta(zero, 0 * one)
     return Piece(
         rows=rows,
-        order=order_of(a, np.array([N]), inside),
+        order=Piece.order_of(a, np.array([N]), inside),
         span=b,
         interval=zero,
         offset=0 * one,
@@ -162,38 +153,36 @@ def _between(
     )
 
 
-def plain_links(number: int, before: Span, span: Span, grid: Grid) -> list[Piece]:
-    """Return rows for the continuity of states from phase `number - 1`, `before`, to `number`.
+def plain_links(problem: Problem, number: int, grid: Grid) -> list[Piece]:
+    """Return rows for the continuity of states from phase `number - 1` to phase `number`.
 
     States whose start follows from other states have no such row.
     """
-    a, b = grid.layout.spans[number - 1], grid.layout.spans[number]
-    old, new = ([v.name for v in s.model.x] for s in (before, span))
-    pairs = [(new.index(link.state), before.same_state(link.expression)) for link in span.links]
-    released = grid.released[number].get(0.0, ())
-    pairs = sorted((to, old.index(name)) for to, name in pairs if name and to not in released)
-    if not pairs:
-        return []
-    to, origin = (np.array(part) for part in zip(*pairs, strict=True))
-    sizes = span.model.nominal("x")[to]
-    rows = Rows.zero([f"the continuity of {new[i]}" for i in to], sizes)
-    columns = np.column_stack([b.nodes[to, 0], a.nodes[origin, -1]])
-    weights = np.column_stack([np.ones(to.size), -before.model.nominal("x")[origin] / sizes])
-    return [linear_piece(rows, columns, weights, number, order_of(number - 1, a.intervals, 0))]
+    before, span = problem.spans[number - 1], problem.spans[number]
+    new, released = [v.name for v in span.model.x], grid.released[number].get(0.0, ())
+    links = [(link.state, before.same_state(link.expression)) for link in span.links]
+    pairs = [(to, of) for to, of in links if of and new.index(to) not in released]
+    pairs.sort(key=lambda pair: new.index(pair[0]))
+    order = Piece.order_of(number - 1, grid.layout.spans[number - 1].intervals, 0)
+    ends = (number, 0), (number - 1, -1)
+    what = "the continuity"
+    return [_equal_states(problem, grid.layout, ends, pairs, what, order)] if pairs else []
 
 
 def whole(problem: Problem, grid: Grid) -> Iterator[Piece]:
     """Yield the rows of periodicity, of shared starts, and of sums of durations."""
     spans, phases, layout = problem.spans, len(problem.chain), grid.layout
-    end = order_of(len(spans), 0, 0)
+    end = Piece.order_of(len(spans), 0, 0)
     for first in range(0, len(spans), phases):
         last = first + phases - 1
         released = [spans[first].model.x[i].name for i in grid.released[first].get(0.0, ())]
         names = [name for name in problem.periodic if name not in released]
         if names:
-            yield _equal_states(problem, layout, (last, -1), (first, 0), names, end)
+            ends, pairs = ((last, -1), (first, 0)), [*zip(names, names, strict=True)]
+            yield _equal_states(problem, layout, ends, pairs, "the period", end)
         for phase, name in problem.shared_starts if first else ():
-            yield _equal_states(problem, layout, (phase, 0), (first + phase, 0), [name], end)
+            starts, what = ((phase, 0), (first + phase, 0)), "the start in all scenarios"
+            yield _equal_states(problem, layout, starts, [(name, name)], what, end)
     for numbers, total in problem.durations:
         free = [i for i in numbers if isinstance(spans[i].T, Free)]
         fixed = sum(limits(spans[i].T)[0] for i in numbers if i not in free)
@@ -207,25 +196,20 @@ def whole(problem: Problem, grid: Grid) -> Iterator[Piece]:
 
 
 def _equal_states(
-    problem: Problem,
-    layout: Layout,
-    a: tuple[int, int],
-    b: tuple[int, int],
-    names: Sequence[str],
-    order: Indices,
-) -> Piece:
-    """Return rows that equate the states `names` at the places (phase, node) a and b."""
+    problem: Problem, layout: Layout, places: tuple[tuple[int, int], tuple[int, int]],
+    names: Sequence[tuple[str, str]], what: str, order: Indices,
+) -> Piece:  # fmt: skip
+    """Return rows that equate pairs of states at two `places` (phase, node)."""
     columns: list[Indices] = []
     sizes: list[Array] = []
-    for span, node in (a, b):
+    for (span, node), states in zip(places, zip(*names, strict=True), strict=True):
         model = problem.spans[span].model
-        at = [[v.name for v in model.x].index(name) for name in names]
+        at = [[v.name for v in model.x].index(name) for name in states]
         columns.append(layout.spans[span].nodes[at, node])
         sizes.append(model.nominal("x")[at])
-    what = "the period" if a[1] < 0 else "the start in all scenarios"
-    rows = Rows.zero([f"{what} of {name}" for name in names], sizes[1])
-    weights = np.column_stack([sizes[0] / sizes[1], -np.ones(len(names))])
-    return linear_piece(rows, np.column_stack(columns), weights, a[0], order)
+    rows = Rows.zero([f"{what} of {name}" for name, _ in names], sizes[0])
+    weights = np.column_stack([np.ones(len(names)), -sizes[1] / sizes[0]])
+    return linear_piece(rows, np.column_stack(columns), weights, places[0][0], order)
 
 
 def largest(layout: Layout, scenarios: int, spans: int, name: str) -> list[Piece]:
@@ -233,6 +217,6 @@ def largest(layout: Layout, scenarios: int, spans: int, name: str) -> list[Piece
     column = np.array([[layout.largest]])
     rows = Rows((name,), np.ones(1), np.array([-inf]), np.zeros(1))
     return [
-        linear_piece(rows, column, np.array([[-1.0]]), 0, order_of(spans + 1, i, 0))
+        linear_piece(rows, column, np.array([[-1.0]]), 0, Piece.order_of(spans + 1, i, 0))
         for i in range(scenarios)
     ]

@@ -21,25 +21,14 @@ those of the discrete map. Bounds and path conditions are imposed at the nodes.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Span
 from ocp.formulation.statement import further_states, rebuilt
-from ocp.transcription.blocks import (
-    LAST,
-    Array,
-    Block,
-    Indices,
-    Linear,
-    Piece,
-    Rows,
-    block,
-    order_of,
-    select,
-)
+from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, Rows, block, select
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.unknowns import Grid, Local
 from symfric import integrator
@@ -90,7 +79,7 @@ class Engine:
         """Block with compiled Functions."""
         path = str(library(self._prospect.written(), *self._prospect.names))
         functions = {name: ca.external(f.name(), path) for name, f in self._functions.items()}
-        return replace(self.block, **functions)
+        return self.block._replace(**functions)
 
     def at(self, places: int) -> Block:
         """Return the block for a number of places per iteration, compiled if this saves time."""
@@ -109,9 +98,7 @@ LEAST, MOST = 1e-6, 1e6
 """Limits of the scales of rows without nominal value, which are derived from derivatives."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class PointEquations:
+class PointEquations(NamedTuple):
     """Equations of one collocation point of a phase.
 
     Attributes:
@@ -190,21 +177,13 @@ def piece_of_points(equations: PointEquations, grid: Grid) -> Piece:
     velocities = np.flatnonzero(equations.sloped < 0)
     known = np.flatnonzero(equations.sloped >= 0)
     factors = np.broadcast_to(slopes, (velocities.size, *slopes.shape))
+    columns, places = (span.inner, span.z, span.u[:, interval]), (interval, scheme.nodes[1 + j])
     return local.piece(
-        grid,
-        equations.rows,
-        equations.engine.at(N * d),
-        (span.inner, span.z, span.u[:, interval]),
-        (interval, scheme.nodes[1 + j]),
-        order_of(local.number, interval, 2 + j),
+        grid, equations.rows, equations.engine.at(N * d), columns, places,
+        Piece.order_of(local.number, interval, 2 + j), weights=scheme.weights[j],
         extra=[(carrying[velocities], factors)] if velocities.size else [],
-        weights=scheme.weights[j],
-        linear=Linear.of(
-            np.repeat(equations.sloped[known], d + 1),
-            carrying[known].reshape(-1, N * d),
-            -np.tile(slopes, (known.size, 1)),
-        ),
-    )
+        linear=Linear.of(equations.sloped[known], carrying[known], -slopes),
+    )  # fmt: skip
 
 
 def gaps(number: int, span: Span, grid: Grid) -> Piece:
@@ -216,15 +195,11 @@ def gaps(number: int, span: Span, grid: Grid) -> Piece:
     weights = np.concatenate([np.ones((len(names), 1, own.intervals)), -weights], axis=1)
     return Piece(
         rows=Rows.zero([f"the continuity of {name}" for name in names], span.model.nominal("x")),
-        order=order_of(number, interval, 0),
+        order=Piece.order_of(number, interval, 0),
         span=number,
         interval=interval,
         offset=np.ones(own.intervals),
-        linear=Linear.of(
-            np.repeat(np.arange(len(names)), weights.shape[1]),
-            columns.reshape(-1, own.intervals),
-            weights.reshape(-1, own.intervals),
-        ),
+        linear=Linear.of(np.arange(len(names)), columns, weights),
     )
 
 
@@ -233,9 +208,7 @@ LARGEST = 20_000
 the steps remain function calls, which are slower but take less time to differentiate."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Shot:
+class Shot(NamedTuple):
     """Equations of one interval of a phase.
 
     Attributes:
@@ -349,5 +322,5 @@ def pieces_of_intervals(made: Shot, gap: Piece, grid: Grid) -> Iterator[Piece]:
         if inputs:
             at, node, offset = np.append(at, N - 1), np.arange(N + 1), np.append(zero, 1.0)
         columns = own.nodes[:, node], own.z, own.u[:, at]
-        order = order_of(number, node, LAST - 2)
+        order = Piece.order_of(number, node, Piece.LAST - 2)
         yield local.piece(grid, rows, path, columns, (at, offset), order)

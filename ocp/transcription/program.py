@@ -270,9 +270,7 @@ class SolverStatistics:
         )
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Outcome:
+class Outcome(NamedTuple):
     """Result of a solver, which may have failed.
 
     Attributes:

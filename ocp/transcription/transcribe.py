@@ -18,39 +18,15 @@ from numpy.typing import ArrayLike
 
 from ocp.formulation.phase import Free, Row, Span, limits
 from ocp.formulation.problem import Problem
+from ocp.transcription import conditions, intervals, unknowns
 from ocp.transcription.assembly import Assembled, Slot, assemble
 from ocp.transcription.blocks import Array, Piece
 from ocp.transcription.closed_loops import Closing, closing
-from ocp.transcription.conditions import (
-    Maker,
-    at_nodes,
-    at_starts,
-    between,
-    largest,
-    plain_links,
-    whole,
-)
-from ocp.transcription.intervals import (
-    PointEquations,
-    Shot,
-    gaps,
-    piece_of_points,
-    pieces_of_intervals,
-    point_equations,
-    shot,
-)
+from ocp.transcription.conditions import Maker
+from ocp.transcription.intervals import PointEquations, Shot
 from ocp.transcription.program import Place, Program, Stages, bounds_of, stages_of
 from ocp.transcription.schemes import Scheme, Shooting, check_meshes, nodes_of
-from ocp.transcription.unknowns import (
-    Grid,
-    Layout,
-    Local,
-    Points,
-    SpanPoints,
-    data_of,
-    lay_out,
-    scale_of,
-)
+from ocp.transcription.unknowns import Grid, Layout, Local, Points, SpanPoints
 from symfric.foundation.parameters import check_names
 
 KEPT = 4
@@ -106,12 +82,12 @@ class Discretisation:
         """Assemble the program for given numbers of intervals and indices of nodes."""
         problem, scheme = self.problem, self.scheme.coefficients()
         extra = [2 * part.m if part and scheme.degree else 0 for part in self.closing]
-        layout = lay_out(problem, scheme.degree, intervals, extra)
+        layout = unknowns.lay_out(problem, scheme.degree, intervals, extra)
         released = [part.released if part else {} for part in self.closing]
         p = ca.MX.sym(
             "p", sum(len(s.model.p) for s in problem.spans) + sum(intervals) + 2 * len(nodes)
         )
-        grid = Grid(layout, scheme, data_of(problem, p, intervals), nodes, released)
+        grid = Grid(layout, scheme, unknowns.data_of(problem, p, intervals), nodes, released)
         w, c = ca.MX.sym("w", layout.size), np.zeros(layout.size)
         pieces, phases = list(self._pieces(grid)), len(problem.chain)
         scenarios = len(problem.spans) // phases
@@ -119,7 +95,7 @@ class Discretisation:
         if problem.kind == "worst":
             slots = [(0.0, len(pieces) + i) for i in range(scenarios)]
             pieces = [replace(piece, slot=piece.span // phases) for piece in pieces]
-            pieces += largest(layout, scenarios, len(problem.spans), LARGEST)
+            pieces += conditions.largest(layout, scenarios, len(problem.spans), LARGEST)
             c[layout.largest] = 1.0
         assembled = assemble(w, p, pieces, slots, c)
         f, g, gradient, jacobian, hessian, rows_of = assembled
@@ -127,7 +103,7 @@ class Discretisation:
         for piece, at in zip(pieces, rows_of, strict=True):
             rows = piece.rows
             lower[at], upper[at] = ((b / rows.scale)[:, None] for b in (rows.lower, rows.upper))
-        bounds, scale = bounds_of(problem, grid), scale_of(problem, layout)
+        bounds, scale = bounds_of(problem, grid), unknowns.scale_of(problem, layout)
         program = Program(
             w, p, f, g, gradient, jacobian, hessian, *bounds, lower, upper, np.zeros(0), scale
         )  # fmt: skip
@@ -137,19 +113,19 @@ class Discretisation:
         """Yield the rows and costs of all phases."""
         spans = self.problem.spans
         for number, (span, equations) in enumerate(zip(spans, self.spans, strict=True)):
-            gap, loops = gaps(number, span, grid), self.closing[number]
+            gap, loops = intervals.gaps(number, span, grid), self.closing[number]
             if loops is not None:
                 yield from loops.pieces(grid)
                 gap = loops.corrected(gap, grid) if grid.scheme.degree else gap
             if isinstance(equations, Shot):
-                yield from pieces_of_intervals(equations, gap, grid)
+                yield from intervals.pieces_of_intervals(equations, gap, grid)
             else:
                 yield gap
-                yield piece_of_points(equations, grid)
+                yield intervals.piece_of_points(equations, grid)
             if span.phase:
-                yield from plain_links(number, spans[number - 1], span, grid)
+                yield from conditions.plain_links(self.problem, number, grid)
         yield from filter(None, (condition(grid) for condition in self.conditions))
-        yield from whole(self.problem, grid)
+        yield from conditions.whole(self.problem, grid)
 
 
 def discretise(
@@ -176,14 +152,20 @@ def discretise(
         key = (span.phase, id(span.model), id(span.running), id(span.path))
         if key not in made:
             shooting = isinstance(scheme, Shooting)
-            made[key] = shot(local, scheme) if shooting else point_equations(local)
-        spans.append(replace(made[key], local=local))
+            made[key] = (
+                intervals.shot(local, scheme) if shooting else intervals.point_equations(local)
+            )
+        spans.append(made[key]._replace(local=local))
         periodic, named = () if earlier else problem.periodic, problem.chain[span.phase].start
-        loops.append(closing(local, earlier[-1][1] if earlier else None, periodic, named))
-        nodes += at_nodes(local)
+        before, mechanics = earlier[-1][1] if earlier else None, span.model.holonomic
+        closed = mechanics is not None and bool(mechanics.phi.numel())
+        loops.append(closing(local, mechanics, before, periodic, named) if closed else None)
+        nodes += conditions.at_nodes(local)
         if earlier:
-            joined += between(spans[-2].local, local)
-    nodes += [at_starts(spans[k].local, rows) for k, rows in (starts or {}).items() if rows]
+            joined += conditions.between(spans[-2].local, local)
+    nodes += [
+        conditions.at_starts(spans[k].local, rows) for k, rows in (starts or {}).items() if rows
+    ]
     return Discretisation(problem, scheme, tuple(spans), tuple(loops), (*nodes, *joined))
 
 

@@ -320,15 +320,10 @@ class Local:
         if self.free:
             parts.append(np.full((1, places), layout.spans[self.number].T))
         if self.free_before:
-            shape = (1, len(self.free_before), places)
             earlier = np.array([layout.spans[i].T for i, _ in self.free_before])
             scales = np.array([initial(span.T) for _, span in self.free_before])
-            parts.append(
-                (
-                    np.broadcast_to(earlier[None, :, None], shape),
-                    np.broadcast_to(scales[None, :, None], shape),
-                )
-            )
+            times, factors = (np.tile(a[None, :, None], places) for a in (earlier, scales))
+            parts.append((times, factors))
         if self.span.chosen:
             names = list(self.choices)
             rows = layout.chosen[[names.index(name) for name in self.span.chosen]]
@@ -356,7 +351,7 @@ class Local:
             made: the block.
             columns: columns of x, z and u at all places.
             at: interval and offset of each place.
-            order: order of the rows; see `blocks.order_of`.
+            order: order of the rows; see `Piece.order_of`.
             extra: columns of further local unknowns of the block, which follow v.
             weights: quadrature weights of the places for an interval of length 1.
             linear: linear part of the rows.

@@ -6,9 +6,9 @@ The problems are read from `ivp_problems.toml`.
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
-from math import nan, pi, sin
+from math import nan, pi
 from pathlib import Path
 from typing import Any, final
 
@@ -201,35 +201,10 @@ def mechanism() -> Mechanism:
     return m
 
 
-def squeezer(formulation: str) -> Model:
-    """Return the equations of `mechanism`; absolute coordinates also give sines of all angles."""
-    made = mechanism().build(formulation=formulation)
-    if formulation == "joint":
-        return made
-    own = {v.name: v.symbol for v in made.x}
-    sines = {f"sin_{body}": 2 * own[f"{body}_e0"] * own[f"{body}_e3"] for body in bodies}
-    more = {name: Output(value, "1") for name, value in sines.items()}
-    return replace(made, outputs={**made.outputs, **more})
-
-
-bodies: dict[str, dict[str, Any]] = DATA[ANDREWS.name]["bodies"]
-REFERENCES = {
-    "joint": ANDREWS.reference,
-    "absolute": {
-        f"sin_{body}": sin(sum(ANDREWS.reference[name] for name in parts["angles"]))
-        for body, parts in bodies.items()
-    },
-}
-JOINT, ABSOLUTE = (
-    Problem(
-        f"{ANDREWS.name}, {formulation} coordinates",
-        partial(squeezer, formulation),
-        ANDREWS.t_end,
-        reference,
-        drift=("constraint_position",),
-    )
-    for formulation, reference in REFERENCES.items()
-)
+JOINT = Problem(
+    f"{ANDREWS.name}, joint coordinates", lambda: mechanism().build(), ANDREWS.t_end,
+    ANDREWS.reference, drift=("constraint_position",),
+)  # fmt: skip
 PROBLEMS = (*(published(name) for name in DATA if name != "car axis"), JOINT, published("car axis"))
 """All problems of the benchmark."""
 

@@ -71,11 +71,6 @@ class Regularisation:
     law: Law
     powers: Mapping[str, float]
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the scaled parameters."""
-        return tuple(self.powers)
-
     def values(self, s: float) -> dict[str, float]:
         """Return the values of the scaled parameters at the factor `s`."""
         known = parameters(self.law)

@@ -1,26 +1,23 @@
 """Laws that combine or wrap other laws: sums, asymmetric and load-dependent laws."""
 
 from dataclasses import fields as fields_of
-from dataclasses import replace
-from itertools import accumulate, pairwise
 from typing import ClassVar
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, column, empty, is_casadi, smallest, total
+from symfric.foundation.numeric import Scalar, is_casadi, smallest
 from symfric.foundation.parameters import (
     Parametric,
-    distinct,
     parameters,
     parametric,
     with_values,
 )
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law, chosen
-from symfric.laws.composed.wrap import Wrapper
+from symfric.laws.base.law import Facts, Law, check_law
+from symfric.laws.composed.wrap import Composed, Wrapper
 
 
 @parametric
-class Sum(Law):
+class Sum(Composed):
     """Sum of friction laws, with the states of all terms.
 
         F = F_1 + F_2 + ...
@@ -45,92 +42,13 @@ class Sum(Law):
         object.__setattr__(self, "laws", tuple(law for group in terms for law in group))
         super().__post_init__()
 
-    @property
-    def states(self) -> tuple[State, ...]:
-        """States of all terms."""
-        names = distinct([[state.name for state in law.states] for law in self.laws])
-        return tuple(
-            replace(state, name=name)
-            for law, group in zip(self.laws, names, strict=True)
-            for state, name in zip(law.states, group, strict=True)
-        )
+    def at(self, v: Scalar) -> tuple[Law, ...]:
+        """Return the terms."""
+        return self.laws
 
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        """Further inputs of all terms, without duplicates."""
-        return tuple(dict.fromkeys(i for law in self.laws for i in law.inputs))
-
-    def terms(self, z: Scalar) -> list[tuple[Law, Scalar]]:
-        """Return each law with its rows of `z`."""
-        ends = accumulate((len(law.states) for law in self.laws), initial=0)
-        return [(law, z[a:b]) for law, (a, b) in zip(self.laws, pairwise(ends), strict=True)]
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """Smallest velocity scale of the terms [m/s]."""
-        return smallest(*(law.velocity_scale for law in self.laws))
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Return the friction force [N]."""
-        return total(law.force(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z))
-
-    def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
-        """Return the sum of the sliding forces [N] on one side."""
-        return total(law.sliding(v, N, side, **chosen(law, inputs)) for law in self.laws)
-
-    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the sum of the static levels [N]."""
-        return total(law.static_level(N, side, **chosen(law, inputs)) for law in self.laws)
-
-    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the sum of the bounds [N] of the terms."""
-        return total(law.most_held(N, side, **chosen(law, inputs)) for law in self.laws)
-
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Return the rates of all states."""
-        rates = [
-            law.rate(v, N, part, **chosen(law, inputs)) for law, part in self.terms(z) if law.states
-        ]
-        return _join(v, rates)
-
-    def switches(
-        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
-    ) -> tuple[Switch, ...]:
-        """Return the changes of mode of all terms, with the state names of the sum."""
-        names = iter(state.name for state in self.states)
-        switches: list[Switch] = []
-        for law, part in self.terms(z):
-            new = {state.name: next(names) for state in law.states}
-            for switch in law.switches(v, N, part, **chosen(law, inputs)):
-                reset = {new[name]: value for name, value in switch.reset.items()}
-                switches.append(replace(switch, reset=reset))
-        return tuple(switches)
-
-    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """Return the held steps of the terms; None if a term with states has none."""
-        known = [law.held_step(v, N, part, h) for law, part in self.terms(z) if law.states]
-        steps = [step for step in known if step is not None]
-        if not steps or len(steps) < len(known):
-            return None
-        return _join(v, [end for end, _ in steps]), _join(v, [mean for _, mean in steps])
-
-    def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
-        """Return the equilibria of the terms, or None if no term with states has any.
-
-        For a term without equilibria these are its steady states.
-        """
-        known = [(law, law.held_rest(v, N, part)) for law, part in self.terms(z) if law.states]
-        if all(rest is None for _, rest in known):
-            return None
-        return _join(v, [law.steady_state(v, N) if r is None else r for law, r in known])
-
-    def warnings(self) -> tuple[str, ...]:
-        """Return the warnings of the terms."""
-        return tuple(warning for law in self.laws for warning in law.warnings())
-
-    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return the steady states of all terms."""
-        return _join(v, [law.steady_state(v, N) for law in self.laws if law.states])
+    def on_side(self, side: int) -> tuple[Law, ...]:
+        """Return the terms."""
+        return self.laws
 
 
 @parametric
@@ -178,9 +96,9 @@ class Asymmetric(Wrapper):
         }
         return with_values(self.positive, blended)
 
-    def inner_of(self, side: int) -> Law:
+    def on_side(self, side: int) -> tuple[Law, ...]:
         """Return the law of one side."""
-        return self.positive if side > 0 else self.negative
+        return (self.positive if side > 0 else self.negative,)
 
     @property
     def velocity_scale(self) -> Scalar:
@@ -229,9 +147,3 @@ def _structure(value: object) -> object:
 
 def _differ(a: Scalar, b: Scalar) -> bool:
     return a is not b and (is_casadi(a, b) or bool(a != b))
-
-
-def _join(v: Scalar, columns: list[Scalar]) -> Scalar:
-    if not columns:
-        return empty(v)
-    return column(*(row for c in columns for row in (c[i] for i in range(c.shape[0]))))

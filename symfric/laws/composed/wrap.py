@@ -1,19 +1,144 @@
-"""Laws that wrap one other law: lagged, temperature-dependent, and normalised by the load."""
+"""Laws evaluated by other laws, and wrappers: lag, temperature, and normalisation by the load."""
 
+from abc import abstractmethod
 from dataclasses import fields as fields_of
+from dataclasses import replace
+from itertools import accumulate, pairwise
 
-from symfric.foundation.numeric import Scalar, column, exp
-from symfric.foundation.parameters import parameters, parametric, with_values
+from symfric.foundation.numeric import Scalar, column, empty, exp, smallest, total
+from symfric.foundation.parameters import distinct, parameters, parametric, with_values
 from symfric.laws.base import fields
-from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law
+from symfric.laws.base.law import Facts, Input, Law, State, Switch, check_law, chosen
 
 
-class Wrapper(Law):
+class Composed(Law):
+    """Law evaluated by other laws: the sum of their forces, with the states of all of them.
+
+    F = sum of F_i(v, load(N), z_i)
+    """
+
+    @abstractmethod
+    def at(self, v: Scalar) -> tuple[Law, ...]:
+        """Return the laws with their parameters at the sliding velocity `v`."""
+
+    @abstractmethod
+    def on_side(self, side: int) -> tuple[Law, ...]:
+        """Return the laws with their parameters on one side of v = 0."""
+
+    def load(self, N: Scalar) -> Scalar:
+        """Return the normal force [N] of the laws."""
+        return N
+
+    def terms(self, z: Scalar, v: Scalar = 0.0) -> list[tuple[Law, Scalar]]:
+        """Return each law at the velocity `v` with its rows of `z`."""
+        laws = self.at(v)
+        if len(laws) == 1:
+            return [(laws[0], z)]
+        ends = accumulate((len(law.states) for law in laws), initial=0)
+        return [(law, z[a:b]) for law, (a, b) in zip(laws, pairwise(ends), strict=True)]
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """States of all laws, in their order; the name of a shared state has a number."""
+        laws = self.on_side(1)
+        names = distinct([[state.name for state in law.states] for law in laws])
+        return tuple(
+            replace(state, name=name)
+            for law, group in zip(laws, names, strict=True)
+            for state, name in zip(law.states, group, strict=True)
+        )
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Further inputs of all laws, without duplicates."""
+        return tuple(dict.fromkeys(i for law in self.on_side(1) for i in law.inputs))
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """Smallest velocity scale of the laws [m/s]."""
+        return smallest(*(law.velocity_scale for law in self.on_side(1)))
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Return the friction force [N]."""
+        terms, load = self.terms(z, v), self.load(N)
+        return total(law.force(v, load, part, **chosen(law, inputs)) for law, part in terms)
+
+    def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
+        """Return the sum of the sliding forces [N] on one side."""
+        laws, load = self.on_side(side), self.load(N)
+        return total(law.sliding(v, load, side, **chosen(law, inputs)) for law in laws)
+
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the sum of the static levels [N]."""
+        laws, load = self.on_side(side), self.load(N)
+        return total(law.static_level(load, side, **chosen(law, inputs)) for law in laws)
+
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the sum of the bounds [N] of the laws."""
+        laws, load = self.on_side(side), self.load(N)
+        return total(law.most_held(load, side, **chosen(law, inputs)) for law in laws)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
+        """Return the rates of all states."""
+        terms, load = self.terms(z, v), self.load(N)
+        rates = [law.rate(v, load, x, **chosen(law, inputs)) for law, x in terms if law.states]
+        return _join(v, rates)
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
+    ) -> tuple[Switch, ...]:
+        """Return the changes of mode of all laws, with the state names of this law."""
+        names = iter(state.name for state in self.states)
+        switches: list[Switch] = []
+        for law, part in self.terms(z, v):
+            new = {state.name: next(names) for state in law.states}
+            for switch in law.switches(v, self.load(N), part, **chosen(law, inputs)):
+                reset = {new[name]: value for name, value in switch.reset.items()}
+                switches.append(replace(switch, reset=reset))
+        return tuple(switches)
+
+    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
+        """Return the held steps of the laws; None if a law with states has none."""
+        terms, load = self.terms(z, v), self.load(N)
+        known = [law.held_step(v, load, part, h) for law, part in terms if law.states]
+        steps = [step for step in known if step is not None]
+        if not steps or len(steps) < len(known):
+            return None
+        return _join(v, [end for end, _ in steps]), _join(v, [mean for _, mean in steps])
+
+    def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
+        """Return the equilibria of the laws, or None if no law with states has any.
+
+        For a law without equilibria these are its steady states.
+        """
+        terms, load = self.terms(z, v), self.load(N)
+        known = [(law, law.held_rest(v, load, part)) for law, part in terms if law.states]
+        if all(rest is None for _, rest in known):
+            return None
+        return _join(v, [law.steady_state(v, load) if r is None else r for law, r in known])
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        """Return the steady states of all laws."""
+        return _join(v, [law.steady_state(v, self.load(N)) for law in self.at(v) if law.states])
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return the warnings of the laws."""
+        return tuple(warning for law in self.on_side(1) for warning in law.warnings())
+
+
+def _join(v: Scalar, columns: list[Scalar]) -> Scalar:
+    """Return the rows of all `columns` in one column."""
+    if len(columns) < 2:
+        return columns[0] if columns else empty(v)
+    return column(*(row for c in columns for row in (c[i] for i in range(c.shape[0]))))
+
+
+class Wrapper(Composed):
     """Law that evaluates another law with modified parameters or a modified normal force.
 
         F = F_inner(v)(v, load(N), z)
 
-    Subclasses override `inner`, `inner_at`, `inner_of`, `load` or methods of `Law`.
+    Subclasses override `inner`, `inner_at`, `on_side`, `load` or methods of `Law`.
     """
 
     law: Law
@@ -33,70 +158,13 @@ class Wrapper(Law):
         """Return the wrapped law with its parameters at the sliding velocity `v`."""
         return self.inner
 
-    def inner_of(self, side: int) -> Law:
+    def at(self, v: Scalar) -> tuple[Law, ...]:
+        """Return the wrapped law with its parameters at the sliding velocity `v`."""
+        return (self.inner_at(v),)
+
+    def on_side(self, side: int) -> tuple[Law, ...]:
         """Return the wrapped law with its parameters on one side of v = 0."""
-        return self.inner
-
-    def load(self, N: Scalar) -> Scalar:
-        """Return the normal force [N] of the wrapped law."""
-        return N
-
-    @property
-    def states(self) -> tuple[State, ...]:
-        """States of the wrapped law."""
-        return self.inner.states
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        """Further inputs of the wrapped law."""
-        return self.inner.inputs
-
-    @property
-    def velocity_scale(self) -> Scalar:
-        """Velocity scale of the wrapped law [m/s]."""
-        return self.inner.velocity_scale
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Return the friction force [N]."""
-        return self.inner_at(v).force(v, self.load(N), z, **inputs)
-
-    def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
-        """Return the steady sliding force [N] of the wrapped law on one side."""
-        return self.inner_of(side).sliding(v, self.load(N), side, **inputs)
-
-    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the largest force [N] of the wrapped law in stick against a pull to `side`."""
-        return self.inner_of(side).static_level(self.load(N), side, **inputs)
-
-    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the bound [N] of the wrapped law for motion to `side`."""
-        return self.inner_of(side).most_held(self.load(N), side, **inputs)
-
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar) -> Scalar:
-        """Return the rates of the states."""
-        return self.inner_at(v).rate(v, self.load(N), z, **inputs)
-
-    def switches(
-        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
-    ) -> tuple[Switch, ...]:
-        """Return the changes of mode of the wrapped law."""
-        return self.inner_at(v).switches(v, self.load(N), z, **inputs)
-
-    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
-        """Return the steady states of the wrapped law."""
-        return self.inner_at(v).steady_state(v, self.load(N))
-
-    def held_step(self, v: Scalar, N: Scalar, z: Scalar, h: Scalar) -> tuple[Scalar, Scalar] | None:
-        """Return the held step of the wrapped law."""
-        return self.inner_at(v).held_step(v, self.load(N), z, h)
-
-    def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
-        """Return the equilibria of the wrapped law."""
-        return self.inner_at(v).held_rest(v, self.load(N), z)
-
-    def warnings(self) -> tuple[str, ...]:
-        """Return the warnings of the wrapped law."""
-        return self.inner.warnings()
+        return (self.inner,)
 
 
 @parametric

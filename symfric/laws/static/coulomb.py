@@ -188,11 +188,7 @@ class Table(StaticLaw):
     @cached_property
     def _slopes(self) -> list[tuple[float, float]]:
         """Slopes at both ends of each interval: weighted harmonic means, zero at the end points."""
-        h = np.diff(self.speeds)
-        secant = np.diff(self.coefficients) / h
-        before, after = secant[:-1], secant[1:]
-        near, far = 2 * h[1:] + h[:-1], h[1:] + 2 * h[:-1]
-        turning = before * after <= 0
-        one, other = (np.where(turning, 1.0, s) for s in (before, after))
-        inner = np.where(turning, 0.0, (near + far) / (near / one + far / other))
-        return list(pairwise([0.0, *inner.tolist(), 0.0]))
+        from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  (it is slow to import)
+
+        curve = PchipInterpolator(self.speeds, self.coefficients)
+        return list(pairwise([0.0, *curve.derivative()(self.speeds[1:-1]).tolist(), 0.0]))

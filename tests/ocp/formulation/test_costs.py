@@ -11,7 +11,7 @@ from ocp.formulation.expressions import TIME, Cost, Signals, at_end, effort, int
 from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem, cost_size, sized
 from ocp.formulation.validate import doubts
-from symfric import BrownMcPhee, Model, Variable, drive
+from symfric import Model, Variable
 
 MODEL = double_integrator()
 
@@ -69,8 +69,8 @@ def test_worst_is_the_largest_of_all_scenarios() -> None:
 def test_signals_are_states_inputs_parameters_outputs_and_time() -> None:
     model = stage(free=["m"])
     signals = Signals(model)
-    assert ca.is_equal(signals.force, model.u[0].symbol)
-    assert ca.is_equal(signals["m"], model.p[0].symbol)
+    for found, symbol in ((signals.force, model.u[0]), (signals["m"], model.p[0])):
+        assert ca.is_equal(found, symbol.symbol)
     assert ca.is_equal(signals.t, model.t)
     assert ca.depends_on(signals.friction, model.x[1].symbol)
 
@@ -111,19 +111,6 @@ def test_moves_are_solved_alike_at_every_size() -> None:
     assert found.cost == pytest.approx(1e-12 * 48.0 * costs[1], rel=1e-6)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("size", [1e-5, 1e3])
-def test_friction_is_solved_alike_at_every_size(size: float) -> None:
-    def cost(size: float) -> float:
-        law = BrownMcPhee(mu_s=3.0 * size, mu_d=3.0 * size, v_t=1e-5 * size)
-        phase = Phase(drive(law, m=2.0, N=1.0), 1.0, end={"x": size, "v": 0.0})
-        found = solve(Problem(phase, integral(lambda s: s.force**2)), starts=1)
-        assert [mode.kind for mode in found.modes["guide"]] == ["slip+"]
-        return found.cost / size**2
-
-    assert cost(size) == pytest.approx(cost(0.1), rel=1e-6)
-
-
 def test_sizes_follow_from_ends_bounds_and_equations_unless_near() -> None:
     assert nominals(sized(move(1e-6))) == pytest.approx({"x": 1e-6, "v": 1e-6, "u": 2e-6})
     assert cost_size(sized(move(1e-6))) == pytest.approx(4e-12)
@@ -160,14 +147,8 @@ def test_odd_sizes_are_doubted(reach: float, most: float, text: str) -> None:
 
 
 def test_doubts_follow_only_a_failed_solve() -> None:
-    x, z, f = Variable("x", "m"), Variable("z", "N", nominal=2.0), Variable("f", "N")
-    model = Model("rod", x=(x,), z=(z,), u=(f,), ode=z.symbol, alg=z.symbol - f.symbol)
-    problem = Problem(Phase(model, 1.0, end={"z": 2000.0}), integral(lambda s: s.f**2))
-    assert "z = 2000 N is 1000 times its nominal 2 N" in doubts(problem)
-    options: dict[str, Any] = {"throw": False, "intervals": 10, "refine": False}
-    failed = solve(cart(300.0, 40.0), **options)
-    assert not failed.ok
-    assert failed.message.endswith("check the unit.")
+    options: dict[str, Any] = {"throw": False, "intervals": 5, "refine": False}
+    assert solve(cart(300.0, 40.0), **options).message.endswith("check the unit.")
     assert "check the unit" not in solve(cart(300.0, 4000.0), **options).message
 
 

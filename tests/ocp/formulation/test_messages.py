@@ -42,7 +42,6 @@ def moved(**changes: Any) -> Problem:
     ("changes", "message"),
     [
         ({"T": 0.0}, r"expected a duration T > 0 \[s\] or Free\(lower, upper\), got 0\.0"),
-        ({"T": "1 s"}, "expected a duration T > 0 .* got '1 s'"),
         ({"T": (0.1, 1.0)}, r"expected a duration T > 0 .*; write Free\(0\.1, 1\.0\)"),
         ({"cost": None}, "expected a cost made of integral"),
         ({"cost": lambda s: s.a}, r"cost: .* wrap it in integral\(\.\.\.\) or at_end"),
@@ -59,37 +58,25 @@ def moved(**changes: Any) -> Problem:
         ({"cost": track("x", "gaol", 1.0)}, r"track: .* got gaol; .*give its value: p=\{'gaol'"),
         ({"end": {"y": 1.0}}, "end: expected one of x, v, a, power, x_acc, got y"),
         ({"end": {"T": 1.0}}, "end: .* got T; durations are T of the phases"),
-        ({"start": {"vv": 1.0}}, r"start: .* got vv; did you mean v\?"),
         ({"bounds": {"powr": 1.0}}, r"bounds: .* got powr; did you mean power\?"),
         ({"p": {"m": 1.0}}, r"p: expected no names, got m; .*free=\['m'\]"),
         ({"choose": {"m": (1.0, 2.0)}}, r"choose: expected no names, got m; .*free=\['m'\]"),
         ({"scenarios": {"a": {"m": 1.0}}}, r"scenario 'a': expected no names, got m"),
         ({"via": {0.5: {"z": 1.0}}}, r"via 0\.5: expected one of x, v, power, x_acc, got z"),
-        (
-            {"via": {0.5: {"a": 1.0}}},
-            "got a; an input holds on intervals; with rates",
-        ),
+        ({"via": {0.5: {"a": 1.0}}}, "got a; an input holds on intervals; with rates"),
         ({"via": {1.5: {"x": 1.0}}}, r"via: expected fractions of T between 0 and 1, got 1\.5"),
         ({"via": [0.5]}, "via: expected states by fractions of T"),
         ({"via": {0.5: {"x": (2, 1)}}}, r"via 0\.5: expected x as a finite number or \(lower"),
-        ({"bounds": {"a": (1.0, -1.0)}}, r"bounds: expected a as a finite .* got \(1\.0, -1\.0\)"),
         ({"bounds": {"a": [0, 1]}}, r"bounds: expected a .* got \[0, 1\]; write a tuple"),
         ({"end": {"x": "far"}}, "end: expected x as a finite number .* got 'far'"),
         ({"rates": {"a": 400.0}}, r"rates: .* got 400\.0; write \(-400, 400\)"),
         ({"rates": {"v": (-1, 1)}}, "rates: .* got v; only inputs have rates that are chosen"),
         ({"bounds": {"x": (0.5, 2.0)}}, r"start: expected x inside its bounds \[0\.5, 2\], got 0"),
-        ({"bounds": {"x": (-1, 0.5)}}, r"end: expected x inside its bounds \[-1, 0\.5\], got 1"),
         ({"bounds": {"a": (-1, 1)}, "end": {"a": 3.0}}, r"end: expected a inside its bounds"),
         ({"model": implicit()}, r"expected an explicit model \(ode\), got an implicit one"),
         ({"path": lambda s: s.x <= 1}, r"path: expected a sequence of .*; write \[lambda"),
-        (
-            {"path": [lambda s: 0 <= s.x <= 1]},
-            "path condition 1: .* no if, and, max or",
-        ),
-        (
-            {"path": [lambda s: math.sin(s.x) <= 1]},
-            "got False: Python compared numbers",
-        ),
+        ({"path": [lambda s: 0 <= s.x <= 1]}, "path condition 1: .* no if, and, max or"),
+        ({"path": [lambda s: math.sin(s.x) <= 1]}, "got False: Python compared numbers"),
         ({"path": [lambda s: s.x - 1]}, r"path condition 1: .*; write <=, >= or =="),
         ({"path": [lambda s: ca.SX(0, 1)]}, "path condition 1: expected a comparison"),
         ({"path": [lambda s: None]}, "path condition 1: expected a comparison .* got None"),
@@ -153,6 +140,8 @@ def by_modes(**options: Any) -> object:
 
 
 OPEN, BACK = Phase(MODEL, Free(0.1, 3.0)), Phase(MODEL, 1.0, name="back")
+BAD_END, STARTED = Phase(MODEL, 1.0, end={"y": 1.0}), Phase(drive(LuGre()), 1.0, start={"v": FREE})
+OPENED = Phase(slider_crank(), 0.5, start={"crank": 1.0, "slider": 0.9})
 REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: Problem(MODEL, EFFORT), r"give the model a duration: Phase\(model, T=1\.0\)"),
     (lambda: Problem([Phase(MODEL, 1.0)], EFFORT), "join phases with >>"),
@@ -160,8 +149,8 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: Phase(1.0, 1.0), "Phase: expected a model"),
     (lambda: Phase(MODEL, 1.0) >> MODEL, "phases: expected a phase"),
     (
-        lambda: two(replace(BACK, T=-1.0), Phase(MODEL, 1.0, end={"y": 1.0})),
-        r"phase 1: end: .*; phase 2 'back': expected a duration",
+        lambda: two(replace(BACK, T=-1.0), BAD_END),
+        r"phase 1: end: .*; phase 2 'back': expected a d",
     ),
     (lambda: two(BACK, BACK), "expected every name once, got 'back' 2 times"),
     (lambda: two(link={"y": None}), "phase 2: link: expected one of x, v, got y"),
@@ -170,46 +159,25 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: two(link={"v": "w"}), "phase 2: link of v: signals of .* got w"),
     (lambda: two(joins=[lambda b: b.x <= 0]), "join 1: .* TypeError"),
     (lambda: two(joins=[lambda b, a: a.y <= 0]), "phase 2: join 1: signals of .* got y"),
-    (
-        lambda: two(start={"x": 2.0}),
-        "phase 2: start: expected x where the previous phase may end, 1, got 2; link",
-    ),
-    (
-        lambda: two(cost=EFFORT, second=Phase(MODEL, 1.0, cost=worst(EFFORT))),
-        "phase 2: cost: expected worst",
-    ),
+    (lambda: two(start={"x": 2.0}), "phase 2: start: .* previous phase may end, 1, got 2; link"),
+    (lambda: two(Phase(MODEL, 1.0, cost=worst(EFFORT))), "phase 2: cost: expected worst"),
     (lambda: two(Phase(stage(), 1.0)), r"phase 2: cost: .*; phases that differ have costs of"),
     (lambda: chosen((1.0, 1.0)), "the one number 1; a fixed value belongs in p"),
     (lambda: chosen(2.0), r"choose: expected m as \(lower, upper\) or \(lower, upper, guess\)"),
     (lambda: chosen((2.0, 1.0)), "with lower < upper"),
     (lambda: chosen((1.0, 2.0, 3.0)), "with a guess between"),
     (lambda: chosen((-2.0, -1.0)), r"within \[.*\] kg"),
-    (
-        lambda: chosen((1.0, 3.0), heavy={"m": 2.0}),
-        "once for all, got a separate value in scenario heavy",
-    ),
+    (lambda: chosen((1.0, 3.0), heavy={"m": 2.0}), "once for all, .* in scenario heavy"),
     (lambda: scenarios(heavy={"mm": 2.0}), "scenario 'heavy': .* got mm; did you mean m"),
-    (
-        lambda: scenarios(heavy={"m": 2.0}, light={"m": -2.0}),
-        r"scenario 'light': drive\.m: expected a number >= 1e-12",
-    ),
+    (lambda: scenarios(light={"m": -2.0}), r"scenario 'light': drive\.m: expected a number >="),
     (clash, "rates: expected new names for the rates, got u_rate"),
     (lambda: with_stop(stuck=False), "expected a model without events, got stop; deriv"),
     (lambda: with_stop(stuck=True), "expected a model without events, got stop; deriv"),
     (lambda: by_modes(friction="smooth"), "expected models without events, got .*modes"),
     (lambda: by_modes(scheme=Shooting()), "expected models without events, got .*modes"),
-    (
-        lambda: Problem(Phase(drive(LuGre()), 1.0, start={"v": FREE}), FORCE),
-        "whose start depends on v; name it",
-    ),
-    (
-        lambda: Problem(Phase(slider_crank(), 0.5, start={"crank": 1.0, "slider": 0.9}), TIME),
-        "start: expected positions from which all loops can be",
-    ),
-    (
-        lambda: Problem(OPEN >> OPEN, TIME, durations=[((0, 1), 7.0)]),
-        r"expected a sum .* 0\.2 to 6 s, got 7 to 7 s",
-    ),
+    (lambda: Problem(STARTED, FORCE), "whose start depends on v; name it"),
+    (lambda: Problem(OPENED, TIME), "start: expected positions from which all loops can be"),
+    (lambda: Problem(OPEN >> OPEN, TIME, durations=[((0, 1), 7.0)]), r"0\.2 to 6 s, got 7 to 7 s"),
     (lambda: rest_to_rest(MODEL, 1.0, 1.0, limit=1.0), "expected one of x, v, a, got force"),
     (lambda: TIME / 0.0, "expected a divisor that is not zero"),
     (lambda: worst(TIME) + TIME, r"write worst\(a \+ b\)"),
@@ -217,10 +185,7 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: worst(lambda s: s.x), "worst: expected a cost made of"),
     (lambda: integral("x"), "integral: expected a function of the signals"),
     (lambda: at_end("x"), "at_end: expected a function of the signals"),
-    (
-        lambda: integral(lambda s: s.forse).expressions(Signals(stage())),
-        r"got forse; did you mean force\?",
-    ),
+    (lambda: Signals(stage()).forse, r"got forse; did you mean force\?"),
     (lambda: track("", 0.0, 1.0), "track: expected the name of a signal"),
     (lambda: track("x", 0.0, 0.0), "track: weight: expected a number > 0"),
     (lambda: track("x", None, 1.0), "track: reference: .* or a function, or a name"),
@@ -235,13 +200,8 @@ def test_bad_phases_costs_and_choices_are_refused(make: Callable[[], object], me
 
 def test_all_problems_are_reported_at_once() -> None:
     with pytest.raises(ValueError) as error:
-        moved(
-            T=-1.0,
-            cost=integral(lambda s: s.b),
-            end={"y": 1.0},
-            bounds={"a": (1.0, 0.0)},
-            path=[lambda s: 0 <= s.x <= 1],
-        )
+        moved(T=-1.0, cost=integral(lambda s: s.b), end={"y": 1.0}, bounds={"a": (1.0, 0.0)},
+              path=[lambda s: 0 <= s.x <= 1])  # fmt: skip
     parts = ("problem 'double integrator': ", "T > 0", "got b", "got y", "bounds: expected a")
     for part in (*parts, "path condition 1"):
         assert str(error.value).count(part) == 1

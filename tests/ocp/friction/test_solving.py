@@ -7,51 +7,27 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
-from math import pi, tanh
+from math import tanh
 from typing import Any
 
 import casadi as ca
+import numpy as np
 import pytest
 from phases import unit_move
 from rubbing import KINDS, Machine, machine
 
-from ocp import Phase, Problem, Progress, Solution, at_end, integral, solve, strategies
+from ocp import Phase, Problem, Progress, Solution, at_end, integral, problems, solve, strategies
 from ocp.formulation.phase import FREE
-from ocp.friction import homotopy
+from ocp.friction import homotopy, smooth_models
 from ocp.friction.event_check import verify_exactly
 from ocp.friction.homotopy import FIRST, LAST, Sharp, sharpened
 from ocp.friction.mode_models import holding, mode_model
-from ocp.friction.smooth_models import (
-    Scale,
-    own_level,
-    same_size,
-    smoothed,
-    speeds_at,
-    sticking,
-    widths_at,
-)
-from ocp.problems import (
-    cart_pendulum,
-    load_through_spring,
-    out_and_back,
-    parcel_on_tray,
-    two_blocks,
-)
+from ocp.friction.smooth_models import Scale, own_level, speeds_at, sticking, widths_at
+from ocp.problems import out_and_back
 from ocp.solving.methods import Ipopt
 from ocp.transcription.schemes import Radau
-from symfric import (
-    BrownMcPhee,
-    Contact,
-    ExactCoulomb,
-    LuGre,
-    Model,
-    SolveError,
-    Status,
-    Variable,
-    drive,
-)
-from symfric.laws import Law
-from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prismatic, Revolute
+from symfric import BrownMcPhee, Contact, Model, SolveError, Status, Variable, drive
+from symfric.scenes import PendulumBox
 
 OUT_AND_BACK = 40.0 + 0.5 / (1.0 - 4.0 * tanh(0.25))
 SCALES = {"guide": Scale(2.0)}
@@ -110,20 +86,10 @@ def test_widths_follow_from_speeds_and_are_not_smaller_than_the_users() -> None:
     assert widths_at(sharp, SCALES, 0.1) == {"guide_v_t": pytest.approx(0.2)}
     assert own_level(wide, SCALES) == 0.25
     assert own_level(sharp, SCALES) == pytest.approx(5e-6)
-    assert same_size(SCALES, {"guide": Scale(5.0)}, 3.0)
-    assert not same_size(SCALES, {"guide": Scale(7.0)}, 3.0)
+    assert smooth_models.same_size(SCALES, {"guide": Scale(5.0)}, 3.0)
+    assert not smooth_models.same_size(SCALES, {"guide": Scale(7.0)}, 3.0)
     assert not sticking(unit_move().chain[0].model)
-    assert sticking(parcel_on_tray().chain[0].model)
-
-
-@pytest.mark.parametrize("law", [ExactCoulomb(mu_s=6.0, mu_d=4.0), LuGre(mu_s=6.0, mu_d=4.0)])
-def test_laws_without_a_width_have_a_stand_in(law: Law) -> None:
-    move = Phase(drive(law, m=1.0, N=1.0), 1.0, end={"x": 1.0, "v": 0.0})
-    problem = Problem(move, FORCE)
-    assert sticking(move.model)
-    assert own_level(problem, SCALES) == 0.0
-    assert [v.name for v in smoothed(problem).chain[0].model.x] == ["x", "v"]
-    assert widths_at(problem, SCALES, 0.1) == {"guide_width": pytest.approx(0.2)}
+    assert sticking(problems.parcel_on_tray().chain[0].model)
 
 
 # --- motions by modes ---------------------------------------------------------------------------
@@ -182,9 +148,14 @@ def judged(of: Machine, found: Solution) -> str:
     return "reported" if any(text in found.message for text in TELLING) else found.message
 
 
-def test_random_machine_is_solved_by_modes() -> None:
-    of = machine(12)
-    assert judged(of, solve(of.problem(), starts=2, throw=False)) == "exact"
+def test_motion_by_modes_arrives_by_other_equations(by_modes: Solution) -> None:
+    guide = Machine(
+        "guide", 1, lambda s, c, q, v: [[1.0]], lambda s, c, q, v: [0.5 * v[0]], (0,), ((1.0,),),
+        ((6.0, 4.0),), {0: 1.0},
+    )  # fmt: skip
+    controls = np.array([by_modes.controls["force"]])
+    end = guide.follow(np.append(by_modes.t_control, by_modes.T), controls)
+    assert np.abs(end).max() < NEAR
 
 
 @pytest.mark.slow
@@ -202,9 +173,9 @@ def test_a_hundred_machines_are_solved_or_reported() -> None:
 @pytest.mark.parametrize(
     ("make", "cost", "kinds"),
     [
-        (cart_pendulum, 71.534, {"x": ["slip+", "slip-", "stick", "slip+"]}),
-        (load_through_spring, 28.480, {"load": ["stick", "slip+", "slip-"]}),
-        (two_blocks, 59.18, {}),
+        (problems.cart_pendulum, 71.534, {"x": ["slip+", "slip-", "stick", "slip+"]}),
+        (problems.load_through_spring, 28.480, {"load": ["stick", "slip+", "slip-"]}),
+        (problems.two_blocks, 59.18, {}),
     ],
 )
 def test_rests_on_the_way_hold_under_exact_friction(
@@ -219,48 +190,13 @@ def test_rests_on_the_way_hold_under_exact_friction(
     assert verify_exactly(solution, tolerance=1e-4).ok
 
 
-def cart_pole(law: Callable[[float, float], Law]) -> Problem:
-    """1 kg on a rail and 0.3 kg on a rod of 0.5 m, friction in both joints: swing up, 0.8 m on."""
-    m = Mechanism("cart_pole", gravity=(0.0, 0.0, -9.81))
-    m.body("cart", 1.0, (1e-6,) * 3)
-    m.body("bob", 0.3, (1e-6,) * 3)
-    for frame in ("ground.rail", "cart.rail"):
-        m.frame(frame, z=(1.0, 0.0, 0.0), x=(0.0, 0.0, 1.0))
-    m.frame("cart.h", z=(0.0, -1.0, 0.0), x=(0.0, 0.0, -1.0))
-    m.frame("bob.h", at=(0.0, 0.0, 0.5), z=(0.0, -1.0, 0.0), x=(0.0, 0.0, -1.0))
-    rail = JointFriction(law(2.2, 1.5), normal=1.0)
-    pin = JointFriction(law(0.03, 0.02), radius=1.0, normal=1.0)
-    m.joint(Prismatic("x", "ground.rail", "cart.rail", friction=rail))
-    m.joint(Revolute("th", "cart.h", "bob.h", friction=pin))
-    force = m.input("force", "N", nominal=10.0)
-    m.force(JointSpringDamper("motor", "x", "slide", actuator=force))
-    start = dict.fromkeys(("x", "th", "x_rate", "th_rate"), 0.0)
-    move = Phase(m.build(), 2.0, start=start, end=start | {"x": 0.8, "th": pi})
-    return Problem(move, FORCE, bounds={"force": (-20.0, 20.0)})
-
-
-def narrow(mu_s: float, mu_d: float) -> Law:
-    return BrownMcPhee(mu_s=mu_s, mu_d=mu_d, v_t=1e-5)
-
-
 def test_holding_force_of_one_joint_contains_the_reaction_of_the_other() -> None:
-    model = cart_pole(narrow).chain[0].model
-    modes = {"x": 1, "th": 0}
+    model = PendulumBox(BrownMcPhee()).model()
+    modes = {"x": 1, "phi": 0}
     moving = mode_model(model, modes)
     force, rooms = holding(model, modes, "x")
     known = [moving.t, *(moving.vector(letter) for letter in "xzup")]
     assert not ca.Function("held", known, [force, *rooms.values()], {"allow_free": True}).has_free()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("law", [narrow, lambda s, d: ExactCoulomb(mu_s=s, mu_d=d)])
-def test_cart_pole_with_friction_in_both_joints(law: Callable[[float, float], Law]) -> None:
-    """Both laws tend to the same friction: 73.8 N^2 s to three digits."""
-    found = solve(cart_pole(law))
-    assert found.verified
-    assert found.cost == pytest.approx(73.8, abs=0.1)
-    assert set(found.modes) == {"x", "th"}
-    assert "With exact Coulomb friction it misses by" in found.message
 
 
 # --- margins of rests ---------------------------------------------------------------------------
@@ -319,9 +255,7 @@ def sharpened_by(monkeypatch: pytest.MonkeyPatch, steps: tuple[Sharp, ...]) -> N
     monkeypatch.setattr(strategies, "sharpened", lambda *_, **__: iter(steps))
 
 
-@pytest.mark.parametrize(
-    "error", [INTERNAL, SolveError("no unique mode", Status.SOLVER_FAILED)], ids=str
-)
+@pytest.mark.parametrize("error", [INTERNAL, SolveError("no mode", Status.SOLVER_FAILED)], ids=str)
 def test_failed_modes_end_in_the_sharpened_motion(
     error: Exception, monkeypatch: pytest.MonkeyPatch, steps: tuple[Sharp, ...]
 ) -> None:

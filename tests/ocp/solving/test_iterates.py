@@ -1,21 +1,174 @@
-"""Iterates of solvers: the worst row, places, the best one, cycling, and Hessians of Sqp."""
+"""Iterates of solvers: starts, places of rows, the best one, cycling, and Hessians of Sqp."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from phases import fastest_move, there_and_back, unit_move
+from phases import UNIT, fastest_move, solve_once, there_and_back, unit_move
 
 from ocp.formulation.expressions import at_end, integral
+from ocp.formulation.phase import FREE, Free, Phase
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Convexified
-from ocp.solving.watch import WINDOW, Seen, Watch, as_fraction, not_finite, worst
+from ocp.solving.motion import span_motions
+from ocp.solving.prepared import as_fraction, not_finite, worst
+from ocp.solving.solution import Solution
+from ocp.solving.starts import Guess, initial_points, resample, start_of
+from ocp.solving.watch import WINDOW, Seen, Watch
 from ocp.transcription.program import Place, Program, SolverStatistics, outside, worst_of
-from ocp.transcription.schemes import Radau, make_meshes
-from ocp.transcription.transcribe import discretise
+from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
+from ocp.transcription.transcribe import Transcription, discretise
+from ocp.transcription.unknowns import SpanPoints
 from symfric import Status
+
+EFFORT = integral(lambda s: s.a**2)
+
+
+def on(problem: Problem, intervals: int = 10, scheme: Scheme | None = None) -> Transcription:
+    return discretise(problem, scheme or Radau()).on(make_meshes(problem, intervals))
+
+
+def first(problem: Problem, intervals: int = 10) -> SpanPoints:
+    return initial_points(on(problem, intervals)).spans[0]
+
+
+@cache
+def unit(intervals: int) -> Solution:
+    return solve_once(unit_move(), intervals)
+
+
+def carried(into: Transcription, old: Solution) -> SpanPoints:
+    spans = span_motions(old.problem, old.scheme, old.meshes, old.points)
+    return resample(into, spans, old.chosen).spans[0]
+
+
+def test_states_run_straight_between_the_ends_and_velocities_follow() -> None:
+    into = on(unit_move(T=2.0))
+    (span,) = initial_points(into).spans
+    np.testing.assert_allclose(span.nodes[0], into.meshes[0])
+    np.testing.assert_allclose(span.inner[0], into.inner_fractions(0))
+    np.testing.assert_allclose(span.nodes[1], 0.5)  # 1 m in 2 s, although it rests at both ends
+    np.testing.assert_array_equal(span.u, 0.0)
+
+
+def test_states_pass_via_points_and_continue_over_phases() -> None:
+    """The middle phase has no conditions: its line goes from the first to the last one."""
+    via = unit_move(via={0.25: {"x": 2.0}})
+    expected = np.interp(on(via, 8).meshes[0], [0, 0.25, 1], [0, 2, 1])
+    np.testing.assert_allclose(first(via, 8).nodes[0], expected)
+    chain = Phase(UNIT, 1.0) >> Phase(UNIT, 2.0) >> Phase(UNIT, 1.0, end={"x": 4.0})
+    points = initial_points(on(Problem(chain, EFFORT), 4))
+    for span, begin in zip(points.spans, (0.0, 1.0, 3.0), strict=True):
+        np.testing.assert_allclose(span.nodes[0, [0, -1]], [begin, begin + span.T])
+        np.testing.assert_allclose(span.nodes[1], 1.0)
+    bounce = Phase(UNIT, 1.0, link={"x": lambda s: 2.0 * s.x + 1.0, "v": None})
+    chain = Phase(UNIT, 1.0, end={"x": 3.0}) >> bounce
+    before, after = initial_points(on(Problem(chain, EFFORT))).spans
+    assert before.nodes[0, -1] == 3.0
+    np.testing.assert_allclose(after.nodes, [[7.0] * 11, [0.0] * 11], atol=1e-12)
+
+
+def test_ranges_are_entered_in_the_middle_or_at_their_finite_end() -> None:
+    x = first(unit_move(start={"x": (1.0, 3.0)}, end={"x": (5.0, None), "v": 0.0})).nodes[0]
+    assert (x[0], x[-1]) == (2.0, 5.0)
+    x = first(unit_move(start={"x": 3.0, "v": FREE}, end={"power": 1.0})).nodes[0]
+    np.testing.assert_array_equal(x, 3.0)  # an output alone has no line
+    for bounds, middle in (((-1, 3), 0.0), ((1, 3), 2.0), ((2, None), 2.0)):
+        np.testing.assert_array_equal(first(unit_move(bounds={"a": bounds})).u, middle)
+
+
+def test_durations_with_a_fixed_sum_are_stretched_to_it() -> None:
+    chain = Phase(UNIT, Free(0.1, 10.0)) >> Phase(UNIT, 1.0) >> Phase(UNIT, Free(0.4, 40.0))
+    problem = Problem(chain, EFFORT, durations=(((0, 1, 2), 11.0),))
+    durations = [span.T for span in initial_points(on(problem)).spans]
+    np.testing.assert_allclose(durations, [2.0, 1.0, 8.0])
+
+
+@pytest.mark.parametrize("given", [[1.0, 2.0, 3.0], lambda t: 1.0 + t])
+def test_guess_is_a_number_samples_or_a_function_of_time(given: Guess) -> None:
+    """Over all phases: 2 s."""
+    into = on(there_and_back(), 4)
+    out, back = initial_points(into, {"v": given}).spans
+    assert (out.nodes[1, 0], back.nodes[1, 0], back.nodes[1, -1]) == (1.0, 2.0, 3.0)
+    assert (initial_points(into, {"v": 2.0}).spans[1].nodes[1] == 2.0).all()
+
+
+WHAT = "guess: expected values by name, a solution, or points"
+
+
+@pytest.mark.parametrize(
+    ("guess", "message"),
+    [
+        ({"w": 1.0}, "guess: expected one of x, v, a, got w"),
+        ({"x": np.nan}, "guess of x: expected finite numbers, got nan"),
+        ({"x": []}, r"guess: expected for x a number, samples, or a function .* shape \(0,\)"),
+        ({"x": np.ones((2, 2))}, r"got an array of shape \(2, 2\)"),
+        ({"a": lambda t: t[:3]}, r"guess: expected for a a number.* shape \(3,\)"),
+        (initial_points(on(unit_move(), 7)), r"expected points of 1 phases, .* shape \(2, 7\)"),
+        (initial_points(on(there_and_back(), 6)), "guess: .* got points of other meshes or models"),
+        (5, WHAT),
+        ("move.npz", rf"{WHAT}, got 'move\.npz'; a file is read by ocp\.load\(path\)"),
+    ],
+)
+def test_bad_guesses_are_refused(guess: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        start_of(on(unit_move(), 6), guess)
+
+
+def test_points_are_a_guess() -> None:
+    into = on(unit_move(), 6)
+    points = initial_points(into)
+    moved = replace(points, spans=(replace(points.spans[0], u=points.spans[0].u + 2.0),))
+    start, warm = start_of(into, moved)
+    assert not warm
+    np.testing.assert_array_equal(into.unpack(start.w).spans[0].u, 2.0)
+
+
+@pytest.mark.parametrize("degree", [2, 4])
+def test_solution_is_carried_to_other_meshes_by_its_polynomials(degree: int) -> None:
+    """Those of a double integrator under constant input are exact everywhere."""
+    old = unit(5)
+    span = carried(on(unit_move(), 10, Radau(degree)), old)
+    np.testing.assert_array_equal(span.u[0], np.repeat(old.controls["a"], 2))
+    x, v, a = span.nodes[0, :-1], span.nodes[1, :-1], span.u[0]
+    np.testing.assert_allclose(span.nodes[0, 1:], x + 0.1 * v + 0.005 * a, atol=1e-12)
+    assert solve_once(unit_move(), 10, guess=old).iterations <= 3
+
+
+def test_solution_is_carried_to_other_phases_and_models_by_name() -> None:
+    """With a bounded rate, `a` is a state, and the solution had it as an input."""
+    old = solve_once(there_and_back(), 10)
+    one = unit_move(T=4.0, end={"x": 0.0, "v": 0.0}, via={0.5: {"x": 1.0}})
+    span = carried(on(one, 20), old)
+    np.testing.assert_allclose(span.nodes[0], old["x"][::3], atol=1e-12)
+    assert span.T == 4.0
+    into = on(unit_move(rates={"a": (-100.0, 100.0)}))
+    span = carried(into, unit(10))
+    names = [v.name for v in into.problem.spans[0].model.x]
+    np.testing.assert_array_equal(span.nodes[names.index("a"), :-1], unit(10).controls["a"])
+    np.testing.assert_allclose(span.nodes[0], unit(10)["x"][::3], atol=1e-12)
+    free = solve_once(unit_move(T=Free(0.5, 2.0), cost=EFFORT), 5)
+    assert pytest.approx(2.0) == free.T
+    for longest in (3.0, 1.5):
+        assert min(free.T, longest) == carried(on(unit_move(T=Free(0.5, longest))), free).T
+
+
+def test_multipliers_are_used_where_the_program_is_the_same() -> None:
+    old = unit(10)
+    start, warm = start_of(on(unit_move(), 10), old)
+    assert warm
+    np.testing.assert_allclose(start.w, old.iterate.w, atol=1e-12)
+    np.testing.assert_array_equal(start.lam_g, old.iterate.lam_g)
+    bounded = unit_move(path=[lambda s: s.v <= 9.0])
+    alike = on(unit_move(), 10, Legendre())  # as many unknowns and rows
+    for other in (on(unit_move(), 11), on(bounded, 10), on(unit_move(), 10, Radau(2)), alike):
+        start, warm = start_of(other, old)
+        assert not warm
+        assert not start.lam_g.any()
 
 
 @cache
@@ -87,22 +240,17 @@ def seen(f: float, violation: float) -> Seen:
     return Seen(none, f, none, none, none, violation)
 
 
-@pytest.mark.parametrize(
-    ("better", "worse"),
-    [
+def test_best_is_feasible_with_the_least_cost_or_least_violated() -> None:
+    for better, worse in (
         ((5.0, 1e-8), (1.0, 1e-3)),
         ((1.0, 1e-7), (5.0, 1e-9)),
         ((5.0, 1e-3), (1.0, 1e-2)),
         ((9.0, 1.0), (np.nan, 1e-9)),
         ((9.0, 1.0), (1.0, np.inf)),
-    ],
-)
-def test_best_is_feasible_with_the_least_cost_or_least_violated(
-    better: tuple[float, float], worse: tuple[float, float]
-) -> None:
-    assert seen(*better).better_than(seen(*worse))
-    assert not seen(*worse).better_than(seen(*better))
-    assert seen(*worse).better_than(None)
+    ):
+        assert seen(*better).better_than(seen(*worse))
+        assert not seen(*worse).better_than(seen(*better))
+        assert seen(*worse).better_than(None)
 
 
 def test_watch_keeps_the_best_and_stops_on_request() -> None:
@@ -112,8 +260,7 @@ def test_watch_keeps_the_best_and_stops_on_request() -> None:
     g = np.zeros(program.g.numel())
     for f, far in ((5.0, 1.0), (3.0, 0.0), (2.0, 0.0), (9.0, 0.0), (1.0, 0.3)):
         assert not watch.see(w, f, np.full_like(g, far), w, g)
-    assert watch.best is not None
-    assert watch.last is not None
+    assert watch.best and watch.last
     assert (watch.best.f, watch.last.f, watch.iterations) == (2.0, 1.0, 4)
     watch.halt = Status.INTERRUPTED
     assert watch.see(w, 0.0, g, w, g)

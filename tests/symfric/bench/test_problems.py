@@ -6,9 +6,9 @@ from math import atan2, hypot, isnan, pi
 import pytest
 
 from symfric import BrownMcPhee, ExactCoulomb, Model, Variable, simulate
-from symfric.bench import ivp, multibody, regularisation
-from symfric.bench.ivp import ANDREWS, DIGITS, DRIFT, JOINT, PROBLEMS, Problem, correct_digits
-from symfric.bench.multibody import CHAINS, chain, chains, count, exponent
+from symfric.bench import ivp, regularisation
+from symfric.bench.ivp import ANDREWS, DIGITS, DRIFT, PROBLEMS, Problem, correct_digits
+from symfric.bench.multibody import chain, chains, exponent
 from symfric.bench.regularisation import CASES, last_cycle, peak
 from symfric.bench.report import Row
 from symfric.scenes import Rabinowicz
@@ -20,7 +20,7 @@ LATE = {("ring modulator", "rodas5p"): 4}
 MOST_STEPS = {
     "HIRES": 250, "Robertson": 350, "van der Pol": 800, "Oregonator": 1100,
     "Chemical Akzo Nobel": 130, "transistor amplifier": 4500, "Pleiades": 330,
-    "Andrews' squeezer": 400, "Andrews' squeezer, absolute coordinates": 1000, "car axis": 1100,
+    "Andrews' squeezer": 400, "car axis": 1100,
 }  # fmt: skip
 """The squeezer in joint coordinates is a case of `multibody/test_loops.py`."""
 
@@ -40,7 +40,7 @@ def reached(problem: Problem, method: str, rtol: float, engine: str | None = Non
 def test_published_digits_are_reached_at_the_default_tolerance() -> None:
     """Andrews' squeezer was called singular, the amplifier discontinuous."""
     for problem in PROBLEMS:
-        if problem.name in MOST_STEPS and "absolute" not in problem.name:
+        if problem.name in MOST_STEPS:
             row = reached(problem, "rodas5p", 1e-6, "vm")
             assert row["steps"] <= MOST_STEPS[problem.name], row
 
@@ -87,40 +87,18 @@ def test_a_failure_is_noted_with_its_reason() -> None:
 
 def test_every_tolerance_and_method_has_a_row() -> None:
     made = ivp.bench(quick=True, problems=PROBLEMS[:1])
-    assert [(r["problem"], r["method"], r["rtol"]) for r in made.tables[DIGITS]] == [
-        ("HIRES", "rodas5p", 1e-6), ("HIRES", "radau5", 1e-6),
+    assert [(r["method"], r["rtol"]) for r in made.tables[DIGITS]] == [
+        ("rodas5p", 1e-6), ("radau5", 1e-6)
     ]  # fmt: skip
     assert "Test Set" in made.notes[0]
     laborious = replace(PROBLEMS[0], laborious=("radau5",))
     rows = [row for title, row in ivp._rows(laborious, quick=False) if title == DIGITS]
     assert [row["rtol"] for row in rows] == [1e-6, 1e-8, 1e-10, 1e-6]
     assert len({p.name for p in PROBLEMS}) == len(PROBLEMS) == 11
-    assert JOINT.drift == ("constraint_position",)
     assert all({*p.reference} <= {*p.model().signals} for p in PROBLEMS if "joint" not in p.name)
 
 
 # ---- mechanisms ----
-
-FOUR = ("frictionless", "constant normal", "reactions in one", "reactions in all")
-ABSOLUTE = pytest.param("absolute", marks=pytest.mark.slow)
-INSTRUCTIONS = ("instructions, accelerations", "instructions, step", "nonzeros of the Jacobian")
-SIZES = {
-    "joint": [(8, 2), (8, 2), (8, 3), (8, 5)],
-    "absolute": [(56, 26), (56, 26), (56, 27), (56, 30)],
-}
-"""Two multipliers of the rods, in absolute coordinates those of all joints; slider 4 carries its
-weight only, which is no unknown if its joint is in the tree."""
-
-
-@pytest.mark.parametrize("coordinates", ["joint", ABSOLUTE])
-def test_every_kind_of_friction_has_its_unknowns_and_its_cost(coordinates: str) -> None:
-    rows = [count("four_mass", variant, coordinates) for variant in FOUR]
-    assert [(r["states"], r["algebraic variables"]) for r in rows] == SIZES[coordinates]
-    none, constant, one, every = rows
-    for column in INSTRUCTIONS:
-        assert none[column] < constant[column] < every[column], column
-        assert none[column] < one[column] < every[column], column
-    assert every["instructions, step"] < 2 * none["instructions, step"]
 
 
 def test_chains_are_measured_up_to_the_budget() -> None:
@@ -133,20 +111,11 @@ def test_chains_are_measured_up_to_the_budget() -> None:
     assert [row["links"] for title, row in chains(chain, (1, 2, 3), budget=0.0)] == [1]
 
 
-@pytest.mark.parametrize("power", [1.0, 1.3, 2.0])
-def test_the_exponent_is_that_of_a_power_law(power: float) -> None:
-    rows = [{"links": n, "y": 1e-6 * n**power, "z": 100} for n in (8, 16, 32)]
-    short = {"links": 2, "y": 1.0, "z": 1.0}
-    assert exponent([short, *rows], "y") == pytest.approx(power)
-    assert exponent(rows, "z") == pytest.approx(0.0, abs=1e-12)
-    assert exponent([short, {"links": 4, "y": 2**power}], "y") == pytest.approx(power)
-    assert CHAINS
-
-
-@pytest.mark.parametrize("t_end", [1.0, pytest.param(100.0, marks=pytest.mark.slow)])
-def test_energy_of_frictionless_mechanisms_is_constant(t_end: float) -> None:
-    for _, row in multibody.drifts(t_end):
-        assert 0 < row["relative change of energy"] < 1e-8 * t_end, row
+def test_the_exponent_is_that_of_a_power_law_for_long_chains() -> None:
+    rows = [{"links": n, "y": 1e-6 * n**1.3} for n in (8, 16, 32)]
+    short = {"links": 2, "y": 1.0}
+    assert exponent([short, *rows], "y") == pytest.approx(1.3)
+    assert exponent([short, {"links": 4, "y": 2**1.3}], "y") == pytest.approx(1.3)
 
 
 # ---- regularisation ----

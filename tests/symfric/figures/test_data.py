@@ -69,14 +69,10 @@ def test_without_v_s_the_velocity_is_where_the_force_has_fallen_half_the_way() -
     assert law.force(V, 1.0) == pytest.approx(0.125, rel=5e-3)
 
 
-@pytest.mark.parametrize(
-    ("name", "stiffness"), [("maxwell_slip", 1e5), ("gms", 1e5), ("dahl", 1e5)]
-)
-def test_stretch_is_the_static_level_over_the_stiffness_at_rest(
-    name: str, stiffness: float
-) -> None:
-    found = scales(law_from_text(name))
-    assert found.stretch == pytest.approx(found.static / stiffness)
+def test_stretch_is_the_static_level_over_the_stiffness_at_rest() -> None:
+    for name in ("maxwell_slip", "gms", "dahl"):
+        found = scales(law_from_text(name))
+        assert found.stretch == pytest.approx(found.static / 1e5)
 
 
 def test_a_strong_contact_gets_a_heavier_block() -> None:

@@ -40,24 +40,6 @@ def test_a_law_with_states_shows_its_loops() -> None:
     assert [line.get_label() for line in lag.lines] == ["5 Hz", "50 Hz", "steady"]
 
 
-@pytest.mark.parametrize(
-    ("law", "shown"),
-    [
-        ("coulomb+viscous", []),
-        ("dahl", ["hysteresis", "transition"]),
-        ("gonthier", ["hysteresis", "lag", "dwell"]),
-        ("rate_and_state", ["velocity_step", "dwell"]),
-        ("karnopp", ["stiction"]),
-        ("wojewoda", ["lag"]),
-        ("bam", ["input_tau_m", "input_tau_e"]),
-        ("quarter_car_general", ["input_x_rel", "input_v_rel"]),
-        ("lagged(stribeck)", ["lag"]),
-    ],
-)
-def test_what_shows_the_nature_of_a_law(law: str, shown: list[str]) -> None:
-    assert list(behaviours(law_from_text(law))) == shown
-
-
 def test_sticking_is_shown_where_a_law_needs_the_applied_force() -> None:
     pulled, moved = plot_laws({"karnopp": Karnopp()}, N=10.0).axes[2:]
     assert (pulled.get_xlabel(), moved.get_ylabel()) == ("F_e [N]", "v [m/s]")
@@ -85,13 +67,18 @@ def test_a_behaviour_that_fails_is_left_out_with_a_word(monkeypatch: pytest.Monk
     assert titles(plot_laws(laws))[2:] == ["lag, v up and down"]
 
 
-@pytest.mark.parametrize(
-    ("law", "half"),
-    [("brown_mcphee", 0.0121), ("bittencourt", 5.0), ("dahl", 5e-4), ("viscous", 1.0),
-     ("rate_and_state", 1.58e-5)],
-)  # fmt: skip
-def test_the_window_around_rest_is_that_of_the_law(law: str, half: float) -> None:
-    assert window(law_from_text(law), 1.0) == pytest.approx(half, rel=0.01)
+def test_behaviours_and_window_around_rest_are_those_of_the_law() -> None:
+    shown = {
+        "coulomb+viscous": "", "dahl": "hysteresis transition", "gonthier": "hysteresis lag dwell",
+        "rate_and_state": "velocity_step dwell", "karnopp": "stiction", "wojewoda": "lag",
+        "bam": "input_tau_m input_tau_e", "quarter_car_general": "input_x_rel input_v_rel",
+        "lagged(stribeck)": "lag",
+    }  # fmt: skip
+    assert {law: " ".join(behaviours(law_from_text(law))) for law in shown} == shown
+    halves = {"brown_mcphee": 0.0121, "bittencourt": 5.0, "dahl": 5e-4, "viscous": 1.0,
+              "rate_and_state": 1.58e-5}  # fmt: skip
+    found = {law: window(law_from_text(law), 1.0) for law in halves}
+    assert found == pytest.approx(halves, rel=0.01)
 
 
 def test_viscous_friction_does_not_hide_the_curve_over_decades() -> None:

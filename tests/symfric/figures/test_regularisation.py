@@ -1,4 +1,4 @@
-"""What makes a law smooth, and where laws are compared."""
+"""Parameters that make a law smooth, and points where laws are compared."""
 
 from dataclasses import replace
 from importlib import import_module
@@ -9,26 +9,24 @@ import pytest
 
 import symfric as sf
 from symfric.bench.regularisation import last_cycle, peak
+from symfric.figures.recommended import _Search  # pyright: ignore[reportPrivateUsage]
 from symfric.figures.regularisation import distance, machine_of, regularisation, sample
 from symfric.scenes import Drive, PendulumBox, Rabinowicz, SliderCrank
 
 
-@pytest.mark.parametrize(
-    ("law", "names"),
-    [
-        (sf.BrownMcPhee(), ("v_t",)),
-        (sf.Coulomb(), ("v_eps",)),
-        (sf.Specker(), ("v_t",)),
-        (sf.Asymmetric(sf.BrownMcPhee(), sf.BrownMcPhee()), ("v_t_pos", "v_t_neg", "v_blend")),
-        (sf.LuGre(), ("sigma_0", "sigma_1")),
-        (sf.LuGre(sigma_1=0.0), ("sigma_0",)),
-        (sf.ElastoPlastic(), ("sigma_0", "sigma_1", "z_ba")),
-        (sf.BlimanSorine(), ("s_f",)),
-        (sf.MaxwellSlip(), ("k_1", "k_2", "k_3", "k_4")),
-    ],
-)
-def test_roles_say_what_makes_a_law_smooth(law: sf.Law, names: tuple[str, ...]) -> None:
-    assert tuple(regularisation("here", law).powers) == names
+def test_roles_say_what_makes_a_law_smooth() -> None:
+    smoothing = {
+        sf.BrownMcPhee(): "v_t",
+        sf.Coulomb(): "v_eps",
+        sf.Specker(): "v_t",
+        sf.Asymmetric(sf.BrownMcPhee(), sf.BrownMcPhee()): "v_t_pos v_t_neg v_blend",
+        sf.LuGre(): "sigma_0 sigma_1",
+        sf.LuGre(sigma_1=0.0): "sigma_0",
+        sf.ElastoPlastic(): "sigma_0 sigma_1 z_ba",
+        sf.BlimanSorine(): "s_f",
+        sf.MaxwellSlip(): "k_1 k_2 k_3 k_4",
+    }
+    assert {law: " ".join(regularisation("here", law).powers) for law in smoothing} == smoothing
 
 
 def test_stiffness_and_inverse_velocity_grow_where_widths_shrink() -> None:
@@ -115,6 +113,14 @@ def test_curve_holds_the_runs_and_is_drawn(found: sf.Recommendation, tmp_path: P
     assert (np.diff(curve["error"]) < 0).all()
     found.plot(tmp_path / "curve.svg")
     assert (tmp_path / "curve.svg").stat().st_size > 0
+
+
+def test_widths_are_rounded_to_two_digits_and_to_narrower_ones() -> None:
+    machine = machine_of("here", Rabinowicz, 1.0, None, None, LAW)
+    for law, name, value in ((LAW, "v_t", 1.2e-5), (sf.LuGre(), "sigma_0", 8.2e6)):
+        search = _Search(machine, regularisation("here", law), 0.01, 1e-6)
+        found = search.knob.values(search.rounded(0.0123456))[name]
+        assert found == pytest.approx(value, rel=1e-9)
 
 
 def test_a_law_that_is_too_dry_is_softened() -> None:

@@ -35,6 +35,12 @@ PLATES = plates()
 NAME = "self_tuning/fig_07_shape_factor"
 SHAPE = script(NAME)
 ROOT = Path(__file__).parents[3]
+COSTLY = dict.fromkeys(
+    ("generalized_maxwell_slip/fig_05_presliding", "selection/fig_07_box_displacement",
+     "generalized_maxwell_slip/fig_02_lag_of_the_generic_model", "self_tuning/fig_13_jitter",
+     "laminator_nips/fig_5_7_stick_slip"), pytest.mark.slow,
+)  # fmt: skip
+"""Figures above a second; others of their modules run in every suite."""
 
 
 @cache
@@ -46,7 +52,7 @@ def quick(name: str) -> Plate:
 # ---- one figure ----
 
 
-@pytest.mark.parametrize("name", [*PLATES])
+@pytest.mark.parametrize("name", [pytest.param(n, marks=COSTLY.get(n, ())) for n in PLATES])
 def test_a_plate_is_drawn_and_its_claims_hold(name: str) -> None:
     plate = quick(name)
     assert plate.picture.axes

@@ -66,6 +66,11 @@ def test_every_parameter_can_be_free_and_costs_less_as_a_constant(kind: type[Sce
     assert free.initial_state() == pytest.approx(fixed.initial_state(), abs=1e-12)
     costs = [model.function("signals").n_instructions() for model in (fixed, free)]
     assert costs[0] < costs[1]
+    if fixed.sketch is not None:
+        marks = fixed.sketch().marks
+        slips = [slip for mark in marks for slip, _ in mark.slips]
+        assert len(slips) == len(fixed.contacts)
+        assert set(slips) <= {*fixed.signals, *fixed.further}
     for law, got in ((sf.LuGre, "the class LuGre"), ("lugre", "'lugre'"), (None, "None")):
         with pytest.raises(ValueError, match=rf"{kind.__name__}: expected a law .* got {got}"):
             kind(law)  # type: ignore[arg-type]
