@@ -64,7 +64,7 @@ MOST = {
     "simulate, first": 33,
     "simulate, second": 20,
     "Fit.solve": 54,
-    "ocp.solve": 96,
+    "ocp.solve": 93,
     "generate": 34,
 }
 
