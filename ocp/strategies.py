@@ -27,6 +27,8 @@ from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
 Friction = Literal["auto", "smooth", "sharpen", "modes"]
+Margins = Iterator[tuple[Solution, float]]
+"""Motions by modes with their friction margins."""
 INTERVALS = 50
 EARLY = 0.04
 """Largest smoothing width, in multiples of the speeds, from which modes are deduced."""
@@ -194,13 +196,7 @@ class Search(NamedTuple):
         first = self.judged(exact)
         return self._closer(first, margin, motions, sharp.solution) if first.right else first
 
-    def _closer(
-        self,
-        first: Judged,
-        margin: float,
-        motions: Iterator[tuple[Solution, float]],
-        sharp: Solution,
-    ) -> Judged:
+    def _closer(self, first: Judged, margin: float, motions: Margins, sharp: Solution) -> Judged:
         """Return the valid motion with the smallest margin of contacts at rest."""
         kept, slope, best, last = margin, nan, first, first.solution
         for exact, less in motions:

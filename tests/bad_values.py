@@ -4,6 +4,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -110,18 +111,14 @@ class Door:
         for argument, tried in self.bad.items():
             for value in tried:
                 arguments = dict(self.good) | {argument: value}
-                yield f"{self.name}({argument}={_text(value)})", _call(self.call, arguments)
+                yield f"{self.name}({argument}={_text(value)})", partial(self.call, **arguments)
 
 
-def door(
-    name: str, call: Callable[..., Any], good: Mapping[str, Any] | None = None, /, **bad: list[Any]
-) -> Door:
-    """Return a door with its bad values by argument."""
-    return Door(name, call, good or {}, bad)
-
-
-def _call(function: Callable[..., Any], arguments: dict[str, Any]) -> Callable[[], Any]:
-    return lambda: function(**arguments)
+def door(call: Callable[..., Any], *about: str | Mapping[str, Any], **bad: list[Any]) -> Door:
+    """Return a public function with its bad values; `about` are its name and good arguments."""
+    names = [one for one in about if isinstance(one, str)] or [getattr(call, "__qualname__", "")]
+    good = [one for one in about if not isinstance(one, str)] or [{}]
+    return Door(names[0], call, good[0], bad)
 
 
 def _text(value: Any) -> str:

@@ -1,11 +1,11 @@
-"""Damaged and hostile files, made from good ones by a seed."""
+"""Hostile files: damaged, inconsistent and malicious variants of good ones by a seed."""
 
 import json
 import random
 import warnings
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from copy import deepcopy
 from functools import cache
 from io import BytesIO
@@ -42,6 +42,7 @@ VALUES: tuple[Any, ...] = (
     {"Function": ["f", [{"SX": 0}], [{"SX": 1}], ["a"], ["b"]]}, {"Function": ["/etc/passwd"]},
     {"Function": ["f", [], [], [], [], {"dict": [["jit", True], ["compiler", "shell"]]}]},
 )  # fmt: skip
+NAMES = ("__class__", "__post_init__", "unpacked", "name", "memory")
 
 
 @cache
@@ -56,18 +57,18 @@ def contents(good: bytes) -> tuple[Arrays, Any]:
     return dict(arrays), json.loads(about)
 
 
-def written(arrays: Arrays, about: Any) -> bytes:
+def written(arrays: Arrays, about: Any, save: Callable[..., None] = np.savez) -> bytes:
     """The file with these arrays and this JSON, a text or data."""
     text = about if isinstance(about, str) else json.dumps(about)
     buffer = BytesIO()
-    head = np.frombuffer(text.encode(), np.uint8)
-    np.savez(buffer, **{packed.ABOUT: head}, **arrays)  # pyright: ignore[reportArgumentType]
+    save(buffer, **{packed.ABOUT: np.frombuffer(text.encode(), np.uint8)}, **arrays)
     return buffer.getvalue()
 
 
 def hostile(good: bytes, dice: random.Random) -> bytes:
-    """A file that differs from `good` in bytes, structure, sizes or depth."""
-    return dice.choice((_bytes, _members, _json, _json, _json, _array, _array, _deep))(good, dice)
+    """A file that differs from `good` in bytes, members, values, sizes or depth."""
+    kinds = (_bytes, _members, _header, _json, _json, _json, _array, _array, _deep)
+    return dice.choice(kinds)(good, dice)
 
 
 def _bytes(good: bytes, dice: random.Random) -> bytes:
@@ -79,42 +80,41 @@ def _bytes(good: bytes, dice: random.Random) -> bytes:
 
 
 def _members(good: bytes, dice: random.Random) -> bytes:
-    """Members that are compressed, missing, repeated, foreign or larger than they are."""
+    """Members that are compressed, missing or foreign."""
     arrays, about = contents(good)
-    name = dice.choice([packed.ABOUT, *arrays])
-    kind = dice.randrange(5)
+    name = dice.choice([*arrays])
+    return dice.choice((
+        lambda: written(arrays | {"zeros": np.zeros(10**7, np.uint8)}, about, np.savez_compressed),
+        lambda: written({k: v for k, v in arrays.items() if k != name}, about),
+        lambda: written(arrays | {name + "x": np.array(["text"]), "s": np.zeros(3)}, about),
+    ))()  # fmt: skip
+
+
+def _header(good: bytes, dice: random.Random) -> bytes:
+    """A member that is repeated, or larger than it is."""
+    name, twice = dice.choice([packed.ABOUT, *contents(good)[0]]), dice.random() < 0.5
     buffer = BytesIO()
-    if kind == 0:
-        np.savez_compressed(buffer, **arrays, about=np.zeros(10**7, np.uint8))  # pyright: ignore
-        return buffer.getvalue()
-    if kind == 1:
-        arrays.pop(name, None)
-        return written(arrays, about)
-    if kind == 2:
-        return written(arrays | {name + "x": np.array(["text"]), "expressions": np.zeros(3)}, about)
     with zipfile.ZipFile(BytesIO(good)) as old, zipfile.ZipFile(buffer, "w") as new:
         for member in old.infolist():
             data = old.read(member)
             if member.filename == f"{name}.npy":
                 end = data.index(b"\n")
-                shape = dice.choice(
-                    ("(9223372036854775807,)", "(1099511627776, 0)", "(-1,)", "(2,)")
-                )
-                dtype = dice.choice(("|O", "<f8", "|V8", "<U0", "<c16", "|u1"))
-                text = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}"
-                data = data[:10] + text.ljust(end - 10)[: end - 10].encode() + data[end:]
-            new.writestr(member, data)
-            if kind == 3:
-                with warnings.catch_warnings(action="ignore"):
+                sizes = ("(9223372036854775807,)", "(1099511627776, 0)", "(-1,)", "(2,)")
+                kind = dice.choice(("|O", "<f8", "|V8", "<U0", "<c16", "|u1"))
+                text = f"'descr': '{kind}', 'fortran_order': False, 'shape': {dice.choice(sizes)}"
+                text = f"{{{text}, }}".ljust(end - 10)[: end - 10]
+                data = data[:10] + text.encode() + data[end:]
+            with warnings.catch_warnings(action="ignore"):
+                for _ in range(1 + twice):
                     new.writestr(member, data)
     return buffer.getvalue()
 
 
 def _places(data: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Ways to all values in JSON."""
+    """Paths to all values in JSON."""
     yield path
     items = (
-        data.items() if isinstance(data, dict) else enumerate(data) if type(data) is list else ()
+        data.items() if isinstance(data, dict) else enumerate(data if type(data) is list else ())
     )
     for key, value in items:
         yield from _places(value, (*path, key))
@@ -128,11 +128,11 @@ def _json(good: bytes, dice: random.Random) -> bytes:
         held = about
         for key in way:
             held = held[key]
-        kind = dice.randrange(4)
-        if kind == 0 and isinstance(held, dict):
+        kind = dice.randrange(4) if isinstance(held, dict) else 3
+        if kind == 0:
             del held[last]
-        elif kind == 1 and isinstance(held, dict):
-            held[dice.choice(("__class__", "__post_init__", "unpacked", "name", "memory"))] = 1
+        elif kind == 1:
+            held[dice.choice(NAMES)] = 1
         else:
             held[last] = dice.choice(CLASSES) if last == "is" else deepcopy(dice.choice(VALUES))
     return written(arrays, about)
@@ -141,22 +141,20 @@ def _json(good: bytes, dice: random.Random) -> bytes:
 def _array(good: bytes, dice: random.Random) -> bytes:
     """An array of other numbers, shape or kind: also of instructions and their operands."""
     arrays, about = contents(good)
-    name = dice.choice(list(arrays))
+    name = dice.choice([*arrays])
     array = arrays[name]
-    numbers = (-1, 0, 10**12, 2**62, np.nan, np.inf, 1e300)
-    kind = dice.randrange(6)
-    if kind < 3 and array.size and array.dtype.kind in "if":
-        flat = array.copy().reshape(-1)
-        flat[dice.randrange(flat.size)] = dice.choice(
+    if dice.random() < 0.5 and array.size and array.dtype.kind in "if":
+        numbers = (-1, 0, 10**12, 2**62, np.nan, np.inf, 1e300)
+        array = array.copy()
+        array.flat[dice.randrange(array.size)] = dice.choice(
             numbers[:4] if array.dtype.kind == "i" else numbers
         )
-        arrays[name] = flat.reshape(array.shape)
     else:
-        arrays[name] = dice.choice((
+        array = dice.choice((
             array[:0], array.reshape(-1), array[None], np.concatenate([array, array]),
             array.astype(str), np.zeros((0, 3)), np.array(1.0), np.zeros((5, 0, 2), np.int64),
         ))  # fmt: skip
-    return written(arrays, about)
+    return written(arrays | {name: array}, about)
 
 
 def _deep(good: bytes, dice: random.Random) -> bytes:
@@ -185,17 +183,12 @@ def nothing_runs(seen: list[str]) -> Iterator[None]:
 
     CasADi runs shell commands outside of Python's audit, therefore its entrances are watched.
     """
-
-    def caught(name: str) -> Any:
-        return lambda *_, **__: seen.append(name)
-
-    for name in REACHABLE:
-        assert hasattr(ca, name), name
-    with (
-        patch.multiple(ca, **{name: caught(name) for name in REACHABLE}),
-        patch.object(ca.Function, "deserialize", caught("deserialize")),
-        patch.object(ca.Function, "load", caught("load")),
-    ):
+    watched = [(ca, name) for name in REACHABLE]
+    watched += [(ca.Function, "deserialize"), (ca.Function, "load")]
+    with ExitStack() as patches:
+        for owner, name in watched:
+            caught = patch.object(owner, name, lambda *_, n=name, **__: seen.append(n))
+            patches.enter_context(caught)
         AUDITED.append(seen)
         try:
             yield

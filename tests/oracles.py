@@ -54,45 +54,30 @@ def rabinowicz_karnopp(
     return StickSlip(stick + slip, stick, slip, centre + amplitude, centre - amplitude, centre)
 
 
-def rabinowicz_brown_mcphee(
-    m: float = 0.8,
-    k: float = 2.1,
-    v_belt: float = 0.1,
-    g: float = 9.81,
-    mu_s: float = 0.15,
-    mu_d: float = 0.1,
-    v_t: float = 1e-3,
-) -> Callable[[float, list[float]], list[float]]:
+Rates = Callable[[float, list[float]], list[float]]
+
+
+def rabinowicz_brown_mcphee() -> Rates:
     """Right-hand side of (x, v) for the block on a belt with Brown-McPhee friction."""
 
     def rates(t: float, y: list[float]) -> list[float]:
         x, v = y
-        s = (v - v_belt) / v_t
-        mu = mu_d * tanh(4 * s) + (mu_s - mu_d) * s / (s * s / 4 + 0.75) ** 2
-        return [v, -(k * x + mu * m * g) / m]
+        s = (v - 0.1) / 1e-3
+        mu = 0.1 * tanh(4 * s) + (0.15 - 0.1) * s / (s * s / 4 + 0.75) ** 2
+        return [v, -(2.1 * x + mu * 0.8 * 9.81) / 0.8]
 
     return rates
 
 
-def rabinowicz_lugre(
-    m: float = 0.8,
-    k: float = 2.1,
-    v_belt: float = 0.1,
-    g: float = 9.81,
-    mu_s: float = 0.15,
-    mu_d: float = 0.1,
-    v_s: float = 1e-3,
-    sigma_0: float = 1e5,
-    sigma_1: float = 190.0,
-) -> Callable[[float, list[float]], list[float]]:
+def rabinowicz_lugre() -> Rates:
     """Right-hand side of (x, v, z) for the block on a belt with LuGre friction, with a true |v|."""
 
     def rates(t: float, y: list[float]) -> list[float]:
         x, v, z = y
-        sliding = v - v_belt
-        level = m * g * (mu_d + (mu_s - mu_d) * exp(-((sliding / v_s) ** 2)))
-        z_dot = sliding - abs(sliding) * sigma_0 * z / level
-        return [v, -(k * x + sigma_0 * z + sigma_1 * z_dot) / m, z_dot]
+        sliding = v - 0.1
+        level = 0.8 * 9.81 * (0.1 + (0.15 - 0.1) * exp(-((sliding / 1e-3) ** 2)))
+        z_dot = sliding - abs(sliding) * 1e5 * z / level
+        return [v, -(2.1 * x + 1e5 * z + 190.0 * z_dot) / 0.8, z_dot]
 
     return rates
 
@@ -168,16 +153,9 @@ def _back_at(a: float, b: float, level: float, mode: int) -> float:
 
 
 def damped_block_events(
-    v_belt: float,
-    t_end: float,
-    *,
-    m: float,
-    k: float,
-    g: float,
-    mu_s: float,
-    mu_d: float,
+    v_belt: float, t_end: float, *, m: float, k: float, g: float, mu_s: float, mu_d: float,
     sigma_2: float,
-) -> list[float]:
+) -> list[float]:  # fmt: skip
     """Times at which a block on a belt, with viscous friction, too, sticks and slips in turn.
 
     It starts at x = 0 at rest. Slower than the belt it swings about a centre with damping, and

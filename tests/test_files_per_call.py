@@ -64,7 +64,7 @@ print(files(lambda: generate(LuGre(), "c")))
 
 @pytest.mark.parametrize(
     ("call", "most"),
-    [(SIMULATE, (33, 20)), (FIT, (54,)), (SOLVE, (96,)), (GENERATE, (34,))],
+    [(SIMULATE, (33, 20)), (FIT, (54,)), (SOLVE, (93,)), (GENERATE, (34,))],
     ids=["simulate, first and second", "Fit.solve", "ocp.solve", "generate"],
 )
 def test_a_call_runs_code_in_few_files(call: str, most: tuple[int, ...], tmp_path: Path) -> None:

@@ -108,8 +108,8 @@ class Convexified(Shaped):
         self._hessian = program.hessian
         hubs = np.array([not np.isfinite(place.fraction) for place in program.unknowns])
         self._sizes, self._pattern = _plan(program.hessian.sparsity_out(0), hubs)
-        inputs = {name: program.hessian.sparsity_in(i) for i, name in enumerate(MULTIPLIERS)}
-        super().__init__("nlp_hess_l", inputs, "hess_gamma_x_x", self._pattern)
+        inputs = [program.hessian.sparsity_in(i) for i in range(len(MULTIPLIERS))]
+        super().__init__("nlp_hess_l", inputs, self._pattern)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:  # noqa: D102
         triangle = np.append(np.array(self._hessian(*arg).nonzeros()), 0.0)

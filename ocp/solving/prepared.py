@@ -28,6 +28,8 @@ from ocp.transcription.transcribe import Transcription
 from symfric.foundation.status import Status
 
 Option = str | float | int
+Result = Mapping[str, ca.DM] | None
+"""Results of a solver by name; None if it failed without any."""
 LEAST = 1e-3
 """Smallest time limit of a solver [s], with which it stops at once."""
 OVERDETERMINED = "Not_Enough_Degrees_Of_Freedom"
@@ -208,7 +210,7 @@ class Prepared:
 
     def _called(
         self, solver: Built, watch: Watch, arguments: Mapping[str, Array]
-    ) -> tuple[Mapping[str, ca.DM] | None, str, Status]:
+    ) -> tuple[Result, str, Status]:
         """Return the result of the solver, its return code and its status."""
         solver.hook.watch = watch
         try:
@@ -231,14 +233,7 @@ class Prepared:
             raise refused_options(self.solver, self.options, reason)
         return result, answer, status
 
-    def _point(
-        self,
-        result: Mapping[str, ca.DM] | None,
-        watch: Watch,
-        status: Status,
-        w: Array,
-        values: Array,
-    ) -> Seen:
+    def _point(self, result: Result, watch: Watch, status: Status, w: Array, values: Array) -> Seen:
         """Return the solution, or the best known point of a failed solve."""
         program = self.program
         if status.ok and result is not None:

@@ -2,7 +2,7 @@
 
 import signal
 import threading
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from time import perf_counter
 from types import FrameType
@@ -123,28 +123,16 @@ class Watch:
 class Shaped(ca.Callback):
     """CasADi function evaluated in Python, with arguments and one result of given shapes."""
 
-    def __init__(
-        self, name: str, inputs: Mapping[str, ca.Sparsity], output: str, shape: ca.Sparsity
-    ) -> None:
+    def __init__(self, name: str, inputs: Sequence[ca.Sparsity], shape: ca.Sparsity) -> None:
         super().__init__()
-        self._inputs, self._output, self._shape = [*inputs.items()], output, shape
+        self._inputs, self._shape = inputs, shape
         self.construct(name, {})
 
     def get_n_in(self) -> int:  # noqa: D102
         return len(self._inputs)
 
-    def get_n_out(self) -> int:  # noqa: D102
-        return 1
-
-    def get_name_in(self, i: int) -> str:  # noqa: D102
-        return self._inputs[i][0]
-
-    def get_name_out(self, i: int) -> str:  # noqa: D102
-        del i
-        return self._output
-
     def get_sparsity_in(self, i: int) -> ca.Sparsity:  # noqa: D102
-        return self._inputs[i][1]
+        return self._inputs[i]
 
     def get_sparsity_out(self, i: int) -> ca.Sparsity:  # noqa: D102
         del i
@@ -160,9 +148,8 @@ class IterationHook(Shaped):
         rows = {"x": n, "lam_x": n, "g": m, "lam_g": m, "f": 1, "lam_p": k}
         names = [ca.nlpsol_out(i) for i in range(ca.nlpsol_n_out())]
         self.watch: Watch | None = None
-        super().__init__(
-            "watch", {n: ca.Sparsity.dense(rows[n], 1) for n in names}, "stop", ca.Sparsity.dense(1)
-        )
+        columns = [ca.Sparsity.dense(rows[name], 1) for name in names]
+        super().__init__("watch", columns, ca.Sparsity.dense(1))
 
     def eval(self, arg: Sequence[ca.DM]) -> list[float]:  # noqa: D102
         if self.watch is None:
@@ -184,7 +171,7 @@ class GradientHook(Shaped):
         self._values = ca.Function("values", [program.w, program.p], [program.f, program.g])
         self.watch: Watch | None = None
         x, p = (ca.Sparsity.dense(part.numel(), 1) for part in (program.w, program.p))
-        super().__init__("nlp_grad_f", {"x": x, "p": p}, "grad_f_x", x)
+        super().__init__("nlp_grad_f", [x, p], x)
 
     def eval(self, arg: Sequence[ca.DM]) -> list[ca.DM]:  # noqa: D102
         slope = ca.densify(self._gradient(*arg)[1])

@@ -101,12 +101,9 @@ def _routine(
     c: CBlock, name: str, doc: str, function: ca.Function, targets: Sequence[Sequence[str]]
 ) -> Routine:
     block, scalars, steps = c.block, c.block.is_function, len(targets) > 1
-    variables = {(i, j): v for i, of in enumerate(block.groups.values()) for j, v in enumerate(of)}
-    checked = [  # values that the guards load
-        entry
-        for entry, v in variables.items()
-        if c.guards and (entry[0] == 2 or (entry[0] == 1 and v.name == STEP_SIZE))
-    ]
+    checked = {(2, j) for j in range(len(block.inputs))} if c.guards else set()
+    if c.guards:  # values that the guards load
+        checked |= {(1, j) for j, v in enumerate(block.parameters) if v.name == STEP_SIZE}
     loads = {
         (i, j): f"{group}->{place}"
         for i, group in enumerate(block.groups)
@@ -134,12 +131,12 @@ def _routine(
     body = code.lines
     if c.guards:
         before: list[str] = []
-        for i, j in sorted(code.used & {*checked}, key=lambda entry: (-entry[0], entry[1])):
-            variable, group = variables[i, j], GROUPS[i]
+        for i, j in sorted(code.used & checked, key=lambda entry: (-entry[0], entry[1])):
+            group, variable = GROUPS[i], block.groups[GROUPS[i]][j]
             if (i, j) in loads:
                 before.append(f"{c.real.name} {variable.name} = {loads[i, j]};")
             before += mended(c, variable, group)
-        if any(i == 1 for i, _ in code.used - {*checked}):
+        if any(i == 1 for i, _ in code.used - checked):
             before += fit_parameters(c)
         body = (*before, *body)
         if steps:

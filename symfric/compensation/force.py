@@ -227,12 +227,9 @@ class Parts:
 
     def given(self, name: str) -> ca.SX:
         """Return the symbol of an input; add the input at its first use."""
-        found = [v.symbol for v in self.inputs if v.name == name]
-        return (
-            found[0]
-            if found
-            else self._added(self.inputs, Variable(name, **TABLES["inputs"][name]))
-        )
+        if name not in [v.name for v in self.inputs]:
+            self.inputs.append(Variable(name, **TABLES["inputs"][name]))
+        return next(v.symbol for v in self.inputs if v.name == name)
 
     def parameter(self, name: str, start: float) -> ca.SX:
         """Add a parameter and return its symbol; a number is appended to a name in use."""

@@ -140,11 +140,10 @@ class Members:
 
     def _in_c(self, real: str, compiler: Compiler) -> Any:
         key = (self.block.fingerprint, real, str(compiler))
-        if key not in COMPILED:
-            COMPILED[key] = self._compiled(real, compiler)
+        step = COMPILED.get(key) or COMPILED.setdefault(key, self._compiled(real, compiler))
         arrays = (self.state, self.param, self.input, self.output, self.status)
         given = [ctypes.c_long(len(self.state)), *(ctypes.c_void_p(a.ctypes.data) for a in arrays)]
-        return partial(COMPILED[key], *given)
+        return partial(step, *given)
 
     def _compiled(self, real: str, compiler: Compiler) -> Any:
         c = CBlock(self.block, REALS[real])

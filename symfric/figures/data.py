@@ -288,7 +288,7 @@ def require(where: str, law: AnyLaw, *codes: str) -> None:
 
 Figures = dict[str, Callable[..., FigureData]]
 FIGURES: Figures = {}
-"""All figures by name, as functions (law, N, given) -> data."""
+"""Figures by name, as functions (law, N, given) -> data."""
 P = ParamSpec("P")
 Content = tuple[str, Sequence[Curve]] | tuple[str, Sequence[Curve], str]
 """Title, curves and optional note of a figure."""

@@ -126,10 +126,14 @@ def figure_of(value: object) -> str:
     return f"{value:.6g}" if is_number(value) else str(value)
 
 
+def spaced(unit: str) -> str:
+    """Return a unit after a space; "" for pure numbers."""
+    return "" if unit in ("", "1") else f" {unit}"
+
+
 def valued(named: Iterable[tuple[str, Scalar, str]]) -> str:
     """Return numbers with their names and units, such as "m = 0.8 kg, mu_s = 0.2"."""
-    units = ((n, v, "" if u in ("", "1") else f" {u}") for n, v, u in named)
-    return ", ".join(f"{n} = {figure_of(v)}{u}" for n, v, u in units)
+    return ", ".join(f"{n} = {figure_of(v)}{spaced(unit)}" for n, v, unit in named)
 
 
 def counted(n: int, one: str, many: str = "") -> str:

@@ -69,8 +69,8 @@ class Variable(Symbolic):
             raise ValueError(f"{where}: expected numbers lower <= upper, got {shown}")
 
     def __repr__(self) -> str:
-        said = f": {self.doc}" if self.doc else ""
-        return f"<variable '{self.name}' [{self.unit}], start {figure_of(self.start)}{said}>"
+        doc = f": {self.doc}" if self.doc else ""
+        return f"<variable '{self.name}' [{self.unit}], start {figure_of(self.start)}{doc}>"
 
     def within(self, where: str, value: object) -> float:
         """Return `value`, which must be a finite number within the bounds."""

@@ -49,7 +49,7 @@ STATIC_LAWS = _named(STATIC)
 DYNAMIC_LAWS = _named(DYNAMIC)
 """Laws with states by name."""
 ALL_LAWS = STATIC_LAWS | DYNAMIC_LAWS
-"""All laws by name; the contract tests cover every entry."""
+"""Laws by name; the contract tests cover every entry."""
 
 
 POPULATIONS: dict[str, type[GenericAsperity | RandomBristles]] = {

@@ -153,8 +153,8 @@ class Mechanism(packed.Portable, Showing):
     def _take(self, group: list[Any], part: object, wanted: type) -> None:
         what = wanted.__name__
         if not isinstance(part, wanted):
-            said = f"expected a {what} of symfric.multibody, got {shown(part)}"
-            self._wrong.append(f"{what.lower()}: {said}")
+            message = f"expected a {what} of symfric.multibody, got {shown(part)}"
+            self._wrong.append(f"{what.lower()}: {message}")
         elif odd := list(checks.texts(part)):
             self._wrong += [f"{what.lower()} {shown(getattr(part, 'name', ''))} > {t}" for t in odd]
         else:

@@ -142,8 +142,8 @@ def tag_friction(
         laws.append(Viscous(sigma_2=joint.damping))
     if not laws or joint.kind in ("planar", "floating"):
         return None
-    whole = laws[0] if len(laws) == 1 else Sum(tuple(laws))
-    return JointFriction(whole, normal=normal, turning=joint.kind != "prismatic")
+    combined = laws[0] if len(laws) == 1 else Sum(tuple(laws))
+    return JointFriction(combined, normal=normal, turning=joint.kind != "prismatic")
 
 
 def relative(law: Law) -> Law:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
-from symfric.foundation.shown import Showing, Shown, Table, among, counted, valued
+from symfric.foundation.shown import Showing, Shown, Table, among, counted, spaced, valued
 from symfric.foundation.status import Status
 from symfric.foundation.storable import agree
 from symfric.results.stored import Format, module
@@ -93,11 +93,9 @@ class Ensemble(Showing):
         done = int(np.isfinite(self.reached).sum())
         left = f", {members - done} members not started" if done < members else ""
         lines = [f"{self.status.name}: {counted(self.attempts.sum(), 'attempt')} in all{left}"]
-        ranges: list[str] = []
-        for name, values in self.varied.items():
-            unit = "" if self.unit(name) in ("", "1") else f" {self.unit(name)}"
-            ranges.append(f"{name} from {values.min():.6g} to {values.max():.6g}{unit}")
-        if ranges:
+        if self.varied:
+            ranges = (f"{name} from {x.min():.6g} to {x.max():.6g}{spaced(self.unit(name))}"
+                      for name, x in self.varied.items())  # fmt: skip
             lines.append(f"varied: {', '.join(ranges)}")
         if self.fixed:
             known = ((n, v, self.unit(n)) for n, v in self.fixed.items())
@@ -204,11 +202,11 @@ class Ensemble(Showing):
         where = f"ensemble of '{self.scene}': plot"
         checks.check_names(f"{where}: over", [over], self.varied)
         shown = self._chosen(names)[: None if names else pictures.SHOWN]
-        said, values = self._at(f"{where}: at", shown, at)
+        when, values = self._at(f"{where}: at", shown, at)
         signals = {name: (self.units[name], values[name]) for name in shown}
         others = {n: (self.unit(n), v) for n, v in self.varied.items() if n != over}
         return pictures.plot_over(
-            self.scene, said, signals, (over, self.unit(over), self.varied[over]), others, path
+            self.scene, when, signals, (over, self.unit(over), self.varied[over]), others, path
         )
 
     def _at(
@@ -218,8 +216,8 @@ class Ensemble(Showing):
         if isinstance(at, str):
             checks.choice(where, at, PLACES)
             if at == "end":
-                said = "at the end" if self.t.ndim > 1 else f"at t = {self.t[-1]:.4g} s"
-                return said, {name: self.signals[name][:, -1] for name in names}
+                when = "at the end" if self.t.ndim > 1 else f"at t = {self.t[-1]:.4g} s"
+                return when, {name: self.signals[name][:, -1] for name in names}
             which = PLACES.index(at) - 1
             return f"{at} of each run", {name: self.extremes[name][which] for name in names}
         if self.t.ndim > 1:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
 from symfric.foundation.panels import panels as empty_panels
+from symfric.foundation.shown import spaced
 from symfric.foundation.style import COLOURS, EDGE, colour, line
 from symfric.foundation.units import clock, readable
 from symfric.model.kinds import CONSTRAINTS, ENERGY, FRICTION
@@ -136,13 +137,13 @@ def _panel(
     factor, unit = (1.0, group.unit) if log else readable(group.unit, values.values())
     for k, (name, called) in enumerate(group.names.items()):
         for r, (label, run) in enumerate(trajectories.items()):
-            said = label if not several else called if r == 0 else None
+            entry = label if not several else called if r == 0 else None
             y = factor * values[name, label]
             if group.norms:
-                axis.plot(by_t * run.t, y, ".", color=colour(k), markersize=1.5, label=said)
+                axis.plot(by_t * run.t, y, ".", color=colour(k), markersize=1.5, label=entry)
                 continue
             look = line(r if alone else k if several else BLACK, r) if runs else line(k)
-            axis.plot(by_t * run.looks, y, linewidth=1.2, label=said, **look)
+            axis.plot(by_t * run.looks, y, linewidth=1.2, label=entry, **look)
     if group.norms or log:
         axis.set_yscale("log", nonpositive="mask")
     else:
@@ -294,7 +295,7 @@ def _bands(axis: Axes, t: Array, values: Array) -> None:
 
 def plot_over(
     scene: str,
-    said: str,
+    when: str,
     signals: Mapping[str, tuple[str, Array]],
     over: Varied,
     others: Mapping[str, tuple[str, Array]],
@@ -306,7 +307,7 @@ def plot_over(
     The title states the number of members without a value, which failed or ended before.
 
     Args:
-        scene, said: title, and a description of the time of the values.
+        scene, when: title, and a description of the time of the values.
         signals: unit and values of each signal by name, shape (members,).
         over: varied quantity on the abscissa.
         others: unit and values of other varied quantities by name.
@@ -326,7 +327,7 @@ def plot_over(
         axes[-1].set_xscale("log")
     absent = int((~np.isfinite(next(iter(signals.values()))[1])).sum())
     without = f", {absent} without a value" if absent else ""
-    title = f"{scene}, {x.size} members{without}, {said}"
+    title = f"{scene}, {x.size} members{without}, {when}"
     handles = axes[0].get_legend_handles_labels()[0] if len(series) > 1 else ()
     xlabel = name_x if unit in ("", "1") else f"{name_x} [{unit}]"
     return _finished(figure, axes, title, xlabel, path, handles, min(3, len(series)))
@@ -343,8 +344,7 @@ def _series(
     known = np.unique(values)
     if not 1 < known.size <= SERIES:
         return every
-    said = "" if unit in ("", "1") else f" {unit}"
-    return [(f"{other} = {value:.4g}{said}", values == value) for value in known]
+    return [(f"{other} = {value:.4g}{spaced(unit)}", values == value) for value in known]
 
 
 def _draw(axis: Axes, x: Array, y: Array, k: int, label: str) -> None:

@@ -51,4 +51,4 @@ ALL_SCENES: Catalogue[Scene] = Catalogue(
         **_MECHANISMS,
     }
 )
-"""All scenes by their name on the command line."""
+"""Scenes by their name on the command line."""

@@ -26,20 +26,9 @@ from bad_values import (
 
 import ocp
 import symfric as sf
+from symfric import multibody as mb
 from symfric.codegen import generate, law_block, plant_block, verify
 from symfric.laws import BrownMcPhee, Coulomb, LuGre, Stribeck
-from symfric.multibody import (
-    Cylindrical,
-    Gear,
-    JointFriction,
-    JointSpringDamper,
-    Mechanism,
-    PrescribedMotion,
-    Prismatic,
-    Revolute,
-    SpringDamper,
-    read_urdf,
-)
 
 URDF = """<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
@@ -49,12 +38,12 @@ URDF = """<robot name="r"><link name="a"/><link name="b"><inertial><mass value="
 def pendulum(**changes: Any) -> Any:
     """A pendulum built with something else in one place."""
     given = {"name": "m", "gravity": (0, 0, -9.81)} | changes
-    m = Mechanism(given["name"], given["gravity"])
+    m = mb.Mechanism(given["name"], given["gravity"])
     body = {"name": "bob", "mass": 1.0, "inertia": (0.01, 0.01, 0.01), "com": (0.0, 0.0, 0.0)}
     m.body(**body | changes.get("body", {}))
     m.frame("ground.pivot", z=(0, 1, 0))
     m.frame(**{"place": "bob.pivot", "at": (0, 0, 0.5), "z": (0, 1, 0)} | changes.get("frame", {}))
-    kind: Callable[..., Any] = changes.get("kind", Revolute)
+    kind: Callable[..., Any] = changes.get("kind", mb.Revolute)
     hinge = {"name": "hinge", "parent": "ground.pivot", "child": "bob.pivot", "start": 0.3}
     m.joint(kind(**hinge | changes.get("joint", {})))
     if "part" in changes:
@@ -80,36 +69,36 @@ def doors_of_mechanisms() -> Iterator[Door]:
         return call
 
     yield door(
-        "Mechanism",
         pendulum,
+        "Mechanism",
         name=[None, 3, "", "a b", Thing(), []],
         gravity=vectors((0, 0, True)),
-        part=thing(Revolute, SpringDamper),
+        part=thing(mb.Revolute, mb.SpringDamper),
     )
     rows = vectors()
     yield door(
-        "Body",
         part("body"),
+        "Body",
         name=[None, 3, "", "a b", "ground", Thing(), []],
         mass=parameter(0.0, -1.0),
         inertia=[*rows, (0.0, 1.0, 1.0), (-1.0, 1.0, 1.0)],
         com=rows,
     )
     yield door(
-        "Frame",
         part("frame"),
+        "Frame",
         place=[None, 3, "", "bob", "nobody.x", Thing(), "bob."],
         at=rows,
         z=[*rows, (0, 0, 0)],
         x=[*rows[1:], (0, 1, 0)],
     )
-    for kind in (Revolute, Prismatic, Cylindrical):
-        start = (0.0, 0.0) if kind is Cylindrical else 0.0
+    for kind in (mb.Revolute, mb.Prismatic, mb.Cylindrical):
+        start = (0.0, 0.0) if kind is mb.Cylindrical else 0.0
         bad = [x for x in parameter() if x is not None]
         yield door(
-            kind.__name__,
             part("joint", kind=kind),
             {"start": start},
+            kind.__name__,
             name=[None, 3, "", "a b", Thing(), []],
             parent=[None, 3, "nobody", "ground.nothing", Thing(), "bob.pivot"],
             child=[None, 3, "nobody", "bob.nothing", Thing()],
@@ -119,9 +108,9 @@ def doors_of_mechanisms() -> Iterator[Door]:
         )
     rub: dict[str, Any] = {"law": Coulomb(), "radius": 0.01}
     yield door(
-        "JointFriction",
-        lambda **a: pendulum(joint={"friction": JointFriction(**a)}),
+        lambda **a: pendulum(joint={"friction": mb.JointFriction(**a)}),
         rub,
+        "JointFriction",
         law=thing(Coulomb),
         radius=parameter(0.0, -1.0),
         length=parameter(0.0)[1:],
@@ -132,8 +121,8 @@ def doors_of_mechanisms() -> Iterator[Door]:
     )
     springs = {"name": "s", "a": "ground.pivot", "b": "bob.pivot"}
     yield door(
+        part("force", lambda **a: mb.SpringDamper(**springs | {"stiffness": 1.0} | a)),
         "SpringDamper",
-        part("force", lambda **a: SpringDamper(**springs | {"stiffness": 1.0} | a)),
         name=[None, 3, "", "a b", Thing()],
         a=[None, 3, "nobody", Thing()],
         b=[None, 3, "nobody", Thing()],
@@ -142,8 +131,8 @@ def doors_of_mechanisms() -> Iterator[Door]:
         free_length=parameter(),
     )
     yield door(
+        part("force", lambda **a: mb.JointSpringDamper(**{"name": "s", "joint": "hinge"} | a)),
         "JointSpringDamper",
-        part("force", lambda **a: JointSpringDamper(**{"name": "s", "joint": "hinge"} | a)),
         joint=[None, 3, "nobody", Thing()],
         stiffness=parameter(),
         damping=parameter(),
@@ -152,38 +141,38 @@ def doors_of_mechanisms() -> Iterator[Door]:
     gear = {"name": "g", "a": "hinge", "b": "hinge", "ratio": 1.0}
     motor = {"name": "p", "joint": "hinge", "motion": lambda t: t}
     yield door(
+        part("constraint", lambda **a: mb.Gear(**gear | a)),
         "Gear",
-        part("constraint", lambda **a: Gear(**gear | a)),
         a=[None, 3, "nobody", Thing()],
         ratio=parameter(0.0),
     )
     motions = [None, "x", Thing(), lambda: 1, lambda t: None, lambda t: "a", lambda t: 1j]
     motions += [lambda t: ca.SX.sym("a"), lambda t: ca.vertcat(t, t), lambda t: NAN]
     yield door(
+        part("constraint", lambda **a: mb.PrescribedMotion(**motor | a)),
         "PrescribedMotion",
-        part("constraint", lambda **a: PrescribedMotion(**motor | a)),
         joint=[None, 3, "nobody", Thing()],
         motion=motions,
     )
     yield door(
-        "Mechanism.input",
         part("input"),
+        "Mechanism.input",
         name=[None, 3, "", "a b", Thing()],
         unit=[None, 3, Thing()],
         start=number(),
         nominal=number(0.0, -1.0),
     )
     yield door(
-        "Mechanism.build",
         part("build"),
+        "Mechanism.build",
         p=[3, "x", (3,), Thing(), [ca.SX.sym("a")]],
         formulation=choice(),
         index=[2, -1, "0", 0.5, Thing(), [0], NAN],
     )
     yield door(
-        "read_urdf",
-        lambda **a: read_urdf(**a).build(),
+        lambda **a: mb.read_urdf(**a).build(),
         {"source": URDF},
+        "read_urdf",
         source=[None, 3, [], Thing(), "", "<robot", "nothing.urdf", "<a/>", "<robot/>", b"x"],
         law=thing(Coulomb)[1:],
         level=parameter(-1.0),
@@ -216,9 +205,9 @@ def doors_of_control() -> Iterator[Door]:
     )
     nodes = [{t: {}} for t in ("a", 0.0, 1.5, NAN, None, True)]
     yield door(
-        "Problem",
         moved,
         good,
+        "Problem",
         model=thing(BrownMcPhee(), sf.Model),
         T=[*number(0.0, -1.0), (0.5, 1.0)],
         cost=[None, 3, "x", Thing(), lambda s: s.x, ocp.integral, *map(ocp.integral, costs)],
@@ -229,7 +218,6 @@ def doors_of_control() -> Iterator[Door]:
         p=values("m", {"m": -1.0}),
     )
     yield door(
-        "Free",
         ocp.Free,
         {"lower": 0.1, "upper": 1.0},
         lower=number(0.0, -1.0, 2.0),
@@ -237,10 +225,9 @@ def doors_of_control() -> Iterator[Door]:
         guess=number(5.0, optional=True),
     )
     for make in (ocp.integral, ocp.at_end):
-        yield door(make.__name__, make, expression=[None, *function()])
-    yield door("Cost * weight", lambda w: ocp.TIME * w, w=number())
+        yield door(make, expression=[None, *function()])
+    yield door(lambda w: ocp.TIME * w, "Cost * weight", w=number())
     yield door(
-        "rest_to_rest",
         ocp.rest_to_rest,
         {"model": model, "distance": 0.1, "T": 1.0, "limit": 9.0},
         model=thing(),
@@ -256,7 +243,6 @@ def doors_of_control() -> Iterator[Door]:
     meshes = ([], [0.0], [0.0, 0.5], [0.0, 0.5, 0.5, 1.0], [0.0, NAN, 1.0])
     guesses = ("a", NAN, [[1.0]], [], lambda: 1, lambda t: "a", lambda t: [1.0, 2.0], None, 1j)
     yield door(
-        "solve",
         ocp.solve,
         fast,
         problem=thing(model, ocp.Problem),
@@ -276,7 +262,6 @@ def doors_of_control() -> Iterator[Door]:
 
 def doors_of_code() -> Iterator[Door]:
     yield door(
-        "generate",
         generate,
         {"law": Stribeck(), "out": "c"},
         law=thing(Coulomb, sf.rabinowicz(LuGre())),
@@ -286,7 +271,6 @@ def doors_of_code() -> Iterator[Door]:
         free=[3, "mu_s", ["nonsense"], [3], Thing()],
     )
     yield door(
-        "law_block",
         law_block,
         {"law": LuGre()},
         law=thing(LuGre),
@@ -295,7 +279,6 @@ def doors_of_code() -> Iterator[Door]:
         name=[3, "a b", Thing(), ""],
     )
     yield door(
-        "plant_block",
         plant_block,
         {"model": sf.rabinowicz(BrownMcPhee())},
         model=thing(LuGre()),
@@ -303,7 +286,7 @@ def doors_of_code() -> Iterator[Door]:
         method=choice(),
         name=[3, "a b", Thing(), ""],
     )
-    yield door("verify", verify, generated=thing())
+    yield door(verify, generated=thing())
 
 
 test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(

@@ -10,16 +10,9 @@ import pytest
 import ocp
 import symfric as sf
 from identification import Dataset, Fit, InverseDynamics, Shooting, synthetic_drive_data
+from symfric import multibody as mb
 from symfric.codegen import law_block, plant_block
 from symfric.figures import compare
-from symfric.multibody import (
-    JointFriction,
-    JointSpringDamper,
-    Mechanism,
-    Revolute,
-    SpringDamper,
-    read_urdf,
-)
 
 KINDS: tuple[Callable[[float], Any], ...] = (
     float,
@@ -106,19 +99,19 @@ def test_every_kind_of_number_makes_an_ensemble_and_a_flow() -> None:
 def test_every_kind_of_number_describes_a_machine() -> None:
     energy = set[float]()
     for kind in PLAIN:
-        m = Mechanism("m", gravity=(kind(0.0), kind(0.0), kind(-8.0)))
+        m = mb.Mechanism("m", gravity=(kind(0.0), kind(0.0), kind(-8.0)))
         m.body("bob", mass=kind(0.5), inertia=(kind(0.5),) * 3, com=(kind(0.0),) * 3)
         m.frame("bob.pivot", at=(kind(0.0), kind(0.0), kind(0.5)))
-        friction = JointFriction(sf.Coulomb(), radius=kind(0.5), normal=kind(2.0), eps=kind(0.5))
-        m.joint(Revolute("hinge", "ground", "bob.pivot", start=kind(0.5), friction=friction))
-        m.force(JointSpringDamper("turning", "hinge", stiffness=kind(0.5), damping=kind(0.5)))
-        m.force(SpringDamper("spring", "ground", "bob", stiffness=kind(0.5)))
+        friction = mb.JointFriction(sf.Coulomb(), radius=kind(0.5), normal=kind(2.0), eps=kind(0.5))
+        m.joint(mb.Revolute("hinge", "ground", "bob.pivot", start=kind(0.5), friction=friction))
+        m.force(mb.JointSpringDamper("turning", "hinge", stiffness=kind(0.5), damping=kind(0.5)))
+        m.force(mb.SpringDamper("spring", "ground", "bob", stiffness=kind(0.5)))
         run = sf.simulate(m.build(), 0.01, backend="vm", samples=2)
         energy.add(round(run.final["energy"], 12))
         urdf = '<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/><inertia'
         urdf += ' ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name='
         urdf += '"j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>'
-        assert read_urdf(urdf, level=kind(0.5)).build().x
+        assert mb.read_urdf(urdf, level=kind(0.5)).build().x
     assert len(energy) == 1
 
 

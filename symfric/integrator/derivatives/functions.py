@@ -6,8 +6,8 @@ costs as much as for a single name, and the linear part is evaluated for all nam
 operations are the same as name by name, and so are the bits.
 """
 
-from collections.abc import Callable, Hashable, Sequence
-from functools import cached_property, partial
+from collections.abc import Sequence
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import final
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.compiled.columns import NAME, Columns, filled
-from symfric.integrator.derivatives.path import Seeds
+from symfric.integrator.derivatives.path import Parameters, of_data
 from symfric.integrator.equations.expressions import branchless, divided_once
 from symfric.integrator.many.vectors import lanes_header, vector_source
 from symfric.integrator.running.integrator import Integrator
@@ -62,17 +62,19 @@ LARGE = 5000
 
 @final
 class Derivatives:
-    """Functions that differentiate the steps of one integrator, created when first needed."""
+    """Functions that differentiate the steps of one integrator, created when first needed.
+
+    Attributes:
+        forward, reverse, of_signals, weighted, columns: cached forms of the private methods of the
+            same names, and of `Columns`.
+    """
 
     def __init__(self, integrator: Integrator) -> None:
         self.integrator, self.system = integrator, integrator.system
         self.step = build_dense_step(integrator.system, integrator.tableau)
-        self._made: dict[Hashable, Columns] = {}
-
-    def _kept(self, key: Hashable, make: Callable[[], Columns]) -> Columns:
-        if key not in self._made:
-            self._made[key] = make()
-        return self._made[key]
+        self.columns = cache(Columns)
+        self.forward, self.reverse = cache(self._forward), cache(self._reverse)
+        self.of_signals, self.weighted = cache(self._of_signals), cache(self._weighted)
 
     @property
     def symbols(self) -> list[ca.SX]:
@@ -85,7 +87,7 @@ class Derivatives:
         y, t, d = self.symbols
         return [t, y, d]
 
-    def forward(self, which: Seeds, linked: bool) -> Columns:
+    def _forward(self, parameters: Parameters, linked: bool) -> Columns:
         """Return (X, y, h, d) -> (X of the next step, Z).
 
         X holds the derivatives of the start of the step, shape (n, names), and Z those of its end
@@ -93,14 +95,9 @@ class Derivatives:
         for the time of the start, and there are additional arguments: share, fall, by_state
         transposed, by_data d'.
         """
-        return self._kept(
-            ("forward", linked, which.parameters), lambda: self._forward(which, linked)
-        )
-
-    def _forward(self, which: Seeds, linked: bool) -> Columns:
-        one, names = self._by_one(linked), len(which.names)
+        one, names = self._by_one(linked), len(parameters)
         single, *steps = one.sx_in()
-        of_d = ca.DM(which.of_data(steps.pop(3).numel()))
+        of_d = ca.DM(of_data(parameters, steps.pop(3).numel()))
         X = ca.SX.sym("X", single.numel(), names)
         if linked:
             steps[-1] = ca.SX.sym("by_data", single.numel(), names)
@@ -138,16 +135,13 @@ class Derivatives:
         share = ca.SX.sym("share", self.step.numel_out(0) // n + 1)
         return [share, ca.SX.sym("fall", n), ca.SX.sym("by_state", n, n + 1)]
 
-    def reverse(self, linked: bool) -> Columns:
+    def _reverse(self, linked: bool) -> Columns:
         """Return (adjoint of the next X, y, h, d, weights) -> (adjoint of X, of d).
 
         `weights` are those of the start and of all results of the step, end first. If steps are
         `linked`, there are additional arguments: weight of the time of the start, share, fall,
         by_state, and by_data transposed.
         """
-        return self._kept(("reverse", linked), lambda: self._reverse(linked))
-
-    def _reverse(self, linked: bool) -> Columns:
         n, (y, h, d) = self.system.n, self.symbols
         every = self.step(y, h, d)
         after, weights = ca.SX.sym("after", n + linked), ca.SX.sym("w", n + every.numel())
@@ -170,7 +164,7 @@ class Derivatives:
 
     def many(self, function: ca.Function, rows: Sequence[Array], backend: str) -> list[Array]:
         """Return the results of one of these Functions for the rows of arrays."""
-        return self._kept(function.name(), lambda: Columns(function))(rows, backend=backend)
+        return self.columns(function)(rows, backend=backend)
 
     @cached_property
     def algebraic(self) -> ca.Function:
@@ -215,27 +209,21 @@ class Derivatives:
         values = function(*(arguments := self.at_times))
         return ca.Function(name, arguments, [ca.jacobian(values, x) for x in arguments])
 
-    def of_signals(self, which: Seeds) -> Columns:
+    def _of_signals(self, parameters: Parameters) -> Columns:
         """Return (t, y, d, S) -> derivatives of all signals, shape (signals, names)."""
-        return self._kept(("signals", which.parameters), lambda: self._of_signals(which))
-
-    def _of_signals(self, which: Seeds) -> Columns:
-        names, arguments = len(which.names), self.at_times
-        of_d = ca.SX(ca.sparsify(ca.DM(which.of_data(arguments[2].numel()))))
-        S = ca.SX.sym("S", self.system.n, names)
+        arguments = self.at_times
+        of_d = ca.SX(ca.sparsify(ca.DM(of_data(parameters, arguments[2].numel()))))
+        S = ca.SX.sym("S", self.system.n, len(parameters))
         values, direction = self.integrator.signals(*arguments), ca.vertcat(S, of_d)
         pushed = ca.jtimes(values, ca.vertcat(*arguments[1:]), direction)
         return Columns(fast("of_signals", [*arguments, S], [ca.densify(pushed)]))
 
-    def weighted(self, used: tuple[int, ...]) -> Columns:
+    def _weighted(self, used: tuple[int, ...]) -> Columns:
         """Return (t, y, d, weights) -> derivatives of a weighted sum of signals by y and by d.
 
         Only signals in `used` are included: other signals may have no derivative, such as a norm at
         zero.
         """
-        return self._kept(("weighted", used), lambda: self._weighted(used))
-
-    def _weighted(self, used: tuple[int, ...]) -> Columns:
         t, y, d = self.at_times
         values, w = self.integrator.signals(t, y, d)[list(used)], ca.SX.sym("w", len(used))
         results = [ca.densify(ca.jtimes(values, x, w, True)) for x in (y, d)]

@@ -15,6 +15,8 @@ from symfric.integrator.running.record import Dense, Jumps
 from symfric.model import Model
 
 Array = NDArray[np.float64]
+Parameters = tuple[int, ...]
+"""Row in p of each name, -1 for a start value."""
 
 
 @final
@@ -24,17 +26,18 @@ class Seeds:
 
     Attributes:
         names: as the user wrote them: a parameter, or "x0.v" for the start value of the state v.
-        parameters: row in p of each name, -1 for a start value.
+        parameters: row of each name.
         start: derivative of the start values of x with respect to each name, shape (nx, names).
     """
 
     names: tuple[str, ...]
-    parameters: tuple[int, ...]
+    parameters: Parameters
     start: Array
 
-    def of_data(self, n_d: int) -> Array:
-        """Return the derivative of the run data d with respect to each name, shape (n_d, names)."""
-        return np.array(np.arange(n_d)[:, None] == self.parameters, dtype=float)
+
+def of_data(parameters: Parameters, n_d: int) -> Array:
+    """Return the derivative of the run data d with respect to each name, shape (n_d, names)."""
+    return np.array(np.arange(n_d)[:, None] == parameters, dtype=float)
 
 
 def seeds(

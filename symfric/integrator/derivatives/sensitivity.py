@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.derivatives.functions import derivatives
-from symfric.integrator.derivatives.path import Jump, Path, Seeds
+from symfric.integrator.derivatives.path import Jump, Path, Seeds, of_data
 from symfric.integrator.derivatives.saltation import Links, at_start, links
 from symfric.integrator.running.record import Dense
 
@@ -40,9 +40,9 @@ class Slopes(NamedTuple):
 def forward(path: Path, which: Seeds) -> Slopes:
     """Return the derivatives of the solution with respect to all names, in one sweep over steps."""
     n, names, linked = path.integrator.system.n, len(which.names), path.linked
-    state, of_d = np.zeros((n + 1, names)), which.of_data(path.steps[2].shape[1])
+    state, of_d = np.zeros((n + 1, names)), of_data(which.parameters, path.steps[2].shape[1])
     state[: which.start.shape[0]] = which.start
-    sweep, rows = derivatives(path.integrator).forward(which, linked), [*path.steps]
+    sweep, rows = derivatives(path.integrator).forward(which.parameters, linked), [*path.steps]
     if not linked:
         state = _after(at_start(path), state, of_d)[:n]
         behind, inner = sweep(rows, state.T, path.backend)
@@ -141,7 +141,7 @@ def of_signals(path: Path, which: Seeds, solution: Dense, times: Array) -> Array
         times: times of the result [s].
     """
     rows = [*path.at(times), solution(times).T]
-    (found,) = derivatives(path.integrator).of_signals(which)(rows, backend=path.backend)
+    (found,) = derivatives(path.integrator).of_signals(which.parameters)(rows, backend=path.backend)
     # CasADi stores column by column
     return np.ascontiguousarray(found.T).reshape(len(which.names), -1, times.size)
 
@@ -163,10 +163,10 @@ def gradient(
     if not used:
         return dict.fromkeys(which.names, 0.0)
     rows = [*path.at(times), np.array([*weights.values()]).T]
-    by_y, of_d = derivatives(path.integrator).weighted(used)(rows, backend=path.backend)
+    by_y, by_d = derivatives(path.integrator).weighted(used)(rows, backend=path.backend)
     start, more = _swept_back(path, _Looks(path, times, by_y))
-    by_data = of_d.sum(axis=0) + more
-    found = start[: s.nx] @ which.start + by_data @ which.of_data(by_data.size)
+    by_data = by_d.sum(axis=0) + more
+    found = start[: s.nx] @ which.start + by_data @ of_data(which.parameters, by_data.size)
     return dict(zip(which.names, found.tolist(), strict=True))
 
 
@@ -182,9 +182,9 @@ def _swept_back(path: Path, looks: "_Looks") -> tuple[Array, Array]:
         steps += [looks.ahead(every)[::-1], *flat]
     else:
         first = at_start(path)
-    before, of_data = made.reverse(path.linked)(steps, np.zeros(n + path.linked), path.backend)
+    before, by_data = made.reverse(path.linked)(steps, np.zeros(n + path.linked), path.backend)
     adjoint = before[-1] if path.linked else np.append(before[-1], 0.0)
-    return first[:, : n + 1].T @ adjoint, of_data.sum(axis=0) + first[:, n + 1 :].T @ adjoint
+    return first[:, : n + 1].T @ adjoint, by_data.sum(axis=0) + first[:, n + 1 :].T @ adjoint
 
 
 @final

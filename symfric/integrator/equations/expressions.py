@@ -20,7 +20,7 @@ much from one to the next. A sine has pieces of equal length and no such times.
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from math import isfinite
 from typing import NamedTuple
@@ -61,9 +61,9 @@ MIDDLE = 0.7
 
 Beyond it, 1 - 2/(e^2|x| + 1) loses less than a bit to cancellation.
 """
-U = (-0.3333333333333333, -0.02049522886753235, -0.00019901990913769401)
-V = (1.0, 0.46148568660258626, 0.023286572463946293, 0.00020636437984939814)
-"""Coefficients of the rational function for (tanh x / x - 1) / x^2.
+U = ca.SX([-0.00019901990913769401, -0.02049522886753235, -0.3333333333333333])
+V = ca.SX([0.00020636437984939814, 0.023286572463946293, 0.46148568660258626, 1.0])
+"""Coefficients of the rational function for (tanh x / x - 1) / x^2, highest power first.
 
 It interpolates at Chebyshev nodes in x^2.
 """
@@ -83,16 +83,9 @@ def tanh(x: ca.SX) -> ca.SX:
     """
     size = ca.fabs(x)
     square = x * x
-    near = x + x * square * (_polynomial(U, square) / _polynomial(V, square))
+    near = x + x * square * (ca.polyval(U, square) / ca.polyval(V, square))
     far = ca.copysign(1 - 2 / (ca.exp(2 * size) + 1), x)
     return ca.if_else(size < MIDDLE, near, far)
-
-
-def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
-    value = ca.SX(coefficients[-1])
-    for coefficient in coefficients[-2::-1]:
-        value = value * x + coefficient
-    return value
 
 
 def branchless(function: ca.Function, most: int = LARGE) -> ca.Function:

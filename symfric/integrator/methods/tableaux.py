@@ -2,6 +2,7 @@
 
 import tomllib
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +22,8 @@ def _array(rows: list[Any]) -> Array:
     """Return a vector, or a matrix whose short rows are filled with zeros."""
     if rows and isinstance(rows[0], list):
         width = len(rows[-1]) + (not rows[0])
-        return np.array([[*map(_number, row)] + [0.0] * (width - len(row)) for row in rows])
-    return np.array([*map(_number, rows)])
-
-
-def _number(value: str | float) -> float:
-    """Return the value of a number or of a quotient of two numbers."""
-    above, _, below = str(value).partition("/")
-    return float(above) / float(below or 1)
+        return np.array([_array(row).tolist() + [0.0] * (width - len(row)) for row in rows])
+    return np.array([Fraction(value) for value in rows], dtype=float)
 
 
 def shampine(b: Array, D: Array) -> Array:

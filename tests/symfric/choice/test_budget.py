@@ -1,4 +1,4 @@
-"""What runs of a law may cost, and which run it is judged by, with runs that are written down."""
+"""The budget of a law and the run it is judged by, tested with tables of runs."""
 
 from dataclasses import dataclass, field
 from math import log, log10, pi
@@ -162,7 +162,7 @@ def test_where_only_the_finest_run_keeps_the_accuracy_its_own_error_is_that_of_t
 def test_bristles_keep_the_accuracy_in_a_far_tighter_run_or_are_not_ranked(
     tight: float | None, status: Status, kept: bool
 ) -> None:
-    """What is off there, or fails for another reason than its cost, is rounding."""
+    """Errors there, and failures for reasons other than the cost, are rounding."""
     held: Any = Written(
         lambda _, rtol: tight if rtol < 1e-5 else 1e-4,
         lambda _, rtol: 10**9 if tight is None and rtol < 1e-5 else 100,

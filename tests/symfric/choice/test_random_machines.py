@@ -1,11 +1,11 @@
-"""What a choice says holds away from the defaults: random machines, parameters over decades.
+"""Choices on random machines with parameters over decades.
 
-Judged by runs of exact dry friction and of the ranked law itself at a hundredth of its tolerance,
-which `select` has no part in.
+The references are runs of exact dry friction and of the ranked law at a hundredth of its
+tolerance, computed without `select`.
 """
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import pi
 
 import casadi as ca
@@ -18,10 +18,10 @@ from symfric.laws import ALL_LAWS
 from symfric.scenes import Rabinowicz
 
 LAWS = ("stribeck", "brown_mcphee", "lugre", "elasto_plastic")
-"""Laws that all tend to dry friction: to none of them may another motion be ascribed."""
+"""Laws that tend to dry friction; `select` must not report another motion for them."""
 ACCURACY = 1e-3
 STILL = 1e-9
-"""A signal that moves by less, in nominal values, is at rest: the box may never slide."""
+"""A signal that moves by less, in nominal values, is at rest."""
 Random = np.random.Generator
 Made = tuple[Callable[[Law], Model], float]
 
@@ -56,14 +56,14 @@ def own(random: Random, mu_s: float, mu_d: float) -> Made:
     return model, t_end
 
 
-def judged(seed: int) -> tuple[int, int]:
-    """How many of the laws are ranked on a random machine, of how many that run; all is true."""
+def judged(seed: int, laws: Sequence[str] = LAWS) -> tuple[int, int]:
+    """Return the numbers of laws ranked and run on a random machine, after checks of each rank."""
     random = np.random.default_rng(seed)
     mu_s = 10 ** random.uniform(-1, 0)
     mu_d = mu_s * random.uniform(0.4, 0.9)
     made, t_end = (belt, own)[seed % 2](random, mu_s, mu_d)
     found = select(
-        made, LAWS, t_end=t_end, friction=Friction(mu_s, mu_d), accuracy=ACCURACY,
+        made, laws, t_end=t_end, friction=Friction(mu_s, mu_d), accuracy=ACCURACY,
         fixed_steps=False,
     )  # fmt: skip
     t = np.linspace(0.0, t_end, 2001)
@@ -84,11 +84,8 @@ def judged(seed: int) -> tuple[int, int]:
     return len(found.ranked), len(found.placed)
 
 
-@pytest.mark.parametrize("seed", [0])
-def test_no_law_that_converges_is_said_to_tend_to_another_motion(seed: int) -> None:
-    ranked, placed = judged(seed)
-    assert placed == len(LAWS)
-    assert ranked >= 3
+def test_no_law_that_converges_is_said_to_tend_to_another_motion() -> None:
+    assert judged(0, ("stribeck", "lugre")) == (2, 2)
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The choice of a law on a machine: what is ranked, what is not and why, and how it looks."""
+"""The choice of a law on a machine: ranks, reasons of laws without rank, and output."""
 
 import csv
 import json
@@ -172,7 +172,7 @@ def test_gms_keeps_an_accuracy_by_events_where_it_may_cost_more() -> None:
 
 
 def test_every_run_and_number_of_processes_gives_the_same_order_and_counts(choice: Choice) -> None:
-    """Whatever the clock says: ranks, work and errors are those of another run of `select`."""
+    """Ranks, work and errors do not depend on the time that a run takes."""
     alone, two = (
         select(press, ["stribeck", "tustin"], accuracy=0.2, t_end=0.2, workers=n, fixed_steps=False)
         for n in (1, 2)

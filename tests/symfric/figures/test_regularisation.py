@@ -1,4 +1,4 @@
-"""What makes a law smooth, and where laws are compared."""
+"""Parameters that make a law smooth, and points where laws are compared."""
 
 from dataclasses import replace
 from importlib import import_module

@@ -125,7 +125,9 @@ def test_width_and_text_are_what_is_asked_for_and_everything_is_on_the_page(figu
     assert figure.get_size_inches()[1] == pytest.approx(70 / 25.4)
 
 
-def test_text_in_pdf_is_truetype(figure: Figure, tmp_path: Path) -> None:
+def test_text_in_pdf_is_truetype(tmp_path: Path) -> None:
+    figure, (axis,) = panels(1)
+    axis.set_ylabel("x [m]")
     for_print(figure, tmp_path / "figure.pdf")
     content = (tmp_path / "figure.pdf").read_bytes()
     assert b"/TrueType" in content or b"/CIDFontType2" in content

@@ -1,4 +1,4 @@
-"""What every law promises, checked over all of them."""
+"""Properties of every law of the catalogue."""
 
 import re
 from collections.abc import Iterable

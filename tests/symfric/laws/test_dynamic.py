@@ -1,4 +1,4 @@
-"""What laws with states share: steady sliding, dissipation, states as people give them."""
+"""Properties of laws with states: steady sliding, dissipation, types of the states."""
 
 from collections.abc import Callable
 from itertools import product

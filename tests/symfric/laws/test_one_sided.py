@@ -54,7 +54,7 @@ def test_sliding_is_the_force_outside_of_a_thin_layer() -> None:
 
 
 def test_derivatives_at_rest_are_those_of_the_side() -> None:
-    """All orders up to two are finite at v = 0, and the slope is the one-sided quotient."""
+    """Derivatives up to order two are finite at v = 0; the slope is the one-sided quotient."""
     for (name, law), side in product(LIMITED.items(), (1, -1)):
         v = ca.SX.sym("v")
         F = ca.SX(law.sliding(v, N, side, **further(law)))

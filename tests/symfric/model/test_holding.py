@@ -172,7 +172,7 @@ UNDETERMINED: dict[str, dict[str, Any]] = {
     "explicit equations":
         {"xdot": RATES, "residual": RATES + ca.vertcat(-V, RATES[1] + FLOOR.force, 0)},
 }  # fmt: skip
-"""What is expected -> the parts of a model that does not determine its applied force."""
+"""Expected text -> the parts of a model that does not determine its applied force."""
 
 
 def test_forces_that_the_equations_do_not_determine_are_refused() -> None:

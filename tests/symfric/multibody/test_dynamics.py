@@ -111,7 +111,7 @@ def test_kinetic_energy_changes_by_the_power_of_all_forces(formulation: str) -> 
     assert rate == pytest.approx(power, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", MECHANISMS)
+@pytest.mark.parametrize("name", ["pendulum_box", "slider_crank", "four_bar"])
 def test_both_formulations_agree(name: str) -> None:
     scene = MECHANISMS[name](BrownMcPhee(v_t=0.5))
     tree, whole = (scene.mechanism().prepare(formulation=f) for f in ("joint", "absolute"))

@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from chains import X, Y, Z, attach, in_both, rod
+from chains import X, Y, Z, attach, in_joint_coordinates_first, rod
 
 from symfric import BrownMcPhee, LuGre, SolveError, Viscous, simulate
 from symfric import multibody as mb
@@ -36,7 +36,7 @@ def test_wrong_masses_loose_bodies_and_open_loops_come_at_once() -> None:
     assert (x, z) == pytest.approx(np.array([0.9, 0.6]) / np.hypot(0.9, 0.6), abs=1e-12)
 
 
-@in_both
+@in_joint_coordinates_first
 def test_a_rod_that_holds_what_is_held_already_is_redundant(formulation: str) -> None:
     m = rod()
     m.frame("ground.beside", at=(0.0, 1.0, 0.0))
@@ -156,7 +156,7 @@ def test_inputs_and_parameters_enter_forces_and_bodies() -> None:
     assert run["x"][-1] == pytest.approx(0.5 * 2.0 * 4.0)
 
 
-@in_both
+@in_joint_coordinates_first
 def test_a_free_body_spins_as_it_must(formulation: str) -> None:
     """Momentum and energy of a tumbling body without forces."""
     m = mb.Mechanism("m", gravity=(0.0, 0.0, 0.0))

@@ -16,7 +16,6 @@ from PIL import Image
 from symfric import (
     BrownMcPhee,
     ExactCoulomb,
-    Law,
     Model,
     Trajectory,
     Variable,
@@ -118,7 +117,7 @@ def test_a_block_on_a_belt_is_seen_from_aside_with_its_spring_and_its_stick() ->
     assert picture(small, np.array([0.0, 1.0]))[0].axes[0].get_xlabel() == "x [mm]"
 
 
-@pytest.mark.parametrize("along", ["x", "y", "z"])
+@pytest.mark.parametrize("along", ["x", "z"])
 def test_a_slider_alone_is_drawn_in_a_plane(along: str) -> None:
     machine = Mechanism("slider", gravity=(0.0, 0.0, 0.0))
     axis = tuple(float(along == other) for other in "xyz")
@@ -143,10 +142,9 @@ def test_spatial_mechanisms_have_one_scale_on_three_axes(runs: dict[str, Traject
     assert spans / spans.max() == pytest.approx(box / box.max())
 
 
-@pytest.mark.parametrize("law", [BrownMcPhee(v_t=0.02), ExactCoulomb()], ids=["smooth", "exact"])
-def test_time_and_speed_stand_above_and_joints_show_whether_they_stick(law: Law) -> None:
+def test_time_and_speed_stand_above_and_joints_show_whether_they_stick() -> None:
     """From rest at 1 rad: the hinge sticks first and slides then."""
-    run = simulate(Pendulum(law).model(), 0.5)
+    run = simulate(Pendulum(ExactCoulomb()).model(), 0.5)
     figure, show = picture(run, np.array([0.0, 0.5]), speed=0.1)
     (axis,) = figure.axes
     fills: list[str] = []

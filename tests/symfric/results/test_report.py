@@ -5,9 +5,11 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from robots import SMALL
 
 from symfric import BrownMcPhee, LuGre, parameters, report, simulate
 from symfric.cli import main
+from symfric.multibody.urdf import read_urdf
 from symfric.page.html import STYLE
 from symfric.results.pictures import plot_trajectories
 from symfric.scenes import Rabinowicz
@@ -71,17 +73,21 @@ def test_a_law_has_one_colour_on_its_page() -> None:
     """That of the picture of the motion, also in the second chart of friction."""
     run = simulate(Rabinowicz(BrownMcPhee()).model(), 0.1)
     runs = {f"law {k}": run for k in range(5)}
-    drawn = re.findall(r'<polyline class="(run\d)"', report(runs))
+    page = report(runs)
+    drawn = re.findall(r'<polyline class="(run\d)"', page)
     assert drawn == [f"run{k}" for k in range(5)]
     positions = plot_trajectories(runs, ["x"]).axes[0].lines
     for kind, line in zip(drawn, positions, strict=True):
         assert f"svg .{kind} {{ stroke: {line.get_color()};" in STYLE
+    robot = simulate(read_urdf(SMALL).build(), 0.1, x0={"hinge": 1.0})
+    for text, unit in ((page, "m/s"), (report(robot), "rad/s")):
+        assert f"sliding velocity [{unit}]" in text
 
 
-@pytest.mark.parametrize("bad", [{}, {"x": 1.0}, 3])
-def test_what_is_no_run_is_refused(bad: dict[str, object]) -> None:
-    with pytest.raises(ValueError, match="report"):
-        report(bad)  # pyright: ignore[reportArgumentType]
+def test_what_is_no_run_is_refused() -> None:
+    for bad in ({}, {"x": 1.0}, 3):
+        with pytest.raises(ValueError, match="report"):
+            report(bad)  # pyright: ignore[reportArgumentType]
 
 
 def test_the_command_writes_one_page_of_several_laws(tmp_path: Path) -> None:

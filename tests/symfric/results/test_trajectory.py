@@ -22,7 +22,6 @@ from symfric import (
     simulate_many,
 )
 from symfric.integrator import simulate_by_peer
-from symfric.laws import MaxwellSlip
 from symfric.model.kinds import MODE
 from symfric.multibody import Mechanism
 from symfric.results import stored
@@ -126,7 +125,6 @@ def test_without_their_packages_there_is_a_sentence(
 
 MODEL: dict[str, Model] = {
     "exact": rabinowicz(ExactCoulomb()),
-    "maxwell": rabinowicz(MaxwellSlip(form="event")),
     "loops": FourMass(ExactCoulomb()).model(),
 }
 

@@ -198,8 +198,8 @@ def test_sweeps_cost_what_they_are_written_for() -> None:
     made = derivatives(integrator)
     which = seeds(model, ["mu_s", "mu_d", "k", "m"], None, None)
     count = [
-        made.step, made.forward(which, False).function, made.reverse(False).function,
-        made.forward(which, True).function, made.reverse(True).function,
+        made.step, made.forward(which.parameters, False).function, made.reverse(False).function,
+        made.forward(which.parameters, True).function, made.reverse(True).function,
     ]  # fmt: skip
     most = [580, 2900, 1400, 3320, 1540]
     found = [f.n_instructions() for f in count]

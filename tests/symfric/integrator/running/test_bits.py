@@ -70,13 +70,17 @@ CASES: dict[str, Case] = {
 }
 
 
-def digest(run: sf.Trajectory) -> str:
+def numbers(run: sf.Trajectory) -> Iterator[bytes]:
     """Every bit of a run but how long it took and what ran it."""
-    total = sha256(run.message.encode() + repr(run.happened).encode())
-    total.update(repr((run.statistics.steps, run.statistics.rejections)).encode())
-    for values in (run.step_times, *(run[name] for name in run.units)):
-        total.update(values.tobytes())
-    return total.hexdigest()
+    counts = run.statistics.steps, run.statistics.rejections, run.statistics.smallest_step
+    yield f"{run.message} {run.happened} {counts}".encode()
+    between = run.at(np.linspace(*run.span, 23))
+    for values in (run.t, run.step_times, *(run[n] for n in run.units), *between.values()):
+        yield values.tobytes()
+
+
+def digest(run: sf.Trajectory) -> str:
+    return sha256(b"".join(numbers(run))).hexdigest()
 
 
 def of_case(case: str, backend: str) -> str:
@@ -198,15 +202,6 @@ MODELS = [
     driven_cubic(),
     driven_cubic(HIT, sf.Event("low", X.symbol + 1, -1)),
 ]
-
-
-def numbers(run: sf.Trajectory) -> Iterator[bytes]:
-    """Every bit of a run."""
-    counts = run.statistics.steps, run.statistics.rejections, run.statistics.smallest_step
-    yield f"{run.message} {run.happened} {counts}".encode()
-    between = run.at(np.linspace(*run.span, 23))
-    for values in (run.t, run.step_times, *(run[n] for n in run.units), *between.values()):
-        yield values.tobytes()
 
 
 def drawn(rng: np.random.Generator) -> tuple[float, dict[str, Any]]:

@@ -1,5 +1,6 @@
 """The search for events in both engines, also of algebraic variables, and storms."""
 
+from dataclasses import fields
 from math import asin, atan2, pi, sqrt
 from typing import Any
 
@@ -8,16 +9,20 @@ import numpy as np
 import pytest
 from backends import each_backend, needs_compiler
 from hybrid import ball
+from numpy.typing import NDArray
 
 from symfric import Event, Linear, MaxwellSlip, Model, Status, Variable, drive, simulate
 from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
+from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.engine import CompiledEngine, loop_source
 from symfric.integrator.running.events import storm
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.record import Dense, Jumps
 from symfric.integrator.running.run import Tolerances, integrate
 
+Array = NDArray[np.float64]
+ATOL = np.full(2, 1e-7)
 x, y = Variable("x", "m"), Variable("y", "m", start=2.0)
 X, Y = x.symbol, y.symbol
 
@@ -26,22 +31,25 @@ def waves(t: ca.SX) -> ca.SX:
     return 12 * ca.sin(3 * t)
 
 
+def jumps_of(model: Model, y0: Array, p: Array, span: float, backend: str) -> tuple[Dense, Jumps]:
+    """Dense output and all jumps of a run."""
+    inputs = input_data(model, None, 0.0, span)
+    integrator, allowed = Integrator(model, inputs, RODAS5P), Tolerances(1e-6, ATOL, 1e-10, 10_000)
+    run, _ = integrate(integrator, inputs, y0, p, allowed, backend, None)
+    parts = ([getattr(part, f.name) for part in run.jumps] for f in fields(Jumps))
+    return run.dense, Jumps(*map(np.concatenate, parts))
+
+
 @each_backend
 def test_each_jump_is_kept_with_the_values_on_both_sides(backend: str) -> None:
-    """What derivatives through events are made of: two events at 1 s, one more at the same time."""
+    """Derivatives through events need them: two events at 1 s, one more at the same time."""
     events = (
         Event("one", X - 1, 1, reset={"x": Y}),
         Event("two", 2 * X - 2, 0, reset={"y": -X}),
         Event("three", Y, -1, reset={"x": 10 * X}),
     )
     model = Model("clock", x=(x, y), ode=ca.vertcat(1.0, 0 * X), events=events)
-    inputs = input_data(model, None, 0.0, 1.5)
-    integrator = Integrator(model, inputs, ADAPTIVE["rodas5p"])
-    allowed = Tolerances(1e-6, np.full(2, 1e-7), 1e-10, 1000)
-    run, _ = integrate(
-        integrator, inputs, np.array([0.0, 2.0]), np.zeros(0), allowed, backend, None
-    )
-    dense, (jumps,) = run.dense, run.jumps
+    dense, jumps = jumps_of(model, np.array([0.0, 2.0]), np.zeros(0), 1.5, backend)
     assert jumps.which.tolist() == [[True, True, False], [False, False, True]]
     assert jumps.t == pytest.approx([1, 1], abs=1e-9)
     assert jumps.before == pytest.approx(np.array([[1, 2], [2, -1]]), abs=1e-9)
@@ -52,6 +60,16 @@ def test_each_jump_is_kept_with_the_values_on_both_sides(backend: str) -> None:
     assert dense.y1[first - 1].tolist() == jumps.before[0].tolist()
     assert dense.y0[first].tolist() == jumps.after[1].tolist()
     assert (np.diff(dense.t0) > 0).all()
+
+
+@needs_compiler
+def test_engines_agree_on_unknowns_around_an_event() -> None:
+    """After it those that follow are known; before it they are as the step has them."""
+    given = watched("explicit"), np.array([0.1, 1.0, 0.3]), np.array([0.12]), SPAN
+    one, other = (jumps_of(*given, backend)[1] for backend in ("vm", "compiled"))
+    assert one.t.size == 3
+    for field in fields(Jumps):
+        np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
 
 
 def test_events_of_time_alone_are_not_leapt_over() -> None:
@@ -101,8 +119,8 @@ def test_exact_memory_takes_fewer_attempts_than_its_smooth_form() -> None:
 def test_a_model_without_events_has_nothing_of_them_in_its_code() -> None:
     for events, found in (((), False), ((Event("one", X - 1),), True)):
         model = Model("clock", x=(x,), ode=ca.SX(1), events=events)
-        made = Integrator(model, input_data(model, None, 0.0, 1.0), ADAPTIVE["rodas5p"])
-        source = loop_source(made.step, ADAPTIVE["rodas5p"].H.shape[0], made.crossings)
+        made = Integrator(model, input_data(model, None, 0.0, 1.0), RODAS5P)
+        source = loop_source(made.step, RODAS5P.H.shape[0], made.crossings)
         assert ("static int symfric_search" in source) == found
 
 
@@ -131,33 +149,15 @@ SPAN = 20.0
 def watched(form: str) -> Model:
     """x'' = -x with z + 20 z^3 = 4 x, watched as z rises through `level`."""
     x, v = Variable("x", "1", start=0.1), Variable("v", "1", start=1.0)
-    z, level = Variable("z", "1"), Variable("level", "1")
-    rates = ca.SX.sym("rates", 2)
+    z, level, r = Variable("z", "1"), Variable("level", "1"), ca.SX.sym("rates", 2)
+    alg = z.symbol + 20 * z.symbol**3 - 4 * x.symbol
     factor = 1 + x.symbol**2 if form == "changing masses" else 1.0
-    equations = ca.vertcat(
-        factor * (rates[0] - v.symbol),
-        factor * (rates[1] + x.symbol),
-        z.symbol + 20 * z.symbol**3 - 4 * x.symbol,
-    )
-    if form != "explicit":
-        return Model(
-            "watched",
-            x=(x, v),
-            z=(z,),
-            p=(level,),
-            xdot=rates,
-            residual=equations,
-            events=(Event("up", z.symbol - level.symbol, direction=1),),
-        )
-    return Model(
-        "watched",
-        x=(x, v),
-        z=(z,),
-        p=(level,),
-        ode=ca.vertcat(v.symbol, -x.symbol),
-        alg=z.symbol + 20 * z.symbol**3 - 4 * x.symbol,
-        events=(Event("up", z.symbol - level.symbol, direction=1),),
-    )
+    rows = ca.vertcat(factor * (r[0] - v.symbol), factor * (r[1] + x.symbol), alg)
+    how: dict[str, Any] = {"xdot": r, "residual": rows}
+    if form == "explicit":
+        how = {"ode": ca.vertcat(v.symbol, -x.symbol), "alg": alg}
+    event = Event("up", z.symbol - level.symbol, direction=1)
+    return Model("watched", x=(x, v), z=(z,), p=(level,), events=(event,), **how)
 
 
 @pytest.mark.parametrize(
@@ -173,24 +173,6 @@ def test_each_passage_is_one_event(backend: str, form: str, rtol: float) -> None
         first = (asin(x / size) - atan2(0.1, 1.0)) % (2 * pi)  # x = size sin(t + atan2(0.1, 1))
         times = np.arange(first, SPAN, 2 * pi)
         assert [t for t, _ in run.happened] == pytest.approx(times, abs=30 * rtol)
-
-
-@needs_compiler
-def test_engines_tell_the_same_of_unknowns_around_an_event() -> None:
-    """Behind it those that follow are known; before it they are as the step has them."""
-    model = watched("explicit")
-    inputs = input_data(model, None, 0.0, SPAN)
-    allowed = Tolerances(1e-6, np.full(2, 1e-7), 1e-10, 10_000)
-    y0, p = np.array([0.1, 1.0, 0.3]), np.array([0.12])
-    runs = [
-        integrate(Integrator(model, inputs, RODAS5P), inputs, y0, p, allowed, backend, None)[0]
-        for backend in ("vm", "compiled")
-    ]
-    one, other = (run.jumps for run in runs)
-    assert sum(part.t.size for part in one) == 3
-    for name in ("step", "t", "size", "before", "after", "which"):
-        a, b = (np.concatenate([getattr(part, name) for part in jumps]) for jumps in (one, other))
-        assert (a == b).all(), name
 
 
 def test_events_of_coupled_variables_grow_with_their_number() -> None:
@@ -213,44 +195,31 @@ def test_events_of_coupled_variables_grow_with_their_number() -> None:
 TOLERANCE = 2.0**-33
 
 
-def raged(times: list[float], which: list[tuple[int, ...]] | None = None) -> list[int]:
-    """Numbers of the events at `times` that complete a storm."""
-    memory, kinds = Memory.new(3, TOLERANCE), which or [(0,)] * len(times)
-    flags = [np.isin(np.arange(3), kind) for kind in kinds]
-    return [k for k, (t, w) in enumerate(zip(times, flags, strict=True)) if storm(memory, t, w)]
+def gaps(*sizes: float) -> list[float]:
+    """Times from 1 s on, with these gaps in tolerances."""
+    return (1.0 + TOLERANCE * np.cumsum([0.0, *sizes])).tolist()
 
 
-def shrinking(last: float) -> list[float]:
-    """Four times whose gaps halve; as much as the last gap is still to come."""
-    return [1.0, 1.0 + 4 * last, 1.0 + 6 * last, 1.0 + 7 * last]
-
-
-def test_gaps_that_shrink_are_a_storm_once_little_is_still_to_come() -> None:
-    assert raged(shrinking(999 * TOLERANCE)) == [3]
-    assert raged(shrinking(1001 * TOLERANCE)) == []
-    assert raged(shrinking(20 * TOLERANCE)) == [3]
-
-
-def test_only_events_of_one_kind_shrink_towards_one_time() -> None:
-    near = shrinking(500 * TOLERANCE)
-    assert raged(near, [(0,), (1,), (0,), (1,)]) == []
-    assert raged(near, [(0, 1)] * 4) == [3]
-
-
-def test_gaps_that_stay_or_grow_are_none() -> None:
-    assert raged([k * 500 * TOLERANCE for k in range(20)]) == []
-    assert raged([k * k * 100 * TOLERANCE for k in range(20)]) == []
-
-
-def test_a_hundred_events_a_few_tolerances_apart_are_a_storm_of_any_kind() -> None:
-    kinds = [(k % 3,) for k in range(120)]
-    close = [1.0 + k * 10 * TOLERANCE for k in range(120)]
-    assert raged(close, kinds) == list(range(99, 120))
-    apart = [1.0 + k * 11 * TOLERANCE for k in range(120)]
-    assert raged(apart, kinds) == []
-
-
-def test_late_in_a_run_the_clock_is_the_tolerance() -> None:
-    """Neighbouring numbers at 1e9 s are a thousand tolerances apart."""
-    late = [2.0**30 + k * 2.0**-22 for k in range(100)]
-    assert raged(late, [(k % 2,) for k in range(100)]) == [99]
+def test_storms_are_shrinking_gaps_of_one_kind_and_crowds_of_any_kind() -> None:
+    """As much as the last of gaps that halve is still to come."""
+    a, b, both, by_turns = (0,), (1,), (0, 1), [(k % 3,) for k in range(120)]
+    late = [2.0**30 + k * 2.0**-22 for k in range(100)]  # neighbours, a thousand tolerances apart
+    cases: list[tuple[list[float], list[tuple[int, ...]], list[int]]] = [
+        (gaps(4 * 999, 2 * 999, 999), [a] * 4, [3]),
+        (gaps(4 * 20, 2 * 20, 20), [a] * 4, [3]),
+        (gaps(4 * 1001, 2 * 1001, 1001), [a] * 4, []),
+        (gaps(2000, 1000, 500), [a, b, a, b], []),
+        (gaps(2000, 1000, 500), [both] * 4, [3]),
+        (gaps(*[500] * 19), [a] * 20, []),
+        (gaps(*range(100, 4000, 200)), [a] * 21, []),
+        (gaps(*[10] * 119), by_turns, list(range(99, 120))),
+        (gaps(*[11] * 119), by_turns, []),
+        (late, [(k % 2,) for k in range(100)], [99]),
+    ]
+    for times, kinds, expected in cases:
+        memory = Memory.new(3, TOLERANCE)
+        flags = [np.isin(np.arange(3), kind) for kind in kinds]
+        found = [
+            k for k, (t, w) in enumerate(zip(times, flags, strict=True)) if storm(memory, t, w)
+        ]
+        assert found == expected

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from backends import needs_compiler
+from backends import each_backend, needs_compiler
 from closed_forms import assemble, smooth_dae, smooth_ode, timed_ode
 from numpy.typing import NDArray
 
@@ -17,9 +17,6 @@ Array = NDArray[np.float64]
 ROWS = RODAS5P.H.shape[0]
 
 KINDS = ("vm", "compiled")
-each_engine = pytest.mark.parametrize(
-    "kind", ["vm", pytest.param("compiled", marks=needs_compiler)]
-)
 
 
 def engine(kind: str, model: Model, method: str = "rodas5p") -> Engine:
@@ -95,10 +92,11 @@ def test_both_engines_stop_after_the_same_attempt() -> None:
         assert found[0] == found[1], (rows, attempts, h_min)
 
 
-@each_engine
-def test_records_are_a_chain_from_start_to_end(kind: str) -> None:
-    S = start((1.0, 1.0))
-    records, _, _ = run(engine(kind, smooth_ode().model), S, data(2, 1.0), 9999, 9999, 0.0)
+@each_backend
+def test_records_are_a_chain_from_start_to_end(backend: str) -> None:
+    """At the end nothing is done."""
+    runner, S = engine(backend, smooth_ode().model), start((1.0, 1.0))
+    records, _, _ = run(runner, S, data(2, 1.0), 9999, 9999, 0.0)
     t0, t1, y0, y1 = records[:, 0], records[:, 1], records[:, 2:4], records[:, 4:6]
     assert (t0[0], t1[-1], S[0]) == (0.0, 1.0, 1.0)
     assert (t1[:-1] == t0[1:]).all()
@@ -106,31 +104,23 @@ def test_records_are_a_chain_from_start_to_end(kind: str) -> None:
     assert y0[0].tolist() == [1.0, 1.0]
     assert y1[-1].tolist() == S[State.MEMORY :].tolist()
     assert y1 == pytest.approx(np.array([smooth_ode().exact(t) for t in t1]), rel=1e-6)
+    before = S.copy()
+    records, made, stop = run(runner, S, data(2, 1.0), 9, 9, 0.0)
+    assert (records.shape[0], made, stop, S.tolist()) == (0, 0, Stop.END, before.tolist())
 
 
-@each_engine
-def test_full_record_is_continued_without_a_trace(kind: str) -> None:
-    runner = engine(kind, BELT)
+@each_backend
+def test_full_record_is_continued_without_a_trace(backend: str) -> None:
+    runner = engine(backend, BELT)
     whole, made, _ = run(runner, start((0.0, 0.0)), data(2, 3.0), 9999, 99999, 0.0)
-    S, parts, attempts, stops = start((0.0, 0.0)), [], 0, []
-    while not stops or stops[-1] is not Stop.END:
+    S, parts, attempts, stop = start((0.0, 0.0)), [], 0, Stop.FULL
+    while stop is Stop.FULL:
         records, count, stop = run(runner, S, data(2, 3.0), 20, 99999, 0.0)
         parts.append(records)
         attempts += count
-        stops.append(stop)
-    assert stops[:-1] == [Stop.FULL] * (len(stops) - 1)
-    assert len(stops) > 2
-    assert attempts == made
+    assert (stop, attempts) == (Stop.END, made)
+    assert len(parts) > 2
     np.testing.assert_array_equal(np.vstack(parts), whole)
-
-
-@each_engine
-def test_nothing_is_done_at_the_end(kind: str) -> None:
-    S = start((1.0, 1.0))
-    S[0] = 1.0
-    records, made, stop = run(engine(kind, smooth_ode().model), S, data(2, 1.0), 9, 9, 0.0)
-    assert (records.shape[0], made, stop) == (0, 0, Stop.END)
-    assert S[State.MEMORY :].tolist() == [1.0, 1.0]
 
 
 def test_source_of_a_model_does_not_change_when_it_is_built_again() -> None:

@@ -59,23 +59,21 @@ def called(monkeypatch: pytest.MonkeyPatch) -> list[Columns]:
     return calls
 
 
-def test_states_of_a_tree_are_the_dense_output(called: list[Columns]) -> None:
+def test_states_need_no_other_signals(called: list[Columns]) -> None:
+    """Those of a tree are the dense output; those of loops are projected onto them."""
     run = simulate(PendulumBox(BrownMcPhee()).model(), 1.0)
     phi = run["phi"]
     assert not called
     assert phi == pytest.approx(run.signals["phi"], abs=1e-14)
-    assert len(called) == 1
-
-
-def test_states_of_loops_are_put_onto_them_without_the_other_signals(called: list[Columns]) -> None:
-    run = simulate(SliderCrank(BrownMcPhee()).model(), 0.02)
+    called.clear()
+    scene = SliderCrank(BrownMcPhee())
+    run = simulate(scene.model(), 0.02)
     crank, slider = run["crank"], run["slider"]
     assert len(called) == 1
     assert crank == pytest.approx(run.signals["crank"], abs=1e-14)
-    scene = SliderCrank(BrownMcPhee())
-    across = float(scene.b) - float(scene.r) * np.sin(crank)
-    up = float(scene.c) - float(scene.e) + float(scene.r) * np.cos(crank)
-    assert np.abs(slider**2 + across**2 + up**2 - float(scene.l) ** 2).max() < 1e-13
+    r, length, b, c, e = (float(getattr(scene, name)) for name in "rlbce")
+    across, up = b - r * np.sin(crank), c - e + r * np.cos(crank)
+    assert np.abs(slider**2 + across**2 + up**2 - length**2).max() < 1e-13
     states, signals = called
     assert states.function.n_instructions() < signals.function.n_instructions() / 2
 
@@ -104,25 +102,21 @@ def test_a_model_that_was_simulated_dies_with_its_last_reference() -> None:
     assert sum(ref() is not None for ref in seen) == 0
 
 
-def test_equal_inputs_and_methods_share_an_integrator_others_do_not() -> None:
+def test_equal_inputs_and_methods_share_an_integrator_and_the_oldest_is_dropped() -> None:
     model = cart()
-    first, fresh = wave(model, 1)
-    assert fresh
-    assert wave(model, 1) == (first, False)
-    assert wave(model, 2)[0] is not first
-    assert built(model, input_data(model, None, 0.0, 1.0), METHODS["rodas3"])[0] is not first
-    assert built(model, input_data(model, None, 0.0, 1.0), METHODS["rodas4p"])[1]
-    assert wave(cart(), 1)[1]
-
-
-def test_the_oldest_goes_when_there_are_too_many() -> None:
-    model = cart()
-    kept = [wave(model, k)[0] for k in range(REMEMBERED + 1)]
+    kept = [wave(model, k) for k in range(REMEMBERED + 1)]
+    assert all(fresh for _, fresh in kept)
+    assert wave(model, 1) == (kept[1][0], False)
+    assert len({id(integrator) for integrator, _ in kept}) == REMEMBERED + 1
     assert len(model.memory["integrators"]) == REMEMBERED
-    assert [wave(model, k)[1] for k in range(1, REMEMBERED + 1)] == [False] * REMEMBERED
     again, fresh = wave(model, 0)
     assert fresh
-    assert again is not kept[0]
+    assert again is not kept[0][0]
+    plain = input_data(model, None, 0.0, 1.0)
+    assert (
+        built(model, plain, METHODS["rodas3"])[0] is not built(model, plain, METHODS["rodas4p"])[0]
+    )
+    assert wave(cart(), 1)[1]
 
 
 def test_threads_that_build_at_once_get_one_integrator(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 """Mechanisms from URDF files against closed forms, and what the file says."""
 
 import warnings
+from math import pi
 
 import casadi as ca
 import numpy as np
@@ -64,19 +65,37 @@ def test_bearings_replace_what_the_file_says_by_friction_of_the_reactions() -> N
     assert weight == pytest.approx(2 * 9.81, rel=1e-4)
 
 
-WELDED = """<robot name="dumb bell">
-  <link name="world"/><link name="hub-0"/>
-  <joint name="spin" type="continuous"><parent link="world"/><child link="left"/>
-    <axis xyz="0 0 2"/></joint>
-  <link name="left"><inertial><mass value="1"/>
-    <inertia ixx="0.1" iyy="0.2" izz="0.3"/></inertial></link>
-  <joint name="weld" type="fixed"><parent link="left"/><child link="hub-0"/>
-    <origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/></joint>
-  <joint name="weld2" type="fixed"><parent link="hub-0"/><child link="right"/>
-    <origin xyz="0 2 0" rpy="1.5707963267948966 0 0"/></joint>
-  <link name="right"><inertial><origin xyz="0 0.5 0"/><mass value="3"/>
-    <inertia ixx="0.1" iyy="0.2" izz="0.3"/></inertial></link>
-</robot>"""
+def weight(mass: float = 1, J: tuple[float, ...] = (1, 1, 1), at: str = "0 0 0") -> str:
+    six = zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), J, strict=False)
+    entries = " ".join(f'{key}="{x}"' for key, x in six)
+    return f'<inertial><origin xyz="{at}"/><mass value="{mass}"/><inertia {entries}/></inertial>'
+
+
+def bar(name: str, inertial: str = "") -> str:
+    return f'<link name="{name}">{inertial}</link>'
+
+
+def hinge(
+    name: str, parent: str, child: str, axis: str = "1 0 0", more: str = "",
+    kind: str = "continuous",
+) -> str:  # fmt: skip
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<axis xyz="{axis}"/>{more}</joint>'
+    )
+
+
+def text_of(*parts: str, name: str = "r") -> str:
+    return f'<robot name="{name}">{bar("world")}{"".join(parts)}</robot>'
+
+
+HEAVY = weight(2, (0.1, 0.2, 0.15, 0.01, 0.02, -0.03), "0.1 0.2 -0.5")
+WELDED = text_of(
+    bar("hub-0"), hinge("spin", "world", "left", "0 0 2"), bar("left", weight(1, (0.1, 0.2, 0.3))),
+    hinge("weld", "left", "hub-0", "1 0 0", f'<origin xyz="1 0 0" rpy="0 0 {pi / 2}"/>', "fixed"),
+    hinge("weld2", "hub-0", "right", "1 0 0", f'<origin xyz="0 2 0" rpy="{pi / 2} 0 0"/>', "fixed"),
+    bar("right", weight(3, (0.1, 0.2, 0.3), "0 0.5 0")), name="dumb bell",
+)  # fmt: skip
 
 
 def test_links_held_by_fixed_joints_are_one_body() -> None:
@@ -99,8 +118,7 @@ def test_links_held_by_fixed_joints_are_one_body() -> None:
 
 def test_massless_root_is_the_ground_and_a_heavy_one_may_float() -> None:
     assert [b.name for b in read_urdf(SMALL, floating=True).bodies] == ["ground", "arm"]
-    heavy = rod(**{'<link name="world"/>': '<link name="world"><inertial><mass value="1"/><inertia '
-                   'ixx="1" iyy="1" izz="1"/></inertial></link>'})  # fmt: skip
+    heavy = rod(**{bar("world").replace("></link>", "/>"): bar("world", weight())})
     assert [b.name for b in read_urdf(heavy).bodies] == ["ground", "arm"]
     model = read_urdf(heavy, floating=True, gravity=(0.0, 0.0, 0.0)).build()
     assert [v.name for v in model.x][:4] == [f"floating_base_{k}" for k in ("x", "y", "z", "e0")]
@@ -110,19 +128,13 @@ def test_massless_root_is_the_ground_and_a_heavy_one_may_float() -> None:
     assert np.ptp(run["floating_base_y"] - 0.1 * run.t) < 1e-9
 
 
-MIMIC = """<robot name="gripper"><link name="palm"/>
-  <joint name="a" type="revolute"><parent link="palm"/><child link="l1"/><axis xyz="0 1 0"/></joint>
-  <link name="l1"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
-    <inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial></link>
-  <joint name="b" type="prismatic"><parent link="l1"/><child link="l2"/><axis xyz="1 0 0"/>
-    <mimic joint="a" multiplier="-0.5" offset="0.2"/></joint>
-  <link name="l2"><inertial><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>
-  </link></robot>"""
-
-
 def test_mimic_joint_follows_and_its_mass_is_felt() -> None:
     """Of both joints with b = 0.2 - a/2 put in: the equation of one coordinate."""
-    m = read_urdf(MIMIC)
+    leader, small = '<mimic joint="a" multiplier="-0.5" offset="0.2"/>', (0.1, 0.1, 0.1)
+    m = read_urdf(text_of(
+        hinge("a", "world", "l1", "0 1 0"), bar("l1", weight(1, small, "0.1 0 0")),
+        hinge("b", "l1", "l2", more=leader, kind="prismatic"), bar("l2", weight(2, small)),
+    ))  # fmt: skip
     model = m.build()
     assert [v.name for v in model.u] == ["tau_a"]
     run = simulate(model, 1.0, rtol=1e-10, samples=11)
@@ -158,22 +170,17 @@ def test_names_are_kept_apart() -> None:
     assert {place for place, _ in m.frames} >= {"ground._1_base", "ground_link.ground_link"}
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({'mass value="2"': 'mass value="0"', "0.1": "0", "0.01": "0"},
-         "urdf 'small' > joint 'hinge': expected links with a mass > 0 kg that it moves, got none"),
-        ({"hinge": "a-b", "</robot>": '<joint name="a_b" type="continuous"><parent link="arm"/>'
-          '<child link="x"/></joint><link name="x"><inertial><mass value="1"/><inertia ixx="1" '
-          'iyy="1" izz="1"/></inertial></link><joint name="a_b_joint" type="continuous"><parent '
-          'link="arm"/><child link="y"/></joint><link name="y"><inertial><mass value="1"/><inertia '
-          'ixx="1" iyy="1" izz="1"/></inertial></link></robot>'},
+def test_what_cannot_be_a_mechanism_is_refused() -> None:
+    massless = rod(**{'mass value="2"': 'mass value="0"', "0.1": "0", "0.01": "0"})
+    others = (hinge("a_b", "arm", "x"), hinge("a_b_joint", "arm", "y"))
+    alike = "".join((*others, bar("x", weight()), bar("y", weight()), "</robot>"))
+    for text, message in (
+        (massless, "urdf 'small' > joint 'hinge': expected links with a mass > 0 kg that it moves"),
+        (rod(hinge="a-b", **{"</robot>": alike}),
          "joint 'a-b': expected a name that differs from that of joint 'a_b_joint' as a C ident"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_a_mechanism_is_refused(changes: dict[str, str], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        read_urdf(rod(**changes))
+    ):  # fmt: skip
+        with pytest.raises(ValueError, match=message):
+            read_urdf(text)
 
 
 def test_inertia_that_no_body_has_is_used_with_a_warning_or_refused() -> None:
@@ -187,25 +194,6 @@ def test_inertia_that_no_body_has_is_used_with_a_warning_or_refused() -> None:
     message = "positive definite, got one that is not in hinge: the"
     with pytest.warns(UserWarning, match="link 'arm'"), pytest.raises(ValueError, match=message):
         read_urdf(text.replace('iyy="0.1"', 'iyy="-0.5"')).build()
-
-
-def bar(name: str, weight: str = "") -> str:
-    return f'<link name="{name}">{weight}</link>'
-
-
-def hinge(name: str, parent: str, child: str, axis: str, more: str = "") -> str:
-    return (
-        f'<joint name="{name}" type="continuous"><parent link="{parent}"/><child link="{child}"/>'
-        f'<axis xyz="{axis}"/>{more}</joint>'
-    )
-
-
-def text_of(*parts: str) -> str:
-    return f'<robot name="r">{bar("world")}{"".join(parts)}</robot>'
-
-
-HEAVY = """<inertial><origin xyz="0.1 0.2 -0.5"/><mass value="2"/>
-  <inertia ixx="0.1" iyy="0.2" izz="0.15" ixy="0.01" ixz="0.02" iyz="-0.03"/></inertial>"""
 
 
 def test_massless_links_between_joints_make_one_joint_of_several_axes() -> None:
@@ -264,8 +252,7 @@ def test_parallel_axes_of_massless_links_are_refused_by_build() -> None:
 
 def test_point_mass_on_a_rod_swings() -> None:
     """Guards against refusing an inertia of zeros: g sin(q) / l."""
-    point = '<inertial><origin xyz="0 0 -0.4"/><mass value="3"/><inertia ixx="0"/></inertial>'
-    text = text_of(bar("bob", point), hinge("a", "world", "bob", "0 1 0"))
+    text = text_of(bar("bob", weight(3, (0,), "0 0 -0.4")), hinge("a", "world", "bob", "0 1 0"))
     f = read_urdf(text, strict=True).build().function("ode")
     assert float(f(0, [0.3, 0], [], [0], [])[1]) == pytest.approx(-9.81 * np.sin(0.3) / 0.4)
     onto = text.replace("0 0 -0.4", "0 0.4 0")
@@ -277,8 +264,7 @@ def test_point_mass_on_a_rod_swings() -> None:
 
 def test_mass_matrix_may_have_zeros_on_one_side_only() -> None:
     """Guards against CasADi's "LDL factorization requires a symmetric matrix" in build()."""
-    ball = '<inertial><origin xyz="{}"/><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></iner'
-    a, b = (f"{ball.format(at)}tial>" for at in ("0 0.1 0", "0 0 0.1"))
+    a, b = weight(at="0 0.1 0"), weight(at="0 0 0.1")
     m = read_urdf(
         text_of(bar("a", a), bar("b", b), hinge("p", "world", "a", "1 0 0"),
                 hinge("q", "a", "b", "0 1 0"))
@@ -292,12 +278,9 @@ def test_mass_matrix_may_have_zeros_on_one_side_only() -> None:
     assert found[2:] == pytest.approx(np.linalg.solve(M, -bias), rel=1e-12)
 
 
-TIP = '<joint name="tip" type="{}"><parent link="arm"/><child link="hand"/></joint>{}</robot>'
-HAND = '<link name="hand"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
-
-
 def test_massless_tips_are_held() -> None:
-    for link, held in (('<link name="hand"/>', ("tip",)), (f"{HAND}</link>", ())):
-        urdf, names = holding(parse(SMALL.replace("</robot>", TIP.format("continuous", link))))
+    for inertial, held in (("", ("tip",)), (weight(), ())):
+        more = hinge("tip", "arm", "hand") + bar("hand", inertial)
+        urdf, names = holding(parse(SMALL.replace("</robot>", f"{more}</robot>")))
         assert names == held
         assert urdf.joints[1].kind == ("fixed" if held else "continuous")
