@@ -1,11 +1,10 @@
-# make demo, test, docs, check, stress, mutants, embedded: each makes its own virtual environment .venv when
-# there is none. PYTHON=... chooses the interpreter (3.11 or newer). make newest: the fast half of the
-# tests on the newest interpreter there is, with the newest NumPy, in .venv-newest. make extras: tests
-# beside other tools (FMPy, NVRTC, Pinocchio, rockit, do-mpc, Dask) in .venv-extras.
+# Every target creates the virtual environment .venv if it does not exist. PYTHON=... selects the interpreter
+# (3.11 or newer). `make newest` runs the tests, except heavy ones, on the newest installed interpreter with the
+# newest NumPy in .venv-newest; `make extras` runs the tests with other tools in .venv-extras.
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
-# Workers share the cores: threads of BLAS would only wait for each other.
+# The test workers occupy all cores; threads of BLAS would only compete with them.
 ONE_THREAD := OPENBLAS_NUM_THREADS=1
 BIN := $(VENV)/bin
 
@@ -17,13 +16,13 @@ demo: $(VENV)/.runtime
 test: $(VENV)/.test
 	$(ONE_THREAD) $(BIN)/python -m pytest -n auto --dist loadfile
 
-# Pages in out/docs/index.html. SYMFRIC_DOCS=quick takes the gallery of the papers at reduced size,
-# SYMFRIC_DOCS=keep takes every picture as it is, for those who write text.
+# Build the pages in out/docs. SYMFRIC_DOCS=quick computes the gallery of the papers at reduced size;
+# SYMFRIC_DOCS=keep reuses all existing pictures.
 docs: $(VENV)/.docs
 	$(ONE_THREAD) $(BIN)/python -m sphinx -W --keep-going -n -q -j auto -d out/doctrees docs out/docs
 	@echo "docs: out/docs/index.html"
 
-# Every page in a browser, narrow and wide; says so where Chromium is not installed.
+# Open every page in a browser, narrow and wide; without Chromium, print a message.
 docs-check: docs
 	$(BIN)/python -m docs.machine.browser out/docs
 
@@ -37,14 +36,14 @@ newest:
 		.venv-newest/bin/python -m pytest -n auto --dist loadfile -p no:cacheprovider \
 			-m "not slow and not heavy"; fi
 
-# What other tools say of units, kernels and robots; where their wheels cannot be had, it says so.
+# Compare FMUs, kernels and robots with other tools; print a message if their wheels are not available.
 extras:
 	@$(MAKE) VENV=.venv-extras .venv-extras/.test
 	@if .venv-extras/bin/python -m pip install --quiet --editable ".[fmu,cuda-check,pinocchio,interop,cluster]"; then \
 		.venv-extras/bin/python -m pytest -n auto --dist loadfile -p no:cacheprovider \
 			tests/interop tests/symfric/fmu tests/symfric/integrator/cuda tests/symfric/codegen/blocks \
 			tests/symfric/multibody/urdf; \
-	else echo "extras: the wheels of FMPy, NVRTC, Pinocchio, rockit, do-mpc or Dask cannot be had here, nothing run"; fi
+	else echo "extras: the wheels of FMPy, NVRTC, Pinocchio, rockit, do-mpc or Dask are not available, nothing run"; fi
 
 stress: $(VENV)/.test
 	$(BIN)/python -m pytest -m slow
@@ -55,7 +54,7 @@ stress: $(VENV)/.test
 mutants: $(VENV)/.test
 	$(BIN)/python tests/mutants.py
 
-# Needs arm-none-eabi-gcc, its newlib and qemu-system-arm; says which of them are absent, and ends well.
+# Needs arm-none-eabi-gcc, newlib and qemu-system-arm; lists missing programs and succeeds without them.
 embedded: $(VENV)/.runtime
 	$(BIN)/symfric bench embedded
 
@@ -69,7 +68,7 @@ clean:
 	rm -rf docs/made docs/laws docs/scenes docs/gallery docs/examples docs/reference docs/benchmarks/*.md
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# The stages build on each other, so that `make -j` never runs two installers at once.
+# Each stage depends on the previous one, so that `make -j` never runs two installers at once.
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "symfric needs Python 3.11 or newer; set PYTHON=..." >&2; exit 1; }
 	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -82,16 +81,16 @@ $(VENV)/.runtime: pyproject.toml | $(BIN)/python
 	@touch $@
 
 $(VENV)/.test: $(VENV)/.runtime
-	@echo "installing what 'test' needs into $(VENV)"
+	@echo "installing the requirements of 'test' into $(VENV)"
 	$(BIN)/python -m pip install --quiet --editable ".[test]"
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.test
-	@echo "installing what 'docs' needs into $(VENV)"
+	@echo "installing the requirements of 'docs' into $(VENV)"
 	$(BIN)/python -m pip install --quiet --editable ".[docs]"
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.docs
-	@echo "installing what 'dev' needs into $(VENV)"
+	@echo "installing the requirements of 'dev' into $(VENV)"
 	$(BIN)/python -m pip install --quiet --editable ".[dev]"
 	@touch $@

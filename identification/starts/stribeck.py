@@ -297,7 +297,8 @@ class _LawFit:
         """Return relative force errors and their derivatives; not finite where F is undefined."""
         p, slope = self.p(w)
         F, J = self.force(p)
-        return (F.full().ravel() - self.F) / self.size, J.full() @ slope / self.size
+        with np.errstate(invalid="ignore"):  # infinite slopes times zero
+            return (F.full().ravel() - self.F) / self.size, J.full() @ slope / self.size
 
     def cost(self, w: Array) -> float:
         """Return the sum of squared errors; infinite where the law is undefined."""

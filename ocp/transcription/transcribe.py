@@ -158,8 +158,10 @@ def discretise(
         spans.append(made[key]._replace(local=local))
         periodic, named = () if earlier else problem.periodic, problem.chain[span.phase].start
         before, mechanics = earlier[-1][1] if earlier else None, span.model.holonomic
-        closed = mechanics is not None and bool(mechanics.phi.numel())
-        loops.append(closing(local, mechanics, before, periodic, named) if closed else None)
+        closed = None
+        if mechanics is not None and mechanics.phi.numel():
+            closed = closing(local, mechanics, before, periodic, named)
+        loops.append(closed)
         nodes += conditions.at_nodes(local)
         if earlier:
             joined += conditions.between(spans[-2].local, local)

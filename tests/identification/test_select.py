@@ -57,10 +57,7 @@ def test_ranking_prints_plots_and_is_plain_data(ranking: Ranking) -> None:
 
 
 def test_a_prediction_that_ran_away_is_no_number() -> None:
-    small = points(2)
-    tiny = Dataset.of(
-        v=small[0]["v"], F=1e-9 * small[0]["F"], units={"v": "m/s", "F": "N"}, points=True
-    )
+    tiny = points(2).scaled({"F": 1e-9})
     found = select({"mine": LAW}, points(1), Points(), tiny, starts=1)
     (row,) = found.rows
     assert "diverged" in str(found)
@@ -70,10 +67,12 @@ def test_a_prediction_that_ran_away_is_no_number() -> None:
     assert percent(4.56789) == "4.57 %"
 
 
-def test_other_data_take_the_place_of_folds() -> None:
+def test_other_data_take_the_place_of_folds_and_too_many_folds_are_said() -> None:
     found = select({"mine": LAW}, points(1), Points(), points(2), starts=1)
     assert found.how == "validation on points 2"
     assert found.rows[0].validation == pytest.approx(found.rows[0].fitted, rel=0.2)
+    short = select(["coulomb"], points(1), Points(), starts=1, folds=1000)
+    assert short.how == "no validation, although 1000 folds were requested"
 
 
 def test_records_are_left_out_whole() -> None:
@@ -117,11 +116,6 @@ def test_criteria_are_those_of_the_errors_and_the_numbers_of_parameters(ranking:
     k, m = first.parameters, other.parameters
     cost = 2 * k * n / (n - k - 1) - 2 * m * n / (n - m - 1)
     assert other.aicc == pytest.approx(n * better - cost)
-
-
-def test_folds_that_are_too_short_are_said() -> None:
-    found = select(["coulomb"], points(1), Points(), starts=1, folds=1000)
-    assert found.how == "no validation, although 1000 folds were requested"
 
 
 def test_an_interrupted_fit_is_not_validated_at_length(monkeypatch: pytest.MonkeyPatch) -> None:

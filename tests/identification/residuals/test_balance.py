@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 
 from identification.residuals.balance import balance, coordinates
 from symfric import Stribeck, rabinowicz
-from symfric.foundation.parameters import Variable
 from symfric.laws import LuGre
 from symfric.model import Model
 from symfric.scenes import Arm
@@ -72,13 +71,10 @@ def test_forward_dynamics_leaves_nothing(model: Model, signals: list[str]) -> No
 
 def test_only_friction_of_a_row_switches_it_off() -> None:
     model = Arm(LAW).model(["mu_d"])
-    found = coordinates(model, "test")
-    made = balance(model, ["mu_d"], found, np.ones(3 * 6 + 6 + 1), "test")
+    made = balance(model, ["mu_d"], coordinates(model, "test"), np.ones(3 * 6 + 6 + 1), "test")
     assert [row.slips for row in made.rows] == [(i,) for i in range(6)]
 
 
 def test_states_of_laws_are_no_coordinates() -> None:
-    model = Drive(LuGre()).model()
-    (one,) = coordinates(model, "test")
-    assert isinstance(one.position, Variable)
+    (one,) = coordinates(Drive(LuGre()).model(), "test")
     assert (one.position.name, one.rate.name) == ("x", "v")

@@ -123,7 +123,7 @@ def record(a: np.ndarray | None = None, m: float = 0.0, offset: float = 0.0) -> 
 def test_start_of_any_law_can_be_constructed(name: str) -> None:
     law = ALL_LAWS[name]()
     free = [n for n, p in parameters(law).items() if p.role not in ASKED]
-    few = record().at([np.arange(0, T.size, 4)])
+    few = record().at([np.arange(0, T.size, 8)])
     found = start_values(law, few, free=free)
     assert set(found) == set(free)
     with_values(law, found)
