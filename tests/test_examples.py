@@ -130,6 +130,7 @@ LONG = {
 }
 """Whole solves of several seconds; `tests/examples/test_motions.py` checks their problems."""
 
+SLOW = LONG | {"mpc_drive", "out_and_back", "press"}
 CHECKS = dict.fromkeys(LONG, motion_is_verified) | {
     check.__name__: check
     for check in (
@@ -152,7 +153,7 @@ def test_every_check_belongs_to_an_example() -> None:
 @pytest.mark.parametrize(
     "example",
     [
-        pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem in LONG))
+        pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem in SLOW))
         for path in EXAMPLES
     ],
 )

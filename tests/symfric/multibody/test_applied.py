@@ -220,6 +220,7 @@ def test_where_rest_cannot_be_told_the_joint_is_named() -> None:
 def test_members_of_an_ensemble_have_their_own_levels() -> None:
     mu = Variable("mu", "1", start=0.3)
     model = PendulumBox(ExactCoulomb(mu_s=mu.symbol, mu_d=mu.symbol)).mechanism().build((mu,))
+    assert {"x_F_e": "N", "phi_F_e": "N"}.items() <= {v.name: v.unit for v in model.z}.items()
     found = simulate_many(model, 0.3, p={"mu": np.array([0.1, 0.2])}, t_eval=[0.3])
     alone = simulate(model, 0.3, p={"mu": 0.2})
     assert found["phi"][1, -1] == pytest.approx(alone.final["phi"], abs=1e-9)

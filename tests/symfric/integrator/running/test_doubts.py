@@ -75,11 +75,6 @@ def test_a_long_run_whose_steps_are_not_kept_is_looked_at(monkeypatch: Any) -> N
         sf.simulate(block(sigma_0=1e16), 20.0, rtol=1e-7, t_eval=[0.0, 1.0])
 
 
-def test_what_a_user_starts_with_is_no_doubt() -> None:
-    model = Drive(sf.LuGre()).model()
-    assert quiet(model, 0.1, x0={"z": 1e-4}).doubts == ""
-
-
 def test_an_ensemble_is_warned_of_once_and_says_which() -> None:
     law = sf.LuGre(mu_s=0.33, mu_d=0.21, v_s=1e-8, sigma_1=2e7)
     model = Rabinowicz(law, **SLOW).model(free=["sigma_0"])
@@ -90,12 +85,13 @@ def test_an_ensemble_is_warned_of_once_and_says_which() -> None:
     assert "doubtful: 2" in repr(study)
 
 
-def test_what_states_may_carry_is_no_overload() -> None:
+def test_what_states_may_carry_or_a_user_starts_with_is_no_overload() -> None:
     """Behind a reversal both parts of Bliman and Sorine point the same way."""
     force = {"force": lambda t: 6 * ca.sin(3 * t)}
     law = sf.BlimanSorine(mu_1=0.41, mu_2=0.33, eta=0.27, s_f=6e-6)
     for other in (law, Sum((law, law)), Asymmetric(law, law), LoadNormalised(law, N_0=10.0)):
         assert quiet(Drive(other).model(), 3.0, u=force).doubts == ""
+    assert quiet(Drive(sf.LuGre()).model(), 0.1, x0={"z": 1e-4}).doubts == ""
 
 
 @pytest.mark.parametrize(
