@@ -13,7 +13,6 @@ from docs.machine.pages import (
     commands,
     differences,
     main,
-    run,
     written_pages,
 )
 from symfric.cli.app import COMMANDS
@@ -82,13 +81,3 @@ def test_differences_and_errors_are_printed(
     page.write_text("```python\nimport warnings\nwarnings.warn('w')\n```\n", "utf-8")
     assert main(page, tmp_path) == 1
     assert "UserWarning: w" in capsys.readouterr().err
-
-
-def test_names_and_changes_reach_the_python_of_a_page() -> None:
-    class Doubled(ast.NodeTransformer):
-        def visit_Constant(self, node: ast.Constant) -> ast.Constant:
-            return ast.Constant(2 * node.value)
-
-    page = blocks("```python\nprint(3 + known)\n```\n")
-    ((_, printed, _),) = run(page, "page", Doubled(), {"known": 1})
-    assert printed == "7\n"

@@ -15,9 +15,9 @@ from identification import Dataset, synthetic_drive_data
 from ocp import solve
 from ocp.problems import READY, out_and_back
 from symfric import Coulomb, Sum, Viscous, drive, law_from_text, with_values
-from symfric.bench import codegen, codegen_runs, embedded, identification, ocp
+from symfric.bench import codegen, embedded, identification, ocp
 from symfric.bench import identification_measured as measured
-from symfric.bench.codegen_runs import PROVEN, compensation, plants, trials
+from symfric.bench.codegen import PROVEN, plants, trials
 from symfric.bench.identification import campaign, files, outcome
 from symfric.bench.identification_memory import ranked
 from symfric.bench.identification_repeats import coloured, far
@@ -239,7 +239,6 @@ def test_absent_tools_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, "find_tools", lambda: Absent(("qemu-system-arm",)))
         monkeypatch.setattr("symfric.foundation.programs.find_compiler", lambda: None)
     monkeypatch.setattr(codegen, "find_compiler", lambda: None)
-    monkeypatch.setattr(codegen_runs, "find_compiler", lambda: None)
     made = codegen.bench(quick=True, sections=("cores", "fuzz", "fmu"))
     assert not made.tables
     assert ["apt-get" in made.notes[0], *("no C compiler" in n for n in made.notes[1:])] == [
@@ -268,12 +267,11 @@ def test_compensators_meet_their_goals(monkeypatch: pytest.MonkeyPatch) -> None:
     (bristles, law), *_ = plants(quick=True).items()
     first = trials()[0]
     cases = {case: first.cases[case] for case in (PROVEN, "levels x 0.5")}
-    monkeypatch.setattr(codegen_runs, "plants", lambda quick: {bristles: law})
-    monkeypatch.setattr(codegen_runs, "trials", lambda: [replace(first, cases=cases)])
-    monkeypatch.setattr(codegen_runs, "_cost", lambda: "")
+    monkeypatch.setattr(codegen, "plants", lambda quick: {bristles: law})
+    monkeypatch.setattr(codegen, "trials", lambda: [replace(first, cases=cases)])
+    monkeypatch.setattr(codegen, "_cost", lambda: "")
     made = codegen.bench(quick=True, sections=("compensation",))
-    rows = made.tables[codegen_runs.LOOPS]
+    rows = made.tables[codegen.LOOPS]
     assert [row["case"] for row in rows] == ["without", PROVEN, "levels x 0.5"]
     assert rows[0][bristles].startswith("1 / 1")
     assert [row["met"] for row in made.tables[GOALS]] == ["yes", "yes"]
-    assert callable(compensation)

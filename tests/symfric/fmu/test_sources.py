@@ -11,7 +11,7 @@ from backends import needs_compiler
 from tables import table
 
 from symfric import BrownMcPhee, ExactCoulomb, LuGre
-from symfric.bench import codegen_runs
+from symfric.bench import codegen
 from symfric.bench.report import GOALS, Report
 from symfric.codegen.runner import WARNINGS
 from symfric.fmu import export_fmu, running
@@ -139,13 +139,13 @@ def test_a_unit_runs_and_its_refusals_are_errors(tmp_path, monkeypatch):
 @heavy
 @needs_compiler
 def test_the_benchmark_of_units_meets_its_goals(monkeypatch):
-    monkeypatch.setattr(codegen_runs, "QUICK", ("drive",))
+    monkeypatch.setattr(codegen, "QUICK", ("drive",))
     monkeypatch.setattr(ALL_SCENES["drive"], "t_end", 0.5)
-    tables = Report().collect({"fmu": lambda: codegen_runs.units(quick=True)}).tables
-    assert len(tables[codegen_runs.UNITS]) == len(codegen_runs.LAWS)
+    tables = Report().collect({"fmu": lambda: codegen.units(quick=True)}).tables
+    assert len(tables[codegen.UNITS]) == len(codegen.LAWS)
     assert all(goal["met"] == "yes" for goal in tables[GOALS])
-    tiny = f"attempts per step of {codegen_runs.TINY:g} s"
-    assert all(row[tiny] < 0.1 for row in tables[codegen_runs.UNITS])
+    tiny = f"attempts per step of {codegen.TINY:g} s"
+    assert all(row[tiny] < 0.1 for row in tables[codegen.UNITS])
 
 
 def test_units_have_exponents_and_so_have_their_rates():

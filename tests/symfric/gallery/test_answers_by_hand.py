@@ -2,10 +2,7 @@
 
 import numpy as np
 import pytest
-from mechanics import brown_mcphee, four_mass, slider_crank
-from numpy.typing import NDArray
 from oracles import rabinowicz_coulomb, rabinowicz_motion
-from scipy.integrate import solve_ivp
 
 from symfric import SteadyStateLuGre
 from symfric.gallery.laminator_nips import sled
@@ -31,26 +28,6 @@ def test_the_belt_has_the_period_and_the_extremes_of_the_closed_form() -> None:
     for t in (0.5, 7.0, 33.3):
         x, _ = rabinowicz_motion(0.0, t, (0.15, 0.1, 0.8, 2.1, 0.1, 9.81))
         assert motion["x"][round(1000 * t)] == pytest.approx(x, rel=1e-10)
-
-
-@pytest.mark.parametrize("name", ["four_mass", "slider_crank"])
-def test_machines_by_hand_have_the_accelerations_of_the_other_ones_by_hand(name: str) -> None:
-    mu_s, mu_d, v_t = 0.12, 0.1, 0.01
-    machine = getattr(machines, name)(machines.brown_mcphee(mu_s, mu_d, v_t))
-    written = {"four_mass": four_mass, "slider_crank": slider_crank}[name]
-    rates = written(lambda v: brown_mcphee(v, mu_s, mu_d, v_t))
-    times = np.linspace(0.0, 0.02, 3)
-    shown = solve(machine, times)
-    start = np.array(machine.start)
-    found = solve_ivp(rates, (0.0, 0.02), start, method="Radau", rtol=1e-9, atol=1e-11)
-    last: NDArray[np.float64] = found.y[:, -1]
-    if name == "four_mass":
-        assert 5 * np.cos(last[0]) == pytest.approx(shown["x1"][-1], rel=1e-8)
-        assert last[1] == pytest.approx(shown["x4"][-1], rel=1e-8)
-        assert rates(0.0, last)[3] == pytest.approx(shown["x4''"][-1], rel=1e-6)
-    else:
-        assert last == pytest.approx([shown["crank"][-1], shown["crank'"][-1]], rel=1e-7)
-        assert rates(0.0, last)[1] == pytest.approx(shown["crank''"][-1], rel=1e-5)
 
 
 def test_fixed_steps_are_of_order_four() -> None:
