@@ -148,19 +148,11 @@ def arcs_among(rules: Rules, legs: Legs) -> tuple["ArcPhase", ...]:
         for c in leaves:
             later = (other.modes.get(c, None) for _, other in pairs[i + 1 :])
             leaves[c] = next((mode or 0 for mode in later if mode != 0), 0)
-        found.append(
-            ArcPhase(
-                rules=rules,
-                number=i,
-                arc=arc,
-                leg=leg,
-                opens=not i or pairs[i - 1][0].phase != leg.phase,
-                closes=last or pairs[i + 1][0].phase != leg.phase,
-                before=pairs[i - 1][1].modes if i and continued(i) else none,
-                after=none if last or not continued(i + 1) else pairs[i + 1][1].modes,
-                leaves=leaves,
-            )
-        )
+        opens = not i or pairs[i - 1][0].phase != leg.phase
+        closes = last or pairs[i + 1][0].phase != leg.phase
+        before = pairs[i - 1][1].modes if i and continued(i) else none
+        after = none if last or not continued(i + 1) else pairs[i + 1][1].modes
+        found.append(ArcPhase(rules, i, arc, leg, opens, closes, before, after, leaves))
     return tuple(found)
 
 

@@ -115,12 +115,9 @@ class Session:
         settings = self.design.settings
         if iterations is not None:
             iterations = checks.count("step: iterations", iterations, most=settings.iterations)
-        return self.cycle(
-            self._measured(x),
-            self.data(references, t, p, bounds),
-            settings.tolerance if tolerance is None else float(tolerance),
-            iterations or settings.iterations,
-        )
+        measured, data = self._measured(x), self.data(references, t, p, bounds)
+        tolerance = settings.tolerance if tolerance is None else float(tolerance)
+        return self.cycle(measured, data, tolerance, iterations or settings.iterations)
 
     def cycle(self, measured: Array, data: CycleData, tolerance: float, iterations: int) -> Action:
         """Compute one cycle from arrays; see `step`."""

@@ -283,18 +283,14 @@ def along(spans: Sequence[SpanMotion], name: str, fractions: Array) -> Array | N
 
 def structure_of(problem: Problem | Posed, scheme: Scheme) -> str:
     """Return a text that identifies the unknowns and rows of a program on a given mesh."""
-    spans = [
-        [
-            span.scenario,
-            span.phase,
-            isinstance(span.T, float | int),
-            [[v.name for v in group] for group in (span.model.x, span.model.z, span.model.u)],
-            [row.name for row in span.path],
-            [[s, [row.name for row in rows]] for s, rows in span.rows_at.items()],
-            [link.state for link in span.links],
-            [join.name for join in span.joins],
-        ]
-        for span in problem.spans
-    ]
+
+    def described(span: Span) -> list[Any]:
+        groups = [[v.name for v in group] for group in (span.model.x, span.model.z, span.model.u)]
+        rows = [[s, [row.name for row in rows]] for s, rows in span.rows_at.items()]
+        names = [[row.name for row in part] for part in (span.path, span.joins)]
+        states, fixed = [link.state for link in span.links], isinstance(span.T, float | int)
+        return [span.scenario, span.phase, fixed, groups, names, rows, states]
+
+    spans = [*map(described, problem.spans)]
     more = [list(problem.choose), list(problem.periodic), problem.kind, len(problem.durations)]
     return json.dumps([repr(scheme), spans, more, list(problem.shared_inputs)])

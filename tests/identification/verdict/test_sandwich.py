@@ -99,6 +99,7 @@ def test_order_correlation_and_effective_samples_of_ar1() -> None:
     assert found.phi == pytest.approx([0.9], abs=0.02)
     assert (white.variance, found.variance) == pytest.approx((1.0, 1.0), rel=0.06)
     assert found.effective == pytest.approx(4000 * 0.1 / 1.9, rel=0.3)
+    assert colour(np.sin(RUN[:19]), NONE[:19], RUN[:19]).order == 1  # a sine has two; ten rows each
 
 
 def test_restricted_likelihood_gives_back_what_a_fit_took() -> None:

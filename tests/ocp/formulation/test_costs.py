@@ -4,6 +4,7 @@ from typing import Any
 
 import casadi as ca
 import pytest
+from discretised import dae
 from motions import double_integrator, stage
 
 from ocp import Ipopt, solve
@@ -144,6 +145,8 @@ def cart(reach: float, most: float) -> Problem:
 def test_odd_sizes_are_doubted(reach: float, most: float, text: str) -> None:
     assert text in doubts(cart(reach, most))
     assert bool(doubts(cart(reach, most))) == bool(text)
+    algebraic = Problem(Phase(dae(), 1.0, end={"z": 3000.0}), effort("u"))
+    assert "z = 3000 N is 1000 times its nominal 3 N" in doubts(algebraic)
 
 
 def test_doubts_follow_only_a_failed_solve() -> None:

@@ -38,7 +38,8 @@ ROOT = Path(__file__).parents[3]
 COSTLY = dict.fromkeys(
     ("generalized_maxwell_slip/fig_05_presliding", "selection/fig_07_box_displacement",
      "generalized_maxwell_slip/fig_02_lag_of_the_generic_model", "self_tuning/fig_13_jitter",
-     "laminator_nips/fig_5_7_stick_slip"), pytest.mark.slow,
+     "laminator_nips/fig_5_7_stick_slip", "generalized_maxwell_slip/fig_07_transition",
+     "generalized_maxwell_slip/fig_09_drift"), pytest.mark.slow,
 )  # fmt: skip
 """Figures above a second; others of their modules run in every suite."""
 
