@@ -197,6 +197,8 @@ def test_dependent_rows_lose_their_rates_and_charges_stay() -> None:
     assert s.names == ("a", "b")
     assert ca.DM(s.mass).full().tolist() == [[0.5, -0.5], [0, 0]]
     assert (s.algebraic, s.free.tolist()) == (([1], []), [[1], [1]])
+    assert s.has_pivots
+    assert not assembled(sf.rabinowicz(sf.LuGre())).has_pivots
     assert value(s, [2.0, 5.0], [1.0]) == pytest.approx([-2.0, -5.0])
     found = consistent(s, "here", np.array([3.0, 1.0]), np.array([1.0]))
     assert found == pytest.approx([2.0, 0.0], abs=1e-12)
