@@ -1,12 +1,13 @@
-"""Mechanisms: run time at equal error compared with other tools, and cost of a step of chains."""
+"""Mechanisms: run time at equal error compared with other tools, and size and cost of a step."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import inf
 from time import perf_counter, process_time
 from typing import final
 
+import casadi as ca
 import numpy as np
 
 from symfric.bench.contenders import MECHANISMS, Array, Contender
@@ -28,20 +29,24 @@ from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.simulate import simulate
 from symfric.integrator.step.attempt import Given, State
-from symfric.laws import BrownMcPhee, Law
+from symfric.laws import BrownMcPhee, Law, Viscous
 from symfric.model import Model
 from symfric.multibody import JointFriction, Mechanism, Revolute
-from symfric.scenes import MechanismScene, PendulumBox, SliderCrank
+from symfric.scenes import DoublePendulum, FourMass, MechanismScene, PendulumBox, SliderCrank
 
 OURS = "symfric"
 ERRORS = (1e-4, 2e-5, 1e-5)
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 CRANK = BrownMcPhee(mu_s=0.1, mu_d=0.08, v_t=0.01)
+LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
+ALL = ("x1", "y2", "z3", "x4")
 METHOD = METHODS["rodas5p"]
 BOTH = ("joint", "absolute")
 """Coordinates in which mechanisms are built."""
 RUNS = "Time of a run against its error"
+COUNTS = "Size of the equations of mechanisms; CasADi instructions"
 CHAINS = "Step of a chain in the virtual machine"
+DRIFTS = "Energy of frictionless mechanisms"
 SIZES = (2, 4, 8, 16, 32, 64)
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 BUDGET = 120.0
@@ -99,7 +104,9 @@ def bench(quick: bool = False, links: Sequence[int] = SIZES, progress: Progress 
     make = partial(chain, law=BrownMcPhee(v_t=0.01))
     tasks |= {
         "ratios": lambda: ratios(report.tables.get(RUNS, []), OURS, ERRORS),
+        "counts": partial(counts, kinds),
         "chains": partial(chains, make, links),
+        "energy": partial(drifts, 1.0 if quick else DRIFT_S),
     }
     return report.collect(tasks, progress)
 
@@ -145,12 +152,62 @@ def _exact(case: str) -> Array:
     return np.array([run[name] for name in what.watched["joint"]])
 
 
-# ---- cost of a step ----
+# ---- size and cost of the equations ----
+
+
+def four_mass(joints: tuple[str, ...] = (), friction: JointFriction | None = None) -> Mechanism:
+    """Return the four-mass system with friction in `joints` only; by default the scene's law."""
+    m = FourMass(LAW).mechanism()
+    m.joints = [
+        replace(j, friction=(friction or j.friction) if j.name in joints else None)
+        for j in m.joints
+    ]
+    return m
+
+
+def turned_pendulum() -> Mechanism:
+    """Return the double pendulum with a turned second hinge, which makes the motion spatial."""
+    m = DoublePendulum(LAW).mechanism()
+    m.frame("upper.turned", at=(0.0, 0.0, -0.5), z=(1.0, 0.0, 0.0), x=(0.0, 0.0, -1.0))
+    m.frame("lower.turned", at=(0.0, 0.0, 0.5), z=(1.0, 0.0, 0.0), x=(0.0, 0.0, -1.0))
+    second = m.joints[1]
+    hinge = Revolute("phi_2", "upper.turned", "lower.turned", friction=second.friction)
+    m.joints = [m.joints[0], hinge]
+    return m
+
+
+VARIANTS: dict[tuple[str, str], Callable[[], Mechanism]] = {
+    ("four_mass", "frictionless"): four_mass,
+    ("four_mass", "constant normal"): lambda: four_mass(ALL, JointFriction(LAW, normal=50.0)),
+    ("four_mass", "reactions in one"): lambda: four_mass(("x1",)),
+    ("four_mass", "reactions in all"): lambda: four_mass(ALL),
+    ("double_pendulum", "planar"): lambda: DoublePendulum(LAW).mechanism(),
+    ("double_pendulum", "spatial"): turned_pendulum,
+}
 
 
 def integrator(model: Model) -> Integrator:
     """Return the adaptive integrator of a model without inputs."""
     return Integrator(model, input_data(model, None, 0.0, 1.0), METHOD)
+
+
+@cache
+def count(mechanism: str, variant: str, coordinates: str) -> Row:
+    """Return the numbers of unknowns, CasADi instructions and nonzeros of one of `VARIANTS`."""
+    model = VARIANTS[mechanism, variant]().build(formulation=coordinates)
+    made = integrator(model)
+    return {
+        "mechanism": mechanism, "variant": variant, "coordinates": coordinates,
+        "states": len(model.x), "algebraic variables": len(model.z),
+        "instructions, accelerations": model.function("ode").n_instructions(),
+        "instructions, step": made.instructions,
+        "nonzeros of the Jacobian": ca.jacobian(made.system.f, made.system.y).nnz(),
+    }  # fmt: skip
+
+
+def counts(coordinates: Iterable[str] = BOTH) -> Iterator[Found]:
+    """Yield the rows of all variants."""
+    yield from ((COUNTS, count(*key, c)) for c in coordinates for key in VARIANTS)
 
 
 def chain(links: int, law: Law | None = None) -> Model:
@@ -211,3 +268,22 @@ def step_time(made: Integrator) -> float:
     R = Given.of(1.0, 1e-6, 1.0, 1e-7 * whole.nominal, d)
     S_out, D = np.zeros(S.size), np.zeros(made.step.numel_out(1))
     return best_time(bound(made.step, (S, R), (S_out, D)), budget=0.1, most=1000)[0]
+
+
+DRIFT_S = 100.0
+"""Duration [s] of the run over which the energy of a frictionless mechanism is checked."""
+
+
+def drifts(t_end: float = DRIFT_S) -> Iterator[Found]:
+    """Measure the change of energy of frictionless mechanisms over `t_end` [s] at rtol 1e-10.
+
+    The change is relative to the largest kinetic energy, or to the initial energy if it is larger.
+    """
+    for kind in (FourMass, SliderCrank):
+        run = simulate(kind(Viscous(sigma_2=0.0)).model(), t_end, rtol=1e-10)
+        energy, kinetic = run["energy"], run["kinetic"]
+        relative = float(np.abs(energy - energy[0]).max() / max(kinetic.max(), abs(energy[0])))
+        yield DRIFTS, {
+            "scene": kind.__name__, "end time [s]": t_end, "steps": run.statistics.steps,
+            "relative change of energy": relative,
+        }  # fmt: skip

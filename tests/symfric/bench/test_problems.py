@@ -6,9 +6,9 @@ from math import atan2, hypot, isnan, pi
 import pytest
 
 from symfric import BrownMcPhee, ExactCoulomb, Model, Variable, simulate
-from symfric.bench import ivp, regularisation
+from symfric.bench import ivp, multibody, regularisation
 from symfric.bench.ivp import ANDREWS, DIGITS, DRIFT, PROBLEMS, Problem, correct_digits
-from symfric.bench.multibody import chain, chains, exponent
+from symfric.bench.multibody import chain, chains, count, exponent
 from symfric.bench.regularisation import CASES, last_cycle, peak
 from symfric.bench.report import Row
 from symfric.scenes import Rabinowicz
@@ -100,6 +100,27 @@ def test_every_tolerance_and_method_has_a_row() -> None:
 
 # ---- mechanisms ----
 
+FOUR = ("frictionless", "constant normal", "reactions in one", "reactions in all")
+ABSOLUTE = pytest.param("absolute", marks=pytest.mark.slow)
+INSTRUCTIONS = ("instructions, accelerations", "instructions, step", "nonzeros of the Jacobian")
+SIZES = {
+    "joint": [(8, 2), (8, 2), (8, 3), (8, 5)],
+    "absolute": [(56, 26), (56, 26), (56, 27), (56, 30)],
+}
+"""Two multipliers of the rods, in absolute coordinates those of all joints; slider 4 carries its
+weight only, which is no unknown if its joint is in the tree."""
+
+
+@pytest.mark.parametrize("coordinates", ["joint", ABSOLUTE])
+def test_every_kind_of_friction_has_its_unknowns_and_its_cost(coordinates: str) -> None:
+    rows = [count("four_mass", variant, coordinates) for variant in FOUR]
+    assert [(r["states"], r["algebraic variables"]) for r in rows] == SIZES[coordinates]
+    none, constant, one, every = rows
+    for column in INSTRUCTIONS:
+        assert none[column] < constant[column] < every[column], column
+        assert none[column] < one[column] < every[column], column
+    assert every["instructions, step"] < 2 * none["instructions, step"]
+
 
 def test_chains_are_measured_up_to_the_budget() -> None:
     (_, short), (_, long), note = chains(chain, (2, 4))
@@ -116,6 +137,12 @@ def test_the_exponent_is_that_of_a_power_law_for_long_chains() -> None:
     short = {"links": 2, "y": 1.0}
     assert exponent([short, *rows], "y") == pytest.approx(1.3)
     assert exponent([short, {"links": 4, "y": 2**1.3}], "y") == pytest.approx(1.3)
+
+
+@pytest.mark.parametrize("t_end", [1.0, pytest.param(100.0, marks=pytest.mark.slow)])
+def test_energy_of_frictionless_mechanisms_is_constant(t_end: float) -> None:
+    for _, row in multibody.drifts(t_end):
+        assert 0 < row["relative change of energy"] < 1e-8 * t_end, row
 
 
 # ---- regularisation ----

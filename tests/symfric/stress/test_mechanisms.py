@@ -1,6 +1,5 @@
 """Mechanisms at the edge: each run equals an oracle or states why it stops, and is finite."""
 
-from dataclasses import replace
 from functools import cache, partial
 from math import atan, sqrt
 from typing import Any
@@ -21,13 +20,11 @@ from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances, integrate
 from symfric.laws import LuGre, LuGreNormalised
-from symfric.multibody import JointFriction, Mechanism
+from symfric.multibody import Mechanism
 from symfric.scenes import (
     MECHANISMS,
     DoublePendulum,
     FourBar,
-    FourMass,
-    MechanismScene,
     Pendulum,
     PendulumBox,
     SliderCrank,
@@ -164,45 +161,6 @@ def test_machines_with_strong_friction_are_far_from_jamming(name: str) -> None:
         reserve = np.linalg.det(A) / np.linalg.det(A[:k, :k]) * (-1) ** (A.shape[0] - k)
         assert reserve == pytest.approx(float(np.prod(np.array(pivots(y, 1e-3, d)[2]))), rel=1e-9)
         assert reserve > 100 * SHOCK
-
-
-# ---- unknowns and energy ----
-
-
-@pytest.mark.parametrize(
-    ("formulation", "states", "least"), [("joint", 8, 2), ("absolute", 56, 26)]
-)
-def test_only_joints_with_friction_from_reactions_add_unknowns(
-    formulation: str, states: int, least: int
-) -> None:
-    """The multipliers of rods and joints, and the normal force of each frictional joint.
-
-    In joint coordinates, slider 4 carries its weight only, which is not an unknown.
-    """
-    names, friction = ("x1", "y2", "z3", "x4"), BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
-    constant = JointFriction(friction, normal=50.0)
-    variants: tuple[tuple[tuple[str, ...], JointFriction | None, int], ...] = (
-        ((), None, 0), (names, constant, 0), (names[:1], None, 1),
-        (names, None, 3 if formulation == "joint" else 4),
-    )  # fmt: skip
-    for frictional, other, more in variants:
-        m = FourMass(friction).mechanism()
-        m.joints = [
-            replace(j, friction=(other or j.friction) if j.name in frictional else None)
-            for j in m.joints
-        ]
-        model = m.build(formulation=formulation)
-        assert (len(model.x), len(model.z)) == (states, least + more), (frictional, other)
-
-
-@pytest.mark.parametrize("t_end", [1.0, pytest.param(100.0, marks=slow)])
-@pytest.mark.parametrize("scene", [FourMass, SliderCrank])
-def test_energy_of_frictionless_mechanisms_is_constant(
-    scene: type[MechanismScene], t_end: float
-) -> None:
-    run = simulate(scene(SMOOTH).model(), t_end, rtol=1e-10)
-    largest = max(run["kinetic"].max(), abs(run["energy"][0]))
-    assert np.abs(run["energy"] - run["energy"][0]).max() < 1e-8 * t_end * largest
 
 
 # ---- uneven masses and dead points ----
