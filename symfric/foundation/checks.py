@@ -372,7 +372,11 @@ def check_names(where: str, given: Iterable[str], known: Collection[str], hint: 
     unknown = [name for name in listed if name not in known]
     if not unknown:
         return
-    close = [get_close_matches(name, list(known), n=1, cutoff=0.4) for name in unknown]
+    close = [
+        [one for one in known if one.endswith((f".{name}", f"_{name}"))]
+        or get_close_matches(name, list(known), n=1, cutoff=0.4)
+        for name in unknown
+    ]
     offers = ", ".join(c[0] for c in close if c)
     advice = hint or ("check the spelling" if known else "")
     if offers:

@@ -165,6 +165,15 @@ def _passage(here: "_Instants") -> Array:
     return _crossed(here, rate)
 
 
+def event_times(path: Path, jump: Jump) -> Array:
+    """Return the passage to the times of simultaneous events, shape (events, n + 1 + n_d)."""
+    here = _Instants.of(path, [jump])
+    rate = here.rates_before()
+    delays = np.vstack([here.delay([i], here.before, rate) for i in jump.which])
+    start = here.nothing if jump.size else here.to_fixed_time(rate)
+    return then(start[0], np.insert(delays, rate.shape[1], 0.0, axis=1))
+
+
 def _crossed(here: "_Instants", rate: Array) -> Array:
     """Return the passage of crossed events, from derivatives at a fixed time before them."""
     which, groups = here.jumps[0].which, list[tuple[Array, list[int]]]()

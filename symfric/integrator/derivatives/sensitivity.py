@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.path import Jump, Path, Seeds, of_data
-from symfric.integrator.derivatives.saltation import Links, at_start, links
+from symfric.integrator.derivatives.saltation import Links, at_start, event_times, links
 from symfric.integrator.running.record import Dense
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ class Slopes(NamedTuple):
     Attributes:
         dense: derivatives of the solution at fixed times, as dense output of names * n columns,
             those of a name together.
-        times: derivatives of the times of the jumps, shape (jumps, names).
+        times: derivatives of the times of the events, shape (events, names).
     """
 
     dense: Dense
@@ -119,15 +119,20 @@ def _ahead(dense: Dense, k: NDArray[np.intp], theta: Array) -> tuple[Array, Arra
 
 
 def _times(path: Path, every: Links, dense: Dense, states: Array, of_d: Array) -> Array:
-    """Return the derivatives of the times of all jumps, shape (jumps, names)."""
+    """Return the derivatives of the times of all events, shape (events, names)."""
     found, own, names = list[Array](), iter(every.alone), of_d.shape[1]
     for step, marks in path.openings:
         jumps = [mark for mark in marks if isinstance(mark, Jump)]
         before = dense.y1[step - 1].reshape(names, -1).T if step else states[0, :, :-1].T
         state = np.vstack([before, np.zeros(names)])
-        for _ in jumps:
-            state = _after(next(own), state, of_d)
-            found.append(states[step, :, -1] if len(jumps) == 1 else state[-1])
+        for jump in jumps:
+            after = _after(next(own), state, of_d)
+            if len(jump.which) > 1 and not jump.at_once:
+                found += [*_after(event_times(path, jump), state, of_d)]
+            else:
+                same = states[step, :, -1] if len(jumps) == 1 else after[-1]
+                found += [same] * len(jump.which)
+            state = after
     return np.array(found).reshape(-1, names)
 
 
@@ -272,6 +277,4 @@ class Differentiated:
 
     def delays(self) -> dict[str, Array]:
         """Return the derivatives of the times of events: name -> values, shape (events,)."""
-        jumps = [len(jump.which) for jump in self.path.jumps]
-        times = np.repeat(self.solution.times, jumps, axis=0)
-        return dict(zip(self.which.names, times.T, strict=True))
+        return dict(zip(self.which.names, self.solution.times.T, strict=True))
