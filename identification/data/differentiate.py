@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -239,7 +239,9 @@ RANK = 1e-7
 """Smallest singular value of the scaled regressors taken as nonzero, relative to the largest."""
 
 
-class LinearFit(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class LinearFit:
     """Estimated parameters with standard errors, and the remaining force error.
 
     Attributes:

@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from re import fullmatch
 from tempfile import TemporaryDirectory
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 
@@ -36,7 +36,9 @@ ALLOWED = frozenset(TRANSCENDENTAL.values()) | {
 TINY = float(np.finfo(float).tiny)
 
 
-class ControllerCheck(NamedTuple):
+@final
+@dataclass(frozen=True)
+class ControllerCheck:
     """Result of checking generated C.
 
     Attributes:
@@ -62,7 +64,9 @@ class ControllerCheck(NamedTuple):
         return self.status == "verified"
 
 
-class GeneratedController(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class GeneratedController:
     """Files written by `Controller.to_c`.
 
     Attributes:

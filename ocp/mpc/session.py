@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter, thread_time
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +27,9 @@ WRAPPER = Path(__file__).with_name("wrapper.c").read_text(encoding="utf-8")
 """C code between ctypes and a controller with the name NAME."""
 
 
-class Action(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class Action:
     """Result of a controller in one cycle.
 
     Attributes:

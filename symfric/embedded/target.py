@@ -140,14 +140,18 @@ LIBRARY_PATIENCE = 10.0
 """Time limit of a compiler to print the path of its library [s]."""
 
 
-class Tools(NamedTuple):
+@final
+@dataclass(frozen=True)
+class Tools:
     """Cross compiler and path of the emulator."""
 
     gcc: Compiler
     qemu: str
 
 
-class Absent(NamedTuple):
+@final
+@dataclass(frozen=True)
+class Absent:
     """Names of the tools that are missing."""
 
     names: tuple[str, ...]
