@@ -19,9 +19,8 @@ and T of the time of its start, give
 
     F = sum_i share_i Z_i + fall T,      X = A F + B d'
 
-where X holds the derivatives of the start of the next step and of its time. Without a jump, F is Z
-of the end, and X is the same. An event cuts the step; F is then Z of the dense output at a fixed
-time there.
+where X holds the derivatives of the start of the next step and of its time. Without a jump, X and
+F are Z of the end. After an event, F is Z of the dense output at a fixed time.
 
 Source: Aizerman and Gantmakher, Quart. J. Mech. Appl. Math., 1958; Leine and Nijmeijer, Dynamics
 and Bifurcations of Non-Smooth Mechanical Systems, 2004 (saltation matrix).
@@ -43,10 +42,9 @@ from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, consiste
 Array = NDArray[np.float64]
 Which = Sequence[int] | NDArray[np.intp]
 GRAZING = 1e-6
-"""Relative rate of an event expression below which it touches zero without crossing it.
+"""Rate of an event expression, over its mean rate in the last step, below which it only touches 0.
 
-The rate is relative to the mean rate in the step before. The square is the limit of the rate
-relative to the sum of its terms.
+The square is the limit of the rate relative to the sum of its terms.
 """
 SAME = 1e-6
 """Relative difference of results that counts as equal, such as those of two orders of events."""
@@ -194,7 +192,7 @@ def _crossed(here: "_Instants", rate: Array) -> Array:
         swaps = ([*every[:i], every[i + 1], every[i], *every[i + 2 :]] for i in pairs)
         orders = [every, every[::-1], *swaps]
     first, *others = (_one_by_one(here, order, rate) for order in orders)
-    if first is None or not all(other is not None and _alike(first, other) for other in others):
+    if first is None or not all(other is not None and _near(first, other, -1) for other in others):
         raise ValueError(
             f"{here.where(which)}: expected events at different times, or independent of "
             "their order, got some whose order changes the result; the motion has no "
@@ -224,14 +222,10 @@ def _one_by_one(here: "_Instants", order: Sequence[list[int]], rate: Array) -> A
     return through
 
 
-def _near(one: Array, other: Array) -> bool:
-    """Return True if two arrays are equal, relative to their largest entry."""
-    return bool(np.abs(one - other).max(initial=0.0) <= SAME * np.abs(one).max(initial=0.0))
-
-
-def _alike(one: Array, other: Array) -> bool:
-    """Return True if two passages are equal, each row relative to its largest entry."""
-    return bool((np.abs(one - other) <= SAME * np.abs(one).max(axis=-1, keepdims=True)).all())
+def _near(one: Array, other: Array, axis: int | None = None) -> bool:
+    """Return True if arrays are equal, relative to the largest entry, of all or along an axis."""
+    size = np.abs(one).max(axis, keepdims=True, initial=0.0)
+    return bool((np.abs(one - other) <= SAME * size).all())
 
 
 NOTHING = np.zeros(0)
