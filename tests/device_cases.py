@@ -20,7 +20,7 @@ WEDGES = [np.roots([(1 - r) * 1.001, -0.12, (1 - r) * 1e-3]).max() for r in (0.1
 
 
 def wedge() -> Model:
-    """A light box on its pendulum, see `test_following`."""
+    """A light box on its pendulum."""
     law = BrownMcPhee(mu_s=0.12, mu_d=0.12, v_t=1e-3)
     box = PendulumBox(law, hinge=Viscous(sigma_2=0.0), m_box=0.02)
     return box.mechanism().build(formulation="joint", index=1)

@@ -1,7 +1,7 @@
 """Reader of text files (dialects of CSV), other files and Python objects as columns."""
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from glob import glob, has_magic
 from os import PathLike
@@ -287,8 +287,20 @@ def to_csv(record: Record, path: Path) -> Path:
     return path
 
 
+def _text(file: Path, variable: str | None) -> list[Raw]:
+    """Return the columns of a text file."""
+    if variable is not None:
+        raise ValueError(
+            f"read '{file.name}': expected variable= only of .mat, .npz and .npy files"
+        )
+    return [read_text(file)]
+
+
 TEXT = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn", ".data", "")
-VARIABLES = (".mat", ".npy", ".npz")
+READERS: dict[str, Callable[[Path, str | None], Record | list[Raw]]] = {
+    **dict.fromkeys(TEXT, _text), **dict.fromkeys((".mat", ".npz", ".npy"), read_variables)
+}  # fmt: skip
+"""Functions that read a file, by its suffix."""
 Paths = str | PathLike[str] | Sequence[str | PathLike[str]]
 
 
@@ -327,13 +339,11 @@ def read_records(paths: Paths, wanted: Wanted, variable: str | None) -> tuple[Re
 
 def _read(file: Path, wanted: Wanted, variable: str | None) -> list[Record]:
     suffix, where = file.suffix.lower(), f"read '{file.name}'"
-    if suffix not in (*TEXT, *VARIABLES):
-        such = f"a text file ({', '.join(filter(None, TEXT))}), .mat, .npz or .npy"
+    if suffix not in READERS:
+        such = f"one of {', '.join(filter(None, READERS))}"
         raise ValueError(f"{where}: expected {such}, got '{file.suffix}'")
-    if suffix in TEXT and variable is not None:
-        raise ValueError(f"{where}: expected variable= only of .mat, .npz and .npy files")
     try:
-        found = read_variables(file, variable) if suffix in VARIABLES else [read_text(file)]
+        found = READERS[suffix](file, variable)
     except OSError as error:
         got = error.strerror or error
         raise ValueError(f"read '{file}': expected a readable file, got {got}") from None

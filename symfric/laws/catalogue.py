@@ -19,35 +19,67 @@ from symfric.laws.static import (
     smooth_peak,
 )
 
-STATIC = """
-    coulomb viscous power_law_viscous stribeck tustin lorentzian steady_state_lugre brown_mcphee
-    simscape_breakaway specker self_tuning brittle_self_tuning rui_wang threlfall
-    modified_threlfall bengisu_akay velocity_based ambrosio hollars exudyn step5 benson andersson
-    duan_singh berger popp_stelter makkar_dixon karnopp awrejcewicz leine_switch wojewoda
-    quarter_car_general quarter_car_simple bittencourt bam capstan
-"""
-"""Names of memoryless laws, with the most widely used laws first."""
-DYNAMIC = """
-    dahl bliman_sorine haessig_friedland lugre lugre_normalised lugre_passive elasto_plastic leuven
-    maxwell_slip gms stick_slip gonthier bristle_2d bouc_wen rate_and_state armstrong exact_coulomb
-"""
-"""Names of laws with states."""
-FILES = (
-    *(applied_force, coulomb, exponential, machines, piecewise, self_tuning, smooth_peak),
-    *(dahl, dwell, lugre, maxwell_slip, stick_slip),
-)
+STATIC_LAWS: dict[str, type[Law]] = {
+    "coulomb": coulomb.Coulomb,
+    "viscous": coulomb.Viscous,
+    "power_law_viscous": coulomb.PowerLawViscous,
+    "stribeck": exponential.Stribeck,
+    "tustin": exponential.Tustin,
+    "lorentzian": smooth_peak.Lorentzian,
+    "steady_state_lugre": exponential.SteadyStateLuGre,
+    "brown_mcphee": smooth_peak.BrownMcPhee,
+    "simscape_breakaway": smooth_peak.SimscapeBreakaway,
+    "specker": smooth_peak.Specker,
+    "self_tuning": self_tuning.SelfTuning,
+    "brittle_self_tuning": self_tuning.BrittleSelfTuning,
+    "rui_wang": self_tuning.RuiWang,
+    "threlfall": piecewise.Threlfall,
+    "modified_threlfall": piecewise.ModifiedThrelfall,
+    "bengisu_akay": piecewise.BengisuAkay,
+    "velocity_based": piecewise.VelocityBased,
+    "ambrosio": piecewise.Ambrosio,
+    "hollars": piecewise.Hollars,
+    "exudyn": piecewise.Exudyn,
+    "step5": piecewise.Step5,
+    "benson": exponential.Benson,
+    "andersson": exponential.Andersson,
+    "duan_singh": exponential.DuanSingh,
+    "berger": exponential.Berger,
+    "popp_stelter": smooth_peak.PoppStelter,
+    "makkar_dixon": smooth_peak.MakkarDixon,
+    "karnopp": applied_force.Karnopp,
+    "awrejcewicz": applied_force.Awrejcewicz,
+    "leine_switch": applied_force.LeineSwitch,
+    "wojewoda": applied_force.Wojewoda,
+    "quarter_car_general": machines.QuarterCarGeneral,
+    "quarter_car_simple": machines.QuarterCarSimple,
+    "bittencourt": machines.Bittencourt,
+    "bam": machines.BAM,
+    "capstan": machines.Capstan,
+}
+"""Memoryless laws by name, with the most widely used laws first."""
 
-
-def _named(names: str) -> dict[str, type[Law]]:
-    """Return the classes by name; a name is that of the class in lower case with underscores."""
-    kinds = {name.lower(): value for file in FILES for name, value in vars(file).items()}
-    return {name: kinds[name.replace("_", "")] for name in names.split()}
-
-
-STATIC_LAWS = _named(STATIC)
-"""Memoryless laws by name."""
-DYNAMIC_LAWS = _named(DYNAMIC)
+DYNAMIC_LAWS: dict[str, type[Law]] = {
+    "dahl": dahl.Dahl,
+    "bliman_sorine": dahl.BlimanSorine,
+    "haessig_friedland": stick_slip.HaessigFriedland,
+    "lugre": lugre.LuGre,
+    "lugre_normalised": lugre.LuGreNormalised,
+    "lugre_passive": lugre.LuGrePassive,
+    "elasto_plastic": lugre.ElastoPlastic,
+    "leuven": maxwell_slip.Leuven,
+    "maxwell_slip": maxwell_slip.MaxwellSlip,
+    "gms": maxwell_slip.GMS,
+    "stick_slip": stick_slip.StickSlip,
+    "gonthier": dwell.Gonthier,
+    "bristle_2d": stick_slip.Bristle2D,
+    "bouc_wen": dahl.BoucWen,
+    "rate_and_state": dwell.RateAndState,
+    "armstrong": dwell.Armstrong,
+    "exact_coulomb": stick_slip.ExactCoulomb,
+}
 """Laws with states by name."""
+
 ALL_LAWS = STATIC_LAWS | DYNAMIC_LAWS
 """Laws by name; the contract tests cover every entry."""
 

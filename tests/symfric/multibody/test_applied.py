@@ -160,7 +160,7 @@ def test_every_contact_of_an_arm_obeys_its_mode() -> None:
 
 
 def test_a_light_box_jams_by_name_under_dry_friction_too() -> None:
-    """At the same instant as under a smooth law, see `test_jamming`."""
+    """At the same instant as under a smooth law."""
     law = ExactCoulomb(mu_s=0.12, mu_d=0.12)
     scene = PendulumBox(law, hinge=Viscous(sigma_2=0.0), m_box=0.02)
     message = "stopped at t = 0.08911.*friction jams.*normal force of joint 'x' with ExactCoulomb"
