@@ -171,3 +171,4 @@ def test_references_are_smooth_and_rest() -> None:
     assert np.abs(np.diff(found.x) / found.h - found.v[:-1]).max() < found.h * np.abs(found.a).max()
     assert found.rest == slice((2000 + 3000) // 2, None)
     assert sine(0.01, 1.0, 1.0).rest is None
+    assert Reference(np.ones(20), np.zeros(20), np.zeros(20), 1e-3).rest == slice(10, None)

@@ -140,6 +140,9 @@ def test_spatial_mechanisms_have_one_scale_on_three_axes(runs: dict[str, Traject
     spans = np.array([np.ptp(getattr(axis, f"get_{a}lim")()) for a in "xyz"])
     box = axis._box_aspect  # type: ignore[attr-defined]
     assert spans / spans.max() == pytest.approx(box / box.max())
+    drawn = np.hstack([np.array(line.get_data_3d()) for line in axis.lines])  # type: ignore[attr-defined]
+    size = np.nanmax(np.ptp(drawn[:, ~np.isnan(drawn).any(axis=0)], axis=1))
+    assert size < spans.max() < 1.5 * size
 
 
 def test_time_and_speed_stand_above_and_joints_show_whether_they_stick() -> None:
