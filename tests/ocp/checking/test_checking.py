@@ -377,3 +377,8 @@ def test_failed_first_solve_and_stop_on_a_later_mesh() -> None:
     failed = refined_solve(problem, make_meshes(problem, 20), solver=Ipopt(max_iter=2))
     assert failed.status is Status.MAX_ITERATIONS
     assert failed.statistics.solves == 1
+
+
+def test_alp_rider_has_the_published_rates() -> None:
+    rates = alp_rider().chain[0].model.function("ode")(0, [1, 2, 3, 4], [], [5, 7], [])
+    assert rates.full().ravel().tolist() == [2.0, 15.0, 9.0, 29.0]

@@ -5,6 +5,7 @@ import pytest
 from oracles import rabinowicz_coulomb, rabinowicz_motion
 
 from symfric import SteadyStateLuGre
+from symfric.gallery.generalized_maxwell_slip.laws import SIGMA_0, SIGMA_1, bristle
 from symfric.gallery.laminator_nips import sled
 from symfric.gallery.self_tuning import machines
 from symfric.gallery.self_tuning.machines import fixed_steps, solve
@@ -60,3 +61,12 @@ def test_a_slack_wire_does_not_push() -> None:
     _, force = sled.cycle("main", (300.0, 0.0), 500 / 60e3)
     assert force.min() == 0.0
     assert np.mean(force == 0.0) > 0.1
+
+
+def test_bristle_is_damped_before_it_slides_and_holds_its_level_after() -> None:
+    v, level = 1e-3, 2.0
+    z, damped = bristle(np.array(0.0), v, 1e-12, level)
+    assert damped == pytest.approx(SIGMA_1 * v, rel=1e-3)
+    assert z == pytest.approx(v * 1e-12, rel=1e-3)
+    z, slides = bristle(np.array(0.0), -v, 1e6, level)
+    assert slides == pytest.approx(SIGMA_0 * z) == pytest.approx(-level)
