@@ -22,7 +22,7 @@ from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable
-from symfric.foundation.programs import CompileError, needed_compiler
+from symfric.foundation.programs import CompileError, find_compiler
 from symfric.laws import AnyLaw, Population
 
 
@@ -124,9 +124,9 @@ def generate(
     for file, text in texts.items():
         write_text(folder / file, text)
     content = manifest(several, texts)
-    with suppress(CompileError):  # no sizes without a working compiler; `verify` reports why
-        compiler = needed_compiler()
-        for c in several if kit else ():
+    compiler = find_compiler() if kit else None
+    for c in several if compiler else ():
+        with suppress(CompileError):  # no sizes without a working compiler; `verify` reports why
             sizes = footprint(c, folder, compiler)
             content["real"][c.real.name]["measured"] = {"compiler": str(compiler), **sizes}
     files = tuple(folder / file for file in (*texts, f"{block.name}_manifest.json"))
