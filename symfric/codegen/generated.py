@@ -125,10 +125,11 @@ def generate(
         write_text(folder / file, text)
     content = manifest(several, texts)
     compiler = find_compiler() if kit else None
-    for c in several if compiler else ():
-        with suppress(CompileError):  # no sizes without a working compiler; `verify` reports why
-            sizes = footprint(c, folder, compiler)
-            content["real"][c.real.name]["measured"] = {"compiler": str(compiler), **sizes}
+    if compiler is not None:
+        for c in several:
+            with suppress(CompileError):  # no sizes of C that does not compile; see `verify`
+                sizes = footprint(c, folder, compiler)
+                content["real"][c.real.name]["measured"] = {"compiler": str(compiler), **sizes}
     files = tuple(folder / file for file in (*texts, f"{block.name}_manifest.json"))
     write_text(files[-1], json.dumps(content, indent=2) + "\n")
     return Generated(block, folder, reals, files, content, guards)
