@@ -108,7 +108,7 @@ class Report:
         Raises:
             ValueError: a benchmark without a picture.
         """
-        from symfric.foundation.panels import save  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.foundation.panels import save  # noqa: PLC0415  (slow to import)
 
         if self.draw is None:
             raise ValueError("plot: expected a benchmark with a picture, got one of tables only")
@@ -212,8 +212,8 @@ def curves(panel: str, lines: Sequence[str], x: str, *ys: str) -> Draw:
 def _draw_curves(
     panel: str, lines: Sequence[str], x: str, ys: Sequence[str], rows: Sequence[Row]
 ) -> "Figure":
-    from symfric.foundation.panels import grid  # noqa: PLC0415  (matplotlib is slow to import)
-    from symfric.foundation.style import COLOURS, MARKERS, colour  # noqa: PLC0415  (likewise)
+    from symfric.foundation.panels import grid  # noqa: PLC0415  (slow to import)
+    from symfric.foundation.style import COLOURS, MARKERS, colour  # noqa: PLC0415  (slow to import)
 
     def label(row: Row) -> str:
         return ", ".join(c if isinstance(c := row[k], str) else f"{k} = {c:g}" for k in lines)

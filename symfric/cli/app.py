@@ -124,7 +124,7 @@ class Commands(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command that the first word names; suggest a name for an unknown word."""
         if not (args[0] in COMMANDS or ctx.resilient_parsing or args[0].startswith("-")):
-            from symfric.foundation.checks import check_names  # noqa: PLC0415  (CasADi is slow)
+            from symfric.foundation.checks import check_names  # noqa: PLC0415  (slow to import)
 
             check_names("command", args[:1], COMMANDS)
         return super().resolve_command(ctx, args)

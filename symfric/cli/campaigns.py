@@ -115,8 +115,8 @@ def gallery(
     Example: symfric gallery self_tuning selection/fig_02 --out figures
     """
     from symfric.gallery import chosen, short  # noqa: PLC0415  (for this command only)
-    from symfric.gallery.plate import about  # noqa: PLC0415  (likewise)
-    from symfric.gallery.rendering import render  # noqa: PLC0415  (likewise)
+    from symfric.gallery.plate import about  # noqa: PLC0415  (for this command only)
+    from symfric.gallery.rendering import render  # noqa: PLC0415  (for this command only)
 
     wanted = tuple(names or ())
     figures = chosen(wanted)
@@ -182,8 +182,8 @@ def stress(
     Example: symfric stress --case stress_cases/silent_7_123.json
     """
     from symfric.stress.campaign import campaign, rerun  # noqa: PLC0415  (for this command only)
-    from symfric.stress.cases import Case  # noqa: PLC0415  (likewise)
-    from symfric.stress.judge import FAILING  # noqa: PLC0415  (likewise)
+    from symfric.stress.cases import Case  # noqa: PLC0415  (for this command only)
+    from symfric.stress.judge import FAILING  # noqa: PLC0415  (for this command only)
 
     opt.check_outputs(json)
     if case is not None:

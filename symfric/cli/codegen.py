@@ -249,7 +249,7 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
     if fit is None:
         text = str(law)
         return Chosen(text, any_from_text(text))
-    from identification.result.fitted import Fitted  # noqa: PLC0415  (SciPy is slow to import)
+    from identification.result.fitted import Fitted  # noqa: PLC0415  (slow to import)
 
     if fit.suffix.lower() == ".urdf":
         raise ValueError(

@@ -62,7 +62,7 @@ def laws(
     every = [name] if name else [*ALL_LAWS, *POPULATIONS]
     chosen = {text: opt.with_settings(any_from_text(text), text, texts) for text in every}
     if plot:
-        from symfric.figures.pictures import plot_catalogue, plot_laws  # noqa: PLC0415  (matplotlib is slow)
+        from symfric.figures.pictures import plot_catalogue, plot_laws  # noqa: PLC0415  (slow to import)
 
         draw = plot_laws if name else plot_catalogue
         draw(chosen, 1.0 if normal_force is None else normal_force, plot)

@@ -36,7 +36,7 @@ def kind_of(
     others = {place: law_from_text(text) for place, text in assignments("--law-of", law_of).items()}
     if scene.endswith(".urdf"):
         from symfric.multibody.urdf import relative  # noqa: PLC0415  (for robots only)
-        from symfric.scenes import Robot  # noqa: PLC0415
+        from symfric.scenes import Robot  # noqa: PLC0415  (for robots only)
 
         check_names("--preset of a robot", [preset] if preset else [], ())
         laws = tuple(relative(law) for law in others.values())

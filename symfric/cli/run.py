@@ -90,7 +90,7 @@ def run(
     if csv:
         first.to_csv(csv)
     if plot:
-        from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
+        from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (slow to import)
 
         plot_trajectories(found, path=plot, panels=panels)
     if movie:
@@ -189,7 +189,7 @@ def check_movie(path: Path | None, scene: str, model: Model) -> None:
             f"--animate: expected a scene with geometry, such as {', '.join(MECHANISMS)}, got "
             f"{scene}; --plot shows its signals"
         )
-    from symfric.results.animation import check_format  # noqa: PLC0415  (matplotlib is slow)
+    from symfric.results.animation import check_format  # noqa: PLC0415  (slow to import)
 
     check_format(path)
 

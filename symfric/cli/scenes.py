@@ -54,7 +54,7 @@ def scenes(
     model = machine.model()
     found = to_dict(name, machine, model, law)
     if plot:
-        from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
+        from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (slow to import)
 
         given = driven(machine, model)
         how: dict[str, Any] = {"x0": given.start, "u": given.signals, "throw": False}

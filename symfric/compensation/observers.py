@@ -1,7 +1,8 @@
 """Observers of friction as blocks: states of a law, or the force by the motion of a mass."""
 
 from collections.abc import Callable
-from typing import Any
+from types import UnionType
+from typing import TypeVar
 
 import casadi as ca
 
@@ -21,6 +22,7 @@ from symfric.model import Output
 
 USE = "Call it once per sample, and add F to the force that the controller commands."
 ERROR = "e is the position error, reference minus measured, in the direction of v."
+L = TypeVar("L", bound=Law)
 Bristles = LuGre | LuGreNormalised | LuGrePassive
 Corrected = tuple[ca.SX, ca.SX]
 """States after the step and mean force over the step."""
@@ -121,7 +123,7 @@ def gms_observer(
     Source: Al-Bender, Lampaert, Swevers, IEEE TAC 50(11), 2005, for the law; the correction follows
     the observer of LuGre and is an addition of symfric.
     """
-    where = _check("gms_observer", law, (GMS,), "GMS(form='event')", gain)
+    where = _check("gms_observer", law, GMS, "GMS(form='event')", gain)
     if law.form != "event":
         raise checks.refused(f"{where}: form", "'event', whose step is known", law.form)
     return _observer(
@@ -142,7 +144,7 @@ def _springs(
     return end, ca.SX(force)
 
 
-def _check(what: str, law: Any, kinds: Any, such_as: str, gain: object) -> str:
+def _check(what: str, law: Law, kinds: type[Law] | UnionType, such_as: str, gain: object) -> str:
     check_law(what, law)
     if not isinstance(law, kinds):
         raise checks.refused(what, f"a law such as {such_as}", law)
@@ -152,8 +154,8 @@ def _check(what: str, law: Any, kinds: Any, such_as: str, gain: object) -> str:
 
 
 def _observer(
-    law: Law,
-    corrected: Callable[..., Corrected],
+    law: L,
+    corrected: Callable[[L, ca.SX, ca.SX, ca.SX, ca.SX, ca.SX | float, str], Corrected],
     gain: float,
     N: float,
     ramp: float | None,

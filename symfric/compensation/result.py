@@ -310,7 +310,7 @@ class Comparison:
             names: cases to show, by default all.
             path: image file.
         """
-        from symfric.foundation.panels import panels, save  # noqa: PLC0415  (matplotlib is slow)
+        from symfric.foundation.panels import panels, save  # noqa: PLC0415  (slow to import)
 
         checks.check_names("comparison", names, self.loops)
         shown = [self.loops[n] for n in names or self.loops]

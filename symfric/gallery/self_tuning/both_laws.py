@@ -89,5 +89,5 @@ def run(both: Both, label: str, v_t: float, t_end: float) -> Signals:
 
 @cache
 def oracle(both: Both, label: str, v_t: float, t_end: float) -> Signals:
-    """Return the same by equations written by hand, and SUNDIALS."""
+    """Return the signals by equations written by hand, integrated by SUNDIALS."""
     return solve(both.machine(label, v_t), run(both, label, v_t, t_end)["t"])

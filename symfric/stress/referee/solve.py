@@ -183,7 +183,7 @@ def by_lsoda(
     motion: Motion, y: Array, times: Array, span: tuple[float, float], rtol: float, asked: Question
 ) -> tuple[Array, Array]:
     """Return states at `times` and at the end, integrated by LSODA."""
-    from scipy.integrate import odeint  # noqa: PLC0415  (a third of a second)
+    from scipy.integrate import odeint  # noqa: PLC0415  (slow to import)
 
     at = np.unique([*span, *times])  # LSODA needs times that differ by more than rounding
     at = at[np.append(True, np.diff(at) > CLOSE * np.abs(at).max())]
@@ -204,7 +204,7 @@ def by_events(
     motion: Motion, y: Array, times: Array, span: tuple[float, float], rtol: float, asked: Question
 ) -> tuple[Array, Array]:
     """Return states at `times` and at the end, integrated from event to event."""
-    from scipy.integrate import solve_ivp  # noqa: PLC0415
+    from scipy.integrate import solve_ivp  # noqa: PLC0415  (slow to import)
 
     contacts, mu_s, (t, end) = range(len(motion.scene.slides)), asked.p["mu_s"], span
     longest = (asked.times[-1] - asked.times[0]) / PIECES
