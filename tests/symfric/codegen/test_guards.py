@@ -75,7 +75,8 @@ def test_every_repair_in_c_is_that_in_numpy_and_sets_its_bit(flags, compiler, tm
     (c,) = program.run([(0, inputs, parameters)])
     status = [Names(Status.__members__).value(text or "0") for _, _, text in STEPS.values()]
     assert c[:, -1].astype(int).tolist() == status
-    assert np.allclose(c, run_vm(program.several[0], inputs, parameters=parameters), rtol=1e-12)
+    wanted = run_vm(program.several[0], inputs, parameters=parameters)
+    assert np.allclose(c, wanted, rtol=0.0 if flags == "-O0" else 1e-12, atol=0.0)
     rows = dict(zip(STEPS, c, strict=True))
     F, big, y = slice(0, 8), 8, 9
     assert rows["no voltage"][y] == rows["step size"][y] == 2.0 / 0.25  # other numbers are kept

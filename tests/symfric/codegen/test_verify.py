@@ -21,6 +21,7 @@ from symfric.compensation import compensator, gms_observer
 from symfric.emitter.c99 import DOUBLE, FLOAT
 from symfric.laws import GMS
 from symfric.model.kinds import CONSTRAINTS
+from symfric.scenes import Drive
 
 LUGRE = block_of(LuGre())
 
@@ -307,6 +308,8 @@ def test_random_steps_find_guards_that_are_wrong(compiler, monkeypatch):
     for found in ({"altered": 1}, {"unflagged": 1}, {"unfinished": 1}, {"report": "overflow"}):
         assert not Fuzzed("f", "float", 10, valid=8, repaired=2, **found).ok
     monkeypatch.setattr(fuzz, "SANITIZED", ("-std=c99", "-O0", "-ffp-contract=off"))
+    plant = fuzz.fuzz(plant_block(Drive(LuGre()).model()), "float", compiler, steps=3000)
+    assert plant.ok, plant
 
     def silent(*given):
         return guards.helpers(*given).replace("*status |= clamped;", "", 1)
