@@ -69,7 +69,7 @@ def test_an_attempt_holds_the_controls_of_each_phase() -> None:
     assert sum(mesh.size for mesh in attempt.meshes) == found.t_control.size
     assert [float(mesh[0]) for mesh in attempt.meshes] == [0.0, 0.0]
     assert landed(problem, attempt) < 1e-4
-    ready = READY["out_and_back"]._replace(optimum=found.cost, friction=False)
+    ready = replace(READY["out_and_back"], optimum=found.cost, friction=False)
     held = tuple({name: 0 * u for name, u in c.items()} for c in attempt.controls)
     wrong = replace(attempt, cost=0.5 * found.cost, controls=held)
     _, row = ocp._row(ready, problem, "x", "near", [attempt, wrong, attempt])
