@@ -142,7 +142,7 @@ def goals(rows: object) -> dict[str, Row]:
     return {row["quantity"]: row for title, row in rows if title == GOALS}  # type: ignore[union-attr]
 
 
-def test_without_data_the_rows_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_data_the_rows_report_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("EMPS", "FRANKA"):
         monkeypatch.setattr(measured, name, tmp_path)
     made = identification.bench(quick=True, cases=("emps", "franka"))
