@@ -18,7 +18,8 @@ from symfric import Coulomb, Sum, Viscous, drive, law_from_text, with_values
 from symfric.bench import codegen, embedded, identification, ocp
 from symfric.bench import identification_measured as measured
 from symfric.bench.codegen import PROVEN, plants, trials
-from symfric.bench.identification import campaign, files, outcome
+from symfric.bench.identification import files, outcome
+from symfric.bench.identification_files import campaign
 from symfric.bench.identification_memory import ranked
 from symfric.bench.identification_repeats import coloured, far
 from symfric.bench.interop import GOAL, ROUTES, STEPS, N, T, missed, move

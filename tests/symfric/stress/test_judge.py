@@ -12,6 +12,7 @@ from symfric.stress.problem import (
     RIGHT,
     Problem,
     amplification,
+    apart,
     at_steps,
     distance,
     of,
@@ -87,6 +88,18 @@ def test_distance_counts_tolerances() -> None:
     shifted = replace(run, states=lambda t: {n: y + 2e-6 for n, y in run.states(t).items()})
     table = np.stack([run["x"], run["v"]])
     assert distance(ready, shifted, of(run)) == pytest.approx(2e-6 / tolerances(ready, table).min())
+
+
+def test_a_model_with_events_may_be_early_or_late_by_its_tolerance() -> None:
+    ready = problem(replace(EASY, law="exact_coulomb"))
+    late = EASY.rtol * EASY.t_end
+
+    def truth(times: np.ndarray) -> np.ndarray:
+        return np.tile(times, (len(ready.model.x), 1))
+
+    for shift, fits in ((-late, True), (late, True), (-3 * late, False), (3 * late, False)):
+        y = truth(ready.times + shift)
+        assert (apart(ready, y, truth)[:, 1:-1].max() < 1e-6) == fits
 
 
 def test_what_a_problem_makes_of_a_tolerance_is_measured() -> None:
