@@ -258,5 +258,7 @@ def _rows(task: Task, laws: Forms, workers: int) -> Iterator[Row]:
         return
     names, tasks = [*laws], enumerate(laws.items())
     for number, row in outcomes(lambda at: best_form(task, *at), tasks, workers, start="fork"):
-        died = isinstance(row, Crashed)
-        yield Row(names[number], FAILED, f"its process ended with {row.how}") if died else row
+        if isinstance(row, Crashed):
+            yield Row(names[number], FAILED, f"its process ended with {row.how}: {row.last_line}")
+        else:
+            yield row
