@@ -123,6 +123,10 @@ class PrescribedMotion(Constraint):
     motion: Callable[[ca.SX], Scalar]
     direction: str = ""
 
+    def joints(self) -> Iterable[tuple[str, str]]:
+        """Return the driven joint and the direction of the motion."""
+        return ((self.joint, self.direction),)
+
     def held(self, kin: Kinematics) -> Held:
         """Return motion(t) - s = 0."""
         what = "motion: expected a function of time that returns one expression"

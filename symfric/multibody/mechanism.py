@@ -201,15 +201,14 @@ class Mechanism(packed.Portable, Showing):
         p = many(where, p, "variables")
         for variable in p:
             kind(where, variable, Variable, "variables made by Variable(...)")
-        u = tuple(self.inputs)
-        made = replace(written(self._tree(p), self.forces, self.constraints, p), u=u)
+        made = written(self._tree(p), self.forces, self.constraints, p, tuple(self.inputs))
         loose = undeclared_in_forces(made)
         self._refuse([*made.problems, *made.misfits, *left_open(made), *loose])
         self._refuse(infinite(made))
         self._refuse(without_inertia(made))
         if formulation == "absolute":
             self._refuse(inseparable(made))
-            made = replace(in_absolute_coordinates(made, self.constraints), u=u)
+            made = in_absolute_coordinates(made, self.constraints)
             self._refuse([*made.problems, *left_open(made)])
         return made
 
