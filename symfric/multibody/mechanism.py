@@ -95,7 +95,7 @@ class Mechanism(packed.Portable, Showing):
 
     def thumbnail(self) -> "Figure | None":
         """Return a small figure of the mechanism at its start; None if it cannot be built yet."""
-        from symfric.results.animation import still  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.results.animation import still  # noqa: PLC0415  (slow to import)
 
         try:
             made = self.prepare()
