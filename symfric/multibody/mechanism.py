@@ -1,4 +1,4 @@
-"""Builder of mechanisms, which returns a model, and their equations as named CasADi Functions."""
+"""Builder of mechanisms and their models, and their equations as named CasADi Functions."""
 
 from collections.abc import Iterable, Sequence
 from copy import copy
