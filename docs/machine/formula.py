@@ -6,18 +6,29 @@ nor defined by the block itself are words of English.
 """
 
 import re
-import tomllib
 from collections.abc import Iterator
-from pathlib import Path
 
-TABLE = tomllib.loads(Path(__file__).with_name("formula.toml").read_text("utf-8"))
-GREEK = {name: f"\\{name}" for name in TABLE["greek"]["names"].split()} | TABLE["greek"]["others"]
-FUNCTIONS: dict[str, str] = {
-    **{name: f"\\{name}" for name in TABLE["functions"]["names"].split()},
-    **{name: rf"\operatorname{{{name}}}" for name in TABLE["functions"]["operators"].split()},
-    **TABLE["functions"]["others"],
+LETTERS = """alpha beta gamma delta zeta eta theta iota kappa nu xi pi rho sigma tau phi chi psi
+omega mu Delta Omega Phi Psi Sigma Theta Gamma Lambda"""
+GREEK = {name: f"\\{name}" for name in LETTERS.split()} | {
+    "epsilon": r"\varepsilon",
+    "eps": r"\varepsilon",
+    "lam": r"\lambda",
+    "inf": r"\infty",
 }
-MARKS: dict[str, str] = TABLE["marks"]
+FUNCTIONS = {
+    **{name: f"\\{name}" for name in ("exp", "tanh", "sin", "cos", "tan", "ln", "min", "max")},
+    "atan": r"\arctan",
+    "asin": r"\arcsin",
+    **{name: rf"\operatorname{{{name}}}" for name in ("sign", "clip", "sat", "hold", "step")},
+    "asinh": r"\operatorname{arsinh}",
+    "sqrt": r"\sqrt",
+    "sum": r"\sum",
+}
+MARKS = {
+    "<=": r"\le ", ">=": r"\ge ", "->": r"\to ", "+-": r"\pm ", "*": r"\cdot ", "...": r"\ldots ",
+    ",": r",\;", ";": r";\;", "{": r"\{", "}": r"\}", "^": "^",
+}  # fmt: skip
 CLOSING = {"(": ")", "[": "]", "{": "}"}
 TOKEN = re.compile(
     r"""(?P<gap>\ {2,})|(?P<blank>\ )|d(?P<rate>[A-Za-z]\w*)/dt\b

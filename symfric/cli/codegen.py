@@ -12,7 +12,6 @@ import typer
 from symfric import Law, any_from_text, law_from_text, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
-from symfric.cli.app import TEXTS
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
@@ -44,7 +43,18 @@ COMPENSATION = [item.name for item in fields(Compensation)]
 LAW, FUNCTION, POPULATION = "a law", "a law without states", "a population"
 PLANT, INVERSE, COMPENSATOR = "--scene", "--inverse-dynamics", "--compensator"
 
-APPLIES: dict[str, list[str]] = TEXTS["applies"]
+APPLIES = {
+    "--step-size": (LAW, POPULATION, PLANT, INVERSE, COMPENSATOR),
+    "--method": (PLANT,),
+    "--free": (LAW, FUNCTION, PLANT),
+    "--fold": (LAW, FUNCTION, PLANT, INVERSE, COMPENSATOR),
+    "--turning": (LAW, FUNCTION, COMPENSATOR),
+    "--payload": (INVERSE,),
+    "--tunable-gravity": (INVERSE,),
+    "--compensation": (COMPENSATOR,),
+    "--preset": (PLANT,),
+    "--law-of": (PLANT,),
+}
 """Option that applies only to some subjects -> these subjects."""
 
 WHY = {

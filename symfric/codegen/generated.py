@@ -22,7 +22,7 @@ from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.parameters import Variable
-from symfric.foundation.programs import CompileError, needed_compiler
+from symfric.foundation.programs import CompileError, find_compiler
 from symfric.laws import AnyLaw, Population
 
 
@@ -124,11 +124,12 @@ def generate(
     for file, text in texts.items():
         write_text(folder / file, text)
     content = manifest(several, texts)
-    with suppress(CompileError):  # no sizes without a working compiler; `verify` reports why
-        compiler = needed_compiler()
-        for c in several if kit else ():
-            sizes = footprint(c, folder, compiler)
-            content["real"][c.real.name]["measured"] = {"compiler": str(compiler), **sizes}
+    compiler = find_compiler() if kit else None
+    if compiler is not None:
+        for c in several:
+            with suppress(CompileError):  # no sizes of C that does not compile; see `verify`
+                sizes = footprint(c, folder, compiler)
+                content["real"][c.real.name]["measured"] = {"compiler": str(compiler), **sizes}
     files = tuple(folder / file for file in (*texts, f"{block.name}_manifest.json"))
     write_text(files[-1], json.dumps(content, indent=2) + "\n")
     return Generated(block, folder, reals, files, content, guards)

@@ -69,10 +69,13 @@ class CBlock:
     @property
     def sizes(self) -> dict[str, str | int]:
         """Names and sizes for templates that call `flat_step`."""
-        groups = (*self.block.groups.values(), self.block.outputs)
-        counts = zip(("states", "params", "inputs", "outputs"), map(len, groups), strict=True)
-        texts = {"name": self.name, "real": self.real.name, "step": self.flat_step}
-        return texts | dict(counts)
+        counts = {
+            "states": len(self.block.states),
+            "params": len(self.block.parameters),
+            "inputs": len(self.block.inputs),
+            "outputs": len(self.block.outputs),
+        }
+        return {"name": self.name, "real": self.real.name, "step": self.flat_step} | counts
 
     @property
     def signals(self) -> list[str]:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from symfric.codegen import Block, generate
 from symfric.codegen.layout import TEMPLATES, CBlock, filled
 from symfric.codegen.runner import FLAGS
-from symfric.compensation.force import TABLES
 from symfric.compensation.result import WITHOUT, Comparison, Loop, Reference
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
@@ -58,10 +57,17 @@ class Cascade(Parametric):
 
     def block(self) -> Block:
         """Return the block (x, r, v_ref, a_ref, hold) -> u and the signals x_m, v_m, e, v_s."""
-        rows = TABLES["cascade"]
-        inputs, states = (
-            tuple(Variable(name, **row) for name, row in rows[group].items())
-            for group in ("inputs", "states")
+        inputs = (
+            Variable("x", "m", nominal=0.1, doc="position"),
+            Variable("r", "m", nominal=0.1, doc="reference position"),
+            Variable("v_ref", "m/s", nominal=0.1, doc="reference velocity"),
+            Variable("a_ref", "m/s^2", doc="reference acceleration"),
+            Variable("hold", "1", lower=0.0, upper=1.0, doc="above 0.5: no integration"),
+        )
+        states = (
+            Variable("before", "m", doc="previous position"),
+            Variable("v_before", "m/s", doc="previous velocity"),
+            Variable("integral", "N", doc="integral force"),
         )
         x, r, v_ref, a_ref, hold = (v.symbol for v in inputs)
         before, v_before, integral = (v.symbol for v in states)
@@ -82,10 +88,11 @@ class Cascade(Parametric):
             inputs=inputs,
             next=ca.vertcat(x_m, v_m, ca.if_else(free, more, integral)),
             outputs={
-                name: Output(value, **row)
-                for (name, row), value in zip(
-                    rows["outputs"].items(), (u, x_m, v_m, e, v_s), strict=True
-                )
+                "u": Output(u, "N", "commanded force"),
+                "x_m": Output(x_m, "m", "measured position"),
+                "v_m": Output(v_m, "m/s", "measured velocity"),
+                "e": Output(e, "m", "position error"),
+                "v_s": Output(v_s, "m/s", "set velocity"),
             },
         )
 

@@ -131,11 +131,15 @@ def chosen_settings(
             f"{where}: error_gain, delay: expected with a desired velocity only, got "
             "velocity = 'measured'"
         )
-    for name, what in TABLES["groups"].items():
+    for name, what, count in (
+        ("hold", "(error [m], velocity [m/s])", 2),
+        ("stick", "(force [N], time [s], velocity [m/s])", 3),
+        ("dither", "(amplitude [N], frequency [Hz])", 2),
+    ):
         value = getattr(s, name)
         if value is not None:
             found = checks.array(f"{where}: {name}", value, what=what)
-            if found.size != what.count("[") or (found < 0).any():
+            if found.size != count or (found < 0).any():
                 raise checks.refused(f"{where}: {name}", f"{what}, numbers >= 0", value)
     if s.stick is not None:
         checks.number(f"{where}: stick: velocity", s.stick[2], unit="m/s", above=0.0)
@@ -166,20 +170,29 @@ def _check_table(where: str, s: Compensation) -> None:
 
 def formula(s: Compensation) -> str:
     """Return the formula of the block, line by line."""
-    texts = TABLES["formula"]
-
-    def chosen(group: str, between: str) -> str:
-        parts = (text for name, text in texts[group].items() if getattr(s, name) is not None)
-        return between.join(parts)
-
-    desired = f"v_ref{chosen('desired', '')}"
-    built = s.build_up is not None
-    lines = [
-        texts["velocity"][s.velocity].format(desired=desired),
-        *[texts["dead_zone"]] * (s.dead_zone is not None),
-        *[texts["build_up"]] * built,
-        f"F = {texts['built_law' if built else 'law']}{chosen('added', '')}, "
-        "terms of the law by their scales",
-    ]
-    last = chosen("last", ", ")
+    desired = "v_ref" + " + t_ahead a_ref" * (s.delay is not None)
+    desired += " + k_error e" * (s.error_gain is not None)
+    velocity = {
+        "blend": f"v_c = {desired} while |v| < v_blend, v beyond 2 v_blend, C2 in between",
+        "reference": f"v_c = {desired}",
+        "measured": "v_c = v",
+    }
+    lines = [velocity[s.velocity]]
+    if s.dead_zone is not None:
+        lines.append("v_c minus its part within +-v_dead")
+    force = "F_law(v_c, N)"
+    if s.build_up is not None:
+        lines.append("built+ = built + 2 v_c h / d_build, held within +-1")
+        force = "built F_sliding(|v_c|, N) + viscous"
+    force += " + offset" * (s.offset is not None)
+    force += " + inertia a_ref" * (s.inertia is not None)
+    force += " + F_stick stuck" * (s.stick is not None)
+    force += " + F_dither sin(2 pi phase)" * (s.dither is not None)
+    lines.append(f"F = {force}, terms of the law by their scales")
+    stages = (
+        ("faded in by enable over t_ramp", s.ramp),
+        ("within +-F_max", s.limit),
+        ("changed by at most F_rate h per step", s.slew),
+    )
+    last = ", ".join(text for text, value in stages if value is not None)
     return "\n".join([*lines, *[f"F {last}"] * bool(last)])

@@ -7,7 +7,6 @@ linker script and main programs are files in `sources`.
 """
 
 import shutil
-import tomllib
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -119,11 +118,17 @@ class Core(NamedTuple):
     machine: str
 
 
-TABLES = tomllib.loads(Path(__file__).with_name("cores.toml").read_text(encoding="utf-8"))
+_SOFT, _HARD = "-mfloat-abi=soft", "-mfloat-abi=hard"
+_M4, _M7 = ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"), ("-mcpu=cortex-m7", "-mfpu=fpv5-d16")
 
 CORES = {
-    name: Core(name, row["title"], tuple(row["options"]), row["machine"])
-    for name, row in TABLES["cores"].items()
+    core.name: core
+    for core in (
+        Core("m0plus", "Cortex-M0+, no FPU", ("-mcpu=cortex-m0plus", _SOFT), "mps2-an385"),
+        Core("m3", "Cortex-M3, no FPU", ("-mcpu=cortex-m3", _SOFT), "mps2-an385"),
+        Core("m4f", "Cortex-M4F, FPU of float", (*_M4, _HARD), "mps2-an386"),
+        Core("m7", "Cortex-M7, FPU of double", (*_M7, _HARD), "mps2-an500"),
+    )
 }
 """Cores by name. Code for the M0+ runs on QEMU's M3 with the same counts: ARMv6-M is a subset of
 ARMv7-M, and QEMU's only board with an M0 has 16 kB of RAM."""
@@ -131,10 +136,14 @@ ARMv7-M, and QEMU's only board with an M0 has 16 kB of RAM."""
 CLOCK = 25e6
 """Frequency of SysTick on the boards [Hz]."""
 
-PACKAGES: dict[str, str] = TABLES["packages"]
-"""Tool -> package of Debian and Ubuntu."""
+GCC, NEWLIB, QEMU = "arm-none-eabi-gcc", "newlib for arm-none-eabi", "qemu-system-arm"
 
-GCC, NEWLIB, QEMU = PACKAGES
+PACKAGES = {
+    GCC: "gcc-arm-none-eabi",
+    NEWLIB: "libnewlib-arm-none-eabi",
+    QEMU: "qemu-system-arm",
+}
+"""Tool -> package of Debian and Ubuntu."""
 
 LIBRARY_PATIENCE = 10.0
 """Time limit of a compiler to print the path of its library [s]."""
@@ -168,14 +177,15 @@ class Absent:
 
 def find_tools() -> Tools | Absent:
     """Return the tools in PATH, or the names of the missing ones."""
-    gcc, qemu, library = shutil.which(GCC), shutil.which(QEMU), b""
+    gcc, qemu, has_library = shutil.which(GCC), shutil.which(QEMU), False
     if gcc is not None:
         with suppress(ProgramError):  # gcc prints the path of libm, or only its name if absent
             command = (gcc, "-print-file-name=libm.a")
             library = finished(command, limit=LIBRARY_PATIENCE).output.strip()
-    if gcc and qemu and library not in (b"", b"libm.a"):
+            has_library = library not in (b"", b"libm.a")
+    if gcc and qemu and has_library:
         return Tools(Compiler((gcc,)), qemu)
-    found = {GCC: gcc, NEWLIB: library not in (b"", b"libm.a"), QEMU: qemu}
+    found = {GCC: gcc, NEWLIB: has_library, QEMU: qemu}
     return Absent(tuple(name for name, there in found.items() if not there))
 
 

@@ -10,6 +10,7 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
 from typing import NamedTuple, final
 
 from symfric.emitter.c99 import TRANSCENDENTAL
@@ -122,8 +123,11 @@ def planned(source: Graph, arrays: Arrays) -> Plan:
         groups = defaultdict[tuple[int, int], list[Strand]](list)
         for strand in chosen:
             groups[stages[strand], len(strand.lanes)].append(strand)
-        loops = ((*key, tuple(groups[key])) for key in sorted(groups))
-        plan = Plan(source, tuple(Loop(*loop, woven(source, loop[2], arrays)) for loop in loops))
+        loops = (
+            Loop(stage, size, tuple(group), woven(source, group, arrays))
+            for (stage, size), group in sorted(groups.items(), key=itemgetter(0))
+        )
+        plan = Plan(source, tuple(loops))
         out = _overwriting(plan.loops) or _idle(plan) or _wasteful(plan, chosen)
         if not out:
             return plan

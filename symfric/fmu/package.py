@@ -6,7 +6,6 @@ The variables of a unit define modelDescription.xml for both versions of the sta
 import platform
 import sys
 import tempfile
-import tomllib
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -174,23 +173,27 @@ FLAGS = (
     "-Werror=implicit-function-declaration",
 )  # fmt: skip
 """Flags of the compiler; without fused multiply-add, steps have the same bits as `simulate`."""
-PLATFORMS: dict[str, dict[str, str]] = tomllib.loads(
-    (SOURCES / "platforms.toml").read_text(encoding="utf-8")
-)
-"""Names of machines and systems in the standard, of platforms in version 2.0, and file endings."""
+MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i386": "x86", "i686": "x86"}
+SYSTEMS = {"Linux": "linux", "Darwin": "darwin", "Windows": "windows"}
+OLD = {
+    "x86_64-linux": "linux64", "x86-linux": "linux32", "x86_64-windows": "win64",
+    "x86-windows": "win32", "x86_64-darwin": "darwin64",
+}  # fmt: skip
+"""Names of platforms in version 2.0; other platforms have the same name in both versions."""
+ENDINGS = {"Windows": ".dll", "Darwin": ".dylib"}
 
 
 def platform_name(fmi: int) -> str:
     """Return the name of this platform in the standard."""
     machine = platform.machine().lower()
-    system = PLATFORMS["systems"].get(platform.system(), platform.system().lower())
-    name = f"{PLATFORMS['machines'].get(machine, machine)}-{system}"
-    return PLATFORMS["second"].get(name, name) if fmi == 2 else name
+    system = SYSTEMS.get(platform.system(), platform.system().lower())
+    name = f"{MACHINES.get(machine, machine)}-{system}"
+    return OLD.get(name, name) if fmi == 2 else name
 
 
 def shared_name(identifier: str) -> str:
     """Return the file name of a binary on this platform."""
-    return identifier + PLATFORMS["endings"].get(platform.system(), ".so")
+    return identifier + ENDINGS.get(platform.system(), ".so")
 
 
 def fixed_text(name: str) -> str:

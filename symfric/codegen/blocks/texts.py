@@ -10,6 +10,7 @@ from textwrap import dedent
 from typing import NamedTuple
 
 from symfric.foundation.parameters import Option, Parametric, options
+from symfric.integrator.methods.families import BackwardEuler, Exponential, Radau, Rosenbrock
 from symfric.integrator.methods.method import Method
 
 SHEET = tomllib.loads(Path(__file__).with_name("sheet.toml").read_text(encoding="utf-8"))
@@ -118,9 +119,30 @@ def of_method(method: Method, algebraic: bool) -> str:
         algebraic: True if there are algebraic unknowns z.
     """
     texts = SHEET["step"]
-    family = next(kind.__name__ for kind in type(method).mro() if kind.__name__ in SHEET["method"])
-    formula = SHEET["method"][family].format(method=method, stages=len(getattr(method, "A", ())))
     return (
         f"Fixed steps by {method.name}, order {method.order}. {texts['held']}\n"
-        f"{formula}{texts['algebraic'] * algebraic}\n{texts['outputs']}"
+        f"{_formula(method)}{texts['algebraic'] * algebraic}\n{texts['outputs']}"
     )
+
+
+def _formula(method: Method) -> str:
+    """Return the formula of one step."""
+    match method:
+        case BackwardEuler():
+            return f"    x+ = x + h f(x+, u)    by {method.iterations} Newton iterations from x"
+        case Radau():
+            return (
+                "    X_i = x + h (a_i1 f(X_1, u) + a_i2 f(X_2, u) + a_i3 f(X_3, u)),   x+ = X_3\n"
+                f"    by {method.iterations} simplified Newton iterations"
+            )
+        case Rosenbrock():
+            return (
+                "    [I / (gamma h) - df/dx] k_i = f(x + sum a_ij k_j, u) + sum c_ij k_j / h\n"
+                f"    x+ = x + sum m_i k_i,   i = 1 ... {len(method.A)}, gamma = {method.gamma:.6g}"
+            )
+        case Exponential():
+            return "    x_i+ = x_i + h phi1(h df_i/dx_i) f_i(x, u),   phi1(a) = (exp(a) - 1) / a"
+        case _:
+            return (
+                "    X_i = x + h sum a_ij f(X_j, u),   x+ = x + h sum b_i f(X_i, u)    (explicit)"
+            )

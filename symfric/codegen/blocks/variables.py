@@ -96,16 +96,15 @@ def variable(
     if fold is False:
         problems.append("fold: expected True, names, or None for the default, got False")
     chosen: dict[str, tuple[str, ...]] = {}
-    for what, names in (("free", free), ("fold", fold)):
+    for what, names in (("free", free), ("fold", None if isinstance(fold, bool) else fold)):
         try:
-            if not (names is None or isinstance(names, bool)):
-                chosen[what] = checks.names(what, names, parameters(obj))
+            chosen[what] = () if names is None else checks.names(what, names, parameters(obj))
         except ValueError as error:
             problems.append(str(error))
     if problems or free is not None:
         return chosen.get("free", ()), problems
     kept = () if fold is True else _worth_it(obj)
-    return tuple(name for name in kept if name not in chosen.get("fold", ())), []
+    return tuple(name for name in kept if name not in chosen["fold"]), []
 
 
 def _worth_it(obj: Parametric) -> tuple[str, ...]:

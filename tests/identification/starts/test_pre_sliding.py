@@ -89,7 +89,7 @@ def test_a_record_may_begin_with_all_elements_slipping(loaded: int) -> None:
     assert np.allclose(found.radii, radii, rtol=1e-3)
 
 
-def test_only_the_last_rise_tells_the_rate_of_a_ramp() -> None:
+def test_only_the_last_rise_determines_the_rate_of_a_ramp() -> None:
     """The force rises, gives way to a quarter, and rises again at another rate."""
     h = 1e-3
     rises = [*np.arange(0.0, 1.2, 50 * h), *np.arange(0.4, 2.0, 2 * h)]

@@ -18,7 +18,8 @@ from symfric import Coulomb, Sum, Viscous, drive, law_from_text, with_values
 from symfric.bench import codegen, embedded, identification, ocp
 from symfric.bench import identification_measured as measured
 from symfric.bench.codegen import PROVEN, plants, trials
-from symfric.bench.identification import campaign, files, outcome
+from symfric.bench.identification import files, outcome
+from symfric.bench.identification_files import campaign
 from symfric.bench.identification_memory import ranked
 from symfric.bench.identification_repeats import coloured, far
 from symfric.bench.interop import GOAL, ROUTES, STEPS, N, T, missed, move
@@ -142,7 +143,7 @@ def goals(rows: object) -> dict[str, Row]:
     return {row["quantity"]: row for title, row in rows if title == GOALS}  # type: ignore[union-attr]
 
 
-def test_without_data_the_rows_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_data_the_rows_report_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("EMPS", "FRANKA"):
         monkeypatch.setattr(measured, name, tmp_path)
     made = identification.bench(quick=True, cases=("emps", "franka"))

@@ -131,7 +131,7 @@ def test_distance_measures_from_point_to_point() -> None:
         assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, z])))) == expected
 
 
-def test_a_joint_starts_where_it_is_told_or_without_displacement() -> None:
+def test_a_joint_starts_at_its_given_position_or_without_displacement() -> None:
     for kind, start, expected in (
         (mb.Revolute, 0.3, (0.3,)), (mb.Revolute, None, (0,)), (mb.Cylindrical, (1.0, 2.0), (1, 2)),
         (mb.Spherical, None, (1, 0, 0, 0)), (mb.Floating, None, (0, 0, 0, 1, 0, 0, 0)),

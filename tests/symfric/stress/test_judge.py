@@ -12,6 +12,7 @@ from symfric.stress.problem import (
     RIGHT,
     Problem,
     amplification,
+    apart,
     at_steps,
     distance,
     of,
@@ -32,7 +33,7 @@ def test_a_run_as_good_as_its_reference_is_right() -> None:
     assert verdict.error < 1.0
 
 
-def test_what_is_refused_is_told_with_its_reason() -> None:
+def test_what_is_refused_is_reported_with_its_reason() -> None:
     bad = replace(EASY, values={"mu_d": 0.5, "mu_s": 0.2})
     assert (judge(bad).kind, judge(bad).group) == ("refused", "input")
     assert "expected mu_d <= mu_s" in judge(bad).reason
@@ -89,6 +90,18 @@ def test_distance_counts_tolerances() -> None:
     assert distance(ready, shifted, of(run)) == pytest.approx(2e-6 / tolerances(ready, table).min())
 
 
+def test_a_model_with_events_may_be_early_or_late_by_its_tolerance() -> None:
+    ready = problem(replace(EASY, law="exact_coulomb"))
+    late = EASY.rtol * EASY.t_end
+
+    def truth(times: np.ndarray) -> np.ndarray:
+        return np.tile(times, (len(ready.model.x), 1))
+
+    for shift, fits in ((-late, True), (late, True), (-3 * late, False), (3 * late, False)):
+        y = truth(ready.times + shift)
+        assert (apart(ready, y, truth)[:, 1:-1].max() < 1e-6) == fits
+
+
 def test_what_a_problem_makes_of_a_tolerance_is_measured() -> None:
     """Near its top a pendulum falls as d phi'' = w^2 d phi, w^2 = m g L / (J + m L^2)."""
     fall = Case(1, 1, "pendulum", "viscous", {"sigma_2": 0.0}, x0={"phi": np.pi - 1e-3}, t_end=1.0)
@@ -139,7 +152,7 @@ def test_a_loose_run_has_a_measured_reason() -> None:
     assert "the problem amplifies one to" in verdict.reason
 
 
-def test_what_is_off_between_right_ends_of_steps_is_told_apart() -> None:
+def test_errors_between_correct_ends_of_steps_are_reported_separately() -> None:
     """As where an implicit step goes over a fast transient, and its polynomial another way."""
     ready = problem(EASY)
     run = ready.run(1e-6, "rodas5p", max_steps=10_000)
