@@ -198,7 +198,7 @@ def test_a_process_that_ends_is_a_row() -> None:
 
     laws = ["stribeck", "lugre"]
     found = select(deadly, laws, accuracy=0.2, t_end=0.2, workers=2, fixed_steps=False)
-    assert found["stribeck"].reason == "its process ended with exit status 3"
+    assert found["stribeck"].reason == "its process ended with exit status 3: no output"
     assert found["lugre"].attempts > 0
 
 
