@@ -7,9 +7,9 @@ Source: Burman, Chow and Nolan, Biometrika 81(2), 1994 (blocks with gaps).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isfinite, nan
-from typing import NamedTuple
+from typing import final
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from identification.data.record import Array, Record
 from identification.fit import Fit
 from identification.result.fitted import Fitted
 from symfric.foundation import checks
+from symfric.foundation.shown import brief
 from symfric.foundation.status import SolveError
 
 GAP = 0.05
@@ -28,7 +29,9 @@ DIVERGED = 1e3
 """Error [%] above which a prediction counts as diverged."""
 
 
-class Left(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class Left:
     """Residuals of one signal of one record that was left out of the fit.
 
     Attributes:
@@ -46,8 +49,12 @@ class Left(NamedTuple):
     r: Array
     spread: float
 
+    __repr__ = brief
 
-class CrossValidation(NamedTuple):
+
+@final
+@dataclass(frozen=True, eq=False)
+class CrossValidation:
     """Prediction errors on the data that were left out of the fits.
 
     Attributes:
@@ -153,7 +160,7 @@ def shared(many: Sequence[Sequence[Left]]) -> list[list[Left]]:
 
     def at_common(part: Left) -> Left:
         there = np.isin(part.t, common[part.record, part.signal])
-        return part._replace(t=part.t[there], r=part.r[there]) if there.any() else part
+        return replace(part, t=part.t[there], r=part.r[there]) if there.any() else part
 
     return [[at_common(part) for part in left] for left in many]
 

@@ -13,9 +13,9 @@ constants, from microseconds in sliding to milliseconds at rest; shooting by exp
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import NamedTuple
+from typing import final
 
 import casadi as ca
 import numpy as np
@@ -51,7 +51,9 @@ KEPT = 1e-6
 """Violation of a scaled row below which an iterate is feasible."""
 
 
-class OriginalLaw(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class OriginalLaw:
     """Solver of a problem with laws with states, and its settings.
 
     Attributes:

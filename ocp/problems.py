@@ -7,9 +7,10 @@ use the data of their sources, so that optima can be compared digit by digit.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from math import pi
-from typing import NamedTuple, TypeVar
+from typing import TypeVar, final
 
 import casadi as ca
 
@@ -24,7 +25,9 @@ from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Prism
 from symfric.scenes.blocks import drive
 
 
-class Ready(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class Ready:
     """Predefined problem that `symfric ocp NAME` solves and `symfric bench ocp` measures.
 
     Attributes:

@@ -124,7 +124,7 @@ def solve(
     posed = sized(problem)
     if posed is not problem and isinstance(solver, Ipopt) and OVER not in solver.options:
         solver = solver.with_options(**{OVER: 1.0 / cost_size(posed)})
-    goals = Goals.of(tolerance) if refine else Goals.of(tolerance)._replace(passes=1)
+    goals = Goals.of(tolerance) if refine else replace(Goals.of(tolerance), passes=1)
     direct = Direct(posed, scheme, solver, intervals, goals, Supervisor(max_time, progress))
     search = Search(direct, tolerance, verify, resting_margin)
     solution = solved(search, friction, guess, starts)

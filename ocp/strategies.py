@@ -1,9 +1,9 @@
 """Strategies of `solve`: direct, by homotopy, by modes, and the order in which they are tried."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isfinite, nan
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, final
 
 from numpy.typing import ArrayLike
 
@@ -48,7 +48,9 @@ FAILURES = (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeErro
 """Exceptions after which the next strategy is tried."""
 
 
-class Direct(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class Direct:
     """Direct solves of a problem, on meshes refined by its local errors.
 
     Attributes:
@@ -79,10 +81,10 @@ class Direct(NamedTuple):
             meshes = make_meshes(self.problem, wanted)
         elif self.problem.scenarios:
             passes, most = min(goals.passes, SHARED_PASSES), SHARED_ITERATIONS
-            goals = goals._replace(passes=passes)
+            goals = replace(goals, passes=passes)
         if close:
             passes, most = min(goals.passes, CLOSE_PASSES), CLOSE_ITERATIONS
-            goals = goals._replace(passes=passes, most=CLOSE_INTERVALS, patient=False)
+            goals = replace(goals, passes=passes, most=CLOSE_INTERVALS, patient=False)
         if most and isinstance(solver, Ipopt) and "max_iter" not in solver.options:
             solver = solver.with_options(max_iter=most)
         return refined_solve(
@@ -109,7 +111,9 @@ class Judged(NamedTuple):
     right: bool
 
 
-class Search(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class Search:
     """Solution of a problem by its strategies, and verification of the motions that they find.
 
     Attributes:
@@ -263,7 +267,7 @@ def solved(search: Search, friction: Friction, guess: Start, starts: int) -> Sol
 
 def _by_shooting(search: Search, guess: Start, starts: int) -> Solution:
     """Solve with laws with states by shooting, started from the motion with static friction."""
-    collocation = search._replace(direct=search.direct._replace(scheme=Radau()), verify=False)
+    collocation = replace(search, direct=replace(search.direct, scheme=Radau()), verify=False)
     static = _by_homotopy(collocation, "modes", guess, starts)
     if static.status.stopped or not static.ok:
         return static

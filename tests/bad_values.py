@@ -1,4 +1,4 @@
-"""Bad values by what a door asks for, and what a door did with one."""
+"""Bad values by the kind of argument, and what entry points do with them."""
 
 import re
 import warnings
@@ -21,7 +21,7 @@ FOREIGN = re.compile(r"\.cpp|\.hpp|overloaded|Sparsit|internal error|Traceback")
 
 
 class Thing:
-    """An object that is nothing a door knows."""
+    """An object that no entry point accepts."""
 
     def __repr__(self) -> str:
         return "a thing"
@@ -89,7 +89,7 @@ def path() -> list[Any]:
 
 
 def thing(*more: Any) -> list[Any]:
-    """What is no object of the kind asked for."""
+    """What is no object of the required kind."""
     return [None, 3, "nonsense", [], {}, Thing(), object, *more]
 
 
@@ -98,7 +98,7 @@ def function(*more: Any) -> list[Any]:
 
 
 @dataclass(frozen=True)
-class Door:
+class EntryPoint:
     """A public function with good arguments, and the bad ones to try instead, one by one."""
 
     name: str
@@ -114,11 +114,13 @@ class Door:
                 yield f"{self.name}({argument}={_text(value)})", partial(self.call, **arguments)
 
 
-def door(call: Callable[..., Any], *about: str | Mapping[str, Any], **bad: list[Any]) -> Door:
+def entry_point(
+    call: Callable[..., Any], *about: str | Mapping[str, Any], **bad: list[Any]
+) -> EntryPoint:
     """Return a public function with its bad values; `about` are its name and good arguments."""
     names = [one for one in about if isinstance(one, str)] or [getattr(call, "__qualname__", "")]
     good = [one for one in about if not isinstance(one, str)] or [{}]
-    return Door(names[0], call, good[0], bad)
+    return EntryPoint(names[0], call, good[0], bad)
 
 
 def _text(value: Any) -> str:
@@ -145,15 +147,17 @@ def verdict(call: Callable[[], Any]) -> str:
     return "accepted"
 
 
-def told(made: Iterator[Door]) -> list[tuple[str, str]]:
+def verdicts(made: Iterator[EntryPoint]) -> list[tuple[str, str]]:
     """Cases and verdicts."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return [(text, verdict(call)) for door in made for text, call in door.cases()]
+        return [(text, verdict(call)) for entry_point in made for text, call in entry_point.cases()]
 
 
-def every_door_refuses(groups: Mapping[str, Callable[[], Iterator[Door]]]) -> Callable[..., None]:
-    """The test that no door of any group accepts what is bad, in an empty folder."""
+def entry_points_refuse(
+    groups: Mapping[str, Callable[[], Iterator[EntryPoint]]],
+) -> Callable[..., None]:
+    """Return the test that no entry point of any group accepts a bad value, in an empty folder."""
 
     @pytest.mark.parametrize("group", groups)
     def test(group: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -163,10 +167,10 @@ def every_door_refuses(groups: Mapping[str, Callable[[], Iterator[Door]]]) -> Ca
     return test
 
 
-def refuses_all(doors: Iterator[Door], folder: Path) -> None:
+def refuses_all(entry_points: Iterator[EntryPoint], folder: Path) -> None:
     """No case is accepted, fails with a foreign exception or leaves a file in `folder`."""
-    found = told(doors)
-    wrong = [f"{text}: {said}" for text, said in found if said != "refused"]
+    found = verdicts(entry_points)
+    wrong = [f"{text}: {outcome}" for text, outcome in found if outcome != "refused"]
     assert found
     assert not wrong, f"{len(wrong)} of {len(found)}:\n" + "\n".join(wrong)
     assert not list(folder.iterdir())

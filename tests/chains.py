@@ -33,7 +33,7 @@ TREE = (Revolute, Prismatic, Cylindrical, Universal, Planar, Spherical, Fixed, F
 
 
 def body(m: Mechanism, name: str, seed: int) -> None:
-    """An unsymmetric body with its centre of mass beside its origin and two skew frames."""
+    """An unsymmetric body with its centre of mass off its origin and two skew frames."""
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(3, 3))
     spread = A @ A.T

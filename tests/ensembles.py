@@ -69,11 +69,11 @@ def explosive() -> Model:
 
 def after(chunks: int) -> Callable[[float], None]:
     """A user who presses Ctrl-C after some chunks."""
-    told: list[float] = []
+    reported: list[float] = []
 
     def progress(fraction: float) -> None:
-        told.append(fraction)
-        if len(told) == chunks:
+        reported.append(fraction)
+        if len(reported) == chunks:
             raise KeyboardInterrupt
 
     return progress

@@ -1,7 +1,7 @@
 """Benchmark mechanisms of the IFToMM library of computational benchmark problems, as Mechanisms.
 
 Source: Gonzalez, Dopico, Lugris, Cuadrado, A benchmarking system for MBS simulation software,
-Multibody System Dynamics 16, 2006. Lengths 1 m, masses 1 kg where nothing else is said.
+Multibody System Dynamics 16, 2006. Lengths 1 m, masses 1 kg unless stated otherwise.
 """
 
 from itertools import pairwise

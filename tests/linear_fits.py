@@ -110,9 +110,9 @@ def solved(
     residuals: Decay, noise: object = "estimate", loss: str = "squares"
 ) -> tuple[Task, Point]:
     """The fit of a decay."""
-    asked = task(residuals, unknowns_of(DECAY, {}, residuals.names), noise, loss)
-    end = descend(asked, asked.unknowns.start)
-    asked = asked.with_noise(end.noise)
-    point = asked.at(end.w)
+    fit = task(residuals, unknowns_of(DECAY, {}, residuals.names), noise, loss)
+    end = descend(fit, fit.unknowns.start)
+    fit = fit.with_noise(end.noise)
+    point = fit.at(end.w)
     assert isinstance(point, Point)
-    return asked, point
+    return fit, point

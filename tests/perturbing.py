@@ -30,14 +30,14 @@ class Job:
         name: what is assigned, or the class of the law.
         place: which number in it; -1 for a law.
         method: of the law.
-        plates: beginnings of the names of the figures that depend on it.
+        figures: beginnings of the names of the figures that depend on it.
     """
 
     file: str
     name: str
     place: int
     method: str
-    plates: tuple[str, ...]
+    figures: tuple[str, ...]
 
     def __str__(self) -> str:
         what = f"{self.name}.{self.method}" if self.method else f"{self.name}[{self.place}]"
@@ -100,7 +100,7 @@ def verdict(job: Job, quick: bool) -> str:
     name = "importing"
     try:
         gallery = import_module("symfric.gallery")
-        for name in gallery.chosen(job.plates):
+        for name in gallery.chosen(job.figures):
             gallery.script(name)(quick=quick)
     except Exception as error:  # noqa: BLE001  (a figure that cannot be drawn is a verdict)
         return f"{name}: {type(error).__name__}: {' '.join(str(error).split())[:400]}"
@@ -123,9 +123,9 @@ def main() -> None:
         import_module(name)
     for line in sys.stdin:
         given = json.loads(line)
-        job = Job(**given | {"plates": tuple(given["plates"])})
-        said = forked(job, quick=sys.argv[1] == "quick")
-        print(json.dumps(given | {"verdict": said}), flush=True)  # noqa: T201
+        job = Job(**given | {"figures": tuple(given["figures"])})
+        reported = forked(job, quick=sys.argv[1] == "quick")
+        print(json.dumps(given | {"verdict": reported}), flush=True)  # noqa: T201
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Small problems in phases, for tests."""
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -60,7 +61,7 @@ def solve_once(
     progress: Report | None = None,
 ) -> Solution:
     """Solve on one mesh."""
-    goals, meshes = Goals.of(1e-3)._replace(passes=1), make_meshes(problem, intervals)
+    goals, meshes = replace(Goals.of(1e-3), passes=1), make_meshes(problem, intervals)
     supervisor = Supervisor(progress=progress)
     return refined_solve(problem, meshes, scheme, solver, guess, goals=goals, supervisor=supervisor)
 

@@ -36,7 +36,7 @@ def controller() -> Controller:
 
 
 def linear_model() -> Model:
-    """x'' = a + b, two inputs; an unstable mode beside it."""
+    """x'' = a + b, two inputs, and an unstable mode."""
     x, v, w = Variable("x", "m"), Variable("v", "m/s"), Variable("w", "1")
     a, b = Variable("a", "m/s^2"), Variable("b", "m/s^2")
     ode = ca.vertcat(v.symbol, a.symbol + b.symbol, 2 * w.symbol + b.symbol - 0.5 * v.symbol)

@@ -26,7 +26,7 @@ WIDTH = 1e-5
 
 @dataclass(frozen=True)
 class Machine:
-    """Equations of motion in NumPy and CasADi alike, and the move that is asked for.
+    """Equations of motion in NumPy and CasADi alike, and the requested move.
 
     Attributes:
         mass, bias: (sin, cos, q, q') -> rows of M, and h.
@@ -168,9 +168,9 @@ class Machine:
         names = [v.name for v in found.problem.chain[0].model.u]
         controls = np.array([found.controls[name] for name in names])
         end = self.follow(np.append(found.t_control, found.T), controls)
-        asked = [i for i in range(2 * self.size) if i % self.size not in self.free]
+        requested = [i for i in range(2 * self.size) if i % self.size not in self.free]
         way = [float(np.abs(found[name]).max()) for name in self.states]
-        return max(abs(end[i]) / way[i] for i in asked)
+        return max(abs(end[i]) / way[i] for i in requested)
 
 
 def _levels(

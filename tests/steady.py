@@ -34,7 +34,7 @@ from docs.machine.pages import ROOT, agrees, blocks, run, written_pages
 from symfric.integrator.step.attempt import Given
 
 SAFETY = 0.5
-"""A value that moved by more than this share of what would turn its last digit is told."""
+"""A value that moved by more than this share of what would change its last digit is reported."""
 OLD_LIBM = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F"}
 """Settings under which glibc's sin, exp, pow round otherwise; others ignore them."""
 NUDGES: Mapping[str, tuple[float, Mapping[str, str]]] = {
@@ -95,7 +95,7 @@ class Finding:
 
 
 class _Listening(ast.NodeTransformer):
-    """Has every value that is formatted told to `_heard` with its format."""
+    """Reports every formatted value to `_heard` with its format."""
 
     def visit_FormattedValue(self, node: ast.FormattedValue) -> ast.AST:
         self.generic_visit(node)
@@ -108,7 +108,7 @@ class _Listening(ast.NodeTransformer):
 
 @contextmanager
 def nudged(factor: float) -> Generator[None]:
-    """Every simulation at tolerances that are `factor` times those asked for."""
+    """Every simulation at tolerances that are `factor` times the requested ones."""
     of = Given.of
 
     def other(t_end: float, rtol: float, h_max: float, atol: Any, d: Any) -> NDArray[np.float64]:
@@ -196,18 +196,18 @@ def runs_of(page: Path) -> dict[str, list[Piece]]:
     found = dict[str, list[Piece]]()
     for name, (factor, environment) in NUDGES.items():
         with tempfile.TemporaryDirectory() as folder:
-            told = Path(folder) / "told.json"
+            reported = Path(folder) / "values.json"
             command = [sys.executable, __file__, str(page)]
             path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
             done = subprocess.run(
-                [*command, "--factor", str(factor), "--to", str(told)],
+                [*command, "--factor", str(factor), "--to", str(reported)],
                 cwd=folder,
                 env=os.environ | dict(environment) | {"PYTHONPATH": path},
                 check=False,
             )
             if done.returncode:
                 raise RuntimeError(f"{page}: expected a page that runs, got the above ({name})")
-            read = json.loads(told.read_text("utf-8"))
+            read = json.loads(reported.read_text("utf-8"))
             found[name] = [
                 Piece(r["code"], r["printed"], r["expected"], tuple(map(tuple, r["values"])))
                 for r in read

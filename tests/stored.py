@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 FOLDER = Path(__file__).parent / "golden" / "references"
 chosen = {"update": False, "recompute": False}
-"""What the command line asked for; set by `conftest.pytest_configure`."""
+"""The option of the command line; set by `conftest.pytest_configure`."""
 
 
 def stored(name: str, compute: Callable[[], Array]) -> Array:

@@ -35,7 +35,7 @@ class Archive:
 
 
 class Unit:
-    """An instance of a unit; `said` keeps its messages."""
+    """An instance of a unit; `messages` keeps its messages."""
 
     prefix, real, counts = "fmi3", "Float64", 2
 
@@ -62,7 +62,7 @@ class Unit:
 
     def get(self, *names: str) -> np.ndarray:
         numbers = (c.c_double * len(names))()
-        assert self.exchange("Get", names, numbers) == OK, self.said
+        assert self.exchange("Get", names, numbers) == OK, self.messages
         return np.array(numbers[:])
 
     def free(self) -> None:
@@ -70,14 +70,14 @@ class Unit:
 
 
 class Second(Unit):
-    """An instance of FMI 2.0; `said` keeps status and text of each message."""
+    """An instance of FMI 2.0; `messages` keeps status and text of each message."""
 
     prefix, real, counts = "fmi2", "Real", 1
 
     def __init__(self, archive: Archive, name: str = "unit", token: str | None = None) -> None:
-        self.said = list[tuple[int, str]]()
+        self.messages = list[tuple[int, str]]()
         self.logger = LOGGER(
-            lambda _e, _n, status, _c, text: self.said.append((status, text.decode()))
+            lambda _e, _n, status, _c, text: self.messages.append((status, text.decode()))
         )
         self.callbacks = Callbacks(self.logger, None, None, None, None)
         token = archive.token if token is None else token
@@ -107,8 +107,8 @@ def over(unit, times, names, inputs=None):
     rows = [unit.get(*names)]
     for t, after in pairwise(times):
         if inputs is not None:
-            assert unit.set(**inputs(t)) == OK, unit.said
-        assert unit.step(t, after - t) == OK, unit.said
+            assert unit.set(**inputs(t)) == OK, unit.messages
+        assert unit.step(t, after - t) == OK, unit.messages
         rows.append(unit.get(*names))
     return np.array(rows)
 
@@ -120,9 +120,9 @@ class Third(Unit):
         self.start(archive, "CoSimulation", False, False, False, False, None, c.c_size_t(0), None)
 
     def start(self, archive: Archive, kind: str, *between) -> None:
-        self.said = list[str]()
+        self.messages = list[str]()
         log = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)
-        self.log = log(lambda _e, _s, _c, text: self.said.append(text.decode()))
+        self.log = log(lambda _e, _s, _c, text: self.messages.append(text.decode()))
         token, environment = archive.token.encode(), [None] * (kind == "CoSimulation")
         self.instantiate(
             archive, f"Instantiate{kind}", b"unit", token, None, *between, self.log, *environment
@@ -158,7 +158,7 @@ class Rates(Third):
 
     def column(self, name: str, n: int) -> np.ndarray:
         values = np.zeros(n)
-        assert self.call(name, c.c_void_p(values.ctypes.data), c.c_size_t(n)) == OK, self.said
+        assert self.call(name, c.c_void_p(values.ctypes.data), c.c_size_t(n)) == OK, self.messages
         return values
 
     def at(self, t: float, x: np.ndarray) -> None:
@@ -177,7 +177,7 @@ class Rates(Third):
         n, k = c.c_size_t(len(unknowns)), c.c_size_t(len(seeds))
         place = c.c_void_p(values.ctypes.data)
         status = self.call("GetDirectionalDerivative", of, n, by, k, given, k, place, n)
-        assert status == OK, self.said
+        assert status == OK, self.messages
         return values
 
     @property

@@ -118,6 +118,8 @@ def delayed(record: Record, delays: Mapping[str, float]) -> Record:
 
 def hermite(at: Array, t: Array, y: Array) -> Array:
     """Interpolate by cubic Hermite with second-order slopes; third order on uneven samples."""
+    if t.size < 3:
+        return np.interp(at, t, y)
     from scipy.interpolate import CubicHermiteSpline  # noqa: PLC0415 (slow to import)
 
     return CubicHermiteSpline(t, y, np.gradient(y, t))(at)

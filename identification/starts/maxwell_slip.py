@@ -10,7 +10,8 @@ Source: Lampaert, Al-Bender, Swevers, Phys. Conf. 2003 (elements from a hysteres
 Rizos and Fassois, Chaos 14(2), 2004 (regression on Maxwell-slip elements).
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,9 @@ STEPS = 40
 """Largest number of evaluations to refine the radii."""
 
 
-class Elements(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class Elements:
     """Maxwell-slip elements in the order in which they slip.
 
     Attributes:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import log
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,7 +105,9 @@ APART = 2.0
 """Smallest ratio of loading rates for which their effect is evaluated."""
 
 
-class BreakAway(NamedTuple):
+@final
+@dataclass(frozen=True)
+class BreakAway:
     """A break-away event.
 
     Attributes:
@@ -121,7 +123,9 @@ class BreakAway(NamedTuple):
     side: int
 
 
-class BreakAways(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class BreakAways:
     """Break-away events of a data set.
 
     Attributes:
@@ -155,25 +159,28 @@ class BreakAways(NamedTuple):
         )
 
 
-def break_away(measured: Measured) -> BreakAways:
+def break_away(measured: Measured, *, rest: float = REST, offset: float = 0.0) -> BreakAways:
     """Find the break-away forces of all ramps in a record.
 
-    A rest is an interval of at least 5 samples below 2 % of the largest speed that ends in
+    A rest is an interval of at least 5 samples below `rest` times the largest speed that ends in
     motion. The break-away force is the largest force in the direction of that motion during the
     rest. The samples must resolve the rise of the force; otherwise the maximum is missed.
 
     Args:
         measured: samples with times; the force excludes inertia, or the ramps are slow.
+        rest: share of the largest speed.
+        offset: constant force [N] in addition to friction.
 
     Raises:
         ValueError: no times, or no rest that ends in motion.
     """
+    rest = checks.number("break_away: rest", rest, above=0.0, upper=0.9)
     if measured.t is None:
         raise ValueError("break_away: expected a record with times, got points; pass t=")
-    events = tuple(e for r in measured.records for e in _events(measured, r))
+    events = tuple(e for r in measured.records for e in _events(measured, r, rest, offset))
     if not events:
         raise ValueError(
-            f"break_away: expected a rest of at least {SHORTEST} samples below {REST:g} of the "
+            f"break_away: expected a rest of at least {SHORTEST} samples below {rest:g} of the "
             "largest speed that ends in motion, got none"
         )
     forces = np.array([event.force for event in events])
@@ -189,9 +196,9 @@ def break_away(measured: Measured) -> BreakAways:
     return BreakAways(events, level, scatter, float(w[1]), error)
 
 
-def _events(measured: Measured, record: slice) -> Iterator[BreakAway]:
-    t, v, F = np.asarray(measured.t)[record], measured.v[record], measured.F[record]
-    for begin, end in runs(np.abs(v) < REST * measured.fastest):
+def _events(measured: Measured, record: slice, rest: float, offset: float) -> Iterator[BreakAway]:
+    t, v, F = np.asarray(measured.t)[record], measured.v[record], measured.F[record] - offset
+    for begin, end in runs(np.abs(v) < rest * measured.fastest):
         if end - begin < SHORTEST or end >= v.size:
             continue
         side = int(np.sign(v[end]))
@@ -215,7 +222,9 @@ PART = 0.3
 """Least force at both ends of a branch, relative to the typical force."""
 
 
-class Branch(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class Branch:
     """Force as a function of path between two consecutive reversals.
 
     Attributes:
@@ -236,7 +245,9 @@ class Branch(NamedTuple):
     damping: float
 
 
-class Hysteresis(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class Hysteresis:
     """Pre-sliding stiffness and damping, medians over all `branches`.
 
     Attributes:

@@ -15,7 +15,8 @@ Source: A Friction Model for Laminator Nips, MSc thesis TFRT-5968, Lund 2015, se
 Olsson, Control Systems with Friction, PhD thesis, Lund 1996.
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import final
 
 import numpy as np
 
@@ -34,7 +35,9 @@ LEAST = 4
 """Least number of speeds in one direction for a curve."""
 
 
-class Step(NamedTuple):
+@final
+@dataclass(frozen=True)
+class Step:
     """Step of the procedure with number, meaning, number of points used, and values."""
 
     number: int
@@ -47,7 +50,9 @@ class Step(NamedTuple):
         return f"{self.number}  {self.what:<44} {self.points:4d} points   {shown}"
 
 
-class SixSteps(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class SixSteps:
     """Result of the six-step procedure.
 
     Attributes:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple, final
+from typing import final
 
 import casadi as ca
 import numpy as np
@@ -108,7 +108,9 @@ def _median(v: Array, F: Array) -> tuple[float, float, float, float]:
     return float(np.median(v)), middle, 1.2533 * spread / np.sqrt(F.size), F.size
 
 
-class StribeckCurve(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class StribeckCurve:
     """Curve F = sign(v) [F_C + (F_S - F_C) exp(-|v/v_s|^delta)] + sigma_2 v + offset.
 
     Attributes:

@@ -22,7 +22,7 @@ from identification.residuals.evaluation import Array
 from identification.solving.task import Point, Task
 from identification.verdict.covariance import Covariance
 from symfric.foundation import checks
-from symfric.foundation.shown import brief
+from symfric.foundation.shown import brief, spaced
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,7 +78,7 @@ class Profile:
             "open" if x is None else f"{x:.{min(max(digits, 4), 12)}g}"
             for x in (self.best, self.low, self.high)
         )
-        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        unit = spaced(self.unit)
         text = f"{self.name}: {best}{unit}, 95 %: {' to '.join(sides)}."
         return " ".join([text, *self.sentences])
 

@@ -4,10 +4,10 @@ Meshes are refined only where the estimates require it.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import ceil, inf, sqrt
 from time import perf_counter
-from typing import NamedTuple
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,7 +142,9 @@ def _spread(mesh: Array, parts: Array, keep: Sequence[float]) -> Array:
     return new
 
 
-class Goals(NamedTuple):
+@final
+@dataclass(frozen=True)
+class Goals:
     """Criteria for a sufficiently fine mesh.
 
     Attributes:

@@ -1,9 +1,10 @@
 """Transfer of motions to arcs by name and time, and deduction of mode sequences from motions."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite
-from typing import NamedTuple
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -104,7 +105,9 @@ def points_in(into: Transcription, arcs: Sequence[Arc], known: Known) -> Points:
     return Points(tuple(spans), dict(known.chosen))
 
 
-class Reader(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class Reader:
     """Deduction of modes from a sharpened motion.
 
     Attributes:

@@ -37,7 +37,9 @@ class CycleStatus(IntEnum):
         }[int(self)]
 
 
-class Settings(NamedTuple):
+@final
+@dataclass(frozen=True)
+class Settings:
     """Limits of the work in one cycle.
 
     Attributes:
@@ -85,7 +87,9 @@ class Prices(NamedTuple):
     soft: NDArray[np.bool_]
 
 
-class Control(NamedTuple):
+@final
+@dataclass(frozen=True)
+class Control:
     """Output of a controller: an input, or the mean over an interval of an input with bounded rate.
 
     Attributes:

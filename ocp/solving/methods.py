@@ -12,15 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.phase import Array
-from ocp.solving.prepared import (
-    OPTIONS,
-    TABLES,
-    Built,
-    Option,
-    Prepared,
-    reason_of,
-    refused_options,
-)
+from ocp.solving.prepared import OVERDETERMINED, Built, Option, Prepared, reason_of, refused_options
 from ocp.solving.watch import GradientHook, IterationHook, Shaped
 from ocp.transcription.program import Program
 from symfric.foundation import checks
@@ -166,11 +158,68 @@ def _groups(rows: Indices, columns: Indices, hubs: NDArray[np.bool_], n: int) ->
 
 
 ANSWERS: dict[str, dict[str, Status]] = {
-    solver: {code: Status[name] for code, name in codes.items()}
-    for solver, codes in TABLES["answers"].items()
+    "Ipopt": {
+        "Solve_Succeeded": Status.SOLVED,
+        "Feasible_Point_Found": Status.SOLVED,
+        "Solved_To_Acceptable_Level": Status.ACCEPTABLE,
+        "Infeasible_Problem_Detected": Status.INFEASIBLE,
+        OVERDETERMINED: Status.INFEASIBLE,
+        "Maximum_Iterations_Exceeded": Status.MAX_ITERATIONS,
+        "Maximum_CpuTime_Exceeded": Status.TIME_LIMIT,
+        "Maximum_WallTime_Exceeded": Status.TIME_LIMIT,
+        "User_Requested_Stop": Status.INTERRUPTED,
+        "Invalid_Number_Detected": Status.NOT_FINITE,
+        "Restoration_Failed": Status.NO_STEP,
+        "Search_Direction_Becomes_Too_Small": Status.NO_STEP,
+        "Error_In_Step_Computation": Status.NO_STEP,
+        "Diverging_Iterates": Status.UNBOUNDED,
+    },
+    "Fatrop": {  # in the order of its return flags
+        "Success": Status.SOLVED,
+        "Maximum_Iterations_Exceeded": Status.MAX_ITERATIONS,
+        "Stop_At_Tiny_Step": Status.NO_STEP,
+        "Stop_At_Acceptable_Point": Status.ACCEPTABLE,
+        "Local_Infeasibility": Status.INFEASIBLE,
+    },
+    "Sqp": {
+        "Solve_Succeeded": Status.SOLVED,
+        "Maximum_Iterations_Exceeded": Status.MAX_ITERATIONS,
+        "Search_Direction_Becomes_Too_Small": Status.NO_STEP,
+        "User_Requested_Stop": Status.INTERRUPTED,
+    },
 }
 """Solver -> return code -> status; other return codes have the status SOLVER_FAILED."""
-QUIET, WARM, SQP = (OPTIONS[name] for name in ("quiet", "warm", "sqp"))
+
+LEAN: dict[str, Option] = {
+    "print_time": False,
+    "show_eval_warnings": False,
+    "calc_lam_p": False,
+    "no_nlp_grad": True,
+}
+"""Options of all solvers for no output and no unused derivatives."""
+QUIET: dict[str, Option] = {"print_level": 0, "sb": "yes"}
+"""Options of Ipopt for no output."""
+WARM: dict[str, Option] = {
+    "warm_start_init_point": "yes",
+    "mu_init": 1e-6,
+    "warm_start_bound_push": 1e-9,
+    "warm_start_bound_frac": 1e-9,
+    "warm_start_slack_bound_push": 1e-9,
+    "warm_start_slack_bound_frac": 1e-9,
+    "warm_start_mult_bound_push": 1e-9,
+}
+"""Options of Ipopt for a start with multipliers; the user's options take precedence."""
+SQP: dict[str, Option] = {
+    "print_header": False,
+    "print_iteration": False,
+    "print_status": False,
+    "max_iter": 300,
+}
+"""Options of sqpmethod."""
+QP: dict[str, dict[str, Option]] = {
+    "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
+}
+"""QP solver -> options that suppress its output."""
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -213,7 +262,7 @@ class _Method(ABC):
         prefix = "" if self.plugin == "sqpmethod" else f"{self.plugin}."
         own = {f"{prefix}{name}": value for name, value in self.options.items()}
         try:
-            return ca.nlpsol("solver", self.plugin, program.nlp, OPTIONS["lean"] | common | own)
+            return ca.nlpsol("solver", self.plugin, program.nlp, LEAN | common | own)
         except (RuntimeError, NotImplementedError) as error:
             if not self.options:
                 raise
@@ -339,7 +388,7 @@ class Sqp(_Method):
         del warm
         hook, hessian = IterationHook(program), Convexified(program)
         solver = str(self.options.get("qpsol", "piqp"))
-        own = {"qpsol": solver, "qpsol_options": OPTIONS.get(solver, {}) | {"error_on_fail": False}}
+        own = {"qpsol": solver, "qpsol_options": QP.get(solver, {}) | {"error_on_fail": False}}
         derivatives = {"nlp_jac_fg": both(program), "nlp_hess_l": hessian}
         function = self._made(program, **SQP, **own, iteration_callback=hook, cache=derivatives)
         return Built(function, hook, (hessian,))

@@ -1,10 +1,8 @@
 """Solver prepared for a nonlinear program with any start and any parameters, and time limits."""
 
 import re
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple, final
 
@@ -34,10 +32,14 @@ LEAST = 1e-3
 """Smallest time limit of a solver [s], with which it stops at once."""
 OVERDETERMINED = "Not_Enough_Degrees_Of_Freedom"
 """Return code of Ipopt for a program with more equations than unknowns."""
-TABLES: dict[str, Any] = tomllib.loads(Path(__file__).with_name("solvers.toml").read_text("utf-8"))
-HINTS: dict[str, str] = TABLES["hints"]
+HINTS: dict[str, str] = {
+    OVERDETERMINED: (
+        "There are more equations than unknowns; use fewer end and via conditions, or more "
+        "intervals."
+    ),
+    "Insufficient_Memory": "The memory is exhausted; use fewer intervals.",
+}
 """Return code -> message, for codes that are more specific than the status."""
-OPTIONS: dict[str, dict[str, Option]] = TABLES["options"]
 TRIED = (
     "It happened at a point tried by the solver, not at an iterate; bound the states to where "
     "the equations are defined."

@@ -5,7 +5,7 @@ from math import isfinite
 from typing import Any, final
 
 from ocp.formulation.phase import Array
-from symfric.foundation.shown import brief
+from symfric.foundation.shown import brief, spaced
 from symfric.foundation.status import Status
 from symfric.foundation.storable import agree
 from symfric.results.trajectory import Trajectory
@@ -50,7 +50,7 @@ class Miss:
     @property
     def sentence(self) -> str:
         """Message with the condition, the time and the difference."""
-        unit = f" {self.unit}" if self.unit not in ("", "1") else ""
+        unit = spaced(self.unit)
         if self.what == "local error":
             return f"the interval at {self.time:.4g} s has a local error of {self.relative:.2g}"
         if self.what == "cost":

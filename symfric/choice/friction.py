@@ -1,11 +1,9 @@
 """Friction that all candidates describe, and the parameters with which each law describes it."""
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import asin, exp, pi
-from pathlib import Path
-from typing import Any, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +11,29 @@ from scipy.optimize import brentq
 
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters, with_values
-from symfric.laws import ALL_LAWS, BlimanSorine, ExactCoulomb, Law, law_name, steady_force
+from symfric.laws import (
+    Armstrong,
+    BengisuAkay,
+    Benson,
+    Bittencourt,
+    BlimanSorine,
+    DuanSingh,
+    ExactCoulomb,
+    Exudyn,
+    Law,
+    Leuven,
+    MakkarDixon,
+    MaxwellSlip,
+    PoppStelter,
+    QuarterCarSimple,
+    RuiWang,
+    SteadyStateLuGre,
+    StickSlip,
+    VelocityBased,
+    steady_force,
+)
 
 Array = NDArray[np.float64]
-WORDS: dict[str, dict[str, Any]] = tomllib.loads(
-    Path(__file__).with_name("words.toml").read_text("utf-8")
-)
-"""Tables of words.toml by name."""
 
 
 @final
@@ -76,12 +90,24 @@ def friction_of(law: Law) -> Friction:
     return Friction(levels.get("mu_s", default.mu_s * mu_d / default.mu_d), mu_d)
 
 
-def fall_of(law: Law) -> str | None:
-    """Return the name of the Stribeck velocity of `law` or of its inverse; None if it has none.
+FALL: dict[type[Law], str] = {
+    BengisuAkay: "xi",
+    Exudyn: "v_exp",
+    Benson: "d_c",
+    DuanSingh: "c",
+    PoppStelter: "d",
+    MakkarDixon: "gamma_3",
+}
+"""Names of the Stribeck velocity, or of its inverse, by law, if it is not v_s."""
+NO_FALL = (VelocityBased, StickSlip)
+"""Laws in which v_s is the width of the transition and not a Stribeck velocity."""
 
-    In some laws v_s is the width of the transition and not a Stribeck velocity.
-    """
-    name: str = WORDS["fall"].get(law_name(law), "v_s")
+
+def fall_of(law: Law) -> str | None:
+    """Return the name of the Stribeck velocity of `law` or of its inverse; None if it has none."""
+    if isinstance(law, NO_FALL):
+        return None
+    name = FALL.get(type(law), "v_s")
     return name if name in parameters(law) else None
 
 
@@ -100,29 +126,28 @@ def _of_bliman(f: Friction, _: float) -> Mapping[str, float]:
     return {"mu_1": f.mu_d + mu_2, "mu_2": mu_2}
 
 
-def _shared(name: str, total: str) -> Levels:
+def _shared(law: type[MaxwellSlip | Leuven], total: str) -> Levels:
     """Return the levels of the default elements, scaled such that together they carry `total`."""
-    law = ALL_LAWS[name]()
-    mu = {n: p.value for n, p in parameters(law).items() if n[:3] == "mu_" and n[3:].isdigit()}
-    least = getattr(law, "mu_s", sum(mu.values()))  # elements of Leuven carry more than mu_s
+    mu = {n: p.value for n, p in parameters(law()).items() if n[:3] == "mu_" and n[3:].isdigit()}
+    least = getattr(law(), "mu_s", sum(mu.values()))  # elements of Leuven carry more than mu_s
     return lambda f, _: {n: value * getattr(f, total) / least for n, value in mu.items()}
 
 
-LEVELS: dict[str, Levels] = {
-    "bittencourt": lambda f, _: {
+LEVELS: dict[type[Law], Levels] = {
+    Bittencourt: lambda f, _: {
         "F_cl": f.mu_d,
         "F_sl": f.mu_s - f.mu_d,
         **dict.fromkeys(("F_c0", "F_s0", "F_sT", "F_v0", "F_vT"), 0.0),
     },
-    "quarter_car_simple": lambda f, N: {"C_e": f.mu_s * N, "sigma_v": 0.0},
-    "popp_stelter": lambda f, _: {"eta": f.mu_d / f.mu_s},
-    "armstrong": lambda f, _: {"mu_inf": f.mu_s - f.mu_d, "mu_a": 0.2 * (f.mu_s - f.mu_d)},
-    "bliman_sorine": _of_bliman,
-    "maxwell_slip": _shared("maxwell_slip", "mu_d"),
-    "leuven": _shared("leuven", "mu_s"),
-    "steady_state_lugre": lambda f, N: {"F_S": f.mu_s * N, "F_C": f.mu_d * N, "sigma_2": 0.0},
-    "rui_wang": lambda f, N: {"D": f.mu_s * N, "C": 2 - 2 / pi * asin(f.mu_d / f.mu_s)},
-    "makkar_dixon": lambda f, N: {"gamma_1": (f.mu_s - f.mu_d) * N, "gamma_4": f.mu_d * N},
+    QuarterCarSimple: lambda f, N: {"C_e": f.mu_s * N, "sigma_v": 0.0},
+    PoppStelter: lambda f, _: {"eta": f.mu_d / f.mu_s},
+    Armstrong: lambda f, _: {"mu_inf": f.mu_s - f.mu_d, "mu_a": 0.2 * (f.mu_s - f.mu_d)},
+    BlimanSorine: _of_bliman,
+    MaxwellSlip: _shared(MaxwellSlip, "mu_d"),
+    Leuven: _shared(Leuven, "mu_s"),
+    SteadyStateLuGre: lambda f, N: {"F_S": f.mu_s * N, "F_C": f.mu_d * N, "sigma_2": 0.0},
+    RuiWang: lambda f, N: {"D": f.mu_s * N, "C": 2 - 2 / pi * asin(f.mu_d / f.mu_s)},
+    MakkarDixon: lambda f, N: {"gamma_1": (f.mu_s - f.mu_d) * N, "gamma_4": f.mu_d * N},
 }
 """Functions (friction, load) -> levels by law, for laws whose levels are not mu_s and mu_d."""
 
@@ -140,7 +165,7 @@ def alike(law: Law, friction: Friction, load: float | None) -> Law:
     """
     known = parameters(law)
     values = {name: getattr(friction, name) for name in ("mu_s", "mu_d") if name in known}
-    if levels := LEVELS.get(law_name(law)):
+    if levels := LEVELS.get(type(law)):
         values |= levels(friction, 1.0 if load is None else load)
     in_newton = [
         n for n, p in known.items()
@@ -197,12 +222,12 @@ def _top(law: Law, v: Array, N: float) -> float:
 def _raised(law: Law, factor: float, missing: float, N: float, v: Array) -> dict[str, float]:
     """Return parameters that raise the peak by a `factor`, or by the coefficient `missing`."""
     now = {name: float(p.value) for name, p in parameters(law).items()}
-    if "gamma_1" in now:  # the excess of the peak is a share of gamma_1
+    if isinstance(law, MakkarDixon):  # the excess of the peak is a share of gamma_1
         share = float((np.tanh(now["gamma_2"] * v) - np.tanh(now["gamma_3"] * v)).max())
         return {"gamma_1": now["gamma_1"] + missing * N / share}
-    if "F_sl" in now:
+    if isinstance(law, Bittencourt):
         return {"F_sl": now["F_sl"] + missing}
-    if law_name(law) == "popp_stelter":
+    if isinstance(law, PoppStelter):
         return {"mu_s": now["mu_s"] * factor, "eta": now["eta"] / factor}
-    name = "F_S" if "F_S" in now else "mu_s"
+    name = "F_S" if isinstance(law, SteadyStateLuGre) else "mu_s"
     return {name: now[name] * factor}

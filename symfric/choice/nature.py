@@ -6,7 +6,7 @@ from math import isfinite, nan
 
 import numpy as np
 
-from symfric.choice.friction import WORDS, Friction
+from symfric.choice.friction import Friction
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_law import law_block
 from symfric.codegen.layout import CBlock
@@ -18,8 +18,33 @@ from symfric.foundation.parameters import Parameter, options, parameters
 from symfric.foundation.programs import CompileError
 from symfric.laws import Law, steady_force
 
-NEEDS: dict[str, tuple[str, str]] = {word: (at[0], at[1]) for word, at in WORDS["needs"].items()}
+NEEDS = {
+    "sliding": ("D", "kinetic friction"),
+    "stiction": ("S", "static friction or a peak at break-away"),
+    "stribeck": ("St", "friction falls as sliding begins"),
+    "viscous": ("V", "friction grows with the velocity"),
+    "presliding": ("P", "elastic displacement before break-away"),
+    "memory": ("M", "hysteresis loops close inside each other"),
+    "lag": ("L", "friction follows the velocity late"),
+    "loading-rate": ("B", "break-away depends on how fast the load grows"),
+    "drift-free": ("N", "no creep under vibration below break-away"),
+    "dwell": ("T", "static friction grows with the time at rest"),
+}
 """Codes of `symfric.laws.PHENOMENA` and their meanings, by word."""
+
+ALIASES = {
+    "static": "stiction",
+    "static-friction": "stiction",
+    "break-away": "stiction",
+    "dynamic": "sliding",
+    "kinetic": "sliding",
+    "pre-sliding": "presliding",
+    "hysteresis": "memory",
+    "frictional-lag": "lag",
+    "no-drift": "drift-free",
+    "ageing": "dwell",
+}
+"""Synonyms of the words in `NEEDS`."""
 
 
 def needed(where: str, given: object) -> tuple[str, ...]:
@@ -34,7 +59,7 @@ def needed(where: str, given: object) -> tuple[str, ...]:
     words: dict[str, str] = {}
     for text in checks.names(where, given):
         plain = text.strip().lower().replace("_", "-").replace(" ", "-")
-        words[text] = of_code.get(text.strip()) or str(WORDS["aliases"].get(plain, plain))
+        words[text] = of_code.get(text.strip(), ALIASES.get(plain, plain))
     if unknown := [text for text, word in words.items() if word not in NEEDS]:
         raise ValueError(f"{where}: expected some of {', '.join(NEEDS)}, got {', '.join(unknown)}")
     return tuple(word for word in NEEDS if word in words.values())

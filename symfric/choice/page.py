@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 
-from symfric.choice.friction import WORDS
 from symfric.choice.nature import NEEDS
 from symfric.choice.ranking import STANDING_TEXTS, Ranking, Row, interruption, number
 from symfric.foundation.panels import blank, dressed, save
@@ -160,7 +159,24 @@ def _round(axis: Axes, values: Sequence[float]) -> None:
     axis.minorticks_off()
 
 
-COLUMNS: dict[str, str] = WORDS["columns"]
+COLUMNS = {
+    "rank": "rank among all laws that run; similar laws share it",
+    "law": "name in the catalogue",
+    "work": "attempted steps times instructions per step, in millions; it determines the rank",
+    "ms": "processor time of this run in CasADi's virtual machine",
+    "error": "largest difference from the reference, relative to the motion",
+    "own error": "largest difference from the finest run of the same law: error of the integrator",
+    "attempts": "attempted steps",
+    "rtol": "loosest relative tolerance that keeps the accuracy",
+    "fixed [s]": "largest step of backward Euler in which the plant follows the motion",
+    "explicit [s]": "largest step of an explicit Runge-Kutta method of order 5 in which it does",
+    "M4F": "instructions of the law's step on a Cortex-M4F, averaged over a typical drive",
+    "C": "operations of the law's step in C with float",
+    "parameters": "number of parameters that describe friction; how many are hard to measure",
+    "class": "smoothness in the velocity",
+    "shows": "codes of its phenomena",
+    "numbers": "parameters that differ from the defaults of the law",
+}
 """Headings of the columns of the table, and their meanings."""
 NARROW = 700
 """Width of a screen [pixel] below which the narrow figure is shown."""

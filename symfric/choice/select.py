@@ -47,7 +47,7 @@ class Choice(Ranking):
         return "\n".join(lines(self, SCREEN))
 
     def _repr_html_(self) -> str:  # pyright: ignore[reportUnusedFunction]  (notebooks call it)
-        from symfric.choice.page import body  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.choice.page import body  # noqa: PLC0415  (slow to import)
 
         return body(self)
 
@@ -56,13 +56,13 @@ class Choice(Ranking):
 
         The figure has the width of a printed column, 85 mm; `wide` places its panels side by side.
         """
-        from symfric.choice.page import plot_choice  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.choice.page import plot_choice  # noqa: PLC0415  (slow to import)
 
         return plot_choice(self, path, wide)
 
     def to_html(self, path: str | Path) -> None:
         """Write a self-contained HTML page with verdict, figure and table."""
-        from symfric.choice.page import page  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.choice.page import page  # noqa: PLC0415  (slow to import)
 
         write_text(path, page(self))
 
@@ -258,5 +258,7 @@ def _rows(task: Task, laws: Forms, workers: int) -> Iterator[Row]:
         return
     names, tasks = [*laws], enumerate(laws.items())
     for number, row in outcomes(lambda at: best_form(task, *at), tasks, workers, start="fork"):
-        died = isinstance(row, Crashed)
-        yield Row(names[number], FAILED, f"its process ended with {row.how}") if died else row
+        if isinstance(row, Crashed):
+            yield Row(names[number], FAILED, f"its process ended with {row.how}: {row.last_line}")
+        else:
+            yield row

@@ -122,7 +122,7 @@ class FigureData(Showing):
         Colours distinguish laws and line styles distinguish cases; with a single law both
         distinguish its cases.
         """
-        from symfric.foundation.panels import panels, save  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.foundation.panels import panels, save  # noqa: PLC0415  (slow to import)
 
         laws = list(dict.fromkeys(c.law for c in self.curves))
         abscissae = {x for x, _ in self.panels}
@@ -149,9 +149,10 @@ class FigureData(Showing):
             {"law": c.law, "case": c.case, "columns": {n: v.tolist() for n, v in c.columns.items()}}
             for c in self.curves
         ]
-        texts = {name: getattr(self, name) for name in ("name", "title", "note")}
-        units, panels = dict(self.units), [list(panel) for panel in self.panels]
-        return texts | {"units": units, "panels": panels, "curves": curves}
+        return {
+            "name": self.name, "title": self.title, "note": self.note, "units": dict(self.units),
+            "panels": [list(panel) for panel in self.panels], "curves": curves,
+        }  # fmt: skip
 
 
 def _range(values: Array) -> str:

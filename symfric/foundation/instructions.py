@@ -144,21 +144,21 @@ class Instructions:
         symbols, count = len(self.labels), len(self.labels) + len(self.constants)
         places, shapes = self.entries[:, [0, 2, 1]], self.shapes
         of, row, column, number = self.entries.T
-        bounds = (
-            (self.code[:, 0], len(self.operations)),
-            (self.code[:, 1:].T, count + np.arange(len(self.code))),
-            (shapes, MOST_ENTRIES + 1),
-            (np.prod(shapes, axis=1), MOST_ENTRIES + 1),
-            (of, len(shapes)), (row, shapes[of, 0]), (column, shapes[of, 1]),
-            (number, count + len(self.code)),
-        )  # fmt: skip
         sound = (
             symbols == len(self.names) == len(set(self.names))
             and set(self.operations) <= CODES.keys()
-            and self.code.shape[1] == 3 and shapes.shape[1] == 2
-            and all(((given >= 0) & (given < end)).all() for given, end in bounds)
+            and self.code.shape[1:] == (3,)
+            and _within(self.code[:, 0], len(self.operations))
+            and _within(self.code[:, 1:].T, count + np.arange(len(self.code)))
+            and shapes.shape[1:] == (2,)
+            and _within(shapes, MOST_ENTRIES + 1)
+            and _within(np.prod(shapes, axis=1), MOST_ENTRIES + 1)
+            and _within(of, len(shapes))
+            and _within(row, shapes[of, 0])
+            and _within(column, shapes[of, 1])
+            and _within(number, count + len(self.code))
             and np.array_equal(np.unique(places, axis=0), places)
-        )  # fmt: skip
+        )
         if not sound:
             raise ValueError("expected instructions that symfric wrote, got others")
         depth = [0] * count
@@ -166,3 +166,8 @@ class Instructions:
             depth.append(1 + max(depth[a], depth[b]))
         if max(depth, default=0) > DEEPEST:
             raise ValueError(f"expected at most {DEEPEST} nested operations, got {max(depth)}")
+
+
+def _within(numbers: NDArray[np.int64], end: NDArray[np.int64] | int) -> bool:
+    """Return True if all numbers lie in [0, end)."""
+    return bool(((numbers >= 0) & (numbers < end)).all())

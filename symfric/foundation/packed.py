@@ -250,7 +250,8 @@ class _Writer:
         if isinstance(value, type) or not data or not known:
             what = "numbers, texts, expressions and objects made of them"
             raise checks.refused(f"pack{where}", what, value)
-        self._known[id(value)] = len(self._known), value  # which keeps its id as long as it exists
+        # keep the object, so that no other object gets its id
+        self._known[id(value)] = len(self._known), value
         say: Callable[[], dict[str, Any]] = getattr(value, "to_pack", partial(state_of, value))
         state = say()
         has = {name: self.write(f"{where}.{name}", held) for name, held in state.items()}

@@ -110,8 +110,8 @@ class Symbolic:
     __mod__, __rmod__ = _both(operator.mod)
     __pow__, __rpow__ = _both(operator.pow)
     __matmul__, __rmatmul__ = _both(operator.matmul)
-    (__lt__, _), (__le__, _) = _both(operator.lt), _both(operator.le)
-    (__gt__, _), (__ge__, _) = _both(operator.gt), _both(operator.ge)
+    __lt__, __le__ = _both(operator.lt)[0], _both(operator.le)[0]
+    __gt__, __ge__ = _both(operator.gt)[0], _both(operator.ge)[0]
 
     def __neg__(self) -> ca.SX:
         return -self.symbol

@@ -123,7 +123,7 @@ class Peer:
             options["control_group_size"] = counts.tolist()
         data = self.inputs.values[:, first]
         if self.index == 2 and y is not None:
-            # the own search of idas for rates is singular, its first step too long
+            # idas cannot compute rates of index 2, and its default first step is too long
             rates, nominal = rates_of(self.system)
             f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
             slope = f(y, np.concatenate([self.p, data[:, 0]])).full().ravel()[rates] / nominal

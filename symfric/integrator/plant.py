@@ -231,14 +231,22 @@ class Plant:
     @property
     def signals(self) -> dict[str, Any]:
         """Name -> value of every signal: states, algebraic variables, inputs, outputs."""
-        if not self._seen:
-            self._values, self._seen = self._look(), True
-        values = self._values[0].tolist() if self._batch is None else self._values.T.copy()
+        columns = self._looked.T
+        values = columns[:, 0].tolist() if self._batch is None else columns.copy()
         return dict(zip(self.model.signals, values, strict=True))
 
     def __getitem__(self, name: str) -> Any:
-        checks.check_names(f"plant of '{self.model.name}'", [name], self.model.signals)
-        return self.signals[name]
+        names = list(self.model.signals)
+        checks.check_names(f"plant of '{self.model.name}'", [name], names)
+        values = self._looked[:, names.index(name)]
+        return float(values[0]) if self._batch is None else values.copy()
+
+    @property
+    def _looked(self) -> Array:
+        """All signals, shape (plants, signals)."""
+        if not self._seen:
+            self._values, self._seen = self._look(), True
+        return self._values
 
     def _take(self, u: ArrayLike | Numbers) -> None:
         """Store the inputs of the next interval."""

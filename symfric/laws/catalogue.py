@@ -114,7 +114,7 @@ WRAPPERS: dict[str, type[Wrapping]] = {
     "temperature_dependent": TemperatureDependent,
 }
 """Wrappers of a single law, by the name that precedes the parentheses in a text."""
-
+NAMES: dict[type, str] = {kind: name for name, kind in (ALL_LAWS | POPULATIONS | WRAPPERS).items()}
 
 DEEPEST = 20
 """Largest nesting depth of laws in a text; deeper texts would exhaust the stack."""
@@ -126,10 +126,7 @@ def law_name(law: AnyLaw) -> str:
         check_law("law_name", law)
     if isinstance(law, Sum):
         return "+".join(law_name(term) for term in law.laws)
-    known: dict[type, str] = {
-        kind: name for name, kind in (ALL_LAWS | POPULATIONS | WRAPPERS).items()
-    }
-    name = known.get(type(law), type(law).__name__)
+    name = NAMES.get(type(law), type(law).__name__)
     return f"{name}({law_name(law.inner)})" if isinstance(law, Wrapping) else name
 
 
@@ -163,7 +160,7 @@ def law_from_text(text: str) -> Law:
 def _single(term: str, text: str) -> Law:
     if wrapped := fullmatch(rf"({'|'.join(WRAPPERS)})\((.+)\)", term):
         kind, inner = WRAPPERS[wrapped[1]], law_from_text(wrapped[2])
-        return Asymmetric(inner, inner) if kind is Asymmetric else kind(inner)  # pyright: ignore[reportCallIssue]  (the others wrap one law)
+        return Asymmetric(inner, inner) if issubclass(kind, Asymmetric) else kind(inner)
     name = ALIASES.get(term, term)
     if name in POPULATIONS:
         raise ValueError(

@@ -135,7 +135,7 @@ class System:
         self, given: Mapping[str, float] | None = None, p: Mapping[str, float] | None = None,
         t: float = 0.0,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
-        """Return the derivatives of `initial_state` by p (nx, n_p) and by values in `given`."""
+        """Return the derivatives of `initial_state` with respect to p and to values in `given`."""
         by_p, by_start = evaluate_all(self._start_slopes, *self._start_arguments(given, p, t))
         return by_p, by_start
 

@@ -52,9 +52,9 @@ def assemble(name: str, made: Prepared, index: int) -> Model:
     inner = None if cut is None else _inner(cut, eq, contacts)
     # balls are excluded: their slip is a vector
     frictional = tuple(_contact(s) for s in contacts if not isinstance(s.contact.law, SpatialSlip))
-    of = partial(_model, name, index, multipliers)
-    return of(made, contacts, groups, inner, frictional,
-              lambda: of(*_opened(made, contacts, frictional)))  # fmt: skip
+    model = partial(_model, name, index, multipliers)
+    opening = partial(_opened, model, made, contacts, frictional)
+    return model(made, contacts, groups, inner, frictional, opening)
 
 
 def _model(
@@ -126,9 +126,10 @@ def _contact(s: Slip) -> Contact:
 
 
 def _opened(
-    made: Prepared, contacts: Sequence[Slip], frictional: Sequence[Contact]
-) -> tuple[Prepared, list[Slip], tuple[Rest, ...], None]:
-    """Return the arguments of the model with friction forces as inputs; balls keep their laws."""
+    model: Callable[..., Model], made: Prepared, contacts: Sequence[Slip],
+    frictional: Sequence[Contact],
+) -> Model:  # fmt: skip
+    """Return the model with friction forces as inputs; balls keep their laws."""
     eps: dict[str, Scalar] = {s.contact.pressed: s.contact.friction.eps for s in contacts}
     widths = {v.name: v for c in frictional for v in c.widths.values()}
     eps |= {name: widths[f"{name}_eps"].symbol for name in eps if f"{name}_eps" in widths}
@@ -140,7 +141,7 @@ def _opened(
             own = replace(own, states=(), rate=ca.SX(0, 1), force=s.contact.F, inputs={})
         free.append(own)
     u = (*made.u, *(c.variable for c in frictional))
-    return replace(made, u=u, p=(*made.p, *widths.values())), free, (), None
+    return model(replace(made, u=u, p=(*made.p, *widths.values())), free, (), None)
 
 
 def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip]) -> Inner | None:

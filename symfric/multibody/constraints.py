@@ -123,6 +123,10 @@ class PrescribedMotion(Constraint):
     motion: Callable[[ca.SX], Scalar]
     direction: str = ""
 
+    def joints(self) -> Iterable[tuple[str, str]]:
+        """Return the driven joint and the direction of the motion."""
+        return ((self.joint, self.direction),)
+
     def held(self, kin: Kinematics) -> Held:
         """Return motion(t) - s = 0."""
         what = "motion: expected a function of time that returns one expression"
@@ -157,7 +161,7 @@ class UserConstraint(Constraint):
 
     def held(self, kin: Kinematics) -> Held:
         """Return the expressions, and the loads from their derivatives by the pose of each body."""
-        # poses as symbols, by which the expression is differentiated
+        # replace poses by symbols, to differentiate the expression by them
         motion = {GROUND: kin.motion[GROUND]}
         for name in (n for n in kin.motion if n != GROUND):
             motion[name] = Motion(ca.SX.sym("R", 3, 3), *(ca.SX.sym(x, 3) for x in "pwvab"))

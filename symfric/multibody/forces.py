@@ -94,8 +94,7 @@ class Part(Keywords, ABC):
 
     def joints(self) -> Iterable[tuple[str, str]]:
         """Return the joints that the part refers to, each with a direction."""
-        own: dict[str, Any] = vars(self)
-        return ((own["joint"], own["direction"]),) if "direction" in own else ()
+        return ()
 
     def problems(self) -> Iterator[str]:
         """Yield messages about numbers that are not finite and values that are not functions."""
@@ -215,6 +214,10 @@ class JointSpringDamper(Force):
     rest: Scalar = 0.0
     damping: Scalar = 0.0
     actuator: Scalar = 0.0
+
+    def joints(self) -> Iterable[tuple[str, str]]:
+        """Return the joint and the direction in which the force acts."""
+        return ((self.joint, self.direction),)
 
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield the sum of spring, damper and actuator as one load of the joint."""

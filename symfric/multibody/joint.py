@@ -295,9 +295,9 @@ class Joint(Keywords, ABC):
         """Return expressions of R_PC and p_PC that must vanish, shape (m, 1)."""
 
     @property
-    def constrains(self) -> int:
-        """Number of constraints of a joint with coordinates; a spanning tree prefers many."""
-        return 6 - len(self.coordinates) + (self.quaternion is not None)
+    def freedoms(self) -> int:
+        """Number of independent coordinates; 0 if the joint only closes loops."""
+        return len(self.coordinates) - (self.quaternion is not None)
 
     def problems(self) -> Iterator[str]:
         """Yield messages about invalid values."""

@@ -1,4 +1,4 @@
-"""Builder of mechanisms, which returns a model, and their equations as named CasADi Functions."""
+"""Builder of mechanisms and their models, and their equations as named CasADi Functions."""
 
 from collections.abc import Iterable, Sequence
 from copy import copy
@@ -95,7 +95,7 @@ class Mechanism(packed.Portable, Showing):
 
     def thumbnail(self) -> "Figure | None":
         """Return a small figure of the mechanism at its start; None if it cannot be built yet."""
-        from symfric.results.animation import still  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.results.animation import still  # noqa: PLC0415  (slow to import)
 
         try:
             made = self.prepare()
@@ -201,15 +201,14 @@ class Mechanism(packed.Portable, Showing):
         p = many(where, p, "variables")
         for variable in p:
             kind(where, variable, Variable, "variables made by Variable(...)")
-        u = tuple(self.inputs)
-        made = replace(written(self._tree(p), self.forces, self.constraints, p), u=u)
+        made = written(self._tree(p), self.forces, self.constraints, p, tuple(self.inputs))
         loose = undeclared_in_forces(made)
         self._refuse([*made.problems, *made.misfits, *left_open(made), *loose])
         self._refuse(infinite(made))
         self._refuse(without_inertia(made))
         if formulation == "absolute":
             self._refuse(inseparable(made))
-            made = replace(in_absolute_coordinates(made, self.constraints), u=u)
+            made = in_absolute_coordinates(made, self.constraints)
             self._refuse([*made.problems, *left_open(made)])
         return made
 

@@ -49,6 +49,7 @@ class Prepared:
 
     eq: Equations
     p: Variables
+    u: Variables
     q: Variables
     qd: Variables
     q0: Array
@@ -60,7 +61,6 @@ class Prepared:
     singular: bool = False
     problems: tuple[str, ...] = ()
     misfits: tuple[str, ...] = ()
-    u: Variables = ()
 
     def numbers(
         self, *expressions: ca.SX, others: Callable[[int], Array] = np.zeros
@@ -111,8 +111,9 @@ def coordinates(topology: Topology) -> tuple[Variables, Variables]:
 
 
 def written(
-    topology: Topology, forces: Sequence[Force], constraints: Sequence[Constraint], p: Variables
-) -> Prepared:
+    topology: Topology, forces: Sequence[Force], constraints: Sequence[Constraint], p: Variables,
+    u: Variables = (),
+) -> Prepared:  # fmt: skip
     """Return the equations of motion with independent constraints only."""
     q, qd = coordinates(topology)
     q0, qd0 = (at_start(starts_of(group), p).full().ravel() for group in (q, qd))
@@ -120,7 +121,7 @@ def written(
     arguments = topology, forces, constraints, symbols_of(q), symbols_of(qd), t
     eq = equations(*arguments)
     labels = tuple(eq.multipliers)
-    made = Prepared(eq, p, q, qd, q0, qd0, labels, problems=tuple(_held(eq, constraints, p)))
+    made = Prepared(eq, p, u, q, qd, q0, qd0, labels, problems=tuple(_held(eq, constraints, p)))
     if not eq.m or made.problems:
         return made
     at = made.position
@@ -240,7 +241,7 @@ def in_absolute_coordinates(tree: Prepared, constraints: Sequence[Constraint]) -
         for j in kin.topology.joints.values()
     ]
     topology = absolute(kin.topology.bodies, joints, starts)
-    return written(topology, tree.eq.forces, constraints, tree.p)
+    return written(topology, tree.eq.forces, constraints, tree.p, tree.u)
 
 
 def left_open(made: Prepared) -> Iterator[str]:

@@ -104,7 +104,7 @@ class Topology:
 
 
 def spanning_tree(bodies: Mapping[str, Body], joints: Sequence[Joint]) -> Topology:
-    """Return the tree that connects the bodies to the ground by the joints with most constraints.
+    """Return the tree that connects the bodies to the ground by the joints with fewest coordinates.
 
     Joints in the tree have coordinates and no constraint equations; all other joints close loops.
     Bodies that no joint with coordinates connects to the ground are omitted.
@@ -117,7 +117,7 @@ def spanning_tree(bodies: Mapping[str, Body], joints: Sequence[Joint]) -> Topolo
         ready = [j for j in rest if not j.closes and sum(e in depth for e in ends[id(j)]) == 1]
         if not ready:
             return _topology(bodies, joints, links, rest)
-        best = max(ready, key=lambda j: (j.constrains, -max(depth.get(e, 0) for e in ends[id(j)])))
+        best = min(ready, key=lambda j: (j.freedoms, max(depth.get(e, 0) for e in ends[id(j)])))
         parent, child = ends[id(best)]
         reverse = parent not in depth
         base, body = (child, parent) if reverse else (parent, child)

@@ -128,7 +128,7 @@ class Ensemble(Showing):
 
     def thumbnail(self) -> "Figure | None":
         """Return a small plot of the first signal; None if there is only one time per member."""
-        from symfric.results.pictures import thumbnail_of_many  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.results.pictures import thumbnail_of_many  # noqa: PLC0415  (slow to import)
 
         if self.t.ndim > 1 or self.t.size < 2:
             return None
@@ -195,7 +195,7 @@ class Ensemble(Showing):
         Raises:
             ValueError: a name is unknown.
         """
-        from symfric.results import pictures  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.results import pictures  # noqa: PLC0415  (slow to import)
 
         if not over:
             return pictures.plot_many(self.scene, self.t, self.signals, self.units, names, path)

@@ -50,7 +50,7 @@ def extremes(times: Array, values: Mapping[str, Array], evaluate: Evaluate) -> d
         least = np.take_along_axis(looked, j, axis=0)[0]
         best = np.where(least < best, least, best)
         low, high = (
-            np.take_along_axis(at, np.clip(j + aside, 0, PARTS), axis=0)[0] for aside in (-1, 1)
+            np.take_along_axis(at, np.clip(j + side, 0, PARTS), axis=0)[0] for side in (-1, 1)
         )
     return dict(zip(names, best * sense, strict=True))
 

@@ -51,7 +51,7 @@ def report(
     Raises:
         ValueError: there is no run, or a value is not a run.
     """
-    from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow)
+    from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (slow to import)
 
     if isinstance(runs, Trajectory):
         runs = {runs.scene: runs}

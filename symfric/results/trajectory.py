@@ -161,7 +161,7 @@ class Trajectory(packed.Portable, Signals):
 
     def thumbnail(self) -> "Figure":
         """Return a small plot of some signals."""
-        from symfric.results.pictures import thumbnail  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.results.pictures import thumbnail  # noqa: PLC0415  (slow to import)
 
         return thumbnail(self)
 
@@ -211,7 +211,7 @@ class Trajectory(packed.Portable, Signals):
                 or power, "all" for every signal, grouped by kind if there are many.
             log: signals on logarithmic axes, as in `plot("v", "x", log=["v"])`.
         """
-        from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (slow to import)
 
         return plot_trajectories({label or self.scene: self}, names, path, panels, log)
 
@@ -240,7 +240,7 @@ class Trajectory(packed.Portable, Signals):
             ValueError: the model has no bodies, the suffix is not supported, ffmpeg is missing, or
                 a number is not positive.
         """
-        from symfric.results.animation import animate  # noqa: PLC0415  (matplotlib is slow to import)
+        from symfric.results.animation import animate  # noqa: PLC0415  (slow to import)
 
         animate(self, path, fps=fps, speed=speed, progress=progress)
 

@@ -1,7 +1,6 @@
 """Predefined machines by name."""
 
-from collections import UserDict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, TypeVar, final
 
@@ -10,20 +9,28 @@ from symfric.scenes.base import Scene
 if TYPE_CHECKING:
     from symfric.scenes.linkages import MechanismScene
 
-S = TypeVar("S", bound=Scene)
+S = TypeVar("S", bound=Scene, covariant=True)
 
 
 @final
-class Catalogue(UserDict[str, type[S]]):
+class Catalogue(Mapping[str, type[S]]):
     """Scenes by name; the module of a scene is imported at its first use."""
 
     def __init__(self, places: Mapping[str, str]) -> None:
-        super().__init__()
-        self.data = dict(places)  # pyright: ignore[reportAttributeAccessIssue]
+        self._places = dict(places)
 
     def __getitem__(self, name: str) -> type[S]:
-        module, kind = str(self.data[name]).split()
+        module, kind = self._places[name].split()
         return getattr(import_module(f"symfric.scenes.{module}"), kind)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._places
 
 
 _MECHANISMS = {

@@ -87,7 +87,7 @@ def test_the_search_must_find_something(tmp_path: Path) -> None:
     assert found == ["search.html: nothing found for 'stribeck'"]
 
 
-def test_without_a_browser_it_says_that_no_page_was_opened(
+def test_without_a_browser_it_reports_that_no_page_was_opened(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(browser, "NAMES", ("no-such-browser",))

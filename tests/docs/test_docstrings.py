@@ -24,7 +24,7 @@ in one paragraph.
     run = simulate(model, t_end=1.0)
 
 Limits: none.
-Source: nobody, 1999.
+Source: Anon, 1999.
 
 shape    slope    class
 tanh     1        C∞
@@ -50,7 +50,7 @@ def test_sections_stay_and_blocks_are_literal() -> None:
         r"Do a thing with \|v\| and x\_ of `Law`.",
         "::\n\n   F = N v\n",
         "It goes on here, in one paragraph.",
-        "**Limits.** none.\n\n**Source.** nobody, 1999.",
+        "**Limits.** none.\n\n**Source.** Anon, 1999.",
         "::\n\n   shape    slope    class\n   tanh     1        C∞\n",
         "Args:\n    a: first,\n        longer \\|x\\|.\n    b, c: others.",
         "Returns:\n    * one: the first value.\n    * two: another.",

@@ -244,10 +244,10 @@ def test_a_figure_that_failed_is_computed_again(
     monkeypatch.setattr(build, "keys", lambda: {"good": "1", "bad": "2"})
     there = dict[str, object]()
     monkeypatch.setattr(build, "read", lambda _: there)
-    asked = list[list[str]]()
+    requested = list[list[str]]()
 
     def render(folder: Path, names: list[str], **_: object) -> Gallery:
-        asked.append(names)
+        requested.append(names)
         there["good"] = {}
         made: dict[str, Record] = {name: {} for name in names if name == "good"}
         return Gallery(folder, tuple(names), made, {"bad": "no"}, 0.0)
@@ -256,7 +256,7 @@ def test_a_figure_that_failed_is_computed_again(
     assert build.make_gallery(lambda _: None) == ["gallery 'bad': no"]
     assert json.loads((tmp_path / "keys.json").read_text("utf-8")) == {"good": "1"}
     build.make_gallery(lambda _: None)
-    assert asked == [["good", "bad"], ["bad"]]
+    assert requested == [["good", "bad"], ["bad"]]
 
 
 @needs_sphinx

@@ -17,36 +17,36 @@ def piece(text: str, *values: tuple[str, float]) -> Piece:
     return Piece("code", text, "x 1.234 m, 634 steps", values)
 
 
-def told(one: Piece, other: Piece, under: str) -> Sequence[str]:
+def differences(one: Piece, other: Piece, under: str) -> Sequence[str]:
     return [found.what for found in findings("page", {HERE: [one], under: [other]})]
 
 
-def test_a_number_that_is_another_is_told_and_a_count_by_rounding_alone() -> None:
+def test_a_changed_number_is_reported_and_a_changed_count_only_under_rounding() -> None:
     good = piece("x 1.234 m, 634 steps")
-    assert told(good, good, BITS) == []
-    assert told(good, piece("x 1.235 m, 634 steps"), LOOSER) == ["1.234 is 1.235"]
-    assert told(good, piece("x 1.234 m, 640 steps"), LOOSER) == []
-    assert told(good, piece("x 1.234 m, 640 steps"), BITS) == ["634 is 640"]
+    assert differences(good, good, BITS) == []
+    assert differences(good, piece("x 1.235 m, 634 steps"), LOOSER) == ["1.234 is 1.235"]
+    assert differences(good, piece("x 1.234 m, 640 steps"), LOOSER) == []
+    assert differences(good, piece("x 1.234 m, 640 steps"), BITS) == ["634 is 640"]
     below = Piece("code", "-634 steps", "-634 steps", ())
-    assert told(below, replace(below, printed="-640 steps"), LOOSER) == []
-    assert told(good, piece("x -0.0 m"), BITS) == ["the text of a block is another"]
+    assert differences(below, replace(below, printed="-640 steps"), LOOSER) == []
+    assert differences(good, piece("x -0.0 m"), BITS) == ["the text of a block is another"]
 
 
-def test_a_number_that_soon_will_be_another_is_told_with_its_value() -> None:
+def test_a_number_close_to_changing_is_reported_with_its_value() -> None:
     text = "x 1.234 m, 634 steps"
     inside, moved = piece(text, ("1.234", 1.2340)), piece(text, ("1.234", 1.2341))
-    assert told(inside, moved, LOOSER) == []
-    edge, beside = piece(text, ("1.234", 1.23445)), piece(text, ("1.234", 1.23441))
-    (found,) = findings("page", {HERE: [edge], LOOSER: [beside]})
+    assert differences(inside, moved, LOOSER) == []
+    edge, near = piece(text, ("1.234", 1.23445)), piece(text, ("1.234", 1.23441))
+    (found,) = findings("page", {HERE: [edge], LOOSER: [near]})
     assert found.moved == pytest.approx(0.04) and found.room == pytest.approx(0.05)
     farther = piece(text, ("1.234", 1.2344))
-    runs = {HERE: [edge], LOOSER: [farther], BITS: [beside]}
+    runs = {HERE: [edge], LOOSER: [farther], BITS: [near]}
     assert [(f.moved, f.under) for f in findings("page", runs)] == [(pytest.approx(0.05), LOOSER)]
     unseen = Piece("code", text, "x 1.2... m, 634 steps", edge.values)
-    assert told(unseen, beside, LOOSER) == []
+    assert differences(unseen, near, LOOSER) == []
 
 
-def test_the_last_digit_is_worth_what_stands_there() -> None:
+def test_the_value_of_the_last_digit_follows_the_text() -> None:
     assert [unit(t) for t in ("12", "1.50", "2e-05", "1.5e+3")] == [1, 0.01, 1e-5, 100]
 
 

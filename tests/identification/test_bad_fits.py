@@ -5,13 +5,13 @@ from typing import Any
 
 import bad_values as bad
 import numpy as np
-from bad_values import INF, NAN, Door, Thing
+from bad_values import INF, NAN, EntryPoint, Thing
 
 import identification as own
 from symfric.laws import Coulomb
 
 
-def doors_of_fits() -> Iterator[Door]:
+def entry_points_of_fits() -> Iterator[EntryPoint]:
     v = np.linspace(-0.1, 0.1, 60)
     data = own.Dataset.of(v=v, F=np.sign(v) + v, points=True)
     right = {"kind": own.Points(), "what": "coulomb+viscous", "data": data}
@@ -39,18 +39,18 @@ def doors_of_fits() -> Iterator[Door]:
         "evaluations": bad.count(1),
         "start": [*bad.choice()[1:], {"nonsense": 1.0}, *({"mu_d": x} for x in bad.number())],
     }  # fmt: skip
-    yield Door("Fit", fitted, right, wrong)
+    yield EntryPoint("Fit", fitted, right, wrong)
     solve = own.Fit(own.Points(), "viscous", data).solve
-    yield Door("Fit.solve", solve, {}, {"throw": bad.flag(), "progress": bad.function()})
+    yield EntryPoint("Fit.solve", solve, {}, {"throw": bad.flag(), "progress": bad.function()})
     one: list[Any] = [None, 3, Thing()]
     box = {"lower": 1.0, "upper": 2.0}
-    yield Door("log", own.log, box, {"lower": bad.number(0.0, 3.0), "upper": bad.number(0.5)})
-    yield Door("linear", own.linear, box, {"lower": [NAN, "a", 3.0, Thing()]})
-    yield Door("above", own.above, {"name": "mu_d"}, {"name": one})
-    yield Door("tied", own.tied, {"to": "mu_d"}, {"to": one, "factor": bad.number()})
+    yield EntryPoint("log", own.log, box, {"lower": bad.number(0.0, 3.0), "upper": bad.number(0.5)})
+    yield EntryPoint("linear", own.linear, box, {"lower": [NAN, "a", 3.0, Thing()]})
+    yield EntryPoint("above", own.above, {"name": "mu_d"}, {"name": one})
+    yield EntryPoint("tied", own.tied, {"to": "mu_d"}, {"to": one, "factor": bad.number()})
 
 
-def doors_of_kinds() -> Iterator[Door]:
+def entry_points_of_kinds() -> Iterator[EntryPoint]:
     name = [None, 3, "", [], Thing(), True]
     seconds = [NAN, INF, -1.0, 0.0, [1.0], Thing(), True]
     inverse = {
@@ -70,10 +70,10 @@ def doors_of_kinds() -> Iterator[Door]:
         "rtol": bad.number(0.0, -1.0, 1.0, optional=True),
         "dead_time": [None, "a", -1.0, NAN, (2.0, 1.0), (1.0,), Thing()],
     }  # fmt: skip
-    yield Door("InverseDynamics", own.InverseDynamics, {}, inverse)
-    yield Door("Points", own.Points, {}, points)
-    yield Door("Shooting", own.Shooting, {}, shooting)
-    yield Door(
+    yield EntryPoint("InverseDynamics", own.InverseDynamics, {}, inverse)
+    yield EntryPoint("Points", own.Points, {}, points)
+    yield EntryPoint("Shooting", own.Shooting, {}, shooting)
+    yield EntryPoint(
         "ClosedLoop",
         own.ClosedLoop,
         {},
@@ -81,7 +81,7 @@ def doors_of_kinds() -> Iterator[Door]:
     )
 
 
-def doors_of_identification() -> Iterator[Door]:
+def entry_points_of_identification() -> Iterator[EntryPoint]:
     data = own.synthetic_drive_data(speeds=(0.01,), dwell=0.1)
     one = data[0]
     x, step = one["x"], bad.number(0.0, -1.0, optional=True)
@@ -105,30 +105,32 @@ def doors_of_identification() -> Iterator[Door]:
     }
     right = {"name": "r", "t": one.t, "signals": {"x": x}, "units": {"x": "m"}}
     points = {"v": np.geomspace(1e-3, 1.0, 60), "F": np.ones(60)}
-    yield Door(
+    yield EntryPoint(
         "Dataset.of",
         own.Dataset.of,
         {"t": one.t, "x": x, "force": one["force"]},
         columns,
     )
-    yield Door("Record", own.Record, right, record)
-    yield Door(
+    yield EntryPoint("Record", own.Record, right, record)
+    yield EntryPoint(
         "Dataset",
         own.Dataset,
         {"records": (one,)},
         {"records": [3, "a", (), (3,), Thing()]},
     )
-    yield Door("Filter", own.Filter, {"cutoff": 10.0}, filters)
-    yield Door("Dataset.resampled", data.resampled, {}, {"step": step})
-    yield Door("Dataset.split", data.split, {}, {"share": bad.number(0.0, -1.0, 1.0)})
-    yield Door("Dataset.thinned", data.thinned, {}, {"every": bad.count()})
-    yield Door("Dataset.renamed", data.renamed, {}, {"names": [3, {"nonsense": "y"}, {"x": 3}]})
-    yield Door("Dataset.delayed", data.delayed, {}, {"delays": bad.values("x")})
+    yield EntryPoint("Filter", own.Filter, {"cutoff": 10.0}, filters)
+    yield EntryPoint("Dataset.resampled", data.resampled, {}, {"step": step})
+    yield EntryPoint("Dataset.split", data.split, {}, {"share": bad.number(0.0, -1.0, 1.0)})
+    yield EntryPoint("Dataset.thinned", data.thinned, {}, {"every": bad.count()})
+    yield EntryPoint(
+        "Dataset.renamed", data.renamed, {}, {"names": [3, {"nonsense": "y"}, {"x": 3}]}
+    )
+    yield EntryPoint("Dataset.delayed", data.delayed, {}, {"delays": bad.values("x")})
     ends = {"begin": bad.number(0.3), "end": bad.number(0.05)}
-    yield Door("Dataset.between", data.between, {"begin": 0.1, "end": 0.2}, ends)
-    yield Door("Dataset.read", own.Dataset.read, {"paths": "a.csv"}, read)
-    yield Door("binned", own.binned, points, {"v": odd, "F": odd})
-    yield Door(
+    yield EntryPoint("Dataset.between", data.between, {"begin": 0.1, "end": 0.2}, ends)
+    yield EntryPoint("Dataset.read", own.Dataset.read, {"paths": "a.csv"}, read)
+    yield EntryPoint("binned", own.binned, points, {"v": odd, "F": odd})
+    yield EntryPoint(
         "six_steps",
         own.six_steps,
         points,
@@ -136,6 +138,10 @@ def doors_of_identification() -> Iterator[Door]:
     )
 
 
-test_every_door_refuses_bad_input_in_a_sentence = bad.every_door_refuses(
-    {"fits": doors_of_fits, "kinds": doors_of_kinds, "data": doors_of_identification}
+test_every_entry_point_refuses_bad_input_in_a_sentence = bad.entry_points_refuse(
+    {
+        "fits": entry_points_of_fits,
+        "kinds": entry_points_of_kinds,
+        "data": entry_points_of_identification,
+    }
 )

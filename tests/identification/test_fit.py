@@ -59,14 +59,14 @@ def test_specs_reach_the_result() -> None:
     assert ordered.solve().parameters["delta"].value == pytest.approx(2.0, rel=0.1)
 
 
-def test_progress_is_told_after_each_start() -> None:
-    told = list[tuple[str, float]]()
+def test_progress_is_reported_after_each_start() -> None:
+    reported = list[tuple[str, float]]()
     Fit(Points(), "coulomb+viscous", points(), starts=4).solve(
-        progress=lambda text, done: told.append((text, done))
+        progress=lambda text, done: reported.append((text, done))
     )
-    assert told[0] == ("start 1 of 4, evaluation 2", 0.0)
-    assert ("start 1 of 4", 0.25) in told
-    assert [done for _, done in told] == sorted(done for _, done in told)
+    assert reported[0] == ("start 1 of 4, evaluation 2", 0.0)
+    assert ("start 1 of 4", 0.25) in reported
+    assert [done for _, done in reported] == sorted(done for _, done in reported)
 
 
 def motion(law: Any, m: float = 2.0) -> Dataset:
@@ -92,14 +92,14 @@ def test_what_the_kind_takes_out_of_free() -> None:
     assert fit.prepared().task.unknowns.nuisance == ()
 
 
-def test_a_fit_without_an_end_says_so_and_hands_back_what_there_is() -> None:
+def test_a_fit_without_convergence_reports_it_and_returns_its_best_point() -> None:
     with pytest.raises(SolveError) as caught:
         Fit(Points(), "stribeck", points(), start="law", starts=1, evaluations=2).solve()
     assert caught.value.status is Status.MAX_ITERATIONS
     assert caught.value.partial.parameters["mu_d"].value > 0
 
 
-def test_a_static_level_that_no_point_comes_near_is_not_told() -> None:
+def test_a_static_level_that_no_point_comes_near_is_not_identifiable() -> None:
     """Points from twice the Stribeck velocity on: the level is read off a curve far beyond them."""
     v = np.linspace(0.02, 0.2, 200)
     v = np.concatenate([-v, v])
@@ -126,7 +126,7 @@ def test_outliers_that_the_loss_allows_for_do_not_make_given_noise_too_small() -
         assert fit.solve(throw=False).status is status, loss
 
 
-def test_who_fits_bristles_at_the_measured_velocity_is_told_to_simulate() -> None:
+def test_a_fit_of_bristles_at_the_measured_velocity_recommends_simulation() -> None:
     data = synthetic_drive_data(
         seed=1, rate=500.0, speeds=(0.01, 0.05)
     )  # of a law without states, with a peak

@@ -67,7 +67,7 @@ def test_a_prediction_that_ran_away_is_no_number() -> None:
     assert percent(4.56789) == "4.57 %"
 
 
-def test_other_data_take_the_place_of_folds_and_too_many_folds_are_said() -> None:
+def test_other_data_replace_folds_and_too_many_folds_are_reported() -> None:
     found = select({"mine": LAW}, points(1), Points(), points(2), starts=1)
     assert found.how == "validation on points 2"
     assert found.rows[0].validation == pytest.approx(found.rows[0].fitted, rel=0.2)

@@ -76,8 +76,8 @@ def printed(name: str, folder: Path) -> str:
 
 
 def test_acados_gets_functions_that_compile_to_the_law(tmp_path: Path) -> None:
-    said = printed("acados_drive", tmp_path)
-    pairs = re.findall(r"(-\d+\.\d+) [^,]*, by \w+ (-\d+\.\d+)", said)
+    reported = printed("acados_drive", tmp_path)
+    pairs = re.findall(r"(-\d+\.\d+) [^,]*, by \w+ (-\d+\.\d+)", reported)
     assert len(pairs) == 2
     assert all(a == b for a, b in pairs)
 

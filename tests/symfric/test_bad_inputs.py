@@ -1,4 +1,4 @@
-"""Bad Python input: every public door refuses in one sentence, whatever it is given."""
+"""Bad Python input: every public entry point refuses it in one sentence."""
 
 from collections.abc import Iterator
 from dataclasses import fields
@@ -9,13 +9,13 @@ import numpy as np
 from bad_values import (
     INF,
     NAN,
-    Door,
+    EntryPoint,
     Thing,
     choice,
     count,
-    door,
     each,
-    every_door_refuses,
+    entry_point,
+    entry_points_refuse,
     expression,
     flag,
     function,
@@ -55,7 +55,7 @@ def some_parameter(*more: Any) -> list[Any]:
     return [None, "0.1", NAN, *more]
 
 
-def doors_of_simulation() -> Iterator[Door]:
+def entry_points_of_simulation() -> Iterator[EntryPoint]:
     model, driven = belt(), sf.drive(BrownMcPhee())
     common = {
         "model": thing(BrownMcPhee(), Rabinowicz(BrownMcPhee()), Model),
@@ -69,7 +69,7 @@ def doors_of_simulation() -> Iterator[Door]:
         "event_tolerance": number(0.0, -1.0),
         "u": values("force"),
     }
-    yield door(
+    yield entry_point(
         sf.simulate,
         QUICK | {"model": model},
         **common
@@ -92,13 +92,13 @@ def doors_of_simulation() -> Iterator[Door]:
         *(lambda t: ca.SX.sym("a"), lambda t: ca.MX.sym("a"), lambda t: [1.0, 2.0]),
         *(lambda t: 1j, lambda t: 1 / 0),
     )
-    yield door(
+    yield entry_point(
         sf.simulate,
         QUICK | {"model": driven},
         "simulate, driven",
         u=values("force", *each("force", *callables)),
     )
-    yield door(
+    yield entry_point(
         sf.simulate_many,
         QUICK | {"model": model, "executor": "serial"},
         **common
@@ -115,9 +115,9 @@ def doors_of_simulation() -> Iterator[Door]:
             "progress": function(),
         },
     )
-    yield door(sf.flow, {"model": model}, model=thing(), steps=count(), method=choice())
+    yield entry_point(sf.flow, {"model": model}, model=thing(), steps=count(), method=choice())
     peer = sf.integrator.simulate_by_peer
-    yield door(
+    yield entry_point(
         peer,
         {"model": model, "t_end": 0.01, "peer": "rosenbrock"},
         "simulate_by_peer",
@@ -131,46 +131,46 @@ def doors_of_simulation() -> Iterator[Door]:
     )
     bad_rows = [3.0, None, "ab", [NAN], [INF], [[0.0]], {}, Thing(), 1j, [None], ["a"], True]
     for kind in (sf.Hold, sf.Linear):
-        yield door(
+        yield entry_point(
             kind,
             {"t": [0.0], "values": [1.0]},
             t=[*bad_rows, [], [0.0, 1.0]],
             values=[*(bad for bad in bad_rows if bad != [[0.0]]), [], [0.0, 1.0]],
         )
-        yield door(
+        yield entry_point(
             kind, {"t": [0.0, 1.0], "values": [1.0, 2.0]}, t=[[0.0, 0.0], [1.0, 0.0], [0.0, NAN]]
         )
 
 
-def doors_of_a_trajectory() -> Iterator[Door]:
+def entry_points_of_a_trajectory() -> Iterator[EntryPoint]:
     run = sf.simulate(belt(), 0.01, backend="vm", samples=5, sensitivities=["mu_d"])
     unordered = ([], [0.01, 0.005], [0.0, 0.0])  # fine here
     inside = [x for x in times([0.02], [-1.0], NAN, INF)[1:] if x not in unordered]
-    yield door(run.at, times=inside)
-    yield door(
+    yield entry_point(run.at, times=inside)
+    yield entry_point(
         run.of,
         {"expression": 1.0},
         expression=expression({}),
         times=[x for x in inside if x is not None],
     )
-    yield door(
+    yield entry_point(
         run.integral, {"name": "v"}, name=choice(), times=[x for x in inside if x is not None]
     )
-    yield door(lambda name: run[name], "Trajectory[]", name=choice())
-    yield door(run.gradient, weights=values("v"))
-    yield door(run.to_csv, path=[*path(), "/dev/null", "."])
-    yield door(lambda name: run.to_csv("a.csv", name), "Trajectory.to_csv", name=choice())
-    yield door(run.to_json, path=[*path(), "/dev/null", "."])
-    yield door(lambda name: run.plot(name), "Trajectory.plot", name=choice())
-    yield door(run.plot, path=[*path(), "a.xyz", "."])
-    yield door(run.animate, {"path": "a.gif"}, path=path())
-    yield door(lambda x: run.energy_balance(), "Trajectory.energy_balance", x=[1])
+    yield entry_point(lambda name: run[name], "Trajectory[]", name=choice())
+    yield entry_point(run.gradient, weights=values("v"))
+    yield entry_point(run.to_csv, path=[*path(), "/dev/null", "."])
+    yield entry_point(lambda name: run.to_csv("a.csv", name), "Trajectory.to_csv", name=choice())
+    yield entry_point(run.to_json, path=[*path(), "/dev/null", "."])
+    yield entry_point(lambda name: run.plot(name), "Trajectory.plot", name=choice())
+    yield entry_point(run.plot, path=[*path(), "a.xyz", "."])
+    yield entry_point(run.animate, {"path": "a.gif"}, path=path())
+    yield entry_point(lambda x: run.energy_balance(), "Trajectory.energy_balance", x=[1])
 
 
-def doors_of_models() -> Iterator[Door]:
+def entry_points_of_models() -> Iterator[EntryPoint]:
     x = sf.Variable("x", "m")
     good, output = {"name": "m", "x": (x,), "ode": -x.symbol}, Output(x.symbol, "m")
-    yield door(
+    yield entry_point(
         sf.Variable,
         {"name": "x", "unit": "m"},
         name=[None, 3, [], {}, Thing(), "", " "],
@@ -182,7 +182,7 @@ def doors_of_models() -> Iterator[Door]:
         symbol=[3, "x", None, Thing(), ca.SX.sym("a", 2), ca.MX.sym("a"), ca.SX(3)],
     )
     collection = [3, "x", (3,), Thing(), (x,)]
-    yield door(
+    yield entry_point(
         Model,
         good,
         name=[None, 3, [], Thing()],
@@ -197,14 +197,14 @@ def doors_of_models() -> Iterator[Door]:
         events=[*collection[:-1], Event("e", x.symbol)],
         t=[3, "t", None, Thing(), ca.SX.sym("t", 2), ca.MX.sym("t")],
     )
-    yield door(
+    yield entry_point(
         lambda **a: Model(**good, outputs={"y": Output(**a)}),
         {"expression": x.symbol, "unit": "m"},
         "Output",
         expression=expression({}, ca.SX.sym("a", 2), NAN, True),
         unit=[None, 3, Thing()],
     )
-    yield door(
+    yield entry_point(
         lambda **a: Model(**good, monitors=(Monitor(**a),)),
         {"expression": x.symbol, "nominal": 1.0},
         "Monitor",
@@ -212,7 +212,7 @@ def doors_of_models() -> Iterator[Door]:
         nominal=number(0.0, -1.0),
     )
     values_of_reset = (None, "a", ca.SX.sym("q"), ca.SX(2, 1), NAN, 1j)
-    yield door(
+    yield entry_point(
         lambda **a: Model(**good, events=(Event(**a),)),
         {"name": "e", "expression": x.symbol},
         "Event",
@@ -223,13 +223,13 @@ def doors_of_models() -> Iterator[Door]:
         reset=[3, "x", [1], {"y": 1.0}, {3: 1.0}, Thing(), *each("x", *values_of_reset)],
     )
     model = belt()
-    yield door(model.function, what=choice())
-    yield door(model.expression, name=choice())
-    yield door(model.values, {"letter": "p"}, given=values("mu_d"))
-    yield door(model.initial_state, given=values("v"), p=values("mu_d"))
+    yield entry_point(model.function, what=choice())
+    yield entry_point(model.expression, name=choice())
+    yield entry_point(model.values, {"letter": "p"}, given=values("mu_d"))
+    yield entry_point(model.initial_state, given=values("v"), p=values("mu_d"))
 
 
-def doors_of_laws() -> Iterator[Door]:
+def entry_points_of_laws() -> Iterator[EntryPoint]:
     for kind in (ALL_LAWS | POPULATIONS).values():
         bad, every = dict[str, list[Any]](), parameter if kind is LuGre else some_parameter
         for item in fields(kind):
@@ -238,9 +238,9 @@ def doors_of_laws() -> Iterator[Door]:
                 bad[item.name] = every(*(x for x in more if abs(x) < INF))
             elif "choices" in item.metadata:
                 bad[item.name] = choice()
-        yield door(kind, **bad)
-    yield door(sf.Sum, laws=[*thing(), (), (Coulomb(),), (Coulomb(), 3), Coulomb()])
-    yield door(
+        yield entry_point(kind, **bad)
+    yield entry_point(sf.Sum, laws=[*thing(), (), (Coulomb(),), (Coulomb(), 3), Coulomb()])
+    yield entry_point(
         sf.Asymmetric,
         {"positive": Coulomb(), "negative": Coulomb()},
         positive=thing(Coulomb, Stribeck()),
@@ -248,10 +248,10 @@ def doors_of_laws() -> Iterator[Door]:
         v_blend=parameter(0.0, -1.0),
     )
     for name, wrapper in WRAPPERS.items():
-        yield door(wrapper, {"law": Stribeck()}, name, law=thing(Coulomb))
-    yield door(sf.GMS, elements=[*thing(), (), (3,), (sf.Element,)])
-    yield door(sf.MaxwellSlip, elements=[*thing(), (), (3,), (sf.Slider,)])
-    yield door(
+        yield entry_point(wrapper, {"law": Stribeck()}, name, law=thing(Coulomb))
+    yield entry_point(sf.GMS, elements=[*thing(), (), (3,), (sf.Element,)])
+    yield entry_point(sf.MaxwellSlip, elements=[*thing(), (), (3,), (sf.Slider,)])
+    yield entry_point(
         sf.Table,
         {"speeds": (0.0, 1.0), "coefficients": (0.2, 0.1)},
         speeds=[*thing(), (0.0,), (1.0, 0.0), (0.0, NAN), ("a", "b"), (-1.0, 1.0)],
@@ -259,9 +259,9 @@ def doors_of_laws() -> Iterator[Door]:
     )
     for kind in (sf.GenericAsperity, sf.RandomBristles):
         bad = {"count": count(), "seed": [*number(-1), 1.5]}
-        yield door(kind, **bad)
+        yield entry_point(kind, **bad)
     rows = [None, 3.0, "ab", [], [0.0], [0.0, NAN], [[0.0, 1.0]], {}, Thing(), [1j, 2], ["a", "b"]]
-    yield door(
+    yield entry_point(
         sf.RandomBristles().force,
         {"t": [0.0, 1.0], "x": [0.0, 1.0], "N": 1.0},
         t=[*rows, [1.0, 0.0], [0.0, 0.0]],
@@ -270,20 +270,20 @@ def doors_of_laws() -> Iterator[Door]:
     )
     texts = ["lugre+", "nonsense", "lugre)", "lagged()", "lagged", "x" * 10000]
     texts.append("lagged(" * 600 + "lugre" + ")" * 600)
-    yield door(sf.law_from_text, text=[None, 3, [], Thing(), "", "+", Coulomb, *texts])
+    yield entry_point(sf.law_from_text, text=[None, 3, [], Thing(), "", "+", Coulomb, *texts])
     for query in (sf.law_name, sf.parameters):
-        yield door(lambda x, query=query: query(x), {}, query.__name__, x=thing(Coulomb))
-    yield door(
+        yield entry_point(lambda x, query=query: query(x), {}, query.__name__, x=thing(Coulomb))
+    yield entry_point(
         sf.with_values,
         {"obj": LuGre(), "values": {}},
         obj=thing(LuGre),
         values=[*values("mu_s")[:8], *({"mu_s": x} for x in parameter(-1.0))],
     )
-    yield door(lambda name: sf.symbolise(LuGre(), name), "symbolise", name=choice())
-    yield door(lambda x: sf.symbolise(x, "mu_s"), "symbolise", x=thing(LuGre))
+    yield entry_point(lambda name: sf.symbolise(LuGre(), name), "symbolise", name=choice())
+    yield entry_point(lambda x: sf.symbolise(x, "mu_s"), "symbolise", x=thing(LuGre))
 
 
-def doors_of_scenes() -> Iterator[Door]:
+def entry_points_of_scenes() -> Iterator[EntryPoint]:
     for name, kind in ALL_SCENES.items():
         bad: dict[str, list[Any]] = {"law": thing(BrownMcPhee, "lugre", belt())}
         for item in fields(kind):
@@ -291,9 +291,9 @@ def doors_of_scenes() -> Iterator[Door]:
                 low = item.metadata["lower"]
                 every = parameter if kind is Rabinowicz else some_parameter
                 bad[item.name] = every(*([low - 1.0] if low > -INF else []))
-        yield door(kind, {"law": BrownMcPhee()}, name, **bad)
+        yield entry_point(kind, {"law": BrownMcPhee()}, name, **bad)
     for make in (sf.rabinowicz, sf.drive):
-        yield door(
+        yield entry_point(
             make,
             {"law": BrownMcPhee()},
             law=thing(BrownMcPhee, "lugre"),
@@ -301,18 +301,18 @@ def doors_of_scenes() -> Iterator[Door]:
             mu_d=parameter(-1.0),
             nonsense=[1.0],
         )
-    yield door(Rabinowicz(BrownMcPhee()).model, free=names("mu_d"))
+    yield entry_point(Rabinowicz(BrownMcPhee()).model, free=names("mu_d"))
 
 
-def doors_of_figures() -> Iterator[Door]:
-    yield door(
+def entry_points_of_figures() -> Iterator[EntryPoint]:
+    yield entry_point(
         compare,
         {"laws": [Coulomb()]},
         laws=[*thing("lugre", Coulomb()), [3], [None], ["nonsense"], {"a": 3}, [Coulomb]],
         scenario=choice(),
         N=number(0.0, -1.0),
     )
-    yield door(
+    yield entry_point(
         figure,
         {"law": Coulomb(), "name": "profile"},
         law=thing(Coulomb),
@@ -320,19 +320,19 @@ def doors_of_figures() -> Iterator[Door]:
         N=number(0.0, -1.0),
     )
     for name, make in FIGURES.items():
-        yield door(make, {"law": LuGre()}, name, law=thing(LuGre), N=number(0.0, -1.0))
+        yield entry_point(make, {"law": LuGre()}, name, law=thing(LuGre), N=number(0.0, -1.0))
     data = compare([Coulomb()])
-    yield door(lambda name: data[name], "FigureData[]", name=choice())
-    yield door(data.plot, path=[*path(), "a.xyz", "."])
+    yield entry_point(lambda name: data[name], "FigureData[]", name=choice())
+    yield entry_point(data.plot, path=[*path(), "a.xyz", "."])
 
 
-test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(
+test_every_entry_point_refuses_bad_input_in_a_sentence = entry_points_refuse(
     {
-        "simulation": doors_of_simulation,
-        "trajectory": doors_of_a_trajectory,
-        "models": doors_of_models,
-        "laws": doors_of_laws,
-        "scenes": doors_of_scenes,
-        "figures": doors_of_figures,
+        "simulation": entry_points_of_simulation,
+        "trajectory": entry_points_of_a_trajectory,
+        "models": entry_points_of_models,
+        "laws": entry_points_of_laws,
+        "scenes": entry_points_of_scenes,
+        "figures": entry_points_of_figures,
     }
 )

@@ -8,12 +8,12 @@ import casadi as ca
 from bad_values import (
     INF,
     NAN,
-    Door,
+    EntryPoint,
     Thing,
     choice,
-    door,
     each,
-    every_door_refuses,
+    entry_point,
+    entry_points_refuse,
     flag,
     function,
     number,
@@ -57,7 +57,7 @@ def pendulum(**changes: Any) -> Any:
     return m.build(**changes.get("build", {}))
 
 
-def doors_of_mechanisms() -> Iterator[Door]:
+def entry_points_of_mechanisms() -> Iterator[EntryPoint]:
     def part(place: str, more: Callable[..., Any] | None = None, **fixed: Any) -> Any:
         """Puts one bad argument into `place`."""
 
@@ -68,7 +68,7 @@ def doors_of_mechanisms() -> Iterator[Door]:
 
         return call
 
-    yield door(
+    yield entry_point(
         pendulum,
         "Mechanism",
         name=[None, 3, "", "a b", Thing(), []],
@@ -76,7 +76,7 @@ def doors_of_mechanisms() -> Iterator[Door]:
         part=thing(mb.Revolute, mb.SpringDamper),
     )
     rows = vectors()
-    yield door(
+    yield entry_point(
         part("body"),
         "Body",
         name=[None, 3, "", "a b", "ground", Thing(), []],
@@ -84,10 +84,10 @@ def doors_of_mechanisms() -> Iterator[Door]:
         inertia=[*rows, (0.0, 1.0, 1.0), (-1.0, 1.0, 1.0)],
         com=rows,
     )
-    yield door(
+    yield entry_point(
         part("frame"),
         "Frame",
-        place=[None, 3, "", "bob", "nobody.x", Thing(), "bob."],
+        place=[None, 3, "", "bob", "unknown.x", Thing(), "bob."],
         at=rows,
         z=[*rows, (0, 0, 0)],
         x=[*rows[1:], (0, 1, 0)],
@@ -95,19 +95,19 @@ def doors_of_mechanisms() -> Iterator[Door]:
     for kind in (mb.Revolute, mb.Prismatic, mb.Cylindrical):
         start = (0.0, 0.0) if kind is mb.Cylindrical else 0.0
         bad = [x for x in parameter() if x is not None]
-        yield door(
+        yield entry_point(
             part("joint", kind=kind),
             {"start": start},
             kind.__name__,
             name=[None, 3, "", "a b", Thing(), []],
-            parent=[None, 3, "nobody", "ground.nothing", Thing(), "bob.pivot"],
-            child=[None, 3, "nobody", "bob.nothing", Thing()],
+            parent=[None, 3, "unknown", "ground.nothing", Thing(), "bob.pivot"],
+            child=[None, 3, "unknown", "bob.nothing", Thing()],
             start=[*bad, (0.0, 0.0, 0.0)],
             rate=[*bad, (0.0, 0.0, 0.0)],
             friction=[3, "x", LuGre(), LuGre, Thing(), []],
         )
     rub: dict[str, Any] = {"law": Coulomb(), "radius": 0.01}
-    yield door(
+    yield entry_point(
         lambda **a: pendulum(joint={"friction": mb.JointFriction(**a)}),
         rub,
         "JointFriction",
@@ -120,41 +120,41 @@ def doors_of_mechanisms() -> Iterator[Door]:
         eps=parameter(-1.0),
     )
     springs = {"name": "s", "a": "ground.pivot", "b": "bob.pivot"}
-    yield door(
+    yield entry_point(
         part("force", lambda **a: mb.SpringDamper(**springs | {"stiffness": 1.0} | a)),
         "SpringDamper",
         name=[None, 3, "", "a b", Thing()],
-        a=[None, 3, "nobody", Thing()],
-        b=[None, 3, "nobody", Thing()],
+        a=[None, 3, "unknown", Thing()],
+        b=[None, 3, "unknown", Thing()],
         stiffness=parameter(),
         damping=parameter(),
         free_length=parameter(),
     )
-    yield door(
+    yield entry_point(
         part("force", lambda **a: mb.JointSpringDamper(**{"name": "s", "joint": "hinge"} | a)),
         "JointSpringDamper",
-        joint=[None, 3, "nobody", Thing()],
+        joint=[None, 3, "unknown", Thing()],
         stiffness=parameter(),
         damping=parameter(),
         direction=[3, "up", Thing()],
     )
     gear = {"name": "g", "a": "hinge", "b": "hinge", "ratio": 1.0}
     motor = {"name": "p", "joint": "hinge", "motion": lambda t: t}
-    yield door(
+    yield entry_point(
         part("constraint", lambda **a: mb.Gear(**gear | a)),
         "Gear",
-        a=[None, 3, "nobody", Thing()],
+        a=[None, 3, "unknown", Thing()],
         ratio=parameter(0.0),
     )
     motions = [None, "x", Thing(), lambda: 1, lambda t: None, lambda t: "a", lambda t: 1j]
     motions += [lambda t: ca.SX.sym("a"), lambda t: ca.vertcat(t, t), lambda t: NAN]
-    yield door(
+    yield entry_point(
         part("constraint", lambda **a: mb.PrescribedMotion(**motor | a)),
         "PrescribedMotion",
-        joint=[None, 3, "nobody", Thing()],
+        joint=[None, 3, "unknown", Thing()],
         motion=motions,
     )
-    yield door(
+    yield entry_point(
         part("input"),
         "Mechanism.input",
         name=[None, 3, "", "a b", Thing()],
@@ -162,14 +162,14 @@ def doors_of_mechanisms() -> Iterator[Door]:
         start=number(),
         nominal=number(0.0, -1.0),
     )
-    yield door(
+    yield entry_point(
         part("build"),
         "Mechanism.build",
         p=[3, "x", (3,), Thing(), [ca.SX.sym("a")]],
         formulation=choice(),
         index=[2, -1, "0", 0.5, Thing(), [0], NAN],
     )
-    yield door(
+    yield entry_point(
         lambda **a: mb.read_urdf(**a).build(),
         {"source": URDF},
         "read_urdf",
@@ -182,7 +182,7 @@ def doors_of_mechanisms() -> Iterator[Door]:
     )
 
 
-def doors_of_control() -> Iterator[Door]:
+def entry_points_of_control() -> Iterator[EntryPoint]:
     model = sf.drive(BrownMcPhee(), free=["m"])
     good = {
         "model": model,
@@ -204,7 +204,7 @@ def doors_of_control() -> Iterator[Door]:
         lambda s: ca.MX.sym("a"),
     )
     nodes = [{t: {}} for t in ("a", 0.0, 1.5, NAN, None, True)]
-    yield door(
+    yield entry_point(
         moved,
         good,
         "Problem",
@@ -217,7 +217,7 @@ def doors_of_control() -> Iterator[Door]:
         via=[3, "x", Thing(), [0.5], *nodes, *each(0.5, 3, {"x": None}, {"nonsense": 1.0})],
         p=values("m", {"m": -1.0}),
     )
-    yield door(
+    yield entry_point(
         ocp.Free,
         {"lower": 0.1, "upper": 1.0},
         lower=number(0.0, -1.0, 2.0),
@@ -225,9 +225,9 @@ def doors_of_control() -> Iterator[Door]:
         guess=number(5.0, optional=True),
     )
     for make in (ocp.integral, ocp.at_end):
-        yield door(make, expression=[None, *function()])
-    yield door(lambda w: ocp.TIME * w, "Cost * weight", w=number())
-    yield door(
+        yield entry_point(make, expression=[None, *function()])
+    yield entry_point(lambda w: ocp.TIME * w, "Cost * weight", w=number())
+    yield entry_point(
         ocp.rest_to_rest,
         {"model": model, "distance": 0.1, "T": 1.0, "limit": 9.0},
         model=thing(),
@@ -242,7 +242,7 @@ def doors_of_control() -> Iterator[Door]:
     fast |= {"solver": ocp.Ipopt(max_iter=1), "throw": False}
     meshes = ([], [0.0], [0.0, 0.5], [0.0, 0.5, 0.5, 1.0], [0.0, NAN, 1.0])
     guesses = ("a", NAN, [[1.0]], [], lambda: 1, lambda t: "a", lambda t: [1.0, 2.0], None, 1j)
-    yield door(
+    yield entry_point(
         ocp.solve,
         fast,
         problem=thing(model, ocp.Problem),
@@ -260,8 +260,8 @@ def doors_of_control() -> Iterator[Door]:
     )
 
 
-def doors_of_code() -> Iterator[Door]:
-    yield door(
+def entry_points_of_code() -> Iterator[EntryPoint]:
+    yield entry_point(
         generate,
         {"law": Stribeck(), "out": "c"},
         law=thing(Coulomb, sf.rabinowicz(LuGre())),
@@ -270,7 +270,7 @@ def doors_of_code() -> Iterator[Door]:
         real=[None, 3, "half", ["half"], [], Thing(), [3]],
         free=[3, "mu_s", ["nonsense"], [3], Thing()],
     )
-    yield door(
+    yield entry_point(
         law_block,
         {"law": LuGre()},
         law=thing(LuGre),
@@ -278,7 +278,7 @@ def doors_of_code() -> Iterator[Door]:
         free=[3, "mu_s", ["nonsense"], [3], Thing()],
         name=[3, "a b", Thing(), ""],
     )
-    yield door(
+    yield entry_point(
         plant_block,
         {"model": sf.rabinowicz(BrownMcPhee())},
         model=thing(LuGre()),
@@ -286,9 +286,13 @@ def doors_of_code() -> Iterator[Door]:
         method=choice(),
         name=[3, "a b", Thing(), ""],
     )
-    yield door(verify, generated=thing())
+    yield entry_point(verify, generated=thing())
 
 
-test_every_door_refuses_bad_input_in_a_sentence = every_door_refuses(
-    {"mechanisms": doors_of_mechanisms, "control": doors_of_control, "code": doors_of_code}
+test_every_entry_point_refuses_bad_input_in_a_sentence = entry_points_refuse(
+    {
+        "mechanisms": entry_points_of_mechanisms,
+        "control": entry_points_of_control,
+        "code": entry_points_of_code,
+    }
 )

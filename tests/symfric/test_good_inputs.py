@@ -1,4 +1,4 @@
-"""Good Python input: what NumPy and CasADi users hold in their hands is a number at every door."""
+"""Valid input: every public function accepts the number types of Python, NumPy and CasADi."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,4 +1,4 @@
-"""What the sentences of the doors say: the way out for those who stumble most often."""
+"""Messages for the most frequent mistakes name the correct call."""
 
 import math
 from typing import Any
@@ -71,7 +71,7 @@ STUMBLES: dict[str, tuple[Any, str]] = {
 
 
 @pytest.mark.parametrize("stumble", STUMBLES)
-def test_who_stumbles_is_told_the_way_out(stumble: str) -> None:
+def test_messages_name_the_correct_call(stumble: str) -> None:
     call, message = STUMBLES[stumble]
     with pytest.raises(ValueError, match=message):
         call()

@@ -118,11 +118,12 @@ class Columns:
         if self.chained:
             arguments[0][:] = np.ravel(cast(Array, first))
         call = bound(batch, arguments, results)
-        tables = [a[0][a[1]] if isinstance(a, tuple) else a for a in rows]
         for begin in range(0, count, most):
             size = min(most, count - begin)
-            for block, table in zip(blocks, tables, strict=True):
-                block[:size] = table[begin : begin + size].reshape(size, block.shape[1])
+            pick = slice(begin, begin + size)
+            for block, row in zip(blocks, rows, strict=True):
+                part = row[0][row[1][pick]] if isinstance(row, tuple) else row[pick]
+                block[:size] = part.reshape(size, block.shape[1])
                 block[size:] = block[size - 1]
             call()
             for whole, result in zip(found, results, strict=True):

@@ -9,13 +9,13 @@ stay together until no member is left. A launch ends after a number of attempts 
 of a second, and unfinished members continue in the next launch.
 
 Tests: the text of the kernel is valid C and CUDA C++. Compiled for a CPU and called through the
-same driver, it gives the bits of `backend="compiled"` for every scene without modes, if the lanes
-call the same math library (`tests/symfric/integrator/cuda`). NVRTC compiles it without a graphics
-processor (`device`), which shows errors and the number of registers per thread; the calls of CuPy
-are checked with a fake module. On a device no operations are contracted to fused multiply-adds, so
-only the last digits of exp, sin, pow and similar functions differ from the tested ones. The code
-has not yet run on a graphics processor, since none was available. With one, `test_gpu.py` compares
-with the CPU, and `symfric bench ensemble` measures members per second.
+same driver, it computes the same bits as `backend="compiled"` for every scene without modes, if
+both call the same math library (`tests/symfric/integrator/cuda`). NVRTC compiles it without a
+graphics processor (`device`), which shows errors and the number of registers per thread; the calls
+of CuPy are checked with a fake module. On a device no operations are contracted to fused
+multiply-adds, so only the last digits of exp, sin, pow and similar functions differ from the tested
+ones. The code has not yet run on a graphics processor, since none was available. With one,
+`test_gpu.py` compares with the CPU, and `symfric bench ensemble` measures members per second.
 
 Limits: models with events are refused. Large mechanisms spill registers: a slider-crank (4100
 operations) takes all 255 registers; a six-joint arm (27000 operations) writes kilobytes of memory

@@ -16,7 +16,7 @@ from symfric.model import Model
 
 Array = NDArray[np.float64]
 Parameters = tuple[int, ...]
-"""Row in p of each name, -1 for a start value."""
+"""Row in p of each parameter, -1 for a start value."""
 
 
 @final
@@ -26,7 +26,7 @@ class Seeds:
 
     Attributes:
         names: as the user wrote them: a parameter, or "x0.v" for the start value of the state v.
-        parameters: row of each name.
+        parameters: row in p of each name, -1 for a start value.
         start: derivative of the start values of x with respect to each name, shape (nx, names).
     """
 
@@ -59,10 +59,11 @@ def seeds(
     known = [*free, *(f"x0.{name}" for name in states)]
     check_names(f"sensitivities of '{model.name}' (parameters must be free)", names, known)
     start = dict(zip(states, model.initial_state(x0, p, t).tolist(), strict=True))
+    by_p, _ = model.start_slopes(x0, p, t)
 
-    def column(name: str) -> NDArray[np.float64]:
+    def column(name: str) -> Array:
         if name in free:
-            return model.start_slopes(x0, p, t)[0][:, free.index(name)]
+            return by_p[:, free.index(name)]
         given = {**(x0 or {}), name[3:]: start[name[3:]]}
         return model.start_slopes(given, p, t)[1][:, states.index(name[3:])]
 

@@ -42,9 +42,9 @@ from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, consiste
 Array = NDArray[np.float64]
 Which = Sequence[int] | NDArray[np.intp]
 GRAZING = 1e-6
-"""Rate of an event expression, over its mean rate in the last step, below which it only touches 0.
+"""Relative rate of an event expression below which it touches zero without crossing it.
 
-The square is the limit of the rate relative to the sum of its terms.
+It is relative to the mean rate in the step before; relative to its own terms the limit is squared.
 """
 SAME = 1e-6
 """Relative difference of results that counts as equal, such as those of two orders of events."""

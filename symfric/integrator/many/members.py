@@ -324,7 +324,7 @@ def with_code(integrator: Integrator, code: str) -> Program:
 
 
 def fastest(integrator: Integrator, plants: Plants) -> Advance:
-    """Return the compiled loop of plants, from sample to sample; for many, in lanes of vectors.
+    """Return the compiled loop of plants from sample to sample, in lanes if that is faster.
 
     A lane computes the same as `symfric.integrator.running.plants`, except that functions like exp
     differ by a few units in the last place (`lanes.h`). The bits of a plant depend neither on the

@@ -136,7 +136,7 @@ class Store:
         return total.hexdigest()
 
     def _note(self, first: int, outcome: dict[str, NDArray[Any]]) -> None:
-        """Take over the arrays of the members from `first` on, and the messages of failed ones."""
+        """Store the results of the members from `first` on, and the messages of failed members."""
         failed = zip(outcome["failed"].tolist(), outcome["why"].tolist(), strict=True)
         pick = slice(first, first + outcome["attempts"].size)
         for name in ("attempts", "reached", "reach"):

@@ -3,7 +3,6 @@
 The C has the operations of the Function in the same order; `lanes.h` defines functions like exp.
 """
 
-import tomllib
 from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,17 +17,31 @@ PART = 1000
 and keep fewer values in registers.
 """
 
+MASKS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
+"""Comparisons, whose results are masks."""
+LOGIC = {ca.OP_AND: "{} & {}", ca.OP_OR: "{} | {}", ca.OP_NOT: "~{}"}
+"""Operations on masks."""
+PLAIN = {
+    ca.OP_ADD: "{} + {}", ca.OP_SUB: "{} - {}", ca.OP_MUL: "{} * {}", ca.OP_DIV: "{} / {}",
+    ca.OP_NEG: "-{}", ca.OP_SQ: "{0} * {0}", ca.OP_TWICE: "2. * {}", ca.OP_INV: "1. / {}",
+}  # fmt: skip
+"""Operators of C."""
+CALLS = {
+    ca.OP_SQRT: "sqrt", ca.OP_FABS: "fabs", ca.OP_SIGN: "sign", ca.OP_FMIN: "fmin",
+    ca.OP_FMAX: "fmax", ca.OP_COPYSIGN: "copysign", ca.OP_FLOOR: "floor", ca.OP_CEIL: "ceil",
+    ca.OP_EXP: "exp", ca.OP_EXPM1: "expm1", ca.OP_LOG: "log", ca.OP_LOG1P: "log1p",
+    ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow", ca.OP_TAN: "tan", ca.OP_ASIN: "asin",
+    ca.OP_ACOS: "acos", ca.OP_ATAN: "atan", ca.OP_ATAN2: "atan2", ca.OP_SINH: "sinh",
+    ca.OP_COSH: "cosh", ca.OP_TANH: "tanh", ca.OP_ASINH: "asinh", ca.OP_ACOSH: "acosh",
+    ca.OP_ATANH: "atanh", ca.OP_ERF: "erf", ca.OP_HYPOT: "hypot", ca.OP_FMOD: "fmod",
+    ca.OP_REMAINDER: "remainder",
+}  # fmt: skip
+"""Functions v_NAME of `lanes.h`."""
+
 
 def c_text(name: str) -> str:
-    """Return the text of a file of this folder."""
+    """Return the text of a C file of this folder."""
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
-
-
-MASKS, LOGIC, PLAIN, CALLS = (
-    {getattr(ca, f"OP_{name}"): text for name, text in table.items()}
-    for table in tomllib.loads(c_text("operations.toml")).values()
-)
-"""CasADi operation -> its C: comparisons, operations on masks, operators, functions."""
 
 
 def lanes_header(lanes: int = 0) -> str:

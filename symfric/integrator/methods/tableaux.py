@@ -36,7 +36,8 @@ def shampine(b: Array, D: Array) -> Array:
     D = 0 gives the cubic of Hermite, which has two rows.
     """
     first, last = np.eye(b.size)[[0, -1]]
-    return np.array([first - b, 2 * b - first - last + D, -D][: 2 + bool(D.any())])
+    rows = [first - b, 2 * b - first - last + D, -D]
+    return np.array(rows if D.any() else rows[:2])
 
 
 def through(c: Array) -> Array:

@@ -296,7 +296,7 @@ class Law(Parametric, ABC):
 
     def thumbnail(self) -> "Figure | None":
         """Return a small figure of the force in steady sliding at N = 1 N; None with symbols."""
-        from symfric.foundation.panels import blank, dressed  # noqa: PLC0415  (it is slow to import)
+        from symfric.foundation.panels import blank, dressed  # noqa: PLC0415  (slow to import)
 
         if any(is_symbolic(p.value) for p in parameters(self).values()):
             return None

@@ -188,7 +188,7 @@ class Table(StaticLaw):
     @cached_property
     def _slopes(self) -> list[tuple[float, float]]:
         """Slopes at both ends of each interval: weighted harmonic means, zero at the end points."""
-        from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  (it is slow to import)
+        from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  (slow to import)
 
         curve = PchipInterpolator(self.speeds, self.coefficients)
         return list(pairwise([0.0, *curve.derivative()(self.speeds[1:-1]).tolist(), 0.0]))

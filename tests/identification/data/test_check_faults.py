@@ -39,7 +39,7 @@ def test_fault_is_found(stage_data: Dataset, fault: str) -> None:
     assert severity == "error" or not found.errors, str(found)
 
 
-def test_places_are_told(stage_data: Dataset) -> None:
+def test_places_are_reported(stage_data: Dataset) -> None:
     def only(fault: str, kind: str) -> tuple[float, float, str]:
         (hit,) = [f for f in spoiled(stage_data, fault).check() if f.kind == kind]
         return hit.begin, hit.end, hit.sentence

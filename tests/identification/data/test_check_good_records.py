@@ -33,7 +33,7 @@ def test_emps(emps_files: Dataset) -> None:
 
 @pytest.mark.parametrize(("case", "joint"), [(3, 2), (4, 7)])
 def test_franka(shared_data: Path, case: int, joint: int) -> None:
-    """In the second file the velocity is twice the slope of the angle, and that is told."""
+    """In the second file the velocity is twice the slope of the angle, and that is reported."""
     file = shared_data / "franka_low_speed" / f"case{case}_slow.csv"
     if not file.is_file():
         pytest.skip("the Franka records are not on this machine (../shared/data)")
@@ -126,7 +126,7 @@ def shaken(frequency: float, slow: float = 0.0, hum: float = 0.0) -> Dataset:
     return Dataset.of(t=t, x=noisy(x, 1e-9), force=noisy(force, 0.01))
 
 
-def test_an_excitation_is_no_hum_and_a_hum_beside_it_is_told() -> None:
+def test_an_excitation_is_no_hum_and_an_additional_hum_is_reported() -> None:
     for frequency, slow in ((8.0, 0.0), (8.0, 2.0), (20.0, 0.0)):
         assert "hum" not in shaken(frequency, slow).check().kinds
     (hum,) = (f for f in shaken(20.0, hum=5.0).check() if f.kind == "hum")

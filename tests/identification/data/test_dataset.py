@@ -99,5 +99,5 @@ def test_a_delay_moves_one_signal() -> None:
     assert record.size == T.size - 3
 
 
-def test_a_dataset_says_what_it_holds() -> None:
+def test_a_dataset_describes_its_contents() -> None:
     assert "data: 0 ... 1.99 s, 200 samples, x [m], force [N]" in str(DATA)

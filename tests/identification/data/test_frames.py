@@ -11,7 +11,7 @@ from identification.data.dataset import Dataset
 T = np.arange(100) / 100
 
 
-def test_arrays_are_si_unless_they_say_more() -> None:
+def test_arrays_are_si_unless_units_are_given() -> None:
     record = Dataset.of(t=T, x=list(T), force=T[:, None], name="rig")[0]
     assert (record.name, record.unit("x"), record.unit("force")) == ("rig", "m", "N")
     record = Dataset.of({"t [ms]": T, "x": T, "tau_1 [N mm]": T}, units="deg, N m")[0]
@@ -50,7 +50,7 @@ def test_rows_without_a_number_are_left_out_with_their_times(file: Path) -> None
     np.testing.assert_array_equal(found.t, [0.0, 0.02, 0.04])
     np.testing.assert_allclose(found["x"], [0.0, np.pi, 2 * np.pi], rtol=1e-15)
     np.testing.assert_array_equal(found["force"], [1.0, 3.0, 5.0])
-    assert "Bemerkung" in found.left_out  # nobody asked for it, so its gaps cost no row
+    assert "Bemerkung" in found.left_out  # not requested, so its gaps remove no row
 
 
 def test_samples_of_a_step_keep_their_times() -> None:
@@ -62,7 +62,7 @@ def test_samples_of_a_step_keep_their_times() -> None:
 TWICE = "t [s],x [m],force [N]\n0,0,1\n1,1,2\n1,1,2\n2,1,2\n3,4,5\n"
 
 
-def test_rows_written_twice_are_left_out_and_standstill_stays(tmp_path: Path) -> None:
+def test_duplicate_rows_are_left_out_and_standstill_stays(tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     path.write_text(TWICE)
     (found,) = Dataset.read(path, missing="drop")

@@ -1,4 +1,4 @@
-"""MATLAB and NumPy files beside SciPy, the EMPS benchmark, and bytes that somebody damaged."""
+"""MATLAB and NumPy files compared with SciPy, the EMPS benchmark, and damaged files."""
 
 from io import BytesIO
 from pathlib import Path
@@ -33,10 +33,10 @@ def saved(content: dict[str, Any], **options: Any) -> bytes:
     return file.getvalue()
 
 
-def read(folder: Path, content: dict[str, Any] | bytes, **said: Any) -> Dataset:
+def read(folder: Path, content: dict[str, Any] | bytes, **options: Any) -> Dataset:
     raw = content if isinstance(content, bytes) else saved(content)
     (folder / "log.mat").write_bytes(raw)
-    return Dataset.read(folder / "log.mat", **{"units": "m, N", **said})
+    return Dataset.read(folder / "log.mat", **{"units": "m, N", **options})
 
 
 def structs(*fields: str, rows: list[tuple[Any, ...]]) -> Any:
@@ -61,8 +61,8 @@ FORMS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 
 @pytest.mark.parametrize("form", FORMS)
 def test_forms_give_the_same_record(tmp_path: Path, form: str) -> None:
-    content, said = FORMS[form]
-    data = read(tmp_path, content, **said)
+    content, options = FORMS[form]
+    data = read(tmp_path, content, **options)
     assert len(data) == 1
     np.testing.assert_allclose(data[0].time, T, atol=1e-15)
     np.testing.assert_array_equal(data[0]["x"], np.sin(T))
@@ -72,12 +72,12 @@ def test_forms_give_the_same_record(tmp_path: Path, form: str) -> None:
 def test_vectors_of_structs_and_equal_structs_are_several_records(tmp_path: Path) -> None:
     cells = np.empty(2, dtype=object)
     cells[:] = [MATRIX, MATRIX[:50]]
-    for content, said in (
+    for content, options in (
         ({"runs": TWO}, {}),
         ({"run1": RUN, "run2": {k: v[:50] for k, v in RUN.items()}}, {}),
         ({"runs": cells}, {"columns": NAMES}),
     ):
-        assert [record.size for record in read(tmp_path, content, **said)] == [100, 50]
+        assert [record.size for record in read(tmp_path, content, **options)] == [100, 50]
 
 
 def test_numpy_files(tmp_path: Path) -> None:
@@ -85,8 +85,8 @@ def test_numpy_files(tmp_path: Path) -> None:
     np.save(tmp_path / "b.npy", MATRIX)
     rows = np.array(list(map(tuple, MATRIX)), dtype=[(name, "f8") for name in NAMES])
     np.save(tmp_path / "c.npy", rows)
-    for name, said in (("a.npz", {}), ("b.npy", {"columns": NAMES}), ("c.npy", {})):
-        data = Dataset.read(tmp_path / name, units="m, N", **said)
+    for name, options in (("a.npz", {}), ("b.npy", {"columns": NAMES}), ("c.npy", {})):
+        data = Dataset.read(tmp_path / name, units="m, N", **options)
         np.testing.assert_array_equal(data[0]["force"], np.cos(T))
 
 
@@ -138,7 +138,7 @@ def test_numbers_in_the_other_order_of_bytes() -> None:
 
 def test_damaged_bytes_are_a_sentence_and_never_a_crash(tmp_path: Path) -> None:
     """Guards a reader that dies of a segmentation fault (as SciPy's), or of any other error."""
-    rng, told = np.random.default_rng(0), 0
+    rng, refused = np.random.default_rng(0), 0
     short = {key: value[:7] for key, value in RUN.items()}
     nested = {"runs": structs(*NAMES, rows=[tuple(short.values())] * 2), "note": "rig"}
     for content, options in (
@@ -155,5 +155,5 @@ def test_damaged_bytes_are_a_sentence_and_never_a_crash(tmp_path: Path) -> None:
             try:
                 read(tmp_path, bytes(bad[: rng.integers(1, len(bad) + 1)]))
             except ValueError:
-                told += 1
-    assert told > 60
+                refused += 1
+    assert refused > 60

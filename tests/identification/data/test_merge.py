@@ -42,7 +42,9 @@ def test_drift_of_the_clocks_is_refused_or_estimated() -> None:
     (lambda t: np.sin(0.3 * t * t), 0.0, -1.0, "one of them has the opposite sign"),
     (lambda t: 0 * t, 0.0, 1.0, "expected a signal 'x' that changes"),
 ])  # fmt: skip
-def test_what_tells_no_delay_is_refused(f: Signal, noise: float, gain: float, message: str) -> None:
+def test_undetermined_delays_are_refused(
+    f: Signal, noise: float, gain: float, message: str
+) -> None:
     first, second = pair(f, 0.1, noise=noise, gain=gain)
     with pytest.raises(ValueError, match=message):
         first.merged(second, on=("x", "y"))

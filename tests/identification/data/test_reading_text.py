@@ -22,10 +22,10 @@ def text(
     return end.join([*([header] if header else []), *rows]) + end
 
 
-def read(folder: Path, content: str | bytes, name: str = "log.csv", **said: object) -> Dataset:
+def read(folder: Path, content: str | bytes, name: str = "log.csv", **options: object) -> Dataset:
     raw = content if isinstance(content, bytes) else content.encode()
     (folder / name).write_bytes(raw)
-    return Dataset.read(folder / name, **said)  # pyright: ignore[reportArgumentType]
+    return Dataset.read(folder / name, **options)  # pyright: ignore[reportArgumentType]
 
 
 SEMICOLON = text(";".join(HEADER), ";", ",")
@@ -71,8 +71,8 @@ CALLS: dict[str, tuple[str | bytes, dict[str, object]]] = {
 
 @pytest.mark.parametrize("name", CALLS)
 def test_dialects_and_calls_give_the_same_record(tmp_path: Path, name: str) -> None:
-    content, said = CALLS[name]
-    record = read(tmp_path, content, **said)[0]
+    content, options = CALLS[name]
+    record = read(tmp_path, content, **options)[0]
     np.testing.assert_allclose(record.time, T, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(record["x"], np.sin(T), rtol=1e-12)
     np.testing.assert_allclose(record["force"], np.cos(T), rtol=1e-12)

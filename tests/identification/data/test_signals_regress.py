@@ -103,7 +103,7 @@ def test_two_records_are_one_regression() -> None:
     assert both.values["m"] == pytest.approx(2.0, rel=1e-3)
 
 
-def test_one_direction_tells_no_coulomb_force_from_the_offset() -> None:
+def test_one_direction_does_not_separate_the_coulomb_force_from_the_offset() -> None:
     t = np.arange(5_000) * 1e-3
     found = regression(t + 0.02 * np.sin(9 * t), 5 + np.cos(9 * t), Filter(100.0, 10))
     unknown = {n for n, error in found.standard_errors.items() if error is None}
@@ -127,12 +127,12 @@ def noise(seed: int) -> Array:
 
 def off(x: Array, v: Array | None) -> tuple[float, float]:
     """Root mean square error of the velocity, and the standard deviation that is stated."""
-    told = Velocity.of(x, v, STEP)
-    found = derivatives(x, v, STEP, PLAIN, told)[1]
-    return float(np.std((found - V)[INSIDE])), told.deviation(PLAIN, STEP)
+    reported = Velocity.of(x, v, STEP)
+    found = derivatives(x, v, STEP, PLAIN, reported)[1]
+    return float(np.std((found - V)[INSIDE])), reported.deviation(PLAIN, STEP)
 
 
-def test_the_mixture_is_less_noisy_than_either_and_says_how_noisy() -> None:
+def test_the_mixture_is_less_noisy_than_either_and_reports_its_noise() -> None:
     x, v = X + 1e-4 * noise(0), V + 0.03 * noise(1)
     both, stated = off(x, v)
     alone = off(x, None)[0]
@@ -180,9 +180,9 @@ def test_a_second_measurement_does_not_narrow_the_band(level: float) -> None:
 
 
 def test_velocity_alone() -> None:
-    told = Velocity.of(None, V + 0.1 * noise(0), STEP)
-    assert (told.weight == 1.0).all()
-    assert told.noise == pytest.approx(0.01, rel=0.1)
+    reported = Velocity.of(None, V + 0.1 * noise(0), STEP)
+    assert (reported.weight == 1.0).all()
+    assert reported.noise == pytest.approx(0.01, rel=0.1)
 
 
 @cache

@@ -32,7 +32,7 @@ def test_a_turning_drive_has_the_same_numbers() -> None:
     assert turns.rotary and not slides.rotary
 
 
-def test_noise_is_seeded_and_of_the_size_asked_for() -> None:
+def test_noise_is_seeded_and_of_the_requested_size() -> None:
     def record(seed: int, noise: float = 0.5) -> np.ndarray:
         short: Any = {"speeds": (0.05,), "dwell": 0.2, "ramp": 0.1}
         return synthetic_drive_data(seed=seed, force_noise=noise, **short)[0]["force"]

@@ -120,7 +120,7 @@ def test_a_fit_finds_the_drive_of_the_other_simulation(rows: LoopRows, drive: Su
         assert found[name] == pytest.approx(value, rel=5e-3), name
 
 
-def test_a_controller_of_ones_own_is_the_same_loop(data: Dataset, drive: Subject) -> None:
+def test_a_user_controller_is_the_same_loop(data: Dataset, drive: Subject) -> None:
     s, x, r, xv = (ca.SX.sym(name, n) for name, n in (("s", 2), ("x", 1), ("r", 1), ("xv", 2)))
     mean = (x + s[0]) / 2
     command = LOOP.kp * LOOP.kv * (r - x) - LOOP.kv * (mean - s[1]) / STEP
@@ -143,7 +143,7 @@ def test_residuals_go_to_other_processes(rows: LoopRows) -> None:
     np.testing.assert_array_equal(one.J, two.J)
 
 
-def test_a_motion_that_is_not_finite_is_said(rows: LoopRows) -> None:
+def test_a_motion_that_is_not_finite_is_reported(rows: LoopRows) -> None:
     assert rows.at(np.full(len(rows.names), np.nan)).startswith("data 'hand': ")
 
 

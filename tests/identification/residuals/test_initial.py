@@ -79,16 +79,17 @@ DATA = Dataset.of(t=TIMES, x=np.exp(-0.7 * TIMES), units={"x": "m"})
 
 
 def test_the_length_whose_fits_predict_is_taken() -> None:
-    asked = list[tuple[object, int]]()
+    requested = list[tuple[object, int]]()
 
     def solve(kind: Shooting, data: Dataset) -> Mapping[str, float]:
-        asked.append((kind.windows, sum(r.size for r in data)))
+        requested.append((kind.windows, sum(r.size for r in data)))
         return {"rate": 0.7 if kind.windows == 1.0 else 0.9}
 
     found = choose(Shooting(windows="choose"), subject(DECAY), DATA, solve)
     assert found.windows == 1.0
-    assert [windows for windows, _ in asked[::4]] == [None, 2.0, 1.0, 0.5, 0.25]
-    assert {size for _, size in asked} <= {300, 301} and len(asked) == 4 * 5  # three quarters
+    assert [windows for windows, _ in requested[::4]] == [None, 2.0, 1.0, 0.5, 0.25]
+    assert {size for _, size in requested} <= {300, 301}  # three quarters
+    assert len(requested) == 4 * 5
 
 
 @pytest.mark.slow

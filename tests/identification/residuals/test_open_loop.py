@@ -58,7 +58,7 @@ def test_coulomb_and_viscous_friction_are_exact_at_any_step() -> None:
         np.testing.assert_allclose(motion.states[:, 1], expected, rtol=1e-13)
 
 
-def test_a_thrown_block_stops_where_the_closed_form_says() -> None:
+def test_a_thrown_block_stops_at_the_place_of_the_closed_form() -> None:
     model = sf.drive(sf.Coulomb(mu_d=4.0, v_eps=1e-9), m=2.0, N=1.0, free=["m", "mu_d"])
     motion = run(model, np.zeros(2001), [2.0, 4.0], [0.0, 1.0])
     x, v = motion.states[-1]
@@ -155,7 +155,7 @@ def test_static_laws_are_solved_in_the_given_number_of_evaluations(text: str) ->
     assert motion.gap < 1e-6
 
 
-def test_motions_that_cannot_be_stepped_are_said() -> None:
+def test_motions_that_cannot_be_stepped_are_reported() -> None:
     """Friction that supplies power, and friction that jumps down with speed."""
     model = sf.drive(sf.Viscous(1.0), m=1.0, free=["sigma_2"])
     away = sampled_motion(model, np.arange(400.0), np.ones(400), [-50.0], [0.0, 1.0])

@@ -34,7 +34,7 @@ def test_the_truth_lies_inside_the_intervals_and_white_noise_stays_white(good: F
         assert e.standard_error == pytest.approx(e.white_error, rel=0.3)
 
 
-def test_what_is_held_says_why_and_what_belongs_to_records_is_apart(good: Fitted) -> None:
+def test_held_parameters_give_the_reason_and_those_of_records_are_separate(good: Fitted) -> None:
     held = {n: e for n, e in good.parameters.items() if e.fixed}
     assert held.keys() == {"delta", "v_eps"}
     assert all(e.note and e.low is None for e in held.values())
@@ -98,7 +98,7 @@ def test_the_text_fits_80_columns_and_holds_every_number(good: Fitted, wrong: Fi
             assert any(line.split()[:2] == row for line in text.splitlines())
 
 
-def test_what_is_not_told_has_no_interval() -> None:
+def test_what_is_not_identifiable_has_no_interval() -> None:
     e = Estimate(8.2e-12, "N", 2.5, low=4.2e-142, high=1.593819374e119)
     assert interval(e) == "not identifiable"
     assert percent(e.relative_error) == "> 10000 %"

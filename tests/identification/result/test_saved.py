@@ -47,7 +47,7 @@ def test_all_of_a_fit_comes_back_to_the_bit(fit: Fitted, data: Dataset, tmp_path
     np.testing.assert_array_equal(ours.values, theirs.values)
 
 
-def test_what_was_asked_with_functions_keeps_its_numbers(data: Dataset, tmp_path: Path) -> None:
+def test_requests_made_with_functions_keep_their_numbers(data: Dataset, tmp_path: Path) -> None:
     rule = tied(lambda p: 1.4 * p["mu_d"])
     made = Fit(InverseDynamics(), "stribeck", data, free={"mu_s": rule}, starts=1)
     back = through_file(made.solve(throw=False), tmp_path)
@@ -56,7 +56,7 @@ def test_what_was_asked_with_functions_keeps_its_numbers(data: Dataset, tmp_path
         back.validate(data)
 
 
-def test_files_of_others_are_told_apart(fit: Fitted, tmp_path: Path) -> None:
+def test_files_of_other_formats_are_distinguished(fit: Fitted, tmp_path: Path) -> None:
     fit.save(tmp_path / "fit.npz")
     with pytest.raises(ValueError, match=r"of the kind 'symfric run', got a 'symfric fit'"):
         load_run(tmp_path / "fit.npz")

@@ -125,7 +125,7 @@ def test_every_law_comes_back_bit_for_bit() -> None:
         assert values == expected
 
 
-def test_a_law_of_ones_own_comes_back_where_its_class_is_given() -> None:
+def test_a_user_law_is_restored_if_its_class_is_given() -> None:
     Mine = type("Mine", (sf.Coulomb,), {})
     data = plain(sf.Sum((Mine(mu_d=0.25), sf.Viscous())))
     with pytest.raises(ValueError, match="Mine"):

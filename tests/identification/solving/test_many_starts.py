@@ -192,7 +192,7 @@ def test_a_trial_that_cannot_be_simulated_shortens_the_step() -> None:
     assert at.unknowns.values(end.w) == pytest.approx(TRUTH, rel=0.05)
 
 
-def test_a_start_without_residuals_is_said_and_others_go_on() -> None:
+def test_a_start_without_residuals_is_reported_and_others_continue() -> None:
     data = decay()
     at = problem(data)
     bad = at.unknowns.of({"a": 1.0, "b": 1e3, "c": 0.0})
@@ -221,7 +221,7 @@ def test_an_interruption_keeps_the_best_so_far() -> None:
     assert end.cost < np.inf and data.calls == 5
 
 
-def test_an_interruption_between_starts_is_said_of_the_best() -> None:
+def test_an_interruption_between_starts_is_reported_for_the_best() -> None:
     at = problem(decay())
     bad = at.unknowns.of({"a": 1.0, "b": 1e3, "c": 0.0})
 
@@ -247,7 +247,7 @@ def test_any_executor_gives_the_same_bits() -> None:
                 assert (a.w == b.w).all() and a.cost == b.cost
 
 
-def test_a_worker_that_dies_is_said() -> None:
+def test_a_worker_that_dies_is_reported() -> None:
     at = problem(decay(other=1.0))
     with (
         ProcessPoolExecutor(1, initializer=os._exit, initargs=(1,)) as dying,  # pyright: ignore

@@ -62,7 +62,7 @@ T = np.linspace(0.0, 10.0, 501)
 TRUTH = {"w": 9.0, "d": 0.02}
 
 
-def asked() -> Fit:
+def requested() -> Fit:
     """Fourteen periods, from a frequency that is off by a quarter: many minima lie between."""
     y = simulate(SWING, 10.0, p=TRUTH, t_eval=T, rtol=1e-9)["y"]
     y = y + 1e-3 * np.random.default_rng(0).standard_normal(T.size)
@@ -71,7 +71,7 @@ def asked() -> Fit:
 
 
 def test_a_start_far_off_needs_the_windows() -> None:
-    prepared = asked().prepared()
+    prepared = requested().prepared()
     task, first = prepared.task, prepared.centre
     (easier,) = task.easier
     assert len(easier.unknowns.fitted) > len(task.unknowns.fitted)

@@ -76,8 +76,10 @@ def test_break_away_of_ramps_and_how_it_depends_on_their_rate() -> None:
     assert [e.rate for e in found.events] == pytest.approx([1, 3, 10, 30], rel=1e-6)
     assert found.per_decade == pytest.approx(-0.2, abs=1e-9)
     assert "decreases" in found.note
-    same = break_away(ramps([2.0, 2.0, 2.0], 2.0, 0.0))
-    assert same.per_decade is None and same.level == pytest.approx(2.0, abs=1e-12)
+    equal = ramps([2.0, 2.0, 2.0], 2.0, 0.0)
+    creeping = Measured(np.maximum(equal.v, 5e-3), equal.F + 0.5, t=equal.t)
+    for same in (break_away(equal), break_away(creeping, rest=0.1, offset=0.5)):
+        assert same.per_decade is None and same.level == pytest.approx(2.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("loaded", [1, -1])
@@ -89,7 +91,7 @@ def test_a_record_may_begin_with_all_elements_slipping(loaded: int) -> None:
     assert np.allclose(found.radii, radii, rtol=1e-3)
 
 
-def test_only_the_last_rise_tells_the_rate_of_a_ramp() -> None:
+def test_only_the_last_rise_determines_the_rate_of_a_ramp() -> None:
     """The force rises, gives way to a quarter, and rises again at another rate."""
     h = 1e-3
     rises = [*np.arange(0.0, 1.2, 50 * h), *np.arange(0.4, 2.0, 2 * h)]

@@ -57,7 +57,7 @@ def test_values_and_coordinates_invert_each_other() -> None:
     assert at.named(at.of(values)) == pytest.approx(values)
 
 
-def test_roles_say_what_is_fitted_and_why_not() -> None:
+def test_roles_determine_what_is_fitted_and_give_the_reason() -> None:
     found = subject("lugre", v_max=0.1)
     assert found.names == (
         "m", "offset", "mu_s", "mu_d", "v_s", "sigma_0", "sigma_1", "sigma_2",

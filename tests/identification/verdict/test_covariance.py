@@ -45,7 +45,7 @@ def norm(x: np.ndarray) -> float:
         ("a b c", (2.0, 5.0, 3.0), (C, V, C + 2 * V), "Of a, b and c only 2 combinations are iden"),
     ],
 )  # fmt: skip
-def test_what_is_not_told_is_said(
+def test_what_is_not_identifiable_is_reported(
     names: str, values: tuple[float, ...], columns: tuple[np.ndarray, ...], sentence: str
 ) -> None:
     J = np.column_stack(columns)
@@ -56,7 +56,7 @@ def test_what_is_not_told_is_said(
         assert np.isnan(error) == (name in group)
 
 
-def test_equal_values_are_told_apart_by_going_a_little_way() -> None:
+def test_equal_values_are_distinguished_by_a_small_step() -> None:
     """a = b = 2: a product and a sum have the same derivatives."""
     same: Any = ("a b", 2 * C, 2 * C)
     product = of(*same, values=(2.0, 2.0), change=lambda p: norm((p[0] * p[1] - 4) * C))
@@ -65,7 +65,7 @@ def test_equal_values_are_told_apart_by_going_a_little_way() -> None:
     assert "sum a + b" in total.sentences[0]
 
 
-def test_difference_is_told_where_the_coordinate_is_the_excess() -> None:
+def test_difference_is_identifiable_where_the_coordinate_is_the_excess() -> None:
     """mu_s = mu_d + w: the untold coordinate is mu_d, the untold values are both."""
     slope = np.array([[1.0, 0.0], [1.0, 1.0]])
     change = lambda p: norm((p[1] - p[0] - 3) * C)  # noqa: E731
@@ -84,11 +84,11 @@ def test_bounds_count_as_known_and_logarithms_keep_their_sign() -> None:
     assert found.sentences[0].startswith("v_s is poorly identified: between ")
 
 
-def test_half_of_itself_is_hardly_told() -> None:
+def test_an_error_of_half_the_value_is_poorly_identified() -> None:
     (error,) = of("F_C", C).standard_errors
     assert of("F_C", C, values=[error / 0.45]).sentences == ()
-    (said,) = of("F_C", C, values=[error / 0.55]).sentences
-    assert said.startswith("F_C is poorly identified: between ")
+    (reported,) = of("F_C", C, values=[error / 0.55]).sentences
+    assert reported.startswith("F_C is poorly identified: between ")
 
 
 @pytest.mark.parametrize("logarithmic", [True, False])
@@ -99,18 +99,20 @@ def test_what_could_be_nearly_anything_has_no_interval(logarithmic: bool) -> Non
     for lost in (found.standard_errors, found.white_errors, found.low, found.high):
         assert np.isnan(lost).tolist() == [True, False]
     assert set(found.notes) == {"k"}
-    said = "k is not identifiable: its effect on the measurements is below the noise."
-    assert [s for s in found.sentences if "k " in s] == [said]
+    reported = "k is not identifiable: its effect on the measurements is below the noise."
+    assert [s for s in found.sentences if "k " in s] == [reported]
 
 
-def test_a_level_far_above_every_force_is_not_told() -> None:
-    """However small its formal error is; a level near the forces is told, a mass is no level."""
+def test_a_level_far_above_every_force_is_not_identifiable() -> None:
+    """Regardless of its formal error. Levels near the forces and masses are not affected."""
     levels = Levels({"mu_s": 2.0, "mu_d": 2.0}, 0.6)
     columns = C, V, np.gradient(V)
     found = of("mu_s mu_d m", *columns, levels=levels, values=(253.0, 0.2, 900.0))
     assert np.isnan(found.standard_errors).tolist() == [True, False, False]
-    said = "mu_s is not identifiable: no friction force in the data is near 506 N, the largest is"
-    assert found.sentences[0] == f"{said} 0.6 N."
+    reported = (
+        "mu_s is not identifiable: no friction force in the data is near 506 N, the largest is"
+    )
+    assert found.sentences[0] == f"{reported} 0.6 N."
     assert "mu_s is poorly" not in " ".join(found.sentences)
 
 
@@ -121,7 +123,7 @@ def test_tied_values_follow() -> None:
     assert found.correlation[0, 2] == pytest.approx(1.0)
 
 
-def test_few_effective_samples_are_said() -> None:
+def test_few_effective_samples_are_reported() -> None:
     made = fitted(coulomb(200), 0.01 * np.cumsum(ar1(200, 0.5, 2)))
     assert any("independent samples for 4 unknowns" in s for s in covariance(made).sentences)
 
@@ -152,7 +154,7 @@ def test_a_level_at_its_upper_bound_has_no_interval() -> None:
 
 
 def test_a_level_whose_excess_has_no_effect_does_not_borrow_the_error_of_the_lower_one() -> None:
-    """A record that only slides: 0.344 +- 2e-7 N was said of a static level of 0.15 N."""
+    """A record that only slides: 0.344 +- 2e-7 N was reported for a static level of 0.15 N."""
     three = (
         Unknown("mu_s", "N", 0.15, above="mu_d", scale=0.15),
         Unknown("mu_d", "N", 0.1, lower=1e-9, logarithmic=True),

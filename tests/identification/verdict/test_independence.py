@@ -113,9 +113,9 @@ def record(z: float) -> Dataset:
 
 
 @pytest.mark.parametrize(("load", "loaded"), [(-1.0, True), (0.0, False)])
-def test_a_record_that_begins_loaded_is_said_to_be(load: float, loaded: bool) -> None:
+def test_a_record_that_begins_loaded_is_reported(load: float, loaded: bool) -> None:
     fit = Fit(Points(), "lugre", record(load * 0.2 / 1e4), starts=1).solve(throw=False)
-    said = [s for s in fit.verdict.sentences if "the record starts under load" in s]
-    assert len(said) == loaded
+    reported = [s for s in fit.verdict.sentences if "the record starts under load" in s]
+    assert len(reported) == loaded
     assert (fit.status is Status.SOLVED) != loaded
-    assert not loaded or said[0].startswith("The residuals of F are ")
+    assert not loaded or reported[0].startswith("The residuals of F are ")

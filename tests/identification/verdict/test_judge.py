@@ -63,9 +63,9 @@ def test_a_fit_that_explains_little_is_doubtful_even_if_what_is_left_is_white(
     verdict = judge(replace(found, held=held))
     assert not verdict.nonsense
     assert verdict.status(Status.SOLVED) is (Status.SOLVED if good else Status.DOUBTFUL)
-    said = verdict.sentences[0] if verdict.sentences else ""
-    assert ("unexplained" in said and "lower cut-off" in said) != good
-    assert ("at a bound" in said) == (at_bound and not good)
+    reported = verdict.sentences[0] if verdict.sentences else ""
+    assert ("unexplained" in reported and "lower cut-off" in reported) != good
+    assert ("at a bound" in reported) == (at_bound and not good)
 
 
 def test_no_physics_is_implausible() -> None:

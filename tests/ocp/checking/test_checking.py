@@ -342,7 +342,7 @@ def test_nodes_move_and_their_number_stays_where_errors_are_misplaced() -> None:
     pulse = ca.exp(-((t - 0.3) ** 2) / 2e-4)
     model = Model("pulse", x=(x,), u=(u,), t=t, ode=u.symbol + 50 * pulse * (1 - x.symbol))
     problem = Problem(Phase(model, 1.0, end={"x": 1.0}), integral(lambda s: s.u**2))
-    goals = Goals.of(1e-3)._replace(loss=1.0)
+    goals = replace(Goals.of(1e-3), loss=1.0)
     meshes = make_meshes(problem, 40)
     solution = refined_solve(problem, meshes, goals=goals)
     assert solution.meshes[0].size == meshes[0].size
@@ -354,7 +354,7 @@ def test_nodes_move_and_their_number_stays_where_errors_are_misplaced() -> None:
 
 def test_large_program_is_not_refined_for_the_cost_alone() -> None:
     problem = bryson_denham()
-    goals = Goals.of(1e-3)._replace(nonzeros=5000)
+    goals = replace(Goals.of(1e-3), nonzeros=5000)
     solution = refined_solve(problem, make_meshes(problem, 20), goals=goals)
     statistics = solution.statistics
     assert 2500 < statistics.jacobian_nonzeros + statistics.hessian_nonzeros < 5500

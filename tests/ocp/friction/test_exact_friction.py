@@ -146,7 +146,7 @@ def moving_ground() -> Model:
 
 
 def driven_twice() -> Model:
-    """Two contacts in one motion, written by hand: nobody knows of a loop."""
+    """Two contacts in one motion, written by hand: no loop is declared."""
     x, v, u = Variable("x", "m"), Variable("v", "m/s"), Variable("force", "N")
     arm, slide = (Contact(name, v.symbol, 10.0, SHARP) for name in ("arm", "slide"))
     return Model("twice", x=(x, v), u=(u,), contacts=(arm, slide),

@@ -247,7 +247,7 @@ def upright(model: Model) -> Problem:
 
 
 @pytest.mark.slow
-def test_pendulum_stands_on_a_cart_with_sharper_friction() -> None:
+def test_pendulum_is_balanced_on_a_cart_with_sharper_friction() -> None:
     made = controller_of(upright(cart(2e-2)), 0.02, steps=4)
     found = made.simulate(cart(1e-4), 3.0, {"goal": 0.3}, x0={"theta": np.pi - 0.3}, check=False)
     assert found.unreported == 0

@@ -215,8 +215,8 @@ def test_worst_of_rows_and_bounds_is_named_with_its_time() -> None:
 def test_what_is_not_finite_is_named(cost: object, text: str) -> None:
     problem = unit_move(cost=cost, end={})
     made = discretise(problem, Radau()).on(make_meshes(problem, 4)).program
-    said = not_finite(made, np.zeros(made.w.numel()), made.values, as_fraction)
-    assert said.startswith(text) and bool(said) == bool(text)
+    reported = not_finite(made, np.zeros(made.w.numel()), made.values, as_fraction)
+    assert reported.startswith(text) and bool(reported) == bool(text)
 
 
 def test_times_of_places_continue_over_the_phases() -> None:

@@ -136,7 +136,7 @@ def test_members_in_lanes_are_those_of_single_runs() -> None:
     assert row["relative difference at the end"] < 1e-5
 
 
-def test_without_a_graphics_processor_a_note_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_graphics_processor_a_note_reports_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cupy", None)
     (note,) = ensemble.cuda()
     assert str(note).startswith("Graphics processor: not run, simulate_many: backend='cuda' needs")

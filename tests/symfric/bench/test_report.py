@@ -64,12 +64,12 @@ def test_an_interrupt_keeps_the_rows_so_far() -> None:
         yield "T", ROWS[0]
         raise KeyboardInterrupt
 
-    told: list[tuple[str, float]] = []
+    reported: list[tuple[str, float]] = []
     tasks = {"a": found, "b": interrupted, "c": found}
-    made = Report().collect(tasks, lambda *at: told.append(at))
+    made = Report().collect(tasks, lambda *at: reported.append(at))
     assert [*made.tables["T"]] == [*ROWS, ROWS[0]]
     assert "Interrupted" in made.notes[-1]
-    assert told == [("a", 0.0), ("b", 1 / 3)]
+    assert reported == [("a", 0.0), ("b", 1 / 3)]
 
     def at_once() -> Iterator[Found]:
         raise KeyboardInterrupt
@@ -146,17 +146,19 @@ def test_compile_time_is_that_of_the_compiler() -> None:
 def test_the_command_prints_and_writes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    asked: list[object] = []
+    requested: list[object] = []
 
     def bench(*arguments: object, **options: object) -> Report:
-        asked.append((arguments, {name: options[name] for name in options if name != "progress"}))
+        requested.append(
+            (arguments, {name: options[name] for name in options if name != "progress"})
+        )
         return report()
 
     monkeypatch.setattr("symfric.bench.multibody.bench", bench)
     files = {"--json": "b.json", "--csv": "b.csv", "--plot": "b.svg"}
     options = [part for o, name in files.items() for part in (o, str(tmp_path / name))]
     assert main(["bench", "multibody", "--quick", "--links", "4,2", *options]) == 0
-    assert asked == [((True,), {"links": (2, 4)})]
+    assert requested == [((True,), {"links": (2, 4)})]
     data = json.loads((tmp_path / "b.json").read_text("utf-8"))
     assert data["tables"]["T"][1] == ROWS[1] | {"time [ms]": None}
     assert all((tmp_path / name).stat().st_size > 0 for name in files.values())

@@ -70,7 +70,7 @@ def test_an_attempt_holds_the_controls_of_each_phase() -> None:
     assert sum(mesh.size for mesh in attempt.meshes) == found.t_control.size
     assert [float(mesh[0]) for mesh in attempt.meshes] == [0.0, 0.0]
     assert landed(problem, attempt) < 1e-4
-    ready = READY["out_and_back"]._replace(optimum=found.cost, friction=False)
+    ready = replace(READY["out_and_back"], optimum=found.cost, friction=False)
     held = tuple({name: 0 * u for name, u in c.items()} for c in attempt.controls)
     wrong = replace(attempt, cost=0.5 * found.cost, controls=held)
     _, row = ocp._row(ready, problem, "x", "near", [attempt, wrong, attempt])
@@ -143,7 +143,7 @@ def goals(rows: object) -> dict[str, Row]:
     return {row["quantity"]: row for title, row in rows if title == GOALS}  # type: ignore[union-attr]
 
 
-def test_without_data_the_rows_say_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_data_the_rows_report_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("EMPS", "FRANKA"):
         monkeypatch.setattr(measured, name, tmp_path)
     made = identification.bench(quick=True, cases=("emps", "franka"))

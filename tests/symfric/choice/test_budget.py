@@ -47,7 +47,7 @@ class Written:
     error: Any
     attempts: Any
     fails: Status = Status.MAX_STEPS
-    asked: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
+    requested: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
     law: Any = None
     power: float = 1.0
 
@@ -55,7 +55,7 @@ class Written:
         return s
 
     def run(self, s: float, rtol: float, most: int) -> Sample:
-        self.asked.append((s, rtol))
+        self.requested.append((s, rtol))
         if (made := self.attempts(s, rtol)) > most:
             raise SolveError("too many", self.fails, PARTIAL)
         return Sample(s, {}, rtol, made, made, 0.0, np.array([[1 + self.error(s, rtol)]]), ONE)
@@ -74,7 +74,7 @@ def test_no_run_is_made_twice_and_those_that_fail_count() -> None:
     held = Written(lambda s, _: s, lambda s, _: 100 if s > 0.5 else 10**9)
     runs = budget(held)
     assert runs.run(1.0, 1e-6) is runs.run(1.0, 1e-6)
-    assert (runs.attempts, len(held.asked)) == ([100], 1)
+    assert (runs.attempts, len(held.requested)) == ([100], 1)
     with pytest.raises(SolveError):
         runs.run(0.25, 1e-6)
     assert runs.attempts == [100, TRIED]
@@ -115,7 +115,7 @@ def test_only_a_run_of_too_many_attempts_is_made_at_a_looser_tolerance(status: S
     if status is Status.JAMMED:
         with pytest.raises(SolveError):
             continued(budget(held), TRUTH, GOAL)
-        assert held.asked == [(1.0, 1e-6)]
+        assert held.requested == [(1.0, 1e-6)]
         return
     held.power = 0.0
     found = continued(budget(held), TRUTH, GOAL)

@@ -79,7 +79,7 @@ def near(limit: float, order: float, wide: float = 0.0) -> Callable[[float], Smo
     return run
 
 
-def test_another_motion_is_said_of_a_limit_with_its_order_alone() -> None:
+def test_another_motion_is_reported_only_of_a_limit_with_its_order() -> None:
     """Of runs that converge, narrower than the speeds of a machine, to what is off."""
     for order in (0.5, 1.0, 2.0):
         found = study(near(0.2, order), 1e-3, 1e-3, 1.0, (ValueError,))
@@ -179,7 +179,7 @@ def test_words_of_papers_are_known() -> None:
     assert needed("n", ["break-away", "Frictional lag", "P"]) == ("stiction", "presliding", "lag")
 
 
-def test_ranked_laws_stand_by_work_others_by_error_whatever_the_clock_says() -> None:
+def test_ranked_laws_are_sorted_by_work_others_by_error_regardless_of_time() -> None:
     rows = [
         replace(ROW, law="slow", attempts=20, time_s=1e-9), replace(ROW, law="fast"),
         replace(ROW, law="alike", attempts=11, time_s=9.0),

@@ -84,7 +84,7 @@ def judged(seed: int, laws: Sequence[str] = LAWS) -> tuple[int, int]:
     return len(found.ranked), len(found.placed)
 
 
-def test_no_law_that_converges_is_said_to_tend_to_another_motion() -> None:
+def test_no_convergent_law_is_reported_to_tend_to_another_motion() -> None:
     assert judged(0, ("stribeck", "lugre")) == (2, 2)
 
 

@@ -32,7 +32,7 @@ def choice() -> Choice:
     return select(Rabinowicz, SOME, accuracy=1e-2, t_end=SHORT, fixed_steps=False)
 
 
-def test_every_candidate_has_a_row_that_says_where_it_stands(choice: Choice) -> None:
+def test_every_candidate_has_a_row_with_its_standing(choice: Choice) -> None:
     assert {row.law for row in choice} == set(SOME)
     assert {row.law for row in choice.ranked} == {
         "brown_mcphee", "lugre", "exact_coulomb", "makkar_dixon",
@@ -81,7 +81,7 @@ def test_it_is_as_soft_as_the_accuracy_allows() -> None:
     assert 0.5e-2 < wide["brown_mcphee"].error < 1e-2
 
 
-def test_a_scene_as_it_stands_gives_the_levels() -> None:
+def test_an_unchanged_scene_gives_the_levels() -> None:
     found = select(
         Rabinowicz(LuGre(mu_s=0.2, mu_d=0.12)), ["stribeck"], accuracy=0.05, t_end=10.0,
         fixed_steps=False,
@@ -198,19 +198,19 @@ def test_a_process_that_ends_is_a_row() -> None:
 
     laws = ["stribeck", "lugre"]
     found = select(deadly, laws, accuracy=0.2, t_end=0.2, workers=2, fixed_steps=False)
-    assert found["stribeck"].reason == "its process ended with exit status 3"
+    assert found["stribeck"].reason == "its process ended with exit status 3: no output"
     assert found["lugre"].attempts > 0
 
 
 def test_laws_left_out_stand_by_the_reason(choice: Choice) -> None:
-    said = list(lines(choice))
+    reported = list(lines(choice))
     rows = choice.rows
     alike = tuple(
         replace(row, law=n) for row in rows if row.law == "coulomb" for n in ("one", "two")
     )
-    assert "lacks, shows no stiction, no stribeck: coulomb" in said
+    assert "lacks, shows no stiction, no stribeck: coulomb" in reported
     tied = {row.rank for row in rows if [r.rank for r in rows].count(row.rank) > 1}
-    marked = [line[2] == "=" for line in said if line[:2].strip().isdigit()]
+    marked = [line[2] == "=" for line in reported if line[:2].strip().isdigit()]
     assert marked == [row.rank in tied for row in choice.placed]
     both = list(lines(replace(choice, rows=rows + alike)))
     assert "lacks, shows no stiction, no stribeck: coulomb, one, two" in both

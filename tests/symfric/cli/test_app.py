@@ -133,9 +133,9 @@ def test_an_interrupt_ends_with_status_130_and_keeps_the_results_so_far(
 
     monkeypatch.setattr(output, "progress", progress)
     line = "run rabinowicz --law lugre --t-end 1e4 --backend vm --out part.csv --json part.json"
-    said = symfric(line, 130)
-    assert "Interrupted by the user" in said.err
-    assert "INTERRUPTED: see the last line" in said.out
+    printed = symfric(line, 130)
+    assert "Interrupted by the user" in printed.err
+    assert "INTERRUPTED: see the last line" in printed.out
     assert '"status": "INTERRUPTED"' in Path("part.json").read_text()
     assert Path("part.csv").stat().st_size > 0
 
@@ -227,7 +227,7 @@ def test_json_docstrings_and_notes(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_errors_of_the_system_are_sentences() -> None:
     for file, place in (("run.npz",), " for 'run.npz'"), ((), ""):
-        told = sentence(OSError(ENOSPC, "No space left on device", *file))
-        assert told.startswith(f"expected free disk space, got none{place}; free some")
+        reported = sentence(OSError(ENOSPC, "No space left on device", *file))
+        assert reported.startswith(f"expected free disk space, got none{place}; free some")
     assert sentence(OSError(13, "Permission denied", "x.csv")) == "'x.csv': Permission denied"
     assert "a task that fits into memory" in sentence(MemoryError())

@@ -35,14 +35,14 @@ def test_failed_figures_are_reported(symfric, monkeypatch: pytest.MonkeyPatch) -
         texts, ("This with that", "word ...", "One", "0.5 mm ... 2 only"), strict=True
     ):
         records = {NAME: record | {"compared": text}}
-        for asked, status in ((("a", NAME), 1), (("a", NAME, "b"), 130)):
-            done = Gallery(Path(), asked, records, {"a": "ValueError: none"}, 2.0)
+        for requested, status in ((("a", NAME), 1), (("a", NAME, "b"), 130)):
+            done = Gallery(Path(), requested, records, {"a": "ValueError: none"}, 2.0)
             monkeypatch.setattr(rendering, "render", lambda *_, done=done, **__: done)
-            said = symfric("gallery --quick --out g", status)
-            assert "a failed, ValueError: none" in said.err
-            assert ("1 of 3 figures were not computed" in said.err) is (status == 130)
-            assert f"1 of {len(asked)} figures in 2 s" in said.err
-            words = " ".join(said.out.split())
+            printed = symfric("gallery --quick --out g", status)
+            assert "a failed, ValueError: none" in printed.err
+            assert ("1 of 3 figures were not computed" in printed.err) is (status == 130)
+            assert f"1 of {len(requested)} figures in 2 s" in printed.err
+            words = " ".join(printed.out.split())
             assert "self_tuning: A and B, Title" in words
             assert shown in words
             assert "More" not in words and "Two" not in words
@@ -64,17 +64,19 @@ def test_a_campaign_prints_a_table_and_writes_json(symfric) -> None:
 def test_a_failing_campaign_saves_its_cases(symfric, monkeypatch: pytest.MonkeyPatch) -> None:
     report = Report(1, 3, {0: Verdict("silent", "far off"), 1: Verdict("right")}, 1.0)
     monkeypatch.setattr("symfric.stress.campaign.campaign", lambda *_, **__: report)
-    said = symfric("stress --out .", 1)
+    printed = symfric("stress --out .", 1)
     assert Case.read(Path("silent_1_0.json")) == draw(1, 0)
-    assert "Interrupted: 1 of 3 cases were not run." in said.out
-    assert all(name in said.out for name in CLASSES)
-    assert "silent_1_0.json" in said.err
+    assert "Interrupted: 1 of 3 cases were not run." in printed.out
+    assert all(name in printed.out for name in CLASSES)
+    assert "silent_1_0.json" in printed.err
     monkeypatch.setattr("symfric.stress.campaign.rerun", lambda *_: Verdict("silent", "far off"))
-    said = symfric("stress --case silent_1_0.json", 1)
+    printed = symfric("stress --case silent_1_0.json", 1)
     case = draw(1, 0)
-    assert f"{case.law} in {case.scene}, rtol {case.rtol:g}, {case.method}: silent. far" in said.out
-    said = symfric("stress --case silent_1_0.json --json -", 1)
-    assert said.json["verdict"]["kind"] == "silent"
+    assert (
+        f"{case.law} in {case.scene}, rtol {case.rtol:g}, {case.method}: silent. far" in printed.out
+    )
+    printed = symfric("stress --case silent_1_0.json --json -", 1)
+    assert printed.json["verdict"]["kind"] == "silent"
 
 
 def test_files_are_written_while_a_campaign_runs(
@@ -106,9 +108,11 @@ def test_a_benchmark_is_printed_and_written(symfric, monkeypatch: pytest.MonkeyP
 
     seen: list[Any] = []
     monkeypatch.setattr(campaigns, "measure", measure)
-    said = symfric("bench multibody --quick --links 4,2,2 --plot b.png --csv b.csv --json b.json")
-    assert said.err == "wrote b.png, b.csv, b.json\n"
-    assert all(text in said.out for text in ("Runs", "tool", "ours", "A sentence."))
+    printed = symfric(
+        "bench multibody --quick --links 4,2,2 --plot b.png --csv b.csv --json b.json"
+    )
+    assert printed.err == "wrote b.png, b.csv, b.json\n"
+    assert all(text in printed.out for text in ("Runs", "tool", "ours", "A sentence."))
     assert seen == [("multibody", True, {"links": (2, 4)})]
     assert (Path("b.png").read_text(), Path("b.csv").read_text()) == ("p", "c")
 
@@ -120,8 +124,8 @@ def test_the_demo_runs_on_a_simulated_record(symfric, monkeypatch: pytest.Monkey
     monkeypatch.setattr(Figure, "savefig", lambda _, to, **__: Path(to).write_bytes(PNG))
     short = partial(demo.synthetic_drive_data, rate=500.0)
     monkeypatch.setattr(demo, "synthetic_drive_data", lambda **how: short(**SHORT | how))
-    said, out = symfric("demo"), Path("out")
-    assert "no measured record found" in said.err
+    printed, out = symfric("demo"), Path("out")
+    assert "no measured record found" in printed.err
     listed = set(re.findall(r"\]\(([^)]+)\)", (out / "README.md").read_text()))
     present = {path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()}
     assert present == listed | {"README.md"}
@@ -129,5 +133,5 @@ def test_the_demo_runs_on_a_simulated_record(symfric, monkeypatch: pytest.Monkey
     fit = json.loads((out / "identification" / "fit.json").read_text())["parameters"]
     for name, value in {"mu_s": 28.0, "mu_d": 20.0, "m": 95.0}.items():
         assert fit[name]["value"] == pytest.approx(value, rel=0.02)
-    assert said.out.count("  yes  ") == 2
-    assert said.out.count("verified (") == 2
+    assert printed.out.count("  yes  ") == 2
+    assert printed.out.count("verified (") == 2

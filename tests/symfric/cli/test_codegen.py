@@ -32,8 +32,8 @@ def names(of: list[dict[str, Any]]) -> list[str]:
 
 
 def test_files_are_written_and_verified(symfric) -> None:
-    said = symfric("codegen --law lugre --out c --step-size 0.002 --set mu_s=0.2 --json r.json")
-    head, *lines, last = said.err.splitlines()
+    printed = symfric("codegen --law lugre --out c --step-size 0.002 --set mu_s=0.2 --json r.json")
+    head, *lines, last = printed.err.splitlines()
     result = json.loads(Path("r.json").read_text())
     written = {path.name for path in Path("c").iterdir()}
     assert {Path(file).name for file in result["files"]} == written
@@ -46,9 +46,9 @@ def test_files_are_written_and_verified(symfric) -> None:
     assert (double["real"], double["ulp"], double["warnings"]) == ("double", 0, [])
     assert (single["real"], result["law"]) == ("float", "lugre")
     assert result["verification"]["ok"]
-    assert "lugre: verified" in said.out
-    assert "bit for bit equal" in said.out
-    assert "within rounding" in said.out
+    assert "lugre: verified" in printed.out
+    assert "bit for bit equal" in printed.out
+    assert "within rounding" in printed.out
     assert described("lugre")["constants"]["h"] == 0.002
     assert "default 0.2" in Path("c/lugre_f64.h").read_text()
 
@@ -148,9 +148,9 @@ def test_a_compensator_of_a_fit_has_the_load_and_offset_of_its_drive(symfric) ->
 def test_the_c_of_a_fit_has_its_numbers(symfric) -> None:
     make(records=1, starts=1, n=800).to_json("fit.json")
     line = "codegen fit.json --out c --real double --no-kit"
-    said = symfric(line)
-    assert "mu_s, mu_d: fitted as forces under a load of 1 N" in said.err
-    assert "bit for bit equal" in said.out
+    printed = symfric(line)
+    assert "mu_s, mu_d: fitted as forces under a load of 1 N" in printed.err
+    assert "bit for bit equal" in printed.out
     law = {p["name"]: p["default"] for p in described("stribeck")["parameters"]}
     assert law["mu_s"] == Fitted.from_json("fit.json").values["mu_s"] > 20
     symfric("codegen fit.json --scene drive --set m=3 --set N=1 --out c --step-size 1e-3 --no-kit")
@@ -179,13 +179,13 @@ def test_sizes_are_measured_on_cores_without_a_compiler(
 
     monkeypatch.setattr(command, "measure", measure)
     line = "codegen --law coulomb --real float --no-kit --out c --core m4f --core m3"
-    said = symfric(f"{line} --json r.json", 1).out
-    assert "no C compiler found" in said
+    printed = symfric(f"{line} --json r.json", 1).out
+    assert "no C compiler found" in printed
     assert Path("c/coulomb_f32.c").is_file()
-    rows = {row.split()[1]: row.split()[2:] for row in said.splitlines() if row[:5] == "float"}
+    rows = {row.split()[1]: row.split()[2:] for row in printed.splitlines() if row[:5] == "float"}
     assert rows["m4f"] == ["88", "16", "12", "15"]
     assert rows["m3"] == ["-"] * 4
-    assert "m3: no QEMU" in said
+    assert "m3: no QEMU" in printed
     assert [m["core"] for m in json.loads(Path("r.json").read_text())["cores"]] == ["m4f", "m3"]
 
 
@@ -198,9 +198,9 @@ def test_the_table_shows_comparisons_and_ties(capsys: pytest.CaptureFixture[str]
     double = Check("double", 28000, (), 0, 0.0, ())
     checks = double, Check("float", 28000, (), None, 0.0, (), ties=3)
     show_verification(Verification("springs", "verified", "gcc", checks))
-    said = " ".join(capsys.readouterr().out.split())
-    assert said.count("rounding decides") == 1
-    assert "float: in 3 of 28000 steps rounding decides a mode, in CasADi as in C" in said
+    printed = " ".join(capsys.readouterr().out.split())
+    assert printed.count("rounding decides") == 1
+    assert "float: in 3 of 28000 steps rounding decides a mode, in CasADi as in C" in printed
 
 
 def test_a_scene_or_a_model_of_a_file_becomes_a_unit(symfric, mine) -> None:
@@ -211,7 +211,7 @@ def test_a_scene_or_a_model_of_a_file_becomes_a_unit(symfric, mine) -> None:
     assert tunable == {"m", "rtol"}
     assert {"modelDescription.xml", "sources/all.c"} <= set(ZipFile("drive.fmu").namelist())
     Path("drive.fmu").unlink()
-    said = symfric("export-fmu mine.py --set m=3")
-    assert "FMI 3.0 co-simulation" in said.out
-    assert said.err == "wrote drive.fmu\n"
+    printed = symfric("export-fmu mine.py --set m=3")
+    assert "FMI 3.0 co-simulation" in printed.out
+    assert printed.err == "wrote drive.fmu\n"
     assert Path("drive.fmu").is_file()

@@ -49,7 +49,7 @@ def test_empty_cells_and_a_pause_are_read_on_request(symfric) -> None:
 
 def test_the_true_values_are_inside_their_intervals_and_files_are_written(symfric) -> None:
     files = "--html r.html --plot r.png --json r.json"
-    said = symfric(f"{LINE} --validate two.csv --profile mu_d {files}")
+    printed = symfric(f"{LINE} --validate two.csv --profile mu_d {files}")
     result = json.loads(Path("r.json").read_text())
     for name, value in TRUTH.items():
         estimate = result["parameters"][name]
@@ -57,13 +57,13 @@ def test_the_true_values_are_inside_their_intervals_and_files_are_written(symfri
     assert result["parameters"]["sigma_2"]["unit"] == "N s/m"
     assert list(result["errors"]) == ["one.csv"]
     assert result["validation"]["two.csv"]["force"]["relative"] < 5.0
-    assert said.out.startswith("coulomb+viscous fitted by InverseDynamics(): ")
-    assert "mu_d: 1" in said.out.splitlines()[-1]
-    assert said.err == "wrote r.html, r.png, r.json\n"
+    assert printed.out.startswith("coulomb+viscous fitted by InverseDynamics(): ")
+    assert "mu_d: 1" in printed.out.splitlines()[-1]
+    assert printed.err == "wrote r.html, r.png, r.json\n"
     assert "<h1>coulomb+viscous</h1>" in Path("r.html").read_text()
     assert Path("r.png").read_bytes().startswith(b"\x89PNG")
     back = Fitted.from_json("r.json")
-    assert str(back) in said.out
+    assert str(back) in printed.out
     assert result["profiles"][0]["name"] == "mu_d"
     assert back.drive is not None
     assert float(back.drive.m) == back.values["m"]
@@ -102,24 +102,24 @@ def test_an_implausible_fit_is_an_error_and_everything_is_written(symfric, made)
     good = made[0][0]
     flipped = Dataset.of(t=good.time, x=good["x"], force=-good["force"], name="flipped")
     flipped.to_csv("one.csv")
-    said = symfric(f"{LINE} --html r.html", 1)
-    assert said.out.startswith("coulomb+viscous fitted by InverseDynamics(): IMPLAUSIBLE")
-    reason = said.err.splitlines()[-1]
+    printed = symfric(f"{LINE} --html r.html", 1)
+    assert printed.out.startswith("coulomb+viscous fitted by InverseDynamics(): IMPLAUSIBLE")
+    reason = printed.err.splitlines()[-1]
     assert reason.startswith("symfric: identify coulomb+viscous: implausible: ")
     assert 'class="verdict bad"' in Path("r.html").read_text()
     swapped = Dataset.of(t=good.time, x=1e-3 * good["force"], force=1e3 * good["x"], name="swapped")
     swapped.to_csv("one.csv")
-    said = symfric(f"{LINE} --json fit.json", 1)
-    assert "columns are exchanged" in " ".join((said.out + said.err).split())
-    assert said.err.splitlines()[-1].startswith("symfric: ")
+    printed = symfric(f"{LINE} --json fit.json", 1)
+    assert "columns are exchanged" in " ".join((printed.out + printed.err).split())
+    assert printed.err.splitlines()[-1].startswith("symfric: ")
 
 
 def test_failed_validation_and_profiles_are_errors(symfric, made) -> None:
     good = made[0][0]
     Dataset.of(t=good.time, x=-good["x"], force=good["force"], name="bad").to_csv("bad.csv")
-    said = symfric(f"{LINE} --validate bad.csv", 1)
-    assert "fitted by" in said.out
-    assert "--validate: " in said.err
+    printed = symfric(f"{LINE} --validate bad.csv", 1)
+    assert "fitted by" in printed.out
+    assert "--validate: " in printed.err
     fit = Fitted.from_json(Path(symfric(f"{LINE} --json f.json").err.split()[-1]))
     refuse(fit, None, ())
     with pytest.raises(SolveError, match="no profile; no data"):

@@ -87,12 +87,12 @@ def test_pictures_are_drawn_with_the_load(symfric, monkeypatch: pytest.MonkeyPat
 
 
 def test_a_figure_is_drawn_summarised_and_given_as_data(symfric) -> None:
-    said = symfric("laws maxwell_slip --figure hysteresis --plot h.png --json h.json")
-    rows = [line.split() for line in said.out.splitlines()]
+    printed = symfric("laws maxwell_slip --figure hysteresis --plot h.png --json h.json")
+    rows = [line.split() for line in printed.out.splitlines()]
     last = next(row for row in rows if row[:3] == ["maxwell_slip,", "20x", "F"])
     assert last[3] == "N"
     assert list(map(float, last[4:])) == pytest.approx((-0.7, 0.75), abs=0.1)
-    assert said.err == "wrote h.png, h.json\n"
+    assert printed.err == "wrote h.png, h.json\n"
     assert Path("h.png").read_bytes().startswith(PNG)
     data = json.loads(Path("h.json").read_text())
     assert data["name"] == "hysteresis"

@@ -15,11 +15,11 @@ from symfric.cli.ocp import scheme_of
 def test_a_problem_of_a_file_is_solved_and_written(symfric, mine) -> None:
     """A mass of 1 kg over 1 m from rest to rest in T: J = 12 / T^3."""
     line = "ocp mine.py --set T=2 --intervals 5"
-    said = symfric(f"{line} --csv a.csv --save a.npz --plot a.png --json a.json")
-    assert said.err == "wrote a.csv, a.npz, a.png, a.json\n"
-    assert "verified" in said.out
-    assert "yes" in said.out
-    assert "difference" not in said.out
+    printed = symfric(f"{line} --csv a.csv --save a.npz --plot a.png --json a.json")
+    assert printed.err == "wrote a.csv, a.npz, a.png, a.json\n"
+    assert "verified" in printed.out
+    assert "yes" in printed.out
+    assert "difference" not in printed.out
     found = json.loads(Path("a.json").read_text())
     assert found["cost"] == pytest.approx(12 / 8, rel=1e-3)
     assert found["verification"]["ok"]

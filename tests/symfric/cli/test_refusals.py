@@ -19,7 +19,7 @@ LAWS = [
     "", " ", "+", "lugre)", "lagged()", "x" * 5000,
     "lagged(" * 500 + "lugre" + ")" * 500, "\x1b[31m", "../lugre", "%s",
 ]  # fmt: skip
-FILES = ["/a-folder-nobody-has/x{}", "record.csv/x{}", ".", "loop/x{}", "a" * 300 + "{}"]
+FILES = ["/no-such-folder/x{}", "record.csv/x{}", ".", "loop/x{}", "a" * 300 + "{}"]
 PICTURES = [f.format(".png") for f in FILES] + ["x", "x.xyz", ".png", "x.png.exe", ""]
 TABLES = [f.format("") for f in FILES]
 DATA = ["force=", "force=bytes.csv:force", "force=huge.csv:force", "force=long.csv:force",
@@ -32,7 +32,7 @@ GRID = {
         "input": ["force=1", "force", "="], "animate": ["x", "x.png"], "method": ["", "AUTO"],
     },
     "run drive --law brown_mcphee --t-end 0.01": {"input": DATA},
-    "run pendulum --law brown_mcphee": {"animate": ["x.mov", "/a-folder-nobody-has/x.gif", "."]},
+    "run pendulum --law brown_mcphee": {"animate": ["x.mov", "/no-such-folder/x.gif", "."]},
     "laws lugre": {"figure": ["", "lagg"], "compare": LAWS, "normal-force": [*NUMBERS, "-1"]},
     "laws": {"": LAWS[2:]},
     "identify record.csv --law coulomb+viscous": {
@@ -48,7 +48,7 @@ GRID = {
         "law": LAWS, "set": PAIRS, "step-size": [*NUMBERS, "0"], "name": ["a b", "1a", "for", ""],
         "free": ["nonsense", ""], "compiler": ["", "/dev/null", "'"],
     },
-    "demo": {"out": ["/dev/null", "/a-folder-nobody-has/x"]},
+    "demo": {"out": ["/dev/null", "/no-such-folder/x"]},
 }  # fmt: skip
 """Good line -> option -> bad values; "" for an argument."""
 
@@ -101,14 +101,19 @@ def verdict(line: list[str], part: str, capsys: pytest.CaptureFixture[str]) -> s
     except Exception as error:  # noqa: BLE001  (whatever comes is the finding)
         return f"{type(error).__name__}: {str(error)[:150]}"
     out, err = capsys.readouterr()
-    told = [text for text in err.splitlines() if not text.startswith("symfric: warning:")]
+    reasons = [text for text in err.splitlines() if not text.startswith("symfric: warning:")]
     if status != 2:
         return f"status {status}: {err[:150]}"
-    if out or len(told) != 1 or not told[0].startswith("symfric: ") or "internal error" in err:
-        return f"said: {out[:80]!r}, {err[:150]!r}"
+    if (
+        out
+        or len(reasons) != 1
+        or not reasons[0].startswith("symfric: ")
+        or "internal error" in err
+    ):
+        return f"printed: {out[:80]!r}, {err[:150]!r}"
     if part not in err:
         return f"no {part!r} in {err!r}"
-    return "" if len(told[0]) < 700 and ".cpp" not in err else f"long: {err[:150]!r}"
+    return "" if len(reasons[0]) < 700 and ".cpp" not in err else f"long: {err[:150]!r}"
 
 
 def test_every_bad_line_is_one_sentence_and_status_2(
@@ -119,9 +124,9 @@ def test_every_bad_line_is_one_sentence_and_status_2(
     before = sorted(path.name for path in folder.iterdir())
     capsys.readouterr()
     wrong = [
-        f"{' '.join(word[:40] or repr(word) for word in line)}: {said}"
+        f"{' '.join(word[:40] or repr(word) for word in line)}: {fault}"
         for line, part in lines()
-        if (said := verdict(line, part, capsys))
+        if (fault := verdict(line, part, capsys))
     ]
     assert not wrong, f"{len(wrong)} of {len(list(lines()))}:\n" + "\n".join(wrong)
     assert sorted(path.name for path in folder.iterdir()) == before

@@ -66,9 +66,9 @@ def test_parameters_and_inputs_are_named_in_the_json(symfric) -> None:
 
 
 def test_files_and_the_table(symfric) -> None:
-    said = symfric(f"{RABINOWICZ} --samples 11 --out x.csv --plot x.png --json x.json")
-    assert said.err == "wrote x.csv, x.png, x.json\n"
-    assert "friction" in said.out
+    printed = symfric(f"{RABINOWICZ} --samples 11 --out x.csv --plot x.png --json x.json")
+    assert printed.err == "wrote x.csv, x.png, x.json\n"
+    assert "friction" in printed.out
     assert Path("x.png").read_bytes().startswith(PNG)
     assert json.loads(Path("x.json").read_text())["status"] == "SUCCESS"
     with Path("x.csv").open(newline="") as file:
@@ -82,9 +82,9 @@ def test_a_failed_solve_has_status_1_and_keeps_the_results_so_far(symfric) -> No
     # an input that leaves the range of double while time goes on
     Path("f.csv").write_text("t [s],force [N]\n0,0\n1,0\n1.5,1e300\n2,1e300\n")
     line = "run drive --law viscous --input force=f.csv:force --t-end 2 --set m=1e-12"
-    said = symfric(f"{line} --out x.csv --json x.json", 1)
-    assert "see the last line for the reason" in said.out
-    written, reason = said.err.splitlines()
+    printed = symfric(f"{line} --out x.csv --json x.json", 1)
+    assert "see the last line for the reason" in printed.out
+    written, reason = printed.err.splitlines()
     assert written == "wrote x.csv, x.json"
     assert reason.startswith("symfric: ")
     result = json.loads(Path("x.json").read_text())
@@ -105,19 +105,19 @@ def test_warnings_of_a_law_concern_numbers_that_were_changed(symfric) -> None:
 @pytest.mark.filterwarnings("default")
 def test_ignored_parts_of_a_robot_are_warned_about(symfric) -> None:
     Path("small.urdf").write_text(SMALL.replace("</joint>", '<limit lower="0"/></joint>'))
-    said = symfric("run small.urdf --law viscous --t-end 0.1 --backend vm")
-    assert said.err == "symfric: warning: urdf 'small': left out: <limit> of joint 'hinge'\n"
+    printed = symfric("run small.urdf --law viscous --t-end 0.1 --backend vm")
+    assert printed.err == "symfric: warning: urdf 'small': left out: <limit> of joint 'hinge'\n"
 
 
 def test_a_mechanism_shows_its_main_signals_constraints_and_energy(symfric) -> None:
     line = "run slider_crank --law brown_mcphee --t-end 0.2 --rtol 1e-8 --backend vm"
-    said = symfric(f"{line} --json x.json")
-    rows = [row.split()[0] for row in said.out.splitlines()[3:] if row]
+    printed = symfric(f"{line} --json x.json")
+    rows = [row.split()[0] for row in printed.out.splitlines()[3:] if row]
     assert {"crank", "crank_rate", "energy"} <= set(rows)
     assert not {"constraint_position", "crank_power"} & set(rows)
-    assert "Largest constraint violations: position " in said.out
-    assert "J, friction -" in said.out
-    assert "unexplained at most" in said.out
+    assert "Largest constraint violations: position " in printed.out
+    assert "J, friction -" in printed.out
+    assert "unexplained at most" in printed.out
     result = json.loads(Path("x.json").read_text())
     balance = result["energy_balance"]
     assert 0 < balance["relative"] < 1e-6
@@ -129,8 +129,8 @@ def test_a_mechanism_shows_its_main_signals_constraints_and_energy(symfric) -> N
 def test_reports_and_animations_are_written_and_named(symfric, monkeypatch) -> None:
     kept = "--html=bericht ä.html".encode().decode("ascii", errors="surrogateescape")
     monkeypatch.setattr("sys.argv", ["symfric", "report", kept])
-    said = symfric("report drive --law viscous --t-end 0.2 --html r.html")
-    assert said.err == "wrote r.html\n"
+    printed = symfric("report drive --law viscous --t-end 0.2 --html r.html")
+    assert printed.err == "wrote r.html\n"
     page = Path("r.html").read_text(encoding="utf-8")
     assert "bericht ä.html" in page
     assert "viscous" in page

@@ -67,16 +67,16 @@ def test_forms_are_set_for_one_law_or_all(symfric, monkeypatch) -> None:
 
 
 def test_laws_without_the_required_phenomena_are_not_fitted(symfric, monkeypatch) -> None:
-    asked = list[str]()
+    requested = list[str]()
 
     def stop(laws: list[str], *_: object) -> None:
-        asked.extend(laws)
+        requested.extend(laws)
         raise ValueError("enough")
 
     monkeypatch.setattr(command, "fitted", stop)
     monkeypatch.setattr(command, "reader", lambda *_: lambda _: None)
     symfric("select drive --law dahl,lugre,coulomb --need presliding,stribeck --data d", 2)
-    assert asked == ["lugre"]
+    assert requested == ["lugre"]
 
 
 def test_fits_are_passed_on_with_their_relative_errors(

@@ -171,8 +171,8 @@ def test_cmake_builds_packages_in_one_folder_also_for_a_core_without_a_system(co
         "lugre_f32_in_t in = {0.1f, 1.0f}; lugre_f32_reset(&s);\n"
         "return (int)lugre_f32_step(&s, &lugre_f32_default, &in, &o); }\n"
     )
-    said = done("cmake", "-S", tmp_path, "-B", bare, "-DCMAKE_SYSTEM_NAME=Generic")
-    assert "Warning" not in said + done("cmake", "--build", bare)
+    reported = done("cmake", "-S", tmp_path, "-B", bare, "-DCMAKE_SYSTEM_NAME=Generic")
+    assert "Warning" not in reported + done("cmake", "--build", bare)
     assert (bare / "servo").is_file()
     assert not [*bare.rglob("*_test*"), *bare.rglob("*shared*.so")]
 

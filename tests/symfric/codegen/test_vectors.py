@@ -78,10 +78,10 @@ def test_guards_add_a_row_for_each_number_that_is_bad(found):
     assert new == 3 * (len(LUGRE.inputs) + len(LUGRE.states)) + len(LUGRE.parameters)
     assert (guarded.status[:-new] == 0).all()
     assert (guarded.status[-new:] != 0).all()
-    said = np.bitwise_or.reduce(guarded.status)
-    assert said & Status.NOT_FINITE
-    assert said & Status.STATE
-    assert said & Status.PARAMETER
+    reported = np.bitwise_or.reduce(guarded.status)
+    assert reported & Status.NOT_FINITE
+    assert reported & Status.STATE
+    assert reported & Status.PARAMETER
     after = guarded.results[:, : len(LUGRE.states) + len(LUGRE.outputs)]
     assert np.isfinite(after).all()
 

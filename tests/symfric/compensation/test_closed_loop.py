@@ -63,7 +63,7 @@ def test_a_limit_cycle_of_a_millimetre_vanishes(name: str) -> None:
     found = compared(name, step(0.01, 20.0 if name == "springs" else 12.0))
     assert found["without"].hunting > 1000 * SOFT.count
     assert found["compensated"].hunting < SOFT.count
-    assert not [said for said in found.remarks() if said.startswith("compensated")]
+    assert not [remark for remark in found.remarks() if remark.startswith("compensated")]
 
 
 @heavy

@@ -140,7 +140,7 @@ def test_a_scene_shows_the_signals_that_the_laws_share() -> None:
     assert data["brown_mcphee"]["x"].max() == pytest.approx(0.5705, rel=0.02)
 
 
-def test_a_law_that_cannot_show_it_is_left_out_and_the_note_says_why() -> None:
+def test_a_law_that_cannot_show_it_is_left_out_with_the_reason_in_the_note() -> None:
     data = sf.compare([sf.LuGre(), sf.Coulomb()], "hysteresis")
     assert {curve.law for curve in data.curves} == {"lugre"}
     assert data.note == "without coulomb: expected a law that shows pre-sliding displacement"
@@ -158,7 +158,7 @@ def test_a_population_is_left_out_of_a_scene() -> None:
     assert data.note == "without generic_asperity: expected a law with equations"
 
 
-def test_the_title_says_the_inputs_of_all_laws() -> None:
+def test_the_title_lists_the_inputs_of_all_laws() -> None:
     title = sf.compare(["coulomb", "karnopp", "awrejcewicz", "bam"], "profile").title
     assert title.endswith("N = 7.848 N, F_e = 1 N, tau_m = 1 N m, tau_e = 0.5 N m")
     assert sf.compare(["karnopp", "lugre"], "rabinowicz").title == "rabinowicz"

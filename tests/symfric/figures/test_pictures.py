@@ -114,7 +114,7 @@ def test_catalogue_has_a_panel_of_its_own_scale_for_every_law() -> None:
     assert all(b == pytest.approx(a / 10, rel=0.2) for a, b in pairwise(edges))
 
 
-def test_a_figure_says_its_note_and_reads_in_its_units() -> None:
+def test_a_figure_prints_its_note_and_its_units() -> None:
     drawn = compare(["lugre", "coulomb"], "hysteresis").plot()
     (axis,) = drawn.axes
     assert (axis.get_xlabel(), axis.get_ylabel()) == ("x [µm]", "F [N]")
@@ -136,7 +136,7 @@ def test_one_colour_a_law_one_line_style_a_case() -> None:
     assert drawn.axes[0].get_title(loc="left") == "not drawn: steady"
 
 
-def test_loops_of_several_laws_are_drawn_at_one_speed_and_the_picture_says_so() -> None:
+def test_loops_of_several_laws_are_drawn_at_one_labelled_speed() -> None:
     figure = compare(["lugre", "maxwell_slip"], "hysteresis").plot()
     (axis,) = figure.axes
     assert [line.get_label() for line in axis.lines] == ["lugre, 1x", "maxwell_slip, 1x"]

@@ -14,7 +14,7 @@ from symfric.figures.regularisation import distance, machine_of, regularisation,
 from symfric.scenes import Drive, PendulumBox, Rabinowicz, SliderCrank
 
 
-def test_roles_say_what_makes_a_law_smooth() -> None:
+def test_roles_mark_what_makes_a_law_smooth() -> None:
     smoothing = {
         sf.BrownMcPhee(): "v_t",
         sf.Coulomb(): "v_eps",
@@ -41,13 +41,13 @@ def test_stiffness_and_inverse_velocity_grow_where_widths_shrink() -> None:
         assert sf.parameters(knob.at(0.3))[name].value == knob.values(0.3)[name]
 
 
-def test_every_law_either_says_or_asks() -> None:
+def test_every_law_declares_its_width_or_requires_it() -> None:
     for law in sf.ALL_LAWS.values():
         try:
             assert regularisation("here", law()).powers
         except ValueError as error:
-            said = ("parameter: expected what makes", "is it dry already", "rests exactly")
-            assert any(text in str(error) for text in said)
+            sentences = ("parameter: expected what makes", "is it dry already", "rests exactly")
+            assert any(text in str(error) for text in sentences)
 
 
 def test_a_machine_is_a_scene_its_class_or_a_function() -> None:
@@ -98,7 +98,7 @@ def test_error_is_kept_against_friction_without_regularisation(found: sf.Recomme
     assert found.order == pytest.approx(2 / 3, abs=0.05)
 
 
-def test_it_says_what_was_set_and_what_it_costs(found: sf.Recommendation) -> None:
+def test_it_reports_what_was_set_and_its_cost(found: sf.Recommendation) -> None:
     assert sf.parameters(found.law)["v_t"].value == found.values["v_t"]
     run = sf.simulate(sf.rabinowicz(found.law), 20.0, rtol=found.rtol)
     assert found.steps == run.statistics.steps
@@ -144,7 +144,7 @@ def test_numbers_of_a_cycle_need_less_than_the_whole_way(found: sf.Recommendatio
     assert cycle.values["v_t"] > 5 * found.values["v_t"]
 
 
-def test_a_scene_is_driven_as_it_is_or_as_told() -> None:
+def test_a_scene_is_driven_by_default_or_by_given_inputs() -> None:
     law = sf.Coulomb(v_eps=1e-2)
     as_it_is = sf.recommended(law, Drive(law), 0.01, t_end=0.5)
     gently = sf.recommended(law, Drive(law), 0.01, t_end=0.5, u={"force": 1.0})
@@ -159,13 +159,13 @@ def test_another_law_as_the_truth_is_not_met_by_other_levels() -> None:
     assert isinstance(error.value.partial, sf.FigureData)
     assert error.value.partial.curves[0]["error"].min() > 1e-3
     same = sf.ExactCoulomb(mu_s=peak(LAW), mu_d=LAW.mu_d)
-    told = sf.recommended(LAW, Rabinowicz, 0.01, of=["x"], exact=same)
-    assert told.reference == "ExactCoulomb"
-    assert told.error <= 0.01
+    advice = sf.recommended(LAW, Rabinowicz, 0.01, of=["x"], exact=same)
+    assert advice.reference == "ExactCoulomb"
+    assert advice.error <= 0.01
 
 
 @pytest.mark.slow
-def test_what_the_integrator_adds_is_told_apart() -> None:
+def test_the_error_of_the_integrator_is_reported_separately() -> None:
     with pytest.raises(sf.SolveError, match=r"with rtol = 1e-05 the run at v_t = .*tighten rtol"):
         sf.recommended(LAW, SliderCrank(LAW, omega=1.0), 1e-7, t_end=0.5, rtol=1e-5)
 

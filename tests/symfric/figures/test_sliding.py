@@ -54,7 +54,7 @@ def test_sweeps_change_stiffness_shape_and_curvature_alone() -> None:
     assert slopes == pytest.approx(np.full(len(slopes), slopes[0]), rel=1e-3)
 
 
-def test_steady_state_of_seed_4_has_its_minimum_where_the_table_says() -> None:
+def test_steady_state_of_seed_4_has_the_minimum_of_the_table() -> None:
     curve = steady_state(SteadyStateLuGre())["steady_state_lugre"]
     v, F = curve["v"], curve["F"]
     sliding = v > 1e-4

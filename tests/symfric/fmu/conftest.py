@@ -87,7 +87,7 @@ def opened(exported) -> Iterator[Callable[..., tuple[Any, Model]]]:
             options["kind"] = "model-exchange"
         archive, model = exported(name, 2 if kind is Second else 3, **options)
         units.append(kind(archive))
-        assert start is None or units[-1].begin(stop=stop, **start) == OK, units[-1].said
+        assert start is None or units[-1].begin(stop=stop, **start) == OK, units[-1].messages
         return units[-1], model
 
     yield make

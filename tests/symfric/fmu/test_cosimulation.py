@@ -24,7 +24,7 @@ TIMES = np.arange(17) / 8
 def steps(unit, *ends, begin=0.0):
     """Make communication steps to each of the `ends`."""
     for end in ends:
-        assert unit.step(begin, end - begin) == OK, unit.said
+        assert unit.step(begin, end - begin) == OK, unit.messages
         begin = end
 
 
@@ -103,7 +103,7 @@ def test_a_terminal_event_ends_the_run_and_is_reported(opened):
     assert unit.call("GetRealStatus", 2, c.byref(reached)) == OK
     assert ended.value == 1
     assert abs(reached.value - same.happened[-1][0]) < 1e-9
-    assert "terminal event end" in unit.said[-1][1]
+    assert "terminal event end" in unit.messages[-1][1]
 
 
 def test_start_values_and_tuned_parameters_act_as_in_simulate(opened):
@@ -144,7 +144,7 @@ def test_states_of_a_unit_are_stored_restored_and_serialised(opened):
     assert foreign.call("SetFMUstate", kept) == ERROR  # the state of another model
     data[0] = bytes([ord(data[0]) ^ 1])
     assert other.call("DeSerializeFMUstate", data, size, c.byref(kept)) == ERROR
-    assert "state of this model" in other.said[-1][1]
+    assert "state of this model" in other.messages[-1][1]
 
 
 def test_instances_are_independent_and_can_be_reset(opened):
@@ -168,22 +168,22 @@ def test_instances_are_independent_and_can_be_reset(opened):
 def test_invalid_communication_steps_are_refused_without_effect(opened, t, size, message):
     unit, _ = opened(Second, "drive", {}, SPAN)
     assert unit.step(t, size) == DISCARD
-    assert message in unit.said[-1][1]
+    assert message in unit.messages[-1][1]
     steps(unit, 0.1)
 
 
 def test_invalid_values_and_calls_out_of_order_are_refused(opened, exported):
     unit, _ = opened(Second, "wire")
     assert unit.step(0.0, 0.1) == ERROR
-    assert "before the initialisation" in unit.said[-1][1]
+    assert "before the initialisation" in unit.messages[-1][1]
     assert unit.setup(rtol=1.0) == ERROR
     assert unit.begin() == OK
     assert unit.set(k=-1.0) == DISCARD
-    assert "set k: expected a finite number from 0 to 50, got -1" in unit.said[-1][1]
+    assert "set k: expected a finite number from 0 to 50, got -1" in unit.messages[-1][1]
     assert unit.set(f=float("nan")) == DISCARD
     assert unit.get("k", "f").tolist() == [3.0, 0.0]
     assert unit.set(x=1.0) == ERROR
-    assert "start value" in unit.said[-1][1]
+    assert "start value" in unit.messages[-1][1]
     assert not Second(exported("wire", 2)[0], token="{other}").handle
 
 
@@ -193,8 +193,8 @@ def test_a_failure_is_reported_with_its_time_and_equation(opened):
     assert unit.begin() == ERROR
     unit, _ = opened(Second, "wire", {"x": 5.0, "v": 10.0, "k": 0.0})  # beyond the terminal event
     assert unit.step(0.0, 1.0) == ERROR
-    assert "stopped at t = 0.0" in unit.said[-1][1]
-    assert "equation" in unit.said[-1][1]
+    assert "stopped at t = 0.0" in unit.messages[-1][1]
+    assert "equation" in unit.messages[-1][1]
     assert 0.0 < unit.get("time")[0] < 0.2
 
 
@@ -265,7 +265,7 @@ def test_signals_without_a_solution_are_refused_until_there_is_one(opened):
     assert unit.set(u=2.0) == OK
     reference, number = (c.c_uint * 1)(unit.archive.reference["z"]), (c.c_double * 1)()
     assert unit.call("GetReal", reference, c.c_size_t(1), number) == ERROR
-    assert "no solution" in unit.said[-1][1]
+    assert "no solution" in unit.messages[-1][1]
     assert unit.set(u=0.0) == OK
     assert unit.get("z")[0] == pytest.approx(1.0)
     steps(unit, 0.1)
@@ -275,8 +275,8 @@ def test_a_start_at_which_friction_jams_is_refused(opened):
     for slope, wanted in zip(WEDGES, (OK, ERROR), strict=True):
         unit, _ = opened(Third, "wedge")
         found = unit.begin(x=0.0, phi=float(np.arctan(slope)), x_rate=1.0, phi_rate=0.0)
-        assert found == wanted, unit.said
-        assert wanted == OK or "friction jams" in unit.said[-1]
+        assert found == wanted, unit.messages
+        assert wanted == OK or "friction jams" in unit.messages[-1]
 
 
 def test_fixed_steps_are_those_of_the_plant(opened):

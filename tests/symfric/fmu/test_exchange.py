@@ -107,10 +107,10 @@ def test_rates_close_loops_and_keep_closed_ones(opened):
 def test_invalid_calls_of_the_importer_are_refused(opened, tmp_path):
     unit, _ = opened(Rates, "wire")
     assert unit.call("SetTime", 0) == ERROR
-    assert "before the initialisation" in unit.said[-1]
+    assert "before the initialisation" in unit.messages[-1]
     assert unit.begin(x=5.9) == OK
     unit.at(0.0, np.array([7.0, 0.0]))
     assert unit.call("GetContinuousStateDerivatives", np.zeros(2).ctypes, 2) == ERROR
-    assert "equation of v returned NaN" in unit.said[-1]
+    assert "equation of v returned NaN" in unit.messages[-1]
     with pytest.raises(ValueError, match="no step"):
         export_fmu(wire(), tmp_path / "u.fmu", kind="model-exchange", step=1e-3)

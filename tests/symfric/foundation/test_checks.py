@@ -95,7 +95,7 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
 ]
 
 
-def test_every_check_says_where_what_and_what_came() -> None:
+def test_every_check_reports_place_expectation_and_value() -> None:
     for call, message in REFUSED:
         with pytest.raises(ValueError, match=message):
             call()
@@ -155,7 +155,7 @@ def test_functions_of_every_type() -> None:
         assert float(function(ca.DM(x))) == pytest.approx(expected, rel=1e-14)
 
 
-def test_plain_numbers_and_symbols_are_told_apart() -> None:
+def test_plain_numbers_and_symbols_are_distinguished() -> None:
     numbers = (1.0, 2, np.float64(1.0), np.int64(3))
     others = (True, np.ones(2), "1", None, ca.DM(1.0), ca.SX(1.0))
     symbols = (ca.SX.sym("x"), ca.MX.sym("x"))
@@ -198,7 +198,7 @@ def test_values_are_sentences() -> None:
 def test_results_that_met_their_tolerances_can_be_used_and_no_others() -> None:
     good = {"SUCCESS", "TERMINATED", "SOLVED", "ACCEPTABLE", "DOUBTFUL"}
     assert {status.name for status in Status if status.ok} == good
-    assert "time" not in Status.INTERRUPTED.value  # also said of fits
+    assert "time" not in Status.INTERRUPTED.value  # fits use it too
 
 
 def test_error_carries_message_status_and_what_there_is_so_far() -> None:

@@ -61,11 +61,11 @@ def test_a_compiler_that_is_named_must_exist(monkeypatch: pytest.MonkeyPatch) ->
 
 
 @needs_shell
-def test_what_it_says_is_returned_and_failure_is_an_error(tmp_path: Path) -> None:
-    told = script(tmp_path / "a", 'echo "$1 $EXTRA $(cat)" >&2').run(
+def test_output_is_returned_and_failure_is_an_error(tmp_path: Path) -> None:
+    reported = script(tmp_path / "a", 'echo "$1 $EXTRA $(cat)" >&2').run(
         "-c", code="int x;", variables={"EXTRA": "more"}
     )
-    assert told.strip() == "-c more int x;"
+    assert reported.strip() == "-c more int x;"
     with pytest.raises(CompileError, match="failed with status 3:\nno licence"):
         script(tmp_path / "b", "echo no licence >&2; exit 3").run()
     broken = script(tmp_path / "c", "")

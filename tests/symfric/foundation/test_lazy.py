@@ -105,7 +105,7 @@ def test_what_is_not_there() -> None:
         exec("from symfric.integrator import simulat")
 
 
-def test_the_list_of_commands_says_what_they_say() -> None:
+def test_the_list_of_commands_has_the_sentences_of_the_commands() -> None:
     for name, line in COMMANDS.items():
         own = name.replace("-", "_")
         function = getattr(importlib.import_module(f"symfric.cli.{MODULES.get(own, own)}"), own)

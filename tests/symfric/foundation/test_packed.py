@@ -55,7 +55,7 @@ def test_symbols_stay_the_same_symbols_within_a_pack() -> None:
 
 @dataclass(frozen=True, eq=False)
 class Shell:
-    """Is packed as a pair that nobody keeps."""
+    """Is packed as a pair that is not referenced elsewhere."""
 
     value: int
 
@@ -68,7 +68,7 @@ class Kernel(Pair):
         return Shell(self.a)
 
 
-def test_an_object_that_stands_twice_is_one_object_and_others_are_told_apart() -> None:
+def test_an_object_referenced_twice_is_one_object_and_others_stay_separate() -> None:
     shared = Pair(1, 2)
     back = again(Pair(shared, [shared]))
     assert back.a is back.b[0]
@@ -170,7 +170,7 @@ def test_fields_out_of_a_file_have_their_types_and_pass_the_checks_of_their_clas
             packed.load(holding({"is": path, "has": has}), "kind", 1)
 
 
-def test_a_file_of_the_format_that_could_run_code_says_so() -> None:
+def test_a_file_of_the_format_that_could_run_code_is_refused_with_the_reason() -> None:
     with pytest.raises(ValueError, match="an older format, which could run code") as error:
         packed.load(naming("symfric.laws:LuGre", expressions=np.zeros(3)), "kind", 1)
     assert "\n" not in str(error.value)

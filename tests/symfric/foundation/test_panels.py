@@ -47,8 +47,8 @@ def test_a_notebook_shows_a_figure_once() -> None:
     figure, (axis,) = panels(1)
     axis.plot([0, 1], [0, 1])
     assert isinstance(figure, Picture)
-    told = getattr(figure, "_repr_png_")()  # noqa: B009  (what IPython calls)
-    shown = imread(BytesIO(told), format="png")
+    pixels = getattr(figure, "_repr_png_")()  # noqa: B009  (what IPython calls)
+    shown = imread(BytesIO(pixels), format="png")
     width, height = figure.get_size_inches()
     assert shown.shape[:2] == (round(100 * height), round(100 * width))
     others = ("_repr_html_", "_repr_svg_", "_repr_jpeg_", "_repr_mimebundle_")
@@ -111,7 +111,7 @@ def sizes(figure: Figure) -> set[float]:
     return {round(float(one.get_fontsize()), 3) for one in texts}
 
 
-def test_width_and_text_are_what_is_asked_for_and_everything_is_on_the_page(figure: Figure) -> None:
+def test_width_and_text_are_as_requested_and_everything_is_on_the_page(figure: Figure) -> None:
     before = sizes(figure)
     wide = figure.legends[0].get_window_extent().width
     assert wide > 85 / 25.4 * figure.dpi  # it would be cut off
@@ -187,7 +187,7 @@ def test_any_two_colours_differ_for_all_eyes(eyes: str) -> None:
     assert near > 25.0
 
 
-def test_every_colour_stands_out_from_paper() -> None:
+def test_every_colour_contrasts_with_paper() -> None:
     contrast = [1.05 / (XYZ[1] @ linear(text) + 0.05) for text in COLOURS]
     assert min(contrast) > 3.0  # what WCAG 2.1 asks of graphics
 

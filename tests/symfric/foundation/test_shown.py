@@ -64,9 +64,9 @@ def test_scenes_are_the_call_that_makes_them_and_models_show_no_expressions() ->
         scene = kind(LuGre())
         text, model = repr(scene), scene.model()
         assert repr(eval(text, {**laws, kind.__name__: kind, "LuGre": LuGre})) == text
-        said = repr(model)
-        assert on_a_screen(text) and on_a_screen(said)
-        assert "by LuGre" in said and "SX(" not in said and "@1" not in said
+        reported = repr(model)
+        assert on_a_screen(text) and on_a_screen(reported)
+        assert "by LuGre" in reported and "SX(" not in reported and "@1" not in reported
         assert "further" not in model.__dict__, "showing must not write the details"
     assert "QuarterCar(law=LuGre(" in repr(QuarterCar(LuGre()))
     assert shown(QuarterCar(LuGre())).pictures
@@ -93,7 +93,7 @@ class Many:
     __repr__ = brief
 
 
-def test_arrays_are_told_by_size_and_range() -> None:
+def test_arrays_are_described_by_size_and_range() -> None:
     lines = repr(Many(np.linspace(0, 5, 2001), {"a": np.zeros((3, 4)), "b": 1.0})).splitlines()
     assert lines[:2] == ["<Many", "  array: 2001 values from 0 to 5"]
     assert lines[2] == "  mapping: a: 3 x 4 values from 0 to 0, b: 1>"

@@ -93,7 +93,7 @@ def test_functions_of_numpy_take_variables():
     assert same(np.clip(A, 0.0, 1.0), ca.fmin(ca.fmax(A.symbol, 0.0), 1.0))
 
 
-def test_what_does_not_fit_is_told():
+def test_what_does_not_fit_is_reported():
     for mixed in (lambda: ca.MX.sym("m") * A, lambda: A - ca.MX.sym("m")):
         with pytest.raises(ValueError, match=r"variable 'a': expected SX or numbers .* got MX"):
             mixed()
@@ -162,7 +162,7 @@ def test_variables_in_other_units_are_refused_where_si_is_meant():
         JointFriction(LuGre(), radius=Variable("d", "mm"))
     with pytest.warns(UserWarning, match="no_unit"):
         own = Variable("v", "no_unit")
-    assert same(BrownMcPhee(v_t=own).v_t, own.symbol)  # of which nobody knows how large it is
+    assert same(BrownMcPhee(v_t=own).v_t, own.symbol)  # a symbol of unknown size
 
 
 def test_variables_are_stacked_in_their_order() -> None:
@@ -175,7 +175,7 @@ def test_variables_are_stacked_in_their_order() -> None:
     assert float(at_start(a.symbol**2 + 1, (a,))) == 5.0
 
 
-def test_strays_are_told_by_the_symbol_and_not_by_its_name() -> None:
+def test_stray_symbols_are_identified_by_the_symbol_and_not_by_its_name() -> None:
     known, other = ca.SX.sym("x"), ca.SX.sym("x")
     assert strays(ca.vertcat(known, other, other), known) == ["x"]
     assert strays(known * known, known) == []

@@ -61,7 +61,7 @@ def test_sizes_are_those_of_the_prefixes() -> None:
         assert in_si(text) == pytest.approx(size, rel=1e-14), text
 
 
-def test_what_is_no_unit_is_told_with_what_is_meant() -> None:
+def test_an_invalid_unit_is_reported_with_the_intended_one() -> None:
     for text, meant in (
         ("m/sec", "m/s"), ("newton", "N"), ("Newton meters", "N m"), ("rad/sec", "rad/s"),
         ("meters per second", "m/s"), ("Kg", "kg"), ("N-m", "N m"), ("[m/s]", "m/s"), ("hz", "Hz"),
@@ -86,9 +86,11 @@ def test_units_outside_the_si_are_as_large_as_scipy_has_them() -> None:
 
 
 def test_a_misspelt_unit_is_warned_of_once_in_the_line_that_has_it() -> None:
-    with pytest.warns(UserWarning, match=r"variable 'v': .*got 'm/seconds'; write 'm/s'") as told:
+    with pytest.warns(
+        UserWarning, match=r"variable 'v': .*got 'm/seconds'; write 'm/s'"
+    ) as reported:
         v = Variable("v", "m/seconds")
-    assert told[0].filename == __file__
+    assert reported[0].filename == __file__
     replace(v, start=1.0)  # a second warning would be an error here
     with pytest.warns(UserWarning, match="Output: .*got 'smoots'; write '1' for counts"):
         Output(v, "smoots")
@@ -120,11 +122,11 @@ def test_the_largest_magnitude_chooses_the_prefix(
     assert readable("m", []) == readable("m", [[]]) == (1.0, "m")
 
 
-def test_long_times_are_told_in_hours_days_and_years() -> None:
-    for last, expected, told in (
+def test_long_times_are_printed_in_hours_days_and_years() -> None:
+    for last, expected, reported in (
         (60.0, "s", 60.0), (2.1e4, "s", 2.1e4), (36000.0, "h", 10.0), (864000.0, "days", 10.0),
         (500 * 365.25 * 86400.0, "years", 500.0),
     ):  # fmt: skip
         factor, unit = clock([0.0, np.nan, last])
-        assert (unit, factor * last) == (expected, pytest.approx(told))
+        assert (unit, factor * last) == (expected, pytest.approx(reported))
     assert clock([]) == (1.0, "s")

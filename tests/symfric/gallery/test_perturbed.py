@@ -26,14 +26,14 @@ def entries(kind: str) -> Iterator[tuple[str, str, tuple[str, ...]]]:
 def jobs() -> list[Job]:
     """Every number of the tables and machines, and every law and its rate."""
     found: list[Job] = []
-    for file, name, plates in entries("numbers"):
+    for file, name, figures in entries("numbers"):
         values = [n.value for n in numbers((ROOT / file).read_text("utf-8"), name)]
         used = [k for k, v in enumerate(values) if name != "PRINTED" or float(str(v)) < 1]
-        found += [Job(file, name, k, "", plates) for k in used]
-    found += [Job(file, name, 0, "", plates) for file, name, plates in entries("fields")]
-    for file, law, plates in entries("laws"):
+        found += [Job(file, name, k, "", figures) for k in used]
+    found += [Job(file, name, 0, "", figures) for file, name, figures in entries("fields")]
+    for file, law, figures in entries("laws"):
         methods = ("force", "rate") if file.startswith("dynamic") else ("force",)
-        found += [Job(f"symfric/laws/{file}.py", law, -1, m, plates) for m in methods]
+        found += [Job(f"symfric/laws/{file}.py", law, -1, m, figures) for m in methods]
     return found
 
 

@@ -67,25 +67,29 @@ def test_every_loose_call_is_warned_of_where_it_is_made() -> None:
         assert [w.filename for w in seen] == [__file__]
 
 
-def test_numbers_that_would_change_results_silently_are_refused_by_every_door() -> None:
+def test_numbers_that_would_change_results_silently_are_refused_by_every_entry_point() -> None:
     """4f644ad took them all: no events, no error control, a mass below zero."""
     model = rabinowicz(Viscous(), free=["m"])
-    doors = (simulate, simulate_many, simulate_by_peer)
+    functions = (simulate, simulate_many, simulate_by_peer)
     cases: list[tuple[tuple[object, ...], dict[str, object], str]] = [
-        (doors[:2], {"event_tolerance": -1.0}, r"event_tolerance: expected a number > 0 \[s\]"),
-        (doors[::2], {"atol": 0.0}, "atol: expected a number > 0, got 0.0"),
-        (doors, {"max_steps": 0}, "max_steps: expected a whole number >= 1, got 0"),
-        (doors, {"p": {"m": -1.0}}, r"[.]m: expected a number >= .* \[kg\], got -1"),
-        (doors[1:2], {"p": {"m": [1.0, -1.0]}}, r"p[.]m: expected a number >= .*, got -1"),
-        (doors[1:2], {"executor": None}, "executor: expected one of serial, .*Executor, got None"),
-        (doors[2:], {"peer": "vm"}, "peer: expected one of sundials, rosenbrock, ggl, got vm"),
-        (doors[:1], {"backend": "ggl"}, "backend: expected one of auto, vm, compiled, got ggl"),
-        (doors[1:2], {"backend": "ggl"}, "expected one of auto, vm, compiled, cuda, got ggl"),
+        (functions[:2], {"event_tolerance": -1.0}, r"event_tolerance: expected a number > 0 \[s\]"),
+        (functions[::2], {"atol": 0.0}, "atol: expected a number > 0, got 0.0"),
+        (functions, {"max_steps": 0}, "max_steps: expected a whole number >= 1, got 0"),
+        (functions, {"p": {"m": -1.0}}, r"[.]m: expected a number >= .* \[kg\], got -1"),
+        (functions[1:2], {"p": {"m": [1.0, -1.0]}}, r"p[.]m: expected a number >= .*, got -1"),
+        (
+            functions[1:2],
+            {"executor": None},
+            "executor: expected one of serial, .*Executor, got None",
+        ),
+        (functions[2:], {"peer": "vm"}, "peer: expected one of sundials, rosenbrock, ggl, got vm"),
+        (functions[:1], {"backend": "ggl"}, "backend: expected one of auto, vm, compiled, got ggl"),
+        (functions[1:2], {"backend": "ggl"}, "expected one of auto, vm, compiled, cuda, got ggl"),
     ]
     for some, arguments, message in cases:
-        for door in some:
+        for function in some:
             with pytest.raises(ValueError, match=message):
-                door(model, 1.0, **arguments)  # type: ignore[operator]
+                function(model, 1.0, **arguments)  # type: ignore[operator]
     for nominal in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(ValueError, match="variable 'x': nominal: expected a"):
             Variable("x", "m", nominal=nominal)

@@ -54,7 +54,7 @@ def test_algebraic_variables_are_solved_for() -> None:
 
 
 def test_mechanism_flows_on_its_constraints() -> None:
-    """From a start beside the circle, as it is simulated."""
+    """From a start off the circle, as it is simulated."""
     x0 = [0.61, -0.8, 0.0, 0.0]
     end = flow(pendulum(), steps=50)(x0=x0, p=1.0, T=1.0)["xf"].full().ravel()
     assert np.hypot(end[0], end[1]) == pytest.approx(1.0, abs=1e-12)

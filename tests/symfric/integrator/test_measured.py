@@ -21,13 +21,13 @@ def decaying(size: float) -> Model:
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-9])
-def test_the_measured_error_is_the_error_where_a_closed_form_tells_it(size: float) -> None:
-    asked = ["k", "x0.x"]
+def test_the_measured_error_is_the_error_against_the_closed_form(size: float) -> None:
+    requested = ["k", "x0.x"]
     run = simulate(
-        decaying(size), 3.0, x0={"x": size}, rtol=1e-5, sensitivities=asked, measure_error=True
+        decaying(size), 3.0, x0={"x": size}, rtol=1e-5, sensitivities=requested, measure_error=True
     )
     exact = {"k": -size * run.t * np.exp(-2 * run.t), "x0.x": np.exp(-2 * run.t)}
-    assert {*run.statistics.sensitivity_errors} == {*asked}
+    assert {*run.statistics.sensitivity_errors} == {*requested}
     for name, measured in run.statistics.sensitivity_errors.items():
         off = np.abs(run.sensitivities[name]["x"] - exact[name]).max() / np.abs(exact[name]).max()
         assert measured == pytest.approx(off, rel=0.1), name

@@ -179,7 +179,7 @@ def blow_up() -> Model:
 
 
 @pytest.mark.parametrize("runner", ["auto", "rosenbrock"])
-def test_failed_solve_says_where_and_keeps_what_there_is(runner: str) -> None:
+def test_a_failed_solve_reports_the_place_and_keeps_partial_results(runner: str) -> None:
     with pytest.raises(SolveError, match=r"stopped .*t = (0\.9|1)") as caught:
         by(runner, blow_up(), 2.0)
     error = caught.value
@@ -226,7 +226,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-def test_bad_input_is_refused_saying_where() -> None:
+def test_bad_input_is_refused_with_its_place() -> None:
     for given, message in BAD:
         with pytest.raises(ValueError, match=message):
             simulate(cart(), **{"t_end": 1.0, **given})

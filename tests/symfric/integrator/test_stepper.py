@@ -160,7 +160,7 @@ def test_time_in_the_equations_starts_at_t_start() -> None:
 
 
 @each_backend
-def test_a_failure_says_when_and_keeps_the_others(backend: str) -> None:
+def test_a_failure_reports_its_time_and_keeps_the_others(backend: str) -> None:
     plant = stepper(burst(), 0.5, batch=3, backend=backend)
     plant.step([[0.0], [1.0], [0.0]])
     with pytest.raises(

@@ -158,13 +158,13 @@ def test_a_stored_run_without_derivatives_reports_the_reason(tmp_path: Path) -> 
     push = {"u": Hold([0.0, 1.0], [1.0, 2.0])}
     run = simulate(model, 2.0, u=push, samples=3, sensitivities=["x0.x"])
     loaded = through_file(run, tmp_path)
-    for asked in ("sensitivities", "event_sensitivities"):
-        told = list[str]()
+    for requested in ("sensitivities", "event_sensitivities"):
+        reported = list[str]()
         for one in (run, loaded):
             with pytest.raises(ValueError, match="apart from the jumps of the inputs") as error:
-                getattr(one, asked)
-            told.append(str(error.value))
-        assert told[0] == told[1]
+                getattr(one, requested)
+            reported.append(str(error.value))
+        assert reported[0] == reported[1]
 
 
 def test_foreign_and_damaged_files_are_refused(tmp_path: Path) -> None:

@@ -236,7 +236,7 @@ def test_bristles_that_stop_a_crank_go_on() -> None:
         assert np.abs(run["crank_friction"] / run["crank_N"]).max() < 0.3
 
 
-def test_the_advice_for_bristles_stands_once_and_can_be_copied() -> None:
+def test_the_advice_for_bristles_appears_once_and_can_be_copied() -> None:
     run = sf.simulate(FourBar(sf.LuGre()).model(), 0.1, throw=False)
     assert not run.status.ok
     assert run.message.count("keep the deflection") == 1

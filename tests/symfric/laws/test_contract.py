@@ -122,7 +122,7 @@ def test_rate_vanishes_in_steady_sliding() -> None:
             assert (rate <= 1e-11 * np.maximum(near, abs(v))).all(), (name, v, N)
 
 
-def test_force_follows_the_load_as_the_law_says() -> None:
+def test_the_force_depends_on_the_load_as_declared() -> None:
     factor = 10 ** (2 * SHARES / 1.5)
     for name, kind in sf.ALL_LAWS.items():
         law, w = kind(), given_inputs(kind())
@@ -275,7 +275,7 @@ def test_docstring_states_equation_limits_and_source() -> None:
         assert getattr(sf, kind.__name__) is kind
 
 
-def test_facts_say_what_the_formula_was_compared_with() -> None:
+def test_facts_name_what_the_formula_was_compared_with() -> None:
     for kind in (sf.ALL_LAWS | sf.POPULATIONS | MADE_OF_LAWS).values():
         facts: sf.Facts | None = getattr(kind, "facts", None)
         if facts is None:
@@ -316,7 +316,7 @@ def test_wrong_parameters_states_and_texts_are_refused() -> None:
     assert not_refused(Path(__file__).with_name("refusals.toml"), sf.laws) == []
 
 
-def test_every_parameter_of_every_law_and_scene_says_what_it_is_for() -> None:
+def test_every_parameter_of_every_law_and_scene_has_a_description() -> None:
     """Roles are data: identification, temperature and code generation read them, not texts."""
     wrappers = (
         *WRAPPERS.values(), sf.PlanarSlip, sf.Table, sf.Element, sf.Slider,

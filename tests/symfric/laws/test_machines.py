@@ -61,7 +61,7 @@ BAND: dict[str, tuple[sf.Law, float, float]] = {
 """Laws that hold what is applied in a band: the law, the band's half width, least power [W]."""
 
 
-def test_friction_in_a_band_of_rest_drives_as_far_as_it_says() -> None:
+def test_friction_in_a_band_of_rest_gains_no_more_power_than_stated() -> None:
     for law, width, least in BAND.values():
         v = width * np.concatenate([np.linspace(-3.0, 3.0, 2001), [0.999999]])
         power = np.asarray(law.force(v, N, F_e=np.linspace(-3.0, 3.0, 61)[:, None])) * v

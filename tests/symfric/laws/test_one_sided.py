@@ -95,7 +95,7 @@ def test_static_level_of_a_law_with_states() -> None:
     assert CASES["bouc_wen"].static_level(N) == CASES["bouc_wen"].sliding(1.0, N, 1)
 
 
-def test_laws_without_the_limit_say_why() -> None:
+def test_laws_without_the_limit_give_the_reason() -> None:
     class Own(sf.Viscous):  # pyright: ignore[reportGeneralTypeIssues]
         outside = sf.Law.outside
 

@@ -138,7 +138,7 @@ def test_force_of_a_law_with_further_inputs_is_the_printed_equation() -> None:
 DELTAS = (0.1, 0.2, 0.35, 0.5, 0.7, 0.78, 1.0, 1.3, 1.7, 2.0, 2.5, 3.2, 5.0, 10.0)
 
 
-def test_stribeck_differs_from_its_equation_by_less_than_it_says() -> None:
+def test_stribeck_differs_from_its_equation_by_less_than_the_stated_bound() -> None:
     """At every speed, for v_eps from far below to far above v_s."""
     for delta, v_s, ratio in product(
         DELTAS, (1e-9, 1e-3, 20.0), (1e-8, 1e-4, 1e-2, 0.09, 0.5, 3.0, 1e4)

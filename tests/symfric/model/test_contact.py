@@ -58,7 +58,7 @@ def test_a_model_closes_itself_with_the_law_of_its_contact(name: str) -> None:
     assert [m.nominal for m in model.monitors] == [1e-3] * (name != "exact")
 
 
-def test_modes_of_ones_own_model_stick_and_slip() -> None:
+def test_modes_of_a_user_model_stick_and_slip() -> None:
     """Pulled slowly through its spring the load stands until the spring carries mu_s N."""
     model = behind_spring(sf.ExactCoulomb(mu_s=0.2, mu_d=0.1))
     assert [e.name for e in model.events] == ["guide_stick", "guide_slip"]
@@ -137,9 +137,7 @@ def test_what_is_given_besides_the_applied_force_reaches_both_sides() -> None:
 
 
 @pytest.mark.parametrize("what", ["rate", "force"])
-def test_what_a_law_of_ones_own_returns_is_one_expression(
-    what: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_user_law_must_return_one_expression(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     changes: dict[str, Callable[[Any], Any]] = {
         "expected an SX expression, got .*vertcat": lambda r: [r],
         "expected an SX expression, got None": lambda _: None,

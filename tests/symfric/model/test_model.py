@@ -86,7 +86,7 @@ def test_inconsistent_models_and_bad_values_are_refused() -> None:
     assert not_refused(Path(__file__).with_name("refusals.toml"), *packages, **names) == []
 
 
-def test_details_are_written_when_asked_for_and_once() -> None:
+def test_details_are_written_once_and_on_request() -> None:
     x, calls = sf.Variable("x", "m"), []
 
     def more() -> dict[str, sf.Output]:
@@ -148,7 +148,7 @@ def test_scenes_have_the_accelerations_of_their_positions() -> None:
             assert np.abs(slopes[rate] - wanted).max() < 2e-3 * scale, (name, n, rate)
 
 
-def test_the_acceleration_of_the_block_is_what_newton_says() -> None:
+def test_the_acceleration_of_the_block_satisfies_newtons_law() -> None:
     run = sf.simulate(sf.rabinowicz(sf.LuGre()), 3.0, samples=301)
     np.testing.assert_allclose(run["x_acc"], (-2.1 * run["x"] - run["friction"]) / 0.8, atol=1e-12)
     assert run.unit("x_acc") == "m/s^2"
@@ -160,7 +160,7 @@ def test_a_velocity_that_a_law_keeps_has_no_acceleration() -> None:
     assert [*model.further] == ["x_acc"]
 
 
-def test_accelerations_cost_nothing_until_they_are_asked_for() -> None:
+def test_accelerations_cost_nothing_unless_requested() -> None:
     model = FourBar(sf.BrownMcPhee()).model()
     run = sf.simulate(model, 0.05, samples=3)
     assert "further" not in model.__dict__

@@ -202,7 +202,7 @@ def moving_rod(law: Law) -> mb.Mechanism:
     return m
 
 
-def test_where_rest_cannot_be_told_the_joint_is_named() -> None:
+def test_where_rest_cannot_be_determined_the_joint_is_named() -> None:
     law, named = ExactCoulomb(), "> friction > law: expected one that needs only v"
     for build, message in (
         (driven(law).build, f"joint 'shaft' {named} and N, because"),

@@ -85,7 +85,7 @@ def test_a_mechanism_has_one_source_of_its_equations() -> None:
 LEVELS = BrownMcPhee(mu_s=0.3, mu_d=0.2, v_t=1e-2)
 
 
-def test_forces_of_ones_own_move_the_mechanism_as_its_law_would() -> None:
+def test_user_forces_move_the_mechanism_as_its_law_would() -> None:
     """The whole run, with normal forces from reactions and a closed loop."""
     model = SliderCrank(LEVELS).model()
     again = model.with_forces({c.name: c.friction for c in model.contacts})
@@ -94,7 +94,7 @@ def test_forces_of_ones_own_move_the_mechanism_as_its_law_would() -> None:
         np.testing.assert_allclose(other[name][-1], signal[-1], rtol=1e-5, atol=1e-6)
 
 
-def test_width_of_the_normal_force_is_a_parameter_when_asked_for() -> None:
+def test_width_of_the_normal_force_is_a_parameter_on_request() -> None:
     model = PendulumBox(LEVELS).model()
     eps = [c.widths["eps"] for c in model.contacts]
     forces = {c.name: c.friction for c in model.contacts}
@@ -109,7 +109,7 @@ def test_width_of_the_normal_force_is_a_parameter_when_asked_for() -> None:
     assert model.with_forces(forces).p == ()
 
 
-def test_a_slider_that_is_held_stands_on_the_force_that_its_drive_needs() -> None:
+def test_a_held_slider_is_in_equilibrium_with_its_drive_force() -> None:
     """Stick as an unknown reaction in a loop: the motion of the rest goes on, the slider stands."""
     model = FourMass(LEVELS).model()
     contact = next(c for c in model.contacts if c.name == "x4")

@@ -164,8 +164,10 @@ def test_bristles_without_damping_that_a_falling_load_stops_are_named(law: Law) 
         SolveError, match=r"force of joint 'slot' with .* falls to zero; below"
     ) as e:
         swung(law)
-    name, said = type(law).__name__, str(e.value)
-    advised = said[said.index("LoadNormalised(") : said.index(f" for {name}")].replace("...", "")
+    name, reported = type(law).__name__, str(e.value)
+    advised = reported[reported.index("LoadNormalised(") : reported.index(f" for {name}")].replace(
+        "...", ""
+    )
     run = swung(eval(advised, {"LoadNormalised": LoadNormalised, name: type(law)}))
     assert np.abs(run.energy_balance().defect).max() < 1e-4
 

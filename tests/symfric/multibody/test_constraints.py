@@ -112,7 +112,7 @@ def test_rope_that_is_pulled_in_swings_faster(formulation: str) -> None:
 
 
 @in_both
-def test_a_rope_of_ones_own_is_the_rope_of_the_library(formulation: str) -> None:
+def test_a_user_rope_equals_the_rope_of_the_library(formulation: str) -> None:
     made = [winch(kind, 0.0).prepare(formulation=formulation) for kind in ("user", "distance")]
     assert made[0].labels[-1 if formulation == "joint" else -2] == "rope_lambda"
     own, ours = (solve(one.eq, one.q0, one.qd0) for one in made)

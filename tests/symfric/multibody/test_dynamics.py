@@ -256,7 +256,7 @@ def test_constraints_and_energy_are_those_of_the_model() -> None:
     assert kinetic + potential == pytest.approx(387.9365209137809)
 
 
-def test_poses_say_where_the_bodies_are() -> None:
+def test_poses_give_the_positions_of_the_bodies() -> None:
     pose = mb.functions(rod())["poses"]([np.pi / 2], []).full()
     assert pose[:, 3] == pytest.approx([-0.4, 0.0, 0.0])
     assert pose[:, :3] @ pose[:, :3].T == pytest.approx(np.eye(3))

@@ -59,7 +59,7 @@ def test_pose_motion_subspace_and_constraints_fit_each_other(kind: type[mb.Joint
     for left in zero:
         assert left == pytest.approx(np.zeros(left.shape), abs=1e-14)
     freedoms = np.linalg.matrix_rank(np.vstack([v, w])) if n else 0
-    assert freedoms + joint(kind).constrains == 6
+    assert freedoms == joint(kind).freedoms
 
 
 def twist_derivatives(kind: type[mb.Joint], R: np.ndarray, p: np.ndarray) -> np.ndarray:
@@ -78,7 +78,7 @@ def test_constraints_are_independent_and_hold_what_joints_transmit(
     apart = np.array([0.0, 0.0, 1.0]) if kind.closes else np.zeros(3)
     C = twist_derivatives(kind, np.eye(3), apart)
     assert C.shape[0] == np.linalg.matrix_rank(C)
-    assert kind.closes or C.shape[0] == joint(kind).constrains
+    assert kind.closes or C.shape[0] == 6 - joint(kind).freedoms
     q = ca.SX.sym("q", len(kind.coordinates))
     if kind.closes:
         R, p = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0], np.ones(3)
@@ -131,7 +131,7 @@ def test_distance_measures_from_point_to_point() -> None:
         assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, z])))) == expected
 
 
-def test_a_joint_starts_where_it_is_told_or_without_displacement() -> None:
+def test_a_joint_starts_at_its_given_position_or_without_displacement() -> None:
     for kind, start, expected in (
         (mb.Revolute, 0.3, (0.3,)), (mb.Revolute, None, (0,)), (mb.Cylindrical, (1.0, 2.0), (1, 2)),
         (mb.Spherical, None, (1, 0, 0, 0)), (mb.Floating, None, (0, 0, 0, 1, 0, 0, 0)),

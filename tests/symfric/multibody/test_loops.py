@@ -75,8 +75,8 @@ def spatial_crank() -> mb.Mechanism:
 
 
 def test_unknowns_that_are_zero_but_for_rounding_are_found() -> None:
-    # the multiplier of the norm is 1e-15 beside accelerations of 1e3: Newton's method went on
-    # for ever and said that there was no solution
+    # the multiplier of the norm is 1e-15, accelerations are 1e3: Newton's method went on
+    # without end and reported that there was no solution
     run = simulate(spatial_crank().build(), 0.02, backend="vm")
     assert run.final["energy"] == pytest.approx(run["energy"][0], rel=1e-6)
 
@@ -164,7 +164,7 @@ def test_a_string_starts_as_wound_up_as_the_joints_of_its_loop_are(formulation: 
         assert moved[k] == pytest.approx(-34.0)
 
 
-def test_in_space_the_start_of_a_joint_says_which_of_the_turns_is_meant() -> None:
+def test_in_space_the_start_of_a_joint_selects_the_turn() -> None:
     q, qd = ca.SX.sym("q", 2), ca.SX.sym("qd", 2)
     assert str(constant_slopes(ca.dot(ca.DM([2.0, -1.0]), qd), qd)) == "[[2, -1]]"
     assert constant_slopes(q[0] * qd[1], qd) is None

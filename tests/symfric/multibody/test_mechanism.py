@@ -125,7 +125,7 @@ def test_a_dead_centre_is_refused_as_a_start() -> None:
 
 
 def dead_centre() -> mb.Mechanism:
-    """Slides at a right angle, the rod lying along one of them: z cannot be told from x."""
+    """Slides at a right angle, the rod along one of them: z and x are not distinguishable."""
     m = mb.Mechanism("dead")
     attach(m, mb.Prismatic, "x", "a", z=X)
     attach(m, mb.Prismatic, "y", "b", at=(1.0, 0.0, 0.0), z=Y)
@@ -170,7 +170,7 @@ def test_a_free_body_spins_as_it_must(formulation: str) -> None:
     assert run[f"{name}_x"] == pytest.approx(run.t, abs=1e-9)
 
 
-def test_a_mechanism_that_falls_into_a_dead_centre_says_so() -> None:
+def test_a_mechanism_that_falls_into_a_dead_centre_reports_it() -> None:
     """All links of the parallelogram in one line: it may go on as one or folded."""
     with pytest.raises(SolveError, match="the configuration is singular: constraints depend"):
         simulate(four_bar(mb.PointOnLine).build(), 1.0, rtol=1e-9)

@@ -111,7 +111,7 @@ def test_components_left_out_are_those_a_joint_cannot_transmit() -> None:
         assert large.tolist() == given, kind
 
 
-def test_details_cost_the_model_nothing_until_they_are_asked_for(
+def test_details_cost_the_model_nothing_unless_requested(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     calls: list[str] = []
@@ -212,7 +212,7 @@ def test_places_follow_the_motion_and_the_parameters_of_the_run() -> None:
     assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(3), (5, 1, 1)))
 
 
-def test_ends_of_springs_alone_are_told_from_frames_and_contacts_have_a_scale() -> None:
+def test_ends_of_springs_are_distinguished_from_frames_and_contacts_have_a_scale() -> None:
     drawn = sketch(FourMass(SLOW).mechanism())
     parts, marks = ({one.name: one for one in group} for group in (drawn.parts, drawn.marks))
     assert (len(parts["slider_4"].ends), parts["slider_1"].ends) == (1, ())
@@ -221,7 +221,7 @@ def test_ends_of_springs_alone_are_told_from_frames_and_contacts_have_a_scale() 
     assert marks["rod_12"].slips == ()
 
 
-def test_springs_dampers_and_rods_are_told_apart() -> None:
+def test_springs_dampers_and_rods_are_distinguished() -> None:
     m = mb.Mechanism("m")
     m.body("bob", 1.0, (0.1, 0.1, 0.1))
     m.frame("ground.wall", at=(1.0, 0.0, 0.0))

@@ -40,9 +40,9 @@ def runs() -> dict[str, Trajectory]:
 def test_films_have_a_picture_per_frame_and_need_nothing_from_elsewhere(
     runs: dict[str, Trajectory], tmp_path: Path
 ) -> None:
-    told: list[float] = []
+    reported: list[float] = []
     path, open_before = tmp_path / "new" / "motion.gif", plt.get_fignums()
-    runs["pendulum"].animate(path, fps=10, speed=0.5, progress=told.append)
+    runs["pendulum"].animate(path, fps=10, speed=0.5, progress=reported.append)
     with Image.open(path) as film:
         assert (film.n_frames, film.info["duration"]) == (5, 100)  # 0.2 s at half speed
         first = np.asarray(film.convert("RGB"))
@@ -50,7 +50,7 @@ def test_films_have_a_picture_per_frame_and_need_nothing_from_elsewhere(
         last = np.asarray(film.convert("RGB"))
     assert first.shape == last.shape
     assert (first != last).any()
-    assert told == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
+    assert reported == pytest.approx([0.2, 0.4, 0.6, 0.8, 1.0])
     runs["pendulum"].animate(path.with_suffix(".html"), fps=10, speed=0.5)
     text = path.with_suffix(".html").read_text()
     pictures = text.split("data:image/png;base64,")[1:]

@@ -170,7 +170,7 @@ def test_work_of_friction_is_the_heat_of_the_belt() -> None:
     assert kinetic == pytest.approx(belt - run.integral("power"), abs=1e-7)
 
 
-def test_damper_takes_what_the_closed_form_says() -> None:
+def test_damper_dissipates_the_energy_of_the_closed_form() -> None:
     """m v' = -d v: the energy falls with exp(-2 d t / m), all of it into the damper."""
     run = simulate(slider(JointSpringDamper("oil", "x", "slide", damping=0.8)).build(), 3.0,
                    rtol=1e-9)  # fmt: skip
@@ -274,7 +274,7 @@ def test_nothing_moves_and_nothing_is_missing() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_mass", "slider_crank", "double_pendulum", "pendulum_box"])
 def test_frictionless_drift_over_100_s(name: str) -> None:
-    """Far below the 1e-6 that are asked for: 3e-9 at most."""
+    """Far below the requested 1e-6: 3e-9 at most."""
     smooth = BrownMcPhee(mu_s=0.0, mu_d=0.0)
     run = simulate(MECHANISMS[name](smooth).model(), 100.0, rtol=1e-10)
     assert run.energy_balance().relative < 1e-7

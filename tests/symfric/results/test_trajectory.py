@@ -187,7 +187,7 @@ def sticking() -> Trajectory:
     return simulate(rabinowicz(ExactCoulomb()), 6.0, samples=301)
 
 
-def test_a_run_says_how_it_ended_and_where_signals_went(sticking: Trajectory) -> None:
+def test_a_run_prints_how_it_ended_and_the_ranges_of_its_signals(sticking: Trajectory) -> None:
     run, text = sticking, repr(sticking)
     assert on_a_screen(text)
     assert text.startswith(
@@ -224,7 +224,7 @@ def test_showing_a_long_run_looks_at_its_times_only() -> None:
     assert looked == [51]
 
 
-def test_an_ensemble_says_who_failed() -> None:
+def test_an_ensemble_names_the_failed_members() -> None:
     model = rabinowicz(BrownMcPhee(), free=["m"])
     runs = simulate_many(model, 1.0, p={"m": [0.5, 1.0]}, t_eval=[0.5, 1.0], max_steps=5)
     assert "ensemble of 'rabinowicz': 2 members at 2 times from 0.5 to 1 s" in repr(runs)

@@ -45,8 +45,10 @@ def test_every_law_gives_a_model_of_its_size_that_starts_or_is_refused(scene: st
     for law in CASES.values() if scene == "drive" else map(CASES.__getitem__, SOME):
         if not {i.name for i in law.inputs} <= OFFERED[scene]:
             refused += 1
-            said = r"law (that needs no more than v, N, .*F_e|of motion and load, got .* the force)"
-            with pytest.raises(ValueError, match=said):
+            reported = (
+                r"law (that needs no more than v, N, .*F_e|of motion and load, got .* the force)"
+            )
+            with pytest.raises(ValueError, match=reported):
                 SINGLE[scene](law).model()
             continue
         model = SINGLE[scene](law).model()
@@ -185,7 +187,7 @@ def belt(law: sf.Law) -> sf.Model:
     return sf.Model("own", x=(x, v), ode=ode, contacts=(slip,), outputs=outputs)
 
 
-def test_equations_of_ones_own_run_as_the_scene_does() -> None:
+def test_user_equations_run_as_the_scene_does() -> None:
     for name in ("brown_mcphee", "lugre", "exact_coulomb", "karnopp"):
         own, scene = belt(sf.ALL_LAWS[name]()), sf.rabinowicz(sf.ALL_LAWS[name]())
         one, other = (sf.simulate(model, 3.0, samples=51) for model in (own, scene))
@@ -194,7 +196,7 @@ def test_equations_of_ones_own_run_as_the_scene_does() -> None:
         np.testing.assert_array_equal(one["friction"], other["friction"])
 
 
-def test_a_sled_slides_as_the_closed_form_says() -> None:
+def test_a_sled_slides_as_the_closed_form() -> None:
     x, v, pull = sf.Variable("x", "m"), sf.Variable("v", "m/s"), sf.Variable("pull", "N")
     slip = sf.contact("floor", sf.Coulomb(mu_d=0.1, v_eps=1e-5), v.symbol, 10.0)
     ode = ca.vertcat(v.symbol, (pull.symbol - slip.force) / 2.0)
@@ -223,13 +225,13 @@ def test_a_contact_that_turns_has_its_units() -> None:
     assert [state.unit for state in model.x] == ["rad/s", "rad"]
 
 
-def test_the_front_door_names_all_that_it_hands_out() -> None:
-    said = sf.__doc__ or ""
+def test_the_docstring_of_the_package_names_all_public_objects() -> None:
+    reported = sf.__doc__ or ""
     laws = {kind.__name__ for kind in sf.ALL_LAWS.values()}
     for name in sf.__all__:
         thing = getattr(sf, name)
         is_law = isinstance(thing, type) and issubclass(thing, sf.Law | sf.Population)
-        assert name in said or name in laws or is_law, name
+        assert name in reported or name in laws or is_law, name
     with pytest.raises(AttributeError) as error:
         sf.Lugre  # noqa: B018  # pyright: ignore
     assert (error.value.name, error.value.obj) == ("Lugre", sf)  # Python offers LuGre by these

@@ -193,7 +193,7 @@ UNIT = {"m_1": 1.0, "m_2": 1.0, "g": 1.0, "start_2": 0.0}
 
 
 @pytest.mark.parametrize("v_belt", [0.1, 0.3])
-def test_blocks_stick_and_slip_as_the_matrix_exponential_says(v_belt: float) -> None:
+def test_blocks_stick_and_slip_as_the_matrix_exponential(v_belt: float) -> None:
     laws = sf.ExactCoulomb(mu_s=1.0, mu_d=0.7), sf.ExactCoulomb(mu_s=1.3, mu_d=0.9)
     K = np.array([[1.0 + 1.2, -1.2], [-1.2, 0.8 + 1.2]])
     happened, last = blocks_on_belt(K, (1.0, 1.3), (0.7, 0.9), v_belt, 40.0)
@@ -227,7 +227,7 @@ DRY = ExactCoulomb(mu_s=0.1, mu_d=0.1)
 
 
 @pytest.mark.parametrize("pressure", [4e5, 4e6, 4e8])
-def test_full_pressure_locks_and_loses_what_the_closed_form_says(pressure: float) -> None:
+def test_full_pressure_locks_with_the_loss_of_the_closed_form(pressure: float) -> None:
     T = GRIP * pressure
     a = T * BOTH - FREE
     scene = Clutch(DRY, N_0=0.0)
@@ -241,7 +241,7 @@ def test_full_pressure_locks_and_loses_what_the_closed_form_says(pressure: float
     assert run["torque"][-1] == pytest.approx((J_2 * T_1 + J_1 * T_2) / (J_1 + J_2))
 
 
-def test_a_ramp_of_pressure_locks_when_the_parabola_says() -> None:
+def test_a_ramp_of_pressure_locks_at_the_time_of_the_parabola() -> None:
     """slip = W + FREE t - BOTH GRIP p t^2 / 2 for the pressure p t."""
     rate = 4e6
     run = simulate(

@@ -175,7 +175,7 @@ def test_slider_crank_agrees_with_the_crank_angle_alone_and_published_numbers() 
     assert constraints(run) < (1e-13, 1e-13 * 120, 1e-12 * 1e4)
 
 
-def test_four_bar_closes_as_freudenstein_says() -> None:
+def test_four_bar_closes_by_the_freudenstein_equation() -> None:
     scene = FourBar(sf.Coulomb(v_eps=0.02))
     run = sf.simulate(scene.model(), 3.0, rtol=1e-8)
     expected = [rocker_angle(0.1, 0.35, 0.3, 0.4, th) for th in run["theta_crank"]]

@@ -101,7 +101,7 @@ def test_roads_of_the_rig() -> None:
         assert scene.law.static_level(0.0) == 193.8
 
 
-def test_the_first_ramp_of_the_rig_is_what_the_text_says_of_it() -> None:
+def test_the_first_ramp_of_the_rig_agrees_with_the_text() -> None:
     """Nothing moves for 0.3 s, X_w - X_b = 6.9 mm at 0.5 s, and it is the gentlest of the three."""
     rig = QuarterCar.preset("al_zughaibi_50_mm", sf.ALL_LAWS["quarter_car_general"]())
     run = sf.simulate(rig.model(), 0.6, rtol=1e-8)
@@ -184,7 +184,7 @@ NEEDS_FORCE = {"karnopp", "awrejcewicz", "exact_coulomb"}
 
 
 @pytest.mark.slow
-def test_every_law_runs_under_given_motion_or_says_what_is_missing() -> None:
+def test_every_law_runs_under_given_motion_or_reports_what_is_missing() -> None:
     refused = set[str]()
     for name, kind in sf.ALL_LAWS.items():
         try:

@@ -33,7 +33,7 @@ def test_a_run_as_good_as_its_reference_is_right() -> None:
     assert verdict.error < 1.0
 
 
-def test_what_is_refused_is_told_with_its_reason() -> None:
+def test_what_is_refused_is_reported_with_its_reason() -> None:
     bad = replace(EASY, values={"mu_d": 0.5, "mu_s": 0.2})
     assert (judge(bad).kind, judge(bad).group) == ("refused", "input")
     assert "expected mu_d <= mu_s" in judge(bad).reason
@@ -152,7 +152,7 @@ def test_a_loose_run_has_a_measured_reason() -> None:
     assert "the problem amplifies one to" in verdict.reason
 
 
-def test_what_is_off_between_right_ends_of_steps_is_told_apart() -> None:
+def test_errors_between_correct_ends_of_steps_are_reported_separately() -> None:
     """As where an implicit step goes over a fast transient, and its polynomial another way."""
     ready = problem(EASY)
     run = ready.run(1e-6, "rodas5p", max_steps=10_000)

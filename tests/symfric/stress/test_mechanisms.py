@@ -47,7 +47,7 @@ def sound(run: Trajectory) -> None:
     assert np.diff(run["energy"]).max() < 1e-6 * np.ptp(run["energy"]) + 1e-9
 
 
-# ---- narrow transitions and strong friction, beside a solver of SciPy ----
+# ---- narrow transitions and strong friction, compared with a solver of SciPy ----
 
 
 ORACLES: dict[str, tuple[Any, list[float], float, Any]] = {
@@ -251,7 +251,7 @@ def test_near_parallelograms_go_through_on_their_own_branch(excess: float) -> No
 
 @slow
 @pytest.mark.parametrize(("v_t", "t_end"), [(1e-6, 1e3), (1e-7, 1e4), (1e-8, 1e5)])
-def test_a_velocity_law_creeps_as_its_slope_at_rest_says(v_t: float, t_end: float) -> None:
+def test_a_velocity_law_creeps_by_its_slope_at_rest(v_t: float, t_end: float) -> None:
     """phi' = -phi m g L / (R^2 N mu'(0)): a static law does not hold, for 1e5 s neither."""
     mu_s, mu_d, R, L = 0.15, 0.12, 0.02, 0.5
     slope = (4 * mu_d + (mu_s - mu_d) / 0.75**2) / v_t
@@ -283,7 +283,7 @@ def test_bristles_hold_a_pendulum_for_a_day(friction: Law) -> None:
 @pytest.mark.parametrize(
     "friction", [BrownMcPhee(), LuGreNormalised(), LuGre()], ids=lambda law: type(law).__name__
 )
-def test_every_mechanism_rests_for_a_day_or_says_why_not(name: str, friction: Law) -> None:
+def test_every_mechanism_rests_for_a_day_or_gives_the_reason(name: str, friction: Law) -> None:
     run = simulate(MECHANISMS[name](friction).model(), 1e5, throw=False)
     assert all(np.isfinite(run[name]).all() for name in run.units)
     if run.status.ok:

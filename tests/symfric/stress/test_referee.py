@@ -46,9 +46,9 @@ class Both:
 
     def __init__(self, case: Case) -> None:
         self.case, ready = case, problem(case)
-        self.model, asked = ready.model, question(ready, ready.times)
-        assert asked is not None
-        self.asked = asked
+        self.model, requested = ready.model, question(ready, ready.times)
+        assert requested is not None
+        self.requested = requested
         self.ode = self.model.function("ode")
         if self.model.z:
             others = [self.model.vector("x"), self.model.t, self.model.vector("u")]
@@ -58,7 +58,7 @@ class Both:
     def rates(self, rng: np.random.Generator) -> tuple[Array, Array]:
         """Rates of the machine and, but for modes, of the law at a state and a time by chance."""
         t, nominal = rng.uniform(0.01, 7.9), self.model.nominal("x")
-        motion = Motion(self.asked, t - 1e-6, t + 1e-6)
+        motion = Motion(self.requested, t - 1e-6, t + 1e-6)
         x = rng.normal(size=nominal.size) * nominal * 10 ** rng.uniform(-2, 0.7)
         if self.case.scene == "quarter_car":
             x[:2] = rng.normal(size=2) * 0.05
@@ -67,7 +67,7 @@ class Both:
                 x[motion.mode(i)] = mode = rng.integers(-1, 2)
                 x[velocity] = rest + mode * abs(x[velocity])
         ours = np.array(motion(t, x.tolist()))
-        u = [self.asked.signal.between(t - 1e-6, t + 1e-6)(t)] * len(self.model.u)
+        u = [self.requested.signal.between(t - 1e-6, t + 1e-6)(t)] * len(self.model.u)
         z = self.root(self.guess(motion), x, t, u) if self.model.z else []
         theirs = self.ode(t, x, z, u, []).full()[:, 0]
         n = motion.scene.states if self.case.law == "exact_coulomb" else None
@@ -107,25 +107,25 @@ def test_a_mass_moves_under_each_kind_of_force(signal: Signal, kinks: int) -> No
     """Without friction m v is the integral of the force, here by the trapezoidal rule."""
     case = Case(1, 1, "drive", "coulomb", {"mu_d": 0.0}, inputs={"force": signal}, t_end=2.0)
     ready = problem(case)
-    asked = question(ready, ready.times)
-    assert asked is not None
-    assert len(asked.signal.kinks) == kinks
-    cuts = sorted({0.0, 2.0, *(t for t in asked.signal.kinks if 0 < t < 2)})
+    requested = question(ready, ready.times)
+    assert requested is not None
+    assert len(requested.signal.kinks) == kinks
+    cuts = sorted({0.0, 2.0, *(t for t in requested.signal.kinks if 0 < t < 2)})
     gained = 0.0
     for a, b in pairwise(cuts):
         t = np.linspace(a, b, 20001)
-        force = asked.signal.between(a, b)
+        force = requested.signal.between(a, b)
         gained += np.trapezoid([force(s) for s in t.tolist()], t)
-    assert 0.8 * solve(asked)[1, -1] == pytest.approx(gained, rel=1e-7, abs=1e-7)
+    assert 0.8 * solve(requested)[1, -1] == pytest.approx(gained, rel=1e-7, abs=1e-7)
 
 
 def test_exact_block_on_its_belt_is_that_of_the_closed_form() -> None:
     """It sticks to mu_s m g / k, then slides for half a period about mu_d m g / k and sticks."""
     values = {"mu_s": 0.2, "mu_d": 0.1, "m": 1.0, "k": 4.0, "v_belt": 0.05, "g": 10.0}
     ready = problem(Case(1, 1, "rabinowicz", "exact_coulomb", values, t_end=12.0))
-    asked = question(ready, ready.times)
-    assert asked is not None
-    x, v, mode = solve(replace(asked, y=np.array([0.0, 0.05, 0.0])))
+    requested = question(ready, ready.times)
+    assert requested is not None
+    x, v, mode = solve(replace(requested, y=np.array([0.0, 0.05, 0.0])))
     t, w, away = ready.times, 2.0, 0.5 / 0.05
     sticks = t < away
     assert x[sticks] == pytest.approx(0.05 * t[sticks], abs=1e-12)

@@ -295,7 +295,7 @@ def test_without_load_viscous_friction_and_preloads_remain():
     assert found[60:90] == pytest.approx(0.5 * v[60:90])
     assert (found[90:110] == 0.0).all()
     assert np.abs(swung(LoadDependent(LuGre(), N_0=2.0))[AWAY, 1]).max() > 0.1
-    said = [any("Without load" in use for use in block_of(law).use) for law in (
+    reported = [any("Without load" in use for use in block_of(law).use) for law in (
         LuGre(), LoadDependent(LuGre(), N_0=2.0), CASES["lugre_normalised"]
     )]  # fmt: skip
-    assert said == [True, False, False]
+    assert reported == [True, False, False]

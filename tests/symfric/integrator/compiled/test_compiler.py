@@ -289,9 +289,9 @@ def test_a_broken_compiler_is_an_error_only_where_compiled_code_is_requested(
     with pytest.raises(CompileError, match=message):
         chooser.choose("compiled", left=0.0)
     assert main(["run", "rabinowicz", "--law", "viscous", "--backend", "compiled"]) == 2
-    told = capsys.readouterr().err
-    assert "internal error" not in told
-    assert message in told
+    reported = capsys.readouterr().err
+    assert "internal error" not in reported
+    assert message in reported
 
 
 @needs_compiler

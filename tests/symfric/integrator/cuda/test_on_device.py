@@ -108,12 +108,12 @@ def test_the_budget_of_a_launch_approaches_its_time() -> None:
 
 
 def test_chunks_change_nothing_and_progress_rises_between_launches() -> None:
-    told: list[float] = []
+    reported: list[float] = []
     whole = simulate_many(oscillator(), 1.0, **TWENTY)
-    for progress in (None, told.append):
+    for progress in (None, reported.append):
         assert_same(simulate_many(oscillator(), 1.0, chunk=6, progress=progress, **TWENTY), whole)
-    assert told == sorted(told)
-    assert set(told) >= {0.3, 0.6, 0.9, 1.0}
+    assert reported == sorted(reported)
+    assert set(reported) >= {0.3, 0.6, 0.9, 1.0}
 
 
 def test_an_interrupt_keeps_finished_chunks_and_a_folder_continues(

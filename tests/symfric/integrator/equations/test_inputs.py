@@ -123,7 +123,7 @@ def test_bad_samples_are_refused() -> None:
                 kind(t, y)
 
 
-def test_bad_inputs_are_refused_saying_what_an_input_is() -> None:
+def test_bad_inputs_are_refused_with_the_definition_of_an_input() -> None:
     cases: list[tuple[Any, str]] = [
         ("strong", "expected a finite number, got 'strong'; an input is a number, Hold or Linear"),
         (np.nan, "expected a finite number, got nan"),

@@ -71,7 +71,7 @@ def test_a_start_off_the_constraints_is_assembled_or_refused() -> None:
 
 
 def drawer(mu_s: float, rate: float = 1.0, names: tuple[str, ...] = ("slide",)) -> Model:
-    """A drawer with its weight beside its guide, pulled back: N = 2 m c |a| / length.
+    """A drawer with its centre of mass off its guide, pulled back: N = 2 m c |a| / length.
 
     While it slides forward, a (1 - 2 mu c / length) = -F / m: with c = length it jams where the
     coefficient of friction reaches 1/2. More `names` make more of them, all alike.

@@ -124,7 +124,7 @@ def test_small_pivot_is_judged_by_what_it_spoils(corner: float, sound: bool, uni
     assert backward_error(A, SWAPPED) <= SOUND
 
 
-def test_regular_and_singular_matrices_are_told_apart_whatever_the_units() -> None:
+def test_regular_and_singular_matrices_are_distinguished_in_any_units() -> None:
     """A stiff oscillator at a long step: the second pivot grows 1e10-fold and is right."""
     assert backward_error(np.array([[1e-5, -1.0], [1.0, 1e-5]]), DIAGONAL) < 1e-10
     for A in (np.ones((2, 2)), np.diag([1.0, 0.0]), np.diag([1e9, 1e-300, 0.0])):

@@ -230,8 +230,8 @@ def test_every_executor_gives_the_same(case: str, backend: str) -> None:
         assert np.isnan(serial["x"][[1, 3], 1]).all()
         assert serial.reached == pytest.approx([1.0, 0.5, 1.0, 0.25, 1.0], rel=1e-5)
         together = f"{Status.STEP_TOO_SMALL.value} Stopped at t = 0.5 s; run it with simulate"
-        said = {"vm": "stopped at t = 0.5000.* grows without bound", "compiled": together}
-        assert re.search(said[backend], serial.failed[1])
+        reasons = {"vm": "stopped at t = 0.5000.* grows without bound", "compiled": together}
+        assert re.search(reasons[backend], serial.failed[1])
     elif case == "mechanism":
         assert list(serial.failed) == [2]
         assert "from which all loops can be closed" in serial.failed[2]
@@ -276,10 +276,10 @@ def test_failed_members_are_named(backend: str) -> None:
 
 @pytest.mark.parametrize("executor", ["serial", "threads"])
 def test_progress_rises_to_one_and_an_interrupt_keeps_finished_members(executor: str) -> None:
-    told: list[float] = []
+    shares: list[float] = []
     given: dict[str, Any] = {"x0": {"x": np.ones(60)}, "chunk": 2, "executor": executor}
-    simulate_many(oscillator(), 1.0, progress=told.append, **given)
-    assert told == pytest.approx(np.arange(1, 31) / 30)
+    simulate_many(oscillator(), 1.0, progress=shares.append, **given)
+    assert shares == pytest.approx(np.arange(1, 31) / 30)
     many = simulate_many(oscillator(), 1.0, progress=after(3), **given)
     assert many.status is Status.INTERRUPTED
     finished = np.isfinite(many["x"][:, 0])

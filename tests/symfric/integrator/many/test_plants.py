@@ -42,7 +42,7 @@ def test_each_goes_as_alone_and_in_any_order(model: Model) -> None:
     np.testing.assert_array_equal(together.u, held[-1])
 
 
-def test_unknowns_that_are_far_are_searched_for_and_failures_disturb_nobody() -> None:
+def test_distant_unknowns_are_found_and_failures_leave_other_members_unchanged() -> None:
     """No fast update reaches a force of 1e3 N from rest; z^2 = u has no root for u = -1."""
     plant = batch(followed(), 0.1)
     forces = np.zeros((MEMBERS, 1))

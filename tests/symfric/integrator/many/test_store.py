@@ -99,13 +99,13 @@ def test_an_interrupted_run_is_resumed(tmp_path: Path) -> None:
     interrupted = run(first, after(3))
     assert interrupted.status is Status.INTERRUPTED
     assert np.isfinite(interrupted["x"][:, 0]).sum() == 3 * 3 - 1
-    told: list[float] = []
-    resumed = run(second, told.append)
+    reported: list[float] = []
+    resumed = run(second, reported.append)
     assert resumed.status is Status.SUCCESS
     assert second.tasks == 7 - 3
-    assert len(told) == 4
-    assert told[0] >= 11 / 20
-    assert told[-1] == 1.0
+    assert len(reported) == 4
+    assert reported[0] >= 11 / 20
+    assert reported[-1] == 1.0
     assert_same(resumed, simulate_many(explosive(), 1.0, p={"p": p}, executor="serial"))
     assert list(resumed.failed) == [1]
     assert_same(run(third), resumed)

@@ -104,18 +104,18 @@ def test_large_steps_are_blocks_in_both_engines(monkeypatch: pytest.MonkeyPatch)
 @needs_compiler
 def test_engines_may_change_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """As "auto" does, at a moment that depends on the load of the machine."""
-    asked = 0
+    requested = 0
 
     def by_turns(self: Integrator, _: str, __: float) -> object:
-        nonlocal asked
-        asked += 1
-        return self.compiled if asked % 2 else self.vm
+        nonlocal requested
+        requested += 1
+        return self.compiled if requested % 2 else self.vm
 
     plain = {case: of_case(case, "vm") for case in ("events", "samples")}
     monkeypatch.setattr(Integrator, "choose", by_turns)
     monkeypatch.setattr(run, "ATTEMPTS", {"vm": 9, "compiled": 7})
     assert {case: of_case(case, "auto") for case in plain} == plain
-    assert asked > 10
+    assert requested > 10
 
 
 @needs_compiler
@@ -229,7 +229,7 @@ def drawn(rng: np.random.Generator) -> tuple[float, dict[str, Any]]:
 @pytest.mark.slow
 @needs_compiler
 def test_random_runs_have_the_same_bits_by_both_engines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """However many attempts, rows and bytes they may take before somebody looks."""
+    """However many attempts, rows and bytes they may take before the state is inspected."""
     rng = np.random.default_rng(10)
     for case in range(RUNS):
         model, (t_end, arguments) = MODELS[case % len(MODELS)], drawn(rng)

@@ -1,4 +1,4 @@
-"""Friction above its level is said, and only that."""
+"""Runs warn of friction above its level, and of nothing else."""
 
 import warnings
 from dataclasses import dataclass
@@ -32,11 +32,13 @@ def quiet(*arguments: Any, **keywords: Any) -> Any:
         return sf.simulate(*arguments, **keywords)
 
 
-def test_a_bristle_that_creeps_below_its_width_is_said() -> None:
+def test_a_bristle_that_creeps_below_its_width_is_reported() -> None:
     """k v_belt / sigma_0 = 1.1e-16 m/s is below v_eps = 1e-15: it stretches, and never slides."""
-    with pytest.warns(sf.OverloadWarning, match="contact 'belt' LuGre carries 2.29 times") as said:
+    with pytest.warns(
+        sf.OverloadWarning, match="contact 'belt' LuGre carries 2.29 times"
+    ) as reported:
         run = sf.simulate(block(sigma_0=1e16), 20.0, rtol=1e-7)
-    assert len(said) == 1
+    assert len(reported) == 1
     assert run.status.ok
     assert "2.29 times" in run.doubts and run.doubts in run.message
     top = np.abs(run.at(run.step_times)["friction"]).max() / (0.33 * 2.0 * 9.81)
@@ -75,12 +77,14 @@ def test_a_long_run_whose_steps_are_not_kept_is_looked_at(monkeypatch: Any) -> N
         sf.simulate(block(sigma_0=1e16), 20.0, rtol=1e-7, t_eval=[0.0, 1.0])
 
 
-def test_an_ensemble_is_warned_of_once_and_says_which() -> None:
+def test_an_ensemble_warns_once_and_names_the_members() -> None:
     law = sf.LuGre(mu_s=0.33, mu_d=0.21, v_s=1e-8, sigma_1=2e7)
     model = Rabinowicz(law, **SLOW).model(free=["sigma_0"])
-    with pytest.warns(sf.OverloadWarning, match="2 of 3 members, the first is 1: .* 2.29") as said:
+    with pytest.warns(
+        sf.OverloadWarning, match="2 of 3 members, the first is 1: .* 2.29"
+    ) as reported:
         study = sf.simulate_many(model, 20.0, p={"sigma_0": [1e15, 1e16, 1e17]}, rtol=1e-7)
-    assert len(said) == 1
+    assert len(reported) == 1
     assert [*study.doubtful] == [1, 2]
     assert "doubtful: 2" in repr(study)
 
@@ -116,7 +120,7 @@ def alarms(seed: int, runs: int) -> list[str]:
             law = sf.with_values(
                 law, {p.name: float(p.value) * 10 ** random.uniform(-wide, wide) for p in known}
             )
-            with warnings.catch_warnings(record=True) as said:
+            with warnings.catch_warnings(record=True) as reported:
                 warnings.simplefilter("always")
                 kind = ALL_SCENES[scene]
                 u = {n: i.function for n, i in kind.inputs.items()}
@@ -127,7 +131,7 @@ def alarms(seed: int, runs: int) -> list[str]:
         except (ValueError, sf.SolveError):
             continue
         found += [
-            f"{law} in {scene}: {w.message}" for w in said if w.category is sf.OverloadWarning
+            f"{law} in {scene}: {w.message}" for w in reported if w.category is sf.OverloadWarning
         ]
     return found
 
@@ -157,7 +161,7 @@ class Pushing(sf.BrownMcPhee):
         (Rabinowicz(Pushing(mu_d=0.1)), {}),
     ],
 )
-def test_friction_that_adds_energy_is_said(machine: Scene, u: dict[str, float]) -> None:
+def test_friction_that_adds_energy_is_reported(machine: Scene, u: dict[str, float]) -> None:
     with pytest.warns(sf.EnergyWarning, match=r"by Pushing adds \d\S* J .* check its sign"):
         run = sf.simulate(machine.model(), 2.0, u=u)
     assert run.status is sf.Status.SUCCESS
@@ -174,7 +178,7 @@ def test_steady_friction_of_no_law_adds_energy(name: str) -> None:
         assert not sliding.suspect(model.values("p"))
 
 
-def test_bristles_that_give_back_what_they_stored_are_not_said() -> None:
+def test_bristles_that_return_stored_energy_are_not_reported() -> None:
     """A block at rest on stretched bristles: at first friction does nothing but push it."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", sf.EnergyWarning)

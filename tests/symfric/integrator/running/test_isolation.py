@@ -55,9 +55,9 @@ def test_the_virtual_machine_searches_only_where_an_event_is_possible(
     searched = list[bool]()
 
     def search(of: Search, *step: Any) -> tuple[Change, Stop | None]:
-        change, asked = whole(of, *step)
+        change, requested = whole(of, *step)
         searched.append(change is Change.CUT)
-        return change, asked
+        return change, requested
 
     whole = Search.__call__
     monkeypatch.setattr(Search, "__call__", search)

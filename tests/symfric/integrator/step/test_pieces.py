@@ -104,15 +104,15 @@ def test_calls_have_the_bits_of_the_virtual_machine():
     assert text.count("static void") == 3  # f is written once and called twice
     assert text.count("whole_1_f(") == 3
     assert "whole_1_f(a0 + 1, " in text  # a slice is handed over where it stands
-    door = (
-        "void door(const double *x, const double *d, double *r, double *s);\n"
-        "void door(const double *x, const double *d, double *r, double *s)"
+    outer = (
+        "void outer(const double *x, const double *d, double *r, double *s);\n"
+        "void outer(const double *x, const double *d, double *r, double *s)"
         " { whole(x, d, r, s); }\n"
     )
-    library = load(HEADER + text + door, "door")
+    library = load(HEADER + text + outer, "outer")
     for x in np.random.default_rng(0).normal(size=(50, 7)):
         place = [np.ascontiguousarray(v) for v in (x[:5], x[5:], np.empty(5), np.empty(1))]
-        library.door(*(ctypes.c_void_p(v.ctypes.data) for v in place))
+        library.outer(*(ctypes.c_void_p(v.ctypes.data) for v in place))
         ends, product = whole(x[:5], x[5:])
         assert (place[2] == ends.full().ravel()).all()
         assert place[3][0] == float(product)

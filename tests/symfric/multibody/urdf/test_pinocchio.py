@@ -1,4 +1,4 @@
-"""Robots, random and of others, beside Pinocchio: dynamics, frames, energies, motion."""
+"""Random and published robots compared with Pinocchio: dynamics, frames, energies, motion."""
 
 import re
 import warnings
@@ -121,7 +121,7 @@ def test_every_link_is_where_pinocchio_puts_it(seed: int) -> None:
         assert expected.translation == pytest.approx(p.ravel(), abs=1e-12), link
 
 
-def test_floating_joints_move_as_pinocchio_says() -> None:
+def test_floating_joints_move_as_in_pinocchio() -> None:
     """Energies, and the accelerations of the joints that turn and slide."""
     text = random_robot(7, 5, ("floating", *MOVING))
     there = pin.buildModelFromXML(text.replace("</joint>", LIMIT))

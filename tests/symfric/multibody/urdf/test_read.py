@@ -54,7 +54,7 @@ def test_another_law_gets_the_friction_tag_as_its_normal_force() -> None:
         read_urdf(rod(**{' friction="0.2"': ""}), law=LuGre())
 
 
-def test_bearings_replace_what_the_file_says_by_friction_of_the_reactions() -> None:
+def test_bearings_replace_friction_of_the_file_by_friction_of_the_reactions() -> None:
     bearing = JointFriction(Coulomb(), radius=0.01)
     for text, name, known in ((SMALL, "elbow", "hinge"), (WELDED, "weld", "spin")):
         with pytest.raises(ValueError, match=f"bearings: expected one of {known}, got {name}"):
@@ -148,7 +148,7 @@ def test_mimic_joint_follows_and_its_mass_is_felt() -> None:
     assert short["a_rate"][-1] == pytest.approx(1e-3 * expected, rel=1e-3)
 
 
-def test_all_that_is_left_out_is_said_once() -> None:
+def test_all_that_is_left_out_is_reported_once() -> None:
     more = '<limit lower="-1" upper="1"/><safety_controller k_velocity="1"/></joint><gazebo/>'
     visual = '<visual><geometry><sphere radius="1"/></geometry></visual></link>'
     with warnings.catch_warnings(record=True) as caught:

@@ -46,7 +46,7 @@ COSTLY = dict.fromkeys(
 
 @cache
 def quick(name: str) -> Plate:
-    """A plate at reduced size, computed once."""
+    """A figure at reduced size, computed once."""
     return PLATES[name](quick=True)
 
 
@@ -54,7 +54,7 @@ def quick(name: str) -> Plate:
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=COSTLY.get(n, ())) for n in PLATES])
-def test_a_plate_is_drawn_and_its_claims_hold(name: str) -> None:
+def test_a_figure_is_drawn_and_its_claims_hold(name: str) -> None:
     plate = quick(name)
     assert plate.picture.axes
     assert all(axis.has_data() for axis in plate.picture.axes if axis.axison)
@@ -81,7 +81,7 @@ def made(
     function: Callable[..., object] = SHAPE, *, distance: float = 0.0, quick: bool = False,
     claims: Mapping[str, object] | None = None, numbers: Mapping[str, float] | None = None,
 ) -> Plate:  # fmt: skip
-    """A plate of given numbers."""
+    """A figure of given numbers."""
     numbers, claims = numbers or {"a [1]": 1.0}, {"it is": 1} if claims is None else claims
     return plate_of(function, Figure(), distance, numbers, claims, "m", within=0.1, quick=quick)
 
@@ -126,7 +126,7 @@ def test_a_docstring_falls_into_its_parts() -> None:
     assert sections(doc) == parts
 
 
-def test_a_plate_shows_itself_in_one_screen() -> None:
+def test_a_figure_shows_itself_in_one_screen() -> None:
     lines = repr(quick(NAME)).splitlines()
     assert lines[0] == "Figure 7: Influence of the shape factor C on the friction force"
     assert "distance: 0 of 4 statements (at most 0" in "".join(lines)
@@ -169,7 +169,7 @@ def test_laws_of_one_picture_look_different() -> None:
 # ---- files ----
 
 
-def test_a_plate_is_written_with_its_page(tmp_path: Path) -> None:
+def test_a_figure_is_written_with_its_page(tmp_path: Path) -> None:
     record = draw(NAME, tmp_path, quick=True)
     assert (tmp_path / f"{NAME}.png").stat().st_size > 10_000
     assert json.loads((tmp_path / f"{NAME}.json").read_text()) == record == read(tmp_path)[NAME]
