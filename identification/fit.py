@@ -189,11 +189,9 @@ class Fit:
 
     def _live(self, asked: "Prepared", made: Task, point: Point) -> Live:
         """Return the problem with its minimum and the friction levels of the law."""
+        values = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
         drive = asked.subject.drive
-        names = made.residuals.names
-        mass = None if drive is None else float(drive.m)
-        if drive is not None and "m" in names:
-            mass = float(point.values[names.index("m")])
+        mass = None if drive is None else float(values.get("m", drive.m))
         largest = strongest(asked.kind, self.data, asked.seen, mass)
         levels = levels_of(asked.subject, largest, self.data.rotary)
         return Live(asked.kind, asked.subject, self.data, made, point, levels)
@@ -374,6 +372,5 @@ def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) 
     if whole is not None and seen is not None:
         with suppress(ValueError):  # without motion in the data, keep the values of the law
             found = start_values(whole, seen, free=[*values])
-    return (
-        values | {n: x for n, x in found.items() if n not in subject.requests.started} | dict(given)
-    )
+    started = subject.requests.started
+    return values | {n: x for n, x in found.items() if n not in started} | dict(given)

@@ -13,7 +13,7 @@ from identification.data.check_signals import (
     of_spikes,
     of_velocity,
 )
-from identification.data.findings import Finding, Findings, Rough, View, rough_model, texts
+from identification.data.findings import Finding, Findings, Rough, View, rough_model
 from identification.data.record import GAP, JITTER, Record
 
 FEWEST, FEW = 20, 50
@@ -71,6 +71,16 @@ def of_points(view: View) -> Iterator[Finding]:
         yield view.warning("one-way", "v", "points_one_way")
 
 
+LIMITS = {
+    "m": (1e-9, 50.0, 1e5),
+    "rad": (1e-9, 1e5, 1e9),
+    "N": (1e-9, 1e6, 1e10),
+    "N m": (1e-12, 1e6, 1e10),
+    "m/s": (1e-9, 100.0, 1e5),
+    "rad/s": (1e-9, 1e4, 1e8),
+}
+"""Limits of signal ranges by unit: error below the first or above the last, warning above the
+second."""
 FASTEST = {"m": (50.0, 1e5), "rad": (1e4, 1e8)}
 """Speeds of a position above which a warning and an error are given."""
 TOGETHER = (("m", "N"), ("rad", "N m"))
@@ -84,7 +94,7 @@ def of_units(view: View, model: Rough | None) -> Iterator[Finding]:
         of_x, of_force = mixed
         yield view.error("units", view.name("force"), "apart", of_x=of_x, of_force=of_force)
     for signal in view.roles.values():
-        low, doubt, high = texts()["ranges"].get(record.units[signal], (0.0, np.inf, np.inf))
+        low, doubt, high = LIMITS.get(record.units[signal], (0.0, np.inf, np.inf))
         range_ = float(np.ptp(record.signals[signal]))
         if 0 < range_ < low or range_ > doubt:
             yield view.finding(not low <= range_ <= high, "units", signal, "range", range=range_)

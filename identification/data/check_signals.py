@@ -14,7 +14,6 @@ from identification.data.findings import (
     count_of,
     rough_model,
     smoothed,
-    texts,
     white_part,
 )
 
@@ -249,6 +248,20 @@ RELATED = 0.7
 """Least correlation of the given and the derived signal."""
 OFF = 0.2
 """Relative error of the scale above which it is reported."""
+SCALES = {
+    57.2958: "deg/s taken as rad/s",
+    0.0174533: "rad/s taken as deg/s",
+    9.5493: "rpm taken as rad/s",
+    0.10472: "rad/s taken as rpm",
+    6.28319: "rad/s taken as rev/s",
+    0.159155: "rev/s taken as rad/s",
+    1000.0: "mm/s taken as m/s",
+    0.001: "m/s taken as mm/s",
+    1e6: "um/s taken as m/s",
+    100.0: "cm/s taken as m/s",
+    60.0: "per minute taken as per second",
+}
+"""Ratio of a velocity to the slope of a position -> its cause."""
 
 
 def of_velocity(view: View) -> Iterator[Finding]:
@@ -275,8 +288,7 @@ def of_velocity(view: View) -> Iterator[Finding]:
         elif alike < RELATED:
             yield view.warning("velocity", name, **values)
         elif abs(scale - 1) > OFF:
-            scales = texts()["scales"].items()
-            near = [text for text, known in scales if abs(scale / known - 1) < 0.1]
+            near = [text for known, text in SCALES.items() if abs(scale / known - 1) < 0.1]
             why = near[0] if near else "a wrong unit or scale"
             serious = bool(near) or not 0.2 <= scale <= 5
             yield view.finding(serious, "units", name, "scale", why=why, **values)

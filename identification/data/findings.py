@@ -99,8 +99,8 @@ class Findings:
 
 
 @cache
-def texts() -> dict[str, dict[str, Any]]:
-    """Return the sentences of findings by kind or case, ranges by unit, and known scales."""
+def sentences() -> dict[str, str]:
+    """Return the sentences of findings by kind or case."""
     return tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 
 
@@ -182,7 +182,7 @@ class View:
         samples = (begin or 0, last if end is None else end)
         names = {"signal": signal, "x": self.name("x"), "force": self.name("force")}
         values |= {"unit": self.record.units.get(signal, ""), "at": self.at(samples[0])}
-        sentence = texts()["sentences"][case or kind].format(**names, **values)
+        sentence = sentences()[case or kind].format(**names, **values)
         start, stop = samples if self.record.t is None else self.record.t[[*samples]]
         severity = "error" if serious else "warning"
         return Finding(kind, self.number, signal, sentence, float(start), float(stop), severity)

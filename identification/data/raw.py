@@ -9,17 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.record import Array, Record
-from identification.data.units import CHANNELS, KINDS, by_channel, is_common, unit
+from identification.data.units import CHANNELS, by_channel, is_common, unit
 from symfric.foundation import checks
 
 T = TypeVar("T")
 Missing = Literal["refuse", "drop"]
 
-ALIASES, POINTS = (
-    {name: CHANNELS[name]["aliases"] for name in names}
-    for names in (("t", "x", "v", "a", "force"), ("v", "F", "N", "t"))
-)
-"""Channel -> aliases of its column in records over time, and in points."""
+MOTION, POINTS = ("t", "x", "v", "a", "force"), ("v", "F", "N", "t")
+"""Channels of records over time, and of points."""
 SKIPPED = ("", "-", "_")
 """Entries of `columns` that mark columns to ignore."""
 
@@ -114,12 +111,14 @@ def label(cell: str) -> tuple[str, str]:
         if match and match[1] and is_common(match[2]):
             return match[1], match[2].strip()
     match = fullmatch(r"(.+)_([A-Za-z]+)", cell)
-    if match and is_common(match[2]) and any(_matches(match[1], n) for n in ALIASES.values()):
+    if match and is_common(match[2]) and any(_matches(match[1], n) for n in MOTION):
         return match[1], match[2]
     return cell, ""
 
 
-def _matches(name: str, names: Sequence[str]) -> bool:
+def _matches(name: str, channel: str) -> bool:
+    """Return True if `name` is an alias of `channel`."""
+    names = CHANNELS[channel].aliases
     return name in names or (len(name) > 1 and name.lower() in names)
 
 
@@ -135,7 +134,7 @@ def record(raw: Raw, wanted: Wanted) -> Record:
     have = ", ".join(map(str, columns))
     named = _channels(where, columns, wanted, have)
     requested = wanted.columns.keys() if isinstance(wanted.columns, Mapping) else set[str]()
-    needed = named.keys() & {*requested, *({"v", "F"} if wanted.points else KINDS)}
+    needed = named.keys() & {*requested, *({"v", "F"} if wanted.points else CHANNELS)}
     given = _units(where, named, wanted)
     rows = _rows(where, columns, {key: named[key] for key in named if key in needed}, wanted)
     problems: list[str] = []
@@ -219,11 +218,11 @@ def _channels(
                 got = f"{len(hits)} of them" if hits else have
                 raise ValueError(f"{where}: expected one column '{name}' for {key}, got {got}")
             take(key, hits[0])
-    for key, names in (POINTS if wanted.points else ALIASES).items():
+    for key in POINTS if wanted.points else MOTION:
         if key in found:
             continue
         exact = [c for c in left if c.label == key]
-        near = [c for c in left if _matches(c.label, names)]
+        near = [c for c in left if _matches(c.label, key)]
         if len(exact) > 1:
             got = ", ".join(f"'{c}'" for c in exact)
             raise ValueError(f"{where}: expected one column for {key}, got {got}")
@@ -279,9 +278,9 @@ def _scale(key: str, column: Column, given: str, wanted: Wanted) -> tuple[float,
     if key == "t" and not text and wanted.units is not None:
         text = "s"
     meant = unit(text) if text else None
-    kinds = KINDS.get(key, ()) if not wanted.points or key in ("v", "F", "N") else ()
-    if kinds and (meant is None or meant.si not in kinds):
-        such = f"a unit of {CHANNELS[key]['examples']}"
+    channel = CHANNELS.get(key) if not wanted.points or key in ("v", "F", "N") else None
+    if channel and (meant is None or meant.si not in channel.units):
+        such = f"a unit of {channel.examples}"
         raise ValueError(f"column '{column}': expected {such}, got {text or 'none'}")
     return (1.0, text) if meant is None else (meant.factor, meant.si)
 

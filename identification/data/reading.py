@@ -14,11 +14,11 @@ import numpy as np
 from identification.data.mat_file import read_variables
 from identification.data.raw import Array, Column, Raw, Wanted, gathered, label, record
 from identification.data.record import Record
-from identification.data.units import KINDS, is_common, unit
+from identification.data.units import CHANNELS, is_common, unit
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
 
-ASSUMED = {name: kinds[0] for name, kinds in KINDS.items()}
+ASSUMED = {name: channel.units[0] for name, channel in CHANNELS.items()}
 """Default units of arrays; numbers in Python are in SI units."""
 
 

@@ -4,13 +4,11 @@ The grammar is that of `symfric.foundation.units`. In addition, recorders use wo
 `newton`), letters of either case, and speeds as `1/min`.
 """
 
-import tomllib
 from collections.abc import Mapping
 from functools import cache
 from math import isfinite
-from pathlib import Path
 from re import findall
-from typing import Any
+from typing import NamedTuple
 
 from symfric.foundation.units import WORDS, Unit, nearest, parsed, per_second, written
 
@@ -25,12 +23,44 @@ COMMON = {
 }  # fmt: skip
 """Symbols that denote units in a header even without brackets, as in `x_mm` but not in `tau_d`."""
 
-CHANNELS: Mapping[str, Mapping[str, Any]] = tomllib.loads(
-    Path(__file__).with_name("channels.toml").read_text("utf-8")
-)
-"""Channel -> SI units, aliases and examples of units."""
-KINDS: Mapping[str, tuple[str, ...]] = {n: tuple(c["units"]) for n, c in CHANNELS.items()}
-"""SI units of the canonical channels; the first one is for linear drives."""
+
+class Channel(NamedTuple):
+    """Canonical channel.
+
+    Attributes:
+        units: SI units; the first one is for linear drives.
+        aliases: names of its column; those of several letters are case-insensitive.
+        examples: examples of accepted units, for messages.
+    """
+
+    units: tuple[str, ...]
+    aliases: tuple[str, ...]
+    examples: str
+
+
+FORCES = "N, mN, kN, N m, N mm, mN m"
+CHANNELS: Mapping[str, Channel] = {
+    "t": Channel(("s",), ("t", "time", "timestamp"), "s, ms, us, min"),
+    "x": Channel(
+        ("m", "rad"),
+        ("x", "q", "qm", "pos", "position", "displacement", "angle", "theta", "phi"),
+        "m, cm, mm, um, rad, mrad, deg, rev",
+    ),
+    "v": Channel(
+        ("m/s", "rad/s"),
+        ("v", "qd", "dq", "vel", "velocity", "speed", "omega"),
+        "m/s, mm/s, rad/s, deg/s, rpm",
+    ),
+    "a": Channel(
+        ("m/s^2", "rad/s^2"),
+        ("a", "qdd", "ddq", "acc", "acceleration"),
+        "m/s^2, mm/s^2, rad/s^2, deg/s^2",
+    ),
+    "force": Channel(("N", "N m"), ("force", "F", "f", "torque", "tau"), FORCES),
+    "F": Channel(("N", "N m"), ("F", "f", "force", "friction", "torque", "tau"), FORCES),
+    "N": Channel(("N",), ("N", "normal", "normal_force"), "N, mN, kN"),
+}
+"""Canonical channels of records over time, and F and N of points."""
 
 
 @cache
@@ -64,7 +94,9 @@ def by_channel(where: str, text: str) -> dict[str, str]:
     found: dict[str, str] = {}
     for part in (p.strip() for p in text.split(",")):
         meant = unit(part) if part else None
-        channels = [c for c, kinds in KINDS.items() if meant and meant.si in kinds and c != "N"]
+        channels = [
+            name for name, c in CHANNELS.items() if meant and meant.si in c.units and name != "N"
+        ]
         if not channels:
             raise ValueError(
                 f"{where}: expected units of position and force such as 'rad, N m', got '{part}'; "

@@ -26,6 +26,7 @@ from identification.result.outcome import (
 from identification.result.series import Curve, Errors, Estimate, Series, limits
 from identification.result.stored import source_of
 from identification.verdict.judge import Test
+from symfric.foundation.status import Status
 from symfric.page import html
 from symfric.page.svg import Axis, Band, Dots, Level, Mark, Path, Stems, around, chart
 
@@ -138,8 +139,10 @@ def page_of(fit: Outcome, ranking: Ranking | None = None) -> str:
     if any(f.severity == "error" for f in fit.findings):
         sections.sort(key=lambda section: section[0] != "findings")
     parts = [(at, name, html.section(at, head, *body)) for at, name, head, body in sections]
-    verdict = ("good", "Good") if fit.status.name == "SOLVED" else ("doubtful", "Doubtful")
-    verdict = verdict if fit.status.ok else ("bad", "No result")
+    verdict = ("bad", "No result")
+    if fit.status.ok:
+        solved = fit.status is Status.SOLVED
+        verdict = ("good", "Good") if solved else ("doubtful", "Doubtful")
     top = [
         f"<header>{html.title(fit.name)}",
         html.paragraph(f"fitted to {', '.join(fit.records)} by {fit.kind}", "soft"),
@@ -236,15 +239,15 @@ def _residuals(fit: Outcome) -> Iterator[str]:
 
 
 def _tests(caption: str, tests: Sequence[Test]) -> str:
-    words = {
-        (True, True): "passed", (True, False): "too small to count",
-        (False, True): "failed", (False, False): "no, allowed for",
-    }  # fmt: skip
+    def outcome(test: Test) -> str:
+        if test.passed:
+            return "passed" if test.p >= test.limit else "too small to count"
+        return "failed" if test.decides else "no, allowed for"
+
     rows = [
-        (t.channel, t.name, number(t.statistic, 3), f"{t.p:.2g}", f"{t.limit:.2g}",
-         words[t.passed, t.p >= t.limit if t.passed else t.decides])
+        (t.channel, t.name, number(t.statistic, 3), f"{t.p:.2g}", f"{t.limit:.2g}", outcome(t))
         for t in tests
-    ]  # fmt: skip
+    ]
     kinds = ["good" if t.passed else "doubtful" * t.decides for t in tests]
     header = ("channel", "test", "statistic", "p", "limit", "result")
     return html.table(caption, header, rows, (2, 3, 4), kinds)

@@ -7,7 +7,7 @@ descriptions fit at one point, the residuals are evaluated a small distance away
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple, final
 
 import numpy as np
@@ -205,16 +205,19 @@ def minimum(task: Task, point: Point) -> Minimum:
             gain[rows] = max(float(np.mean(above[rows] - below[rows])) / (2 * h), 0.05)
     known, box = {s: x for s, x in task.noise.items() if s not in task.estimated}, task.unknowns
     raw = point.evaluation.r
-
-    def change(values: Array) -> float:
-        there = task.residuals.at(values)
-        failed = isinstance(there, str)
-        return np.inf if failed else float(np.linalg.norm((there.r - raw) / task.sigma))
-
+    change = partial(_change, task, raw)
     return Minimum(
         task.channels, box.unknowns, box.names, point.values, point.slope, box.at_bound(point.w),
         point.weights * point.r, point.J, gain, raw, known, change,
     )  # fmt: skip
+
+
+def _change(task: Task, raw: Array, values: Array) -> float:
+    """Return the norm of the change of the weighted residuals from `raw` to other values."""
+    there = task.residuals.at(values)
+    if isinstance(there, str):
+        return np.inf
+    return float(np.linalg.norm((there.r - raw) / task.sigma))
 
 
 SHARE = 1e-4

@@ -217,8 +217,7 @@ class _Walk:
         """Minimise over the other values with the value held at c; return a message on failure.
 
         The search starts at `w`. The coordinate of the value is eliminated: w_own solves
-        value(w) = c.
-        The derivatives become J_j - J_own (dvalue/dw_j) / (dvalue/dw_own).
+        value(w) = c. The derivatives become J_j - J_own (dvalue/dw_j) / (dvalue/dw_own).
         """
         optimize: Any = import_module("scipy.optimize")  # slow to import
         box, own = self.task.unknowns, self.own
