@@ -95,7 +95,7 @@ def test_what_no_pack_holds_is_refused_with_its_place() -> None:
     for thing, message in (
         (Pair((1, lambda: 0), 2), function),
         (Pair(1, LuGre), r"pack\.b: expected numbers.*the class LuGre"),
-        (Pair(Local(), 2), r"pack\.a: expected an object whose class can be imported.*Local"),
+        (Pair(Local(), 2), r"pack\.a: expected an object whose class can be imported"),
         (np.array([object()]), "expected an array of numbers"),
     ):
         with pytest.raises(ValueError, match=message):
