@@ -228,11 +228,7 @@ class _Writer:
 
     def _function(self, where: str, value: Any) -> Any:
         """Return a Python function as its import path."""
-        try:
-            same = storable.found_at(storable.path_of(value)) is value
-        except (ImportError, AttributeError, ValueError):
-            same = False
-        if same:
+        if storable.importable(value):
             return {"function": storable.path_of(value)}
         what = "a function that can be imported: written by def at the top of a module"
         hint = "move it there (arguments by functools.partial), or write a casadi.Function"
@@ -250,6 +246,9 @@ class _Writer:
         if isinstance(value, type) or not data or not known:
             what = "numbers, texts, expressions and objects made of them"
             raise checks.refused(f"pack{where}", what, value)
+        if self._trusted and not storable.importable(kind):
+            what = "an object whose class can be imported: defined at the top of a module"
+            raise checks.refused(f"pack{where}", what, value, "move the class there")
         # keep the object, so that no other object gets its id
         self._known[id(value)] = len(self._known), value
         say: Callable[[], dict[str, Any]] = getattr(value, "to_pack", partial(state_of, value))

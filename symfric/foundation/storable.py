@@ -53,6 +53,14 @@ def found_at(path: str) -> Any:
     return found
 
 
+def importable(named: Any) -> bool:
+    """Return True if the path of a class or function leads to it."""
+    try:
+        return found_at(path_of(named)) is named
+    except (ImportError, AttributeError, ValueError):
+        return False
+
+
 def may_hold(path: str) -> bool:
     """Return True if a file may name the class: it is in "modules" or in another package."""
     inside = (path.startswith(m if m.endswith(".") else f"{m}:") for m in names()["modules"])

@@ -104,8 +104,8 @@ def simulate_many(
         executor: "serial", "threads" (the compiled loop holds no lock), "processes", or any
             `concurrent.futures.Executor`, such as those of dask and mpi4py. A compiled task is
             plain data and C source, so a worker needs only this package and a compiler. With
-            events or backend="vm", the task contains the model, and each worker builds its
-            integrator once and runs the members one by one, as `simulate` does.
+            events or backend="vm", the task contains the model, whose classes a worker imports;
+            each worker builds its integrator once and runs members one by one, as `simulate` does.
         workers: number of threads or processes, or of the executor's workers; default all cores of
             this machine. Twice as many chunks are in progress at once.
         chunk: members per task; default 500. On a graphics processor the default is limited by a

@@ -104,7 +104,7 @@ class Topology:
 
 
 def spanning_tree(bodies: Mapping[str, Body], joints: Sequence[Joint]) -> Topology:
-    """Return the tree that connects the bodies to the ground by the joints with fewest coordinates.
+    """Return the tree that connects the bodies to the ground by joints with the fewest freedoms.
 
     Joints in the tree have coordinates and no constraint equations; all other joints close loops.
     Bodies that no joint with coordinates connects to the ground are omitted.

@@ -100,7 +100,7 @@ def digest(*parts: Any) -> str:
 @final
 @dataclass(frozen=True, eq=False)
 class Job:
-    """Task whose members run together, in compiled code; for a model without events; picklable.
+    """Task of a model without events, whose members run together in compiled code; picklable.
 
     Attributes:
         program: the equations.
@@ -234,7 +234,7 @@ def suited(integrator: Integrator, points: Points, inputs: InputData) -> Integra
 class SingleJob:
     """Task whose members run one by one as in `simulate`; picklable.
 
-    It serves models with events, and CasADi's virtual machine. Each process builds its own
+    It is used for models with events and for CasADi's virtual machine. Each process builds its own
     integrator, with the same pivots.
 
     Attributes:

@@ -304,13 +304,13 @@ def program(integrator: Integrator) -> Program:
 
 
 def follow_of(integrator: Integrator) -> Following | None:
-    """Return the fast update of algebraic unknowns, if members need it."""
+    """Return the fast update of algebraic unknowns if members need it, otherwise None."""
     jumps = integrator.model.u or integrator.system.manifold is not None
     return integrator.follow if integrator.follows and jumps else None
 
 
 def with_code(integrator: Integrator, code: str) -> Program:
-    """Return the program of an integrator with this C."""
+    """Return the program of an integrator, with its equations in C as `code`."""
     s = integrator.system
     equations = Equations(s.names, s.nx, s.free, s.constraints, s.manifold)
     return Program(

@@ -39,7 +39,7 @@ class Composed(Law):
 
     @property
     def states(self) -> tuple[State, ...]:
-        """States of all laws, in their order; the name of a shared state has a number."""
+        """States of all laws, in their order; repeated names get the number of their law."""
         laws = self.on_side(1)
         names = distinct([[state.name for state in law.states] for law in laws])
         return tuple(

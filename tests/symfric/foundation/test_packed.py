@@ -87,10 +87,15 @@ def test_laws_and_variables() -> None:
 
 
 def test_what_no_pack_holds_is_refused_with_its_place() -> None:
+    @dataclass(frozen=True)
+    class Local:
+        value: int = 0
+
     function = r"pack\.a\[1\]: expected a function that can be imported.*the function <lambda>"
     for thing, message in (
         (Pair((1, lambda: 0), 2), function),
         (Pair(1, LuGre), r"pack\.b: expected numbers.*the class LuGre"),
+        (Pair(Local(), 2), r"pack\.a: expected an object whose class can be imported"),
         (np.array([object()]), "expected an array of numbers"),
     ):
         with pytest.raises(ValueError, match=message):
