@@ -51,6 +51,13 @@ def test_undetermined_delays_are_refused(
     assert len(first.merged(second, on=("x", "y"), shift=0.1)) == 1
 
 
+def test_neighbouring_samples_count_as_one_in_short_records() -> None:
+    """The smoothing makes samples dependent, so a short record determines its delay less well."""
+    first, second = pair(lambda t: np.sin(t * (t + 2) / 2), 0.1, noise=0.008, end=1.2)
+    with pytest.raises(ValueError, match=r"signals that determine their delay, got 5\d sh"):
+        first.merged(second, on=("x", "y"))
+
+
 def test_gaps_split_the_merged_record() -> None:
     first, second = pair(lively(1), 0.1, gap=(5.0, 6.0))
     data = first.merged(second, on=("x", "y"))

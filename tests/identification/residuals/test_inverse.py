@@ -124,12 +124,15 @@ def test_the_dead_time_of_the_force_is_an_own_unknown() -> None:
 
 
 def test_motion_without_force_is_balanced_by_itself() -> None:
-    model = rabinowicz(Stribeck(mu_s=0.15, mu_d=0.1, v_s=0.05), free=["mu_d"], v_belt=0.3)
+    law = Stribeck(mu_s=0.15, mu_d=0.1, v_s=0.05)
+    model, other = (rabinowicz(law, free=p, v_belt=0.3) for p in (["mu_d"], ["mu_d", "v_belt"]))
     run = simulate(model, 3.0, t_eval=T, rtol=1e-9, x0={"x": 0.4})
     data = Dataset.of(t=T, x=run["x"], units={"x": "m"})
     rows = InverseDynamics(filter=Filter(60.0, 4)).prepare(subject(model), data)
     (channel,) = rows.channels
     assert (channel.signal, channel.unit) == ("balance of v", "m/s^2")
+    free_belt = InverseDynamics(filter=Filter(60.0, 4)).prepare(subject(other), data)
+    assert free_belt.channels[0].t.size == channel.t.size  # reversals are those of the start value
     values = starts(subject(model))
     a = channel.regressors["a"]
     assert np.abs(evaluated(rows, values).r).max() < 5e-3 * np.abs(a).max()

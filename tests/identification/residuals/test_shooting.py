@@ -79,6 +79,12 @@ def test_derivatives_by_parameters_starts_and_dead_time() -> None:
     check_slopes(found, values, least=1e-2)
 
 
+@pytest.mark.parametrize(("noise", "rtol"), [(0.0, 1e-7), (1e-8, 1e-7), (1e-5, 1e-6)])
+def test_the_tolerance_follows_the_noise_of_the_data(noise: float, rtol: float) -> None:
+    """Data without noise count as accurate to a share of their size."""
+    assert shots(Shooting(x0="given", engine="simulate"), slide(noise=noise)).rtol == rtol
+
+
 def test_dead_time_is_that_of_the_input() -> None:
     data = slide(tau=0.012, noise=0.0)
     late, early = (shots(Shooting(x0="given", dead_time=tau), data) for tau in (0.012, 0.0))

@@ -289,10 +289,14 @@ def test_a_value_that_drifts_off_ends_at_a_number_one_can_read() -> None:
     data = made(
         ("k",), channel, lambda v: Evaluation(1 - 1 / v[0] - y, np.full((200, 1), v[0] ** -2.0))
     )
-    for upper, end in ((np.inf, 2e12), (1e10, 1e10)):
+    for upper, end, noise in (
+        (np.inf, 2e12, "estimate"),
+        (np.inf, 2e12, {"x": 1e-4}),  # a hundredth of the noise of the data
+        (1e10, 1e10, "estimate"),
+    ):
         k = Unknown("k", "1", 2.0, lower=0.0, upper=upper, logarithmic=True)
         box = unknowns_of((k,), {}, data.names)
-        found = descend(task(data, box), box.of({"k": 1e14}) + 300.0)
+        found = descend(task(data, box, noise), box.of({"k": 1e14}) + 300.0)
         assert found.status is Status.SOLVED
         assert box.values(found.w)[0] == pytest.approx(end, rel=1e-5)
         assert box.values(found.w)[0] < upper

@@ -130,6 +130,19 @@ def known() -> Known:
     return Known.of(out_and_back(), smooth.motions[0], {})
 
 
+def test_rests_are_inserted_in_phases_whose_inputs_can_hold() -> None:
+    """Inputs above the 6 N of friction cannot hold the load."""
+    out, back = out_and_back().chain
+    pushed = [replace(phase, bounds={"force": (10.0, 20.0)}) for phase in (out, back)]
+    for phases, expected in (
+        (out >> back, "0+0- | -0"),
+        (pushed[0] >> back, "+- | -0"),
+        (out >> pushed[1], "0+0- | -"),
+    ):
+        reader = Reader(replace(out_and_back(), phases=phases), known())
+        assert sequence.shown(reader.sequence({"guide": 0.05})) == expected
+
+
 def modes_solver() -> ModeSolver:
     problem = out_and_back()
     rules = Rules(problem, Reader(problem, known()).sizes(), ("guide",), SHORTEST * 2)

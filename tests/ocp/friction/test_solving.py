@@ -66,6 +66,12 @@ def test_step_to_a_worse_motion_is_rejected(monkeypatch: pytest.MonkeyPatch) -> 
     assert [step.level for step in steps] == [FIRST]
 
 
+def test_a_failed_solve_on_the_finer_mesh_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(homotopy, "ONTO", {"max_iter": 1})
+    first = next(sharpened(out_and_back(), Radau(3), Ipopt(), starts=1, intervals=20))
+    assert first.solution.ok
+
+
 def test_sizes_do_not_matter(steps: tuple[Sharp, ...]) -> None:
     """A thousandth of the way by a thousandfold mass: forces and cost are the same."""
     law = BrownMcPhee(mu_s=6.0, mu_d=4.0, mu_v=500.0, v_t=1e-8, N_t=1e-3)

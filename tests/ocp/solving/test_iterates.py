@@ -157,6 +157,19 @@ def test_solution_is_carried_to_other_phases_and_models_by_name() -> None:
         assert min(free.T, longest) == carried(on(unit_move(T=Free(0.5, longest))), free).T
 
 
+def test_new_scenarios_start_from_the_motion_of_the_first() -> None:
+    names = ("dry", "oiled", "worn")
+    two, three = (
+        there_and_back(scenarios={name: {} for name in names[:count]}, shared=())
+        for count in (2, 3)
+    )
+    into, points = on(two, 4), initial_points(on(two, 4))
+    spans = tuple(replace(span, u=0.0 * span.u + k) for k, span in enumerate(points.spans))
+    motions = span_motions(two, Radau(), into.meshes, replace(points, spans=spans))
+    found = resample(on(three, 4), motions, {})
+    assert [span.u[0, 0] for span in found.spans] == [0.0, 1.0, 2.0, 3.0, 0.0, 1.0]
+
+
 def test_multipliers_are_used_where_the_program_is_the_same() -> None:
     old = unit(10)
     start, warm = start_of(on(unit_move(), 10), old)

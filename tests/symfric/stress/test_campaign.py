@@ -6,6 +6,7 @@ import re
 import signal as signals
 import time
 from collections.abc import Callable
+from multiprocessing.context import BaseContext
 from pathlib import Path
 
 import pytest
@@ -153,6 +154,16 @@ def test_an_unknown_signal_is_refused() -> None:
 
 def outcomes(work: Callable[..., object], tasks: list[object], limit: float = 60.0) -> object:
     return dict(workers.outcomes(work, enumerate(tasks), 2, limit))
+
+
+def test_only_a_fork_server_imports_the_module_of_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    imported: list[list[str]] = []
+    monkeypatch.setattr(
+        BaseContext, "set_forkserver_preload", lambda _, names: imported.append(names)
+    )
+    for start, expected in (("fork", []), ("forkserver", [["__main__", "builtins"]])):
+        assert dict(workers.outcomes(abs, [(0, -1)], 1, start=start)) == {0: 1}
+        assert imported == expected
 
 
 def test_results_exceptions_exits_and_signals_are_distinguished() -> None:
