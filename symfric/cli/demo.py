@@ -10,6 +10,7 @@ from identification.data.synthetic import synthetic_drive_data
 from symfric import SolveError, Status
 from symfric.cli import output
 from symfric.cli.app import INTERRUPTED, main
+from symfric.foundation import checks
 from symfric.foundation.files import check_folder, write_text
 from symfric.foundation.programs import find_compiler
 
@@ -63,7 +64,9 @@ def records(folder: Path, data: Path | None) -> dict[str, str]:
     if stage is not None:
         laws = "coulomb+viscous,asymmetric(coulomb+viscous)"
         files = stage / "DATA_EMPS.mat", stage / "DATA_EMPS_PULSES.mat"
-        files[0].stat()  # a missing folder is an error now, not after the first part
+        if missing := [file.name for file in files if not file.is_file()]:
+            what = "the folder of DATA_EMPS.mat and DATA_EMPS_PULSES.mat"
+            raise checks.refused("demo: data", what, str(stage), f"missing: {', '.join(missing)}")
         output.note(f"identification from the measured EMPS stage in {stage}")
     else:
         output.note("no measured record found (--data DIR for the EMPS benchmark), simulating one")
