@@ -190,14 +190,15 @@ def otherwise(law: Law, friction: Friction, load: float | None) -> str:
     if law.states:
         times = [p.name for p in known if p.role == "time" and p.unit == "s" and p.value != 0.0]
         if times:
-            return f"friction follows by times of its own ({', '.join(times)})"
+            return f"friction changes with time constants ({', '.join(times)})"
         roles = {p.role for p in known if p.value != 0.0}
         bristle = roles & {"stiffness", "length"} and "damping" not in roles
-        return "nothing damps its bristle, which rings" if bristle else ""
+        return "its bristle is undamped" if bristle else ""
     if law.inputs:
         return ""
     level = float(steady_force(law, np.array([FAST]), load or 1.0)[0]) / (load or 1.0)
     wanted = friction.sliding(FAST)
     if abs(level - wanted) <= ANOTHER * wanted:
         return ""
-    return f"sliding at {FAST:g} m/s it rubs with {level:.3g} of the load, not {wanted:.3g}"
+    found = f"its friction is {level:.3g} of the load instead of {wanted:.3g}"
+    return f"sliding at {FAST:g} m/s {found}"

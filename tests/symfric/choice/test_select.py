@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 from dataclasses import replace
 from functools import partial
 from math import log2
@@ -98,8 +99,11 @@ def test_a_fall_that_is_known_is_kept() -> None:
     )  # fmt: skip
     assert [row.law for row in found.ranked] == ["stribeck"]
     assert (found["stribeck"].values or {})["v_s"] == 0.05
-    assert "it tends to another motion, with order 1; sliding at 0.1 m/s" in found["tustin"].reason
-    assert "rubs with 0.107 of the load, not 0.101" in found["tustin"].reason  # e^-2 and e^-4
+    reason = found["tustin"].reason
+    order = re.search(r"it tends to another motion, with order (\S+); sliding at 0.1 m/s", reason)
+    assert order is not None
+    assert 0.8 < float(order[1]) < 1.2
+    assert "its friction is 0.107 of the load instead of 0.101" in reason  # e^-2 and e^-4
 
 
 def press(law: Law) -> Model:
@@ -189,7 +193,7 @@ def test_what_a_law_may_cost_is_counted() -> None:
     found = select(Rabinowicz, ["gms"], accuracy=1e-6, fixed_steps=False)["gms"]
     assert (found.standing, found.spent, found.rank) == ("inaccurate", True, 1)
     assert found.work <= RUN
-    assert "nothing damps its bristle" in found.reason
+    assert "its bristle is undamped" in found.reason
 
 
 def test_a_process_that_ends_is_a_row() -> None:
