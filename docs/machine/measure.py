@@ -44,7 +44,7 @@ def machine() -> str:
 def others() -> list[str]:
     """Return versions of installed tools that subjects compare with."""
     found: list[str] = []
-    for name in ("numpy", "scipy", "rockit-meco", "do-mpc"):
+    for name in ("numpy", "scipy", "rockit-meco", "nosnoc", "do-mpc", "opty"):
         with suppress(PackageNotFoundError):
             found.append(f"{name} {version(name)}")
     return found
@@ -62,7 +62,7 @@ def commit() -> str:
 def measured(subject: str, quick: bool) -> dict[str, Any]:
     """Return the tables of `symfric bench SUBJECT` with machine, load and commit."""
     loads, began = [os.getloadavg()[0]], perf_counter()
-    result = bench.measure(subject, quick)
+    result = bench.measure(subject, quick, lambda item, fraction, row: print(row) if row else None)
     loads.append(os.getloadavg()[0])
     spent = perf_counter() - began
     tables = [
