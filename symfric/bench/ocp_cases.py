@@ -232,7 +232,7 @@ CASES = (
     ),
     Case(
         "pendulum", OURS, ("phi", "phi_rate"), _pendulum, (1,), ((0.15, 0.1),), (0.0, 0.0),
-        {1.0: _rest(pi, 0.0)}, limit=3.0, T=5.0, size={0: 3.0, 1: 5.0},
+        {1.0: _rest(pi, 0.0)}, limit=3.0, T=5.0, intervals=100, size={0: 3.0, 1: 5.0},
     ),
     Case(
         "cart_pendulum", OURS, ("x", "theta", "x_rate", "theta_rate"),

@@ -126,7 +126,9 @@ def line(found: Found) -> str:
     """Return a row as one line of its cells, or a note."""
     if isinstance(found, str):
         return found
-    cells = (c if isinstance(c, str) else f"{c:.{DIGITS}g}" for c in found[1].values())
+    cells = (
+        c if isinstance(c, str) else f"{c:.{DIGITS}g}" if c == c else "-" for c in found[1].values()
+    )
     return "  ".join(cell for cell in cells if cell)
 
 
@@ -260,7 +262,7 @@ def _draw_curves(
         axis.set_title(str(case).replace("_", " "), fontsize="small")
         axis.set_xlabel(x)
         axis.set_ylabel(y)
-        axis.tick_params(labelsize="small")
+        axis.tick_params(which="both", labelsize="small")
         axis.xaxis.set_minor_formatter("")
     for axis in axes[len(tiles) :]:
         axis.set_axis_off()

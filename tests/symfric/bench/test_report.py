@@ -72,7 +72,7 @@ def test_an_interrupt_keeps_the_rows_so_far() -> None:
     assert made.interrupted
     assert [at for at in reported if not at[2]] == [("a", 0.0, ""), ("b", 1 / 3, "")]
     assert len(reported) == 2 + 5 + 1
-    assert reported[2] == ("a", 1 / 3, "a  other  0.00123  nan  7")
+    assert reported[2] == ("a", 1 / 3, "a  other  0.00123  -  7")
     assert reported[5] == ("a", 1 / 3, "A note.")
 
     def at_once() -> Iterator[Found]:
