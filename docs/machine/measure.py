@@ -1,9 +1,10 @@
 """Measure a subject and store it for the page of benchmarks: `python -m docs.machine.measure ivp`.
 
 The tables of `symfric bench SUBJECT` are stored in `docs/benchmarks/SUBJECT.json`, with machine,
-load, versions, date and commit, and its picture next to it. The page of benchmarks and the tables of the page on other tools
-are made from these files only. Measure on an idle machine; the load is the mean number of processes
-that waited for a processor, before and after. `--quick` takes fewer points.
+load, versions, date and commit, and its picture next to it. The page of benchmarks and the tables
+of the page on other tools are made from these files only. Measure on an idle machine; the load is
+the mean number of processes that waited for a processor, before and after. `--quick` takes fewer
+points.
 """
 
 import json

@@ -28,7 +28,7 @@ from symfric.model import Model
 from symfric.scenes.blocks import drive
 
 Array = NDArray[np.float64]
-LIMIT, QUICK_LIMIT = 30.0, 5.0
+LIMIT, QUICK_LIMIT = 20.0, 3.0
 """Time limits of one solve [s]."""
 TITLE = (
     "Optimal control with dry friction; the referee simulates every control with exact Coulomb "
