@@ -17,7 +17,7 @@ from typing import Any, final
 import casadi as ca
 
 from ocp.formulation.expressions import at_end, integral
-from ocp.formulation.phase import Phase
+from ocp.formulation.phase import Chain, Phase
 from ocp.formulation.problem import Problem
 from ocp.problems import GRAVITY, READY
 from symfric.foundation.parameters import Variable
@@ -129,15 +129,19 @@ def _stated(case: Case, width: float) -> Problem:
     model = Model(case.name, x=x, u=(u,), ode=ca.vertcat(*rate), contacts=contacts)
     marks = [0.0, *sorted(case.ends)]
     start = dict(zip(case.states, case.start, strict=True))
-    chain = None
-    for a, b in pairwise(marks):
-        end = {case.states[i]: value for i, value in case.ends[b].items()}
-        phase = Phase(model, T=(b - a) * case.T, start=start if a == 0.0 else {}, end=end)
-        chain = phase if chain is None else chain >> phase
+    phases = Chain(
+        tuple(
+            Phase(
+                model, T=(b - a) * case.T, start=start if a == 0.0 else {},
+                end={case.states[i]: value for i, value in case.ends[b].items()},
+            )
+            for a, b in pairwise(marks)
+        )
+    )  # fmt: skip
     cost = integral(lambda s: case.running(ca, [s[n] for n in case.states], s.u))
     cost += at_end(lambda s: case.final(ca, [s[n] for n in case.states], s.u))
     bounds = {case.states[i]: box for i, box in case.bounds.items()}
-    return Problem(chain, cost, bounds={"u": (-case.limit, case.limit), **bounds})
+    return Problem(phases, cost, bounds={"u": (-case.limit, case.limit), **bounds})
 
 
 # ---- predefined problems, derived again by hand ----

@@ -252,7 +252,11 @@ def do_mpc(case: Case, limit: float, width: float) -> Attempt:
         for i, value in case.ends[s].items():
             control.set_nl_cons(f"over_{i}", on * (x[i] - value), 0.0)
             control.set_nl_cons(f"under_{i}", on * (value - x[i]), 0.0)
-    control.set_tvp_fun(lambda _: plan)
+
+    def planned(t: float) -> Any:
+        return plan
+
+    control.set_tvp_fun(planned)
     control.setup()
     control.x0 = np.array(case.start).reshape(n, 1)
     control.set_initial_guess()

@@ -78,7 +78,7 @@ def judged(case: Case, edges: Array, controls: Array, rtol: float = RTOL) -> Ver
             low, high = case.bounds.get(i, UNBOUNDED)
             off[i] = max(off.get(i, 0.0), low - state[i], state[i] - high)
     miss = max((off[i] / largest[i] for i in off if off[i] > 0), default=0.0)
-    return Verdict(float(state[-1] + case.final(math, state[:-1], 0.0)), float(miss))
+    return Verdict(float(state[-1] + case.final(math, state[:-1].tolist(), 0.0)), float(miss))
 
 
 def _loads(case: Case, x: Sequence[float], u: float) -> list[float]:
