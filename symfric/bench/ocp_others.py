@@ -84,11 +84,15 @@ OPTY = {
 """Number of a status of Ipopt -> its name."""
 
 
+SAMPLES = 10
+"""Number of samples of the control in each segment of Dymos."""
+
+
 def dymos(case: Case, limit: float, width: float) -> Attempt:
     """Return the solution by Radau pseudospectral collocation of order 3 in Dymos, with SLSQP.
 
     Each segment has a cubic control, so a third of the intervals gives about as many unknowns of
-    the control. The cost is a state, as in the examples of Dymos.
+    the control; it is sampled for the referee. The cost is a state, as in the examples of Dymos.
     """
     om: Any = import_module("openmdao.api")
     tool: Any = import_module("dymos")
@@ -160,7 +164,8 @@ def dymos(case: Case, limit: float, width: float) -> Attempt:
         series = f"traj.p{k}.timeseries"
         t, u = (problem.get_val(f"{series}.{name}").reshape(-1, 4) for name in ("time", "u"))
         for nodes, values in zip(t, u, strict=True):
-            cubic, fine = np.polyfit(nodes - nodes[0], values, 3), np.linspace(*nodes[[0, -1]], 11)
+            cubic = np.polyfit(nodes - nodes[0], values, 3)
+            fine = np.linspace(nodes[0], nodes[-1], SAMPLES + 1)
             edges += fine[1:].tolist()
             controls += np.polyval(cubic, 0.5 * (fine[1:] + fine[:-1]) - nodes[0]).tolist()
     claimed = problem.get_val(f"traj.p{len(parts) - 1}.timeseries.total")[-1, 0]
