@@ -1,6 +1,5 @@
 """Active conditions of a solution with their multipliers, in words and SI units."""
 
-from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -13,9 +12,9 @@ from ocp.formulation.phase import Array, Box, Span
 from ocp.solving.optimum import STATIONARY, Optimum
 from ocp.transcription.program import Place
 
-WEAK, SMALL, TINY = 0.1, 1e-2, 1e-8
+WEAK, SMALL, TINY, ROUNDING = 0.1, 1e-2, 1e-8, 1e-10
 """Ratio of distance and multiplier, both scaled and at most `SMALL`, above which it is not certain
-whether a condition is active; `TINY` is the error of both."""
+whether a condition is active; `TINY` is the error of both, `ROUNDING` that of distances alone."""
 EQUATIONS = ("the equation of", "the algebraic equation", "the continuity of", "the largest cost",
              "the constraint", "the loop")  # fmt: skip
 """Rows of the equations of motion, whose multipliers are costates."""
@@ -88,12 +87,14 @@ class Status(NamedTuple):
         upper: mask of those nearer to, or pressing on, their upper bound.
         weak: mask of those for which this is uncertain.
         fixed: mask of equal bounds.
+        ratio: ratio of multiplier and distance, above 1 where a condition is active.
     """
 
     active: NDArray[np.bool_]
     upper: NDArray[np.bool_]
     weak: NDArray[np.bool_]
     fixed: NDArray[np.bool_]
+    ratio: Array
 
 
 def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> Status:
@@ -107,29 +108,21 @@ def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> Sta
     size = np.maximum(np.where(np.isfinite(span), span, np.abs(values)), 1.0)
     high = above < below
     pressure, distance = np.where(high, strength, -strength), np.minimum(below, above) / size
+    distance = np.where(np.abs(distance) < ROUNDING, 0.0, distance)
     larger = np.fmax(np.abs(pressure), np.abs(distance))
     smaller = np.fmin(np.abs(pressure), np.abs(distance))
     weak = ~fixed & (larger < SMALL) & (smaller >= WEAK * larger - TINY)
-    return Status(fixed | (pressure > distance), high, weak, fixed)
+    ratio = pressure / np.maximum(distance, TINY)
+    return Status(fixed | (pressure > distance), high, weak, fixed, ratio)
 
 
 def statuses(optimum: Optimum) -> tuple[Status, Status]:
     """Return the status of all unknowns and of all rows."""
-    program, iterate = optimum.transcription.program, optimum.iterate
-    w, g = iterate.lam_w / optimum.size, iterate.lam_g / optimum.size
-    if optimum.dense:
-        w, g = (lam * _counts(places) for lam, places in ((w, program.unknowns), (g, program.rows)))
+    program, iterate, size = optimum.transcription.program, optimum.iterate, optimum.size
     return (
-        status_of(iterate.w, program.lower_w, program.upper_w, w),
-        status_of(optimum.rows[0], program.lower_g, program.upper_g, g),
+        status_of(iterate.w, program.lower_w, program.upper_w, iterate.lam_w / size),
+        status_of(optimum.rows[0], program.lower_g, program.upper_g, iterate.lam_g / size),
     )
-
-
-def _counts(places: Sequence[Place]) -> Array:
-    """Return the number of places with the name and the phase of each place."""
-    groups = [(place.name, place.span) for place in places]
-    counts = Counter(groups)
-    return np.array([counts[group] for group in groups], dtype=float)
 
 
 class Entry(NamedTuple):

@@ -184,6 +184,17 @@ def test_costates_of_a_mechanism_account_for_its_mass_matrix(scheme: Scheme) -> 
     np.testing.assert_allclose(found.hamiltonian, wanted, rtol=4e-3)
 
 
+def test_bang_bang_motions_have_no_degrees_of_freedom() -> None:
+    """The interior-point method ends with many forces near the switch inside their bounds."""
+    for N in (31, 90):
+        found = solve_once(fastest(), N)
+        assert found.condition.degrees_of_freedom == 0
+        assert found.condition.sufficient
+        by = found.sensitivity("x at the end")
+        np.testing.assert_allclose([by.cost, by.T], np.sqrt(0.3), rtol=1e-3)
+        np.testing.assert_allclose(by.cost, by.T, rtol=1e-9)
+
+
 # --- multipliers --------------------------------------------------------------------------------
 
 
