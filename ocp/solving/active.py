@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +95,12 @@ class Status(NamedTuple):
     weak: NDArray[np.bool_]
     fixed: NDArray[np.bool_]
     ratio: Array
+
+    @staticmethod
+    def joined(unknowns: "Status", rows: "Status") -> "Status":
+        """Return the status of unknowns, then of rows."""
+        pairs: Any = zip(unknowns, rows, strict=True)
+        return Status(*map(np.concatenate, pairs))
 
 
 def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> Status:
@@ -204,7 +210,7 @@ def per_unit(unit: str) -> str:
 
 def active_conditions(optimum: Optimum) -> ActiveConditions:
     """Return the active conditions in the order of time; consecutive times are joined."""
-    status = Status(*map(np.concatenate, zip(*statuses(optimum), strict=True)))
+    status = Status.joined(*statuses(optimum))
     groups: dict[tuple[str, int], list[Entry]] = {}
     for entry in entries(optimum):
         groups.setdefault((entry.name, entry.place.span), []).append(entry)

@@ -34,14 +34,13 @@ from symfric.foundation.parameters import check_names
 
 STEP = 1e-3
 """Step of differences relative to a parameter."""
-SOFT = 1e-11
-"""Regularisation of dependent conditions, whose effect iterative refinement removes."""
-LEAST_PIVOT = 1e-20
-"""Least ratio of two pivots of a matrix that is not singular."""
+SOFT, TINY = 1e-11, 1e-14
+"""Regularisation of dependent conditions and of a Hessian without curvature, whose effect iterative
+refinement removes."""
 ROUNDS = 5
 SINGULAR = 1e-5
 """Largest relative residual of the linear equations."""
-LARGE, UNSOLVABLE = 1e12, 1e17
+LARGE, UNSOLVABLE = 1e12, 1e15
 """Condition numbers above which active conditions count as dependent, and above which the linear
 equations have no unique solution."""
 PENALTY, FLAT = 1e6, 1e-6
@@ -73,15 +72,15 @@ class Linearised:
 
     Attributes:
         optimum: the solution.
-        added: indices of unknowns, then of rows, that count as active although the distance from
-            their bound exceeds their multiplier.
+        changed: indices of unknowns, then of rows, that count as active although the distance from
+            their bound exceeds their multiplier, or as inactive although it does not.
 
     Raises:
         ValueError: the point does not satisfy the optimality conditions.
     """
 
     optimum: Optimum
-    added: Indices = field(default_factory=lambda: np.zeros(0, np.int64))
+    changed: Indices = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def __post_init__(self) -> None:
         if not self.optimum.residual <= STATIONARY:
@@ -97,10 +96,10 @@ class Linearised:
 
     @cached_property
     def status(self) -> tuple[Status, Status]:
-        """Status of all unknowns and of all rows, with the conditions `added`."""
+        """Status of all unknowns and of all rows, with the conditions `changed`."""
         w, g = statuses(self.optimum)
         active = np.concatenate([w.active, g.active])
-        active[self.added] = True
+        active[self.changed] ^= True
         n = w.active.size
         return w._replace(active=active[:n]), g._replace(active=active[n:])
 
@@ -147,14 +146,11 @@ class Linearised:
     @cached_property
     def factors(self) -> Any:
         """LU factors of the slightly regularised matrix; None if it is singular."""
-        n, m = self.free.size, self.held.size
-        soft = sp.diags(np.concatenate([np.zeros(n), np.full(m, -SOFT)]))
+        soft = np.append(np.full(self.free.size, TINY), np.full(self.held.size, -SOFT))
         try:
-            factors = linalg.splu(sp.csc_matrix(self.matrix + soft))
+            return linalg.splu(sp.csc_matrix(self.matrix + sp.diags(soft)))
         except RuntimeError:
             return None
-        pivots = np.abs(factors.U.diagonal())
-        return factors if pivots.min() > LEAST_PIVOT * pivots.max() else None
 
     def solved(self, right: Array) -> Array | None:
         """Return the solution of the linear equations, or None if there is no unique one."""
@@ -224,11 +220,11 @@ class Linearised:
     def by_condition(self, name: str) -> Change:
         """Return the effect of a prescribed value or of a bound."""
         n, iterate = self.optimum.iterate.w.size, self.optimum.iterate
-        status = [np.concatenate(p) for p in zip(*self.status, strict=True)]
-        lam, shift = np.concatenate([iterate.lam_w, iterate.lam_g]), np.zeros(status[0].size)
+        active, high, _, equal, _ = Status.joined(*self.status)
+        lam, shift = np.concatenate([iterate.lam_w, iterate.lam_g]), np.zeros(active.size)
         for entry, upper in self.conditions[name]:
             k = entry.number
-            if status[0][k] and (status[3][k] or bool(status[1][k]) == upper):
+            if active[k] and (equal[k] or bool(high[k]) == upper):
                 shift[k] = 1.0 / entry.place.scale
         unit = self.conditions[name][0][0].unit
         return Change(unit, np.zeros(n), -shift[n:], shift[:n], -float(lam @ shift))

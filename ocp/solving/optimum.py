@@ -65,8 +65,8 @@ class Optimum:
         return float(self._cost[0])
 
     @cached_property
-    def _cost(self) -> tuple[ca.DM, ca.DM]:
-        return self.transcription.program.gradient(self.iterate.w, self.values)
+    def _cost(self) -> Sequence[ca.DM]:
+        return self.transcription.program.gradient.call([self.iterate.w, self.values])
 
     @cached_property
     def rows(self) -> tuple[Array, Sparse]:

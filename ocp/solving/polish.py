@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ocp.solving.active import Status
 from ocp.solving.linearised import Linearised
 from ocp.solving.optimum import STATIONARY, Optimum
 from ocp.transcription.program import worst_of
@@ -9,23 +10,28 @@ from ocp.transcription.program import worst_of
 STEPS = 10
 CONVERGED, CLOSE = 1e-8, 1e-5
 """Change of scaled unknowns by the last step, and largest relative change of the cost."""
+MOST = 2
+"""Number of conditions that may be given up, in multiples of the number that are too many."""
 NEAREST = 1e-3
 """Least ratio of multiplier and distance of a condition that may count as active."""
 
 
 def determined(optimum: Optimum) -> Linearised:
-    """Return the optimality conditions with enough active conditions for a strict minimum.
+    """Return the optimality conditions with active conditions that determine a strict minimum.
 
     Near a switch of a bang-bang control both multiplier and distance from the bound are small. If
-    the second-order conditions are not met, the conditions nearest to active ones are added.
+    active conditions are too few or too many, those that are nearest to the limit are changed.
     """
     plain = Linearised(optimum)
-    ratio = np.concatenate([status.ratio for status in plain.status])
-    ratio[np.concatenate([status.active for status in plain.status])] = 0.0
-    order = np.argsort(-ratio)[: max(0, plain.free.size - plain.held.size)]
-    order = order[ratio[order] > NEAREST]
+    if plain.regular:
+        return plain
+    active, _, _, fixed, ratio = Status.joined(*plain.status)
+    spare = plain.free.size - plain.held.size
+    near = ~active & (ratio > NEAREST) if spare > 0 else active & ~fixed
+    order = np.argsort(np.where(near, -ratio if spare > 0 else ratio, np.inf))
+    order = order[: min(int(near.sum()), max(spare, -MOST * spare))]
     few, many = 0, order.size
-    if plain.regular or not Linearised(optimum, order).regular:
+    if not Linearised(optimum, order).regular:
         return plain
     while many - few > 1:
         middle = (few + many) // 2
