@@ -12,7 +12,15 @@ from typing import Any, NamedTuple, TypeVar, final
 
 import casadi as ca
 
-from ocp.formulation.expressions import Cost
+from ocp.formulation.expressions import (
+    Cost,
+    Expression,
+    MissingError,
+    Signals,
+    arguments,
+    value_of,
+)
+from ocp.formulation.inputs import Form, Forms, Polynomial, is_form, order_of, rate_name, states_of
 from ocp.formulation.phase import (
     Chain,
     Free,
@@ -26,12 +34,17 @@ from ocp.formulation.phase import (
     meet,
     size_of,
 )
+from ocp.formulation.relaxed import EPS, relaxes
+from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import symbols_of
+from symfric.foundation.variable import stacked, symbols_of
 from symfric.model import Model
 
 T = TypeVar("T")
 Request = TypeVar("Request", bound=Mapping[str, Any] | Sequence[str])
+
+WAVES = 4.0
+"""Typical rate of an input, in multiples of its magnitude over the duration."""
 
 Duration = tuple[Sequence[int], float | Free]
 """(indices of phases, sum of their durations [s])."""
@@ -46,7 +59,9 @@ class Statement:
     _: KW_ONLY
     bounds: Ranges = field(default_factory=dict[str, Range])
     rates: Ranges = field(default_factory=dict[str, Range])
+    inputs: Forms = field(default_factory=dict[str, Form])
     path: Sequence[PathCondition] = ()
+    totals: Mapping[str, Expression] = field(default_factory=dict[str, Expression])
     choose: Mapping[str, tuple[float | None, ...]] = field(default_factory=dict[str, Any])
     periodic: Sequence[str] = ()
     scenarios: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Any])
@@ -86,9 +101,11 @@ class Setting(NamedTuple):
     Attributes:
         number: index of the phase.
         where: prefix of messages, "phase 2 'back': ".
-        model: model with `rates` applied and with the references of costs as parameters.
+        model: model with `inputs`, `rates` and `totals` applied, and with the references of costs
+            as parameters.
         bounds, p: bounds and parameters of the problem and the phase whose names the model has.
         costs: costs of the problem and of the phase.
+        forms: inputs of the model that are not constant on intervals, and their forms.
     """
 
     number: int
@@ -98,25 +115,59 @@ class Setting(NamedTuple):
     bounds: Ranges
     p: Mapping[str, float]
     costs: tuple[Cost, ...]
+    forms: Forms
+
+    @property
+    def apart(self) -> tuple[str, ...]:
+        """States of this phase that do not continue those of the previous one by default."""
+        return states_of({n: f for n, f in self.forms.items() if isinstance(f, Polynomial)})
 
 
 def settings_of(problem: Statement) -> tuple[Setting, ...]:
-    """Return the phases of `problem`; invalid rates, which `validate` reports, are omitted."""
+    """Return the phases of `problem`; invalid inputs, which `validate` reports, are omitted."""
     settings: list[Setting] = []
     for number, (where, phase) in enumerate(labelled_phases(problem)):
-        inputs = {v.name: v for v in phase.model.u}
-        taken = {*phase.model.signals, *(v.name for v in phase.model.p)}
+        model, costs = phase.model, costs_of(problem, phase)
+        forms = forms_of(problem, phase)
+        inputs = {v.name: v for v in model.u if v.name in forms}
         rates = only(problem.rates, inputs) | only(phase.rates, inputs)
-        rates = {n: r for n, r in rates.items() if is_range(r) and rate_name(n) not in taken}
-        sizes = {n: size_of(as_box(r), inputs[n].nominal) for n, r in rates.items()}
-        costs = costs_of(problem, phase)
-        model = with_rates(phase.model, sizes)
-        model = with_parameters(model, dict.fromkeys(references_of(problem, phase), ""))
+        sizes = {n: size_of(as_box(r), 0.0) for n, r in rates.items() if is_range(r)}
+        T = checks.as_number(phase.T.start if isinstance(phase.T, Free) else phase.T)
+        T = T if T is not None and T > 0 else 1.0
+        model = with_forms(model, forms, sizes, T)
+        extra = [*references_of(problem, phase), *[EPS] * relaxes([*problem.path, *phase.path])]
+        model = with_totals(with_parameters(model, dict.fromkeys(extra, "")), problem.totals)
         bounds = only(problem.bounds, names_of(model, problem.bounds)) | dict(phase.bounds)
-        bounds |= {rate_name(name): value for name, value in rates.items()}
+        bounds |= {rate_name(n): rates[n] for n in sizes if order_of(forms[n])}
         p = only(problem.p, [v.name for v in model.p]) | dict(phase.p)
-        settings.append(Setting(number, where, phase, model, bounds, p, costs))
+        settings.append(Setting(number, where, phase, model, bounds, p, costs, forms))
     return tuple(settings)
+
+
+def forms_of(problem: Statement, phase: Phase) -> dict[str, Form]:
+    """Return input -> form of the inputs of a phase that are not constant on intervals.
+
+    Inputs with bounded rate are linear by default. Forms that are invalid, or whose derivatives
+    have names that the model uses, are omitted.
+    """
+    inputs = [v.name for v in phase.model.u]
+    taken = {*phase.model.signals, *(v.name for v in phase.model.p)} - set(inputs)
+    forms: dict[str, Form] = dict.fromkeys([*problem.rates, *phase.rates], "linear")
+    forms |= dict(problem.inputs) | dict(phase.inputs)
+    return {
+        name: form
+        for name, form in only(forms, inputs).items()
+        if is_form(form)
+        and form != "constant"
+        and not taken & {rate_name(name, k + 1) for k in range(order_of(form))}
+    }
+
+
+def added_signals(problem: Statement, phase: Phase) -> set[str]:
+    """Return the names of the signals that `inputs`, `rates` and `totals` add to a model."""
+    forms = forms_of(problem, phase)
+    derived = {rate_name(name, k) for name, f in forms.items() for k in range(order_of(f) + 1)}
+    return derived | {*problem.totals}
 
 
 def only(values: Mapping[str, T], names: Iterable[str]) -> dict[str, T]:
@@ -191,11 +242,6 @@ def _nearby(box: tuple[float, float], value: float) -> float:
     return low if isfinite(low) else high
 
 
-def rate_name(name: str) -> str:
-    """Return the name of the rate of an input."""
-    return f"{name}_rate"
-
-
 def rebuilt(model: Model, again: Callable[[Model], Model] | None = None, **changes: Any) -> Model:
     """Return `model` with changed fields; `again` applies the same change to its open form."""
     if model.contacts and again is not None:
@@ -230,15 +276,84 @@ def with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
 
     Args:
         model: the model.
-        nominal: input -> typical magnitude of its rate.
+        nominal: input -> typical magnitude of its rate; 0 for an input that is constant.
     """
     states, rates = tuple(v for v in model.u if v.name in nominal), dict[str, Variable]()
     for v in states:
         doc, size = f"rate of {v.doc or v.name}", nominal[v.name]
-        rates[v.name] = Variable(rate_name(v.name), f"{v.unit}/s", nominal=size, doc=doc)
-    inputs = tuple(rates.get(v.name, v) for v in model.u)
-    changes = further_states(model, states, symbols_of(rates[v.name] for v in states))
+        if size:
+            rates[v.name] = Variable(rate_name(v.name), f"{v.unit}/s", nominal=size, doc=doc)
+    kept = (v for v in model.u if v.name not in nominal or v.name in rates)
+    inputs = tuple(rates.get(v.name, v) for v in kept)
+    slopes = stacked(rates[v.name].symbol if v.name in rates else 0.0 for v in states)
+    changes = further_states(model, states, slopes)
     return rebuilt(model, lambda other: with_rates(other, nominal), u=inputs, **changes)
+
+
+def with_forms(model: Model, forms: Forms, sizes: Mapping[str, float], T: float) -> Model:
+    """Return `model` with derivatives of inputs as states and inputs; see `Form`.
+
+    Args:
+        model: the model.
+        forms: input -> form.
+        sizes: input -> typical magnitude of its rate; 0 if unknown.
+        T: duration [s], from which unknown magnitudes of derivatives follow.
+    """
+    orders = {name: order_of(form) for name, form in forms.items()}
+    inputs = {v.name: v for v in model.u}
+    for k in range(max(orders.values(), default=0)):
+        rising = [name for name, order in orders.items() if order > k]
+        first = {name: sizes.get(name) or inputs[name].nominal * WAVES / T for name in rising}
+        rates = {rate_name(name, k): first[name] * (WAVES / T) ** k for name in rising}
+        model = with_rates(model, rates)
+    fixed = {n: order_of(form) for n, form in forms.items() if isinstance(form, Polynomial)}
+    return with_rates(model, {rate_name(n, order): 0.0 for n, order in fixed.items()})
+
+
+@_cached
+def with_totals(model: Model, totals: Mapping[str, Expression]) -> Model:
+    """Return `model` with integrals of expressions as states, which start at zero.
+
+        y' = e(t, x, z, u, p)
+
+    Totals with names that the model lacks are constant; invalid ones, which `validate` reports, are
+    omitted.
+    """
+    states, rates = list[Variable](), list[ca.SX]()
+    for name, expression in totals.items():
+        try:
+            rate = value_of(expression, Signals(model))
+        except MissingError:
+            rate = ca.SX(0)
+        except ValueError:
+            continue
+        if name not in (*model.signals, *(v.name for v in model.p)):
+            doc = "integral over the motion"
+            states.append(Variable(name, "", nominal=typical(model, rate), doc=doc))
+            rates.append(rate)
+    changes = further_states(model, states, stacked(rates))
+    return rebuilt(model, lambda other: with_totals(other, totals), **changes)
+
+
+@_cached
+def with_constants(model: Model, nominal: Mapping[str, float]) -> Model:
+    """Return `model` with constant states, name -> typical magnitude, whose start is free.
+
+    Those with a negative magnitude have the lower bound zero.
+    """
+    states = [
+        Variable(name, "", nominal=abs(size), lower=0.0 if size < 0 else -inf)
+        for name, size in nominal.items()
+    ]
+    changes = further_states(model, states, ca.SX.zeros(len(states)))
+    return rebuilt(model, lambda other: with_constants(other, nominal), **changes)
+
+
+def typical(model: Model, expression: ca.SX) -> float:
+    """Return the magnitude of an expression at nominal values; 1 if it is zero or not finite."""
+    at = ca.Function("typical", arguments(model), [expression])
+    value = abs(float(at(0.0, *map(model.nominal, "xzu"), model.values("p"))))
+    return value if isfinite(value) and value > 0.0 else 1.0
 
 
 def further_states(model: Model, states: Sequence[Variable], rates: ca.SX) -> dict[str, Any]:

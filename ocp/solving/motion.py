@@ -287,7 +287,7 @@ def structure_of(problem: Problem | Posed, scheme: Scheme) -> str:
     def described(span: Span) -> list[Any]:
         groups = [[v.name for v in group] for group in (span.model.x, span.model.z, span.model.u)]
         rows = [[s, [row.name for row in rows]] for s, rows in span.rows_at.items()]
-        names = [[row.name for row in part] for part in (span.path, span.joins)]
+        names = [[row.name for row in part] for part in (span.path, span.joins, span.penalised)]
         states, fixed = [link.state for link in span.links], isinstance(span.T, float | int)
         return [span.scenario, span.phase, fixed, groups, names, rows, states]
 
