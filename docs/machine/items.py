@@ -18,14 +18,16 @@ from symfric.laws import PHENOMENA, AnyLaw
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.composed.isotropic import PlanarSlip, SpatialSlip
 from symfric.laws.composed.populations import cost
-from symfric.laws.composed.wrap import Lagged, TemperatureDependent
+from symfric.laws.composed.wrap import Exact, Lagged, LoadNormalised, TemperatureDependent
 from symfric.laws.static.coulomb import Table
 from symfric.scenes import ALL_SCENES, Scene
 
 MADE_OF_LAWS: dict[str, type[Any]] = {
     "sum": Sum,
     "asymmetric": Asymmetric,
+    "exact": Exact,
     "load_dependent": LoadDependent,
+    "load_normalised": LoadNormalised,
     "lagged": Lagged,
     "temperature_dependent": TemperatureDependent,
     "planar_slip": PlanarSlip,

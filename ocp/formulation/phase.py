@@ -166,8 +166,9 @@ class Phase:
 
     `Problem` reports errors of its phases.
 
-    Limits: bounds on states and outputs, and `path`, are imposed at the collocation points;
-    `verify` checks them between these points.
+    Limits: bounds on states and outputs, and `path`, are imposed at the collocation points. Those
+    that contain inputs and no algebraic variables are also imposed at the starts of all intervals,
+    where inputs jump. `verify` checks all of them between these points.
     """
 
     model: Model

@@ -167,10 +167,12 @@ def discretise(
             closed = closing(local, mechanics, before, periodic, named)
         loops.append(closed)
         nodes += conditions.at_nodes(local)
+        jumping = [] if isinstance(scheme, Shooting) else conditions.jumping(span)
+        nodes += [conditions.at_starts(local, jumping, 0)] if jumping else []
         if earlier:
             joined += conditions.between(spans[-2].local, local)
     nodes += [
-        conditions.at_starts(spans[k].local, rows) for k, rows in (starts or {}).items() if rows
+        conditions.at_starts(spans[k].local, rows, 1) for k, rows in (starts or {}).items() if rows
     ]
     return Discretisation(problem, scheme, tuple(spans), tuple(loops), (*nodes, *joined))
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from symfric.laws.composed.populations import RandomBristles as RandomBristles
     from symfric.laws.composed.populations import steady_force as steady_force
     from symfric.laws.composed.populations import steady_inputs as steady_inputs
+    from symfric.laws.composed.wrap import Exact as Exact
     from symfric.laws.composed.wrap import Lagged as Lagged
     from symfric.laws.composed.wrap import LoadNormalised as LoadNormalised
     from symfric.laws.composed.wrap import TemperatureDependent as TemperatureDependent

@@ -7,7 +7,7 @@ from symfric.foundation.parameters import check_names
 from symfric.laws.base.law import Law, check_law
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.composed.populations import AnyLaw, GenericAsperity, Population, RandomBristles
-from symfric.laws.composed.wrap import Lagged, LoadNormalised, TemperatureDependent
+from symfric.laws.composed.wrap import Exact, Lagged, LoadNormalised, TemperatureDependent
 from symfric.laws.dynamic import dahl, dwell, lugre, maxwell_slip, stick_slip
 from symfric.laws.static import (
     applied_force,
@@ -105,9 +105,10 @@ ALIASES = {
 }
 """Other names of laws that papers and programs use."""
 
-Wrapping = Asymmetric | LoadDependent | LoadNormalised | Lagged | TemperatureDependent
+Wrapping = Asymmetric | Exact | LoadDependent | LoadNormalised | Lagged | TemperatureDependent
 WRAPPERS: dict[str, type[Wrapping]] = {
     "asymmetric": Asymmetric,
+    "exact": Exact,
     "load_dependent": LoadDependent,
     "load_normalised": LoadNormalised,
     "lagged": Lagged,
@@ -144,8 +145,9 @@ def law_from_text(text: str) -> Law:
     """Return the law given by `text`, with default parameters.
 
     The text is a name such as `brown_mcphee`, an alias such as `adams`, a sum such as
-    `coulomb+viscous`, or a wrapped law: `asymmetric(coulomb+viscous)`, `load_dependent(lugre)`,
-    `load_normalised(lugre)`, `lagged(stribeck)` or `temperature_dependent(lugre)`.
+    `coulomb+viscous`, or a wrapped law: `asymmetric(coulomb+viscous)`, `exact(stribeck)`,
+    `load_dependent(lugre)`, `load_normalised(lugre)`, `lagged(stribeck)` or
+    `temperature_dependent(lugre)`.
 
     Raises:
         ValueError: unknown name (the message suggests the closest), empty term, unbalanced
