@@ -22,17 +22,20 @@ from ocp.formulation.relaxed import EPS
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solved, Solver
 from ocp.solving.penalties import largest_product
-from ocp.solving.prepared import Supervisor
+from ocp.solving.prepared import Prepared, Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start, start_of
 from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
-from ocp.transcription.transcribe import discretise
+from ocp.transcription.transcribe import Transcription, discretise
+from symfric.foundation.status import Status
 
 FIRST, LAST = 1e-1, 1e-8
 """First and last eps; `p` of the problem may give another last one."""
 FACTOR, LEAST_FACTOR = 10.0, 1.5
 """Ratio of successive eps, and the ratio below which the sequence stops."""
+MOST = 1e-5
+"""Largest last eps of a solution."""
 PASSES = 4
 """Largest number of solves on refined meshes."""
 UNREFINED = 1.0
@@ -48,39 +51,56 @@ def solve_relaxed(
 ) -> Solution:  # fmt: skip
     """Solve a problem with complementary signals; see `refined_solve` for the arguments.
 
-    The message gives the last eps and the largest product in the solution.
+    The message gives the last eps and the largest product in the solution. The status is not ok if
+    eps remains above `MOST`.
     """
-    on, last = discretise(problem, scheme).on(meshes), problem.p.get(EPS, LAST)
     later = solver
     if isinstance(solver, Ipopt):
         later = solver.with_options(**({"mu_init": LATER} | dict(solver.options)))
-    first, again = solver.prepared(on.program), later.prepared(on.program)
-    start, found = start_of(on, guess)[0], list[tuple[float, Solution]]()
-    statistics, eps, factor = list[SolverStatistics](), max(FIRST, last), FACTOR
-    while factor > LEAST_FACTOR:
-        values, name = on.values({EPS: eps}), f"complementarity {eps:.1g}"
-        outcome = supervisor.run(on, again if found else first, start, name, values)
-        statistics.append(outcome.statistics)
-        solution = Solved(on, outcome).solution
-        if outcome.status.ok or not found:
-            found.append((eps, solution))
-        if outcome.status.ok:
-            start = Iterate.cold(outcome.iterate.w, on.program.g.numel())
-        if outcome.status.stopped or not found[-1][1].ok or (outcome.status.ok and eps <= last):
-            break
-        factor = factor if outcome.status.ok else sqrt(factor)
-        eps = max(found[-1][0] / factor, last)
-    eps, solution = found[-1]
-    relaxed = replace(problem, p=dict(problem.p) | {EPS: eps})
-    solution = replace(solution, problem=relaxed)
-    if solution.ok and not outcome.status.stopped:
+    on = discretise(problem, scheme).on(meshes)
+    prepared = solver.prepared(on.program), later.prepared(on.program)
+    eps, solution = _decreased(on, prepared, start_of(on, guess)[0], supervisor)
+    problem = replace(problem, p=dict(problem.p) | {EPS: eps})
+    solution = replace(solution, problem=problem)
+    if solution.ok:
         goals = replace(goals, loss=UNREFINED, passes=min(goals.passes, PASSES), patient=False)
         finer = refined_solve(
-            relaxed, meshes, scheme, later, solution, goals=goals, supervisor=supervisor
+            problem, meshes, scheme, later, solution, goals=goals, supervisor=supervisor
         )
-        statistics.append(finer.statistics)
-        solution = finer if finer.ok or finer.status.stopped else solution
+        statistics = solution.statistics.then(finer.statistics)
+        kept = finer if finer.ok or finer.status.stopped else solution
+        solution = replace(kept, statistics=statistics)
     product = largest_product(solution.problem, scheme, solution.meshes, solution.points)
     text = f"Complementary signals: eps = {eps:.1g}, largest product {product:.1g}."
-    solution = replace(solution, statistics=reduce(SolverStatistics.then, statistics))
     return with_sentence(solution, text)
+
+
+def _decreased(
+    on: Transcription, prepared: tuple[Prepared, Prepared], start: Iterate, supervisor: Supervisor
+) -> tuple[float, Solution]:
+    """Return the last eps and its solution; the first solve uses the first prepared solver."""
+    first, later = prepared
+    last = float(on.problem.p.get(EPS, LAST))
+    eps, factor, statistics = max(FIRST, last), FACTOR, list[SolverStatistics]()
+    reached, found = eps, list[Solution]()
+    while factor > LEAST_FACTOR:
+        values, solver = on.values({EPS: eps}), later if found else first
+        outcome = supervisor.run(on, solver, start, f"complementarity {eps:.1g}", values)
+        statistics.append(outcome.statistics)
+        solved = outcome.status.ok
+        if solved or not found:
+            reached = eps
+            found.append(Solved(on, outcome).solution)
+            start = Iterate.cold(outcome.iterate.w, on.program.g.numel())
+        if outcome.status.stopped or not found[-1].ok:
+            cause, text = outcome.cause, f"ocp '{on.problem.name}': {outcome.sentence}"
+            found.append(replace(found[-1], status=outcome.status, message=text, cause=cause))
+            break
+        if solved and eps <= last:
+            break
+        factor = factor if solved else sqrt(factor)
+        eps = max(reached / factor, last)
+    if found[-1].ok and reached > max(MOST, last):
+        text = f"ocp '{on.problem.name}': No solve with a smaller eps than {reached:.1g} succeeded."
+        found.append(replace(found[-1], status=Status.NO_STEP, message=text))
+    return reached, replace(found[-1], statistics=reduce(SolverStatistics.then, statistics))

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from ocp.formulation import expressions
+from ocp.formulation.changed_models import typical
 from ocp.formulation.expressions import MissingError, Signals, arguments
 from ocp.formulation.phase import Join, Link, PathCondition, Row
 from ocp.formulation.relaxed import EPS, Complementary, Soft
-from ocp.formulation.statement import Setting, Statement, typical
+from ocp.formulation.statement import Setting, Statement
 from symfric.foundation.variable import strays
 from symfric.model import Model
 
@@ -172,7 +173,8 @@ def _rows(
     label: str, rows: Sequence[expressions.Comparison], condition: PathCondition, known: ca.SX
 ) -> Iterator[Row]:
     """Yield the rows of a condition, with its penalty if it is soft."""
-    weights = (condition.linear, condition.quadratic) if isinstance(condition, Soft) else ()
+    soft = isinstance(condition, Soft)
+    weights = (condition.linear, condition.quadratic) if soft else (0.0, 0.0)
     for expression, low, high in rows:
         if stray := strays(expression, known):
             raise ValueError(f"expected only signals of the model, got {', '.join(stray)}")

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation import statement
+from ocp.formulation.changed_models import with_constants, with_outputs
 from ocp.formulation.evaluate_callbacks import Evaluated, collected, evaluated
 from ocp.formulation.inputs import states_of
 from ocp.formulation.phase import FREE, Box, Free, Link, Range, Row, Span, as_box, fixed, meet
@@ -88,11 +89,11 @@ def _span(
     given = dict(sorted(given.items()))
     named = (*setting.bounds, *(name for at in given.values() for name in at))
     details = dict.fromkeys(n for n in (*named, *result.details) if n not in setting.model.signals)
-    model = statement.with_outputs(setting.model, tuple(details))
+    model = with_outputs(setting.model, tuple(details))
     slacks = [*_slacks(result.at)]
     sizes = {peak.name: peak.rows[0].size for peak in result.peaks}
     sizes |= {name: -row.nominal for _, row, names in slacks for name in names}
-    model = statement.with_constants(model, sizes)
+    model = with_constants(model, sizes)
     at, end = _relaxed(result.at, slacks, model)
     links = result.links
     for peak in result.peaks:

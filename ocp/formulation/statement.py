@@ -1,25 +1,12 @@
-"""Fields of a problem, and the model, bounds and costs of each phase derived from them.
+"""Fields of a problem, and the model, bounds and costs of each phase derived from them."""
 
-Functions that change a model return a new one with the same symbols and names, so costs, bounds and
-outputs written for the original model remain valid.
-"""
-
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field, replace
-from functools import wraps
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
 from math import inf, isfinite, sqrt
 from typing import Any, NamedTuple, TypeVar, final
 
-import casadi as ca
-
-from ocp.formulation.expressions import (
-    Cost,
-    Expression,
-    MissingError,
-    Signals,
-    arguments,
-    value_of,
-)
+from ocp.formulation.changed_models import with_forms, with_parameters, with_totals
+from ocp.formulation.expressions import Cost, Expression
 from ocp.formulation.inputs import Form, Forms, Polynomial, is_form, order_of, rate_name, states_of
 from ocp.formulation.phase import (
     Chain,
@@ -36,15 +23,9 @@ from ocp.formulation.phase import (
 )
 from ocp.formulation.relaxed import EPS, relaxes
 from symfric.foundation import checks
-from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import stacked, symbols_of
 from symfric.model import Model
 
 T = TypeVar("T")
-Request = TypeVar("Request", bound=Mapping[str, Any] | Sequence[str])
-
-WAVES = 4.0
-"""Typical rate of an input, in multiples of its magnitude over the duration."""
 
 Duration = tuple[Sequence[int], float | Free]
 """(indices of phases, sum of their durations [s])."""
@@ -132,9 +113,8 @@ def settings_of(problem: Statement) -> tuple[Setting, ...]:
         inputs = {v.name: v for v in model.u if v.name in forms}
         rates = only(problem.rates, inputs) | only(phase.rates, inputs)
         sizes = {n: size_of(as_box(r), 0.0) for n, r in rates.items() if is_range(r)}
-        T = checks.as_number(phase.T.start if isinstance(phase.T, Free) else phase.T)
-        T = T if T is not None and T > 0 else 1.0
-        model = with_forms(model, forms, sizes, T)
+        time = checks.as_number(phase.T.start if isinstance(phase.T, Free) else phase.T)
+        model = with_forms(model, forms, sizes, time if time is not None and time > 0 else 1.0)
         extra = [*references_of(problem, phase), *[EPS] * relaxes([*problem.path, *phase.path])]
         model = with_totals(with_parameters(model, dict.fromkeys(extra, "")), problem.totals)
         bounds = only(problem.bounds, names_of(model, problem.bounds)) | dict(phase.bounds)
@@ -240,152 +220,3 @@ def _nearby(box: tuple[float, float], value: float) -> float:
     if isfinite(low) and isfinite(high):
         return 0.5 * (low + high)
     return low if isfinite(low) else high
-
-
-def rebuilt(model: Model, again: Callable[[Model], Model] | None = None, **changes: Any) -> Model:
-    """Return `model` with changed fields; `again` applies the same change to its open form."""
-    if model.contacts and again is not None:
-        changes["opening"] = lambda: again(model.open)
-    if model.holonomic is not None:
-        changes |= {"ode": None, "alg": ca.SX(0, 1)}  # derived again from `holonomic`
-    return replace(model, **changes)
-
-
-def _cached(change: Callable[[Model, Request], Model]) -> Callable[[Model, Request], Model]:
-    """Return `change` with its results cached in the model; an empty request changes nothing."""
-
-    @wraps(change)
-    def changed(model: Model, request: Request) -> Model:
-        key = tuple(request.items() if isinstance(request, Mapping) else request)
-        kept = model.memory.setdefault(f"ocp {change.__name__}", {(): model})
-        if key not in kept:
-            kept[key] = change(model, request)
-        return kept[key]
-
-    return changed
-
-
-@_cached
-def with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
-    """Return `model` with some inputs as states and the rates of these as inputs.
-
-        u' = u_rate
-
-    A rate that is constant on an interval makes the input continuous and linear there. The new
-    states follow those of the model; in a mechanism their rates are appended to `holonomic.rates`.
-
-    Args:
-        model: the model.
-        nominal: input -> typical magnitude of its rate; 0 for an input that is constant.
-    """
-    states, rates = tuple(v for v in model.u if v.name in nominal), dict[str, Variable]()
-    for v in states:
-        doc, size = f"rate of {v.doc or v.name}", nominal[v.name]
-        if size:
-            rates[v.name] = Variable(rate_name(v.name), f"{v.unit}/s", nominal=size, doc=doc)
-    kept = (v for v in model.u if v.name not in nominal or v.name in rates)
-    inputs = tuple(rates.get(v.name, v) for v in kept)
-    slopes = stacked(rates[v.name].symbol if v.name in rates else 0.0 for v in states)
-    changes = further_states(model, states, slopes)
-    return rebuilt(model, lambda other: with_rates(other, nominal), u=inputs, **changes)
-
-
-def with_forms(model: Model, forms: Forms, sizes: Mapping[str, float], T: float) -> Model:
-    """Return `model` with derivatives of inputs as states and inputs; see `Form`.
-
-    Args:
-        model: the model.
-        forms: input -> form.
-        sizes: input -> typical magnitude of its rate; 0 if unknown.
-        T: duration [s], from which unknown magnitudes of derivatives follow.
-    """
-    orders = {name: order_of(form) for name, form in forms.items()}
-    inputs = {v.name: v for v in model.u}
-    for k in range(max(orders.values(), default=0)):
-        rising = [name for name, order in orders.items() if order > k]
-        first = {name: sizes.get(name) or inputs[name].nominal * WAVES / T for name in rising}
-        rates = {rate_name(name, k): first[name] * (WAVES / T) ** k for name in rising}
-        model = with_rates(model, rates)
-    fixed = {n: order_of(form) for n, form in forms.items() if isinstance(form, Polynomial)}
-    return with_rates(model, {rate_name(n, order): 0.0 for n, order in fixed.items()})
-
-
-@_cached
-def with_totals(model: Model, totals: Mapping[str, Expression]) -> Model:
-    """Return `model` with integrals of expressions as states, which start at zero.
-
-        y' = e(t, x, z, u, p)
-
-    Totals with names that the model lacks are constant; invalid ones, which `validate` reports, are
-    omitted.
-    """
-    states, rates = list[Variable](), list[ca.SX]()
-    for name, expression in totals.items():
-        try:
-            rate = value_of(expression, Signals(model))
-        except MissingError:
-            rate = ca.SX(0)
-        except ValueError:
-            continue
-        if name not in (*model.signals, *(v.name for v in model.p)):
-            doc = "integral over the motion"
-            states.append(Variable(name, "", nominal=typical(model, rate), doc=doc))
-            rates.append(rate)
-    changes = further_states(model, states, stacked(rates))
-    return rebuilt(model, lambda other: with_totals(other, totals), **changes)
-
-
-@_cached
-def with_constants(model: Model, nominal: Mapping[str, float]) -> Model:
-    """Return `model` with constant states, name -> typical magnitude, whose start is free.
-
-    Those with a negative magnitude have the lower bound zero.
-    """
-    states = [
-        Variable(name, "", nominal=abs(size), lower=0.0 if size < 0 else -inf)
-        for name, size in nominal.items()
-    ]
-    changes = further_states(model, states, ca.SX.zeros(len(states)))
-    return rebuilt(model, lambda other: with_constants(other, nominal), **changes)
-
-
-def typical(model: Model, expression: ca.SX) -> float:
-    """Return the magnitude of an expression at nominal values; 1 if it is zero or not finite."""
-    at = ca.Function("typical", arguments(model), [expression])
-    value = abs(float(at(0.0, *map(model.nominal, "xzu"), model.values("p"))))
-    return value if isfinite(value) and value > 0.0 else 1.0
-
-
-def further_states(model: Model, states: Sequence[Variable], rates: ca.SX) -> dict[str, Any]:
-    """Return changed fields of `model` with `states` of derivatives `rates` appended to its states.
-
-    In a mechanism the rates are appended to `holonomic.rates`. No other equation depends on the
-    new states.
-    """
-    x, mechanics = (*model.x, *states), model.holonomic
-    if mechanics is None:
-        ode = ca.SX(0, 1) if model.ode is None else ca.SX(model.ode)
-        return {"x": x, "ode": ca.vertcat(ode, rates)}
-    inner = mechanics.inner
-    if inner is not None and states:
-        inner = replace(inner, groups=(*inner.groups, symbols_of(states)))
-    together = replace(mechanics, rates=ca.vertcat(mechanics.rates, rates), inner=inner)
-    return {"x": x, "holonomic": together}
-
-
-@_cached
-def with_parameters(model: Model, units: Mapping[str, str]) -> Model:
-    """Return `model` with additional parameters (name -> unit) that its equations do not use."""
-    p = (*model.p, *(Variable(name, unit) for name, unit in units.items()))
-    return rebuilt(model, lambda other: with_parameters(other, units), p=p)
-
-
-@_cached
-def with_outputs(model: Model, names: Sequence[str]) -> Model:
-    """Return `model` with some of its details as outputs, for solutions and simulations."""
-    wanted = {name: model.further[name] for name in names if name not in model.signals}
-    others = {name: output for name, output in model.further.items() if name not in wanted}
-    outputs = {**model.outputs, **wanted}
-    return rebuilt(
-        model, lambda other: with_outputs(other, names), outputs=outputs, details=lambda: others
-    )

@@ -32,17 +32,11 @@ from typing import Any, NamedTuple, final
 
 import casadi as ca
 
+from ocp.formulation.changed_models import further_states, rebuilt
 from ocp.formulation.inputs import states_of
 from ocp.formulation.phase import Chain, Free, Phase, Range, Span, Start, limits, meet
 from ocp.formulation.problem import Problem
-from ocp.formulation.statement import (
-    Duration,
-    added_signals,
-    forms_of,
-    further_states,
-    only,
-    rebuilt,
-)
+from ocp.formulation.statement import Duration, added_signals, forms_of, only
 from ocp.friction.mode_models import SIDES, excess, holding, mode_model
 from ocp.friction.sequence import Arc, Leg, Legs
 from ocp.friction.smooth_models import sticking

@@ -1,4 +1,4 @@
-"""What the conditions with a penalty cost in a solution, and by how much they are violated."""
+"""Cost and violation of the conditions with a penalty in a solution."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

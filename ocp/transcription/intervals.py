@@ -30,8 +30,8 @@ from typing import Any, NamedTuple, final
 import casadi as ca
 import numpy as np
 
+from ocp.formulation.changed_models import further_states, rebuilt
 from ocp.formulation.phase import Span
-from ocp.formulation.statement import further_states, rebuilt
 from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, Rows, block, select
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.unknowns import Grid, Local
