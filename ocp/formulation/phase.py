@@ -357,6 +357,11 @@ class Span:
         return self.softened + self.absolutes
 
     @property
+    def integrand(self) -> ca.SX:
+        """Integrand of the contribution to the cost with all penalties, which have kinks."""
+        return sum((row.penalty for row in self.penalised), self.running)
+
+    @property
     def sides(self) -> tuple[tuple[int, int], ...]:
         """(index of a penalised row, 1 or -1 for its upper or lower bound) of each violation."""
         pairs = enumerate(self.penalised)

@@ -150,8 +150,7 @@ def cost_size(problem: Problem) -> float:
     for span in problem.spans:
         model, T = span.model, initial(span.T)
         z = [float(v.start) for v in model.z]
-        running = span.running + sum((row.penalty for row in span.absolutes), ca.SX(0))
-        at = ca.Function("cost", span.symbols, [ca.vertcat(running, span.end)])
+        at = ca.Function("cost", span.symbols, [ca.vertcat(span.integrand, span.end)])
         running, end = at(T, model.nominal("x"), z, model.nominal("u"), span.p).full()[:, 0]
         total += abs(T * running) + abs(end)
     return total if isfinite(total) and total > 0.0 else 1.0

@@ -151,8 +151,8 @@ def _slacks(at: Mapping[float, tuple[Row, ...]]) -> Iterator[Slack]:
     for s, rows in at.items():
         place = {0.0: "start", 1.0: "end"}.get(s, f"{s:g}".replace(".", "_"))
         for k, row in enumerate(rows, 1):
-            sides = {f"over_{place}_{k}": row.upper, f"under_{place}_{k}": row.lower}
-            names = {n: 1 if n[0] == "o" else -1 for n, bound in sides.items() if isfinite(bound)}
+            sides = (("above", 1, row.upper), ("below", -1, row.lower))
+            names = {f"violation_{place}_{k}_{n}": side for n, side, b in sides if isfinite(b)}
             if row.linear or row.quadratic:
                 yield s, row, names
 

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any, NamedTuple, final
 
 import numpy as np
@@ -92,6 +93,14 @@ class Motion:
     def T(self) -> float:
         """Total duration of all phases [s]."""
         return self.phases[-1].end - self.phases[0].begin
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return times and signals as plain data, with None for numbers that are not finite."""
+        signals = {
+            name: [v if isfinite(v) else None for v in row.tolist()]
+            for name, row in self.signals.items()
+        }
+        return {"scenario": self.name, "t": self.t.tolist(), "signals": signals}
 
     def __getitem__(self, name: str) -> Array:
         if name == "t":

@@ -368,17 +368,7 @@ class Solution(packed.Portable):
             "verification": None if self.verification is None else self.verification.to_dict(),
             "statistics": asdict(self.statistics),
             "units": {"t": "s", **self.units},
-            "motions": [
-                {
-                    "scenario": motion.name,
-                    "t": motion.t.tolist(),
-                    "signals": {
-                        name: [v if isfinite(v) else None for v in row.tolist()]
-                        for name, row in motion.signals.items()
-                    },
-                }
-                for motion in self.motions
-            ],
+            "motions": [motion.to_dict() for motion in self.motions],
         }
 
     def to_json(self, path: str | Path) -> None:
