@@ -19,8 +19,8 @@ whether a condition is active; `TINY` is the error of both."""
 EQUATIONS = ("the equation of", "the algebraic equation", "the continuity of", "the largest cost",
              "the constraint", "the loop", "absolute value", "the violation of", "violation_",
              "the bound largest_")  # fmt: skip
-"""Rows of the equations of motion, whose multipliers are costates, and rows and unknowns that define
-the costs of absolute values, maxima and violations."""
+"""Rows of the equations of motion, whose multipliers are costates, and rows and unknowns that make
+up costs of absolute values, maxima and violations."""
 SAME_TIME = 1e-9
 SHOWN = 3
 """Largest number of conditions in a line."""
