@@ -84,19 +84,12 @@ OPTY = {
 """Number of a status of Ipopt -> its name."""
 
 
-SAMPLES = 10
+SAMPLES = 40
 """Number of samples of the control in each segment of Dymos."""
 
 
-def dymos(case: Case, limit: float, width: float) -> Attempt:
-    """Return the solution by Radau pseudospectral collocation of order 3 in Dymos, with SLSQP.
-
-    Each segment has a cubic control, so a third of the intervals gives about as many unknowns of
-    the control; it is sampled for the referee. The cost is a state, as in the examples of Dymos.
-    """
-    om: Any = import_module("openmdao.api")
-    tool: Any = import_module("dymos")
-    names = [f"x_{name}" for name in case.states]
+def _dynamics(om: Any, case: Case, width: float) -> Any:
+    """Return the component of OpenMDAO with the equations; the cost is a state J."""
 
     class Dynamics(om.ExplicitComponent):
         def initialize(self) -> None:
@@ -104,73 +97,91 @@ def dymos(case: Case, limit: float, width: float) -> Attempt:
 
         def setup(self) -> None:
             shape = (self.options["num_nodes"],)
-            for name in (*names, "J", "u"):
+            for name in (*_names(case), "u"):
                 self.add_input(name, shape=shape)
-            for name in (*(f"d_{name}" for name in names), "d_J", "total"):
+            for name in (*(f"d_{name}" for name in _names(case)), "total"):
                 self.add_output(name, shape=shape)
             self.declare_coloring(wrt="*", method="cs", show_summary=False)
 
         def compute(self, inputs: Any, outputs: Any) -> None:
-            x, u = [inputs[name] for name in names], inputs["u"]
-            for name, rate in zip(names, case.smooth(np, x, u, width), strict=True):
+            *x, J = (inputs[name] for name in _names(case))
+            u = inputs["u"]
+            rates = [*case.smooth(np, x, u, width), case.running(np, x, u)]
+            for name, rate in zip(_names(case), rates, strict=True):
                 outputs[f"d_{name}"] = rate
-            outputs["d_J"] = case.running(np, x, u)
-            outputs["total"] = inputs["J"] + case.final(np, x, u)
+            outputs["total"] = J + case.final(np, x, u)
 
+    return Dynamics
+
+
+def _names(case: Case) -> list[str]:
+    return [*(f"x_{name}" for name in case.states), "J"]
+
+
+def _phase(tool: Any, case: Case, equations: Any, a: float, b: float) -> Any:
+    """Return the phase between two fractions of T."""
+    scheme = tool.Radau(num_segments=round((b - a) * case.intervals / 3), order=3)
+    phase = tool.Phase(ode_class=equations, transcription=scheme)
+    phase.set_time_options(fix_initial=True, fix_duration=True)
+    sizes = [*(case.size.get(i, 1.0) for i in range(len(case.states))), 10.0]
+    for i, (name, size) in enumerate(zip(_names(case), sizes, strict=True)):
+        low, high = case.bounds.get(i, (None, None))
+        phase.add_state(
+            name, rate_source=f"d_{name}", targets=[name], fix_initial=a == 0.0, lower=low,
+            upper=high, ref=size, defect_ref=size,
+        )  # fmt: skip
+    phase.add_control(
+        "u", targets=["u"], lower=-case.limit, upper=case.limit, ref=case.limit,
+        continuity=False, rate_continuity=False,
+    )  # fmt: skip
+    for i, value in case.ends[b].items():
+        phase.add_boundary_constraint(_names(case)[i], loc="final", equals=value, ref=sizes[i])
+    phase.add_timeseries_output("total")
+    return phase
+
+
+def dymos(case: Case, limit: float, width: float) -> Attempt:
+    """Return the solution by Radau pseudospectral collocation of order 3 in Dymos, with SLSQP.
+
+    Each segment has a cubic control, so a third of the intervals gives about as many unknowns of
+    the control; it is sampled for the referee. SLSQP has no limit of time, but 200 iterations.
+    """
+    om: Any = import_module("openmdao.api")
+    tool: Any = import_module("dymos")
     problem = om.Problem(reports=False)
     driver = problem.driver = om.ScipyOptimizeDriver(optimizer="SLSQP", maxiter=200, disp=False)
     driver.declare_coloring(show_summary=False)
-    trajectory, parts = problem.model.add_subsystem("traj", tool.Trajectory()), list[Any]()
-    spans = list(pairwise([0.0, *sorted(case.ends)]))
-    for k, (a, b) in enumerate(spans):
-        segments = round((b - a) * case.intervals / 3)
-        scheme = tool.Radau(num_segments=segments, order=3)
-        phase = trajectory.add_phase(f"p{k}", tool.Phase(ode_class=Dynamics, transcription=scheme))
-        phase.set_time_options(fix_initial=True, fix_duration=True)
-        for i, name in enumerate(names):
-            low, high = case.bounds.get(i, (None, None))
-            size = case.size.get(i, 1.0)
-            phase.add_state(
-                name, rate_source=f"d_{name}", targets=[name], fix_initial=not k, lower=low,
-                upper=high, ref=size, defect_ref=size,
-            )  # fmt: skip
-        phase.add_state(
-            "J", rate_source="d_J", targets=["J"], fix_initial=not k, ref=10.0, defect_ref=10.0
-        )
-        phase.add_control(
-            "u", targets=["u"], lower=-case.limit, upper=case.limit, ref=case.limit,
-            continuity=False, rate_continuity=False,
-        )  # fmt: skip
-        for i, value in case.ends[b].items():
-            phase.add_boundary_constraint(
-                names[i], loc="final", equals=value, ref=case.size.get(i, 1.0)
-            )
-        phase.add_timeseries_output("total")
-        parts.append(phase)
-    parts[-1].add_objective("total", loc="final", ref=10.0)
-    if len(parts) > 1:
-        trajectory.link_phases([f"p{k}" for k in range(len(parts))], [*names, "J"])
+    trajectory = problem.model.add_subsystem("traj", tool.Trajectory())
+    spans, equations = list(pairwise([0.0, *sorted(case.ends)])), _dynamics(om, case, width)
+    phases = {f"p{k}": _phase(tool, case, equations, *span) for k, span in enumerate(spans)}
+    for name, phase in phases.items():
+        trajectory.add_phase(name, phase)
+    phases[f"p{len(spans) - 1}"].add_objective("total", loc="final", ref=10.0)
+    if len(phases) > 1:
+        trajectory.link_phases([*phases], _names(case))
     problem.setup(force_alloc_complex=True)
-    for k, (phase, (a, b)) in enumerate(zip(parts, spans, strict=True)):
-        problem.set_val(f"traj.p{k}.t_initial", a * case.T)
-        problem.set_val(f"traj.p{k}.t_duration", (b - a) * case.T)
-        for name, *ends in zip(names, case.guess(a), case.guess(b), strict=True):
-            phase.set_state_val(name, ends)
-        phase.set_state_val("J", [0.0, 0.0])
+    for (name, phase), (a, b) in zip(phases.items(), spans, strict=True):
+        problem.set_val(f"traj.{name}.t_initial", a * case.T)
+        problem.set_val(f"traj.{name}.t_duration", (b - a) * case.T)
+        guess = np.array([[*case.guess(a), 0.0], [*case.guess(b), 0.0]])
+        for state, ends in zip(_names(case), guess.T, strict=True):
+            phase.set_state_val(state, ends)
         phase.set_control_val("u", [0.0, 0.0])
     tool.run_problem(problem, simulate=False, make_plots=False)
-    edges, controls = [0.0], list[float]()
-    for k in range(len(parts)):
-        series = f"traj.p{k}.timeseries"
-        t, u = (problem.get_val(f"{series}.{name}").reshape(-1, 4) for name in ("time", "u"))
-        for nodes, values in zip(t, u, strict=True):
+    edges, controls, claimed = [0.0], list[float](), 0.0
+    for name in phases:
+        t, u, total = (problem.get_val(f"traj.{name}.timeseries.{v}") for v in SERIES)
+        claimed = float(total[-1, 0])
+        for nodes, values in zip(t.reshape(-1, 4), u.reshape(-1, 4), strict=True):
             cubic = np.polyfit(nodes - nodes[0], values, 3)
             fine = np.linspace(nodes[0], nodes[-1], SAMPLES + 1)
             edges += fine[1:].tolist()
             controls += np.polyval(cubic, 0.5 * (fine[1:] + fine[:-1]) - nodes[0]).tolist()
-    claimed = problem.get_val(f"traj.p{len(parts) - 1}.timeseries.total")[-1, 0]
     status = {"SUCCESS": "Solve_Succeeded"}.get(driver.result.exit_status, "Failed")
-    return Attempt(float(claimed), status, np.array(edges), np.array(controls))
+    return Attempt(claimed, status, np.array(edges), np.array(controls))
+
+
+SERIES = ("time", "u", "total")
 
 
 PACKAGES = {"rockit": "rockit-meco", "nosnoc": "nosnoc", "do_mpc": "do-mpc"}
