@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
+    from symfric.laws.base import smooth as smooth
     from symfric.laws.base.law import PHENOMENA as PHENOMENA
     from symfric.laws.base.law import Facts as Facts
     from symfric.laws.base.law import Input as Input

@@ -149,7 +149,8 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
     """Wrap `method(law, v, N, z)` so that it accepts and checks states in any common form.
 
     Raises:
-        ValueError: the number of states is wrong, or an integer is too large for a float.
+        ValueError: the number of states is wrong, an integer is too large for a float, or the
+            method of a user's law fails or returns an unsuitable value.
     """
 
     @wraps(method)
@@ -159,9 +160,37 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
             if type(value) is int and not is_number(value):
                 where = f"{type(law).__name__}.{method.__name__}: {name}"
                 raise checks.refused(where, "a number that a float can hold", value)
-        return method(law, slip, load, states_of(law, slip, plain(z)), *more, **inputs)
+        states = states_of(law, slip, plain(z))
+        if type(law).__module__.startswith("symfric."):
+            return method(law, slip, load, states, *more, **inputs)
+        where = f"{type(law).__name__}.{method.__name__}"
+        try:
+            value = method(law, slip, load, states, *more, **inputs)
+        except (TypeError, ValueError, RuntimeError) as error:
+            if not isinstance(slip, np.ndarray) and "truth value" not in str(error):
+                raise
+            raise _unsuitable(where, slip, error) from error
+        arguments = is_casadi(slip, load, states, *inputs.values())
+        if isinstance(value, list | tuple) or (is_casadi(value) and not arguments):
+            raise _unsuitable(where, slip, value)
+        return value
 
     return checked
+
+
+def _unsuitable(where: str, v: Scalar, got: object) -> ValueError:
+    """Return the error for a method of a user's law that fails, or returns an unsuitable value."""
+    if "truth value" in str(got):
+        return ValueError(
+            f"{where}: expected an expression, got a condition that Python evaluates (if, and, or, "
+            "max, min); write smooth.choose(v > 0, a, b) of symfric.laws"
+        )
+    what, hint = "a force, or a column of rates", ""
+    if isinstance(got, list | tuple):
+        hint = "write ca.vertcat(...) for several rates"
+    elif isinstance(v, np.ndarray):
+        what, hint = "an array for velocities in an array", "write it with symfric.laws.smooth"
+    return checks.refused(where, what, got, hint)
 
 
 @parametric
@@ -180,7 +209,7 @@ class Law(Parametric, ABC):
     The modes of a law (stick, slip) are states that change only by jumps, at its `switches`.
     """
 
-    facts: ClassVar[Facts]
+    facts: ClassVar[Facts] = Facts((), "not stated", "unverified")
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)
