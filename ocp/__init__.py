@@ -32,13 +32,16 @@ if TYPE_CHECKING:
     from ocp.mpc.controller import Controller as Controller
     from ocp.mpc.controller import controller_of as controller_of
     from ocp.solve import solve as solve
+    from ocp.solving.active import Active as Active
     from ocp.solving.methods import Fatrop as Fatrop
     from ocp.solving.methods import Ipopt as Ipopt
     from ocp.solving.methods import Sqp as Sqp
+    from ocp.solving.picture import plot_solutions as plot_solutions
+    from ocp.solving.sensitivity import Condition as Condition
+    from ocp.solving.sensitivity import Sensitivity as Sensitivity
     from ocp.solving.solution import Mode as Mode
     from ocp.solving.solution import Solution as Solution
     from ocp.solving.solution import load as load
-    from ocp.solving.solution import plot_solutions as plot_solutions
     from ocp.solving.starts import Guess as Guess
     from ocp.solving.verification import Miss as Miss
     from ocp.solving.verification import Verification as Verification

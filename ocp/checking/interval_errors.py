@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.resimulate import Arc
+from ocp.solving.optimum import cost_weight
 from ocp.transcription.blocks import Array, Entries
 from ocp.transcription.program import Iterate
 from ocp.transcription.transcribe import Transcription
@@ -181,7 +182,7 @@ def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tupl
     block, selection, places = piece.block, piece.selection, piece.places
     if not at.size or block is None or selection is None:
         return np.zeros(shape), np.zeros(shape)
-    lam, sigma = iterate.lam_g[at], _weight(transcription, iterate.lam_g, number)
+    lam, sigma = iterate.lam_g[at], cost_weight(transcription, iterate.lam_g, number)
     v = np.zeros((block.n, places))
     np.add.at(v, selection.local, (selection.weights * iterate.w[selection.columns]).T)
     theta = ca.Function("theta", [skeleton.program.p], [piece.theta])(transcription.program.values)
@@ -213,11 +214,3 @@ def _entries(
     values[entries.still] = entries.constant[:, None]
     for e in np.flatnonzero(np.isin(entries.columns, columns)):
         yield int(entries.rows[e]), int(entries.columns[e] - columns[0]), values[e]
-
-
-def _weight(transcription: Transcription, lam_g: Array, number: int) -> float:
-    """Return the weight of the cost of a phase in J; for "worst", the multiplier of its bound."""
-    problem, phases = transcription.problem, len(transcription.problem.chain)
-    if problem.kind == "worst":
-        return float(lam_g[transcription.skeleton.largest[number // phases]])
-    return phases / len(problem.spans) if problem.kind == "mean" else 1.0
