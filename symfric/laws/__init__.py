@@ -9,8 +9,8 @@ from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.laws.base import smooth as smooth
-    from symfric.laws.base.law import PHENOMENA as PHENOMENA
-    from symfric.laws.base.law import Facts as Facts
+    from symfric.laws.base.facts import PHENOMENA as PHENOMENA
+    from symfric.laws.base.facts import Facts as Facts
     from symfric.laws.base.law import Input as Input
     from symfric.laws.base.law import Law as Law
     from symfric.laws.base.law import State as State

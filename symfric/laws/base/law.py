@@ -1,84 +1,24 @@
-"""Base class of friction laws: parameters, a force, the rate of internal states, and facts."""
+"""Base class of friction laws: parameters, a force, and the rate of internal states."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from inspect import cleandoc
+from functools import wraps
 from math import inf, isfinite
-from re import DOTALL, search
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, empty, equals, is_symbolic
+from symfric.foundation.numeric import Scalar, empty, equals, is_casadi, is_number, is_symbolic
 from symfric.foundation.parameters import Parametric, parameters, parametric
+from symfric.foundation.symbolic import plain
+from symfric.foundation.vector import Rows
 from symfric.laws.base import smooth
-from symfric.laws.base.arguments import with_states
+from symfric.laws.base.facts import Facts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-PHENOMENA = {
-    "D": "dynamic (kinetic) friction",
-    "S": "static friction (stiction or a break-away peak)",
-    "St": "Stribeck effect",
-    "V": "viscous friction",
-    "P": "pre-sliding displacement",
-    "M": "non-local memory (hysteresis loops inside loops close)",
-    "L": "frictional lag",
-    "B": "break-away force depends on the loading rate",
-    "N": "no drift under vibration below break-away",
-    "T": "static friction grows with the dwell time",
-}
-"""Phenomena that a law can reproduce, by the codes in `Facts.phenomena`."""
-
-CONFIDENCE = {
-    "two sources": "the formula was compared with two independent ones",
-    "one source": "the formula was compared with one",
-    "textbook": "the formula is in every textbook",
-    "rebuilt": "the formula was lost or garbled, and rebuilt from descriptions of it",
-    "constructed": "constructed here",
-    "unverified": "written from memory, compared with no publication and no public code",
-}
-"""Confidence in a formula, by the words in `Facts.confidence`."""
-
-
-@dataclass(frozen=True)
-class Facts:
-    """Properties of a law that are not part of its equations.
-
-    Attributes:
-        phenomena: codes of `PHENOMENA`.
-        smoothness: differentiability class in the velocity, and the exceptions.
-        confidence: a key of `CONFIDENCE`.
-        source: publication of the law; by default the section "Source:" of its docstring.
-        odd: True if the force changes sign when v, the states and the further inputs do.
-        load: dependence of the dry force on N: "proportional", "independent" or a description.
-        checked: reference of the comparison; by default the section "Checked:" of the docstring.
-    """
-
-    phenomena: tuple[str, ...]
-    smoothness: str
-    confidence: str
-    source: str = ""
-    odd: bool = True
-    load: str = "proportional"
-    checked: str = ""
-
-    def __set_name__(self, law: type, _: str) -> None:
-        text = cleandoc(law.__doc__ or "")
-        for name in ("source", "checked"):
-            found = search(rf"\n{name.title()}: (.+?)(?=\n\s*\n|\n[A-Z]\w+:|\Z)", text, DOTALL)
-            if found and not getattr(self, name):
-                object.__setattr__(self, name, " ".join(found[1].split()).removesuffix("."))
-
-    @property
-    def formula(self) -> str:
-        """Confidence in the formula as text, with the reference of the comparison."""
-        text = f"{self.confidence} ({CONFIDENCE[self.confidence]})"
-        return f"{text}: {self.checked}" if self.checked else text
 
 
 @dataclass(frozen=True)
@@ -141,6 +81,54 @@ class Switch:
     halts: bool = False
     at_start: bool = False
     rtol: float = inf
+
+
+def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap `method(law, v, N, z)` so that it accepts and checks states in any common form.
+
+    Raises:
+        ValueError: the number of states is wrong, an integer is too large for a float, or the
+            method of a user's law fails or returns an unsuitable value.
+    """
+
+    @wraps(method)
+    def checked(law: "Law", v: Scalar, N: Scalar, z: Scalar = (), *more: Any, **inputs: Any) -> Any:
+        slip, load = plain(v), plain(N)
+        for name, value in (("v", slip), ("N", load)):
+            if type(value) is int and not is_number(value):
+                where = f"{type(law).__name__}.{method.__name__}: {name}"
+                raise checks.refused(where, "a number that a float can hold", value)
+        states = states_of(law, slip, plain(z))
+        if type(law).__module__.startswith("symfric."):
+            return method(law, slip, load, states, *more, **inputs)
+        where = f"{type(law).__name__}.{method.__name__}"
+        try:
+            value = method(law, slip, load, states, *more, **inputs)
+        except (TypeError, ValueError, RuntimeError) as error:
+            if not isinstance(slip, np.ndarray) and "truth value" not in str(error):
+                raise
+            raise _unsuitable(where, slip, error) from error
+        arguments = is_casadi(slip, load, states, *inputs.values())
+        if isinstance(value, list | tuple) or (is_casadi(value) and not arguments):
+            raise _unsuitable(where, slip, value)
+        return value
+
+    return checked
+
+
+def _unsuitable(where: str, v: Scalar, got: object) -> ValueError:
+    """Return the error for a method of a user's law that fails, or returns an unsuitable value."""
+    if "truth value" in str(got):
+        return ValueError(
+            f"{where}: expected an expression, got a condition that Python evaluates (if, and, or, "
+            "max, min); write smooth.choose(v > 0, a, b) of symfric.laws"
+        )
+    what, hint = "a force, or a column of rates", ""
+    if isinstance(got, list | tuple):
+        hint = "write ca.vertcat(...) for several rates"
+    elif isinstance(v, np.ndarray):
+        what, hint = "an array for velocities in an array", "write it with symfric.laws.smooth"
+    return checks.refused(where, what, got, hint)
 
 
 @parametric
@@ -342,3 +330,35 @@ class StaticLaw(Law):
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return an empty column."""
         return empty(v)
+
+
+def states_of(law: Law, v: Scalar, z: Scalar) -> Scalar:
+    """Return `z` with one row for each state of `law`.
+
+    If the law has one state, `z` may be a number, or an array of the shape of the velocities.
+    """
+    given = z
+    if is_casadi(z):
+        rows = z.shape[0] if z.numel() else 0  # a slice of a scalar has shape (1, 0)
+    elif isinstance(z, Rows):
+        return z
+    elif is_number(z):
+        z, rows = np.array([z], float), 1
+    elif isinstance(z, tuple | list):
+        rows = len(z)  # pyright: ignore[reportUnknownArgumentType]
+    elif isinstance(z, np.ndarray):
+        if z.ndim == 1 and z.size != 1 and np.shape(v) == z.shape and len(law.states) == 1:
+            z = z[None]
+        rows = z.shape[0]
+    else:
+        rows = -1
+    known = law.states
+    if rows == len(known):
+        return z
+    hint, what = "leave z out", "no states"
+    if known:
+        names = checks.listed(s.name for s in known)
+        what = f"z with {len(known)} {'state' if len(known) == 1 else 'states'}, {names}"
+        hint = "z = law.steady_state(v, N) gives those of steady sliding"
+    got = "none" if rows == 0 else checks.shown(given)
+    raise ValueError(f"{type(law).__name__}: expected {what}, got {got}; {hint}")
