@@ -17,8 +17,10 @@ WEAK, SMALL, TINY = 0.1, 1e-2, 1e-8
 """Ratio of distance and multiplier, both scaled and at most `SMALL`, above which it is not certain
 whether a condition is active; `TINY` is the error of both."""
 EQUATIONS = ("the equation of", "the algebraic equation", "the continuity of", "the largest cost",
-             "the constraint", "the loop")  # fmt: skip
-"""Rows of the equations of motion, whose multipliers are costates."""
+             "the constraint", "the loop", "absolute value", "the violation of", "violation_",
+             "the bound largest_")  # fmt: skip
+"""Rows of the equations of motion, whose multipliers are costates, and rows and unknowns that make
+up costs of absolute values, maxima and violations."""
 SAME_TIME = 1e-9
 SHOWN = 3
 """Largest number of conditions in a line."""
@@ -161,6 +163,8 @@ def entries(optimum: Optimum) -> Iterator[Entry]:
     is_node[nodes], is_input[inputs] = True, True
     for k in np.flatnonzero(limited).tolist():
         place = program.unknowns[k]
+        if place.name.startswith(EQUATIONS):
+            continue
         span, end, name = spans[place.span], place.fraction, place.name
         units = _units(span)
         if is_input[k]:

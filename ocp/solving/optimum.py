@@ -210,7 +210,7 @@ class Optimum:
         last = number - spans[number].phase + len(made.problem.chain)
         weight = cost_weight(made, self.iterate.lam_g, number)
         at = "points" if made.scheme.coefficients().degree else "starts"
-        total = self._along(number, spans[number].running, at)[0]
+        total = self._along(number, spans[number].integrand, at)[0]
         for k in range(number, last):
             total = total + self._along(k, ca.jacobian(spans[k].end, spans[k].model.t), "end")[0]
         return weight * total
