@@ -4,7 +4,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import wraps
+from inspect import cleandoc
 from math import inf, isfinite
+from re import DOTALL, search
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -15,10 +17,46 @@ from symfric.foundation.parameters import Parametric, parameters, parametric
 from symfric.foundation.symbolic import plain
 from symfric.foundation.vector import Rows
 from symfric.laws.base import smooth
-from symfric.laws.base.facts import Facts
+from symfric.laws.base.phenomena import CONFIDENCE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Properties of a law that are not part of its equations.
+
+    Attributes:
+        phenomena: codes of `PHENOMENA`.
+        smoothness: differentiability class in the velocity, and the exceptions.
+        confidence: a key of `CONFIDENCE`.
+        source: publication of the law; by default the section "Source:" of its docstring.
+        odd: True if the force changes sign when v, the states and the further inputs do.
+        load: dependence of the dry force on N: "proportional", "independent" or a description.
+        checked: reference of the comparison; by default the section "Checked:" of the docstring.
+    """
+
+    phenomena: tuple[str, ...]
+    smoothness: str
+    confidence: str
+    source: str = ""
+    odd: bool = True
+    load: str = "proportional"
+    checked: str = ""
+
+    def __set_name__(self, law: type, _: str) -> None:
+        text = cleandoc(law.__doc__ or "")
+        for name in ("source", "checked"):
+            found = search(rf"\n{name.title()}: (.+?)(?=\n\s*\n|\n[A-Z]\w+:|\Z)", text, DOTALL)
+            if found and not getattr(self, name):
+                object.__setattr__(self, name, " ".join(found[1].split()).removesuffix("."))
+
+    @property
+    def formula(self) -> str:
+        """Confidence in the formula as text, with the reference of the comparison."""
+        text = f"{self.confidence} ({CONFIDENCE[self.confidence]})"
+        return f"{text}: {self.checked}" if self.checked else text
 
 
 @dataclass(frozen=True)
@@ -87,8 +125,7 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
     """Wrap `method(law, v, N, z)` so that it accepts and checks states in any common form.
 
     Raises:
-        ValueError: the number of states is wrong, an integer is too large for a float, or the
-            method of a user's law fails or returns an unsuitable value.
+        ValueError: a wrong number of states, an integer too large for a float, an unsuitable value.
     """
 
     @wraps(method)
@@ -108,8 +145,8 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
             if not isinstance(slip, np.ndarray) and "truth value" not in str(error):
                 raise
             raise _unsuitable(where, slip, error) from error
-        arguments = is_casadi(slip, load, states, *inputs.values())
-        if isinstance(value, list | tuple) or (is_casadi(value) and not arguments):
+        numbers = not is_casadi(slip, load, states, *inputs.values())
+        if isinstance(value, list | tuple) or (numbers and is_casadi(value)):
             raise _unsuitable(where, slip, value)
         return value
 
@@ -123,10 +160,8 @@ def _unsuitable(where: str, v: Scalar, got: object) -> ValueError:
             f"{where}: expected an expression, got a condition that Python evaluates (if, and, or, "
             "max, min); write smooth.choose(v > 0, a, b) of symfric.laws"
         )
-    what, hint = "a force, or a column of rates", ""
-    if isinstance(got, list | tuple):
-        hint = "write ca.vertcat(...) for several rates"
-    elif isinstance(v, np.ndarray):
+    what, hint = "a force, or a column of rates", "write ca.vertcat(...) for several rates"
+    if isinstance(v, np.ndarray) and not isinstance(got, list | tuple):
         what, hint = "an array for velocities in an array", "write it with symfric.laws.smooth"
     return checks.refused(where, what, got, hint)
 

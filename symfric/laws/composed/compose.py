@@ -12,8 +12,7 @@ from symfric.foundation.parameters import (
     with_values,
 )
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
-from symfric.laws.base.law import Law, check_law
+from symfric.laws.base.law import Facts, Law, check_law
 from symfric.laws.composed.wrap import Composed, Wrapper
 
 

@@ -20,8 +20,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, column, expm1, sin
 from symfric.foundation.parameters import Parametric, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
-from symfric.laws.base.law import Input, Law, State
+from symfric.laws.base.law import Facts, Input, Law, State
 
 Array = NDArray[np.float64]
 SPEEDS = 20

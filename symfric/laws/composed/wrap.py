@@ -9,9 +9,8 @@ from math import inf
 from symfric.foundation.numeric import Scalar, column, empty, exp, smallest, total
 from symfric.foundation.parameters import distinct, parameters, parametric, with_values
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
 from symfric.laws.base.families import WithModes, carried
-from symfric.laws.base.law import FORCE, Input, Law, State, Switch, check_law, chosen
+from symfric.laws.base.law import FORCE, Facts, Input, Law, State, Switch, check_law, chosen
 
 
 class Composed(Law):

@@ -5,8 +5,7 @@ from math import inf
 from symfric.foundation.numeric import Scalar, column, equals, is_number
 from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
-from symfric.laws.base.law import Law, State
+from symfric.laws.base.law import Facts, Law, State
 from symfric.laws.dynamic.element import deflection, onward, spent
 
 

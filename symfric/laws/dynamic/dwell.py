@@ -14,9 +14,8 @@ from symfric.foundation.numeric import (
 from symfric.foundation.parameters import option, parametric
 from symfric.foundation.vector import TINY
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
 from symfric.laws.base.families import Levels
-from symfric.laws.base.law import Law, State, one_sided
+from symfric.laws.base.law import Facts, Law, State, one_sided
 from symfric.laws.dynamic.element import deflection, yielding
 
 

@@ -5,8 +5,7 @@ from math import pi
 from symfric.foundation.numeric import Scalar, column, equals, exp, is_number, sin
 from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
-from symfric.laws.base.law import State
+from symfric.laws.base.law import Facts, State
 from symfric.laws.dynamic.element import StribeckLevel, ahead, deflection
 
 

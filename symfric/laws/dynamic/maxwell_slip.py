@@ -3,8 +3,7 @@
 from symfric.foundation.numeric import Scalar, both, column, either, expm1, is_number, total
 from symfric.foundation.parameters import Parametric, option, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
-from symfric.laws.base.law import State, Switch
+from symfric.laws.base.law import Facts, State, Switch
 from symfric.laws.dynamic.element import (
     Elements,
     Held,

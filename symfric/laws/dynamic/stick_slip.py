@@ -5,9 +5,8 @@ from math import inf
 from symfric.foundation.numeric import Scalar, column, equals, exp
 from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
 from symfric.laws.base.families import Levels, Sticking, TwoLevels, carried
-from symfric.laws.base.law import State, Switch
+from symfric.laws.base.law import Facts, State, Switch
 from symfric.laws.dynamic.element import Held, deflection, yielding
 
 

@@ -6,9 +6,8 @@ from math import inf, pi
 from symfric.foundation.numeric import Scalar, atan, column, exp, is_number
 from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
 from symfric.laws.base.families import Levels, Sticking, carried, rests
-from symfric.laws.base.law import APPLIED_FORCE, Input, State, StaticLaw, Switch, one_sided
+from symfric.laws.base.law import APPLIED_FORCE, Facts, Input, State, StaticLaw, Switch, one_sided
 
 FORMS = ("smooth", "original")
 WITH_MODES = (*FORMS, "event")

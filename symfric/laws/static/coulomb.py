@@ -11,8 +11,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, atan, equals, erf, sqrt, tanh
 from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
-from symfric.laws.base.law import StaticLaw
+from symfric.laws.base.law import Facts, StaticLaw
 
 
 def _quadratic(u: Scalar) -> Scalar:

@@ -3,8 +3,8 @@
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields
-from symfric.laws.base.facts import Facts
 from symfric.laws.base.families import Curve, Fall, Levels
+from symfric.laws.base.law import Facts
 
 
 @parametric

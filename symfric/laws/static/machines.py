@@ -17,9 +17,8 @@ from symfric.foundation.numeric import (
 )
 from symfric.foundation.parameters import option, param, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
 from symfric.laws.base.families import Curve, Fall
-from symfric.laws.base.law import Input, StaticLaw, one_sided
+from symfric.laws.base.law import Facts, Input, StaticLaw, one_sided
 
 
 @parametric

@@ -6,9 +6,8 @@ from math import exp as exp_of_float
 from symfric.foundation.numeric import Scalar, exp, tanh
 from symfric.foundation.parameters import option, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
 from symfric.laws.base.families import Levels, TwoLevels
-from symfric.laws.base.law import StaticLaw
+from symfric.laws.base.law import Facts, StaticLaw
 
 FORMS = ("smooth", "original")
 RISE = 1 - exp_of_float(-3.0)

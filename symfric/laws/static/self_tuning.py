@@ -6,9 +6,8 @@ from math import pi
 from symfric.foundation.numeric import Scalar, asin, atan, equals, exp, is_casadi, sin, tan
 from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
 from symfric.laws.base.families import TwoLevels
-from symfric.laws.base.law import StaticLaw
+from symfric.laws.base.law import Facts, StaticLaw
 
 
 @parametric

@@ -5,9 +5,8 @@ from math import e, sqrt
 from symfric.foundation.numeric import Scalar, equals, exp, tanh
 from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.facts import Facts
 from symfric.laws.base.families import Curve, Fall, Levels, TwoLevels
-from symfric.laws.base.law import StaticLaw
+from symfric.laws.base.law import Facts, StaticLaw
 
 
 @parametric
