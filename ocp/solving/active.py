@@ -1,10 +1,9 @@
 """Active conditions of a solution with their multipliers, in words and SI units."""
 
-from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,9 @@ from ocp.formulation.phase import Array, Box, Span
 from ocp.solving.optimum import STATIONARY, Optimum
 from ocp.transcription.program import Place
 
-WEAK, SMALL, TINY = 0.1, 1e-2, 1e-8
+WEAK, SMALL, TINY, ROUNDING = 0.1, 1e-2, 1e-8, 1e-10
 """Ratio of distance and multiplier, both scaled and at most `SMALL`, above which it is not certain
-whether a condition is active; `TINY` is the error of both."""
+whether a condition is active; `TINY` is the error of both, `ROUNDING` that of distances alone."""
 EQUATIONS = ("the equation of", "the algebraic equation", "the continuity of", "the largest cost",
              "the constraint", "the loop", "absolute value", "the violation of", "violation_",
              "the bound largest_")  # fmt: skip
@@ -90,12 +89,20 @@ class Status(NamedTuple):
         upper: mask of those nearer to, or pressing on, their upper bound.
         weak: mask of those for which this is uncertain.
         fixed: mask of equal bounds.
+        ratio: ratio of multiplier and distance, above 1 where a condition is active.
     """
 
     active: NDArray[np.bool_]
     upper: NDArray[np.bool_]
     weak: NDArray[np.bool_]
     fixed: NDArray[np.bool_]
+    ratio: Array
+
+    @staticmethod
+    def joined(unknowns: "Status", rows: "Status") -> "Status":
+        """Return the status of unknowns, then of rows."""
+        pairs: Any = zip(unknowns, rows, strict=True)
+        return Status(*map(np.concatenate, pairs))
 
 
 def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> Status:
@@ -109,29 +116,21 @@ def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> Sta
     size = np.maximum(np.where(np.isfinite(span), span, np.abs(values)), 1.0)
     high = above < below
     pressure, distance = np.where(high, strength, -strength), np.minimum(below, above) / size
+    distance = np.where(np.abs(distance) < ROUNDING, 0.0, distance)
     larger = np.fmax(np.abs(pressure), np.abs(distance))
     smaller = np.fmin(np.abs(pressure), np.abs(distance))
     weak = ~fixed & (larger < SMALL) & (smaller >= WEAK * larger - TINY)
-    return Status(fixed | (pressure > distance), high, weak, fixed)
+    ratio = pressure / np.maximum(distance, TINY)
+    return Status(fixed | (pressure > distance), high, weak, fixed, ratio)
 
 
 def statuses(optimum: Optimum) -> tuple[Status, Status]:
     """Return the status of all unknowns and of all rows."""
-    program, iterate = optimum.transcription.program, optimum.iterate
-    w, g = iterate.lam_w / optimum.size, iterate.lam_g / optimum.size
-    if optimum.dense:
-        w, g = (lam * _counts(places) for lam, places in ((w, program.unknowns), (g, program.rows)))
+    program, iterate, size = optimum.transcription.program, optimum.iterate, optimum.size
     return (
-        status_of(iterate.w, program.lower_w, program.upper_w, w),
-        status_of(optimum.rows[0], program.lower_g, program.upper_g, g),
+        status_of(iterate.w, program.lower_w, program.upper_w, iterate.lam_w / size),
+        status_of(optimum.rows[0], program.lower_g, program.upper_g, iterate.lam_g / size),
     )
-
-
-def _counts(places: Sequence[Place]) -> Array:
-    """Return the number of places with the name and the phase of each place."""
-    groups = [(place.name, place.span) for place in places]
-    counts = Counter(groups)
-    return np.array([counts[group] for group in groups], dtype=float)
 
 
 class Entry(NamedTuple):
@@ -215,7 +214,7 @@ def per_unit(unit: str) -> str:
 
 def active_conditions(optimum: Optimum) -> ActiveConditions:
     """Return the active conditions in the order of time; consecutive times are joined."""
-    status = Status(*map(np.concatenate, zip(*statuses(optimum), strict=True)))
+    status = Status.joined(*statuses(optimum))
     groups: dict[tuple[str, int], list[Entry]] = {}
     for entry in entries(optimum):
         groups.setdefault((entry.name, entry.place.span), []).append(entry)

@@ -283,7 +283,7 @@ class Solution(packed.Portable):
 
     def _linearised(self, what: str) -> "Linearised":
         """Return the optimality conditions for the property `what`."""
-        from ocp.solving.linearised import Linearised, polished  # noqa: PLC0415  (loads scipy.sparse)
+        from ocp.solving.polish import polished  # noqa: PLC0415  (loads scipy.sparse)
 
         if self.optimum is None or self.status.stopped:
             got = "one from a file" if self.optimum is None else self.status.name
@@ -291,7 +291,7 @@ class Solution(packed.Portable):
                 f"solution of '{self.problem.name}': {what}: expected an optimal solution of this "
                 f"session, got {got}; solve the problem with this solution as guess"
             )
-        return Linearised(polished(self.optimum))
+        return polished(self.optimum)
 
     def save(self, path: str | Path) -> None:
         """Write the solution to a file, which `ocp.load` reads without loss.
