@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.checking.verify import verified, verify
+from ocp.complementarity import solve_relaxed
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import verify_exactly
@@ -71,14 +72,19 @@ class Direct:
         """The solver if it is Ipopt, otherwise Ipopt without options."""
         return self.solver if isinstance(self.solver, Ipopt) else Ipopt()
 
+    @property
+    def meshes(self) -> list[Array]:
+        """First meshes."""
+        wanted = INTERVALS if self.intervals is None else self.intervals
+        return make_meshes(self.problem, wanted)
+
     def solved(
         self, guess: Start, meshes: Sequence[Array] | None = None, *, close: bool = False
     ) -> Solution:
         """Solve the problem from `guess`; `close` limits passes, intervals and iterations."""
         goals, solver, most = self.goals, self.solver, 0
         if meshes is None:
-            wanted = INTERVALS if self.intervals is None else self.intervals
-            meshes = make_meshes(self.problem, wanted)
+            meshes = self.meshes
         elif self.problem.scenarios:
             passes, most = min(goals.passes, SHARED_PASSES), SHARED_ITERATIONS
             goals = replace(goals, passes=passes)
@@ -247,6 +253,8 @@ class Search:
 def solved(search: Search, friction: Friction, guess: Start, starts: int) -> Solution:
     """Solve the problem of `search.direct` by the strategy that it requires."""
     direct, check = search.direct, search.checked
+    if any(row.is_product for span in direct.problem.spans for row in span.path):
+        return _by_relaxation(search, friction, guess)
     problem, shooting = direct.problem, isinstance(direct.scheme, Shooting)
     holding = any(sticking(phase.model) for phase in problem.chain)
     static = friction == "auto" and not isinstance(guess, Solution) and bool(law_states(problem))
@@ -263,6 +271,22 @@ def solved(search: Search, friction: Friction, guess: Start, starts: int) -> Sol
             "collocation friction='modes' or 'sharpen' replaces laws that have them"
         )
     return check(direct.solved(guess))
+
+
+def _by_relaxation(search: Search, friction: Friction, guess: Start) -> Solution:
+    """Solve a problem with complementary signals, with the friction of its models."""
+    direct = search.direct
+    problem, meshes = direct.problem, direct.meshes
+    if friction != "smooth" and any(sticking(phase.model) for phase in problem.chain):
+        raise ValueError(
+            "solve: expected friction='smooth' with complementary(...), as modes and widths of "
+            f"friction are not sought together with it, got {friction!r}"
+        )
+    return search.checked(
+        solve_relaxed(
+            problem, meshes, direct.scheme, direct.solver, guess, direct.goals, direct.supervisor
+        )
+    )
 
 
 def _by_shooting(search: Search, guess: Start, starts: int) -> Solution:

@@ -1,10 +1,9 @@
 """Active conditions of a solution with their multipliers, in words and SI units."""
 
-from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +12,14 @@ from ocp.formulation.phase import Array, Box, Span
 from ocp.solving.optimum import STATIONARY, Optimum
 from ocp.transcription.program import Place
 
-WEAK, SMALL, TINY = 0.1, 1e-2, 1e-8
+WEAK, SMALL, TINY, ROUNDING = 0.1, 1e-2, 1e-8, 1e-10
 """Ratio of distance and multiplier, both scaled and at most `SMALL`, above which it is not certain
-whether a condition is active; `TINY` is the error of both."""
+whether a condition is active; `TINY` is the error of both, `ROUNDING` that of distances alone."""
 EQUATIONS = ("the equation of", "the algebraic equation", "the continuity of", "the largest cost",
-             "the constraint", "the loop")  # fmt: skip
-"""Rows of the equations of motion, whose multipliers are costates."""
+             "the constraint", "the loop", "absolute value", "the violation of", "violation_",
+             "the bound largest_")  # fmt: skip
+"""Rows of the equations of motion, whose multipliers are costates, and rows and unknowns that make
+up costs of absolute values, maxima and violations."""
 SAME_TIME = 1e-9
 SHOWN = 3
 """Largest number of conditions in a line."""
@@ -38,6 +39,7 @@ class Active:
         unit: unit of the multiplier, such as "cost/N".
         weak: True if distance and multiplier are too small to decide whether the condition is
             active; then J* may have different derivatives in both directions.
+        scenario: name of its scenario; empty for a problem without scenarios.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Active:
     multiplier: float
     unit: str
     weak: bool = False
+    scenario: str = ""
 
     @property
     def when(self) -> str:
@@ -72,7 +75,7 @@ class ActiveConditions(tuple[Active, ...]):
         head = f"{'condition':<34}{'side':<7}{'value':>12}  {'t':<22}{'dJ/dvalue':>13}"
         rows = [
             f"{a.name:<34}{a.side:<7}{a.value:>12.6g}  {a.when:<22}{a.multiplier:>13.6g} {a.unit}"
-            f"{'  (weakly active)' * a.weak}"
+            f"{'  (weakly active)' * a.weak}{f'  ({a.scenario})' * bool(a.scenario)}"
             for a in self
         ]
         return "\n".join([head, *rows])
@@ -88,12 +91,20 @@ class Status(NamedTuple):
         upper: mask of those nearer to, or pressing on, their upper bound.
         weak: mask of those for which this is uncertain.
         fixed: mask of equal bounds.
+        ratio: ratio of multiplier and distance, above 1 where a condition is active.
     """
 
     active: NDArray[np.bool_]
     upper: NDArray[np.bool_]
     weak: NDArray[np.bool_]
     fixed: NDArray[np.bool_]
+    ratio: Array
+
+    @staticmethod
+    def joined(unknowns: "Status", rows: "Status") -> "Status":
+        """Return the status of unknowns, then of rows."""
+        pairs: Any = zip(unknowns, rows, strict=True)
+        return Status(*map(np.concatenate, pairs))
 
 
 def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> Status:
@@ -107,29 +118,21 @@ def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> Sta
     size = np.maximum(np.where(np.isfinite(span), span, np.abs(values)), 1.0)
     high = above < below
     pressure, distance = np.where(high, strength, -strength), np.minimum(below, above) / size
+    distance = np.where(np.abs(distance) < ROUNDING, 0.0, distance)
     larger = np.fmax(np.abs(pressure), np.abs(distance))
     smaller = np.fmin(np.abs(pressure), np.abs(distance))
     weak = ~fixed & (larger < SMALL) & (smaller >= WEAK * larger - TINY)
-    return Status(fixed | (pressure > distance), high, weak, fixed)
+    ratio = pressure / np.maximum(distance, TINY)
+    return Status(fixed | (pressure > distance), high, weak, fixed, ratio)
 
 
 def statuses(optimum: Optimum) -> tuple[Status, Status]:
     """Return the status of all unknowns and of all rows."""
-    program, iterate = optimum.transcription.program, optimum.iterate
-    w, g = iterate.lam_w / optimum.size, iterate.lam_g / optimum.size
-    if optimum.dense:
-        w, g = (lam * _counts(places) for lam, places in ((w, program.unknowns), (g, program.rows)))
+    program, iterate, size = optimum.transcription.program, optimum.iterate, optimum.size
     return (
-        status_of(iterate.w, program.lower_w, program.upper_w, w),
-        status_of(optimum.rows[0], program.lower_g, program.upper_g, g),
+        status_of(iterate.w, program.lower_w, program.upper_w, iterate.lam_w / size),
+        status_of(optimum.rows[0], program.lower_g, program.upper_g, iterate.lam_g / size),
     )
-
-
-def _counts(places: Sequence[Place]) -> Array:
-    """Return the number of places with the name and the phase of each place."""
-    groups = [(place.name, place.span) for place in places]
-    counts = Counter(groups)
-    return np.array([counts[group] for group in groups], dtype=float)
 
 
 class Entry(NamedTuple):
@@ -161,6 +164,8 @@ def entries(optimum: Optimum) -> Iterator[Entry]:
     is_node[nodes], is_input[inputs] = True, True
     for k in np.flatnonzero(limited).tolist():
         place = program.unknowns[k]
+        if place.name.startswith(EQUATIONS):
+            continue
         span, end, name = spans[place.span], place.fraction, place.name
         units = _units(span)
         if is_input[k]:
@@ -211,7 +216,7 @@ def per_unit(unit: str) -> str:
 
 def active_conditions(optimum: Optimum) -> ActiveConditions:
     """Return the active conditions in the order of time; consecutive times are joined."""
-    status = Status(*map(np.concatenate, zip(*statuses(optimum), strict=True)))
+    status = Status.joined(*statuses(optimum))
     groups: dict[tuple[str, int], list[Entry]] = {}
     for entry in entries(optimum):
         groups.setdefault((entry.name, entry.place.span), []).append(entry)
@@ -247,12 +252,14 @@ def _active(optimum: Optimum, status: Status, run: Sequence[Entry]) -> Active:
     numbers = [entry.number for entry in run]
     upper = bool(status.upper[first])
     bounds = (program.upper_w, program.upper_g) if upper else (program.lower_w, program.lower_g)
-    first_span = place.span - optimum.transcription.problem.spans[place.span].phase
+    problem = optimum.transcription.problem
+    span = problem.spans[place.span]
+    first_span = place.span - span.phase
     start, length = sum(s.T for s in points[first_span : place.span]), points[place.span].T
     whole = not np.isfinite(place.fraction)
     if name.startswith("the duration of"):  # of several phases
         start, whole = 0.0, True
-        length = sum(s.T for s in points[: len(optimum.transcription.problem.chain)])
+        length = sum(s.T for s in points[: len(problem.chain)])
     return Active(
         name=name,
         side="=" if status.fixed[first] else ("lower", "upper")[upper],
@@ -262,6 +269,7 @@ def _active(optimum: Optimum, status: Status, run: Sequence[Entry]) -> Active:
         multiplier=-float(sum(lam[entry.number] / entry.place.scale for entry in run)),
         unit=per_unit(unit),
         weak=bool(status.weak[numbers].all()),
+        scenario=next(iter(problem.scenario_names[span.scenario :]), ""),
     )
 
 
@@ -269,11 +277,12 @@ def _merged(found: Sequence[Active]) -> list[Active]:
     """Return `found` with bounds joined that are active in consecutive phases."""
     merged: list[Active] = []
     for one in found:
-        for k, other in enumerate(merged):
-            same = (one.name, one.side, one.value) == (other.name, other.side, other.value)
-            if same and one.side != "=" and abs(one.begin - other.end) < SAME_TIME:
+        for number, other in enumerate(merged):
+            keys = ("name", "side", "value", "scenario")
+            same = one.side != "=" and all(getattr(one, k) == getattr(other, k) for k in keys)
+            if same and abs(one.begin - other.end) < SAME_TIME:
                 total, weak = other.multiplier + one.multiplier, other.weak and one.weak
-                merged[k] = replace(other, end=one.end, multiplier=total, weak=weak)
+                merged[number] = replace(other, end=one.end, multiplier=total, weak=weak)
                 break
         else:
             merged.append(one)

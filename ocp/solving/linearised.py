@@ -13,7 +13,7 @@ Source: Fiacco, Introduction to Sensitivity and Stability Analysis in Nonlinear 
 Nocedal and Wright, Numerical Optimization, 2006, 12.5, 16.1 (second-order conditions).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple, final
 
@@ -23,7 +23,7 @@ import scipy.sparse as sp
 from scipy.sparse import linalg
 
 from ocp.formulation.phase import Array, fixed
-from ocp.solving.active import Entry, entries, statuses
+from ocp.solving.active import Entry, Status, entries, statuses
 from ocp.solving.motion import Motion, at_times
 from ocp.solving.optimum import STATIONARY, Optimum, Sparse
 from ocp.solving.sensitivity import Condition, Sensitivity
@@ -34,18 +34,17 @@ from symfric.foundation.parameters import check_names
 
 STEP = 1e-3
 """Step of differences relative to a parameter."""
-SOFT = 1e-11
-"""Regularisation of dependent conditions, whose effect iterative refinement removes."""
-ROUNDS, STEPS = 5, 10
-FARTHEST, CONVERGED = 0.1, 1e-8
-"""Largest change of scaled unknowns by a step from the optimum of a solver, and at the end."""
+SOFT, TINY = 1e-11, 1e-14
+"""Regularisation of dependent conditions and of a Hessian without curvature, whose effect iterative
+refinement removes."""
+ROUNDS = 5
 SINGULAR = 1e-5
 """Largest relative residual of the linear equations."""
-LARGE, UNSOLVABLE = 1e12, 1e17
+LARGE, UNSOLVABLE = 1e12, 1e15
 """Condition numbers above which active conditions count as dependent, and above which the linear
 equations have no unique solution."""
-PENALTY = 1e7
-"""Weight of A'A, relative to H, in the test of second-order conditions."""
+PENALTY, FLAT = 1e6, 1e-6
+"""Weight of A'A in the test of second-order conditions, and least pivot of a positive matrix."""
 
 
 class Change(NamedTuple):
@@ -71,11 +70,17 @@ class Change(NamedTuple):
 class Linearised:
     """Optimality conditions of a solution with its active conditions fixed.
 
+    Attributes:
+        optimum: the solution.
+        changed: indices of unknowns, then of rows, that count as active although the distance from
+            their bound exceeds their multiplier, or as inactive although it does not.
+
     Raises:
         ValueError: the point does not satisfy the optimality conditions.
     """
 
     optimum: Optimum
+    changed: Indices = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def __post_init__(self) -> None:
         if not self.optimum.residual <= STATIONARY:
@@ -90,14 +95,23 @@ class Linearised:
         return f"solution of '{self.optimum.transcription.problem.name}'"
 
     @cached_property
+    def status(self) -> tuple[Status, Status]:
+        """Status of all unknowns and of all rows, with the conditions `changed`."""
+        w, g = statuses(self.optimum)
+        active = np.concatenate([w.active, g.active])
+        active[self.changed] ^= True
+        n = w.active.size
+        return w._replace(active=active[:n]), g._replace(active=active[n:])
+
+    @cached_property
     def free(self) -> Indices:
         """Indices of unknowns that are not at bounds."""
-        return np.flatnonzero(~statuses(self.optimum)[0].active)
+        return np.flatnonzero(~self.status[0].active)
 
     @cached_property
     def held(self) -> Indices:
         """Indices of the active rows."""
-        return np.flatnonzero(statuses(self.optimum)[1].active)
+        return np.flatnonzero(self.status[1].active)
 
     @cached_property
     def entries(self) -> list[Entry]:
@@ -107,7 +121,7 @@ class Linearised:
     @cached_property
     def weak(self) -> tuple[str, ...]:
         """Names of conditions that may or may not be active."""
-        uncertain = np.concatenate([status.weak for status in statuses(self.optimum)])
+        uncertain = np.concatenate([status.weak for status in self.status])
         return tuple(dict.fromkeys(e.name for e in self.entries if uncertain[e.number]))
 
     @cached_property
@@ -132,10 +146,9 @@ class Linearised:
     @cached_property
     def factors(self) -> Any:
         """LU factors of the slightly regularised matrix; None if it is singular."""
-        n, m = self.free.size, self.held.size
-        soft = sp.diags(np.concatenate([np.zeros(n), np.full(m, -SOFT)]))
+        soft = np.append(np.full(self.free.size, TINY), np.full(self.held.size, -SOFT))
         try:
-            return linalg.splu(sp.csc_matrix(self.matrix + soft))
+            return linalg.splu(sp.csc_matrix(self.matrix + sp.diags(soft)))
         except RuntimeError:
             return None
 
@@ -154,7 +167,7 @@ class Linearised:
     def stepped(self) -> Optimum | None:
         """Return the optimum after a Newton step with these active conditions, None without one."""
         optimum, program = self.optimum, self.optimum.transcription.program
-        (g, J), (unknowns, rows), n = optimum.rows, statuses(optimum), self.free.size
+        (g, J), (unknowns, rows), n = optimum.rows, self.status, self.free.size
         bounds = np.where(unknowns.upper, program.upper_w, program.lower_w)
         moved = np.where(unknowns.active, bounds - optimum.iterate.w, 0.0)
         wanted = np.where(rows.upper, program.upper_g, program.lower_g)
@@ -207,11 +220,11 @@ class Linearised:
     def by_condition(self, name: str) -> Change:
         """Return the effect of a prescribed value or of a bound."""
         n, iterate = self.optimum.iterate.w.size, self.optimum.iterate
-        status = [np.concatenate(p) for p in zip(*statuses(self.optimum), strict=True)]
-        lam, shift = np.concatenate([iterate.lam_w, iterate.lam_g]), np.zeros(status[0].size)
+        active, high, _, equal, _ = Status.joined(*self.status)
+        lam, shift = np.concatenate([iterate.lam_w, iterate.lam_g]), np.zeros(active.size)
         for entry, upper in self.conditions[name]:
             k = entry.number
-            if status[0][k] and (status[3][k] or bool(status[1][k]) == upper):
+            if active[k] and (equal[k] or bool(high[k]) == upper):
                 shift[k] = 1.0 / entry.place.scale
         unit = self.conditions[name][0][0].unit
         return Change(unit, np.zeros(n), -shift[n:], shift[:n], -float(lam @ shift))
@@ -321,8 +334,14 @@ class Linearised:
     @cached_property
     def sufficient(self) -> bool:
         """True if the Hessian is positive definite on the active conditions."""
-        convex = self.hessian[self.free][:, self.free] + PENALTY * (self.active.T @ self.active)
-        return _positive(convex)
+        norms = linalg.norm(self.active, axis=1)
+        A = sp.diags(1.0 / np.maximum(norms, 1e-300)) @ self.active
+        return _positive(self.hessian[self.free][:, self.free] + PENALTY * (A.T @ A))
+
+    @property
+    def regular(self) -> bool:
+        """True if the linear equations have a unique solution, at a strict minimum."""
+        return self.number < LARGE and self.sufficient
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -341,34 +360,6 @@ class Linearised:
         return Condition(*known, self.number, self.sufficient, self.weak)
 
 
-def polished(optimum: Optimum) -> Optimum:
-    """Return the optimum with multipliers of full precision, by a primal-dual active set method.
-
-    A condition becomes active where it is violated, and inactive where its multiplier has the wrong
-    sign. If this does not converge from the active conditions of the solver, the optimum of the
-    solver is returned.
-
-    Source: Hintermueller, Ito and Kunisch, SIAM J. Optimization 13(3), 2002, 865-888.
-
-    Raises:
-        ValueError: the point does not satisfy the optimality conditions.
-    """
-    Linearised(optimum)
-    for dense in (False, True):
-        now = Linearised(replace(optimum, dense=dense))
-        for _ in range(STEPS):
-            if (step := now.stepped()) is None or not step.residual <= STATIONARY:
-                break
-            later, change = Linearised(step), np.abs(step.iterate.w - now.optimum.iterate.w).max()
-            same = np.array_equal(now.free, later.free) and np.array_equal(now.held, later.held)
-            if same and change < CONVERGED:
-                return step
-            if change > FARTHEST:
-                break
-            now = later
-    return optimum
-
-
 def _positive(matrix: Sparse) -> bool:
     """Return True if a symmetric matrix is positive definite, by the pivots of LDL'."""
     if not matrix.shape[0]:
@@ -380,4 +371,4 @@ def _positive(matrix: Sparse) -> bool:
         )  # fmt: skip
     except RuntimeError:
         return False
-    return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > 0).all())
+    return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > FLAT).all())

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any, NamedTuple, final
 
 import numpy as np
@@ -92,6 +93,14 @@ class Motion:
     def T(self) -> float:
         """Total duration of all phases [s]."""
         return self.phases[-1].end - self.phases[0].begin
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return times and signals as plain data, with None for numbers that are not finite."""
+        signals = {
+            name: [v if isfinite(v) else None for v in row.tolist()]
+            for name, row in self.signals.items()
+        }
+        return {"scenario": self.name, "t": self.t.tolist(), "signals": signals}
 
     def __getitem__(self, name: str) -> Array:
         if name == "t":
@@ -331,7 +340,7 @@ def structure_of(problem: Problem | Posed, scheme: Scheme) -> str:
     def described(span: Span) -> list[Any]:
         groups = [[v.name for v in group] for group in (span.model.x, span.model.z, span.model.u)]
         rows = [[s, [row.name for row in rows]] for s, rows in span.rows_at.items()]
-        names = [[row.name for row in part] for part in (span.path, span.joins)]
+        names = [[row.name for row in part] for part in (span.path, span.joins, span.penalised)]
         states, fixed = [link.state for link in span.links], isinstance(span.T, float | int)
         return [span.scenario, span.phase, fixed, groups, names, rows, states]
 

@@ -48,19 +48,25 @@ class Optimum:
         transcription: the transcribed problem; for a motion by modes, that of its arcs.
         iterate: unknowns and multipliers, scaled.
         values: values of the parameters of the program.
-        dense: True if multipliers of conditions at many points are compared as shares of integrals.
     """
 
     transcription: Transcription
     iterate: Iterate
     values: Array
-    dense: bool = False
 
     @cached_property
     def slope(self) -> Array:
         """Gradient of the cost, scaled, shape (n,)."""
-        gradient = self.transcription.program.gradient(self.iterate.w, self.values)[1]
-        return np.asarray(ca.densify(gradient)).ravel()
+        return np.asarray(ca.densify(self._cost[1])).ravel()
+
+    @property
+    def cost(self) -> float:
+        """Cost J."""
+        return float(self._cost[0])
+
+    @cached_property
+    def _cost(self) -> Sequence[ca.DM]:
+        return self.transcription.program.gradient.call([self.iterate.w, self.values])
 
     @cached_property
     def rows(self) -> tuple[Array, Sparse]:
@@ -210,7 +216,7 @@ class Optimum:
         last = number - spans[number].phase + len(made.problem.chain)
         weight = cost_weight(made, self.iterate.lam_g, number)
         at = "points" if made.scheme.coefficients().degree else "starts"
-        total = self._along(number, spans[number].running, at)[0]
+        total = self._along(number, spans[number].integrand, at)[0]
         for k in range(number, last):
             total = total + self._along(k, ca.jacobian(spans[k].end, spans[k].model.t), "end")[0]
         return weight * total

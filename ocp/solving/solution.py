@@ -14,6 +14,7 @@ from ocp.formulation.problem import Posed, Problem, posed
 from ocp.solving.active import ActiveConditions, active_conditions, in_words
 from ocp.solving.motion import Motion, Stretch, at_times
 from ocp.solving.optimum import Optimum
+from ocp.solving.penalties import Penalty, penalties_of
 from ocp.solving.verification import Verification
 from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
@@ -114,6 +115,7 @@ class Solution(packed.Portable):
             least = span.T.lower if isinstance(span.T, Free) else 0.0
             if phase.T - least <= AT_BOUND * least:
                 lines.append(f"{phase.name}: T is at its lower bound, {least:g} s")
+        lines += [f"{name}: {penalty}" for name, penalty in self.soft.items()]
         if self.chosen:
             lines.append("chosen: " + ", ".join(f"{n} = {v:.6g}" for n, v in self.chosen.items()))
         if self.optimum is not None and self.ok:
@@ -192,6 +194,11 @@ class Solution(packed.Portable):
     def phases(self) -> tuple[Stretch, ...]:
         """Name, start time and duration of each phase."""
         return self.motions[0].phases
+
+    @property
+    def soft(self) -> dict[str, Penalty]:
+        """Soft condition -> its cost and its largest violation."""
+        return penalties_of(self.problem, self.scheme, self.meshes, self.points)
 
     @property
     def iterations(self) -> int:
@@ -276,7 +283,7 @@ class Solution(packed.Portable):
 
     def _linearised(self, what: str) -> "Linearised":
         """Return the optimality conditions for the property `what`."""
-        from ocp.solving.linearised import Linearised, polished  # noqa: PLC0415  (loads scipy.sparse)
+        from ocp.solving.polish import polished  # noqa: PLC0415  (loads scipy.sparse)
 
         if self.optimum is None or self.status.stopped:
             got = "one from a file" if self.optimum is None else self.status.name
@@ -284,7 +291,7 @@ class Solution(packed.Portable):
                 f"solution of '{self.problem.name}': {what}: expected an optimal solution of this "
                 f"session, got {got}; solve the problem with this solution as guess"
             )
-        return Linearised(polished(self.optimum))
+        return polished(self.optimum)
 
     def save(self, path: str | Path) -> None:
         """Write the solution to a file, which `ocp.load` reads without loss.
@@ -354,23 +361,14 @@ class Solution(packed.Portable):
             "T": self.T,
             "cost": self.cost if isfinite(self.cost) else None,
             "chosen": dict(self.chosen),
+            "soft": {name: asdict(penalty) for name, penalty in self.soft.items()},
             "phases": [asdict(phase) for phase in self.phases],
             "modes": {name: [asdict(m) for m in modes] for name, modes in self.modes.items()},
             "verified": self.verified,
             "verification": None if self.verification is None else self.verification.to_dict(),
             "statistics": asdict(self.statistics),
             "units": {"t": "s", **self.units},
-            "motions": [
-                {
-                    "scenario": motion.name,
-                    "t": motion.t.tolist(),
-                    "signals": {
-                        name: [v if isfinite(v) else None for v in row.tolist()]
-                        for name, row in motion.signals.items()
-                    },
-                }
-                for motion in self.motions
-            ],
+            "motions": [motion.to_dict() for motion in self.motions],
         }
 
     def to_json(self, path: str | Path) -> None:

@@ -7,14 +7,14 @@ from scipy.integrate import solve_ivp
 
 import symfric as sf
 from symfric.foundation.numeric import Scalar
-from symfric.laws import Exact
+from symfric.laws import Exact, smooth
 
 
 class Falling(sf.StaticLaw):
     """A user's law, F = N sign(v) / (1 + |v|)."""
 
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        return self.outside(v, N) * v / 1e-3
+        return self.outside(smooth.magnitude(v, 1e-3), N) * smooth.sign(v, 1e-3)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         return N / (1.0 + speed)
@@ -62,9 +62,9 @@ def test_oscillator_of_a_user_on_a_belt() -> None:
 
 def test_exact_coulomb_is_a_case() -> None:
     levels = {"mu_s": 0.15, "mu_d": 0.1, "v_s": 1e-2}
-    for smooth, form in ((sf.Stribeck(**levels), "stribeck"), (sf.LuGre(**levels), "stribeck")):
-        one = sf.simulate(sf.rabinowicz(Exact(smooth)), 20.0)
-        other = sf.simulate(sf.rabinowicz(sf.ExactCoulomb(**levels, form=form)), 20.0)
+    for law in (sf.Stribeck(**levels), sf.LuGre(**levels)):
+        one = sf.simulate(sf.rabinowicz(Exact(law)), 20.0)
+        other = sf.simulate(sf.rabinowicz(sf.ExactCoulomb(**levels, form="stribeck")), 20.0)
         assert one.final["x"] == pytest.approx(other.final["x"], abs=1e-9)
         assert one.statistics.events == other.statistics.events > 3
 
@@ -106,3 +106,33 @@ def test_all_laws_with_a_sliding_force_have_an_exact_form() -> None:
             assert found == law().sliding(0.02 * side, 3.0, side, **inputs), name
             assert exact.force(0.0, 3.0, 0.0 * z, F_e=0.1 * side) == 0.1 * side, name
     assert refused == {"wojewoda", "rate_and_state"}
+
+
+class Stiff(sf.Law):
+    """A user's law whose methods return unsuitable values."""
+
+    @property
+    def states(self) -> tuple[sf.State, ...]:
+        return (sf.State("z", "m", 1e-6),)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        return N * ca.tanh(v)
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        return [v if v > 0 else -v]
+
+    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+        return np.zeros(1)
+
+
+def test_unsuitable_methods_of_a_user_are_refused() -> None:
+    v, law = np.linspace(-1.0, 1.0, 5), Stiff()
+    for call, text in (
+        (lambda: law.rate(0.1, 1.0, 0.0), "Stiff.rate: expected .*column.*write ca.vertcat"),
+        (lambda: law.rate(ca.SX.sym("v"), 1.0, 0.0), "a condition that Python evaluates"),
+        (lambda: law.force(v, 1.0, np.zeros((1, 5))), "an array .* write it with symfric.laws.sm"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            call()
+    assert float(law.force(0.1, 2.0, 0.0)) == pytest.approx(2.0 * np.tanh(0.1))
+    assert sf.Law.facts.phenomena == ()
