@@ -45,7 +45,7 @@ def machine() -> str:
 def others() -> list[str]:
     """Return versions of installed tools that subjects compare with."""
     found: list[str] = []
-    for name in ("numpy", "scipy", "rockit-meco", "nosnoc", "do-mpc", "opty"):
+    for name in ("numpy", "scipy", "rockit-meco", "nosnoc", "do-mpc", "opty", "dymos"):
         with suppress(PackageNotFoundError):
             found.append(f"{name} {version(name)}")
     return found

@@ -18,7 +18,8 @@ from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.problems import guide
 from symfric.bench.ocp_cases import CASES, QUICK, Case
-from symfric.bench.ocp_contenders import Attempt, Contender, attempted, contenders
+from symfric.bench.ocp_contenders import Attempt, Contender
+from symfric.bench.ocp_others import attempted, contenders
 from symfric.bench.ocp_referee import Verdict, judged
 from symfric.bench.report import Found, Progress, Report, Row, curves
 from symfric.foundation.parameters import check_names

@@ -1,17 +1,13 @@
-"""Contenders of the benchmark of optimal control, each with the settings that it recommends.
+"""symfric and tools on CasADi in the benchmark of optimal control, with recommended settings.
 
 A contender maps a `Case` to an `Attempt`. Tools without dry friction solve the problem with the
 smooth friction of `Case.smooth`, from a linear guess, with Ipopt; nosnoc solves it with Coulomb
 friction (no static level above the sliding one).
 """
 
-import contextlib
-import io
-import os
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from importlib import import_module
 from itertools import pairwise
 from typing import Any, final
@@ -50,11 +46,6 @@ Contender = Callable[[Case, float], Attempt]
 """Function (case, limit of time [s]) -> attempt."""
 
 
-def cpu() -> float:
-    """Return the processor time [s] of this process and of the compilers that it called."""
-    return sum(os.times()[:4])
-
-
 def _ipopt(limit: float) -> dict[str, Any]:
     return {
         "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 2000,
@@ -62,7 +53,7 @@ def _ipopt(limit: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _even(case: Case, claimed: float, status: object, controls: Any) -> Attempt:
+def even(case: Case, claimed: float, status: object, controls: Any) -> Attempt:
     """Return an attempt on the grid of the case."""
     edges = np.linspace(0.0, case.T, case.intervals + 1)
     return Attempt(float(claimed), str(status), edges, np.ravel(controls).astype(float))
@@ -74,7 +65,8 @@ def _sides(case: Case) -> list[Any]:
     return list(np.array(boxes).T)
 
 
-def _guesses(case: Case, count: int) -> Array:
+def guesses_of(case: Case, count: int) -> Array:
+    """Return the guess of the states at equal times, shape (count, states)."""
     return np.array([case.guess(s) for s in np.linspace(0, 1, count)])
 
 
@@ -113,7 +105,7 @@ def opti(case: Case, limit: float, width: float) -> Attempt:
     o, f, N, n = ca.Opti(), equations(case, width), case.intervals, len(case.states)
     slopes, ends, weights = ca.collocation_coeff(ca.collocation_points(3, "radau"))
     x, u, cost, h = o.variable(n, N + 1), o.variable(1, N), ca.MX(0), case.T / N
-    guess = _guesses(case, 3 * N + 1).T
+    guess = guesses_of(case, 3 * N + 1).T
     o.set_initial(x, guess[:, ::3])
     for k in range(N):
         inner = o.variable(n, 3)
@@ -137,7 +129,7 @@ def opti(case: Case, limit: float, width: float) -> Attempt:
         value = o.solve().value
     except RuntimeError:  # without convergence, the last iterate is used
         value = o.debug.value
-    return _even(case, value(cost), o.stats()["return_status"], value(u))
+    return even(case, value(cost), o.stats()["return_status"], value(u))
 
 
 def rockit(case: Case, limit: float, width: float) -> Attempt:
@@ -174,7 +166,7 @@ def rockit(case: Case, limit: float, width: float) -> Attempt:
         found = master.non_converged_solution
     controls = [np.ravel(found(s).sample(u, grid="control")[1])[:N] for s, _, u, N in stages]
     claimed = sum(float(found(stage).value(stage.objective)) for stage, *_ in stages)
-    return _even(case, claimed, found.stats["return_status"], np.concatenate(controls))
+    return even(case, claimed, found.stats["return_status"], np.concatenate(controls))
 
 
 def nosnoc(case: Case, limit: float) -> Attempt:
@@ -219,7 +211,7 @@ def nosnoc(case: Case, limit: float) -> Attempt:
         g_path=ca.vertcat(ca.SX(0, 1), *(on * (x[i] - v) for i, v in middle.items())),
     )  # fmt: skip
     found = tool.NosnocSolver(options, model, problem).solve()
-    return _even(case, found["cost_val"], found["status"].name, found["u_traj"])
+    return even(case, found["cost_val"], found["status"].name, found["u_traj"])
 
 
 def do_mpc(case: Case, limit: float, width: float) -> Attempt:
@@ -260,102 +252,10 @@ def do_mpc(case: Case, limit: float, width: float) -> Attempt:
     control.setup()
     control.x0 = np.array(case.start).reshape(n, 1)
     control.set_initial_guess()
-    for k, guess in enumerate(_guesses(case, N + 1)):
+    for k, guess in enumerate(guesses_of(case, N + 1)):
         control.opt_x_num["_x", k] = guess
     control.make_step(control.x0)
     controls = [float(control.opt_x_num["_u", k, 0][0]) for k in range(N)]
     cost = ca.Function("J", [control.opt_x, control.opt_p], [control.nlp_obj])
     claimed = cost(control.opt_x_num, control.opt_p_num)
-    return _even(case, float(claimed), control.solver_stats["return_status"], controls)
-
-
-def opty(case: Case, limit: float, width: float) -> Attempt:
-    """Return the solution by the midpoint rule with opty, in SymPy and compiled C."""
-    tool: Any = import_module("opty")
-    sm: Any = import_module("sympy")
-    N, t = case.intervals, sm.Symbol("t")
-    x = [sm.Function(name)(t) for name in case.states]
-    u = sm.Function("u")(t)
-    eom = sm.Matrix([a.diff(t) for a in x]) - sm.Matrix(case.smooth(sm, x, u, width))
-    h = case.T / N
-    last = sm.sympify(case.final(sm, x, u))
-    end = sm.lambdify([x], [last, *(last.diff(a) for a in x)], "numpy")
-    fixed = {0.0: dict(enumerate(case.start)), **case.ends}
-    instance = [
-        x[i].func(round(s * N) * h) - v for s, ends in fixed.items() for i, v in ends.items()
-    ]
-    running, slope = tool.create_objective_function(
-        sm.Integral(case.running(sm, x, u), t), x, [u], [], N + 1, h,
-        integration_method="midpoint", time_symbol=t,
-    )  # fmt: skip
-    ends = slice(N, len(x) * (N + 1), N + 1)
-
-    def objective(free: Array) -> float:
-        return running(free) + end(free[ends])[0]
-
-    def gradient(free: Array) -> Array:
-        found = slope(free)
-        found[ends] += end(free[ends])[1:]
-        return found
-
-    bounds = {u: (-case.limit, case.limit), **{x[i]: box for i, box in case.bounds.items()}}
-    problem = tool.Problem(
-        objective, gradient, eom, x, N + 1, h, instance_constraints=instance, time_symbol=t,
-        bounds=bounds, integration_method="midpoint",
-    )  # fmt: skip
-    for name, value in {"max_iter": 2000, "max_cpu_time": limit, "print_level": 0}.items():
-        problem.add_option(name, value)
-    guess = np.concatenate([_guesses(case, N + 1).T.ravel(), np.zeros(N + 1)])
-    solution, info = problem.solve(guess)
-    nodes = solution[len(x) * (N + 1) :]
-    status = OPTY.get(info["status"], info["status"])
-    return _even(case, info["obj_val"], status, 0.5 * (nodes[1:] + nodes[:-1]))
-
-
-OPTY = {
-    0: "Solve_Succeeded", 1: "Solved_To_Acceptable_Level", 2: "Infeasible_Problem_Detected",
-    5: "User_Requested_Stop", -1: "Maximum_Iterations_Exceeded", -2: "Restoration_Failed",
-    -4: "Maximum_CpuTime_Exceeded",
-}  # fmt: skip
-"""Number of a status of Ipopt -> its name."""
-
-
-PACKAGES = {"rockit": "rockit-meco", "nosnoc": "nosnoc", "do_mpc": "do-mpc", "opty": "opty"}
-"""Module -> distribution of the optional extra `peers`."""
-WIDE, NARROW = 0.1, 0.01
-"""Widths of smooth friction, in units of the sliding speed of each case."""
-
-
-def contenders(quick: bool) -> dict[str, Contender]:
-    """Return the contenders by name; tools with smooth friction appear once for each width.
-
-    Tools that compile or build for long run with the narrow width only, and not with `quick`.
-    """
-    tools: dict[str, Callable[..., Attempt]] = {"Opti": opti, "rockit": rockit, "do-mpc": do_mpc}
-    slow: dict[str, Callable[..., Attempt]] = {"opty": opty}
-    found: dict[str, Contender] = {"symfric": symfric, "nosnoc": nosnoc}
-    for width in (NARROW,) if quick else (WIDE, NARROW):
-        found |= {f"{name} {width:g}": partial(f, width=width) for name, f in tools.items()}
-    if not quick:
-        found |= {f"{name} {NARROW:g}": partial(f, width=NARROW) for name, f in slow.items()}
-    return found
-
-
-def attempted(contender: Contender, case: Case, limit: float) -> tuple[Attempt | str, float]:
-    """Return the attempt, or the reason why there is none, and its processor time [s].
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C, also within a solver.
-    """
-    begin, quiet = cpu(), io.StringIO()
-    try:
-        with contextlib.redirect_stdout(quiet), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            found: Attempt | str = contender(case, limit)
-    except ModuleNotFoundError as error:
-        found = f"not installed: {PACKAGES.get(error.name or '', error.name)}"
-    except Exception as error:  # noqa: BLE001  (a failing tool is a row of the table)
-        found = " ".join(f"{type(error).__name__}: {error}".split())[:80]
-    if isinstance(found, Attempt) and found.status == "User_Requested_Stop":
-        raise KeyboardInterrupt
-    return found, cpu() - begin
+    return even(case, float(claimed), control.solver_stats["return_status"], controls)

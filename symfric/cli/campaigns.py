@@ -51,12 +51,11 @@ def bench(
     and size of their equations, and energy. ivp: correct digits on problems with published
     solutions (Test Set for IVP Solvers). regularisation: error of smooth laws relative to dry
     friction, over their width or stiffness. ocp: optimal control with dry friction in symfric,
-    CasADi's Opti, rockit, nosnoc, do-mpc and opty, judged by an independent simulation. starts:
-    optimal control from random starts. interop: laws in Opti, rockit, do-mpc and CasADi's
-    integrators. identification: fits from many starts and with many noise
-    seeds, confidence intervals, measured machines, damaged files. codegen: generated C, its
-    requirements, and C of CasADi. embedded: instructions and memory of generated C on Cortex-M
-    cores under QEMU.
+    CasADi's Opti, rockit, nosnoc, do-mpc, opty and Dymos, judged by an independent simulation.
+    starts: optimal control from random starts. interop: laws in Opti, rockit, do-mpc and CasADi's
+    integrators. identification: fits from many starts and with many noise seeds,
+    confidence intervals, measured machines, damaged files. codegen: generated C, its requirements,
+    and C of CasADi. embedded: instructions and memory of generated C on Cortex-M cores under QEMU.
 
     In files and pipes each row is also printed on standard error as it is measured. Ctrl-C keeps
     the rows so far; the exit status is then 130.
