@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from ocp.solving.methods import Fatrop as Fatrop
     from ocp.solving.methods import Ipopt as Ipopt
     from ocp.solving.methods import Sqp as Sqp
+    from ocp.solving.nlp import Nlp as Nlp
+    from ocp.solving.nlp import nlp_of as nlp_of
     from ocp.solving.picture import plot_solutions as plot_solutions
     from ocp.solving.sensitivity import Condition as Condition
     from ocp.solving.sensitivity import Sensitivity as Sensitivity

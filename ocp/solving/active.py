@@ -39,6 +39,7 @@ class Active:
         unit: unit of the multiplier, such as "cost/N".
         weak: True if distance and multiplier are too small to decide whether the condition is
             active; then J* may have different derivatives in both directions.
+        scenario: name of its scenario; empty for a problem without scenarios.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Active:
     multiplier: float
     unit: str
     weak: bool = False
+    scenario: str = ""
 
     @property
     def when(self) -> str:
@@ -73,7 +75,7 @@ class ActiveConditions(tuple[Active, ...]):
         head = f"{'condition':<34}{'side':<7}{'value':>12}  {'t':<22}{'dJ/dvalue':>13}"
         rows = [
             f"{a.name:<34}{a.side:<7}{a.value:>12.6g}  {a.when:<22}{a.multiplier:>13.6g} {a.unit}"
-            f"{'  (weakly active)' * a.weak}"
+            f"{'  (weakly active)' * a.weak}{f'  ({a.scenario})' * bool(a.scenario)}"
             for a in self
         ]
         return "\n".join([head, *rows])
@@ -212,9 +214,14 @@ def per_unit(unit: str) -> str:
     return f"cost/({unit})" if " " in unit or "/" in unit else f"cost/{unit}"
 
 
-def active_conditions(optimum: Optimum) -> ActiveConditions:
-    """Return the active conditions in the order of time; consecutive times are joined."""
-    status = Status.joined(*statuses(optimum))
+def active_conditions(optimum: Optimum, each: tuple[Status, Status]) -> ActiveConditions:
+    """Return the active conditions in the order of time; consecutive times are joined.
+
+    Args:
+        optimum: the solution.
+        each: status of all unknowns and of all rows.
+    """
+    status = Status.joined(*each)
     groups: dict[tuple[str, int], list[Entry]] = {}
     for entry in entries(optimum):
         groups.setdefault((entry.name, entry.place.span), []).append(entry)
@@ -236,7 +243,11 @@ def in_words(optimum: Optimum, signals: Collection[str]) -> list[str]:
     """Return a line with the active bounds on `signals` and path conditions if they are few."""
     if not optimum.residual <= STATIONARY:
         return []
-    found = [one for one in active_conditions(optimum) if one.side != "=" and not one.weak]
+    found = [
+        one
+        for one in active_conditions(optimum, statuses(optimum))
+        if one.side != "=" and not one.weak
+    ]
     named = [one for one in found if one.name.removeprefix("the bound on ") in signals]
     named += [one for one in found if one.name.startswith("path condition")]
     return [f"active: {'; '.join(map(str, named))}"] if 0 < len(named) <= SHOWN else []
@@ -250,12 +261,14 @@ def _active(optimum: Optimum, status: Status, run: Sequence[Entry]) -> Active:
     numbers = [entry.number for entry in run]
     upper = bool(status.upper[first])
     bounds = (program.upper_w, program.upper_g) if upper else (program.lower_w, program.lower_g)
-    first_span = place.span - optimum.transcription.problem.spans[place.span].phase
+    problem = optimum.transcription.problem
+    span = problem.spans[place.span]
+    first_span = place.span - span.phase
     start, length = sum(s.T for s in points[first_span : place.span]), points[place.span].T
     whole = not np.isfinite(place.fraction)
     if name.startswith("the duration of"):  # of several phases
         start, whole = 0.0, True
-        length = sum(s.T for s in points[: len(optimum.transcription.problem.chain)])
+        length = sum(s.T for s in points[: len(problem.chain)])
     return Active(
         name=name,
         side="=" if status.fixed[first] else ("lower", "upper")[upper],
@@ -265,6 +278,7 @@ def _active(optimum: Optimum, status: Status, run: Sequence[Entry]) -> Active:
         multiplier=-float(sum(lam[entry.number] / entry.place.scale for entry in run)),
         unit=per_unit(unit),
         weak=bool(status.weak[numbers].all()),
+        scenario=next(iter(problem.scenario_names[span.scenario :]), ""),
     )
 
 
@@ -272,11 +286,12 @@ def _merged(found: Sequence[Active]) -> list[Active]:
     """Return `found` with bounds joined that are active in consecutive phases."""
     merged: list[Active] = []
     for one in found:
-        for k, other in enumerate(merged):
-            same = (one.name, one.side, one.value) == (other.name, other.side, other.value)
-            if same and one.side != "=" and abs(one.begin - other.end) < SAME_TIME:
+        for number, other in enumerate(merged):
+            keys = ("name", "side", "value", "scenario")
+            same = one.side != "=" and all(getattr(one, k) == getattr(other, k) for k in keys)
+            if same and abs(one.begin - other.end) < SAME_TIME:
                 total, weak = other.multiplier + one.multiplier, other.weak and one.weak
-                merged[k] = replace(other, end=one.end, multiplier=total, weak=weak)
+                merged[number] = replace(other, end=one.end, multiplier=total, weak=weak)
                 break
         else:
             merged.append(one)
