@@ -238,12 +238,12 @@ def _moved(
     xi, prior, unconverged = first[:, None], (first, np.eye(first.size)), 0
     free = prior[1]  # covariance at the first sample of the horizon without measurements
     means, deviations = np.empty((first.size, count)), np.empty((first.size, count))
-    found = None
+    found = _passed(machine, xi, y[:, :1], u[:, :1], prior)
     for k in range(count):
         begin = max(0, k + 1 - horizon)
-        if found is not None:
+        if k:
             xi = np.column_stack([found.smooth, found.predicted[-1][0]])
-        if found is not None and begin > max(0, k - horizon):
+        if begin > max(0, k - horizon):
             xi, prior = xi[:, 1:], found.predicted[1]
             free = found.slopes[0] @ free @ found.slopes[0].T + machine.Q
         here = slice(begin, k + 1)
@@ -254,10 +254,8 @@ def _moved(
                 break
         else:
             unconverged += 1
-        assert found is not None
         means[:, k] = found.smooth[:, -1]
         deviations[:, k] = np.sqrt(np.diag(found.filtered[-1]))
-    assert found is not None
     for slope in found.slopes[:-1]:
         free = slope @ free @ slope.T + machine.Q
     smooth = found.smooth * scale[:, None]
