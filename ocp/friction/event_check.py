@@ -3,10 +3,9 @@
     slip    F = law.sliding(v, N, side)     until v = 0
     stick   F with dv/dt = 0                until it reaches the static level of a side
 
-The motion consists of pieces that end at changes of mode and at jumps of inputs. Each piece is a
-smooth run of the model in its modes (`mode_models`). Between pieces `decided` (`contact_modes`)
-determines which contacts stick. The method has no smoothing width and no penalty; it simulates the
-limit of smooth laws.
+The motion consists of pieces that end at changes of mode. Each piece is a run of the model in its
+modes (`mode_models`). Between pieces `decided` (`contact_modes`) determines which contacts stick.
+The method has no smoothing width and no penalty; it simulates the limit of smooth laws.
 
 `simulate` with `ExactCoulomb` supports the same explicit models and mechanisms. This module covers
 further cases: any law, by its sliding force and static level; normal forces that are algebraic
@@ -55,7 +54,7 @@ APART = 1e-6
 
 
 class Piece(NamedTuple):
-    """Run in which no contact changes its mode and no input jumps."""
+    """Run in which no contact changes its mode."""
 
     run: Trajectory
     modes: Modes
@@ -74,7 +73,7 @@ class SetValued:
     Attributes:
         model: the user's model.
         t: times of the result [s].
-        pieces: runs between changes of mode and jumps of inputs.
+        pieces: runs between changes of mode.
         status, message: status of the simulation and its description.
         contacts: names of the contacts.
     """
@@ -247,7 +246,12 @@ def set_valued(
 
 @final
 class _Run:
-    """Simulation of a motion piece by piece, with its state after the last piece."""
+    """Simulation of a motion piece by piece, with its state after the last piece.
+
+    Attributes:
+        ahead: number of inputs that the next piece covers unless its modes change; it doubles while
+            they do not. At each jump of inputs modes are checked as at the start of a piece.
+    """
 
     def __init__(
         self, machine: Machine, p: dict[str, float], rtol: float,
@@ -260,6 +264,7 @@ class _Run:
         self._values = ca.Function("inputs", symbols, [self.inputs.expression])
         self.names = [v.name for v in model.open.x]
         self.pieces: list[Piece] = []
+        self.ahead = 1
 
     def start(self, t: float, x0: dict[str, float], modes: dict[str, int]) -> None:
         """Set the state at the start, in which contacts without velocity stick by default."""
@@ -291,17 +296,14 @@ class _Run:
         raise SolveError(f"more than {MOST} changes of mode", Status.EVENT_STORM)
 
     def piece(self) -> None:
-        """Decide the modes, and simulate to the next change."""
+        """Decide the modes, and simulate to their next change, over at most `ahead` inputs."""
         t, machine, inputs = self.t, self.machine, self.inputs
         k = int(inputs.interval(np.array([t + LATER * max(1.0, abs(t))]))[0])
         u = self._values(t, inputs.values[:, k]).full()[:, 0]
         modes, guess = machine.decided(Instant(t, self.x, u, self.guess), self.modes)
-        model = machine.within(modes).model
-        held = dict(zip((v.name for v in machine.model.u), u.tolist(), strict=True))
-        run = self._run(model, float(inputs.breaks[k + 1]), {
-            name: held[name] if isinstance(value, Hold) else value
-            for name, value in self.given.items()
-        })  # fmt: skip
+        model, linear = machine.within(modes).model, machine.within(modes).linear
+        breaks = inputs.breaks[k + 1 : k + 1 + (self.ahead if linear else 1)]
+        run = self._run(model, float(breaks[-1]))
         begin, reached = _unknowns(run, model, t), run.span[1]
         for v in model.z:
             value = begin[v.name]
@@ -309,6 +311,14 @@ class _Run:
                 raise machine.undecided(
                     t, f"{v.name} is {guess[v.name]:.6g} or {value:.6g}: two solutions"
                 )
+        jumps = breaks[breaks < reached]
+        columns = symbols_of([v for v in model.x if v.name in self.names])
+        x, z, u = (
+            run.express(c, jumps) for c in (columns, symbols_of(model.z), symbols_of(model.u))
+        )
+        changed = machine.changed(modes, jumps, x, z, u)
+        self.ahead = 2 * self.ahead if changed is None else 1
+        reached = reached if changed is None else float(jumps[changed])
         self.pieces.append(Piece(run, modes, t, reached))
         states = run.states(np.array([reached]))
         x = np.array([float(states[name][-1]) for name in self.names])
@@ -328,12 +338,12 @@ class _Run:
                 found |= {c.name: -modes[c.name]} if turns else dict.fromkeys(members, 0)
         return found
 
-    def _run(self, model: Model, end: float, u: Mapping[str, Input]) -> Trajectory:
+    def _run(self, model: Model, end: float) -> Trajectory:
         where, x0 = f"at t = {self.t:.9g} s", dict(zip(self.names, self.x.tolist(), strict=True))
         try:
             run = simulate(
-                model, end, t_start=self.t, x0=x0, u=u, p=self.p, rtol=self.rtol, samples=2,
-                throw=False,
+                model, end, t_start=self.t, x0=x0, u=self.given, p=self.p, rtol=self.rtol,
+                samples=2, throw=False,
             )  # fmt: skip
         except JammedError as error:
             raise SolveError(f"{where}: {error}", Status.JAMMED) from None

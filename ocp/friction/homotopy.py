@@ -26,7 +26,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from ocp.checking.interval_errors import cut_meshes, local_errors
+from ocp.checking.interval_errors import cut_meshes, estimated_errors
 from ocp.checking.resimulate import arcs_of
 from ocp.formulation.phase import Array, initial
 from ocp.formulation.problem import Problem
@@ -338,7 +338,7 @@ class _Path:
         for k, arc in enumerate(arcs):
             pairs = zip(arc.span.model.p, arc.p, strict=True)
             arcs[k] = replace(arc, p=np.array([widths.get(v.name, x) for v, x in pairs]))
-        errors = local_errors(arcs, min(1e-6, 1e-2 * TOLERANCE))
+        errors = estimated_errors(step.transcription, step.outcome.iterate.w, step.values, arcs)
         worst = max((float(e.max()) for e in errors), default=0.0)
         return replace(step, error=worst, errors=errors)
 

@@ -24,7 +24,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from ocp.checking.interval_errors import local_errors
+from ocp.checking.interval_errors import estimated_errors
 from ocp.checking.mesh_refinement import MeshErrors, refined
 from ocp.checking.resimulate import arcs_of
 from ocp.formulation.phase import Array
@@ -272,7 +272,8 @@ def _fine(modes_solver: ModeSolver, solved: SolvedSequence) -> SolvedSequence:
     before = inf, inf
     for _ in range(ROUNDS):
         t, allowed = solved.transcription, FINE * abs(solved.outcome.cost) + ZERO
-        local = local_errors(arcs_of(t.problem, t.meshes, solved.points))
+        arcs = arcs_of(t.problem, t.meshes, solved.points)
+        local = estimated_errors(t, solved.outcome.iterate.w, t.program.values, arcs)
         agree = abs(solved.ideal_cost - before[0]) <= allowed
         enough = solved.loss <= allowed or 0.0 <= before[1] - solved.outcome.cost <= allowed
         exact = max(float(own.max()) for own in local) <= LOCAL
