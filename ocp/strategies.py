@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite, nan
 from typing import Literal, NamedTuple, final
 
 from numpy.typing import ArrayLike
@@ -27,8 +26,6 @@ from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
 Friction = Literal["auto", "smooth", "sharpen", "modes"]
-Margins = Iterator[tuple[Solution, float]]
-"""Motions by modes with their friction margins."""
 INTERVALS = 50
 EARLY = 0.04
 """Largest smoothing width, in multiples of the speeds, from which modes are deduced."""
@@ -100,7 +97,7 @@ class Direct:
             intervals = sum(mesh.size - 1 for mesh in meshes[: len(self.problem.chain)])
         return sharpened(
             self.problem, self.scheme, self.solver, guess, intervals=intervals, starts=starts,
-            last=last, supervisor=self.supervisor,
+            last=last, rivals=last > 0.0, supervisor=self.supervisor,
         )  # fmt: skip
 
 
@@ -172,56 +169,45 @@ class Search:
         return Judged(with_sentence(solution, f"{text}."), solution.ok)
 
     def near(self, sharp: Sharp) -> Judged:
-        """Return the exact motion near a sharpened one, verified with the user's laws."""
-        direct, problem = self.direct, self.direct.problem
-        speeds = speeds_at(problem, sharp.scales, sharp.level)
-        motions = optimise_modes(
-            sharp.solution, problem, speeds, solver=direct.ipopt, scheme=direct.scheme,
-            margin=self.margin, supervisor=direct.supervisor,
-        )  # fmt: skip
-        exact, margin = next(motions)
-        if exact.status.stopped and not exact.modes:
-            by = "The time limit was reached" if exact.status is Status.TIME_LIMIT else "Stopped"
-            text = f"ocp '{problem.name}': {by} while modes were sought; friction is still smooth."
-            both = _after(exact, sharp.solution)
-            stopped = replace(both, status=exact.status, message=text, cause=exact.cause)
-            return Judged(stopped, right=False)
-        exact = self.checked(_after(sharp.solution, exact))
-        if exact.status in MISSED and law_states(problem) and not direct.supervisor.over:
-            exact = self.by_original_law(exact)
-            if exact.verified:
-                return Judged(exact, True)
-        narrow = own_level(problem, sharp.scales) < SHARPEST
-        if exact.status in MISSED and not narrow and not direct.supervisor.over:
-            own = self.checked(direct.solved(exact, exact.meshes, close=True))
-            if own.verified:
-                return Judged(_after(exact, replace(own, modes=exact.modes)), True)
-            exact = _after(own, exact)
-        first = self.judged(exact)
-        return self._closer(first, margin, motions, sharp.solution) if first.right else first
+        """Return the best exact motion near a sharpened one or its rivals, with the user's laws.
 
-    def _closer(self, first: Judged, margin: float, motions: Margins, sharp: Solution) -> Judged:
-        """Return the valid motion with the smallest margin of contacts at rest."""
-        kept, slope, best, last = margin, nan, first, first.solution
-        for exact, less in motions:
-            last = _after(sharp, exact)
-            if exact.status is Status.INTERRUPTED:
-                return Judged(last, right=False)
-            if exact.ok:
-                slope = max(0.0, first.solution.cost - exact.cost) / (margin - less)
-            if exact.status.stopped or less < self.margin:
-                break
-            nearer = self.judged(self.checked(last)) if exact.ok else first
-            if exact.ok and nearer.right:
-                best, kept = nearer, less
-                break
-        if last is first.solution:
-            return first
-        found = replace(best.solution, statistics=last.statistics)
-        costs = f"about {slope * kept:.2g} of {found.cost:.6g}" if isfinite(slope) else "is open"
-        few = "" if kept <= self.margin else "; with less none was found that is right"
-        text = f"Rests keep {kept:.2g} of their static levels, which costs {costs}{few}."
-        return Judged(with_sentence(found, text), right=True)
+        Motions with small margins of contacts at rest are tried first.
+        """
+        direct, problem = self.direct, self.direct.problem
+        found = optimise_modes(
+            [
+                (one.solution, speeds_at(problem, one.scales, one.level))
+                for one in sharp.rivals or (sharp,)
+            ],
+            problem, solver=direct.ipopt, scheme=direct.scheme, margin=self.margin,
+            supervisor=direct.supervisor,
+        )  # fmt: skip
+        narrow = own_level(problem, sharp.scales) < SHARPEST
+        margins = found.margins if narrow else (*found.margins[:1], *found.margins[1:][-1:])
+        margins = margins[-1:] if law_states(problem) else margins
+        judged: Judged | None = None
+        for margin in margins:
+            exact, last = found.motion(margin), margin == margins[-1]
+            if exact.status.stopped:
+                return Judged(_stopped(exact, sharp.solution), right=False)
+            exact = self.checked(_after(sharp.solution, exact))
+            if exact.status in MISSED and last and not direct.supervisor.over:
+                exact = self.by_original_law(exact) if law_states(problem) else exact
+                own = exact if narrow or exact.verified else self._by_own_law(exact)
+                if own.verified:
+                    return Judged(own, True)
+                exact = _after(own, exact) if own is not exact else exact
+            if exact.ok or last:
+                judged = self.judged(exact)
+            if judged is not None and judged.right:
+                return Judged(with_sentence(judged.solution, found.rests(margin, exact.cost)), True)
+        assert judged is not None
+        return judged
+
+    def _by_own_law(self, exact: Solution) -> Solution:
+        """Return the verified motion with the laws of the problem, near a motion by modes."""
+        own = self.checked(self.direct.solved(exact, exact.meshes, close=True))
+        return replace(_after(exact, own), modes=exact.modes)
 
     def by_original_law(self, exact: Solution) -> Solution:
         """Return a motion with the law and its states, found by shooting from `exact`.
@@ -242,6 +228,15 @@ class Search:
         kept = replace(kept, statistics=own.statistics)
         stopped = own.status.stopped
         return replace(kept, status=own.status, cause=own.cause) if stopped else kept
+
+
+def _stopped(exact: Solution, sharp: Solution) -> Solution:
+    """Return the motion of a stopped search: with modes if there are any, otherwise smooth."""
+    if exact.modes:
+        return _after(sharp, exact)
+    by = "The time limit was reached" if exact.status is Status.TIME_LIMIT else "Stopped"
+    text = f"ocp '{exact.problem.name}': {by} while modes were sought; friction is still smooth."
+    return replace(_after(exact, sharp), status=exact.status, message=text, cause=exact.cause)
 
 
 def solved(search: Search, friction: Friction, guess: Start, starts: int) -> Solution:
@@ -298,7 +293,7 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int) 
             smooth = search.direct.solved(sharp.solution, sharp.solution.meshes)
             return check(_after(sharp.solution, smooth))
         early = sharp.level <= EARLY and not sharp.steady
-        if not reason and (early or sharp.level <= LAST * 1.001):
+        if not reason and (sharp.rivals or early or sharp.level <= LAST * 1.001):
             try:
                 tried.append(search.near(sharp))
                 if tried[-1].right or tried[-1].solution.status.stopped:

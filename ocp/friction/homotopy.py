@@ -31,7 +31,14 @@ from ocp.checking.resimulate import arcs_of
 from ocp.formulation.phase import Array, initial
 from ocp.formulation.problem import Problem
 from ocp.friction import smooth_models
-from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
+from ocp.friction.smooth_models import (
+    Scales,
+    own_level,
+    same_size,
+    scales_of,
+    sticking,
+    widths_at,
+)
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
 from ocp.solving.one_solve import Solved, Solver
@@ -79,6 +86,13 @@ SAME = 3.0
 EARLY: dict[str, Option] = {"tol": 1e-4, "max_iter": 100}
 LATER: dict[str, Option] = {"tol": 1e-5, "max_iter": 60, "mu_init": 1e-3}
 ONTO = LATER | {"max_iter": 150}
+RIVAL = 0.02
+"""Width, in multiples of the speeds, down to which motions of coarse solves are continued to read
+their modes, on the coarse mesh."""
+NEAR = 0.1
+"""Largest width, in multiples of the speeds, from which modes of these motions are read."""
+DEAR = 0.15
+"""Relative excess of J over the best coarse solve, above which a motion is not continued."""
 BOUNDING: dict[str, Option] = {"max_iter": 80}
 """Options for worst-case costs. With a small initial barrier parameter the initial multipliers of
 the bounds on the costs would be wrong, and with them the curvature."""
@@ -142,6 +156,8 @@ class Sharp(NamedTuple):
         scales: scales of the widths of each contact.
         steady: True if the step to this solution was not rejected before.
         error: largest local error of an interval.
+        rivals: solutions from all starts that lead to different motions, if this one is the first
+            of them; otherwise empty.
     """
 
     solution: Solution
@@ -149,6 +165,7 @@ class Sharp(NamedTuple):
     scales: Scales
     steady: bool
     error: float
+    rivals: "tuple[Sharp, ...]" = ()
 
 
 def sharpened(
@@ -160,12 +177,15 @@ def sharpened(
     intervals: int = FINE,
     starts: int = STARTS,
     last: float = LAST,
+    rivals: bool = False,
     supervisor: Supervisor | None = None,
 ) -> Iterator[Sharp]:
     """Yield solutions with decreasing smoothing widths, one solve at a time.
 
     The first solution has the width `FIRST`, and the last one has the width `last` or the smallest
     width reached. If the solver fails or is stopped, the status of the last solution reports it.
+    With `rivals`, the best motion on the coarse mesh precedes them, at a width of about `RIVAL`,
+    with those from other starts.
 
     Args:
         problem: the user's problem, with contacts.
@@ -174,10 +194,14 @@ def sharpened(
         intervals: total number of intervals before refinement.
         starts: number of coarse solves from different starts; the best one is continued.
         last: final smoothing width, in multiples of the speeds.
+        rivals: True to yield motions on the coarse mesh first.
         supervisor: time limit and progress.
     """
     path = _Path(problem, scheme, solver, supervisor or Supervisor())
-    step = path.first(guess, starts, intervals)
+    coarse = path.coarse(guess, starts)
+    if rivals and (found := path.rivals(coarse)):
+        yield found[0]._replace(rivals=found)
+    step = path.first(coarse, intervals)
     factor, steady = FACTOR, True
     yield path.sharp(step, steady)
     while step.good and step.level > last * 1.001:
@@ -212,8 +236,11 @@ class _Path:
         self.solves: list[SolverStatistics] = []
         self.prepared: dict[tuple[int, str], Prepared] = {}
 
-    def first(self, guess: Start, starts: int, intervals: int) -> Step:
-        """Return the best of several coarse solves with wide layers, on the finer mesh."""
+    def coarse(self, guess: Start, starts: int) -> list[Step]:
+        """Return coarse solves with wide layers that lead to different motions, the best first.
+
+        If no solve succeeded, or the last one was stopped, it is the only one.
+        """
         coarse = self.discretisation.on(_meshes(self.problem, COARSE))
         begin = coarse.unpack(start_of(coarse, guess)[0].w)
         straight = coarse.unpack(start_of(coarse, None)[0].w)
@@ -231,7 +258,7 @@ class _Path:
             steps += self.each(coarse, starts_around(coarse, straight, seeds, SPREAD))
             best = least(steps)
         if best.ended:
-            return best
+            return [best]
         before, self.scales = self.scales, self.scales_at(best)
         if not same_size(self.scales, before, SAME):
             again = self.each(coarse, [best.points, *tries])
@@ -239,8 +266,39 @@ class _Path:
                 steps = again
             else:  # the change of the widths is too large
                 self.scales = before
+        return finalists(steps)
+
+    def rivals(self, coarse: Sequence[Step]) -> tuple[Sharp, ...]:
+        """Return the motions of coarse solves with narrower layers on the same mesh.
+
+        There are none if the layers of the laws are wide, or with several contacts, whose sequences
+        require a finer mesh.
+        """
+        contacts = {c.name for phase in self.user.chain for c in sticking(phase.model)}
+        if own_level(self.user, self.scales) > LAST or len(contacts) > 1:
+            return ()
+        found: list[Sharp] = []
+        dearest = coarse[0].outcome.cost + DEAR * abs(coarse[0].outcome.cost)
+        for step in coarse:
+            last = False
+            while step.good and step.outcome.cost <= dearest and not last:
+                level = max(step.level / FACTOR, RIVAL)
+                name, last = f"width {level:.2g}", level == RIVAL
+                narrower = self.solve(step.transcription, step.points, level, LATER, name)
+                if narrower.ended:
+                    return ()
+                step, last = (narrower, last) if narrower.good else (step, True)
+            if step.level <= NEAR:
+                found.append(self.sharp(step, steady=False))
+        return tuple(found)
+
+    def first(self, coarse: Sequence[Step], intervals: int) -> Step:
+        """Return the best of several coarse solves, solved again on the finer mesh."""
+        best = coarse[0]
+        if best.ended:
+            return best
         fine = self.discretisation.on(_meshes(self.problem, intervals))
-        step = least(self.each(fine, [self.moved(one, fine) for one in finalists(steps)], ONTO))
+        step = least(self.each(fine, [self.moved(one, fine) for one in coarse], ONTO))
         if not step.good and not step.ended:
             step = least(self.each(fine, [self.moved(best, fine)], LATER | {"max_iter": 300}))
         now = self.scales_at(step)

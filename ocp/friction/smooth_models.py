@@ -25,6 +25,9 @@ WIDTH = 1e-3
 LEAST = 0.1
 """Smallest ratio of the scale of a contact to its previous scale, for contacts that barely move."""
 
+LAYER = np.geomspace(0.1, 10.0, 101)
+"""Sliding velocities, in multiples of the velocity scale of a law, among which its peak lies."""
+
 
 class Width(NamedTuple):
     """Parameter of a smooth model that determines the smoothing width around v = 0.
@@ -168,6 +171,25 @@ def _jumps(model: Model, contact: Contact) -> bool:
 def sticking(model: Model) -> tuple[Contact, ...]:
     """Return the contacts that can stick, whose friction is nonzero at v = 0."""
     return tuple(contact for contact in model.contacts if _jumps(model, contact))
+
+
+def shortfall(model: Model) -> float:
+    """Return the largest share of a static level that the law of a contact does not reach.
+
+    The peak of a smooth law may be below its static level, for Brown-McPhee by 5e-4. A contact
+    cannot rest under a force between both. Laws with states and jumps reach their levels.
+    """
+    shares = [0.0]
+    for contact in sticking(model):
+        law = _law(contact)
+        scale = float(at_start(law.velocity_scale, model.p))
+        if law.states or not law.widths or not isfinite(scale):
+            continue
+        given = dict.fromkeys(contact.further, 0.0)
+        level = at_start(law.static_level(1.0, 1, **given), model.p)
+        forces = [at_start(law.force(scale * x, 1.0, (), **given), model.p) for x in LAYER]
+        shares.append(1.0 - max(float(force) for force in forces) / float(level))
+    return max(shares)
 
 
 class Scale(NamedTuple):

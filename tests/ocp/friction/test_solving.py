@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import pairwise
 from math import tanh
+from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
@@ -296,7 +297,10 @@ def test_failed_simulation_with_exact_friction_is_reported(
     sharpened_by(monkeypatch, steps)
     error = ValueError("expected no events, got 1")
     monkeypatch.setattr(strategies, "verify_exactly", raising(error))
-    monkeypatch.setattr(strategies, "optimise_modes", lambda *_, **__: iter([(by_modes, 1e-2)]))
+    found_modes = SimpleNamespace(
+        margins=(1e-2,), motion=lambda *_, **__: by_modes, rests=lambda *_: ""
+    )
+    monkeypatch.setattr(strategies, "optimise_modes", lambda *_, **__: found_modes)
     found = solve(out_and_back(v_t=1e-5))
     assert found.verified
     assert found.modes
