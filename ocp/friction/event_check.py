@@ -47,10 +47,9 @@ LATER = 1e-13
 """Relative time difference by which times just after a jump are found."""
 MOST, PILED = 10_000, 40
 """Largest number of mode changes in a run, and of consecutive ones without time between them."""
-CREEP = 1e4
-"""Sliding velocity, in zero thresholds, above which a loop moves although one contact stops."""
-APART = 1e-6
-"""Relative difference of an unknown above which two solvers have found different solutions."""
+CREEP, APART = 1e4, 1e-6
+"""Sliding velocity, in zero thresholds, above which a loop moves although one contact stops, and
+relative difference of an unknown above which two solvers have found different solutions."""
 
 
 class Piece(NamedTuple):
@@ -248,9 +247,7 @@ def set_valued(
 class _Run:
     """Simulation of a motion piece by piece, with its state after the last piece.
 
-    Attributes:
-        ahead: number of inputs that the next piece covers unless its modes change; it doubles while
-            they do not. At each jump of inputs modes are checked as at the start of a piece.
+    The next piece covers `ahead` inputs unless its modes change, twice as many as the last one.
     """
 
     def __init__(
@@ -290,15 +287,14 @@ class _Run:
                 return
             piled = piled + 1 if self.t - before <= 1e-12 * (end - before) else 0
             if piled > PILED:
-                raise SolveError(
-                    f"at t = {self.t:.9g} s: {Status.EVENT_STORM.value}", Status.EVENT_STORM
-                )
+                where = f"at t = {self.t:.9g} s: {Status.EVENT_STORM.value}"
+                raise SolveError(where, Status.EVENT_STORM)
         raise SolveError(f"more than {MOST} changes of mode", Status.EVENT_STORM)
 
     def piece(self) -> None:
         """Decide the modes, and simulate to their next change, over at most `ahead` inputs."""
         t, machine, inputs = self.t, self.machine, self.inputs
-        k = int(inputs.interval(np.array([t + LATER * max(1.0, abs(t))]))[0])
+        k = inputs.interval(np.array([t + LATER * max(1.0, abs(t))])).item()
         u = self._values(t, inputs.values[:, k]).full()[:, 0]
         modes, guess = machine.decided(Instant(t, self.x, u, self.guess), self.modes)
         model, linear = machine.within(modes).model, machine.within(modes).linear
@@ -308,20 +304,16 @@ class _Run:
         for v in model.z:
             value = begin[v.name]
             if abs(value - guess[v.name]) > APART * max(v.nominal, abs(value)):
-                raise machine.undecided(
-                    t, f"{v.name} is {guess[v.name]:.6g} or {value:.6g}: two solutions"
-                )
+                two = f"{v.name} is {guess[v.name]:.6g} or {value:.6g}: two solutions"
+                raise machine.undecided(t, two)
         jumps = breaks[breaks < reached]
-        columns = symbols_of([v for v in model.x if v.name in self.names])
-        x, z, u = (
-            run.express(c, jumps) for c in (columns, symbols_of(model.z), symbols_of(model.u))
-        )
-        changed = machine.changed(modes, jumps, x, z, u)
+        states = symbols_of([v for v in model.x if v.name in self.names])
+        rows = (run.express(c, jumps) for c in (states, *map(symbols_of, (model.z, model.u))))
+        changed = machine.changed(modes, jumps, *rows)
         self.ahead = 2 * self.ahead if changed is None else 1
         reached = reached if changed is None else float(jumps[changed])
         self.pieces.append(Piece(run, modes, t, reached))
-        states = run.states(np.array([reached]))
-        x = np.array([float(states[name][-1]) for name in self.names])
+        x = run.express(states, np.array([reached]))[:, -1]
         self.guess = guess | _unknowns(run, model, reached)
         self.modes = modes | self._stopped(modes, machine.slips(reached, x)[0])
         self.t, self.x = reached, machine.at_rest(reached, x, self.modes)

@@ -31,14 +31,7 @@ from ocp.checking.resimulate import arcs_of
 from ocp.formulation.phase import Array, initial
 from ocp.formulation.problem import Problem
 from ocp.friction import smooth_models
-from ocp.friction.smooth_models import (
-    Scales,
-    own_level,
-    same_size,
-    scales_of,
-    sticking,
-    widths_at,
-)
+from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
 from ocp.solving.one_solve import Solved, Solver
@@ -86,13 +79,9 @@ SAME = 3.0
 EARLY: dict[str, Option] = {"tol": 1e-4, "max_iter": 100}
 LATER: dict[str, Option] = {"tol": 1e-5, "max_iter": 60, "mu_init": 1e-3}
 ONTO = LATER | {"max_iter": 150}
-RIVAL = 0.02
-"""Width, in multiples of the speeds, down to which motions of coarse solves are continued to read
-their modes, on the coarse mesh."""
-NEAR = 0.1
-"""Largest width, in multiples of the speeds, from which modes of these motions are read."""
-DEAR = 0.15
-"""Relative excess of J over the best coarse solve, above which a motion is not continued."""
+RIVAL, NEAR = 0.02, 0.1
+"""Width, in multiples of the speeds, to which coarse motions are continued on their mesh, and the
+largest width from which their modes are read if a step fails."""
 BOUNDING: dict[str, Option] = {"max_iter": 80}
 """Options for worst-case costs. With a small initial barrier parameter the initial multipliers of
 the bounds on the costs would be wrong, and with them the curvature."""
@@ -156,8 +145,7 @@ class Sharp(NamedTuple):
         scales: scales of the widths of each contact.
         steady: True if the step to this solution was not rejected before.
         error: largest local error of an interval.
-        rivals: solutions from all starts that lead to different motions, if this one is the first
-            of them; otherwise empty.
+        rivals: different motions from all starts if this is the first of them; otherwise empty.
     """
 
     solution: Solution
@@ -184,8 +172,7 @@ def sharpened(
 
     The first solution has the width `FIRST`, and the last one has the width `last` or the smallest
     width reached. If the solver fails or is stopped, the status of the last solution reports it.
-    With `rivals`, the best motion on the coarse mesh precedes them, at a width of about `RIVAL`,
-    with those from other starts.
+    With `rivals`, motions on the coarse mesh at a width of about `RIVAL` precede them.
 
     Args:
         problem: the user's problem, with contacts.
@@ -237,10 +224,7 @@ class _Path:
         self.prepared: dict[tuple[int, str], Prepared] = {}
 
     def coarse(self, guess: Start, starts: int) -> list[Step]:
-        """Return coarse solves with wide layers that lead to different motions, the best first.
-
-        If no solve succeeded, or the last one was stopped, it is the only one.
-        """
+        """Return coarse solves with wide layers that lead to different motions, the best first."""
         coarse = self.discretisation.on(_meshes(self.problem, COARSE))
         begin = coarse.unpack(start_of(coarse, guess)[0].w)
         straight = coarse.unpack(start_of(coarse, None)[0].w)
@@ -274,14 +258,15 @@ class _Path:
         There are none if the layers of the laws are wide, or with several contacts, whose sequences
         require a finer mesh.
         """
-        contacts = {c.name for phase in self.user.chain for c in sticking(phase.model)}
-        if own_level(self.user, self.scales) > LAST or len(contacts) > 1:
+        contacts = {
+            c.name for phase in self.user.chain for c in smooth_models.sticking(phase.model)
+        }
+        if smooth_models.own_level(self.user, self.scales) > LAST or len(contacts) > 1:
             return ()
         found: list[Sharp] = []
-        dearest = coarse[0].outcome.cost + DEAR * abs(coarse[0].outcome.cost)
         for step in coarse:
             last = False
-            while step.good and step.outcome.cost <= dearest and not last:
+            while step.good and not last:
                 level = max(step.level / FACTOR, RIVAL)
                 name, last = f"width {level:.2g}", level == RIVAL
                 narrower = self.solve(step.transcription, step.points, level, LATER, name)
@@ -294,13 +279,12 @@ class _Path:
 
     def first(self, coarse: Sequence[Step], intervals: int) -> Step:
         """Return the best of several coarse solves, solved again on the finer mesh."""
-        best = coarse[0]
-        if best.ended:
-            return best
+        if coarse[0].ended:
+            return coarse[0]
         fine = self.discretisation.on(_meshes(self.problem, intervals))
         step = least(self.each(fine, [self.moved(one, fine) for one in coarse], ONTO))
         if not step.good and not step.ended:
-            step = least(self.each(fine, [self.moved(best, fine)], LATER | {"max_iter": 300}))
+            step = least(self.each(fine, [self.moved(coarse[0], fine)], LATER | {"max_iter": 300}))
         now = self.scales_at(step)
         self.scales = now if same_size(now, self.scales, SAME) else self.scales
         return self.refined(step, np.inf) if step.good else step
