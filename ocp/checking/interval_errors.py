@@ -42,9 +42,9 @@ def estimated_errors(
     found: list[Array] = []
     for number, arc in enumerate(arcs):
         ends = _collocated(transcription, w, values, number)
-        open_ = ~np.isfinite(ends).all(axis=0)
-        if open_.any():
-            ends[:, open_] = _ends(arc, RTOL, open_)
+        unknown = np.flatnonzero(~np.isfinite(ends).all(axis=0))
+        if unknown.size:
+            ends[:, unknown] = _ends(arc, RTOL, unknown)
         off = np.abs(ends - arc.nodes[:, 1:]) / arc.sizes[:, None]
         found.append(np.max(off, axis=0, initial=0.0))
     return tuple(found)
@@ -111,30 +111,30 @@ def _newton_step(
     v[:n] = motion.reshape(n, -1)
     v[first:] = slopes[velocities].reshape(mechanism, -1) if mechanism else 0.0
     rows, entries = (np.array(a) for a in block.jacobian.map(N * D)(v, theta))
-    rows, J = rows[:n].reshape(n, N, D), np.zeros((n, block.n, N * D))
+    rows, slope = rows[:n].reshape(n, N, D), np.zeros((n, block.n, N, D))
     for row, column, numbers in _entries(block.of_jacobian, entries, np.arange(block.n)):
         if row < n:
-            J[row, column] = numbers
-    J = J.reshape(n, block.n, N, D)
+            slope[row, column] = numbers.reshape(N, D)
     rows[known] -= slopes[known]
     A = np.zeros((N, D, n, D, n))
     for j in range(D):
-        A[:, j, :, j] = J[:, :n, :, j].transpose(2, 0, 1)
+        A[:, j, :, j] = slope[:, :n, :, j].transpose(2, 0, 1)
         for k in range(D):
             factor = scheme.slopes[1 + k, j]
-            A[:, j, :, k, velocities] += factor * J[:, first:, :, j].transpose(1, 2, 0)
+            A[:, j, :, k, velocities] += factor * slope[:, first:, :, j].transpose(1, 2, 0)
             A[:, j, known, k, known] -= factor
     b = rows.transpose(1, 2, 0).reshape(N, D * n)
     try:
         step = np.linalg.solve(A.reshape(N, D * n, D * n), -b[:, :, None])
     except np.linalg.LinAlgError:
         step = np.full((N, D * n), np.nan)
-    return step.reshape(N, D, n).transpose(2, 0, 1)
+    return np.asarray(step, dtype=float).reshape(N, D, n).transpose(2, 0, 1)
 
 
 def _interpolation(nodes: Array, at: Array) -> Array:
     """Return l_r(at_j) of the polynomials through `nodes`, shape (nodes, points)."""
-    return np.linalg.solve(np.vander(nodes).T, np.vander(at, nodes.size).T)
+    found = np.linalg.solve(np.vander(nodes).T, np.vander(at, nodes.size).T)
+    return np.asarray(found, dtype=float)
 
 
 def local_errors(arcs: Sequence[Arc], rtol: float = RTOL) -> tuple[Array, ...]:
@@ -180,7 +180,7 @@ def cut_meshes(
     return made
 
 
-def _ends(arc: Arc, rtol: float, which: NDArray[np.bool_] | slice = slice(None)) -> Array:
+def _ends(arc: Arc, rtol: float, which: Indices | slice = slice(None)) -> Array:
     """Return the states at the ends of intervals, simulated from their starts, (nx, n)."""
     model, t_end, t_start = arc.span.model, np.diff(arc.times)[which], arc.times[:-1][which]
     local, N = _local(model), t_end.size

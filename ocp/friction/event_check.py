@@ -5,7 +5,7 @@
 
 The motion consists of pieces that end at changes of mode. Each piece is a run of the model in its
 modes (`mode_models`). Between pieces `decided` (`contact_modes`) determines which contacts stick.
-The method has no smoothing width and no penalty; it simulates the limit of smooth laws.
+The method has no smoothing width; it simulates the limit of smooth laws.
 
 `simulate` with `ExactCoulomb` supports the same explicit models and mechanisms. This module covers
 further cases: any law, by its sliding force and static level; normal forces that are algebraic
@@ -247,7 +247,7 @@ def set_valued(
 class _Run:
     """Simulation of a motion piece by piece, with its state after the last piece.
 
-    The next piece covers `ahead` inputs unless its modes change, twice as many as the last one.
+    A piece covers `ahead` inputs unless its modes change, twice as many as the last one.
     """
 
     def __init__(
@@ -260,16 +260,15 @@ class _Run:
         symbols = [model.t, self.inputs.data]
         self._values = ca.Function("inputs", symbols, [self.inputs.expression])
         self.names = [v.name for v in model.open.x]
-        self.pieces: list[Piece] = []
-        self.ahead = 1
+        self.pieces, self.ahead = list[Piece](), 1
 
     def start(self, t: float, x0: dict[str, float], modes: dict[str, int]) -> None:
         """Set the state at the start, in which contacts without velocity stick by default."""
         machine, model = self.machine, self.machine.model
         names = [c.name for c in machine.contacts]
         checks.check_names("set_valued: modes", modes, names)
-        start = model.initial_state(x0, self.p)
-        values = {v.name: float(value) for v, value in zip(model.x, start, strict=True)}
+        start = zip(model.x, model.initial_state(x0, self.p), strict=True)
+        values = {v.name: float(value) for v, value in start}
         x = np.array([values[name] for name in self.names])
         found: Modes = {}
         for name, v, still in zip(names, machine.slips(t, x)[0], machine.still, strict=True):
@@ -297,8 +296,8 @@ class _Run:
         k = inputs.interval(np.array([t + LATER * max(1.0, abs(t))])).item()
         u = self._values(t, inputs.values[:, k]).full()[:, 0]
         modes, guess = machine.decided(Instant(t, self.x, u, self.guess), self.modes)
-        model, linear = machine.within(modes).model, machine.within(modes).linear
-        breaks = inputs.breaks[k + 1 : k + 1 + (self.ahead if linear else 1)]
+        model, _, _, linear = machine.within(modes)
+        breaks = inputs.breaks[k + 1 :][: self.ahead if linear else 1]
         run = self._run(model, float(breaks[-1]))
         begin, reached = _unknowns(run, model, t), run.span[1]
         for v in model.z:
