@@ -1,6 +1,7 @@
 """Strategies of `solve`: direct, by homotopy, by modes, and the order in which they are tried."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, final
 
@@ -13,7 +14,7 @@ from ocp.formulation.problem import Problem
 from ocp.friction.event_check import verify_exactly
 from ocp.friction.homotopy import FINE, LAST, Sharp, sharpened
 from ocp.friction.mode_optimisation import optimise_modes, refusal
-from ocp.friction.smooth_models import own_level, speeds_at, sticking
+from ocp.friction.smooth_models import is_exact, narrowed, own_level, speeds_at, sticking
 from ocp.original_law import STEPS, OriginalLaw
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solver
@@ -102,10 +103,17 @@ class Direct:
 
 
 class Judged(NamedTuple):
-    """A motion by modes, and True if it is valid with the user's laws and with exact friction."""
+    """A motion by modes with the verdict of simulations.
+
+    Attributes:
+        solution: the motion.
+        right: True if it is valid with the user's laws and with exact friction.
+        exact: True if it is valid with exact friction only.
+    """
 
     solution: Solution
     right: bool
+    exact: bool = False
 
 
 @final
@@ -139,6 +147,8 @@ class Search:
             if not (solution.modes and laws):
                 return verified(solution, self.tolerance)
             found = _without_law_states(solution, verify(solution, self.tolerance))
+            if is_exact(solution.problem) and (found.ok or not solution.ok):
+                return replace(solution, verification=found)
         except FAILURES as error:
             return with_sentence(solution, f"It was not verified: {_reason(error)}.")
         names = ", ".join(f"{name}: {type(c.law).__name__}" for name, c in laws.items())
@@ -151,8 +161,11 @@ class Search:
 
     def judged(self, solution: Solution) -> Judged:
         """Return a motion by modes with the verdict of a simulation with exact friction."""
-        if not self.verify or not (solution.ok or solution.status in MISSED):
+        if not self.verify or not (solution.ok or solution.status in FOUND):
             return Judged(solution, solution.ok)
+        if solution.ok and is_exact(solution.problem):
+            text = "It was verified with exact Coulomb friction, the law of the model."
+            return Judged(with_sentence(solution, text), right=True)
         try:
             exact = verify_exactly(solution, self.tolerance, EXACT_RTOL)
             exact = _without_law_states(solution, exact)
@@ -162,11 +175,33 @@ class Search:
         if not exact.ok:
             text = f"With exact Coulomb friction: {exact.sentence}"
             return Judged(with_sentence(solution, text), right=False)
-        text = f"With exact Coulomb friction it misses by {exact.largest:.1g}"
         if not solution.ok:
-            text += " only: the layers of the law creep at rest and break away later; make them "
-            text += "narrower, or allow this by `tolerance`"
-        return Judged(with_sentence(solution, f"{text}."), solution.ok)
+            return Judged(self._creeping(solution, exact.largest), right=False, exact=True)
+        text = f"With exact Coulomb friction it misses by {exact.largest:.1g}."
+        return Judged(with_sentence(solution, text), right=True)
+
+    def _creeping(self, solution: Solution, exact: float) -> Solution:
+        """Return a motion that is right only with exact friction, where it misses by `exact`."""
+        found, layers = solution.verification, ""
+        if found is None or not found.misses:
+            return solution
+        grows = (
+            f" and whose errors grow by a factor of {found.growth:.1g}" if found.unstable else ""
+        )
+        for factor in (0.5 * self.tolerance / found.largest, 0.05 * self.tolerance / found.largest):
+            problem, narrow = narrowed(solution.problem, factor)
+            with suppress(*FAILURES):
+                if narrow and verify(replace(solution, problem=problem), self.tolerance).ok:
+                    shown = checks.listed([f"{name} {v:.1g} m/s" for name, v in narrow.items()])
+                    layers = f"a layer of {shown}, "
+                    break
+        text = (
+            f"ocp '{solution.problem.name}': The motion is right with exact Coulomb friction "
+            f"(largest miss {exact:.1g}), but under the laws of the model, whose layers creep at "
+            f"rest{grows}, {found.misses[0].sentence}; {layers}feedback along the motion, or the "
+            "law ExactCoulomb closes the gap."
+        )
+        return replace(solution, message=text)
 
     def near(self, sharp: Sharp) -> Judged:
         """Return the best exact motion near a sharpened one or its rivals, with the user's laws.
@@ -174,17 +209,16 @@ class Search:
         Motions with small margins of contacts at rest are tried first.
         """
         direct, problem = self.direct, self.direct.problem
+        each = sharp.rivals or (sharp,)
         found = optimise_modes(
-            [
-                (one.solution, speeds_at(problem, one.scales, one.level))
-                for one in sharp.rivals or (sharp,)
-            ],
+            [(one.solution, speeds_at(problem, one.scales, one.level)) for one in each],
             problem, solver=direct.ipopt, scheme=direct.scheme, margin=self.margin,
             supervisor=direct.supervisor,
         )  # fmt: skip
         narrow = own_level(problem, sharp.scales) < SHARPEST
         margins = found.margins if narrow else (*found.margins[:1], *found.margins[1:][-1:])
-        margins = margins[-1:] if law_states(problem) else margins
+        bristles = bool(law_states(problem)) and not is_exact(problem)
+        margins = margins[-1:] if bristles else margins
         judged: Judged | None = None
         for margin in margins:
             exact, last = found.motion(margin), margin == margins[-1]
@@ -192,7 +226,7 @@ class Search:
                 return Judged(_stopped(exact, sharp.solution), right=False)
             exact = self.checked(_after(sharp.solution, exact))
             if exact.status in MISSED and last and not direct.supervisor.over:
-                exact = self.by_original_law(exact) if law_states(problem) else exact
+                exact = self.by_original_law(exact) if bristles else exact
                 own = exact if narrow or exact.verified else self._by_own_law(exact)
                 if own.verified:
                     return Judged(own, True)
@@ -202,7 +236,7 @@ class Search:
             if judged is not None and judged.right:
                 return Judged(with_sentence(judged.solution, found.rests(margin, exact.cost)), True)
         assert judged is not None
-        return judged
+        return judged._replace(exact=judged.exact and narrow)
 
     def _by_own_law(self, exact: Solution) -> Solution:
         """Return the verified motion with the laws of the problem, near a motion by modes."""
@@ -296,7 +330,8 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int) 
         if not reason and (sharp.rivals or early or sharp.level <= LAST * 1.001):
             try:
                 tried.append(search.near(sharp))
-                if tried[-1].right or tried[-1].solution.status.stopped:
+                last = tried[-1]  # narrower layers would not change a motion that is exact
+                if last.right or last.exact or last.solution.status.stopped:
                     return tried[-1].solution
             except FAILURES as error:
                 text = f"Modes were not found: {_reason(error)}."

@@ -19,7 +19,7 @@ the number of intervals changes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 from math import sqrt
 from typing import NamedTuple, final
@@ -32,9 +32,10 @@ from ocp.formulation.phase import Array, initial
 from ocp.formulation.problem import Problem
 from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
+from ocp.friction.steps import Step, finalists, least, same_cost
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
-from ocp.solving.one_solve import Solved, Solver
+from ocp.solving.one_solve import Solver
 from ocp.solving.prepared import Option, Prepared, Supervisor
 from ocp.solving.solution import Solution
 from ocp.solving.starts import STARTS, Start, resample, start_of, starts_around
@@ -43,10 +44,8 @@ from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
 from ocp.transcription.unknowns import Points
 
-FINALISTS = 3
-"""Number of coarse solutions that are solved again on the finer mesh."""
-ALIKE = 1e-3
-"""Relative difference of J below which motions count as equal."""
+AGREE = 3
+"""Number of equal motions after which no further starts are solved."""
 FIRST = 0.3
 """Smoothing width of the first solves, in multiples of the largest sliding velocity."""
 LAST = 1e-2
@@ -85,55 +84,6 @@ largest width from which their modes are read if a step fails."""
 BOUNDING: dict[str, Option] = {"max_iter": 80}
 """Options for worst-case costs. With a small initial barrier parameter the initial multipliers of
 the bounds on the costs would be wrong, and with them the curvature."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Step(Solved):
-    """Solve with the smoothing width `level` and the `values` of all parameters.
-
-    Attributes:
-        accepted: False if the solve jumped to a worse motion.
-        error: largest local error of an interval.
-        errors: local errors of each interval, (N,) for each phase.
-    """
-
-    values: Array
-    level: float
-    accepted: bool = True
-    error: float = np.inf
-    errors: tuple[Array, ...] = ()
-
-    @property
-    def good(self) -> bool:
-        """True if the homotopy can continue from this step."""
-        return self.accepted and self.ok
-
-    @property
-    def ended(self) -> bool:
-        """True if the user or the time limit has stopped the solver."""
-        return self.outcome.status.stopped
-
-
-def least(steps: Sequence[Step]) -> Step:
-    """Return the stopped step, or the cheapest one, or the least violated if none is solved."""
-
-    def rank(step: Step) -> tuple[bool, bool, float]:
-        outcome = step.outcome
-        return not step.ended, not step.ok, outcome.cost if step.ok else outcome.violation
-
-    return min(steps, key=rank)
-
-
-def finalists(steps: Sequence[Step]) -> list[Step]:
-    """Return the best steps with different costs, which indicate different motions."""
-    kept: list[Step] = []
-    for step in sorted(steps, key=lambda one: (not one.good, one.outcome.cost)):
-        costs = [one.outcome.cost for one in kept]
-        new = all(abs(step.outcome.cost - cost) > ALIKE * abs(cost) for cost in costs)
-        if not kept or (new and step.good and len(kept) < FINALISTS):
-            kept.append(step)
-    return kept
 
 
 class Sharp(NamedTuple):
@@ -233,7 +183,7 @@ class _Path:
             tries += starts_around(coarse, straight, range(1, starts, 2), SPREAD)
         found = [scales_of(self.user, self.problem, points, {}) for points in tries]
         self.scales = smooth_models.guessed(self.user, found)
-        steps = self.each(coarse, tries)
+        steps = self.each(coarse, tries, sized=True)
         best = least(steps)
         for more in range(1, FURTHER + 1):
             if best.ended or best.good:
@@ -293,14 +243,27 @@ class _Path:
         """Return the scales of the motion of a step."""
         return scales_of(self.user, self.problem, step.points, self.scales)
 
+    def faster(self, step: Step) -> bool:
+        """Return True if a speed of a motion exceeds the one assumed by more than `SAME`."""
+        now = self.scales_at(step)
+        return any(now[name].speed > SAME * scale.speed for name, scale in self.scales.items())
+
     def each(
-        self, mesh: Transcription, tries: Sequence[Points], options: Mapping[str, Option] = EARLY
-    ) -> list[Step]:
-        """Solve with the widest layers from each start, until a solve is stopped."""
+        self, mesh: Transcription, tries: Sequence[Points],
+        options: Mapping[str, Option] = EARLY, *, sized: bool = False,
+    ) -> list[Step]:  # fmt: skip
+        """Solve with the widest layers from each start, until a solve is stopped or some agree.
+
+        With `sized`, also until the speeds of a motion exceed those assumed, as layers that are too
+        narrow take many iterations.
+        """
         steps: list[Step] = []
         for number, points in enumerate(tries, 1):
-            steps.append(self.solve(mesh, points, FIRST, options, f"start {number}"))
-            if steps[-1].ended:
+            step = self.solve(mesh, points, FIRST, options, f"start {number}")
+            steps.append(step)
+            alike = [s for s in steps if s.good and same_cost(s, step)]
+            faster = sized and step.good and self.faster(step)
+            if step.ended or faster or len(alike) == AGREE:
                 break
         return steps
 

@@ -16,7 +16,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import tanh
 from symfric.foundation.parameters import Variable, parameters, with_values
 from symfric.foundation.variable import at_start, strays
-from symfric.laws import Law
+from symfric.laws import ExactCoulomb, Law
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Monitor
 
@@ -286,6 +286,23 @@ def speeds_at(problem: Problem, scales: Scales, level: float) -> dict[str, float
         for w in widths(phase.model)
         if w.layer is not None
     }
+
+
+def narrowed(problem: Problem, factor: float) -> tuple[Problem, dict[str, float]]:
+    """Return `problem` with layers narrower by `factor`, and contact -> its layer [m/s]."""
+    made, p, layers = smoothed(problem), dict[str, float](), dict[str, float]()
+    for phase in problem.chain:
+        for w in widths(phase.model):
+            if w.layer is not None and w.least > 0.0:
+                layers[w.contact] = factor * w.least
+                p[w.parameter] = w.at(layers[w.contact])
+    return replace(made, p=dict(made.p) | p), layers
+
+
+def is_exact(problem: Problem) -> bool:
+    """Return True if all contacts that can stick have the law `ExactCoulomb`."""
+    laws = [c.law for phase in problem.chain for c in sticking(phase.model)]
+    return bool(laws) and all(isinstance(law, ExactCoulomb) for law in laws)
 
 
 def own_level(problem: Problem, scales: Scales) -> float:
