@@ -98,7 +98,7 @@ class Direct:
             intervals = sum(mesh.size - 1 for mesh in meshes[: len(self.problem.chain)])
         return sharpened(
             self.problem, self.scheme, self.solver, guess, intervals=intervals, starts=starts,
-            last=last, rivals=last > 0.0, supervisor=self.supervisor,
+            last=last, rivals=last > 0 and not bristles(self.problem), supervisor=self.supervisor,
         )  # fmt: skip
 
 
@@ -172,13 +172,11 @@ class Search:
         except FAILURES as error:
             text = f"With exact Coulomb friction it was not simulated: {_reason(error)}."
             return Judged(with_sentence(solution, text), solution.ok)
-        if not exact.ok:
-            text = f"With exact Coulomb friction: {exact.sentence}"
-            return Judged(with_sentence(solution, text), right=False)
-        if not solution.ok:
+        if exact.ok and not solution.ok:
             return Judged(self._creeping(solution, exact.largest), right=False, exact=True)
-        text = f"With exact Coulomb friction it misses by {exact.largest:.1g}."
-        return Judged(with_sentence(solution, text), right=True)
+        text = f"it misses by {exact.largest:.1g}." if exact.ok else exact.sentence
+        text = f"With exact Coulomb friction{'' if exact.ok else ':'} {text}"
+        return Judged(with_sentence(solution, text), right=exact.ok)
 
     def _creeping(self, solution: Solution, exact: float) -> Solution:
         """Return a motion that is right only with exact friction, where it misses by `exact`."""
@@ -217,8 +215,7 @@ class Search:
         )  # fmt: skip
         narrow = own_level(problem, sharp.scales) < SHARPEST
         margins = found.margins if narrow else (*found.margins[:1], *found.margins[1:][-1:])
-        bristles = bool(law_states(problem)) and not is_exact(problem)
-        margins = margins[-1:] if bristles else margins
+        margins = margins[-1:] if bristles(problem) else margins
         judged: Judged | None = None
         for margin in margins:
             exact, last = found.motion(margin), margin == margins[-1]
@@ -226,7 +223,7 @@ class Search:
                 return Judged(_stopped(exact, sharp.solution), right=False)
             exact = self.checked(_after(sharp.solution, exact))
             if exact.status in MISSED and last and not direct.supervisor.over:
-                exact = self.by_original_law(exact) if bristles else exact
+                exact = self.by_original_law(exact) if bristles(problem) else exact
                 own = exact if narrow or exact.verified else self._by_own_law(exact)
                 if own.verified:
                     return Judged(own, True)
@@ -360,6 +357,11 @@ def law_states(problem: Problem) -> set[str]:
     """Return the names of the states of laws, which a motion by modes does not contain."""
     contacts = [c for phase in problem.chain for c in phase.model.contacts]
     return {v.name for c in contacts for v in c.states}
+
+
+def bristles(problem: Problem) -> bool:
+    """Return True if a law has states other than the mode of `ExactCoulomb`."""
+    return bool(law_states(problem)) and not is_exact(problem)
 
 
 def _without_law_states(solution: Solution, found: Verification) -> Verification:
