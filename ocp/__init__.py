@@ -13,11 +13,14 @@ if TYPE_CHECKING:
     from ocp.formulation.expressions import TIME as TIME
     from ocp.formulation.expressions import Cost as Cost
     from ocp.formulation.expressions import Signals as Signals
+    from ocp.formulation.expressions import absolute as absolute
     from ocp.formulation.expressions import at_end as at_end
     from ocp.formulation.expressions import effort as effort
     from ocp.formulation.expressions import integral as integral
+    from ocp.formulation.expressions import largest as largest
     from ocp.formulation.expressions import track as track
     from ocp.formulation.expressions import worst as worst
+    from ocp.formulation.inputs import Polynomial as Polynomial
     from ocp.formulation.phase import FREE as FREE
     from ocp.formulation.phase import Chain as Chain
     from ocp.formulation.phase import Free as Free
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
     from ocp.formulation.phase import Range as Range
     from ocp.formulation.problem import Problem as Problem
     from ocp.formulation.problem import rest_to_rest as rest_to_rest
+    from ocp.formulation.relaxed import complementary as complementary
+    from ocp.formulation.relaxed import soft as soft
     from ocp.friction.event_check import set_valued as set_valued
     from ocp.friction.event_check import verify_exactly as verify_exactly
     from ocp.mpc.closed_loop import ClosedLoopRun as ClosedLoopRun
@@ -32,13 +37,18 @@ if TYPE_CHECKING:
     from ocp.mpc.controller import Controller as Controller
     from ocp.mpc.controller import controller_of as controller_of
     from ocp.solve import solve as solve
+    from ocp.solving.active import Active as Active
     from ocp.solving.methods import Fatrop as Fatrop
     from ocp.solving.methods import Ipopt as Ipopt
     from ocp.solving.methods import Sqp as Sqp
+    from ocp.solving.nlp import Nlp as Nlp
+    from ocp.solving.nlp import nlp_of as nlp_of
+    from ocp.solving.picture import plot_solutions as plot_solutions
+    from ocp.solving.sensitivity import Condition as Condition
+    from ocp.solving.sensitivity import Sensitivity as Sensitivity
     from ocp.solving.solution import Mode as Mode
     from ocp.solving.solution import Solution as Solution
     from ocp.solving.solution import load as load
-    from ocp.solving.solution import plot_solutions as plot_solutions
     from ocp.solving.starts import Guess as Guess
     from ocp.solving.verification import Miss as Miss
     from ocp.solving.verification import Verification as Verification

@@ -1,30 +1,37 @@
 """Strategies of `solve`: direct, by homotopy, by modes, and the order in which they are tried."""
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, final
+from typing import Literal, final
 
 from numpy.typing import ArrayLike
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
-from ocp.checking.verify import verified, verify
+from ocp.complementarity import solve_relaxed
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
-from ocp.friction.event_check import verify_exactly
 from ocp.friction.homotopy import FINE, LAST, Sharp, sharpened
 from ocp.friction.mode_optimisation import optimise_modes, refusal
-from ocp.friction.smooth_models import is_exact, narrowed, own_level, speeds_at, sticking
+from ocp.friction.smooth_models import own_level, speeds_at, sticking
 from ocp.original_law import STEPS, OriginalLaw
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solver
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start
-from ocp.solving.verification import Verification
 from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes
+from ocp.verdicts import (
+    FAILURES,
+    FOUND,
+    MISSED,
+    Judge,
+    Judged,
+    bristles,
+    law_states,
+    reason_of,
+)  # fmt: skip
 from symfric.foundation import checks
-from symfric.foundation.status import SolveError, Status
+from symfric.foundation.status import Status
 
 Friction = Literal["auto", "smooth", "sharpen", "modes"]
 INTERVALS = 50
@@ -35,15 +42,8 @@ CLOSE_PASSES, CLOSE_INTERVALS, CLOSE_ITERATIONS = 4, 400, 60
 SHARED_PASSES, SHARED_ITERATIONS = 4, 150
 """Limits if scenarios share inputs. Their contacts reverse at many times, and each finer mesh takes
 many iterations at these kinks for a thousandth of the cost."""
-EXACT_RTOL = 1e-7
-"""Relative tolerance of the simulation with exact friction, 1 % of the required accuracy."""
 SHARPEST = 1e-4
 """Smallest smoothing width, in multiples of the speeds, of a direct solve."""
-MISSED = (Status.TERMINAL_MISS, Status.BOUND_MISS)
-FOUND = (*MISSED, Status.UNSTABLE)
-"""Statuses of a motion that was found but violates its conditions."""
-FAILURES = (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError)
-"""Exceptions after which the next strategy is tried."""
 
 
 @final
@@ -69,14 +69,19 @@ class Direct:
         """The solver if it is Ipopt, otherwise Ipopt without options."""
         return self.solver if isinstance(self.solver, Ipopt) else Ipopt()
 
+    @property
+    def meshes(self) -> list[Array]:
+        """First meshes."""
+        wanted = INTERVALS if self.intervals is None else self.intervals
+        return make_meshes(self.problem, wanted)
+
     def solved(
         self, guess: Start, meshes: Sequence[Array] | None = None, *, close: bool = False
     ) -> Solution:
         """Solve the problem from `guess`; `close` limits passes, intervals and iterations."""
         goals, solver, most = self.goals, self.solver, 0
         if meshes is None:
-            wanted = INTERVALS if self.intervals is None else self.intervals
-            meshes = make_meshes(self.problem, wanted)
+            meshes = self.meshes
         elif self.problem.scenarios:
             passes, most = min(goals.passes, SHARED_PASSES), SHARED_ITERATIONS
             goals = replace(goals, passes=passes)
@@ -102,104 +107,18 @@ class Direct:
         )  # fmt: skip
 
 
-class Judged(NamedTuple):
-    """A motion by modes with the verdict of simulations.
-
-    Attributes:
-        solution: the motion.
-        right: True if it is valid with the user's laws and with exact friction.
-        exact: True if it is valid with exact friction only.
-    """
-
-    solution: Solution
-    right: bool
-    exact: bool = False
-
-
 @final
 @dataclass(frozen=True, eq=False)
-class Search:
+class Search(Judge):
     """Solution of a problem by its strategies, and verification of the motions that they find.
 
     Attributes:
         direct: direct solves of the problem.
-        tolerance: tolerance of the verification.
-        verify: True to verify motions.
         margin: margin of a contact at rest, as a share of its static level.
     """
 
     direct: Direct
-    tolerance: float
-    verify: bool
     margin: float
-
-    def checked(self, solution: Solution) -> Solution:
-        """Return `solution` with its verification.
-
-        The law states of a motion by modes are unknown, so their simulated values are not compared,
-        and local errors are not evaluated.
-        """
-        if not self.verify or solution.status.stopped:
-            return solution
-        chain = solution.problem.chain
-        laws = {c.name: c for phase in chain for c in phase.model.contacts if c.states}
-        try:
-            if not (solution.modes and laws):
-                return verified(solution, self.tolerance)
-            found = _without_law_states(solution, verify(solution, self.tolerance))
-            if is_exact(solution.problem) and (found.ok or not solution.ok):
-                return replace(solution, verification=found)
-        except FAILURES as error:
-            return with_sentence(solution, f"It was not verified: {_reason(error)}.")
-        names = ", ".join(f"{name}: {type(c.law).__name__}" for name, c in laws.items())
-        text = f"{solution.message} Friction with states ({names}) was taken as its steady sliding"
-        text += " and its static level, and the motion verified with the law itself."
-        if not found.ok and solution.ok:
-            text = f"ocp '{solution.problem.name}': {found.sentence} {text}"
-            solution = replace(solution, status=found.status)
-        return replace(solution, verification=found, message=text)
-
-    def judged(self, solution: Solution) -> Judged:
-        """Return a motion by modes with the verdict of a simulation with exact friction."""
-        if not self.verify or not (solution.ok or solution.status in FOUND):
-            return Judged(solution, solution.ok)
-        if solution.ok and is_exact(solution.problem):
-            text = "It was verified with exact Coulomb friction, the law of the model."
-            return Judged(with_sentence(solution, text), right=True)
-        try:
-            exact = verify_exactly(solution, self.tolerance, EXACT_RTOL)
-            exact = _without_law_states(solution, exact)
-        except FAILURES as error:
-            text = f"With exact Coulomb friction it was not simulated: {_reason(error)}."
-            return Judged(with_sentence(solution, text), solution.ok)
-        if exact.ok and not solution.ok:
-            return Judged(self._creeping(solution, exact.largest), right=False, exact=True)
-        text = f"it misses by {exact.largest:.1g}." if exact.ok else exact.sentence
-        text = f"With exact Coulomb friction{'' if exact.ok else ':'} {text}"
-        return Judged(with_sentence(solution, text), right=exact.ok)
-
-    def _creeping(self, solution: Solution, exact: float) -> Solution:
-        """Return a motion that is right only with exact friction, where it misses by `exact`."""
-        found, layers = solution.verification, ""
-        if found is None or not found.misses:
-            return solution
-        grows = (
-            f" and whose errors grow by a factor of {found.growth:.1g}" if found.unstable else ""
-        )
-        for factor in (0.5 * self.tolerance / found.largest, 0.05 * self.tolerance / found.largest):
-            problem, narrow = narrowed(solution.problem, factor)
-            with suppress(*FAILURES):
-                if narrow and verify(replace(solution, problem=problem), self.tolerance).ok:
-                    shown = checks.listed([f"{name} {v:.1g} m/s" for name, v in narrow.items()])
-                    layers = f"a layer of {shown}, "
-                    break
-        text = (
-            f"ocp '{solution.problem.name}': The motion is right with exact Coulomb friction "
-            f"(largest miss {exact:.1g}), but under the laws of the model, whose layers creep at "
-            f"rest{grows}, {found.misses[0].sentence}; {layers}feedback along the motion, or the "
-            "law ExactCoulomb closes the gap."
-        )
-        return replace(solution, message=text)
 
     def near(self, sharp: Sharp) -> Judged:
         """Return the best exact motion near a sharpened one or its rivals, with the user's laws.
@@ -251,7 +170,7 @@ class Search:
         try:
             own = OriginalLaw(direct.problem, scheme, *settings).solved(exact)
         except FAILURES as error:  # shooting does not support all models
-            return with_sentence(exact, f"With the law itself: {_reason(error)}.")
+            return with_sentence(exact, f"With the law itself: {reason_of(error)}.")
         own = _after(exact, own)
         if own.verified:
             return replace(own, modes=exact.modes)
@@ -273,6 +192,8 @@ def _stopped(exact: Solution, sharp: Solution) -> Solution:
 def solved(search: Search, friction: Friction, guess: Start, starts: int) -> Solution:
     """Solve the problem of `search.direct` by the strategy that it requires."""
     direct, check = search.direct, search.checked
+    if any(row.is_product for span in direct.problem.spans for row in span.path):
+        return _by_relaxation(search, friction, guess)
     problem, shooting = direct.problem, isinstance(direct.scheme, Shooting)
     holding = any(sticking(phase.model) for phase in problem.chain)
     static = friction == "auto" and not isinstance(guess, Solution) and bool(law_states(problem))
@@ -289,6 +210,22 @@ def solved(search: Search, friction: Friction, guess: Start, starts: int) -> Sol
             "collocation friction='modes' or 'sharpen' replaces laws that have them"
         )
     return check(direct.solved(guess))
+
+
+def _by_relaxation(search: Search, friction: Friction, guess: Start) -> Solution:
+    """Solve a problem with complementary signals, with the friction of its models."""
+    direct = search.direct
+    problem, meshes = direct.problem, direct.meshes
+    if friction != "smooth" and any(sticking(phase.model) for phase in problem.chain):
+        raise ValueError(
+            "solve: expected friction='smooth' with complementary(...), as modes and widths of "
+            f"friction are not sought together with it, got {friction!r}"
+        )
+    return search.checked(
+        solve_relaxed(
+            problem, meshes, direct.scheme, direct.solver, guess, direct.goals, direct.supervisor
+        )
+    )
 
 
 def _by_shooting(search: Search, guess: Start, starts: int) -> Solution:
@@ -317,7 +254,7 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int) 
         if _events(problem):
             raise
         smooth = check(search.direct.solved(guess))
-        return with_sentence(smooth, f"Friction was not sharpened: {_reason(error)}.")
+        return with_sentence(smooth, f"Friction was not sharpened: {reason_of(error)}.")
     tried, text = list[Judged](), f"No motion by modes was sought: {reason}." if reason else ""
     while sharp.solution.ok:
         if friction != "modes" and sharp.level <= own_level(problem, sharp.scales) * 1.001:
@@ -331,11 +268,11 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int) 
                 if last.right or last.exact or last.solution.status.stopped:
                     return tried[-1].solution
             except FAILURES as error:
-                text = f"Modes were not found: {_reason(error)}."
+                text = f"Modes were not found: {reason_of(error)}."
         try:
             sharp, before = next(path, sharp), sharp
         except FAILURES as error:
-            text, before = f"{text} Friction was not sharpened further: {_reason(error)}.", sharp
+            text, before = f"{text} Friction was not sharpened further: {reason_of(error)}.", sharp
         if sharp is before:
             break
     if any(one.solution.ok or one.solution.status in FOUND for one in tried):
@@ -353,26 +290,6 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int) 
     return with_sentence(check(sharp.solution), text)
 
 
-def law_states(problem: Problem) -> set[str]:
-    """Return the names of the states of laws, which a motion by modes does not contain."""
-    contacts = [c for phase in problem.chain for c in phase.model.contacts]
-    return {v.name for c in contacts for v in c.states}
-
-
-def bristles(problem: Problem) -> bool:
-    """Return True if a law has states other than the mode of `ExactCoulomb`."""
-    return bool(law_states(problem)) and not is_exact(problem)
-
-
-def _without_law_states(solution: Solution, found: Verification) -> Verification:
-    """Return `found` without checks of law states and local errors."""
-    hidden = law_states(solution.problem)
-    if not hidden:
-        return found
-    kept = [m for m in found.checked if m.name not in hidden and m.what != "local error"]
-    return replace(found, checked=tuple(kept), restarted=None)
-
-
 def _events(problem: Problem) -> list[str]:
     """Return the names of events of the models, which direct solves ignore."""
     return [*dict.fromkeys(e.name for span in problem.spans for e in span.model.events)]
@@ -383,15 +300,7 @@ def _refused(problem: Problem) -> str:
     try:
         return refusal(problem)
     except FAILURES as error:
-        return _reason(error)
-
-
-def _reason(error: Exception) -> str:
-    """Return the message of `error` as a clause, with its type if it is an internal error."""
-    first = (str(error).strip().splitlines() or [""])[0].rstrip(".")
-    if isinstance(error, ValueError | SolveError):
-        return first
-    return f"internal error, {type(error).__name__}: {first}"
+        return reason_of(error)
 
 
 def _after(first: Solution, later: Solution) -> Solution:

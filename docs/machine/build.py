@@ -257,7 +257,7 @@ def figure_page(record: Mapping[str, Any]) -> str:
     )
     text += "".join(f"{plain(p)}\n\n" for p in record["text"].split("\n\n") if p)
     if record["quick"]:
-        text += directive("note", "", "Computed at reduced size; verdicts rest on the full size.")
+        text += directive("note", "", "Computed at reduced size; verdicts hold for the full size.")
     file = f"/made/gallery/{record['picture']}"
     text += directive("figure", file, alt=plain(record["title"]))
     parts = {
@@ -267,7 +267,7 @@ def figure_page(record: Mapping[str, Any]) -> str:
     }
     text += "".join(f"**{name}.** {plain(words)}\n\n" for name, words in parts.items())
     if record.get("checked"):
-        text += "Checked on the numbers below whenever this figure is computed:\n\n"
+        text += "The computation of this figure checks these claims on the numbers below:\n\n"
         text += "".join(f"* {plain(claim)}\n" for claim in record["checked"]) + "\n"
     rows = [[plain(name), f"{value:.6g}"] for name, value in record["numbers"].items()]
     if rows:

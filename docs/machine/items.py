@@ -18,14 +18,16 @@ from symfric.laws import PHENOMENA, AnyLaw
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.composed.isotropic import PlanarSlip, SpatialSlip
 from symfric.laws.composed.populations import cost
-from symfric.laws.composed.wrap import Lagged, TemperatureDependent
+from symfric.laws.composed.wrap import Exact, Lagged, LoadNormalised, TemperatureDependent
 from symfric.laws.static.coulomb import Table
 from symfric.scenes import ALL_SCENES, Scene
 
 MADE_OF_LAWS: dict[str, type[Any]] = {
     "sum": Sum,
     "asymmetric": Asymmetric,
+    "exact": Exact,
     "load_dependent": LoadDependent,
+    "load_normalised": LoadNormalised,
     "lagged": Lagged,
     "temperature_dependent": TemperatureDependent,
     "planar_slip": PlanarSlip,
@@ -109,7 +111,8 @@ def law_page(name: str, law: AnyLaw) -> str:
     """Return the page of one law."""
     kind, instructions = type(law), cost(law)
     text = entry(kind, f"symfric.{kind.__name__}")
-    text += f"`{name}` on the command line, `from symfric import {kind.__name__}` in Python.\n\n"
+    text += f"The name on the command line is `{name}`. In Python, use "
+    text += f"`from symfric import {kind.__name__}`.\n\n"
     text += directive("figure", f"/made/laws/{name}.png", alt=f"{name} with default parameters")
     facts = [
         ["shows", ", ".join(PHENOMENA[code] for code in phenomena(law))],
@@ -135,7 +138,7 @@ def law_page(name: str, law: AnyLaw) -> str:
         text += "## States\n\n" + table(["state", "unit", "typical", "meaning"], rows)
     if getattr(law, "inputs", ()):
         rows = [[code(i.name), i.unit, plain(i.doc)] for i in law.inputs]
-        text += "## Inputs besides v and N\n\n" + table(["input", "unit", "meaning"], rows)
+        text += "## Further inputs\n\n" + table(["input", "unit", "meaning"], rows)
     lines = [f"$ symfric laws {name}"]
     if {"P", "M"} & set(phenomena(law)) and law.states:
         lines.append(f"$ symfric laws {name} --figure hysteresis --plot {name}.png")
@@ -199,8 +202,8 @@ def scene_page(name: str, kind: type[Scene]) -> str:
     model, law = scene.model(), law_name(RUBS())
     rst = f".. autoclass:: symfric.scenes.{kind.__name__}\n"
     text = f"# {name.replace('_', ' ').capitalize()}\n\n" + directive("eval-rst", "", rst)
-    text += f"`{name}` on the command line, "
-    text += f"`from symfric.scenes import {kind.__name__}` in Python.\n\n"
+    text += f"The name on the command line is `{name}`. In Python, use "
+    text += f"`from symfric.scenes import {kind.__name__}`.\n\n"
     if model.sketch is not None:
         about = f"{name} at an instant of this run"
         text += directive("figure", f"/made/scenes/{name}_sketch.png", alt=about, width="24rem")
@@ -215,7 +218,7 @@ def scene_page(name: str, kind: type[Scene]) -> str:
         text += "NAME`.\n\n" + table(["preset", "description", "source"], rows)
     if places := kind.places():
         rows = [[code(n), plain(doc)] for n, doc in places.items()]
-        text += "## Frictional contacts\n\nEach may have its own law: `--law-of PLACE=LAW`.\n\n"
+        text += "## Contacts\n\nEach contact may have its own law: `--law-of PLACE=LAW`.\n\n"
         text += table(["place", "description"], rows)
     if model.u:
         given = {u.name: kind.inputs[u.name].text if u.name in kind.inputs else "0"
@@ -228,7 +231,8 @@ def scene_page(name: str, kind: type[Scene]) -> str:
     details = [n for n in model.details() if n not in model.outputs]
     if details:
         more = f" and {len(details) - 60} more" if len(details) > 60 else ""
-        text += f"On request (`run[name]`): {', '.join(map(code, details[:60]))}{more}.\n\n"
+        names = ", ".join(map(code, details[:60]))
+        text += f"Computed on request (`run[name]`) are {names}{more}.\n\n"
     return text
 
 

@@ -122,7 +122,7 @@ def reference_pages() -> dict[str, str]:
     """Return the text of each page, by its name relative to `reference`."""
     modules = {module: names for module, names in catalogue().items() if names}
     found = {module: module_page(module, names) for module, names in modules.items()}
-    text = "# Python\n\nEvery public name, from its docstring.\n\n"
+    text = "# Python\n\nThe reference contains every public name with its docstring.\n\n"
     text += table(["module", "subject"], [[f"[{m}]({m}.md)", MODULES[m]] for m in modules])
     return found | {
         "python": text + contents(modules),
@@ -139,7 +139,7 @@ def module_page(module: str, names: list[Public]) -> str:
     text = f"# {module}\n\n{MODULES[module]}\n\n"
     text += table(["name", "description"], [[link(p), plain(p.summary())] for p in others])
     if laws:
-        text += "## Laws\n\nEach has its own page.\n\n" + ", ".join(map(link, laws)) + "\n\n"
+        text += "## Laws\n\nEach law has its own page.\n\n" + ", ".join(map(link, laws)) + "\n\n"
     entries = [entry(p) for p in others if not p.page]
     return text + directive("eval-rst", "", "\n".join(entries))
 
@@ -166,7 +166,7 @@ def command_page() -> str:
     """Return all commands with their arguments and options, as Typer writes them."""
     group = typer.main.get_command(app)
     context = typer.Context(group, info_name="symfric")
-    text = f"# Command line\n\nNames and units are those of Python. {group.epilog}\n\n"
+    text = f"# Command line\n\nNames and units are the same as in Python. {group.epilog}\n\n"
     rows = [[f"[symfric {n}](#symfric-{n})", plain(about)] for n, about in COMMANDS.items()]
     text += table(["command", "description"], rows)
     for name in COMMANDS:
@@ -212,7 +212,8 @@ def limits(item: Any) -> str:
 
 def limit_page() -> str:
     """Return limits of laws, scenes and public names, each with its link."""
-    text = "# Limits\n\nLimits that docstrings state; each is also on the page of its object.\n\n"
+    text = "# Limits\n\nThis page collects the limits that docstrings state. "
+    text += "Each limit is also on the page of its object.\n\n"
     for title, items in {"Laws": LAW_PAGES, "Scenes": ALL_SCENES}.items():
         folder = title.lower()
         rows = [[f"[{name}](../{folder}/{name}.md)", plain(limits(kind))]
@@ -241,8 +242,7 @@ def literature_page() -> str:
         for source, names in laws().items()
     ]
     text += table(["source", "laws"], rows)
-    text += "## Figures\n\nPapers whose figures are recomputed in the "
-    text += "[gallery](../gallery/index.md).\n\n"
+    text += "## Figures\n\nThe [gallery](../gallery/index.md) contains figures of these papers:\n\n"
     folders = dict.fromkeys(module.rpartition(".")[0] for module in scripts().values())
     text += "".join(f"* {plain(about_paper(folder)['paper'])}\n" for folder in folders) + "\n"
     rows = [[plain(source), code(module)] for source, module in methods()]

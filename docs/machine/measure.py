@@ -1,9 +1,10 @@
 """Measure a subject and store it for the page of benchmarks: `python -m docs.machine.measure ivp`.
 
 The tables of `symfric bench SUBJECT` are stored in `docs/benchmarks/SUBJECT.json`, with machine,
-load, versions, date and commit. The page of benchmarks and the tables of the page on other tools
-are made from these files only. Measure on an idle machine; the load is the mean number of processes
-that waited for a processor, before and after. `--quick` takes fewer points.
+load, versions, date and commit, and its picture next to it. The page of benchmarks and the tables
+of the page on other tools are made from these files only. Measure on an idle machine; the load is
+the mean number of processes that waited for a processor, before and after. `--quick` takes fewer
+points.
 """
 
 import json
@@ -44,7 +45,7 @@ def machine() -> str:
 def others() -> list[str]:
     """Return versions of installed tools that subjects compare with."""
     found: list[str] = []
-    for name in ("numpy", "scipy", "rockit-meco", "do-mpc"):
+    for name in ("numpy", "scipy", "rockit-meco", "nosnoc", "do-mpc", "opty", "dymos"):
         with suppress(PackageNotFoundError):
             found.append(f"{name} {version(name)}")
     return found
@@ -62,8 +63,10 @@ def commit() -> str:
 def measured(subject: str, quick: bool) -> dict[str, Any]:
     """Return the tables of `symfric bench SUBJECT` with machine, load and commit."""
     loads, began = [os.getloadavg()[0]], perf_counter()
-    result = bench.measure(subject, quick)
+    result = bench.measure(subject, quick, lambda item, fraction, row: print(row) if row else None)
     loads.append(os.getloadavg()[0])
+    if result.draw:
+        result.plot(STORED / f"{subject}.png")
     spent = perf_counter() - began
     tables = [
         {
@@ -129,6 +132,8 @@ def page() -> str:
         text += f"## {found['title']}\n\n" + f"{found['about']}\n\n" * bool(found["about"])
         if short := found.get("short"):
             text += _tables(short) + f"*Summarised by hand from* {made_by(short)}.\n\n"
+        if (STORED / f"{name}.png").exists():
+            text += f"![{found['title']}]({name}.png)\n\n"
         if "tables" in found:
             text += _tables(found) + f"*Measured by* {made_by(found)}. "
             text += f"Stored in `docs/benchmarks/{name}.json`.\n\n"

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.checking.resimulate import Arc
+from ocp.solving.optimum import cost_weight
 from ocp.transcription.blocks import Array, Block, Entries, Indices, Piece
 from ocp.transcription.program import Iterate
 from ocp.transcription.schemes import Coefficients, Radau
@@ -55,12 +56,13 @@ def _collocated(transcription: Transcription, w: Array, values: Array, number: i
 
     They are NaN where Newton's method does not converge, and without collocation points.
     """
-    own, model = transcription.layout.spans[number], transcription.problem.spans[number].model
+    own, span = transcription.layout.spans[number], transcription.problem.spans[number]
     nx, nz, N, d = own.nodes.shape[0], own.z.shape[0], own.intervals, own.degree
     ends, (piece, _) = np.full((nx, N), np.nan), _equations(transcription, number)
     if piece is None or piece.block is None:
         return ends
-    mechanism = 0 if model.holonomic is None else model.holonomic.n
+    n = 0 if span.model.holonomic is None else span.model.holonomic.n
+    first = piece.block.n - len(span.sides) - n
     old, new = transcription.scheme.coefficients(), FINER.coefficients()
     D = new.degree
     v, theta = (a[:, ::d] for a in _at_places(piece, w, transcription.program.p, values))
@@ -75,13 +77,13 @@ def _collocated(transcription: Transcription, w: Array, values: Array, number: i
         for _ in range(NEWTON_STEPS):
             at = np.flatnonzero(moving)
             step = _newton_step(
-                piece.block, mechanism, new, start[:, at], motion[:, at],
+                piece.block, (n, first), new, start[:, at], motion[:, at],
                 *(a.reshape(-1, N, D)[:, at].reshape(a.shape[0], -1) for a in (v, theta)),
             )  # fmt: skip
             motion[:, at] += step
             size = np.abs(step).max(axis=(0, 2), initial=0.0)
             done = size < CONVERGED
-            ends[:, at[done]] = model.nominal("x")[:, None] * motion[:nx, at[done], -1]
+            ends[:, at[done]] = span.model.nominal("x")[:, None] * motion[:nx, at[done], -1]
             moving[at[done | ~np.isfinite(size)]] = False
             if not moving.any():
                 break
@@ -89,27 +91,27 @@ def _collocated(transcription: Transcription, w: Array, values: Array, number: i
 
 
 def _newton_step(
-    block: Block, mechanism: int, scheme: Coefficients, start: Array, motion: Array,
+    block: Block, implicit: tuple[int, int], scheme: Coefficients, start: Array, motion: Array,
     v: Array, theta: Array,
 ) -> Array:  # fmt: skip
     """Return the change of states and algebraic variables at all points, (nx + nz, N, D).
 
     Args:
         block: equations of a collocation point.
-        mechanism: number of coordinates whose accelerations are slopes of the polynomials.
+        implicit: number of coordinates of a mechanism, whose accelerations are slopes of the
+            polynomials, and index of the first of these slopes among the local unknowns.
         scheme: collocation with D points.
         start: states at the starts of the intervals, (nx, N).
         motion: states and algebraic variables at the points, (nx + nz, N, D).
         v: local unknowns, (n, N D), of which only those after the motion are used.
         theta: parameters, (k, N D).
     """
-    nx, (n, N, D) = start.shape[0], motion.shape
-    velocities = np.arange(mechanism, 2 * mechanism)
+    nx, (n, N, D), (q, first) = start.shape[0], motion.shape, implicit
+    velocities = np.arange(q, 2 * q)
     known = np.setdiff1d(np.arange(nx), velocities)
     slopes = np.concatenate([start[:, :, None], motion[:nx]], axis=2) @ scheme.slopes
-    first = block.n - mechanism
     v[:n] = motion.reshape(n, -1)
-    v[first:] = slopes[velocities].reshape(mechanism, -1) if mechanism else 0.0
+    v[first : first + q] = slopes[velocities].reshape(q, v.shape[1])
     rows, entries = (np.array(a) for a in block.jacobian.map(N * D)(v, theta))
     rows, slope = rows[:n].reshape(n, N, D), np.zeros((n, block.n, N, D))
     for row, column, numbers in _entries(block.of_jacobian, entries, np.arange(block.n)):
@@ -121,7 +123,9 @@ def _newton_step(
         A[:, j, :, j] = slope[:, :n, :, j].transpose(2, 0, 1)
         for k in range(D):
             factor = scheme.slopes[1 + k, j]
-            A[:, j, :, k, velocities] += factor * slope[:, first:, :, j].transpose(1, 2, 0)
+            A[:, j, :, k, velocities] += factor * slope[:, first : first + q, :, j].transpose(
+                1, 2, 0
+            )
             A[:, j, known, k, known] -= factor
     b = rows.transpose(1, 2, 0).reshape(N, D * n)
     try:
@@ -292,7 +296,7 @@ def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tupl
     if piece is None or piece.block is None:
         return np.zeros(shape), np.zeros(shape)
     block, places = piece.block, piece.places
-    lam, sigma = iterate.lam_g[at], _weight(transcription, iterate.lam_g, number)
+    lam, sigma = iterate.lam_g[at], cost_weight(transcription, iterate.lam_g, number)
     v, theta = _at_places(piece, iterate.w, program.p, program.values)
     inputs = own.nodes.shape[0] + own.z.shape[0] + np.arange(shape[0])
     H_u, H_uu = np.zeros((shape[0], places)), np.zeros((shape[0], places))
@@ -340,11 +344,3 @@ def _entries(
     values[entries.still] = entries.constant[:, None]
     for e in np.flatnonzero(np.isin(entries.columns, columns)):
         yield int(entries.rows[e]), int(entries.columns[e] - columns[0]), values[e]
-
-
-def _weight(transcription: Transcription, lam_g: Array, number: int) -> float:
-    """Return the weight of the cost of a phase in J; for "worst", the multiplier of its bound."""
-    problem, phases = transcription.problem, len(transcription.problem.chain)
-    if problem.kind == "worst":
-        return float(lam_g[transcription.skeleton.largest[number // phases]])
-    return phases / len(problem.spans) if problem.kind == "mean" else 1.0

@@ -23,6 +23,9 @@ REST = 1e-3
 """Magnitude of a state, in multiples of its nominal value, that counts as zero."""
 RTOL = 1e-9
 """Relative tolerance of the re-simulation."""
+PARTS = 4
+"""Number of parts of a step in which zeros are sought."""
+BISECTIONS = 40
 GAUSS_POINTS, GAUSS_WEIGHTS = legendre.leggauss(4)
 
 
@@ -147,16 +150,35 @@ class Run(NamedTuple):
         values = [self.of(model.vector(letter), time)[:, 0] for letter in "xzu"]
         return [np.array([time]), *values, self.arc.p]
 
-    def integral(self, expression: ca.SX) -> float:
-        """Return the integral of an expression over the run, by Gauss quadrature over each step."""
+    def integral(self, expression: ca.SX, kinks: Sequence[ca.SX] = ()) -> float:
+        """Return the integral of an expression over the run, by Gauss quadrature over each step.
+
+        Steps are divided where an expression in `kinks` is zero.
+        """
         if ca.SX(expression).is_zero():
             return 0.0
         steps = self.trajectory.step_times
         ends = np.unique(np.concatenate([steps[steps < self.end], [self.end]]))
+        for kink in kinks:
+            ends = np.unique(np.concatenate([ends, self._zeros(kink, ends)]))
         half = np.diff(ends)[:, None] / 2
         times = ends[:-1, None] + half * (1.0 + GAUSS_POINTS)
         values = self.of(expression, times.ravel()).reshape(times.shape)
         return float((half * GAUSS_WEIGHTS * values).sum())
+
+    def _zeros(self, kink: ca.SX, ends: Array) -> Array:
+        """Return the times between `ends` at which an expression changes its sign."""
+        parts = np.linspace(0.0, 1.0, PARTS + 1)[1:-1]
+        inside = ends[:-1, None] + np.diff(ends)[:, None] * parts
+        looks = np.unique(np.concatenate([np.nextafter(ends[1:], -np.inf), ends, inside.ravel()]))
+        values = self.of(kink, looks)[0]
+        low, high = (looks[k : k + looks.size - 1][values[:-1] * values[1:] < 0] for k in (0, 1))
+        sign = np.sign(self.of(kink, low)[0])
+        for _ in range(BISECTIONS):
+            middle = (low + high) / 2
+            before = sign * self.of(kink, middle)[0] > 0
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        return low
 
 
 def resimulated(

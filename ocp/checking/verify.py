@@ -6,7 +6,7 @@ All conditions are evaluated on simulated runs, at the nodes of the mesh and bet
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise
-from math import isfinite
+from math import isfinite, prod
 from typing import NamedTuple
 
 import casadi as ca
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ocp.checking.interval_errors import local_errors
 from ocp.checking.resimulate import RTOL, Arc, Run, arcs_of, resimulated, run_from
-from ocp.formulation.phase import FREE, Array, Box, fixed, size_of
+from ocp.formulation.phase import FREE, Array, Box, Row, fixed, size_of
 from ocp.formulation.problem import Problem
 from ocp.solving.solution import Solution
 from ocp.solving.verification import Miss, Verification
@@ -82,41 +82,51 @@ class _Kept(NamedTuple):
     expression: ca.SX
     box: Box
     unit: str = ""
+    parts: tuple[ca.SX, ...] = ()
+
+    @staticmethod
+    def of(row: Row) -> "_Kept":
+        """Return a path condition."""
+        return _Kept("path", row.name, row.expression, (row.lower, row.upper), parts=row.parts)
 
     def outside(self, values: Array) -> Array:
         """Return the distance of values from the range: negative inside, inf for NaN."""
         outside = np.maximum(values - self.box[1], self.box[0] - values)
         return np.where(np.isnan(outside), np.inf, outside)
 
-    def magnitude(self, values: Array) -> float:
-        """Return the largest magnitude of the bounds and of `values`."""
+    def magnitude(self, run: Run, times: Array) -> float:
+        """Return the largest magnitude of the bounds and of the values at `times`.
+
+        The magnitude of a product is that of its factors.
+        """
         bounds = [abs(b) for b in self.box if isfinite(b)]
-        return max([*bounds, float(np.abs(values).max(initial=0.0))])
+        sizes = (float(np.abs(run.of(e, times)).max()) for e in self.parts or [self.expression])
+        return max([*bounds, prod(sizes)])
 
 
-def _kept(arc: Arc) -> list[_Kept]:
-    """Return the bounds of states and algebraic variables, and the path conditions."""
+def _kept(arc: Arc, *, peaks: bool) -> list[_Kept]:
+    """Return the bounds of states and algebraic variables, and the path conditions.
+
+    Conditions that define costs of largest values are included if `peaks`.
+    """
     span = arc.span
     known = [v for v in (*span.model.x, *span.model.z) if span.boxes[v.name] != FREE]
     bounds = [_Kept("bound", v.name, v.symbol, span.boxes[v.name], v.unit) for v in known]
-    rows = [_Kept("path", row.name, row.expression, (row.lower, row.upper)) for row in span.path]
-    return bounds + rows
+    return bounds + [_Kept.of(row) for row in span.path if peaks or not row.is_peak]
 
 
 def _between_nodes(runs: Sequence[Run]) -> Iterator[Miss]:
     """Yield the worst violation of each bound and path condition in the runs of one arc."""
-    for kept in _kept(runs[0].arc):
-        size, worst = kept.magnitude(np.zeros(0)), (-np.inf, 0.0, 0.0)
-        for run in runs:
-            looks = run.looks
-            values = run.of(kept.expression, looks)[0]
-            size = max(size, kept.magnitude(values))
-            worst = max(worst, _worst(run, kept, looks, values), key=lambda at: at[0])
+    for kept in _kept(runs[0].arc, peaks=False):
+        size = max(kept.magnitude(run, run.looks) for run in runs)
+        worst = max((_worst(run, kept) for run in runs), key=lambda at: at[0])
         yield _miss(kept.kind, kept.name, *worst[1:], kept.box, size, kept.unit)
 
 
-def _worst(run: Run, kept: _Kept, looks: Array, values: Array) -> tuple[float, float, float]:
-    """Return the worst violation of a range, its time and its value, refined between `looks`."""
+def _worst(run: Run, kept: _Kept) -> tuple[float, float, float]:
+    """Return the worst violation of a range, its time and its value, refined between steps."""
+    looks = run.looks
+    values = run.of(kept.expression, looks)[0]
     outside = kept.outside(values)
     j = int(np.argmax(outside))
     best = (float(outside[j]), float(looks[j]), float(values[j]))
@@ -136,9 +146,9 @@ def left_between(run: Run, tolerance: float) -> NDArray[np.bool_]:
     mask = np.zeros(run.arc.intervals, dtype=bool)
     looks = run.looks
     interval = np.searchsorted(run.arc.times, looks, side="right") - 1
-    for kept in _kept(run.arc):
+    for kept in _kept(run.arc, peaks=True):
         values = run.of(kept.expression, looks)[0]
-        outside = kept.outside(values) > tolerance * kept.magnitude(values)
+        outside = kept.outside(values) > tolerance * kept.magnitude(run, looks)
         mask[np.minimum(interval[outside], mask.size - 1)] = True
     return mask
 
@@ -265,13 +275,33 @@ def cost_of(problem: Problem, runs: Sequence[Run]) -> float:
     for run in runs:
         span = run.arc.span
         share = run.integral(span.running)
+        for row in span.penalised:
+            kinks = [row.expression - b for b in {row.lower, row.upper} if isfinite(b)]
+            share += run.integral(row.penalty, kinks)
         if run.at_end and not span.end.is_zero():
             share += float(run.of(span.end, run.end)[0, 0])
         shares[span.scenario] = shares.get(span.scenario, 0.0) + share
+    for scenario, above in _above_largest(runs):
+        shares[scenario] += above
     values = list(shares.values())
     if problem.kind == "worst":
         return max(values)
     return sum(values) / (len(values) if problem.kind == "mean" else 1)
+
+
+def _above_largest(runs: Sequence[Run]) -> Iterator[tuple[int, float]]:
+    """Yield (scenario, difference of a cost `largest` from the state that bounds its values)."""
+    values: dict[tuple[int, str], list[float]] = {}
+    weights: dict[tuple[int, str], float] = {}
+    for run in runs:
+        span = run.arc.span
+        for row in span.path:
+            if row.is_peak:
+                key = span.scenario, row.name
+                values.setdefault(key, []).append(_worst(run, _Kept.of(row))[2])
+                weights[key] = row.linear  # that of the last phase
+    for key, found in values.items():
+        yield key[0], weights[key] * max(found)
 
 
 def restarted(

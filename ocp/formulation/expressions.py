@@ -177,12 +177,14 @@ Expression = Callable[[Signals], Scalar]
 """A function of the signals, such as `lambda s: s.force**2`."""
 
 Terms = tuple[tuple[float, Expression], ...]
+TERMS = ("running", "end", "squares", "absolutes", "peaks")
+"""Fields of a cost with terms."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Cost:
-    """Bolza cost J = integral of (L + sum_i w_i r_i^2) dt + E at the end.
+    """Cost J = integral of (L + sum_i w_i r_i^2 + sum_i w_i |e_i|) dt + E + sum_i w_i max e_i.
 
     Costs can be added and multiplied by weights: `integral(lambda s: s.force**2) + 0.1 * TIME`. A
     negative weight maximises: `-at_end(lambda s: s.height)`. Signals are identified by name, so a
@@ -192,6 +194,7 @@ class Cost:
         running: the terms of L as (weight, expression).
         end: the terms of E as (weight, expression).
         squares: (w_i, r_i) of `track` and `effort`, stored separately for Gauss-Newton methods.
+        absolutes, peaks: (w_i, e_i) of `absolute` and `largest`, with positive weights.
         references: names of the references of `track`.
         largest: True for the largest cost of all scenarios instead of the mean; see `worst`.
     """
@@ -199,6 +202,8 @@ class Cost:
     running: Terms = ()
     end: Terms = ()
     squares: Terms = ()
+    absolutes: Terms = ()
+    peaks: Terms = ()
     references: tuple[str, ...] = ()
     largest: bool = False
 
@@ -210,22 +215,19 @@ class Cost:
                 "cost: expected worst(...) around the whole cost, got it added to another; write "
                 "worst(a + b)"
             )
-        return Cost(
-            self.running + other.running,
-            self.end + other.end,
-            self.squares + other.squares,
-            tuple(dict.fromkeys(self.references + other.references)),
-        )
+        terms = {name: getattr(self, name) + getattr(other, name) for name in TERMS}
+        return Cost(references=tuple(dict.fromkeys(self.references + other.references)), **terms)
 
     def __mul__(self, weight: float) -> "Cost":
         weight = checks.number("cost: weight", weight)
-        if self.largest and weight < 0:
-            raise ValueError(f"cost: expected a weight >= 0 of worst(...), got {weight:g}")
-        running, end, squares = (
-            tuple((weight * w, term) for w, term in terms)
-            for terms in (self.running, self.end, self.squares)
-        )
-        return replace(self, running=running, end=end, squares=squares)
+        kinds = {"worst": self.largest, "absolute": self.absolutes, "largest": self.peaks}
+        if weight < 0 and (kind := next((name for name, found in kinds.items() if found), "")):
+            raise ValueError(
+                f"cost: expected a weight >= 0 of {kind}(...), got {weight:g}; it is a least upper "
+                "bound, which only a minimum attains"
+            )
+        terms = {n: tuple((weight * w, term) for w, term in getattr(self, n)) for n in TERMS}
+        return replace(self, **terms)
 
     __rmul__ = __mul__
 
@@ -275,6 +277,37 @@ def integral(expression: Expression) -> Cost:
 def at_end(expression: Expression) -> Cost:
     """Return the value at the end as a cost; `s.t` is the time since the start of the problem."""
     return Cost(end=((1.0, _checked("at_end", expression)),))
+
+
+def absolute(expression: Expression, weight: float = 1.0) -> Cost:
+    """Return the integral of weight |e| over the motion as a cost, such as fuel |force|.
+
+    It is exact at the collocation points: e = a - b with a, b >= 0 and the integrand a + b.
+
+    Args:
+        expression: function of the signals; it may change its sign.
+        weight: positive weight.
+
+    Limits: collocation only. The integrand has a kink where e changes its sign within an interval,
+    which the quadrature resolves to second order in the length of the interval.
+    """
+    checked = _checked("absolute", expression)
+    return Cost(absolutes=((checks.number("absolute: weight", weight, above=0.0), checked),))
+
+
+def largest(expression: Expression, weight: float = 1.0) -> Cost:
+    """Return weight max e(t), the largest value over the motion, as a cost.
+
+    `largest(lambda s: abs(s.force))` is the largest magnitude. The cost of a problem covers all
+    phases, separately in each scenario, and the cost of a phase only this phase. The maximum is a
+    constant state that bounds e where path conditions hold.
+
+    Args:
+        expression: function of the signals.
+        weight: positive weight.
+    """
+    checked = _checked("largest", expression)
+    return Cost(peaks=((checks.number("largest: weight", weight, above=0.0), checked),))
 
 
 TIME = at_end(lambda s: s.t)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.expressions import Cost, Signals, arguments
+from ocp.formulation.inputs import Form, Forms
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_number
 from symfric.model import Model, check_model
@@ -146,10 +147,14 @@ class Phase:
         via: conditions on states and outputs at fractions of T, such as {0.5: {"x": 1.0}}.
         bounds: bounds of states, algebraic variables, inputs and outputs over the whole phase,
             which replace the bounds of the model.
-        rates: bounds of the rates of inputs [unit/s]. Such an input becomes a continuous state
-            with the constant rate `<input>_rate` on each interval. Its start is free unless `start`
-            names it; links and ends can name it.
-        path: functions of the signals that return `a <= b`, `a >= b` or `a == b`.
+        inputs: input -> its form over time (see `Form`), by default "constant" on each interval,
+            and "linear" with a bounded rate. Inputs of other forms and their derivatives
+            `<input>_rate`, `<input>_rate_rate` are states, whose start is free unless `start`
+            names them; bounds, links and ends can name them.
+        rates: bounds of the rates of inputs [unit/s].
+        path: functions of the signals that return `a <= b`, `a >= b` or `a == b`; also `soft` and
+            `complementary` conditions.
+        at: fraction of T -> such functions, also `soft` ones, that apply at this time only.
         cost: cost of this phase only; `at_end` refers to the end of this phase.
         link: state -> its start: a function such as `lambda before: -0.5 * before.v` of the signals
             at the end of the previous phase, the name of one of them, or None for no condition.
@@ -161,8 +166,9 @@ class Phase:
 
     `Problem` reports errors of its phases.
 
-    Limits: bounds on states and outputs, and `path`, are imposed at the collocation points;
-    `verify` checks them between these points.
+    Limits: bounds on states and outputs, and `path`, are imposed at the collocation points. Those
+    that contain inputs and no algebraic variables are also imposed at the starts of all intervals,
+    where inputs jump. `verify` checks all of them between these points.
     """
 
     model: Model
@@ -173,7 +179,11 @@ class Phase:
     via: Mapping[float, Ranges] = field(default_factory=dict[float, Ranges])
     bounds: Ranges = field(default_factory=dict[str, Range])
     rates: Ranges = field(default_factory=dict[str, Range])
+    inputs: Forms = field(default_factory=dict[str, Form])
     path: Sequence[PathCondition] = ()
+    at: Mapping[float, Sequence[PathCondition]] = field(
+        default_factory=dict[float, Sequence[PathCondition]]
+    )
     cost: Cost | None = None
     link: Mapping[str, Start] = field(default_factory=dict[str, Start])
     joins: Sequence[JoinCondition] = ()
@@ -182,6 +192,11 @@ class Phase:
 
     def __post_init__(self) -> None:
         check_model("Phase", self.model)
+
+    @property
+    def stops(self) -> list[float]:
+        """Fractions of T inside the phase with conditions, in increasing order."""
+        return sorted({float(s) for s in (*self.via, *self.at)} - {0.0, 1.0})
 
     def __rshift__(self, other: "Phase | Chain") -> "Chain":
         return Chain((self,)) >> other
@@ -215,17 +230,46 @@ class Row:
     Attributes:
         name: subject for messages, such as "the bound on tip_x".
         expression: SX (1, 1) in the symbols of the model of its span.
+        linear, quadratic: weights in the cost of a violation, for rows with a penalty.
+        size: typical magnitude if it does not follow from the bounds.
+        parts: for a product, its factors; for e - max e, e. They determine the magnitude of values.
+            At a time, the violation of a row with a penalty, a constant state.
     """
 
     name: str
     expression: ca.SX
     lower: float
     upper: float
+    linear: float = 0.0
+    quadratic: float = 0.0
+    size: float = 0.0
+    parts: tuple[ca.SX, ...] = ()
 
     @property
     def nominal(self) -> float:
         """Typical magnitude: that of the bounds, or 1 if they are zero or infinite."""
-        return size_of((self.lower, self.upper))
+        return self.size or size_of((self.lower, self.upper))
+
+    @property
+    def is_peak(self) -> bool:
+        """True for e - max e <= 0, which defines the cost of a largest value."""
+        return len(self.parts) == 1
+
+    @property
+    def is_product(self) -> bool:
+        """True for the product of complementary signals."""
+        return len(self.parts) == 2
+
+    @property
+    def violation(self) -> ca.SX:
+        """Distance of the expression from its range, SX (1, 1)."""
+        e = self.expression
+        return ca.fmax(0.0, ca.fmax(e - self.upper, self.lower - e))
+
+    @property
+    def penalty(self) -> ca.SX:
+        """Penalty of the violation, SX (1, 1)."""
+        return self.linear * self.violation + self.quadratic * self.violation**2
 
 
 @final
@@ -279,6 +323,8 @@ class Span:
         rows_at: fraction of T (0, 1 and all `via`) -> further conditions there. They use algebraic
             variables and inputs of the preceding interval; at 0, of the first interval.
         path: conditions at every collocation point.
+        softened, absolutes: conditions at every collocation point with a penalty: of the user, and
+            e = 0 for the costs |e|.
         running, end: integrand and end value of the contribution to the cost, SX (1, 1).
         squares: least-squares form of the squared terms in `running`, as (weight, residual).
         links: starts of states that follow from the previous span; empty for the first span.
@@ -302,6 +348,29 @@ class Span:
     squares: tuple[tuple[float, ca.SX], ...]
     links: tuple[Link, ...]
     joins: tuple[Join, ...]
+    softened: tuple[Row, ...] = ()
+    absolutes: tuple[Row, ...] = ()
+
+    @property
+    def penalised(self) -> tuple[Row, ...]:
+        """Conditions at every collocation point with a penalty."""
+        return self.softened + self.absolutes
+
+    @property
+    def integrand(self) -> ca.SX:
+        """Integrand of the contribution to the cost with all penalties, which have kinks."""
+        return sum((row.penalty for row in self.penalised), self.running)
+
+    @property
+    def sides(self) -> tuple[tuple[int, int], ...]:
+        """(index of a penalised row, 1 or -1 for its upper or lower bound) of each violation."""
+        pairs = enumerate(self.penalised)
+        return tuple(
+            (k, side)
+            for k, row in pairs
+            for side, bound in ((1, row.upper), (-1, row.lower))
+            if isfinite(bound)
+        )
 
     @property
     def symbols(self) -> list[ca.SX]:

@@ -18,10 +18,12 @@ from typing import Any, Literal, final
 import casadi as ca
 import numpy as np
 
+from ocp.formulation.changed_models import rebuilt
 from ocp.formulation.expressions import TIME, arguments, integral
+from ocp.formulation.inputs import rate_name, states_of
 from ocp.formulation.phase import Chain, Free, Phase, Span, as_box, initial, size_of
 from ocp.formulation.resolve import resolved
-from ocp.formulation.statement import Choice, Statement, chosen_of, rate_name, rebuilt, settings_of
+from ocp.formulation.statement import Choice, Statement, chosen_of, forms_of, only, settings_of
 from symfric.foundation import checks
 from symfric.foundation.variable import Variable
 from symfric.model import Model, check_model
@@ -46,9 +48,11 @@ class Problem(Statement):
     Attributes:
         phases: a `Phase`, or several: `out >> back`.
         cost: a sum of `integral(...)` over all phases, `at_end(...)` of the last phase, `TIME`,
-            `track(...)` and `effort(...)`. With scenarios, the mean of their costs is minimised,
-            or the largest one with `worst(...)`.
-        bounds, rates, path, p: as in `Phase`.
+            `track(...)`, `effort(...)`, `absolute(...)` and `largest(...)`. With scenarios, the
+            mean of their costs is minimised, or the largest one with `worst(...)`.
+        bounds, rates, inputs, path, p: as in `Phase`.
+        totals: name -> integrand: integrals over the motion as states that start at zero, such as
+            {"energy": lambda s: s.force**2}, which bounds and ends can name.
         choose: parameter -> (lower, upper) or (lower, upper, guess): parameters optimised with the
             motion; their values are equal in all phases and scenarios.
         periodic: states whose value at the end of the last phase equals that at the start of the
@@ -97,17 +101,20 @@ class Problem(Statement):
         inputs = dict.fromkeys(v.name for span in self.spans for v in span.model.u)
         if self.shared is None:
             return tuple(inputs)
-        wanted = {*self.shared, *map(rate_name, self.shared)}
+        wanted = {rate_name(name, k) for name in self.shared for k in range(4)}
         return tuple(name for name in inputs if name in wanted)
 
     @cached_property
     def shared_starts(self) -> tuple[tuple[int, str], ...]:
-        """(phase, state) of inputs with bounded rate whose free start all scenarios share."""
+        """(phase, state) of inputs that are states, and whose free start all scenarios share."""
         starts: list[tuple[int, str]] = []
-        for span in self.spans[: len(self.chain)]:
+        for span, phase in zip(self.spans, self.chain, strict=False):  # of the first scenario
             linked = {link.state for link in span.links}
-            for name, (low, high) in span.nodes[0.0].items():
-                if rate_name(name) in self.shared_inputs and low < high and name not in linked:
+            forms = forms_of(self, phase)
+            forms = forms if self.shared is None else only(forms, self.shared)
+            for name in states_of(forms):
+                low, high = span.nodes[0.0][name]
+                if low < high and name not in linked:
                     starts.append((span.phase, name))
         return tuple(starts)
 
@@ -143,7 +150,7 @@ def cost_size(problem: Problem) -> float:
     for span in problem.spans:
         model, T = span.model, initial(span.T)
         z = [float(v.start) for v in model.z]
-        at = ca.Function("cost", span.symbols, [ca.vertcat(span.running, span.end)])
+        at = ca.Function("cost", span.symbols, [ca.vertcat(span.integrand, span.end)])
         running, end = at(T, model.nominal("x"), z, model.nominal("u"), span.p).full()[:, 0]
         total += abs(T * running) + abs(end)
     return total if isfinite(total) and total > 0.0 else 1.0

@@ -7,14 +7,17 @@ loops start at coordinates and rates that satisfy their constraints.
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from math import isfinite
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ocp.formulation import statement
+from ocp.formulation.changed_models import with_constants, with_outputs
 from ocp.formulation.evaluate_callbacks import Evaluated, collected, evaluated
-from ocp.formulation.phase import FREE, Box, Free, Link, Row, Span, as_box, fixed, meet
+from ocp.formulation.inputs import states_of
+from ocp.formulation.phase import FREE, Box, Free, Link, Range, Row, Span, as_box, fixed, meet
 from ocp.formulation.statement import Choice, Setting, Statement
 from ocp.formulation.validate import input_problems, type_problems
 from symfric.foundation.variable import stacked
@@ -37,7 +40,9 @@ def resolved(problem: Statement) -> tuple[Span, ...]:
     results = evaluated(problem, settings, problems)
     _refuse(problem, problems)
     chosen = statement.chosen_of(problem, settings)
-    bare = [_span(*pair, chosen) for pair in zip(settings, results, strict=True)]
+    bare = list[Span]()
+    for setting, result in zip(settings, results, strict=True):
+        bare.append(_span(setting, result, chosen, bare[-1] if bare else None))
     spans: list[Span] = []
     for number, (name, values) in enumerate((problem.scenarios or {"": {}}).items()):
         where = f"scenario '{name}': " if name else ""
@@ -65,34 +70,54 @@ def _without_repeats(before: Span, span: Span) -> Span:
     return replace(span, links=tuple(link for link in span.links if not repeats(link)))
 
 
-def _box_of(setting: Setting, name: str) -> Box:
+def _box_of(setting: Setting, model: Model, name: str) -> Box:
     """Return the bounds of a signal in a phase, by default those of the model."""
     if name in setting.bounds:
         return as_box(setting.bounds[name])
-    model = setting.model
     known = {v.name: v for group in (model.x, model.z, model.u) for v in group}
     return (known[name].lower, known[name].upper) if name in known else FREE
 
 
-def _span(setting: Setting, result: Evaluated, chosen: Sequence[Choice]) -> Span:
+def _span(
+    setting: Setting, result: Evaluated, chosen: Sequence[Choice], before: Span | None
+) -> Span:
     """Return a span with zeros as values of its parameters."""
     phase = setting.phase
-    given = {0.0: phase.start, **{float(s): phase.via[s] for s in phase.via}, 1.0: phase.end}
+    given = {s: dict[str, Range]() for s in map(float, phase.at)}
+    given |= {0.0: dict(phase.start), **{float(s): dict(phase.via[s]) for s in phase.via}}
+    given |= {1.0: dict(phase.end)}
     given = dict(sorted(given.items()))
     named = (*setting.bounds, *(name for at in given.values() for name in at))
     details = dict.fromkeys(n for n in (*named, *result.details) if n not in setting.model.signals)
-    model = statement.with_outputs(setting.model, tuple(details))
+    model = with_outputs(setting.model, tuple(details))
+    slacks = [*_slacks(result.at)]
+    sizes = {peak.name: peak.rows[0].size for peak in result.peaks}
+    sizes |= {name: -row.nominal for _, row, names in slacks for name in names}
+    model = with_constants(model, sizes)
+    at, end = _relaxed(result.at, slacks, model)
+    links = result.links
+    for peak in result.peaks:
+        bound = model.expression(peak.name)
+        end += peak.weight * bound
+        if before is not None and peak.continued:
+            links += (Link(peak.name, before.model.expression(peak.name)),)
+    highest = (
+        replace(row, expression=row.expression - model.expression(peak.name), linear=peak.weight)
+        for peak in result.peaks
+        for row in peak.rows
+    )
+    softened = tuple(row for row in result.path if row.linear or row.quadratic)
     variables = [v.name for group in (model.x, model.z, model.u) for v in group]
-    boxes = {name: _box_of(setting, name) for name in variables}
+    boxes = {name: _box_of(setting, model, name) for name in variables}
     parameters = {v.name for v in model.p}
 
     def within(at: Mapping[str, Any], group: Any) -> dict[str, Box]:
         return {v.name: meet(boxes[v.name], as_box(at.get(v.name, FREE))) for v in group}
 
     bounded = (
-        Row(f"the bound on {name}", model.expression(name), *_box_of(setting, name))
-        for name in setting.bounds
-        if name not in boxes and _box_of(setting, name) != FREE
+        Row(f"the bound on {name}", model.expression(name), *as_box(box))
+        for name, box in setting.bounds.items()
+        if name not in boxes and as_box(box) != FREE
     )
     return Span(
         name=phase.name or f"phase {setting.number + 1}",
@@ -105,14 +130,45 @@ def _span(setting: Setting, result: Evaluated, chosen: Sequence[Choice]) -> Span
         boxes=boxes,
         nodes={s: within(at, model.x) for s, at in given.items()},
         inputs_at={s: within(given[s], model.u) for s in (0.0, 1.0)},
-        rows_at={s: _rows_at(model, s, at) for s, at in given.items()},
-        path=(*bounded, *result.path),
+        rows_at={s: (*_rows_at(model, s, values), *at.get(s, ())) for s, values in given.items()},
+        path=(*bounded, *(row for row in result.path if row not in softened), *highest),
         running=result.running,
-        end=result.end,
+        end=result.end + end,
         squares=result.squares,
-        links=result.links,
+        links=links,
         joins=result.joins,
+        softened=softened,
+        absolutes=result.absolutes,
     )
+
+
+Slack = tuple[float, Row, dict[str, int]]
+"""Fraction of T, soft condition there, and its violations: name -> 1 above, -1 below."""
+
+
+def _slacks(at: Mapping[float, tuple[Row, ...]]) -> Iterator[Slack]:
+    """Yield the soft conditions at fractions of T."""
+    for s, rows in at.items():
+        place = {0.0: "start", 1.0: "end"}.get(s, f"{s:g}".replace(".", "_"))
+        for k, row in enumerate(rows, 1):
+            sides = (("above", 1, row.upper), ("below", -1, row.lower))
+            names = {f"violation_{place}_{k}_{n}": side for n, side, b in sides if isfinite(b)}
+            if row.linear or row.quadratic:
+                yield s, row, names
+
+
+def _relaxed(
+    at: Mapping[float, tuple[Row, ...]], slacks: Sequence[Slack], model: Model
+) -> tuple[dict[float, list[Row]], ca.SX]:
+    """Return conditions at fractions of T, with violations as constant states, and their cost."""
+    found, cost = {s: list(rows) for s, rows in at.items()}, ca.SX(0)
+    for s, row, names in slacks:
+        violations = stacked(model.expression(name) for name in names)
+        size, off = ca.sum1(violations), ca.dot(violations, ca.DM(list(names.values())))
+        cost += row.linear * size + row.quadratic * size**2
+        e = row.expression - off
+        found[s][found[s].index(row)] = replace(row, expression=e, parts=(size,))
+    return found, cost
 
 
 def _rows_at(model: Model, fraction: float, given: Mapping[str, Any]) -> tuple[Row, ...]:
@@ -174,7 +230,7 @@ def _constant_cost(spans: Sequence[Span]) -> Iterator[str]:
     """Yield a message if the cost is constant."""
     costs, free = ca.SX(0, 1), False
     for span in spans:
-        own = ca.vertcat(span.running, span.end)
+        own = ca.vertcat(span.running, span.end, *(row.expression for row in span.absolutes))
         chosen = [v.symbol for v in span.model.p if v.name in span.chosen]
         if ca.depends_on(own, ca.vertcat(*span.symbols[1:4], *chosen)):
             return
@@ -199,10 +255,12 @@ def _start_of(
         ValueError: a start value that is not finite, or that depends on states in a range.
     """
     model, given = span.model, setting.phase.start
-    symbols, inputs = {v.name: v.symbol for v in model.x}, {v.name for v in model.u}
+    symbols = {v.name: v.symbol for v in model.x}
+    constants = symbols.keys() - {v.name for v in setting.model.x}
+    free = {*periodic, *states_of(setting.forms), *constants}
     named = {v.name: as_box(given[v.name]) for v in model.x if v.name in given}
     for v in model.x:
-        if v.name not in given and (v.name in periodic or statement.rate_name(v.name) in inputs):
+        if v.name not in given and v.name in free:
             named[v.name] = FREE
     ranged = [name for name, box in named.items() if not fixed(box)]
     for v in model.x:

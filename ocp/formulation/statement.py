@@ -1,18 +1,13 @@
-"""Fields of a problem, and the model, bounds and costs of each phase derived from them.
+"""Fields of a problem, and the model, bounds and costs of each phase derived from them."""
 
-Functions that change a model return a new one with the same symbols and names, so costs, bounds and
-outputs written for the original model remain valid.
-"""
-
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field, replace
-from functools import wraps
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass, field
 from math import inf, isfinite, sqrt
 from typing import Any, NamedTuple, TypeVar, final
 
-import casadi as ca
-
-from ocp.formulation.expressions import Cost
+from ocp.formulation.changed_models import with_forms, with_parameters, with_totals
+from ocp.formulation.expressions import Cost, Expression
+from ocp.formulation.inputs import Form, Forms, Polynomial, is_form, order_of, rate_name, states_of
 from ocp.formulation.phase import (
     Chain,
     Free,
@@ -26,12 +21,11 @@ from ocp.formulation.phase import (
     meet,
     size_of,
 )
-from symfric.foundation.parameters import Variable
-from symfric.foundation.variable import symbols_of
+from ocp.formulation.relaxed import EPS, relaxes
+from symfric.foundation import checks
 from symfric.model import Model
 
 T = TypeVar("T")
-Request = TypeVar("Request", bound=Mapping[str, Any] | Sequence[str])
 
 Duration = tuple[Sequence[int], float | Free]
 """(indices of phases, sum of their durations [s])."""
@@ -46,7 +40,9 @@ class Statement:
     _: KW_ONLY
     bounds: Ranges = field(default_factory=dict[str, Range])
     rates: Ranges = field(default_factory=dict[str, Range])
+    inputs: Forms = field(default_factory=dict[str, Form])
     path: Sequence[PathCondition] = ()
+    totals: Mapping[str, Expression] = field(default_factory=dict[str, Expression])
     choose: Mapping[str, tuple[float | None, ...]] = field(default_factory=dict[str, Any])
     periodic: Sequence[str] = ()
     scenarios: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Any])
@@ -86,9 +82,11 @@ class Setting(NamedTuple):
     Attributes:
         number: index of the phase.
         where: prefix of messages, "phase 2 'back': ".
-        model: model with `rates` applied and with the references of costs as parameters.
+        model: model with `inputs`, `rates` and `totals` applied, and with the references of costs
+            as parameters.
         bounds, p: bounds and parameters of the problem and the phase whose names the model has.
         costs: costs of the problem and of the phase.
+        forms: inputs of the model that are not constant on intervals, and their forms.
     """
 
     number: int
@@ -98,25 +96,58 @@ class Setting(NamedTuple):
     bounds: Ranges
     p: Mapping[str, float]
     costs: tuple[Cost, ...]
+    forms: Forms
+
+    @property
+    def apart(self) -> tuple[str, ...]:
+        """States of this phase that do not continue those of the previous one by default."""
+        return states_of({n: f for n, f in self.forms.items() if isinstance(f, Polynomial)})
 
 
 def settings_of(problem: Statement) -> tuple[Setting, ...]:
-    """Return the phases of `problem`; invalid rates, which `validate` reports, are omitted."""
+    """Return the phases of `problem`; invalid inputs, which `validate` reports, are omitted."""
     settings: list[Setting] = []
     for number, (where, phase) in enumerate(labelled_phases(problem)):
-        inputs = {v.name: v for v in phase.model.u}
-        taken = {*phase.model.signals, *(v.name for v in phase.model.p)}
+        model, costs = phase.model, costs_of(problem, phase)
+        forms = forms_of(problem, phase)
+        inputs = {v.name: v for v in model.u if v.name in forms}
         rates = only(problem.rates, inputs) | only(phase.rates, inputs)
-        rates = {n: r for n, r in rates.items() if is_range(r) and rate_name(n) not in taken}
-        sizes = {n: size_of(as_box(r), inputs[n].nominal) for n, r in rates.items()}
-        costs = costs_of(problem, phase)
-        model = with_rates(phase.model, sizes)
-        model = with_parameters(model, dict.fromkeys(references_of(problem, phase), ""))
+        sizes = {n: size_of(as_box(r), 0.0) for n, r in rates.items() if is_range(r)}
+        time = checks.as_number(phase.T.start if isinstance(phase.T, Free) else phase.T)
+        model = with_forms(model, forms, sizes, time if time is not None and time > 0 else 1.0)
+        extra = [*references_of(problem, phase), *[EPS] * relaxes([*problem.path, *phase.path])]
+        model = with_totals(with_parameters(model, dict.fromkeys(extra, "")), problem.totals)
         bounds = only(problem.bounds, names_of(model, problem.bounds)) | dict(phase.bounds)
-        bounds |= {rate_name(name): value for name, value in rates.items()}
+        bounds |= {rate_name(n): rates[n] for n in sizes if order_of(forms[n])}
         p = only(problem.p, [v.name for v in model.p]) | dict(phase.p)
-        settings.append(Setting(number, where, phase, model, bounds, p, costs))
+        settings.append(Setting(number, where, phase, model, bounds, p, costs, forms))
     return tuple(settings)
+
+
+def forms_of(problem: Statement, phase: Phase) -> dict[str, Form]:
+    """Return input -> form of the inputs of a phase that are not constant on intervals.
+
+    Inputs with bounded rate are linear by default. Forms that are invalid, or whose derivatives
+    have names that the model uses, are omitted.
+    """
+    inputs = [v.name for v in phase.model.u]
+    taken = {*phase.model.signals, *(v.name for v in phase.model.p)} - set(inputs)
+    forms: dict[str, Form] = dict.fromkeys([*problem.rates, *phase.rates], "linear")
+    forms |= dict(problem.inputs) | dict(phase.inputs)
+    return {
+        name: form
+        for name, form in only(forms, inputs).items()
+        if is_form(form)
+        and form != "constant"
+        and not taken & {rate_name(name, k + 1) for k in range(order_of(form))}
+    }
+
+
+def added_signals(problem: Statement, phase: Phase) -> set[str]:
+    """Return the names of the signals that `inputs`, `rates` and `totals` add to a model."""
+    forms = forms_of(problem, phase)
+    derived = {rate_name(name, k) for name, f in forms.items() for k in range(order_of(f) + 1)}
+    return derived | {*problem.totals}
 
 
 def only(values: Mapping[str, T], names: Iterable[str]) -> dict[str, T]:
@@ -189,88 +220,3 @@ def _nearby(box: tuple[float, float], value: float) -> float:
     if isfinite(low) and isfinite(high):
         return 0.5 * (low + high)
     return low if isfinite(low) else high
-
-
-def rate_name(name: str) -> str:
-    """Return the name of the rate of an input."""
-    return f"{name}_rate"
-
-
-def rebuilt(model: Model, again: Callable[[Model], Model] | None = None, **changes: Any) -> Model:
-    """Return `model` with changed fields; `again` applies the same change to its open form."""
-    if model.contacts and again is not None:
-        changes["opening"] = lambda: again(model.open)
-    if model.holonomic is not None:
-        changes |= {"ode": None, "alg": ca.SX(0, 1)}  # derived again from `holonomic`
-    return replace(model, **changes)
-
-
-def _cached(change: Callable[[Model, Request], Model]) -> Callable[[Model, Request], Model]:
-    """Return `change` with its results cached in the model; an empty request changes nothing."""
-
-    @wraps(change)
-    def changed(model: Model, request: Request) -> Model:
-        key = tuple(request.items() if isinstance(request, Mapping) else request)
-        kept = model.memory.setdefault(f"ocp {change.__name__}", {(): model})
-        if key not in kept:
-            kept[key] = change(model, request)
-        return kept[key]
-
-    return changed
-
-
-@_cached
-def with_rates(model: Model, nominal: Mapping[str, float]) -> Model:
-    """Return `model` with some inputs as states and the rates of these as inputs.
-
-        u' = u_rate
-
-    A rate that is constant on an interval makes the input continuous and linear there. The new
-    states follow those of the model; in a mechanism their rates are appended to `holonomic.rates`.
-
-    Args:
-        model: the model.
-        nominal: input -> typical magnitude of its rate.
-    """
-    states, rates = tuple(v for v in model.u if v.name in nominal), dict[str, Variable]()
-    for v in states:
-        doc, size = f"rate of {v.doc or v.name}", nominal[v.name]
-        rates[v.name] = Variable(rate_name(v.name), f"{v.unit}/s", nominal=size, doc=doc)
-    inputs = tuple(rates.get(v.name, v) for v in model.u)
-    changes = further_states(model, states, symbols_of(rates[v.name] for v in states))
-    return rebuilt(model, lambda other: with_rates(other, nominal), u=inputs, **changes)
-
-
-def further_states(model: Model, states: Sequence[Variable], rates: ca.SX) -> dict[str, Any]:
-    """Return changed fields of `model` with `states` of derivatives `rates` appended to its states.
-
-    In a mechanism the rates are appended to `holonomic.rates`. No other equation depends on the
-    new states.
-    """
-    x, mechanics = (*model.x, *states), model.holonomic
-    if mechanics is None:
-        ode = ca.SX(0, 1) if model.ode is None else ca.SX(model.ode)
-        return {"x": x, "ode": ca.vertcat(ode, rates)}
-    inner = mechanics.inner
-    if inner is not None and states:
-        inner = replace(inner, groups=(*inner.groups, symbols_of(states)))
-    together = replace(mechanics, rates=ca.vertcat(mechanics.rates, rates), inner=inner)
-    return {"x": x, "holonomic": together}
-
-
-@_cached
-def with_parameters(model: Model, units: Mapping[str, str]) -> Model:
-    """Return `model` with additional parameters (name -> unit) that its equations do not use."""
-    p = (*model.p, *(Variable(name, unit) for name, unit in units.items()))
-    return rebuilt(model, lambda other: with_parameters(other, units), p=p)
-
-
-@_cached
-def with_outputs(model: Model, names: Sequence[str]) -> Model:
-    """Return `model` with some of its details as outputs, for solutions and simulations."""
-    wanted = {name: model.further[name] for name in names if name not in model.signals}
-    others = {name: output for name, output in model.further.items() if name not in wanted}
-    outputs = {**model.outputs, **wanted}
-    return rebuilt(
-        model, lambda other: with_outputs(other, names), outputs=outputs, details=lambda: others
-    )

@@ -4,14 +4,15 @@
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from math import inf, isfinite
 from typing import Any, cast
 
 from ocp.formulation import statement
 from ocp.formulation.expressions import Cost
+from ocp.formulation.inputs import FORM, is_form, order_of, rate_name
 from ocp.formulation.phase import RANGE, Chain, Free, Phase, as_box, is_range, limits
-from ocp.formulation.statement import Statement
+from ocp.formulation.statement import Setting, Statement
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
 from symfric.foundation.variable import Variable
@@ -47,7 +48,12 @@ def type_problems(problem: Statement) -> Iterator[str]:
             hint = "give the model a duration: Phase(model, T=1.0)"
         yield str(checks.refused("phases", "a phase, such as Phase(model, T=1.0)", phases, hint))
         return
-    yield from _fields(problem, ("bounds", "rates", "choose", "p", "scenarios"), ("path",))
+    mappings = "bounds", "rates", "inputs", "choose", "p", "scenarios", "totals"
+    yield from _fields(problem, mappings, ("path",))
+    if isinstance(problem.totals, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+        for name, total in problem.totals.items():
+            what = f"totals: {checks.shown(name)}"
+            yield message(checks.function, what, total, "an integrand such as lambda s: s.force**2")
     if isinstance(problem.scenarios, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
         for name, values in problem.scenarios.items():
             yield message(_named, f"scenario {checks.shown(name)}", values)
@@ -60,16 +66,22 @@ def type_problems(problem: Statement) -> Iterator[str]:
 
 
 def _phase_fields(phase: Phase) -> Iterator[str]:
-    yield from _fields(phase, ("start", "end", "bounds", "rates", "link", "p"), ("path", "joins"))
+    mappings = "start", "end", "bounds", "rates", "inputs", "link", "p"
+    yield from _fields(phase, mappings, ("path", "joins"))
     yield message(checks.kind, "name", phase.name, str, "a text")
-    if not isinstance(phase.via, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
-        what = "states by fractions of T, such as {0.5: {'x': 1.0}}"
-        yield str(checks.refused("via", what, phase.via))
-        return
-    for fraction, values in phase.via.items():
-        if not is_number(fraction):
-            yield f"via: expected fractions of T, got {checks.shown(fraction)}"
-        yield message(_named, f"via {checks.shown(fraction)}", values)
+    of_fractions = {
+        "via": ("states by fractions of T, such as {0.5: {'x': 1.0}}", _named),
+        "at": ("conditions by fractions of T, such as {0.5: [lambda s: s.x <= 1]}", _conditions),
+    }
+    for name, (what, check) in of_fractions.items():
+        given = cast(object, getattr(phase, name))
+        if not isinstance(given, Mapping):
+            yield str(checks.refused(name, what, given))
+            continue
+        for fraction, values in cast(Mapping[Any, Any], given).items():
+            if not is_number(fraction):
+                yield f"{name}: expected fractions of T, got {checks.shown(fraction)}"
+            yield message(check, f"{name} {checks.shown(fraction)}", values)
 
 
 def _fields(
@@ -107,56 +119,79 @@ def _sums(durations: object) -> None:
 
 def input_problems(problem: Statement) -> Iterator[str]:
     """Yield messages about unknown names, invalid ranges and impossible durations."""
-    for number, (where, phase) in enumerate(statement.labelled_phases(problem)):
-        yield from (f"{where}{text}" for text in _phase(problem, number, phase) if text)
+    settings = statement.settings_of(problem)
+    for one in settings:
+        yield from (f"{one.where}{text}" for text in _phase(problem, one) if text)
     for name, count in Counter(phase.name for phase in problem.chain if phase.name).items():
         if count > 1:
             yield f"phases: expected every name once, got '{name}' {count} times"
-    yield from _for_all_phases(problem)
+    yield from _for_all_phases(problem, settings)
     yield from _choices(problem)
-    known = _parameters(problem)
+    known = list(dict.fromkeys(v.name for one in settings for v in one.model.p))
     for name, values in problem.scenarios.items():
         yield from _parameter_problems(f"scenario '{name}'", values, known)
     yield from _durations(problem)
     yield from _cost_problems(problem)
 
 
-def _phase(problem: Statement, number: int, phase: Phase) -> Iterator[str]:
-    model, inputs = phase.model, [v.name for v in phase.model.u]
+def _phase(problem: Statement, one: Setting) -> Iterator[str]:
+    phase, model, made, number = one.phase, one.phase.model, one.model, one.number
+    inputs, held = [v.name for v in model.u], [v.name for v in made.u]
     if model.ode is None:
         yield "expected an explicit model (ode), got an implicit one (residual)"
     yield _event_problem(model)
     yield duration_problem(phase.T)
-    rated = [n for n in inputs if n in phase.rates or n in problem.rates]
     yield _unknown("rates", phase.rates, inputs, _not_rated(model, phase.rates))
-    taken = {*model.signals, *(v.name for v in model.p)} & set(map(statement.rate_name, rated))
-    if taken:
-        yield f"rates: expected new names for the rates, got {', '.join(sorted(taken))}"
+    yield _unknown("inputs", phase.inputs, inputs)
+    yield from _form_problems(problem, one)
     groups: list[tuple[str, Mapping[str, Any], list[str]]] = [
         ("start", phase.start, []),
-        *((f"via {fraction:g}", values, inputs) for fraction, values in phase.via.items()),
+        *((f"via {fraction:g}", values, held) for fraction, values in phase.via.items()),
         ("end", phase.end, []),
         ("bounds", phase.bounds, []),
     ]
     for where, values, excluded in groups:
-        known = [n for n in statement.names_of(model, values) if n not in excluded or n in rated]
-        yield _unknown(where, values, known, _no_signal(model, values, excluded))
+        known = [n for n in statement.names_of(made, values) if n not in excluded]
+        yield _unknown(where, values, known, _no_signal(made, values, excluded))
         yield from range_problems(where, values)
     yield from _rate_problems(phase.rates)
     for fraction in phase.via:
         if not 0 < fraction < 1:
             yield f"via: expected fractions of T between 0 and 1, got {fraction:g}"
-    known = [*(v.name for v in model.p), *statement.references_of(problem, phase)]
-    yield from _parameter_problems("p", phase.p, known)
+    for fraction in phase.at:
+        if not 0 <= fraction <= 1:
+            yield f"at: expected fractions of T from 0 to 1, got {fraction:g}"
+    yield from _parameter_problems("p", phase.p, [v.name for v in made.p])
     if number == 0 and (phase.link or phase.joins):
         what = "link" if phase.link else "joins"
         yield f"{what}: expected none in the first phase, which has no previous one"
-    states = [*(v.name for v in model.x), *rated]
+    states = [v.name for v in made.x]
     yield _unknown("link", phase.link, states, "only states are continued")
     for name, start in phase.link.items():
         if start is not None and not isinstance(start, str) and not callable(start):
             what = f"{name} as a function such as lambda before: -0.5 * before.v, a name, or None"
             yield str(checks.refused("link", what, start, "numbers belong in start"))
+
+
+def _form_problems(problem: Statement, one: Setting) -> Iterator[str]:
+    """Yield messages about forms of inputs, and about names of derivatives and totals."""
+    model, forms = one.phase.model, dict(problem.inputs) | dict(one.phase.inputs)
+    taken = {*model.signals, *(v.name for v in model.p)}
+    rated = {*problem.rates, *one.phase.rates} & {v.name for v in model.u}
+    for name, form in statement.only(forms, [v.name for v in model.u]).items():
+        if not is_form(form):
+            yield str(checks.refused("inputs", f"{name} as {FORM}", form))
+        elif name in rated and not order_of(form):
+            yield (
+                f"rates: expected {name} to be 'linear', 'cubic' or Polynomial(degree >= 1), got "
+                f"{checks.shown(form)}, whose rate is not bounded"
+            )
+        rated |= {name}
+    derived = {rate_name(n, k) for n in rated - {*one.forms} for k in (1, 2, 3)}
+    if both := taken & derived:
+        yield f"rates: expected new names for the rates, got {', '.join(sorted(both))}"
+    if both := taken & {*problem.totals}:
+        yield f"totals: expected new names, got {', '.join(sorted(both))}"
 
 
 def _event_problem(model: Model) -> str:
@@ -229,34 +264,24 @@ def _parameter_problems(where: str, values: Mapping[str, Any], known: list[str])
         yield message(checks.number, f"{where}: {name}", value)
 
 
-def _parameters(problem: Statement) -> list[str]:
-    """Return the parameters of all models, and the references of costs."""
-    names = dict[str, None]()
-    for phase in problem.chain:
-        names |= dict.fromkeys(v.name for v in phase.model.p)
-        names |= dict.fromkeys(statement.references_of(problem, phase))
-    return list(names)
-
-
-def _for_all_phases(problem: Statement) -> Iterator[str]:
+def _for_all_phases(problem: Statement, settings: Sequence[Setting]) -> Iterator[str]:
     """Yield messages about fields of the problem whose names must exist in some phase."""
-    models = [phase.model for phase in problem.chain]
+    models, made = [phase.model for phase in problem.chain], [one.model for one in settings]
     inputs = list(dict.fromkeys(v.name for model in models for v in model.u))
-    signals = list(dict.fromkeys(n for m in models for n in statement.names_of(m, problem.bounds)))
+    signals = list(dict.fromkeys(n for m in made for n in statement.names_of(m, problem.bounds)))
     hint = next((h for m in models if (h := _no_signal(m, problem.bounds, ()))), "")
     yield _unknown("bounds", problem.bounds, signals, hint)
     yield from range_problems("bounds", problem.bounds)
     hint = next((h for m in models if (h := _not_rated(m, problem.rates))), "")
     yield _unknown("rates", problem.rates, inputs, hint)
     yield from _rate_problems(problem.rates)
-    yield from _parameter_problems("p", problem.p, _parameters(problem))
-    yield _unknown("shared", problem.shared or (), inputs, "only inputs are shared")
-    first, last = (
-        {*(v.name for v in p.model.x), *p.rates, *(set(problem.rates) & set(inputs))}
-        for p in (problem.chain[0], problem.chain[-1])
+    yield _unknown("inputs", problem.inputs, inputs)
+    yield from _parameter_problems(
+        "p", problem.p, list(dict.fromkeys(v.name for m in made for v in m.p))
     )
-    states = [v.name for v in models[0].x]
-    both = [name for name in (*states, *inputs) if name in first & last]
+    yield _unknown("shared", problem.shared or (), inputs, "only inputs are shared")
+    last = {v.name for v in made[-1].x}
+    both = [v.name for v in made[0].x if v.name in last]
     yield _unknown("periodic", problem.periodic, both, "only states are periodic")
 
 

@@ -255,7 +255,14 @@ def reassemble(
 
 
 def _span_points(span: Span, arcs: Sequence[tuple[Span, SpanPoints, Array]]) -> SpanPoints:
-    """Return the points of one phase of the user's problem, with zeros for absent variables."""
+    """Return the points of one phase of the user's problem.
+
+    Variables that no arc has are zero. States that only some arcs have, the violations of soft
+    conditions at the ends, are constant.
+    """
+    held = {
+        v.name: row[-1] for one, p, _ in arcs for v, row in zip(one.model.x, p.nodes, strict=True)
+    }
 
     def joined(letter: str, name: str) -> Array:
         parts: list[Array] = []
@@ -263,8 +270,9 @@ def _span_points(span: Span, arcs: Sequence[tuple[Span, SpanPoints, Array]]) -> 
         for k, (own, points, _) in enumerate(arcs):
             values: Array = getattr(points, name)[:, int(k > 0 and name == "nodes") :]
             names = [v.name for v in getattr(own.model, letter)]
-            rows, zero = dict(zip(names, values, strict=True)), np.zeros(values.shape[1])
-            parts.append(np.array([rows.get(v.name, zero) for v in wanted]).reshape(-1, zero.size))
+            rows, count = dict(zip(names, values, strict=True)), values.shape[1]
+            filled = (rows.get(v.name, np.full(count, held.get(v.name, 0.0))) for v in wanted)
+            parts.append(np.array([*filled]).reshape(-1, count))
         return np.hstack(parts)
 
     groups = (("x", "nodes"), ("x", "inner"), ("z", "z"), ("u", "u"))
@@ -275,7 +283,7 @@ def _mesh(
     problem: Problem, number: int, legs: Sequence[Leg], arcs: Sequence[tuple[float, Array]]
 ) -> Array:
     """Return the mesh of a phase as fractions of its duration, with its via points as nodes."""
-    fractions = [0.0, *sorted(problem.chain[number].via), 1.0]
+    fractions = [0.0, *problem.chain[number].stops, 1.0]
     parts = [np.zeros(1)]
     first = 0
     for leg, low, high in zip(legs, fractions[:-1], fractions[1:], strict=True):

@@ -32,9 +32,11 @@ from typing import Any, NamedTuple, final
 
 import casadi as ca
 
+from ocp.formulation.changed_models import further_states, rebuilt
+from ocp.formulation.inputs import states_of
 from ocp.formulation.phase import Chain, Free, Phase, Range, Span, Start, limits, meet
 from ocp.formulation.problem import Problem
-from ocp.formulation.statement import Duration, further_states, only, rebuilt
+from ocp.formulation.statement import Duration, added_signals, forms_of, only
 from ocp.friction.mode_models import SIDES, excess, holding, mode_model
 from ocp.friction.sequence import Arc, Leg, Legs
 from ocp.friction.smooth_models import sticking
@@ -96,13 +98,14 @@ def in_arcs(rules: Rules, legs: Legs) -> Problem:
     """
     problem, fade = rules.problem, FADE * sum(leg.duration for leg in legs)
     phases = [arc.in_modes(fade) for arc in arcs_among(rules, legs)]
-    states = {v.name for v in phases[0].model.x}
+    added = {name for phase in phases for name in added_signals(problem, phase)}
+    states = added | {v.name for v in phases[0].model.x}
     signals = {name for phase in phases for name in (*phase.model.signals, *phase.model.further)}
     parameters = {v.name for phase in phases for v in phase.model.p}
     return replace(
         problem,
         phases=Chain(tuple(phases)),
-        bounds=only(problem.bounds, signals),
+        bounds=only(problem.bounds, signals | added),
         p=only(problem.p, parameters),
         choose=only(problem.choose, parameters),
         durations=_durations(problem, legs),
@@ -123,8 +126,8 @@ def _durations(problem: Problem, legs: Legs) -> tuple[Duration, ...]:
         if isinstance(phase.T, Free):
             if len(numbers) > 1:
                 sums.append((numbers, Free(phase.T.lower, phase.T.upper)))
-        elif len(numbers) > 1 or phase.via:
-            fractions = [0.0, *sorted(phase.via), 1.0]
+        elif len(numbers) > 1 or phase.stops:
+            fractions = [0.0, *phase.stops, 1.0]
             share = fractions[leg.part + 1] - fractions[leg.part]
             sums.append((numbers, share * phase.T))
     for phases, total in problem.durations:
@@ -189,7 +192,7 @@ class ArcPhase:
     @cached_property
     def inputs(self) -> ca.SX:
         """Inputs that may jump, which have no bounded rate."""
-        limited = {*self.rules.problem.rates, *self.base.rates}
+        limited = forms_of(self.rules.problem, self.base)
         return stacked(v.symbol for v in self.base.model.u if v.name not in limited)
 
     def jumps(self, name: str, side: int) -> bool:
@@ -282,8 +285,13 @@ class ArcPhase:
         start: Ranges = dict(base.start) if self.opens else {}
         link: dict[str, Start] = dict(base.link) if self.opens else {}
         end: Ranges = dict(base.end) if self.closes else {}
+        ends = [s for s, here in ((0.0, self.opens), (1.0, self.closes)) if here and s in base.at]
+        at = {s: base.at[s] for s in ends}
         if self.arc is self.leg.arcs[-1] and not self.closes:
-            end = dict(base.via[sorted(base.via)[self.leg.part]])
+            stop = base.stops[self.leg.part]
+            end, at = dict(base.via.get(stop, {})), at | {1.0: base.at.get(stop, ())}
+        if not self.opens:  # polynomials cover all arcs of a phase
+            link |= {name: name for name in states_of(forms_of(self.rules.problem, base))}
         if self.leaving:
             start, end = start | {LEFT: (0.0, None)}, end | {LEFT: 0.0}
             link |= {LEFT: None} if self.number else {}
@@ -312,7 +320,7 @@ class ArcPhase:
                 start |= {f"{name}{STOPPED}": (0.0, None)} if name in self.stopped else {}
             if name in self.released:
                 start[f"{name}{PULLED}"] = self._pull(name)
-        signals = {*model.signals, *model.further}
+        signals = {*model.signals, *model.further, *added_signals(self.rules.problem, base)}
         return replace(
             base,
             model=model,
@@ -320,6 +328,7 @@ class ArcPhase:
             start=only(start, signals),
             end=only(end, signals),
             via={},
+            at=at,
             bounds=only(bounds, signals),
             link=only(link, signals),
             joins=base.joins if self.opens else (),

@@ -21,9 +21,9 @@ from typing import Any, NamedTuple, final
 import casadi as ca
 import numpy as np
 
+from ocp.formulation.changed_models import further_states, rebuilt
 from ocp.formulation.expressions import arguments
 from ocp.formulation.phase import Array
-from ocp.formulation.statement import further_states, rebuilt
 from ocp.friction.mode_models import SIDES, loops_of, mode_model, nominal_load, slip_change
 from ocp.friction.sequence import KINDS
 from ocp.friction.smooth_models import sticking

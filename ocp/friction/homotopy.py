@@ -36,6 +36,7 @@ from ocp.friction.steps import Step, finalists, least, same_cost
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
 from ocp.solving.one_solve import Solver
+from ocp.solving.optimum import Optimum
 from ocp.solving.prepared import Option, Prepared, Supervisor
 from ocp.solving.solution import Solution
 from ocp.solving.starts import STARTS, Start, resample, start_of, starts_around
@@ -352,7 +353,8 @@ class _Path:
         widths = widths_at(self.user, self.scales, step.level)
         problem = replace(self.problem, p=dict(self.problem.p) | widths)
         statistics = reduce(SolverStatistics.then, self.solves)
-        solution = replace(step.solution, problem=problem, statistics=statistics)
+        optimum = Optimum(step.transcription, step.outcome.iterate, step.values)
+        solution = replace(step.solution, problem=problem, statistics=statistics, optimum=optimum)
         return Sharp(solution, step.level, self.scales, steady, step.error)
 
 

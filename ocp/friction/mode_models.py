@@ -34,8 +34,8 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from ocp.formulation.changed_models import rebuilt
 from ocp.formulation.expressions import arguments
-from ocp.formulation.statement import rebuilt
 from ocp.friction.smooth_models import sticking
 from symfric.foundation import checks
 from symfric.foundation.graph import coupled

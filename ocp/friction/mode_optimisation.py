@@ -30,6 +30,7 @@ from ocp.checking.mesh_refinement import MeshErrors, refined
 from ocp.checking.resimulate import arcs_of
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
+from ocp.formulation.relaxed import Soft
 from ocp.friction.arc_solution import ModeSolver, SolvedSequence, StoppedError, reassemble
 from ocp.friction.arcs import MARGIN, Rules
 from ocp.friction.mode_models import restless
@@ -268,7 +269,12 @@ def refusal(problem: Problem) -> str:
             "expected one motion, got scenarios, whose contacts change their modes at different "
             "times under one control"
         )
-    if any(phase.via and not isinstance(phase.T, float | int) for phase in problem.chain):
+    if any(phase.cost is not None and phase.cost.peaks for phase in problem.chain):
+        return "expected largest(...) in the cost of the problem, got it in the cost of a phase"
+    inside = [c for phase in problem.chain for s in phase.stops for c in phase.at.get(s, ())]
+    if any(isinstance(condition, Soft) for condition in inside):
+        return "expected soft conditions at the ends of phases or over them, got one between"
+    if any(phase.stops and not isinstance(phase.T, float | int) for phase in problem.chain):
         return "expected phases of fixed duration with via points; split them at the via points"
     if reasons := [text for phase in problem.chain if (text := restless(phase.model))]:
         return reasons[0]

@@ -131,7 +131,7 @@ class Reader:
         legs: list[Leg] = []
         phases = zip(self.problem.chain, self.known.motion.phases, strict=True)
         for number, (phase, when) in enumerate(phases):
-            times = [when.begin + when.T * s for s in (0.0, *sorted(phase.via), 1.0)]
+            times = [when.begin + when.T * s for s in (0.0, *phase.stops, 1.0)]
             legs += [cut(tracks, (number, k), *ends) for k, ends in enumerate(pairwise(times))]
         return tuple(legs)
 

@@ -270,6 +270,15 @@ def _checked(problem: Problem, step: float) -> tuple[Span, int]:
     held = sorted({n for at in span.inputs_at.values() for n in at if at[n] != span.boxes.get(n)})
     if held:
         problems.append(f"expected no values of inputs at the ends, got {', '.join(held)}")
+    kinds = {
+        "absolute(...)": span.absolutes,
+        "soft conditions": span.softened,
+        "totals": problem.totals,
+        "largest(...) or complementary(...)": [row for row in span.path if row.parts],
+        "soft ends": [row for rows in span.rows_at.values() for row in rows if row.parts],
+    }
+    if unable := [kind for kind, found in kinds.items() if found]:
+        problems.append(f"expected none of {', '.join(kinds)}, got {', '.join(unable)}")
     costs = (problem.cost, problem.chain[0].cost)
     if not any(cost and (cost.squares or cost.running or cost.end) for cost in costs):
         problems.append("expected a cost, such as track(name, reference, weight), got none")

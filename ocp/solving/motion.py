@@ -1,8 +1,9 @@
 """Motions as named signals over time, and their values at any time."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any, NamedTuple, final
 
 import numpy as np
@@ -17,6 +18,8 @@ from symfric.foundation.storable import agree
 
 SAME = 1e-6
 """Difference, in multiples of the nominal value, up to which a state is continuous at a joint."""
+SAME_TIME = 1e-9
+"""Difference of equal times, relative to the total duration."""
 
 
 @final
@@ -91,6 +94,14 @@ class Motion:
         """Total duration of all phases [s]."""
         return self.phases[-1].end - self.phases[0].begin
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return times and signals as plain data, with None for numbers that are not finite."""
+        signals = {
+            name: [v if isfinite(v) else None for v in row.tolist()]
+            for name, row in self.signals.items()
+        }
+        return {"scenario": self.name, "t": self.t.tolist(), "signals": signals}
+
     def __getitem__(self, name: str) -> Array:
         if name == "t":
             return self.t
@@ -133,24 +144,16 @@ def _motion(
     spans, own = [problem.spans[k] for k in numbers], [points.spans[k] for k in numbers]
     pieces: list[_Piece] = []
     phases: list[Stretch] = []
-    ends: list[int] = []
     for k, span in enumerate(spans):
         begin = phases[-1].end if phases else 0.0
         pieces.append(_piece(span, own[k], meshes[numbers[k]], scheme, points.chosen, begin))
         phases.append(Stretch(span.name, begin, own[k].T))
-        goes_on = k + 1 < len(spans) and not _jumps(span, own[k], spans[k + 1], own[k + 1])
-        ends.append(pieces[-1].t.size - int(goes_on))
     units: dict[str, str] = {}
     for span in spans:
         units = span.model.signals | units  # the units of the first phase take precedence
     names = dict.fromkeys(name for span in spans for name in span.model.signals)
     inputs = dict.fromkeys(v.name for span in spans for v in span.model.u)
-
-    def joined(of: Callable[[_Piece], NDArray[Any]]) -> NDArray[Any]:
-        return np.concatenate([of(p)[:n] for p, n in zip(pieces, ends, strict=True)])
-
-    def signal(name: str) -> Array:
-        return joined(lambda p: p.values.get(name, np.full(p.t.size, np.nan)))
+    several = joined(spans, own, [p.values | {"": p.nodes, "t": p.t} for p in pieces])
 
     def control(name: str) -> Array:
         none = [np.full(p.edges.size - 1, np.nan) for p in pieces]
@@ -158,15 +161,40 @@ def _motion(
 
     return Motion(
         name=name,
-        t=joined(lambda p: p.t),
-        signals={name: signal(name) for name in names},
+        t=several["t"],
+        signals={name: several[name] for name in names},
         units={name: units[name] for name in names},
-        nodes=joined(lambda p: p.nodes),
+        nodes=several[""],
         t_control=np.concatenate([p.edges[:-1] for p in pieces]),
         controls={name: control(name) for name in inputs},
         phases=tuple(phases),
         spans=tuple(numbers),
     )
+
+
+def joined(
+    spans: Sequence[Span], points: Sequence[SpanPoints], values: Sequence[Mapping[str, Any]]
+) -> dict[str, NDArray[Any]]:
+    """Return values by name over consecutive phases, NaN in phases without the name.
+
+    A time at which no state jumps appears once, with the values of the later phase.
+    """
+    kept = [next(iter(own.values())).size for own in values]
+    for k in range(len(spans) - 1):
+        kept[k] -= not _jumps(spans[k], points[k], spans[k + 1], points[k + 1])
+    pairs = [*zip(values, kept, strict=True)]
+    return {
+        name: np.concatenate([v[name][:n] if name in v else np.full(n, np.nan) for v, n in pairs])
+        for name in dict.fromkeys(name for own in values for name in own)
+    }
+
+
+def at_times(motion: Motion, times: Array, series: Mapping[str, Array]) -> dict[str, Array]:
+    """Return values by name, given at `times` that include those of `motion`, at its times."""
+    if times.size == motion.t.size:
+        return dict(series)
+    at = np.searchsorted(times, motion.t + SAME_TIME * motion.T, side="right") - 1
+    return {name: row[at] for name, row in series.items()}
 
 
 def _jumps(before: Span, old: SpanPoints, after: Span, new: SpanPoints) -> bool:
@@ -177,19 +205,30 @@ def _jumps(before: Span, old: SpanPoints, after: Span, new: SpanPoints) -> bool:
     return bool((gap > SAME * after.model.nominal("x")).any())
 
 
-def _piece(
-    span: Span, points: SpanPoints, mesh: Array, scheme: Coefficients,
-    chosen: Mapping[str, float], begin: float,
-) -> _Piece:  # fmt: skip
-    """Return the signals of one phase at its nodes and collocation points."""
-    model, N, d = span.model, mesh.size - 1, scheme.degree
+class Sampled(NamedTuple):
+    """Values of a phase at its nodes and collocation points in the order of time.
+
+    Attributes:
+        fractions: fractions of T, shape (n,).
+        nodes: mask of nodes of the mesh.
+        x, z, u: states, algebraic variables and inputs, shapes (nx, n), (nz, n) and (nu, n).
+    """
+
+    fractions: Array
+    nodes: NDArray[np.bool_]
+    x: Array
+    z: Array
+    u: Array
+
+
+def sampled(points: SpanPoints, mesh: Array, scheme: Coefficients) -> Sampled:
+    """Return the values of `points` at the times of a `Motion`."""
+    N, d = mesh.size - 1, scheme.degree
     inside = scheme.nodes[1:-1] if d and scheme.meets_end else scheme.nodes[1:]
     shown = inside.size
-    fractions = mesh[:-1, None] + np.diff(mesh)[:, None] * np.append(0.0, inside)
-    at = begin + points.T * np.append(fractions.ravel(), 1.0)
+    fractions = (mesh[:-1, None] + np.diff(mesh)[:, None] * np.append(0.0, inside)).ravel()
 
-    def joined(nodes: Array, inner: Array) -> Array:
-        """Return the columns of nodes and inner points in the order of time."""
+    def together(nodes: Array, inner: Array) -> Array:
         blocks = inner.reshape(nodes.shape[0], N, d)[:, :, :shown]
         held = np.concatenate([nodes[:, :-1, None], blocks], axis=2)
         return np.column_stack([held.reshape(nodes.shape[0], N * (shown + 1)), nodes[:, -1]])
@@ -199,15 +238,29 @@ def _piece(
     if d:
         blocks = points.z.reshape(points.z.shape[0], N, d)
         z = np.column_stack([blocks[:, 0, 0], blocks @ scheme.inner_ends])
-    x, z = joined(points.nodes, points.inner), joined(z, points.z)
-    held = points.u[:, np.minimum(np.arange(at.size) // (shown + 1), N - 1)]
+    at = np.arange(fractions.size + 1)
+    return Sampled(
+        np.append(fractions, 1.0),
+        at % (shown + 1) == 0,
+        together(points.nodes, points.inner),
+        together(z, points.z),
+        points.u[:, np.minimum(at // (shown + 1), N - 1)],
+    )
+
+
+def _piece(
+    span: Span, points: SpanPoints, mesh: Array, scheme: Coefficients,
+    chosen: Mapping[str, float], begin: float,
+) -> _Piece:  # fmt: skip
+    """Return the signals of one phase at its nodes and collocation points."""
+    model, at = span.model, sampled(points, mesh, scheme)
+    t, n = begin + points.T * at.fractions, at.fractions.size
     p = np.array([chosen.get(v.name, number) for v, number in zip(model.p, span.p, strict=True)])
-    signals, p = model.function("signals").map(at.size), np.tile(p[:, None], (1, at.size))
-    rows = signals(at[None, :], x, z, held, p).full()
+    signals, p = model.function("signals").map(n), np.tile(p[:, None], (1, n))
+    rows = signals(t[None, :], at.x, at.z, at.u, p).full()
     values = dict(zip(model.signals, rows, strict=True))
     controls = {v.name: row for v, row in zip(model.u, points.u, strict=True)}
-    nodes = np.arange(at.size) % (shown + 1) == 0
-    return _Piece(at, nodes, values, begin + points.T * mesh, controls)
+    return _Piece(t, at.nodes, values, begin + points.T * mesh, controls)
 
 
 class SpanMotion(NamedTuple):
@@ -287,7 +340,7 @@ def structure_of(problem: Problem | Posed, scheme: Scheme) -> str:
     def described(span: Span) -> list[Any]:
         groups = [[v.name for v in group] for group in (span.model.x, span.model.z, span.model.u)]
         rows = [[s, [row.name for row in rows]] for s, rows in span.rows_at.items()]
-        names = [[row.name for row in part] for part in (span.path, span.joins)]
+        names = [[row.name for row in part] for part in (span.path, span.joins, span.penalised)]
         states, fixed = [link.state for link in span.links], isinstance(span.T, float | int)
         return [span.scenario, span.phase, fixed, groups, names, rows, states]
 

@@ -11,6 +11,7 @@ import numpy as np
 from ocp.formulation.phase import Array, Span
 from ocp.solving.methods import Fatrop, Ipopt, Sqp
 from ocp.solving.motion import motions_of
+from ocp.solving.optimum import Optimum
 from ocp.solving.solution import Solution
 from ocp.transcription.program import Outcome
 from ocp.transcription.transcribe import Transcription
@@ -64,6 +65,7 @@ class Solved:
             points=points,
             iterate=outcome.iterate,
             cause=outcome.cause,
+            optimum=Optimum(made, outcome.iterate, made.program.values),
         )
 
 

@@ -1,18 +1,23 @@
 """Figures of optimal motions: optimised points and simulated motion."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import astuple
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from ocp.formulation.phase import Span
+from ocp.formulation.problem import Problem
 from ocp.solving.motion import Motion, Stretch
+from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
+from symfric.foundation.parameters import check_names
+from symfric.foundation.status import Status
 from symfric.foundation.style import Line, colour, line
 from symfric.results.trajectory import Trajectory
 
@@ -45,6 +50,88 @@ class Drawn(NamedTuple):
     motion: Motion
     runs: Sequence[Trajectory]
     ending: str
+
+
+class Plotted(Protocol):
+    """Attributes of a `Solution` that a plot shows."""
+
+    @property
+    def problem(self) -> Problem:
+        """The solved problem."""
+        ...
+
+    @property
+    def status(self) -> Status:
+        """Status of the solution."""
+        ...
+
+    @property
+    def cost(self) -> float:
+        """Cost J."""
+        ...
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """Motion of each scenario."""
+        ...
+
+    @property
+    def trajectories(self) -> Sequence[Trajectory]:
+        """Re-simulated motion of each phase."""
+        ...
+
+    @property
+    def verified(self) -> bool:
+        """True if the re-simulated motion satisfies all conditions."""
+        ...
+
+    @property
+    def modes(self) -> Mapping[str, Sequence[Any]]:
+        """Contact -> its modes in order."""
+        ...
+
+
+def plot_solutions(
+    solutions: Mapping[str, Plotted],
+    names: Sequence[str] = (),
+    path: str | Path | None = None,
+) -> Figure:
+    """Plot signals of one or several optimal motions over time, one panel each.
+
+    Circles are optimised nodes of the mesh. Lines are the simulated motion under the same control,
+    or the optimised motion without a simulation. Inputs are steps. Thin vertical lines separate
+    phases. For a single solution, bounds are dashed lines, prescribed values and ranges are crosses
+    and bars, and shaded bands show the modes of each contact.
+
+    Args:
+        solutions: legend entry -> solution; each scenario is a separate motion.
+        names: signals to show, by default all signals common to the solutions.
+        path: image file; its extension selects the format.
+
+    Raises:
+        ValueError: no solution, an unknown signal, or an unsupported file extension.
+    """
+    if not solutions:
+        raise checks.refused("plot", "at least one solution", solutions)
+    first = next(iter(solutions.values()))
+    shared = [
+        n
+        for n in first.motions[0].signals
+        if all(n in s.motions[0].signals for s in solutions.values())
+    ]
+    check_names(f"plot of '{first.problem.name}'", names, shared)
+    drawn: list[Drawn] = []
+    for label, one in solutions.items():
+        status = "" if one.status.ok else f", {one.status.name.lower().replace('_', ' ')}"
+        status = ", verified" * one.verified + status
+        for motion in one.motions:
+            ending = f"T = {motion.T:.4g} s, J = {one.cost:.5g}{status}"
+            runs = [run for k, run in enumerate(one.trajectories) if k in motion.spans]
+            drawn.append(Drawn(f"{label} {motion.name}".strip(), motion, runs, ending))
+    alone = len(solutions) == 1
+    spans = [first.problem.spans[i] for i in first.motions[0].spans] if alone else []
+    modes = {name: [*map(astuple, each)] for name, each in first.modes.items()} if alone else {}
+    return plot_motions(drawn, list(names) or shared, spans, modes, path)
 
 
 def plot_motions(

@@ -1,8 +1,8 @@
 """Result of an optimal control problem: named signals, with plots, tables and files."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, astuple, dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -11,12 +11,15 @@ import numpy as np
 
 from ocp.formulation.phase import Array, Free
 from ocp.formulation.problem import Posed, Problem, posed
-from ocp.solving.motion import Motion, Stretch
+from ocp.solving.active import ActiveConditions, active_conditions, in_words
+from ocp.solving.motion import Motion, Stretch, at_times
+from ocp.solving.optimum import Optimum
+from ocp.solving.penalties import Penalty, penalties_of
 from ocp.solving.verification import Verification
 from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.unknowns import Points
-from symfric.foundation import checks, packed
+from symfric.foundation import packed
 from symfric.foundation.files import write_table, write_text
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Shown
@@ -26,6 +29,9 @@ from symfric.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from ocp.solving.linearised import Linearised
+    from ocp.solving.sensitivity import Condition, Sensitivity
 
 
 AT_BOUND = 1e-5
@@ -67,6 +73,8 @@ class Solution(packed.Portable):
         modes: contact -> its modes in order; empty if friction was not solved by modes.
         verification: result of the re-simulation; None without verification.
         cause: exception in `progress` that stopped the solver, if any.
+        optimum: the program with its multipliers; that of the arcs for a motion by modes. None
+            after loading from a file.
     """
 
     problem: Problem = field(metadata={"packed": Posed})
@@ -83,6 +91,7 @@ class Solution(packed.Portable):
     modes: Mapping[str, tuple[Mode, ...]] = field(default_factory=dict[str, tuple[Mode, ...]])
     verification: Verification | None = None
     cause: BaseException | None = None
+    optimum: Optimum | None = None
 
     def __repr__(self) -> str:
         known = f", {'not ' * (not self.verified)}verified"
@@ -106,8 +115,11 @@ class Solution(packed.Portable):
             least = span.T.lower if isinstance(span.T, Free) else 0.0
             if phase.T - least <= AT_BOUND * least:
                 lines.append(f"{phase.name}: T is at its lower bound, {least:g} s")
+        lines += [f"{name}: {penalty}" for name, penalty in self.soft.items()]
         if self.chosen:
             lines.append("chosen: " + ", ".join(f"{n} = {v:.6g}" for n, v in self.chosen.items()))
+        if self.optimum is not None and self.ok:
+            lines += in_words(self.optimum, self.signals)
         for contact, modes in self.modes.items():
             listed = ", ".join(f"{m.kind} {m.begin:.4g} ... {m.end:.4g} s" for m in modes)
             lines.append(f"{contact}: {listed}")
@@ -184,6 +196,11 @@ class Solution(packed.Portable):
         return self.motions[0].phases
 
     @property
+    def soft(self) -> dict[str, Penalty]:
+        """Soft condition -> its cost and its largest violation."""
+        return penalties_of(self.problem, self.scheme, self.meshes, self.points)
+
+    @property
     def iterations(self) -> int:
         """Total number of iterations of all solves."""
         return self.statistics.iterations
@@ -199,6 +216,83 @@ class Solution(packed.Portable):
         """Input -> values, shape (n,)."""
         return {name: self.signals[name] for name in self.controls}
 
+    @property
+    def costates(self) -> dict[str, Array]:
+        """State -> costate [cost/unit of the state] at the times `t`, shape (n,).
+
+        The costate is the derivative of the optimal cost by the state at that time: at the start,
+        by the start value. Where it jumps, it is the limit after the time. A motion by modes has no
+        states of laws.
+
+        Raises:
+            ValueError: the solution is not optimal, or was loaded from a file.
+        """
+        found = self._linearised("costates").optimum
+        series = found.over_time(found.costates)
+        series = at_times(self.motions[0], series.pop("t"), series)
+        return {name: row for name, row in series.items() if name in self.signals}
+
+    @property
+    def hamiltonian(self) -> Array:
+        """H = L + costate' x' + dE/dt [cost/s] at the times `t`, shape (n,), with end costs E.
+
+        It is constant if no function contains the time, and zero if the duration is free. It jumps
+        at via points, and slightly because inputs are constant on intervals.
+
+        Raises:
+            ValueError: as for `costates`, or shooting with a mechanism or algebraic variables.
+        """
+        found = self._linearised("hamiltonian").optimum
+        series = found.over_time(found.hamiltonians, "H")
+        return at_times(self.motions[0], series.pop("t"), series)["H"]
+
+    def active(self) -> ActiveConditions:
+        """Return the conditions that hold with equality, with their times and multipliers.
+
+        A multiplier is the derivative of the optimal cost by the value. In a motion by modes,
+        phases are the arcs between changes of mode.
+
+        Raises:
+            ValueError: as for `costates`.
+        """
+        return active_conditions(self._linearised("active").optimum)
+
+    def sensitivity(self, name: str) -> "Sensitivity":
+        """Return derivatives of cost, motion, durations and chosen parameters by one number.
+
+        The active conditions and the modes of contacts remain the same.
+
+        Args:
+            name: a parameter of the model that is not chosen; "T", a given duration ("T of out" if
+                there are several phases); a prescribed value, such as "x at the end"; or a bound,
+                such as "upper bound on force".
+
+        Raises:
+            ValueError: an unknown name, derivatives that are not finite, or as for `costates`.
+        """
+        return self._linearised("sensitivity").sensitivity(name, self.motions[0])
+
+    @property
+    def condition(self) -> "Condition":
+        """Degrees of freedom, second-order conditions and condition number of the optimum.
+
+        Raises:
+            ValueError: as for `costates`.
+        """
+        return self._linearised("condition").condition
+
+    def _linearised(self, what: str) -> "Linearised":
+        """Return the optimality conditions for the property `what`."""
+        from ocp.solving.polish import polished  # noqa: PLC0415  (loads scipy.sparse)
+
+        if self.optimum is None or self.status.stopped:
+            got = "one from a file" if self.optimum is None else self.status.name
+            raise ValueError(
+                f"solution of '{self.problem.name}': {what}: expected an optimal solution of this "
+                f"session, got {got}; solve the problem with this solution as guess"
+            )
+        return polished(self.optimum)
+
     def save(self, path: str | Path) -> None:
         """Write the solution to a file, which `ocp.load` reads without loss.
 
@@ -213,7 +307,8 @@ class Solution(packed.Portable):
 
     def to_pack(self) -> dict[str, Any]:
         """Return the fields for a file, with the problem in its resolved form."""
-        return packed.state_of(self) | {"problem": posed(self.problem), "cause": None}
+        none = dict.fromkeys(("cause", "optimum"))
+        return packed.state_of(self) | none | {"problem": posed(self.problem)}
 
     def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
         """Plot signals over time, one panel each: optimised points and the re-simulated motion.
@@ -222,6 +317,8 @@ class Solution(packed.Portable):
             names: signals to show, by default all.
             path: image file; its extension selects the format.
         """
+        from ocp.solving.picture import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
+
         return plot_solutions({self.problem.name: self}, names, path)
 
     def to_csv(self, path: str | Path) -> None:
@@ -264,23 +361,14 @@ class Solution(packed.Portable):
             "T": self.T,
             "cost": self.cost if isfinite(self.cost) else None,
             "chosen": dict(self.chosen),
+            "soft": {name: asdict(penalty) for name, penalty in self.soft.items()},
             "phases": [asdict(phase) for phase in self.phases],
             "modes": {name: [asdict(m) for m in modes] for name, modes in self.modes.items()},
             "verified": self.verified,
             "verification": None if self.verification is None else self.verification.to_dict(),
             "statistics": asdict(self.statistics),
             "units": {"t": "s", **self.units},
-            "motions": [
-                {
-                    "scenario": motion.name,
-                    "t": motion.t.tolist(),
-                    "signals": {
-                        name: [v if isfinite(v) else None for v in row.tolist()]
-                        for name, row in motion.signals.items()
-                    },
-                }
-                for motion in self.motions
-            ],
+            "motions": [motion.to_dict() for motion in self.motions],
         }
 
     def to_json(self, path: str | Path) -> None:
@@ -291,47 +379,6 @@ class Solution(packed.Portable):
 def with_sentence(solution: Solution, sentence: str) -> Solution:
     """Return `solution` with `sentence` appended to its message."""
     return replace(solution, message=f"{solution.message} {sentence}".rstrip())
-
-
-def plot_solutions(
-    solutions: Mapping[str, Solution],
-    names: Sequence[str] = (),
-    path: str | Path | None = None,
-) -> "Figure":
-    """Plot signals of one or several optimal motions over time, one panel each.
-
-    Circles are optimised nodes of the mesh. Lines are the simulated motion under the same control,
-    or the optimised motion without a simulation. Inputs are steps. Thin vertical lines separate
-    phases. For a single solution, bounds are dashed lines, prescribed values and ranges are crosses
-    and bars, and shaded bands show the modes of each contact.
-
-    Args:
-        solutions: legend entry -> solution; each scenario is a separate motion.
-        names: signals to show, by default all signals common to the solutions.
-        path: image file; its extension selects the format.
-
-    Raises:
-        ValueError: no solution, an unknown signal, or an unsupported file extension.
-    """
-    from ocp.solving.picture import Drawn, plot_motions  # noqa: PLC0415  (matplotlib is slow)
-
-    if not solutions:
-        raise checks.refused("plot", "at least one solution", solutions)
-    first = next(iter(solutions.values()))
-    shared = [n for n in first.signals if all(n in s.signals for s in solutions.values())]
-    check_names(f"plot of '{first.problem.name}'", names, shared)
-    drawn: list[Drawn] = []
-    for label, one in solutions.items():
-        status = "" if one.ok else f", {one.status.name.lower().replace('_', ' ')}"
-        status = ", verified" * one.verified + status
-        for motion in one.motions:
-            ending = f"T = {motion.T:.4g} s, J = {one.cost:.5g}{status}"
-            runs = [run for k, run in enumerate(one.trajectories) if k in motion.spans]
-            drawn.append(Drawn(f"{label} {motion.name}".strip(), motion, runs, ending))
-    alone = len(solutions) == 1
-    spans = [first.problem.spans[i] for i in first.motions[0].spans] if alone else []
-    modes = {name: [*map(astuple, each)] for name, each in first.modes.items()} if alone else {}
-    return plot_motions(drawn, list(names) or shared, spans, modes, path)
 
 
 SOLUTION = Format("symfric ocp solution", 3, "ocp.load", "a saved solution", Solution)

@@ -210,7 +210,7 @@ class Closing(NamedTuple):
         columns = own.ends(grid.scheme), own.z[:, d - 1 :: d], own.u
         return self.local.piece(
             grid, gap.rows, self.correction, columns, (gap.interval, gap.offset), gap.order,
-            extra=[own.extra], linear=gap.linear,
+            extra=[own.extra[: 2 * self.m]], linear=gap.linear,
         )  # fmt: skip
 
     def pieces(self, grid: Grid) -> Iterator[Piece]:

@@ -78,17 +78,17 @@ def _sum(columns: Indices, weights: Array) -> Columns:
     return columns[:, kept, None], factors[:, :, None]
 
 
-def at_starts(local: Local, rows: Sequence[Row]) -> Maker:
-    """Return conditions at the starts of all intervals of a phase except the first one.
+def at_starts(local: Local, rows: Sequence[Row], first: int) -> Maker:
+    """Return conditions at the starts of all intervals of a phase from the interval `first` on.
 
-    Inputs are constant on intervals, so expressions with inputs jump there. Conditions at the start
-    of the phase cover the first interval.
+    Inputs are constant on intervals, so expressions with inputs jump there, and no collocation
+    point is at a start. Algebraic variables are those of the first collocation point.
     """
     made = _node_block(local, stacked(row.expression / row.nominal for row in rows))
 
     def piece(grid: Grid) -> Piece | None:
         span = grid.layout.spans[local.number]
-        at = np.arange(1, span.intervals)
+        at = np.arange(first, span.intervals)
         if not at.size:
             return None
         columns = span.nodes[:, at], span.z[:, at * grid.scheme.degree], span.u[:, at]
@@ -96,6 +96,13 @@ def at_starts(local: Local, rows: Sequence[Row]) -> Maker:
         return local.piece(grid, Rows.of(rows), made, columns, (at, np.zeros(at.size)), order)
 
     return piece
+
+
+def jumping(span: Span) -> list[Row]:
+    """Return the path conditions that jump with the inputs and need no algebraic variables."""
+    u, z = span.model.vector("u"), span.model.vector("z")
+    rows = [row for row in span.path if ca.depends_on(row.expression, u)]
+    return [row for row in rows if not (z.numel() and ca.depends_on(row.expression, z))]
 
 
 def _knows_inside(span: Span, expression: ca.SX) -> bool:

@@ -9,6 +9,10 @@ polynomial, so neither the equations nor their derivatives invert a mass matrix:
 
     0 = h v - q'(s_j),   0 = h (M(q) a + phi_q' lam - Q),   0 = phi_q a + ...,   0 = h y' - y'(s_j)
 
+Path conditions with a penalty have their violations as further unknowns s >= 0 of the point,
+
+    lower <= e - s_above + s_below <= upper,   share of the cost += linear s + quadratic s^2
+
 All rows are divided by nominal values. Slopes of the polynomials are linear in the unknowns. In
 multiple shooting each interval consists of a few steps of an integrator,
 
@@ -26,8 +30,8 @@ from typing import Any, NamedTuple, final
 import casadi as ca
 import numpy as np
 
+from ocp.formulation.changed_models import further_states, rebuilt
 from ocp.formulation.phase import Span
-from ocp.formulation.statement import further_states, rebuilt
 from ocp.transcription.blocks import Array, Block, Indices, Linear, Piece, Rows, block, select
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.unknowns import Grid, Local
@@ -102,9 +106,11 @@ class PointEquations(NamedTuple):
     """Equations of one collocation point of a phase.
 
     Attributes:
-        local: unknowns of the point, which the slopes of the velocities of a mechanism follow in v.
+        local: unknowns of the point, which the slopes of the velocities of a mechanism and the
+            violations follow in v.
         engine: rows and share of the cost.
-        rows: names, sizes and ranges of the rows; the path conditions come last.
+        rows: names, sizes and ranges of the rows; the path conditions come last, those with a
+            penalty after the others.
         sloped: for each state, index of the row from which its slope is subtracted; -1 if the slope
             is a local unknown.
     """
@@ -118,7 +124,8 @@ class PointEquations(NamedTuple):
 def point_equations(local: Local) -> PointEquations:
     """Formulate the equations of a collocation point of a phase."""
     span, model, h = local.span, local.span.model, local.h
-    mechanics, nominal, paths = model.holonomic, model.nominal("x"), Rows.of(span.path)
+    conditions, penalised = (*span.path, *span.penalised), span.penalised
+    mechanics, nominal, paths = model.holonomic, model.nominal("x"), Rows.of(conditions)
     ode = ca.SX(0, 1) if model.ode is None else model.ode
     n, a, implicit, further = 0, ca.SX(0, 1), model.alg, ode
     if mechanics is not None:
@@ -132,19 +139,26 @@ def point_equations(local: Local) -> PointEquations:
     J = ca.fabs(slope) @ ca.diag(ca.DM(sizes))  # change of rows by nominal changes of unknowns
     largest = stacked(ca.mmax(J[i, :]) if J[i, :].nnz() else 1.0 for i in range(len(model.z)))
     scale = np.concatenate([nominal[:n], mass, nominal[2 * n :], at_start(largest)])
-    path = stacked(row.expression for row in span.path)
+    path = stacked(row.expression for row in conditions)
+    slacks = ca.SX.sym("slacks", len(span.sides))
+    shares = ca.SX(0)
     outputs = [ca.densify(ca.SX(e)) for e in (implicit, further, path, span.running)]
     implicit, further, path, running = ca.Function("evaluated", [*span.symbols, a], outputs).call(
         [*local.values, slopes * ca.DM(nominal[n : 2 * n]) / h]
     )
+    for s, (k, side) in zip(ca.vertsplit(slacks), span.sides, strict=True):
+        row = penalised[k]
+        path[len(span.path) + k] -= side * row.nominal * s
+        shares += row.linear * row.nominal * s + row.quadratic * (row.nominal * s) ** 2
+    running += shares
     rates = h * ca.vertcat(local.values[1][n : 2 * n, :], implicit[:n, :], further)
     rows = ca.vertcat(rates, implicit[n:, :], path) / ca.DM([*scale, *paths.scale])
     names = [f"the equation of {v.name}" for v in model.x]
     names += [f"the algebraic equation {i + 1}" for i in range(len(model.z))]
-    share = None if span.running.is_zero() else local.weight * running
+    share = None if running.is_zero() else local.weight * running
     return PointEquations(
         local,
-        Engine(block("point", ca.vertcat(local.v, slopes), local.theta, rows, share)),
+        Engine(block("point", ca.vertcat(local.v, slopes, slacks), local.theta, rows, share)),
         Rows.zero(names, scale) + paths,
         np.concatenate([np.arange(n), np.full(n, -1), np.arange(2 * n, len(model.x))]),
     )
@@ -177,11 +191,12 @@ def piece_of_points(equations: PointEquations, grid: Grid) -> Piece:
     velocities = np.flatnonzero(equations.sloped < 0)
     known = np.flatnonzero(equations.sloped >= 0)
     factors = np.broadcast_to(slopes, (velocities.size, *slopes.shape))
+    slacks = span.slacks(len(local.span.sides))[:, j, interval]
     columns, places = (span.inner, span.z, span.u[:, interval]), (interval, scheme.nodes[1 + j])
     return local.piece(
         grid, equations.rows, equations.engine.at(N * d), columns, places,
         Piece.order_of(local.number, interval, 2 + j), weights=scheme.weights[j],
-        extra=[(carrying[velocities], factors)] if velocities.size else [],
+        extra=[*([(carrying[velocities], factors)] if velocities.size else []), slacks],
         linear=Linear.of(equations.sloped[known], carrying[known], -slopes),
     )  # fmt: skip
 
@@ -273,6 +288,7 @@ def _check(span: Span) -> None:
     """Raise ValueError if `span` has conditions that shooting does not support."""
     model, mechanics = span.model, span.model.holonomic
     conditions = [*span.path, *(row for rows in span.rows_at.values() for row in rows)]
+    kinds = {"soft path conditions": span.softened, "absolute(...)": span.absolutes}
     named = [(row.name, row.expression) for row in conditions] + [("the end cost", span.end)]
     problems = [
         f"{name} depends on algebraic variables"
@@ -284,6 +300,7 @@ def _check(span: Span) -> None:
         for v in model.z
         if np.isfinite(span.boxes[v.name]).any()
     ]
+    problems += [f"{kind}, which need collocation points" for kind, rows in kinds.items() if rows]
     if mechanics is not None:
         parts = ca.vertcat(mechanics.implicit, mechanics.rates, mechanics.phi)
         if ca.depends_on(parts, model.t):

@@ -125,6 +125,7 @@ def bounds_of(problem: Problem, grid: Grid) -> tuple[Array, Array]:
             bound[own.nodes] = x[:, None]
             bound[inner[:, :, : d - 1 if grid.scheme.meets_end else d]] = x[:, None, None]
             bound[own.z] = of(model.z, span.boxes)[:, None]
+            bound[own.slacks(len(span.sides) * (d > 0))] = (0.0, np.inf)[side]
             for fraction, column in ((0.0, 0), (1.0, -1)):
                 u[:, column] = meet(u[:, column], of(model.u, span.inputs_at[fraction]))
             bound[own.u] = meet(u, bound[own.u])  # shared inputs may be bounded in each scenario

@@ -20,13 +20,13 @@ from ocp.formulation.phase import Free, Row, Span, limits
 from ocp.formulation.problem import Problem
 from ocp.transcription import conditions, intervals, unknowns
 from ocp.transcription.assembly import Assembled, Slot, assemble
-from ocp.transcription.blocks import Array, Piece
+from ocp.transcription.blocks import Array, Indices, Piece
 from ocp.transcription.closed_loops import Closing, closing
 from ocp.transcription.conditions import Maker
 from ocp.transcription.intervals import PointEquations, Shot
 from ocp.transcription.program import Place, Program, Stages, bounds_of, stages_of
 from ocp.transcription.schemes import Scheme, Shooting, check_meshes, nodes_of
-from ocp.transcription.unknowns import Grid, Layout, Local, Points, SpanPoints
+from ocp.transcription.unknowns import Grid, Layout, Local, Points, SpanLayout, SpanPoints
 from symfric.foundation.parameters import check_names
 
 KEPT = 4
@@ -81,7 +81,11 @@ class Discretisation:
     ) -> "Skeleton":
         """Assemble the program for given numbers of intervals and indices of nodes."""
         problem, scheme = self.problem, self.scheme.coefficients()
-        extra = [2 * part.m if part and scheme.degree else 0 for part in self.closing]
+        d = scheme.degree
+        extra = [
+            2 * part.m * (d > 0) + d * len(span.sides) if part else d * len(span.sides)
+            for span, part in zip(problem.spans, self.closing, strict=True)
+        ]
         layout = unknowns.lay_out(problem, scheme.degree, intervals, extra)
         released = [part.released if part else {} for part in self.closing]
         p = ca.MX.sym(
@@ -163,10 +167,12 @@ def discretise(
             closed = closing(local, mechanics, before, periodic, named)
         loops.append(closed)
         nodes += conditions.at_nodes(local)
+        jumping = [] if isinstance(scheme, Shooting) else conditions.jumping(span)
+        nodes += [conditions.at_starts(local, jumping, 0)] if jumping else []
         if earlier:
             joined += conditions.between(spans[-2].local, local)
     nodes += [
-        conditions.at_starts(spans[k].local, rows) for k, rows in (starts or {}).items() if rows
+        conditions.at_starts(spans[k].local, rows, 1) for k, rows in (starts or {}).items() if rows
     ]
     return Discretisation(problem, scheme, tuple(spans), tuple(loops), (*nodes, *joined))
 
@@ -195,6 +201,22 @@ class Skeleton:
     def structure(self) -> tuple[Stages | None, str]:
         """Stages of the program, or None and the reason why it has none."""
         return stages_of(self.problem, self.layout, self.pieces, self.assembled)
+
+    @cached_property
+    def violations(self) -> list[tuple[Indices, Indices, int]]:
+        """(columns of w, rows, side) of the violations of each condition with a penalty."""
+        found: list[tuple[Indices, Indices, int]] = []
+        for number, span in enumerate(self.problem.spans):
+            names = tuple(row.name for row in span.penalised)
+            columns = self.layout.spans[number].slacks(len(span.sides))
+            for piece, at in zip(self.pieces, self.assembled.at, strict=True):
+                if names and piece.span == number and piece.names[-len(names) :] == names:
+                    rows = at[-len(names) :]
+                    found += [
+                        (own.T.ravel(), rows[k], side)
+                        for own, (k, side) in zip(columns, span.sides, strict=True)
+                    ]
+        return found
 
     @cached_property
     def largest(self) -> list[int]:
@@ -246,7 +268,13 @@ class Transcription:
         for column, choice in zip(self.layout.chosen, self.problem.chosen, strict=True):
             w[column] = points.chosen.get(choice.name, choice.guess)
         w /= self.program.scale
-        if self.layout.largest >= 0:
+        if self.layout.largest < 0 and not self.skeleton.violations:
+            return w
+        g = np.asarray(self.program.jacobian(w, self.program.values)[0]).ravel()
+        for columns, rows, side in self.skeleton.violations:
+            bound = (self.program.upper_g if side > 0 else self.program.lower_g)[rows]
+            w[columns] = np.maximum(0.0, side * (g[rows] - bound))
+        if self.layout.largest >= 0:  # the costs contain the penalties of the violations
             g = np.asarray(self.program.jacobian(w, self.program.values)[0]).ravel()
             w[self.layout.largest] = g[self.skeleton.largest].max()
         return w
@@ -339,7 +367,7 @@ class Transcription:
             [*enumerate(zip(self.problem.spans, self.layout.spans, strict=True))]
         ):
             mesh, inner = self.meshes[number], self.inner_fractions(number)
-            groups = _names(span, own.extra.shape[0]), (mesh, inner, inner, mesh[:-1], mesh[:-1])
+            groups = _names(span, own), (mesh, inner, inner, mesh[:-1], mesh[:-1])
             for names, columns, at in zip(groups[0], own[1:], groups[1], strict=True):
                 for name, row in zip(names, columns.tolist(), strict=True):
                     for k, fraction in zip(row, at.tolist(), strict=True):
@@ -351,7 +379,9 @@ class Transcription:
         return places
 
 
-def _names(span: Span, extra: int) -> list[list[str]]:
+def _names(span: Span, own: SpanLayout) -> list[list[str]]:
     """Return names of nodes, inner points, algebraic variables, inputs and extra unknowns."""
     x, z, u = ([v.name for v in getattr(span.model, letter)] for letter in "xzu")
-    return [x, x, z, u, [f"correction {k + 1}" for k in range(extra)]]
+    slacks = [f"the violation of {span.penalised[k].name}" for k, _ in span.sides] * own.degree
+    loops = [f"correction {k + 1}" for k in range(own.extra.shape[0] - len(slacks))]
+    return [x, x, z, u, [*loops, *slacks]]

@@ -55,7 +55,8 @@ class SpanLayout(NamedTuple):
     Attributes:
         T: index of the duration; -1 if it is fixed.
         nodes, inner, z, u: indices in the shapes of `SpanPoints`.
-        extra: indices of additional unknowns of each interval, shape (k, N).
+        extra: indices of additional unknowns of each interval, shape (k, N): corrections of closed
+            loops, then violations at the collocation points.
     """
 
     T: int
@@ -74,6 +75,11 @@ class SpanLayout(NamedTuple):
     def degree(self) -> int:
         """Number of collocation points of an interval."""
         return self.inner.shape[1] // self.intervals
+
+    def slacks(self, count: int) -> Indices:
+        """Return the indices of `count` violations at each collocation point, (count, d, N)."""
+        last = self.extra[self.extra.shape[0] - count * self.degree :]
+        return last.reshape(self.degree, count, self.intervals).transpose(1, 0, 2)
 
     @property
     def carrying(self) -> Indices:

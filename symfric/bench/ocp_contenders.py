@@ -1,273 +1,261 @@
-"""Optimal control problems in other tools, in the style of users of CasADi's Opti and rockit.
+"""symfric and tools on CasADi in the benchmark of optimal control, with recommended settings.
 
-Both tools use the same model, mesh, start and Ipopt; neither refines its mesh or verifies results.
+A contender maps a `Case` to an `Attempt`. Tools without dry friction solve the problem with the
+smooth friction of `Case.smooth`, from a linear guess, with Ipopt; nosnoc solves it with Coulomb
+friction (no static level above the sliding one).
 """
 
-import contextlib
-import io
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from importlib.util import find_spec
-from math import isfinite
-from time import process_time
+from itertools import pairwise
 from typing import Any, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.formulation.phase import Free, Span
-from ocp.formulation.problem import Problem
+from ocp.solve import solve
+from ocp.solving.solution import Solution
+from symfric.bench.ocp_cases import UNBOUNDED, Case
+from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
-IPOPT = {
-    "ipopt.print_level": 0,
-    "print_time": False,
-    "ipopt.sb": "yes",
-    "ipopt.max_iter": 2000,
-    "ipopt.max_cpu_time": 60.0,
-}
-DEGREE = 3
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """Result of a solver.
+    """Result of a contender.
 
     Attributes:
-        cost: J reported by the solver.
-        iterations: number of iterations.
-        status: status reported by the solver.
-        time_s: processor time [s] of building and solving.
-        durations: duration of each phase [s].
-        controls: for each phase, input -> constant values on the intervals.
-        meshes: for each phase, starts of the intervals as fractions; None: equal intervals.
+        claimed: cost J reported by the contender.
+        status: status reported by the contender, in its words.
+        edges: limits of the intervals of the control [s], shape (N + 1,).
+        controls: values of the input, shape (N,).
     """
 
-    cost: float
-    iterations: int
+    claimed: float
     status: str
-    time_s: float
-    durations: tuple[float, ...]
-    controls: tuple[Mapping[str, Array], ...]
-    meshes: tuple[Array, ...] | None = None
+    edges: Array
+    controls: Array
 
 
-Guesses = Mapping[str, Array]
-"""State -> equally spaced samples from 0 to the end of the problem."""
+Contender = Callable[[Case, float], Attempt]
+"""Function (case, limit of time [s]) -> attempt."""
 
 
-def opti(problem: Problem, intervals: int, guess: Guesses) -> Attempt:
-    """Return the solution by Radau collocation, written as a Python loop with CasADi's Opti.
+def _ipopt(limit: float) -> dict[str, Any]:
+    return {
+        "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": 2000,
+        "ipopt.max_cpu_time": limit,
+    }  # fmt: skip
 
-    Args:
-        problem: problem of one scenario, without chosen parameters and periodic states.
-        intervals: total number of intervals.
-        guess: initial guess of the states.
-    """
-    if problem.periodic or problem.choose or problem.scenarios:
-        raise ValueError("opti: expected one motion with given ends and parameters")
-    begin = process_time()
-    o = ca.Opti()
-    each = max(1, intervals // len(problem.spans))
-    cost, before, clock = ca.MX(0), None, ca.MX(0)
-    parts: list[tuple[Span, ca.MX, list[ca.MX]]] = []
-    for span in problem.spans:
-        T = ca.MX(span.T) if not isinstance(span.T, Free) else o.variable()
-        if isinstance(span.T, Free):
-            o.subject_to(o.bounded(span.T.lower, T, span.T.upper))
-            o.set_initial(T, span.T.start)
-        start = states_of(problem, span, guess)
-        share, end, inputs = _collocated(o, span, T, each, clock, before, start)
-        cost, before, clock = cost + share, end, clock + T
-        parts.append((span, T, inputs))
+
+def even(case: Case, claimed: float, status: object, controls: Any) -> Attempt:
+    """Return an attempt on the grid of the case."""
+    edges = np.linspace(0.0, case.T, case.intervals + 1)
+    return Attempt(float(claimed), str(status), edges, np.ravel(controls).astype(float))
+
+
+def _sides(case: Case) -> list[Any]:
+    """Return the bounds of the states, as two arrays."""
+    boxes = [case.bounds.get(i, UNBOUNDED) for i in range(len(case.states))]
+    return list(np.array(boxes).T)
+
+
+def guesses_of(case: Case, count: int) -> Array:
+    """Return the guess of the states at equal times, shape (count, states)."""
+    return np.array([case.guess(s) for s in np.linspace(0, 1, count)])
+
+
+def equations(case: Case, width: float) -> ca.Function:
+    """Return the Function (x, u) -> (x', running cost) with smooth friction."""
+    x, u = ca.SX.sym("x", len(case.states)), ca.SX.sym("u")
+    rate = case.smooth(ca, ca.vertsplit(x), u, width)
+    return ca.Function("f", [x, u], [ca.vertcat(*rate), case.running(ca, ca.vertsplit(x), u)])
+
+
+def _final(case: Case, x: Any) -> Any:
+    return case.final(ca, ca.vertsplit(x), 0.0)
+
+
+PATIENCE = 4.0
+"""Ratio of wall time, which limits symfric, to the processor time that limits Ipopt."""
+
+
+def symfric(case: Case, limit: float) -> Attempt:
+    """Return the solution of `ocp.solve` with its default settings, on intervals of its own."""
+    found = solve(case.problem(), throw=False, max_time=PATIENCE * limit)
+    if found.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    status = "verified" if found.verified else found.status.name
+    return Attempt(found.cost, status, *held(found))
+
+
+def held(solution: Solution) -> tuple[Array, Array]:
+    """Return the limits of the intervals [s] of a control of one input, and its values."""
+    (controls,) = solution.motions[0].controls.values()
+    return np.append(solution.t_control, solution.motions[0].phases[-1].end), np.asarray(controls)
+
+
+def opti(case: Case, limit: float, width: float) -> Attempt:
+    """Return the solution by Radau collocation of degree 3 in CasADi's Opti, as in its examples."""
+    o, f, N, n = ca.Opti(), equations(case, width), case.intervals, len(case.states)
+    slopes, ends, weights = ca.collocation_coeff(ca.collocation_points(3, "radau"))
+    x, u, cost, h = o.variable(n, N + 1), o.variable(1, N), ca.MX(0), case.T / N
+    guess = guesses_of(case, 3 * N + 1).T
+    o.set_initial(x, guess[:, ::3])
+    for k in range(N):
+        inner = o.variable(n, 3)
+        o.set_initial(inner, guess[:, 3 * k + 1 : 3 * k + 4])
+        both = ca.horzcat(x[:, k], inner)
+        rate, running = f(inner, u[:, k])
+        o.subject_to(both @ slopes == h * rate)
+        o.subject_to(x[:, k + 1] == both @ ends)
+        cost += h * running @ weights
+    o.subject_to(x[:, 0] == ca.DM(case.start))
+    for s, values in case.ends.items():
+        for i, value in values.items():
+            o.subject_to(x[i, round(s * N)] == value)
+    for i, (low, high) in case.bounds.items():
+        o.subject_to(o.bounded(low, x[i, :], high))
+    o.subject_to(o.bounded(-case.limit, u, case.limit))
+    cost += _final(case, x[:, N])
     o.minimize(cost)
-    o.solver("ipopt", IPOPT)
+    o.solver("ipopt", _ipopt(limit))
     try:
         value = o.solve().value
-    except RuntimeError:
+    except RuntimeError:  # without convergence, the last iterate is used
         value = o.debug.value
-    stats = o.stats()
-    return Attempt(
-        float(value(cost)),
-        int(stats["iter_count"]),
-        str(stats["return_status"]),
-        process_time() - begin,
-        tuple(float(value(T)) for _, T, _ in parts),
-        tuple(
-            _named(span, np.array([np.ravel(value(u)) for u in inputs]))
-            for span, _, inputs in parts
-        ),
-    )
+    return even(case, value(cost), o.stats()["return_status"], value(u))
 
 
-def _named(span: Span, rows: Array) -> dict[str, Array]:
-    return {v.name: rows[:, i] for i, v in enumerate(span.model.u)}
-
-
-def states_of(problem: Problem, span: Span, guess: Guesses) -> Callable[[float], Array]:
-    """Return the guess of the states as a function of the fraction of a phase."""
-    lengths = [s.T.start if isinstance(s.T, Free) else s.T for s in problem.spans]
-    begin, whole = sum(lengths[: span.phase]), sum(lengths)
-
-    def at(s: float) -> Array:
-        f = (begin + s * lengths[span.phase]) / whole
-        known = (guess[v.name] for v in span.model.x)
-        return np.array([np.interp(f, np.linspace(0, 1, row.size), row) for row in known])
-
-    return at
-
-
-def _collocated(
-    o: ca.Opti,
-    span: Span,
-    T: ca.MX,
-    N: int,
-    clock: ca.MX,
-    before: ca.MX | None,
-    guess: Callable[[float], Array],
-) -> tuple[ca.MX, ca.MX, list[ca.MX]]:
-    """Add the equations of a phase; return its cost, its final state and its inputs."""
-    model = span.model
-    path = ca.vertcat(ca.SX(0, 1), *(row.expression for row in span.path))
-    point = ca.Function("point", span.symbols, [_ode(span), model.alg, span.running, path])
-    at_end = ca.Function("end", span.symbols, [span.end])
-    tau = [0.0, *ca.collocation_points(DEGREE, "radau")]
-    C, _, B = ca.collocation_coeff(tau[1:])
-    p, h, cost = ca.MX(ca.DM(span.p)), T / N, ca.MX(0)
-
-    def state(s: float) -> ca.MX:
-        x = o.variable(len(model.x))
-        o.set_initial(x, guess(s))
-        for i, v in enumerate(model.x):
-            _bound(o, x[i], *span.boxes[v.name])
-        return x
-
-    x = state(0.0)
-    _meet(o, span, 0.0, x)
-    if before is not None:
-        names = [link.state for link in span.links]
-        for i, v in enumerate(model.x):
-            if v.name in names:
-                o.subject_to(x[i] == before[i])
-    inputs: list[ca.MX] = []
-    z, u = ca.MX(0, 1), ca.MX(0, 1)
-    for k in range(N):
-        u = o.variable(len(model.u))
-        inputs.append(u)
-        for i, v in enumerate(model.u):
-            _bound(o, u[i], *span.boxes[v.name])
-        nodes = [x, *(state((k + s) / N) for s in tau[1:])]
-        for j in range(1, DEGREE + 1):
-            z = o.variable(len(model.z)) if model.z else ca.MX(0, 1)
-            rate, alg, running, limited = point(clock + (k + tau[j]) * h, nodes[j], z, u, p)
-            o.subject_to(ca.horzcat(*nodes) @ C[:, j - 1] == h * rate)
-            if model.z:
-                o.subject_to(alg == 0)
-            for row, value in zip(span.path, ca.vertsplit(limited), strict=False):
-                _bound(o, value, row.lower, row.upper)
-            cost += float(B[j - 1]) * h * running
-        x = nodes[-1]
-        for s in span.nodes:
-            if s > 0 and abs((k + 1) / N - s) < 0.5 / N:
-                _meet(o, span, s, x)
-    return cost + at_end(clock + T, x, z, u, p), x, inputs
-
-
-def _ode(span: Span) -> ca.SX:
-    return span.model.function("ode")(*span.symbols)
-
-
-def _bound(o: ca.Opti, x: ca.MX, low: float, high: float) -> None:
-    if low == high:
-        o.subject_to(x == low)
-        return
-    if isfinite(low):
-        o.subject_to(x >= low)
-    if isfinite(high):
-        o.subject_to(x <= high)
-
-
-def _meet(o: ca.Opti, span: Span, s: float, x: ca.MX) -> None:
-    """Add the conditions on states at the fraction `s` of a phase."""
-    linked = {link.state for link in span.links} if s == 0.0 else set[str]()
-    for i, v in enumerate(span.model.x):
-        low, high = span.nodes[s][v.name]
-        if v.name not in linked and (low, high) != span.boxes[v.name]:
-            _bound(o, x[i], low, high)
-
-
-def has_rockit() -> bool:
-    """Return True if rockit is installed."""
-    return find_spec("rockit") is not None
-
-
-def rockit(problem: Problem, intervals: int, guess: Guesses) -> Attempt:
-    """Return the solution by collocation with rockit, with arguments as those of `opti`.
-
-    Limits: explicit models without algebraic variables, bounds on states and inputs, and phases of
-    given durations.
-    """
-    other: Any = import_module("rockit")
-    begin = process_time()
-    master, clock = other.Ocp(), 0.0
-    each = max(1, intervals // len(problem.spans))
-    stages: list[tuple[Span, Any, ca.MX, ca.MX]] = []
-    for span in problem.spans:
-        model, equations = span.model, [_ode(span), span.running]
-        if isinstance(span.T, Free) or model.z or ca.depends_on(ca.vertcat(*equations), model.t):
-            raise ValueError(
-                "rockit: expected given durations, no algebraic variables and no time in equations"
-            )
-        stage = master.stage(t0=clock, T=span.T)
-        x, u = stage.state(len(model.x)), stage.control(len(model.u))
-        point = ca.Function("point", span.symbols, equations)
-        rate, running = point(0.0, x, ca.MX(0, 1), u, ca.MX(ca.DM(span.p)))
+def rockit(case: Case, limit: float, width: float) -> Attempt:
+    """Return the solution by collocation with rockit; stages end where states are prescribed."""
+    tool: Any = import_module("rockit")
+    master, f, stages = tool.Ocp(), equations(case, width), list[tuple[Any, Any, Any, int]]()
+    for a, b in pairwise([0.0, *sorted(case.ends)]):
+        stage = master.stage(t0=a * case.T, T=(b - a) * case.T)
+        x, u = stage.state(len(case.states)), stage.control()
+        rate, running = f(x, u)
         stage.set_der(x, rate)
         stage.add_objective(stage.integral(running))
-        for v, symbol in zip((*model.x, *model.u), ca.vertsplit(ca.vertcat(x, u)), strict=True):
-            low, high = span.boxes[v.name]
-            if isfinite(low) and isfinite(high):
-                stage.subject_to(low <= (symbol <= high))
-        at = np.linspace(0, 1, each + 1)
-        samples = np.array([*map(states_of(problem, span, guess), at.tolist())])
-        line = ca.interpolant("line", "linear", [clock + span.T * at], samples.ravel())
+        stage.subject_to(-case.limit <= (u <= case.limit))
+        for i, (low, high) in case.bounds.items():
+            stage.subject_to(low <= (x[i] <= high))
+        N = round((b - a) * case.intervals)
+        grid = np.linspace(a, b, N + 1)
+        samples = np.array([case.guess(s) for s in grid])
+        line = ca.interpolant("line", "linear", [grid * case.T], samples.ravel(), {})
         stage.set_initial(x, line(stage.t))
-        stage.method(other.DirectCollocation(N=each))
-        stages.append((span, stage, x, u))
-        clock += span.T
-    _join(master, stages)
-    master.solver("ipopt", IPOPT)
-    with contextlib.redirect_stdout(io.StringIO()):
-        try:
-            found = master.solve_limited()
-        except RuntimeError:  # without convergence, the last iterate is used
-            found = master.non_converged_solution
-    controls = [found(stage).sample(u, grid="control")[1] for _, stage, _, u in stages]
-    return Attempt(
-        float(sum(found(stage).value(stage.objective) for _, stage, *_ in stages)),
-        int(found.stats["iter_count"]),
-        str(found.stats["return_status"]),
-        process_time() - begin,
-        tuple(float(span.T) for span in problem.spans if not isinstance(span.T, Free)),
-        tuple(
-            _named(span, np.asarray(u, dtype=float).reshape(each + 1, -1)[:-1])
-            for span, u in zip(problem.spans, controls, strict=True)
-        ),
-    )
+        stage.method(tool.DirectCollocation(N=N))
+        old = stages[-1] if stages else None
+        before = old[0].at_tf(old[1]) if old else ca.DM(case.start)
+        master.subject_to(before == stage.at_t0(x))
+        for i, value in case.ends[b].items():
+            master.subject_to(stage.at_tf(x)[i] == value)
+        if b == 1.0:
+            stage.add_objective(_final(case, stage.at_tf(x)))
+        stages.append((stage, x, u, N))
+    master.solver("ipopt", _ipopt(limit))
+    try:
+        found = master.solve_limited()
+    except RuntimeError:
+        found = master.non_converged_solution
+    controls = [np.ravel(found(s).sample(u, grid="control")[1])[:N] for s, _, u, N in stages]
+    claimed = sum(float(found(stage).value(stage.objective)) for stage, *_ in stages)
+    return even(case, claimed, found.stats["return_status"], np.concatenate(controls))
 
 
-def _join(master: Any, stages: Sequence[tuple[Span, Any, ca.MX, ca.MX]]) -> None:
-    """Add end conditions and links between phases."""
-    for number, (span, stage, x, _) in enumerate(stages):
-        linked = {link.state for link in span.links}
-        if number:
-            _, old, y, _ = stages[number - 1]
-            master.subject_to(old.at_tf(y) == stage.at_t0(x))
-        for s, at_end in ((0.0, stage.at_t0), (1.0, stage.at_tf)):
-            for i, v in enumerate(span.model.x):
-                low, high = span.nodes[s][v.name]
-                if low == high and not (s == 0.0 and v.name in linked):
-                    master.subject_to(at_end(x)[i] == low)
+def nosnoc(case: Case, limit: float) -> Attempt:
+    """Return the solution by finite elements with switch detection, as in the examples of nosnoc.
+
+    The settings are those of its cart-pole with friction: Radau IIA with 2 stages, 2 elements in
+    each interval. A prescribed state at a middle time is a path constraint with a switch.
+    """
+    tool: Any = import_module("nosnoc")
+    options = tool.NosnocOpts()
+    options.irk_scheme, options.n_s, options.print_level = tool.IrkSchemes.RADAU_IIA, 2, 0
+    options.N_stages, options.N_finite_elements = case.intervals, 2
+    options.terminal_time = case.T
+    options.opts_casadi_nlp["ipopt"]["max_cpu_time"] = limit
+    n, count = len(case.states), len(case.slips)
+    x, u, on = ca.SX.sym("x", n), ca.SX.sym("u"), ca.SX.sym("on")
+    xs = ca.vertsplit(x)
+    loads = case.normal(ca, xs, u)
+
+    def rate(forces: Sequence[Any]) -> ca.SX:
+        return ca.vertcat(*case.rate(ca, xs, u, forces))
+
+    free, pushed = rate([0.0] * count), list[ca.SX]()
+    for i, (_, sliding) in enumerate(case.levels):
+        unit = [0.0] * count
+        unit[i] = sliding * loads[i]
+        pushed.append(rate(unit) - free)
+    branches = [ca.horzcat(share, -share) for share in pushed]
+    branches[0] += ca.horzcat(free, free)
+    middle = {i: value for s, ends in case.ends.items() if s < 1 for i, value in ends.items()}
+    active = np.array([[(k + 1) / case.intervals in case.ends] for k in range(case.intervals)])
+    active[-1] = False
+    model = tool.NosnocModel(
+        x=x, F=branches, S=[np.array([[1.0], [-1.0]])] * count, c=[x[i] for i in case.slips],
+        x0=np.array(case.start), u=u, p_time_var=on, p_time_var_val=active.astype(float),
+    )  # fmt: skip
+    low, high = _sides(case)
+    problem = tool.NosnocOcp(
+        lbu=np.array([-case.limit]), ubu=np.array([case.limit]), lbx=low, ubx=high,
+        f_q=case.running(ca, xs, u), f_terminal=ca.SX(_final(case, x)),
+        g_terminal=ca.vertcat(ca.SX(0, 1), *(x[i] - v for i, v in case.ends[1.0].items())),
+        g_path=ca.vertcat(ca.SX(0, 1), *(on * (x[i] - v) for i, v in middle.items())),
+    )  # fmt: skip
+    found = tool.NosnocSolver(options, model, problem).solve()
+    return even(case, found["cost_val"], found["status"].name, found["u_traj"])
+
+
+def do_mpc(case: Case, limit: float, width: float) -> Attempt:
+    """Return the solution by do-mpc, the first plan of a controller over the whole problem."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # do-mpc warns about each missing optional package
+        tool: Any = import_module("do_mpc")
+    n, N = len(case.states), case.intervals
+    plant = tool.model.Model("continuous", "SX")
+    x, u = plant.set_variable("_x", "x", (n, 1)), plant.set_variable("_u", "u")
+    plant.set_variable("_tvp", "on")
+    plant.set_rhs("x", equations(case, width)(x, u)[0])
+    plant.setup()
+    x, u, on = plant.x["x"], plant.u["u"], plant.tvp["on"]
+    running = equations(case, width)(x, u)[1]
+    control = tool.controller.MPC(plant)
+    control.settings.n_horizon, control.settings.t_step = N, case.T / N
+    control.settings.nlpsol_opts = _ipopt(limit)
+    control.set_objective(mterm=ca.SX(_final(case, x)) + 0.0 * x[0], lterm=running * case.T / N)
+    control.set_rterm(u=0.0)
+    control.bounds["lower", "_u", "u"], control.bounds["upper", "_u", "u"] = -case.limit, case.limit
+    low, high = (side.reshape(n, 1).copy() for side in _sides(case))
+    control.bounds["lower", "_x", "x"], control.bounds["upper", "_x", "x"] = low, high
+    for i, value in case.ends[1.0].items():
+        low[i], high[i] = value - 1e-9, value + 1e-9
+    control.terminal_bounds["lower", "x"], control.terminal_bounds["upper", "x"] = low, high
+    plan, middle = control.get_tvp_template(), [s for s in case.ends if s < 1]
+    for s in middle:
+        plan["_tvp", round(s * N), "on"] = 1.0
+        for i, value in case.ends[s].items():
+            control.set_nl_cons(f"over_{i}", on * (x[i] - value), 0.0)
+            control.set_nl_cons(f"under_{i}", on * (value - x[i]), 0.0)
+
+    def planned(t: float) -> Any:
+        return plan
+
+    control.set_tvp_fun(planned)
+    control.setup()
+    control.x0 = np.array(case.start).reshape(n, 1)
+    control.set_initial_guess()
+    for k, guess in enumerate(guesses_of(case, N + 1)):
+        control.opt_x_num["_x", k] = guess
+    control.make_step(control.x0)
+    controls = [float(control.opt_x_num["_u", k, 0][0]) for k in range(N)]
+    cost = ca.Function("J", [control.opt_x, control.opt_p], [control.nlp_obj])
+    claimed = cost(control.opt_x_num, control.opt_p_num)
+    return even(case, float(claimed), control.solver_stats["return_status"], controls)

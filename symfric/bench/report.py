@@ -28,8 +28,8 @@ Row = Mapping[str, Cell]
 """Column title with its unit -> value, at full precision."""
 Found = tuple[str, Row] | str
 """Row with the title of its table, or a note."""
-Progress = Callable[[str, float], None] | None
-"""Function called with the name of the current item and the fraction done."""
+Progress = Callable[[str, float, str], None] | None
+"""Function called with the name of the current item, the fraction done, and each new row."""
 Draw = Callable[[Sequence[Row]], "Figure"]
 DIGITS = 3
 """Significant digits of printed numbers that are not integers."""
@@ -52,11 +52,13 @@ class Report:
         draw: title of a table, and the function that draws its rows; None if there is no picture.
         tables: title -> rows; the rows of a table may have different columns.
         notes: sentences, for example about tools that are not installed.
+        interrupted: True after Ctrl-C.
     """
 
     draw: tuple[str, Draw] | None = None
     tables: dict[str, list[Row]] = field(default_factory=dict[str, list[Row]])
     notes: list[str] = field(default_factory=list[str])
+    interrupted: bool = False
 
     def add(self, found: Iterable[Found]) -> None:
         """Append rows and notes."""
@@ -77,11 +79,15 @@ class Report:
         try:
             for k, (name, task) in enumerate(tasks.items()):
                 if progress is not None:
-                    progress(name, k / len(tasks))
-                self.add(task())
+                    progress(name, k / len(tasks), "")
+                for found in task():
+                    self.add([found])
+                    if progress is not None:
+                        progress(name, (k + 1) / len(tasks), line(found))
         except KeyboardInterrupt:
             if not self.tables:
                 raise
+            self.interrupted = True
             self.notes.append("Interrupted: the other measurements were not made.")
         return self
 
@@ -114,6 +120,16 @@ class Report:
             raise ValueError("plot: expected a benchmark with a picture, got one of tables only")
         title, draw = self.draw
         return save(draw(self.tables.get(title, [])), path)
+
+
+def line(found: Found) -> str:
+    """Return a row as one line of its cells, or a note."""
+    if isinstance(found, str):
+        return found
+    cells = (
+        c if isinstance(c, str) else f"{c:.{DIGITS}g}" if c == c else "-" for c in found[1].values()
+    )
+    return "  ".join(cell for cell in cells if cell)
 
 
 def _short(cell: Cell) -> Cell:
@@ -246,7 +262,7 @@ def _draw_curves(
         axis.set_title(str(case).replace("_", " "), fontsize="small")
         axis.set_xlabel(x)
         axis.set_ylabel(y)
-        axis.tick_params(labelsize="small")
+        axis.tick_params(which="both", labelsize="small")
         axis.xaxis.set_minor_formatter("")
     for axis in axes[len(tiles) :]:
         axis.set_axis_off()

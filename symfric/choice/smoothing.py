@@ -28,7 +28,7 @@ from symfric.choice.friction import Friction, fall_of, peaked
 from symfric.figures.regularisation import Regularisation, apart
 from symfric.foundation.parameters import Parameter, parameters, with_values
 from symfric.laws import Law, LeineSwitch, RateAndState
-from symfric.laws.base.families import Sticking
+from symfric.laws.base.families import WithModes
 
 Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-7
@@ -79,7 +79,7 @@ def smoothing(
         load: normal force [N]; None if it is not one number.
         bristles: power of the velocities of a law with states.
     """
-    exact = isinstance(law, Sticking) and law.has_mode
+    exact = isinstance(law, WithModes) and law.has_mode
     fixed = fall_of(law) if friction.v_s is not None else None
     of_speed = bristles if law.states else 1.0
     known = {n: p for n, p in parameters(law).items() if n != fixed and not exact}

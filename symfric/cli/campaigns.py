@@ -5,6 +5,7 @@ figures of the papers. Stress tests verify random cases with an independent refe
 other methods.
 """
 
+import sys
 from collections.abc import Iterable
 from dataclasses import asdict
 from functools import partial
@@ -49,12 +50,15 @@ def bench(
     ensemble: ensembles, and the same runs one by one on one core. multibody: mechanisms, the cost
     and size of their equations, and energy. ivp: correct digits on problems with published
     solutions (Test Set for IVP Solvers). regularisation: error of smooth laws relative to dry
-    friction, over their width or stiffness. ocp: optimal control from many starts, verification,
-    controllers, and a comparison with CasADi's Opti and rockit. interop: laws in Opti, rockit,
-    do-mpc and CasADi's integrators. identification: fits from many starts and with many noise
-    seeds, confidence intervals, measured machines, damaged files. codegen: generated C, its
-    requirements, and C of CasADi. embedded: instructions and memory of generated C on Cortex-M
-    cores under QEMU.
+    friction, over their width or stiffness. ocp: optimal control with dry friction in symfric,
+    CasADi's Opti, rockit, nosnoc, do-mpc, opty and Dymos, judged by an independent simulation.
+    starts: optimal control from random starts. interop: laws in Opti, rockit, do-mpc and CasADi's
+    integrators. identification: fits from many starts and with many noise seeds,
+    confidence intervals, measured machines, damaged files. codegen: generated C, its requirements,
+    and C of CasADi. embedded: instructions and memory of generated C on Cortex-M cores under QEMU.
+
+    In files and pipes each row is also printed on standard error as it is measured. Ctrl-C keeps
+    the rows so far; the exit status is then 130.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """
@@ -65,13 +69,21 @@ def bench(
         raise ValueError(f"bench {subject}: expected no {', '.join(given)}, got one")
     opt.check_outputs(json, csv, picture=plot)
     sizes = {"links": lengths(links)} if links else {}
-    with output.progress("measuring") as tell:
+    with output.progress("measuring") as bar:
+
+        def tell(item: str, fraction: float, row: str) -> None:
+            bar(item, fraction)
+            if row and not sys.stderr.isatty():
+                output.note(row)
+
         result = measure(subject, quick, tell, **sizes)
     if plot:
         result.plot(plot)
     if csv:
         result.write_csv(csv)
     output.finish(result.to_dict(), json, lambda: show(result.shown()), plot, csv)
+    if result.interrupted:
+        raise typer.Exit(INTERRUPTED)
 
 
 def show(shown: "Iterable[Table | str]") -> None:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import typer
 
-from symfric import Law, any_from_text, law_from_text, with_values
+from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.machines import kind_of, settable, with_set
@@ -248,7 +248,7 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
         raise ValueError(f"codegen: expected the name of a law or the file of a fit, got {got}")
     if fit is None:
         text = str(law)
-        return Chosen(text, any_from_text(text))
+        return Chosen(text, opt.any_named_law(text))
     from identification.result.fitted import Fitted  # noqa: PLC0415  (slow to import)
 
     if fit.suffix.lower() == ".urdf":
@@ -281,8 +281,8 @@ def machine_of(
         ValueError: coefficients that are forces in a scene with a load, or unknown names.
     """
     own = chosen.drive if kind is Drive else None
-    # `law_from_text` refuses a population
-    law = chosen.law if isinstance(chosen.law, Law) else law_from_text(chosen.text)
+    # `named_law` refuses a population
+    law = chosen.law if isinstance(chosen.law, Law) else opt.named_law(chosen.text)
     machine = own or kind(law)
     check_names(f"--set of {scene}", texts, settable(machine, texts))
     machine = with_set(machine, texts)
@@ -329,7 +329,7 @@ def robot(
         return read_urdf(where)
     if law is None:
         raise ValueError(f"{INVERSE}: expected --law NAME with --scene {where}, got none")
-    machine = kind_of(where, "--scene")(law_from_text(law))
+    machine = kind_of(where, "--scene")(opt.named_law(law))
     check_names(f"--set of {where}", values, parameters(machine))
     if not isinstance(machine, MechanismScene):
         raise ValueError(f"{INVERSE}: expected a scene of bodies and joints, got {where}")

@@ -50,7 +50,7 @@ def export_fmu(
     elif law is None:
         raise ValueError(f"export-fmu {what}: expected --law NAME, got none; such as --law lugre")
     else:
-        model = scenes_with(what, [law], settings, preset, law_of)[law]
+        model = scenes_with(what, {law: opt.named_law(law)}, settings, preset, law_of)[law]
     stem = model.name if isinstance(model, Model) else Path(what).stem
     unit = exported(
         model,

@@ -169,7 +169,8 @@ def identify(
     Example: symfric identify run*.csv --law stribeck,lugre --validate v.csv --html out.html
     """
     opt.check_outputs(html, json, picture=plot)
-    laws, wishes = opt.law_names(law), free_in(free)
+    laws, wishes = opt.laws_of(law), free_in(free)
+    first = next(iter(laws.values()))
     chosen = residuals_of(kind, windows, wishes)
     read = reader(columns, units, kind, missing, resample, step, variable)
     request: dict[str, Any] = {
@@ -184,7 +185,7 @@ def identify(
     records = read(data)
     other = read(validate) if validate else None
     if profiles:
-        one = Fit(chosen, laws[0], records, **request).prepared()
+        one = Fit(chosen, first, records, **request).prepared()
         check_names("--profile", profiles, one.task.unknowns.fitted)
     ranking: Ranking | None = None
     pool = nullcontext() if workers == 1 else ProcessPoolExecutor(workers)
@@ -194,7 +195,7 @@ def identify(
             ranking = select(laws, records, chosen, other, **how, **request)
             fit = ranking.best
         else:
-            fit = Fit(chosen, laws[0], records, **request).solve(**how, throw=False)
+            fit = Fit(chosen, first, records, **request).solve(**how, throw=False)
     fit, found, failed = judged(fit, other, profiles or ())
     if html:
         fit.to_html(html, ranking)

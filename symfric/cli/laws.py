@@ -17,7 +17,7 @@ from symfric.figures.data import parts, phenomena
 from symfric.figures.motion import NORMAL_FORCE
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
-from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population, any_from_text
+from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population
 from symfric.laws.catalogue import ALIASES
 from symfric.laws.composed.populations import cost
 from symfric.scenes import ALL_SCENES
@@ -60,7 +60,7 @@ def laws(
         return output.finish(data.to_dict(), json, partial(show_figure, data), plot)
     texts = opt.assignments("--set", settings)
     every = [name] if name else [*ALL_LAWS, *POPULATIONS]
-    chosen = {text: opt.with_settings(any_from_text(text), text, texts) for text in every}
+    chosen = {text: opt.with_settings(opt.any_named_law(text), text, texts) for text in every}
     if plot:
         from symfric.figures.pictures import plot_catalogue, plot_laws  # noqa: PLC0415  (slow to import)
 
@@ -79,7 +79,7 @@ def laws_with(texts: Sequence[str], settings: Strings) -> list[AnyLaw]:
     Raises:
         ValueError: a name that one of the laws does not have.
     """
-    made = {text: any_from_text(text) for text in texts}
+    made = {text: opt.any_named_law(text) for text in texts}
     chosen: dict[str, dict[str, str]] = {text: {} for text in texts}
     lacking: list[str] = []
     given = opt.assignments("--set", settings)
@@ -161,7 +161,7 @@ def show_law(name: str, law: AnyLaw) -> None:
     for part in parts(law):
         output.show_doc(getdoc(part) or "")
     output.show(
-        f"{name} shows {', '.join(PHENOMENA[code] for code in phenomena(law))}.\n"
+        f"Phenomena: {', '.join(PHENOMENA[code] for code in phenomena(law)) or 'not stated'}.\n"
         f"Smoothness: {law.facts.smoothness}.\nFormula: {law.facts.formula}.\n"
         f"Cost: {cost(law).value} CasADi instructions for {costs(law)}, "
         f"{cost(law).gradient} for their derivatives.\n"

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symfric import Law, Linear, law_from_text, parameters, rate_of, with_values
-from symfric.cli.options import assignments, numbers
+from symfric import Law, Linear, parameters, rate_of, with_values
+from symfric.cli.options import assignments, named_law, numbers
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
 from symfric.foundation.tables import read_columns
@@ -33,7 +33,7 @@ def kind_of(
     Raises:
         ValueError: an unknown scene, preset, place or law.
     """
-    others = {place: law_from_text(text) for place, text in assignments("--law-of", law_of).items()}
+    others = {place: named_law(text) for place, text in assignments("--law-of", law_of).items()}
     if scene.endswith(".urdf"):
         from symfric.multibody.urdf import relative  # noqa: PLC0415  (for robots only)
         from symfric.scenes import Robot  # noqa: PLC0415  (for robots only)
@@ -54,7 +54,7 @@ def kind_of(
 
 def scenes_with(
     scene: str,
-    laws: Sequence[str],
+    laws: Mapping[str, Law],
     settings: Sequence[str] | None,
     preset: str | None = None,
     law_of: Sequence[str] | None = None,
@@ -63,7 +63,7 @@ def scenes_with(
 
     Args:
         scene: name, or FILE.urdf.
-        laws: texts of --law.
+        laws: laws by name.
         settings: texts of --set: parameters of the scene and the laws, forms of the laws, and
             structure of the scene; they override a preset.
         preset: value of --preset.
@@ -73,7 +73,7 @@ def scenes_with(
         ValueError: an unknown law, or a parameter that none of the scenes has; see also `kind_of`.
     """
     kind, texts = kind_of(scene, preset=preset, law_of=law_of), assignments("--set", settings)
-    machines = {law: kind(law_from_text(law)) for law in laws}
+    machines = {text: kind(law) for text, law in laws.items()}
     known = {law: settable(machine, texts) for law, machine in machines.items()}
     check_names(f"--set of {scene}", texts, dict.fromkeys(n for own in known.values() for n in own))
     return {

@@ -1,5 +1,6 @@
 """`symfric ocp`: solve a predefined optimal control problem, or a problem in a Python file."""
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import cast, get_args
@@ -7,6 +8,7 @@ from typing import cast, get_args
 from ocp import Problem, Solution, load, solve
 from ocp.problems import READY, Ready
 from ocp.solving.methods import Fatrop, Ipopt, Sqp
+from ocp.solving.sensitivity import Sensitivity
 from ocp.strategies import Friction
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric import SolveError
@@ -29,6 +31,7 @@ def ocp(
     resting_margin: float = 1e-4,
     max_time: float | None = None,
     guess: Path | None = None,
+    sensitivity: str | None = None,
     save: Path | None = None,
     csv: Path | None = None,
     plot: Path | None = None,
@@ -42,6 +45,8 @@ def ocp(
     Example: symfric ocp out_and_back --plot move.png
 
     Example: symfric ocp crane.py:swing --set length=2 --csv swing.csv
+
+    Example: symfric ocp goddard --sensitivity "m at the end"
     """
     if problem is None:
         return output.show_table(
@@ -80,8 +85,11 @@ def ocp(
         found.save(save)
     if plot:
         found.plot(path=plot)
-    show = partial(show_solution, problem, found, ready)
-    output.finish(found.to_dict(), json, show, csv, save, plot)
+    names = (sensitivity or "").split(",") if sensitivity and found.ok else []
+    rates = [found.sensitivity(name.strip()) for name in names]
+    show = partial(show_solution, problem, found, ready, rates)
+    rows = {r.name: {"dJ": r.cost, "dT": r.T, "doubts": list(r.doubts)} for r in rates}
+    output.finish(found.to_dict() | {"sensitivities": rows}, json, show, csv, save, plot)
     if not found.ok:
         raise SolveError(found.message, found.status, found)
     return None
@@ -103,8 +111,10 @@ def scheme_of(text: str) -> Scheme:
     raise ValueError(f"--scheme: expected radau3, legendre4 or shooting:METHOD:STEPS, got '{text}'")
 
 
-def show_solution(name: str, found: Solution, ready: Ready | None) -> None:
-    """Print the solution, its verification and the modes of contacts."""
+def show_solution(
+    name: str, found: Solution, ready: Ready | None, rates: Sequence[Sensitivity]
+) -> None:
+    """Print the solution, its verification, the modes of contacts and sensitivities."""
     s = found.statistics
     row: dict[str, str | float] = {"duration T [s]": found.T, "cost J": found.cost}
     if ready is not None:
@@ -119,4 +129,8 @@ def show_solution(name: str, found: Solution, ready: Ready | None) -> None:
         output.show_table(["contact", "mode", "from [s]", "to [s]"], rows, "Modes")
     if found.chosen:
         output.show_table(["chosen parameter", "value"], [[*pair] for pair in found.chosen.items()])
+    if rates:
+        rows = [(r.name, r.unit, r.cost, r.T, "; ".join(r.doubts)) for r in rates]
+        heads = ["p", "unit", "dJ/dp", "dT/dp [s/unit]", "doubts"]
+        output.show_table(heads, rows, "Sensitivities with fixed active conditions and modes")
     output.show(f"\n{found.message}")

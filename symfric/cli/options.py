@@ -9,7 +9,7 @@ from inspect import isclass, isfunction, signature
 from pathlib import Path
 from typing import Any, TypeVar
 
-from symfric import Law, law_from_text, parameters, with_values
+from symfric import Law, any_from_text, law_from_text, parameters, with_values
 from symfric.foundation import checks
 from symfric.foundation.files import check_file
 from symfric.foundation.parameters import check_names, options
@@ -44,8 +44,27 @@ def numbers(option: str, texts: dict[str, str] | Iterable[str] | None) -> dict[s
     return {name: checks.parsed(f"{option} {name}", value) for name, value in given.items()}
 
 
-def law_names(texts: Sequence[str]) -> list[str]:
-    """Return the laws of --law, which may be repeated or list several names with commas.
+def named_law(text: str) -> Law:
+    """Return the law given by a text, which may contain laws of files, FILE.py:NAME."""
+    return law_from_text(text, _of_file)
+
+
+def any_named_law(text: str) -> AnyLaw:
+    """Return the law or population given by a text; see `named_law`."""
+    return any_from_text(text, _of_file)
+
+
+def _of_file(text: str) -> Law:
+    """Return the law FILE.py:NAME: a law, or the result of a class or function called without."""
+    name, found = named_in_file("law", text, "law", lambda value: isinstance(value, Law))
+    law = found() if callable(found) else found
+    if not isinstance(law, Law):
+        raise checks.refused(f"law '{text}'", f"a law, or a class or function of one, {name}", law)
+    return law
+
+
+def laws_of(texts: Sequence[str]) -> dict[str, Law]:
+    """Return the laws of --law by text; it may be repeated or list several laws with commas.
 
     Raises:
         ValueError: an empty, repeated or unknown name.
@@ -55,9 +74,7 @@ def law_names(texts: Sequence[str]) -> list[str]:
         raise ValueError(f"--law: expected names of laws separated by commas, got '{texts[0]}'")
     if len(set(laws)) != len(laws):
         raise ValueError(f"--law: expected every law once, got {', '.join(laws)}")
-    for name in laws:
-        law_from_text(name)
-    return laws
+    return {text: named_law(text) for text in laws}
 
 
 def with_settings(law: L, text: str, settings: dict[str, str]) -> L:

@@ -63,7 +63,7 @@ def run(
         raise ValueError(
             "--peer: expected no --method, --backend, --max-step or --times, got one of them"
         )
-    laws = opt.law_names(law)
+    laws = opt.laws_of(law)
     if len(laws) > 1 and (csv or json or movie):
         raise ValueError(
             f"--csv, --json and --animate: expected one --law, got {len(laws)}; compare several "
@@ -74,7 +74,8 @@ def run(
     ends = [] if times is None else times.split(",")
     stops = [checks.parsed("--times", end.strip()) for end in ends]
     machines, models, given = prepared(scene, laws, settings, preset, law_of, inputs, x0, t_end)
-    check_movie(movie, scene, models[laws[0]])
+    chosen = next(iter(laws))
+    check_movie(movie, scene, models[chosen])
     common: Any = {"x0": given.start, "u": given.signals, "rtol": rtol, "samples": samples}
 
     def integrate(model: Model, tell: Callable[[float], None]) -> Trajectory:
@@ -86,7 +87,7 @@ def run(
         )  # fmt: skip
 
     found = simulated(scene, models, integrate)
-    first = found[laws[0]]
+    first = found[chosen]
     if csv:
         first.to_csv(csv)
     if plot:
@@ -96,7 +97,7 @@ def run(
     if movie:
         with output.progress(f"{movie}") as tell:
             first.animate(movie, progress=tell)
-    content = to_dict(laws[0], machines[laws[0]], first) if json else {}
+    content = to_dict(chosen, machines[chosen], first) if json else {}
     show = partial(show_runs, found, machines)
     output.finish(content | {"inputs": given.texts}, json, show, csv, plot, movie)
     refuse_failed(found.values())
@@ -124,7 +125,7 @@ def report(
     from symfric.results.report import report as write_report  # noqa: PLC0415  (not for `run`)
 
     opt.check_outputs(html)
-    laws = opt.law_names(law)
+    laws = opt.laws_of(law)
     machines, models, given = prepared(scene, laws, settings, preset, law_of, inputs, x0, t_end)
     found = simulated(
         scene,
@@ -143,13 +144,14 @@ def report(
 
 
 def prepared(
-    scene: str, laws: list[str], settings: Strings, preset: str | None, law_of: Strings,
+    scene: str, laws: Mapping[str, Law], settings: Strings, preset: str | None, law_of: Strings,
     inputs: Strings, x0: Strings, t_end: float | None,
 ) -> tuple[dict[str, Scene], dict[str, Model], Driven]:  # fmt: skip
     """Return scene and model for each law, and inputs, start values and end time of the runs."""
     machines = scenes_with(scene, laws, settings, preset, law_of)
     models = {name: machine.model() for name, machine in machines.items()}
-    return machines, models, driven(machines[laws[0]], models[laws[0]], inputs, x0, t_end)
+    first = next(iter(laws))
+    return machines, models, driven(machines[first], models[first], inputs, x0, t_end)
 
 
 def simulated(

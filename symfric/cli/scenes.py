@@ -50,7 +50,7 @@ def scenes(
         rows = [summary(scene, kind(Viscous())) for scene, kind in ALL_SCENES.items()]
         return output.finish({"scenes": rows}, json, partial(show_list, rows))
     text = LAW if law is None else law
-    machine = scenes_with(name, [text], settings, preset, law_of)[text]
+    machine = scenes_with(name, {text: opt.named_law(text)}, settings, preset, law_of)[text]
     model = machine.model()
     found = to_dict(name, machine, model, law)
     if plot:

@@ -15,7 +15,7 @@ from typing import Any
 
 import typer
 
-from symfric import Law, SolveError, Status, law_from_text, parameters
+from symfric import Coulomb, Law, SolveError, Status, parameters
 from symfric.choice import NEEDS as NEEDS
 from symfric.choice import Friction
 from symfric.choice import select as select_law
@@ -83,7 +83,7 @@ def select(
     words = needed("--need", [word for word in need.split(",") if word])
     given = opt.assignments("--set", settings)
     levels = opt.numbers("--set", {n: given.pop(n) for n in OF_FRICTION if n in given})
-    candidates, formed_by_user = _candidates(opt.law_names(law) if law else [*ALL_LAWS], given)
+    candidates, formed_by_user = _candidates(opt.laws_of(law or [*ALL_LAWS]), given)
     if ".py" in scene:
         machine: Any = _function_of_file(scene, opt.numbers("--set", given))
     else:
@@ -151,7 +151,7 @@ def reported(text: str) -> Generator[Callable[[str, float], None]]:
         yield say
 
 
-def _candidates(names: list[str], given: dict[str, str]) -> tuple[dict[str, Law], set[str]]:
+def _candidates(named: dict[str, Law], given: dict[str, str]) -> tuple[dict[str, Law], set[str]]:
     """Return the laws with their settings, and the names of laws whose form is set.
 
     The settings of laws are removed from `given`.
@@ -159,7 +159,7 @@ def _candidates(names: list[str], given: dict[str, str]) -> tuple[dict[str, Law]
     Raises:
         ValueError: an option value that no law has, or unknown laws or parameters.
     """
-    laws, chosen = {text: law_from_text(text) for text in names}, set[str]()
+    laws, chosen = dict(named), set[str]()
     choices: dict[str, dict[str, tuple[str, ...]]] = {}
     for text, law in laws.items():
         for option in options(law).values():
@@ -194,7 +194,7 @@ def _with(kind: Callable[[Law], Scene], scene: str, texts: dict[str, str]) -> An
     """Return the scene with its settings in --set: parameters, forms and structure."""
     if not texts:
         return kind
-    one = kind(law_from_text("coulomb"))
+    one = kind(Coulomb())
     of_law = parameters(one.law)
     known = [n for n in settable(one, texts) if n not in of_law]
     check_names(f"--set of {scene}", texts, [*known, *OF_FRICTION])

@@ -37,7 +37,7 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.inputs import Input
 from symfric.integrator.simulate import simulate
 from symfric.laws import Law
-from symfric.laws.base.families import Sticking
+from symfric.laws.base.families import WithModes
 from symfric.laws.base.law import check_law
 from symfric.model import Model
 from symfric.model.kinds import FRICTION_STATE, MODE, POSITION
@@ -102,7 +102,7 @@ def regularisation(
         if not names:
             raise ValueError(f"{where}: parameter: expected the names of one or more, got none")
         return _scaled(where, law, names)
-    if isinstance(law, Sticking) and law.has_mode:
+    if isinstance(law, WithModes) and law.has_mode:
         raise ValueError(
             f"{where}: law: expected a law that has to be made smooth, got {type(law).__name__}, "
             "which rests exactly"

@@ -1,13 +1,14 @@
 """Catalogue of laws by name, and the conversion between laws and text."""
 
-from re import fullmatch
+from collections.abc import Callable
+from re import fullmatch, sub
 
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 from symfric.laws.base.law import Law, check_law
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.composed.populations import AnyLaw, GenericAsperity, Population, RandomBristles
-from symfric.laws.composed.wrap import Lagged, LoadNormalised, TemperatureDependent
+from symfric.laws.composed.wrap import Exact, Lagged, LoadNormalised, TemperatureDependent
 from symfric.laws.dynamic import dahl, dwell, lugre, maxwell_slip, stick_slip
 from symfric.laws.static import (
     applied_force,
@@ -105,9 +106,10 @@ ALIASES = {
 }
 """Other names of laws that papers and programs use."""
 
-Wrapping = Asymmetric | LoadDependent | LoadNormalised | Lagged | TemperatureDependent
+Wrapping = Asymmetric | Exact | LoadDependent | LoadNormalised | Lagged | TemperatureDependent
 WRAPPERS: dict[str, type[Wrapping]] = {
     "asymmetric": Asymmetric,
+    "exact": Exact,
     "load_dependent": LoadDependent,
     "load_normalised": LoadNormalised,
     "lagged": Lagged,
@@ -130,22 +132,32 @@ def law_name(law: AnyLaw) -> str:
     return f"{name}({law_name(law.inner)})" if isinstance(law, Wrapping) else name
 
 
-def any_from_text(text: str) -> AnyLaw:
+Find = Callable[[str], Law]
+"""Function that returns the law of a term FILE.py:NAME."""
+
+
+def any_from_text(text: str, find: Find | None = None) -> AnyLaw:
     """Return the law or population given by `text`, with default parameters.
 
-    Raises the errors of `law_from_text`.
+    See `law_from_text`, also for errors.
     """
     checks.text("law", text, "the name of a law, such as lugre")
     name = ALIASES.get(text.strip(), text.strip())
-    return POPULATIONS[name]() if name in POPULATIONS else law_from_text(text)
+    return POPULATIONS[name]() if name in POPULATIONS else law_from_text(text, find)
 
 
-def law_from_text(text: str) -> Law:
+def law_from_text(text: str, find: Find | None = None) -> Law:
     """Return the law given by `text`, with default parameters.
 
     The text is a name such as `brown_mcphee`, an alias such as `adams`, a sum such as
-    `coulomb+viscous`, or a wrapped law: `asymmetric(coulomb+viscous)`, `load_dependent(lugre)`,
-    `load_normalised(lugre)`, `lagged(stribeck)` or `temperature_dependent(lugre)`.
+    `coulomb+viscous`, or a wrapped law: `asymmetric(coulomb+viscous)`, `exact(stribeck)`,
+    `load_dependent(lugre)`, `load_normalised(lugre)`, `lagged(stribeck)` or
+    `temperature_dependent(lugre)`.
+
+    Args:
+        text: the text.
+        find: function that returns the law of a term such as `my_laws.py:Falling`; None: no law of
+            a file, so that a text never runs code.
 
     Raises:
         ValueError: unknown name (the message suggests the closest), empty term, unbalanced
@@ -153,14 +165,16 @@ def law_from_text(text: str) -> Law:
     """
     checks.text("law", text, "the name of a law, such as lugre")
     terms = _split_terms(text)
-    laws = tuple(_single(term, text) for term in terms)
+    laws = tuple(_single(term, text, find) for term in terms)
     return laws[0] if len(laws) == 1 else Sum(laws)
 
 
-def _single(term: str, text: str) -> Law:
+def _single(term: str, text: str, find: Find | None) -> Law:
     if wrapped := fullmatch(rf"({'|'.join(WRAPPERS)})\((.+)\)", term):
-        kind, inner = WRAPPERS[wrapped[1]], law_from_text(wrapped[2])
+        kind, inner = WRAPPERS[wrapped[1]], law_from_text(wrapped[2], find)
         return Asymmetric(inner, inner) if issubclass(kind, Asymmetric) else kind(inner)
+    if find is not None and ".py" in term:
+        return find(term)
     name = ALIASES.get(term, term)
     if name in POPULATIONS:
         raise ValueError(
@@ -177,7 +191,7 @@ def _split_terms(text: str) -> list[str]:
     """Split `text` at the plus signs outside parentheses."""
     where = f"law {checks.shown(text)}"
     terms, depth = [""], 0
-    for letter in text.replace(" ", ""):
+    for letter in sub(r"\s*([()+])\s*", r"\1", text.strip()):
         depth += (letter == "(") - (letter == ")")
         if depth < 0:
             break

@@ -145,7 +145,7 @@ def test_a_measurement_is_stored_with_machine_load_and_commit(
     move = {"tool": "opti", "route": "flow", "law": "lugre", "cost J [N^2 s]": 1.11449}
     result = Report(tables={MOVES: [move], RUNS: [{"integrator": "cvodes", "law": "lugre"}]})
     monkeypatch.setattr(measure, "STORED", tmp_path)
-    monkeypatch.setattr("symfric.bench.measure", lambda subject, quick: result)
+    monkeypatch.setattr("symfric.bench.measure", lambda subject, quick, progress: result)
     monkeypatch.setattr(measure, "commit", lambda: "abc")
     path = tmp_path / "interop.json"
     short = dict.fromkeys(measure.SHORT, "-") | {"tables": []}

@@ -11,6 +11,10 @@ from ensembles import assert_same
 
 from symfric import LuGre, rabinowicz, simulate_many
 from symfric.bench.interop import QUICK, integrators, move
+from symfric.bench.ocp_cases import CASES
+from symfric.bench.ocp_contenders import Attempt
+from symfric.bench.ocp_others import attempted, contenders
+from symfric.bench.ocp_referee import judged
 from symfric.bench.report import Row
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "interop"
@@ -20,7 +24,7 @@ MISS = {"flow": 2e-3, "collocation": 1e-3}
 
 def needs(tool: str) -> None:
     if tool not in ("opti", "acados") and find_spec(tool) is None:
-        pytest.skip(f"needs {tool} (extra interop)")
+        pytest.skip(f"needs {tool} (extra peers)")
 
 
 @pytest.fixture(scope="module")
@@ -107,3 +111,22 @@ def test_executor_of_dask_gives_the_same() -> None:
     ):
         other = simulate_many(model, 2.0, x0=x0, executor=executor, chunk=1, workers=2)
     assert_same(serial, other)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # of the other tools
+@pytest.mark.parametrize(
+    ("tool", "name"),
+    [("rockit", "rockit 0.01"), ("nosnoc", "nosnoc"), ("do_mpc", "do-mpc 0.01"),
+     ("opty", "opty 0.01"), ("dymos", "Dymos 0.01")],
+)  # fmt: skip
+def test_contenders_push_a_block_out_and_back(tool: str, name: str) -> None:
+    """J = 438.645 with exact friction; intervals and smooth friction cost less than 6 %."""
+    needs(tool)
+    (case,) = (case for case in CASES if case.name == "pushed_block")
+    found, _ = attempted(contenders(quick=False)[name], case, 60.0)
+    assert isinstance(found, Attempt), found
+    cost, miss = judged(case, found.edges, found.controls)
+    assert cost == pytest.approx(438.645, rel=0.06)
+    assert cost == pytest.approx(found.claimed, rel=0.01)
+    assert miss < 0.05

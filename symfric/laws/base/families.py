@@ -74,8 +74,7 @@ FINEST = 1e-7
 """Largest relative tolerance of runs with a law with modes, which is a reference for others."""
 
 
-@parametric
-class Sticking(Law):
+class WithModes(Law):
     """Law whose state is a mode: the direction of sliding, or 0 in stick.
 
         F = slip force in the direction `mode`   while sliding
@@ -84,12 +83,10 @@ class Sticking(Law):
     A form of the law without modes (`has_mode` is False) has no states.
     """
 
-    mu_s: Scalar = fields.MU_S(0.15)
-
     @property
     def has_mode(self) -> bool:
-        """True if stick is a mode, as in form = "event"; False if it is a band of velocities."""
-        return getattr(self, "form", "event") == "event"
+        """True if stick is a mode; False if it is a band of velocities."""
+        return True
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -102,7 +99,13 @@ class Sticking(Law):
         """Applied force F_e [N], which the contact carries in stick."""
         return (APPLIED_FORCE,)
 
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
+    def level_towards(self, direction: Scalar, N: Scalar, **inputs: Scalar) -> Scalar:
+        """Return the static level [N] against a pull with the sign of `direction`."""
+        return self.static_level(N, **inputs)
+
+    def rate(
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0, **inputs: Scalar
+    ) -> Scalar:
         """Return zero [1/s], or (F_e -+ level) / (|F_e| + 1 N) in stick above the static level.
 
         The nonzero rate has no effect on the motion, since stick ends when |F_e| reaches the static
@@ -111,21 +114,17 @@ class Sticking(Law):
         """
         if not self.has_mode:
             return empty(v)
-        static = self.static_level(N)
+        static = self.level_towards(F_e, N, **inputs)
         beyond = F_e - smooth.clip(F_e, -static, static)
         share = beyond / (smooth.magnitude(F_e, 0.0) + APPLIED_FORCE.nominal)
         return column(smooth.choose(rests(z[0]), share, 0.0 * v))
-
-    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
-        """Return the break-away force mu_s N [N], which is the largest force in stick."""
-        return self.mu_s * N
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return the direction of sliding."""
         return column(smooth.sign(v, 0.0)) if self.has_mode else empty(v)
 
     def switches(
-        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0, **inputs: Scalar
     ) -> tuple[Switch, ...]:
         """Return two switches: to stick at v = 0, and to slip where |F_e| exceeds the static level.
 
@@ -135,17 +134,33 @@ class Sticking(Law):
         """
         if not self.has_mode:
             return ()
-        mode, static = z[0], self.static_level(N)
+        mode = z[0]
         onward, still = smooth.choose(F_e < 0, -1.0, 1.0), rests(mode)
-        excess = smooth.magnitude(F_e, 0.0) - static
+        excess = smooth.magnitude(F_e, 0.0) - self.level_towards(F_e, N, **inputs)
         after = smooth.choose(excess <= 0, 0.0, onward)
-        pull = mode * F_e - static
+        pull = mode * F_e - self.level_towards(mode, N, **inputs)
         ahead = smooth.choose(mode * v > pull, mode * v, pull)
         stick, slip = smooth.choose(still, 1.0, ahead), smooth.choose(still, excess, -1.0)
         return (
             Switch("stick", stick, -1, {"mode": after}, halts=True),
             Switch("slip", slip, 1, {"mode": onward}, at_start=True, rtol=FINEST),
         )
+
+
+@parametric
+class Sticking(WithModes):
+    """Law with modes whose static level is mu_s N; stick is a mode in form = "event"."""
+
+    mu_s: Scalar = fields.MU_S(0.15)
+
+    @property
+    def has_mode(self) -> bool:
+        """True if stick is a mode, as in form = "event"; False if it is a band of velocities."""
+        return getattr(self, "form", "event") == "event"
+
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the break-away force mu_s N [N], which is the largest force in stick."""
+        return self.mu_s * N
 
 
 def rests(mode: Scalar) -> Scalar:

@@ -1,4 +1,4 @@
-"""Base class of friction laws: parameters, a force, the rate of internal states, and facts."""
+"""Base class of friction laws: parameters, a force, and the rate of internal states."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -17,34 +17,10 @@ from symfric.foundation.parameters import Parametric, parameters, parametric
 from symfric.foundation.symbolic import plain
 from symfric.foundation.vector import Rows
 from symfric.laws.base import smooth
+from symfric.laws.base.phenomena import CONFIDENCE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-PHENOMENA = {
-    "D": "dynamic (kinetic) friction",
-    "S": "static friction (stiction or a break-away peak)",
-    "St": "Stribeck effect",
-    "V": "viscous friction",
-    "P": "pre-sliding displacement",
-    "M": "non-local memory (hysteresis loops inside loops close)",
-    "L": "frictional lag",
-    "B": "break-away force depends on the loading rate",
-    "N": "no drift under vibration below break-away",
-    "T": "static friction grows with the dwell time",
-}
-"""Phenomena that a law can reproduce, by the codes in `Facts.phenomena`."""
-
-CONFIDENCE = {
-    "two sources": "the formula was compared with two independent ones",
-    "one source": "the formula was compared with one",
-    "textbook": "the formula is in every textbook",
-    "rebuilt": "the formula was lost or garbled, and rebuilt from descriptions of it",
-    "constructed": "constructed here",
-    "unverified": "written from memory, compared with no publication and no public code",
-}
-"""Confidence in a formula, by the words in `Facts.confidence`."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +125,7 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
     """Wrap `method(law, v, N, z)` so that it accepts and checks states in any common form.
 
     Raises:
-        ValueError: the number of states is wrong, or an integer is too large for a float.
+        ValueError: a wrong number of states, an integer too large for a float, an unsuitable value.
     """
 
     @wraps(method)
@@ -159,9 +135,35 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
             if type(value) is int and not is_number(value):
                 where = f"{type(law).__name__}.{method.__name__}: {name}"
                 raise checks.refused(where, "a number that a float can hold", value)
-        return method(law, slip, load, states_of(law, slip, plain(z)), *more, **inputs)
+        states = states_of(law, slip, plain(z))
+        if type(law).__module__.startswith("symfric."):
+            return method(law, slip, load, states, *more, **inputs)
+        where = f"{type(law).__name__}.{method.__name__}"
+        try:
+            value = method(law, slip, load, states, *more, **inputs)
+        except (TypeError, ValueError, RuntimeError) as error:
+            if not isinstance(slip, np.ndarray) and "truth value" not in str(error):
+                raise
+            raise _unsuitable(where, slip, error) from error
+        numbers = not is_casadi(slip, load, states, *inputs.values())
+        if isinstance(value, list | tuple) or (numbers and is_casadi(value)):
+            raise _unsuitable(where, slip, value)
+        return value
 
     return checked
+
+
+def _unsuitable(where: str, v: Scalar, got: object) -> ValueError:
+    """Return the error for a method of a user's law that fails, or returns an unsuitable value."""
+    if "truth value" in str(got):
+        return ValueError(
+            f"{where}: expected an expression, got a condition that Python evaluates (if, and, or, "
+            "max, min); write smooth.choose(v > 0, a, b) of symfric.laws"
+        )
+    what, hint = "a force, or a column of rates", "write ca.vertcat(...) for several rates"
+    if isinstance(v, np.ndarray) and not isinstance(got, list | tuple):
+        what, hint = "an array for velocities in an array", "write it with symfric.laws.smooth"
+    return checks.refused(where, what, got, hint)
 
 
 @parametric
@@ -180,7 +182,7 @@ class Law(Parametric, ABC):
     The modes of a law (stick, slip) are states that change only by jumps, at its `switches`.
     """
 
-    facts: ClassVar[Facts]
+    facts: ClassVar[Facts] = Facts((), "not stated", "unverified")
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)

@@ -57,9 +57,11 @@ class Karnopp(Sticking):
         leaving = State("leaving", "1", 1.0, True, "1 while it leaves the band", whole=True)
         return (*super().states, leaving) if self.has_mode else ()
 
-    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0) -> Scalar:
+    def rate(
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0, **inputs: Scalar
+    ) -> Scalar:
         """Return the rate of the mode [1/s], and zero for the second state."""
-        rate = super().rate(v, N, z, F_e=F_e)
+        rate = super().rate(v, N, z, F_e=F_e, **inputs)
         return column(rate[0], 0.0 * v) if self.has_mode else rate
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
@@ -93,12 +95,12 @@ class Karnopp(Sticking):
         return (1 - w) * smooth.hold(F_e, static, self.F_eps) + w * slip
 
     def switches(
-        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0, **inputs: Scalar
     ) -> tuple[Switch, ...]:
         """Return the switches to stick and slip, and those of entering and leaving the band."""
         stuck = [
             replace(s, reset={**s.reset, "leaving": smooth.magnitude(s.reset["mode"], 0.0)})
-            for s in super().switches(v, N, z, F_e=F_e)
+            for s in super().switches(v, N, z, F_e=F_e, **inputs)
         ]
         if not stuck:
             return ()

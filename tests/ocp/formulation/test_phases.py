@@ -9,10 +9,10 @@ import pytest
 from motions import double_integrator, stage
 from phases import SLIDER_CRANK, slider_crank
 
+from ocp.formulation.changed_models import with_parameters, with_rates
 from ocp.formulation.expressions import TIME, Signals, at_end, effort, integral
 from ocp.formulation.phase import FREE, Free, Phase, Row, Span
 from ocp.formulation.problem import Problem, rest_to_rest
-from ocp.formulation.statement import with_parameters, with_rates
 from symfric import BrownMcPhee, LuGre, Model, drive, simulate
 from symfric.scenes import PendulumBox
 

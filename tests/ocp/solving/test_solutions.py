@@ -18,7 +18,8 @@ from ocp import Phase, Problem, integral, solve, verify
 from ocp.checking.verify import verified
 from ocp.problems import guide
 from ocp.solving.motion import Stretch, along, span_motions
-from ocp.solving.solution import SOLUTION, Mode, Solution, load, plot_solutions
+from ocp.solving.picture import plot_solutions
+from ocp.solving.solution import SOLUTION, Mode, Solution, load
 from ocp.solving.starts import start_of
 from ocp.transcription.schemes import Legendre, Radau, make_meshes
 from ocp.transcription.transcribe import discretise
@@ -171,6 +172,7 @@ def test_texts_fit_in_a_few_lines(move: Solution, back: Solution) -> None:
     assert lines == [
         solution.message,
         f"J = {solution.cost:.6g}, T = {solution.T:.6g} s",
+        "active: force <= 20 (0 ... 0.2749 s); force >= -20 (0.2978 ... 0.4582 s)",
         "guide: slip+ 0 ... 0.25 s, stick 0.25 ... 0.5 s",
     ]
     assert last.startswith(f"solves: 1, iterations: {solution.iterations}, ")

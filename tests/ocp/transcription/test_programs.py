@@ -12,6 +12,7 @@ import pytest
 from discretised import CASES, EFFORT, all_at_once, mean_of_scenarios, mechanism, stage
 from phases import UNIT, unit_move
 
+from ocp import solve
 from ocp.formulation.expressions import at_end, integral
 from ocp.formulation.phase import FREE, Free, Phase, Row
 from ocp.formulation.problem import Problem
@@ -107,6 +108,23 @@ def test_conditions_at_starts_of_intervals_use_the_input_that_begins_there() -> 
         np.testing.assert_allclose(2.0 * g[own], mesh[1:-1] ** 3 + 10.0 * u[0, 1:])
         np.testing.assert_allclose([t.program.rows[i].fraction for i in own], mesh[1:-1])
         assert (t.program.lower_g[own] == 1.0).all()
+
+
+def test_path_conditions_with_inputs_hold_between_the_collocation_points() -> None:
+    # Rayleigh's problem with u <= -x/6: x falls within intervals, so u + x/6 is largest at starts
+    x, y, u = (Variable(name, "1") for name in "xyu")
+    speeding = -x.symbol + y.symbol * (1.4 - 0.14 * y.symbol**2) + 4.0 * u.symbol
+    model = Model("rayleigh", x=(x, y), u=(u,), ode=ca.vertcat(y.symbol, speeding))
+    ahead = Phase(model, 4.5, start={"x": -5.0, "y": -5.0}, path=[lambda s: s.u + s.x / 6.0 <= 0.0])
+    problem = Problem(ahead, integral(lambda s: s.u**2 + s.x**2))
+    excess: list[float] = []
+    for intervals in (30, 60):
+        made = solve(problem, intervals=intervals, refine=False)
+        excess.append(made.cost - 44.8044)  # Maurer and Augustin 2001, by continuous inputs
+        assert made.verified
+        nodes = np.searchsorted(made.t, made.t_control)
+        assert np.max(made.controls["u"] + made["x"][nodes] / 6.0) == pytest.approx(0.0, abs=1e-7)
+    assert excess[0] / excess[1] == pytest.approx(2.0, rel=0.15)  # inputs constant on intervals
 
 
 def test_nominal_values_scale_unknowns_and_rows() -> None:

@@ -64,12 +64,16 @@ def test_an_interrupt_keeps_the_rows_so_far() -> None:
         yield "T", ROWS[0]
         raise KeyboardInterrupt
 
-    reported: list[tuple[str, float]] = []
+    reported: list[tuple[str, float, str]] = []
     tasks = {"a": found, "b": interrupted, "c": found}
     made = Report().collect(tasks, lambda *at: reported.append(at))
     assert [*made.tables["T"]] == [*ROWS, ROWS[0]]
     assert "Interrupted" in made.notes[-1]
-    assert reported == [("a", 0.0), ("b", 1 / 3)]
+    assert made.interrupted
+    assert [at for at in reported if not at[2]] == [("a", 0.0, ""), ("b", 1 / 3, "")]
+    assert len(reported) == 2 + 5 + 1
+    assert reported[2] == ("a", 1 / 3, "a  other  0.00123  -  7")
+    assert reported[5] == ("a", 1 / 3, "A note.")
 
     def at_once() -> Iterator[Found]:
         raise KeyboardInterrupt

@@ -103,7 +103,7 @@ def test_a_benchmark_is_printed_and_written(symfric, monkeypatch: pytest.MonkeyP
         table = SimpleNamespace(head=["tool", "ratio"], rows=[("ours", 1.0)], title="Runs")
         return SimpleNamespace(
             plot=lambda path: path.write_text("p"), write_csv=lambda path: path.write_text("c"),
-            to_dict=lambda: {"a": 1}, shown=lambda: [table, "A sentence."],
+            to_dict=lambda: {"a": 1}, shown=lambda: [table, "A sentence."], interrupted=False,
         )  # fmt: skip
 
     seen: list[Any] = []

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from symfric import law_from_text, parameters
+from identification import synthetic_drive_data
+from symfric import Stribeck, law_from_text, parameters
 from symfric.cli import laws as command
 from symfric.cli.laws import parts
 from symfric.figures import pictures
@@ -106,3 +107,48 @@ def test_settings_hold_for_all_compared_laws_or_for_the_named_one(symfric) -> No
     assert [curve["law"] for curve in data["curves"]] == ["lugre", "elasto_plastic", "gms"]
     tops = [max(curve["columns"]["F"]) for curve in data["curves"]]
     assert tops == pytest.approx([0.3 * 7.848, 0.3 * 7.848, 0.2 * 7.848], rel=1e-3)
+
+
+OWN = """
+from symfric import Exact, StaticLaw
+from symfric.laws import smooth
+
+class Falling(StaticLaw):
+    'Friction that decreases with the speed.'
+    def outside(self, speed, N):
+        return 0.3 * N / (1 + speed)
+    def force(self, v, N, z=()):
+        return self.outside(smooth.magnitude(v, 1e-3), N) * smooth.sign(v, 1e-3)
+
+stick = Exact(Falling())
+"""
+LAW_COMMANDS = {
+    "laws LAW": "Friction that decreases with the speed.",
+    "run rabinowicz --law LAW --t-end 1": "The end was reached",
+    "scenes rabinowicz --law LAW": "v_belt",
+    "codegen LAW --real double --out c": "verified",
+    "export-fmu rabinowicz --law LAW": "FMI 3.0 co-simulation",
+    "identify record.csv --law LAW+viscous --fix m=95": "sigma_2",
+    "select rabinowicz --law LAW,stribeck --need stiction --accuracy 0.1 --effort 0.1": "LAW",
+}
+
+
+@pytest.mark.parametrize("line", LAW_COMMANDS)
+def test_every_command_accepts_a_law_of_a_file(line: str, symfric) -> None:
+    Path("own.py").write_text(OWN)
+    if line.startswith("identify"):
+        data = synthetic_drive_data(Stribeck(mu_s=25.0, mu_d=20.0), speeds=(0.06,), dwell=0.1)
+        data.to_csv("record.csv")
+    found = symfric(line.replace("LAW", "own.py:Falling"))
+    assert LAW_COMMANDS[line].replace("LAW", "own.py:Falling") in found.out
+
+
+def test_laws_of_files_can_be_wrapped_and_added(symfric) -> None:
+    Path("own.py").write_text(OWN)
+    finals = [
+        symfric(f"run rabinowicz --law '{text}' --json -").json["final"]["x"]
+        for text in ("own.py:stick", "exact(own.py:Falling)", "exact( own.py:Falling )")
+    ]
+    assert len(set(finals)) == 1
+    both = symfric("run rabinowicz --law own.py:Falling+viscous --set sigma_2=2 --json -").json
+    assert both["parameters"]["sigma_2"] == 2.0

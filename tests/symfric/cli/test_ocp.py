@@ -27,6 +27,9 @@ def test_a_problem_of_a_file_is_solved_and_written(symfric, mine) -> None:
     assert rows[0][:3] == ["t [s]", "x [m]", "v [m/s]"]
     assert load("a.npz").cost == found["cost"]
     assert Path("a.png").stat().st_size > 1000
+    by = symfric("ocp mine.py --intervals 5 --sensitivity 'x at the end,T' --json -").json
+    assert by["sensitivities"]["x at the end"]["dJ"] == pytest.approx(2 * by["cost"])
+    assert by["sensitivities"]["T"]["dJ"] == pytest.approx(-3 * by["cost"])
     again = symfric("ocp mine.py:problem --set T=2 --guess a.npz --scheme legendre2 --json -").json
     assert again["cost"] == pytest.approx(12 / 8, rel=1e-3)
 

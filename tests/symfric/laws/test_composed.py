@@ -260,6 +260,7 @@ TEXTS = (
     "coulomb+viscous",
     "coulomb+viscous+lugre",
     "asymmetric(coulomb+viscous)",
+    "exact(asymmetric(stribeck+viscous))",
     "load_dependent(lugre)",
     "load_normalised(lugre)",
     "lagged(stribeck+viscous)",

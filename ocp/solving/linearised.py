@@ -1,0 +1,374 @@
+"""Optimality conditions linearised at a solution, for its derivatives and its condition.
+
+With the active conditions A fixed, the optimality conditions are equations in w and the
+multipliers. Their derivative by a parameter p is
+
+    [H  A'] [dw  ]     [L_wp]
+    [A  0 ] [dlam] = - [A_p ],     dJ*/dp = f_p + lam'g_p
+
+with the Hessian H of the Lagrangian L on the unknowns that are not at bounds. Both terms with p are
+central differences of fourth order of the exact first derivatives.
+
+Source: Fiacco, Introduction to Sensitivity and Stability Analysis in Nonlinear Programming, 1983;
+Nocedal and Wright, Numerical Optimization, 2006, 12.5, 16.1 (second-order conditions).
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, NamedTuple, final
+
+import casadi as ca
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse import linalg
+
+from ocp.formulation.phase import Array, fixed
+from ocp.solving.active import Entry, Status, entries, statuses
+from ocp.solving.motion import Motion, at_times
+from ocp.solving.optimum import STATIONARY, Optimum, Sparse
+from ocp.solving.sensitivity import Condition, Sensitivity
+from ocp.transcription.blocks import Indices
+from ocp.transcription.program import Iterate
+from ocp.transcription.unknowns import SpanPoints
+from symfric.foundation.parameters import check_names
+
+STEP = 1e-3
+"""Step of differences relative to a parameter."""
+SOFT, TINY = 1e-11, 1e-14
+"""Regularisation of dependent conditions and of a Hessian without curvature, whose effect iterative
+refinement removes."""
+ROUNDS = 5
+SINGULAR = 1e-5
+"""Largest relative residual of the linear equations."""
+LARGE, UNSOLVABLE = 1e12, 1e15
+"""Condition numbers above which active conditions count as dependent, and above which the linear
+equations have no unique solution."""
+PENALTY, FLAT = 1e6, 1e-6
+"""Weight of A'A in the test of second-order conditions, and least pivot of a positive matrix."""
+
+
+class Change(NamedTuple):
+    """Effect of a number on the program.
+
+    Attributes:
+        unit: unit of the number.
+        gradient: derivative of the gradient of the Lagrangian, (n,).
+        rows: derivative of the rows minus that of their bounds, (m,).
+        bounds: derivative of the bounds of the unknowns, (n,).
+        cost: derivative of the optimal cost.
+    """
+
+    unit: str
+    gradient: Array
+    rows: Array
+    bounds: Array
+    cost: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """Optimality conditions of a solution with its active conditions fixed.
+
+    Attributes:
+        optimum: the solution.
+        changed: indices of unknowns, then of rows, that count as active although the distance from
+            their bound exceeds their multiplier, or as inactive although it does not.
+
+    Raises:
+        ValueError: the point does not satisfy the optimality conditions.
+    """
+
+    optimum: Optimum
+    changed: Indices = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def __post_init__(self) -> None:
+        if not self.optimum.residual <= STATIONARY:
+            raise ValueError(
+                f"{self.name}: expected a solution that satisfies the optimality conditions, got a "
+                f"residual of {self.optimum.residual:.1g}; solve again from this guess"
+            )
+
+    @property
+    def name(self) -> str:
+        """Subject of messages."""
+        return f"solution of '{self.optimum.transcription.problem.name}'"
+
+    @cached_property
+    def status(self) -> tuple[Status, Status]:
+        """Status of all unknowns and of all rows, with the conditions `changed`."""
+        w, g = statuses(self.optimum)
+        active = np.concatenate([w.active, g.active])
+        active[self.changed] ^= True
+        n = w.active.size
+        return w._replace(active=active[:n]), g._replace(active=active[n:])
+
+    @cached_property
+    def free(self) -> Indices:
+        """Indices of unknowns that are not at bounds."""
+        return np.flatnonzero(~self.status[0].active)
+
+    @cached_property
+    def held(self) -> Indices:
+        """Indices of the active rows."""
+        return np.flatnonzero(self.status[1].active)
+
+    @cached_property
+    def entries(self) -> list[Entry]:
+        """Restricted unknowns and rows by name."""
+        return [*entries(self.optimum)]
+
+    @cached_property
+    def weak(self) -> tuple[str, ...]:
+        """Names of conditions that may or may not be active."""
+        uncertain = np.concatenate([status.weak for status in self.status])
+        return tuple(dict.fromkeys(e.name for e in self.entries if uncertain[e.number]))
+
+    @cached_property
+    def hessian(self) -> Sparse:
+        """Hessian of the Lagrangian, divided by `size`, (n, n)."""
+        made, iterate = self.optimum.transcription, self.optimum.iterate
+        H = made.program.hessian(iterate.w, self.optimum.values, 1.0, iterate.lam_g)
+        upper = sp.csc_matrix(ca.DM(H).sparse())
+        return (upper + sp.triu(upper, 1).T) / self.optimum.size
+
+    @cached_property
+    def active(self) -> Sparse:
+        """Jacobian of the active rows by the free unknowns."""
+        return sp.csr_matrix(self.optimum.rows[1])[self.held][:, self.free]
+
+    @cached_property
+    def matrix(self) -> Sparse:
+        """Matrix of the linear equations."""
+        H = self.hessian[self.free][:, self.free]
+        return sp.bmat([[H, self.active.T], [self.active, None]], format="csc")
+
+    @cached_property
+    def factors(self) -> Any:
+        """LU factors of the slightly regularised matrix; None if it is singular."""
+        soft = np.append(np.full(self.free.size, TINY), np.full(self.held.size, -SOFT))
+        try:
+            return linalg.splu(sp.csc_matrix(self.matrix + sp.diags(soft)))
+        except RuntimeError:
+            return None
+
+    def solved(self, right: Array) -> Array | None:
+        """Return the solution of the linear equations, or None if there is no unique one."""
+        found, size, rest = np.zeros(right.size), float(np.abs(right).max(initial=0.0)), right
+        for _ in range(ROUNDS if self.number < UNSOLVABLE else 0):  # iterative refinement
+            found = found + self.factors.solve(rest)
+            rest = right - self.matrix @ found
+            if not np.isfinite(rest).all():
+                return None
+            if np.abs(rest).max(initial=0.0) <= 1e-12 * size:
+                return found
+        return found if np.abs(rest).max(initial=0.0) <= SINGULAR * size else None
+
+    def stepped(self) -> Optimum | None:
+        """Return the optimum after a Newton step with these active conditions, None without one."""
+        optimum, program = self.optimum, self.optimum.transcription.program
+        (g, J), (unknowns, rows), n = optimum.rows, self.status, self.free.size
+        bounds = np.where(unknowns.upper, program.upper_w, program.lower_w)
+        moved = np.where(unknowns.active, bounds - optimum.iterate.w, 0.0)
+        wanted = np.where(rows.upper, program.upper_g, program.lower_g)
+        first = optimum.slope / optimum.size + self.hessian @ moved
+        last = (J @ moved)[self.held] + (g - wanted)[self.held]
+        found = self.solved(-np.concatenate([first[self.free], last]))
+        if found is None:
+            return None
+        lam_g, moved[self.free] = np.zeros(g.size), found[:n]
+        lam_g[self.held] = found[n:] * optimum.size
+        slope = optimum.slope + optimum.size * (self.hessian @ moved) + J.T @ lam_g
+        lam_w = np.where(unknowns.active, -slope, 0.0)
+        return replace(optimum, iterate=Iterate(optimum.iterate.w + moved, lam_w, lam_g))
+
+    @cached_property
+    def numbers(self) -> dict[str, tuple[str, Indices]]:
+        """Name -> unit and indices in the values of the program: parameters, fixed durations."""
+        made = self.optimum.transcription
+        found: dict[str, tuple[str, list[int]]] = {}
+        for number, (span, own) in enumerate(
+            zip(made.problem.spans, made.layout.spans, strict=True)
+        ):
+            first, n = self.optimum.offset(number), len(span.model.p)
+            for i, v in enumerate(span.model.p):
+                if v.name not in span.chosen:
+                    found.setdefault(v.name, (v.unit, []))[1].append(first + i)
+            if own.T < 0:
+                name = "T" if len(made.problem.chain) == 1 else f"T of {span.name}"
+                found.setdefault(name, ("s", []))[1].append(first + n)
+        return {name: (unit, np.array(at)) for name, (unit, at) in found.items()}
+
+    @cached_property
+    def conditions(self) -> dict[str, list[tuple[Entry, bool]]]:
+        """Name -> restricted unknowns and rows, and whether the name means their upper bound."""
+        program = self.optimum.transcription.program
+        lower = np.concatenate([program.lower_w, program.lower_g])
+        upper = np.concatenate([program.upper_w, program.upper_g])
+        found: dict[str, list[tuple[Entry, bool]]] = {}
+        for entry in self.entries:
+            if lower[entry.number] == upper[entry.number]:
+                found.setdefault(entry.name, []).append((entry, True))
+                continue
+            short = entry.name.removeprefix("the ")
+            for side, bounds in (("lower", lower), ("upper", upper)):
+                if np.isfinite(bounds[entry.number]):
+                    pair = entry, side == "upper"
+                    found.setdefault(f"{side} {short}", []).append(pair)
+        return found
+
+    def by_condition(self, name: str) -> Change:
+        """Return the effect of a prescribed value or of a bound."""
+        n, iterate = self.optimum.iterate.w.size, self.optimum.iterate
+        active, high, _, equal, _ = Status.joined(*self.status)
+        lam, shift = np.concatenate([iterate.lam_w, iterate.lam_g]), np.zeros(active.size)
+        for entry, upper in self.conditions[name]:
+            k = entry.number
+            if active[k] and (equal[k] or bool(high[k]) == upper):
+                shift[k] = 1.0 / entry.place.scale
+        unit = self.conditions[name][0][0].unit
+        return Change(unit, np.zeros(n), -shift[n:], shift[:n], -float(lam @ shift))
+
+    def by_number(self, name: str) -> Change:
+        """Return the effect of a parameter or of a fixed duration.
+
+        Raises:
+            ValueError: derivatives that are not finite, or a parameter that changes the start of a
+                mechanism with loops.
+        """
+        optimum, (unit, at) = self.optimum, self.numbers[name]
+        program, iterate = optimum.transcription.program, optimum.iterate
+        now = optimum.values[at]
+        h = STEP * (float(np.abs(now).max()) or 1.0)
+
+        def lagrangian(times: int) -> Array:
+            values = optimum.values.copy()
+            values[at] += times * h
+            f, slope = program.gradient(iterate.w, values)
+            g, J = program.jacobian(iterate.w, values)
+            total = ca.vec(ca.densify(slope)) + J.T @ iterate.lam_g
+            return np.concatenate([np.array(part).ravel() for part in (f, total, g)])
+
+        one, two = (lagrangian(k) - lagrangian(-k) for k in (1, 2))
+        rate = (8.0 * one - two) / (12.0 * h)
+        if not np.isfinite(rate).all():
+            raise ValueError(
+                f"{self.name}: expected finite derivatives by {name}, got others within "
+                f"{2 * h:.3g} {unit} of its value"
+            )
+        n, bounds = iterate.w.size, self._starts(name)
+        cost = float(rate[0] + iterate.lam_g @ rate[n + 1 :] - iterate.lam_w @ bounds)
+        return Change(unit, rate[1 : n + 1], rate[n + 1 :], bounds, cost)
+
+    def _starts(self, name: str) -> Array:
+        """Return the derivative of the bounds of w by a parameter on which start values depend."""
+        made = self.optimum.transcription
+        bounds = np.zeros(made.layout.size)
+        for span, own in zip(made.problem.spans, made.layout.spans, strict=True):
+            p = {v.name: value for v, value in zip(span.model.p, span.p, strict=True)}
+            if span.phase or name not in p:
+                continue
+            mechanics, i = span.model.holonomic, [*p].index(name)
+            if mechanics and ca.depends_on(mechanics.phi, span.model.p[i].symbol):
+                raise ValueError(
+                    f"{self.name}: expected a parameter that leaves closed loops closed, got {name}"
+                )
+            given = {n: span.nodes[0.0][n][0] for n in made.problem.chain[0].start
+                     if n in span.nodes[0.0] and fixed(span.nodes[0.0][n])}  # fmt: skip
+            slopes = span.model.start_slopes(given, p)[0][:, i]
+            for k, v in enumerate(span.model.x):
+                if v.name not in made.problem.chain[0].start and fixed(span.nodes[0.0][v.name]):
+                    bounds[own.nodes[k, 0]] = slopes[k]
+        return bounds / made.program.scale
+
+    def by(self, name: str) -> tuple[Change, Array]:
+        """Return the effect of a number and the derivative of the scaled unknowns by it.
+
+        The derivative is NaN if the linear equations have no unique solution.
+
+        Raises:
+            ValueError: an unknown name, or derivatives that are not finite.
+        """
+        check_names("sensitivity", [name], [*self.numbers, *self.conditions])
+        change = self.by_condition(name) if name in self.conditions else self.by_number(name)
+        moved = change.bounds.copy()
+        right = change.gradient / self.optimum.size + self.hessian @ moved
+        rows = change.rows + self.optimum.rows[1] @ moved
+        right = -np.concatenate([right[self.free], rows[self.held]])
+        found = self.solved(right)
+        moved[self.free] = np.nan if found is None else found[: self.free.size]
+        return change, moved
+
+    def sensitivity(self, name: str, motion: Motion) -> Sensitivity:
+        """Return the derivatives by a parameter or a prescribed value, at times of `motion`."""
+        change, moved = self.by(name)
+        made, moved = self.optimum.transcription, moved * self.optimum.transcription.program.scale
+        changed = self.numbers[name][1] if name in self.numbers else ()
+        parts: list[SpanPoints] = []
+        for number, own in enumerate(made.layout.spans):
+            T = self.optimum.offset(number) + len(made.problem.spans[number].model.p)
+            rate = moved[own.T] if own.T >= 0 else float(T in changed)
+            groups = (own.nodes, own.inner, own.z, own.u)
+            parts.append(SpanPoints(float(rate), *(moved[columns] for columns in groups)))
+        rates = self.optimum.over_time(parts, "xzu")
+        times = self.optimum.over_time(self.optimum.points.spans, "")["t"]
+        rates = at_times(motion, times, rates)
+        chosen = zip(made.problem.chosen, moved[made.layout.chosen].tolist(), strict=True)
+        return Sensitivity(
+            name, change.unit, change.cost, float(rates["t"][-1]),
+            {choice.name: rate for choice, rate in chosen},
+            rates["t"], {n: row for n, row in rates.items() if n in motion.signals}, self.doubts,
+        )  # fmt: skip
+
+    @cached_property
+    def number(self) -> float:
+        """Estimated 1-norm condition number of the linear equations; inf if they are singular."""
+        if self.factors is None:
+            return np.inf
+        shape, solve = self.matrix.shape, self.factors.solve
+        operator: Any = linalg.LinearOperator  # whose stubs lack its arguments
+        estimate: Any = linalg.onenormest(operator(shape, matvec=solve, rmatvec=solve))
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(np.nan_to_num(estimate * linalg.norm(self.matrix, 1), nan=np.inf))
+
+    @cached_property
+    def sufficient(self) -> bool:
+        """True if the Hessian is positive definite on the active conditions."""
+        norms = linalg.norm(self.active, axis=1)
+        A = sp.diags(1.0 / np.maximum(norms, 1e-300)) @ self.active
+        return _positive(self.hessian[self.free][:, self.free] + PENALTY * (A.T @ A))
+
+    @property
+    def regular(self) -> bool:
+        """True if the linear equations have a unique solution, at a strict minimum."""
+        return self.number < LARGE and self.sufficient
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Reasons why derivatives may be wrong."""
+        weak = (f"weakly active: {', '.join(self.weak)}",) if self.weak else ()
+        if not self.sufficient:
+            return *weak, "second-order conditions not met: the motion may not be unique"
+        many = "active conditions depend on each other: multipliers are not unique"
+        return (*weak, many) if self.number > LARGE else weak
+
+    @property
+    def condition(self) -> Condition:
+        """Condition of the optimum."""
+        size, free, held = self.optimum.iterate.w.size, self.free.size, self.held.size
+        known = size, held + size - free, free - held, self.optimum.residual
+        return Condition(*known, self.number, self.sufficient, self.weak)
+
+
+def _positive(matrix: Sparse) -> bool:
+    """Return True if a symmetric matrix is positive definite, by the pivots of LDL'."""
+    if not matrix.shape[0]:
+        return True
+    try:
+        lu = linalg.splu(
+            sp.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )  # fmt: skip
+    except RuntimeError:
+        return False
+    return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > FLAT).all())

@@ -1,0 +1,101 @@
+"""Cost and violation of the conditions with a penalty in a solution."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import casadi as ca
+import numpy as np
+
+from ocp.formulation.phase import Array, Span
+from ocp.formulation.problem import Posed, Problem
+from ocp.transcription.schemes import Scheme
+from ocp.transcription.unknowns import Points
+
+
+@final
+@dataclass(frozen=True)
+class Penalty:
+    """Cost of a soft condition.
+
+    Attributes:
+        cost: share in J; with scenarios, in the cost of its scenario.
+        violation: largest violation, in the unit of the condition.
+        time: time of this violation [s].
+    """
+
+    cost: float
+    violation: float
+    time: float
+
+    def __str__(self) -> str:
+        return f"costs {self.cost:.4g}, largest violation {self.violation:.3g} at {self.time:.4g} s"
+
+
+def penalties_of(
+    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Points
+) -> dict[str, Penalty]:
+    """Return condition -> its penalty at the collocation points, or at its time."""
+    found: dict[str, Penalty] = {}
+    for at in _all_points(problem, scheme, meshes, points):
+        span, own = at.span, points.spans[at.number]
+        scenario = problem.scenario_names[span.scenario : span.scenario + 1]
+        label = ": ".join([*scenario, *[span.name] * (len(problem.chain) > 1), ""])
+        for row in span.softened:
+            violation, cost = at.of(row.violation), at.of(row.penalty)
+            k = int(np.argmax(violation))
+            total = float(at.weights @ cost)
+            found[label + row.name] = Penalty(total, float(violation[k]), float(at.t[k]))
+        for s, rows in span.rows_at.items():
+            for row in (row for row in rows if row.linear or row.quadratic):
+                off = ca.Function("off", [span.model.vector("x")], list(row.parts))
+                size = max(0.0, float(off(own.nodes[:, -1])))  # a constant state
+                cost = row.linear * size + row.quadratic * size**2
+                found[label + row.name] = Penalty(cost, size, at.begin + s * own.T)
+    return found
+
+
+def largest_product(
+    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Points
+) -> float:
+    """Return the largest product of complementary signals, relative to its typical magnitude."""
+    return max(
+        float(at.of(row.parts[0] * row.parts[1]).max()) / row.nominal
+        for at in _all_points(problem, scheme, meshes, points)
+        for row in at.span.path
+        if row.is_product
+    )
+
+
+class _Points(NamedTuple):
+    """Values of one phase at its collocation points, or at the starts of intervals without them."""
+
+    number: int
+    span: Span
+    begin: float
+    t: Array
+    weights: Array
+    values: tuple[Array, ...]
+
+    def of(self, expression: ca.SX) -> Array:
+        """Return the values of an expression, shape (points,)."""
+        function = ca.Function("of", self.span.symbols, [expression]).map(self.t.size)
+        return np.array(function(*self.values))[0]
+
+
+def _all_points(
+    problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Points
+) -> Iterator[_Points]:
+    made, begin = scheme.coefficients(), 0.0
+    inside = made.nodes[1:] if made.degree else made.nodes
+    pairs = zip(problem.spans, meshes, points.spans, strict=True)
+    for number, (span, mesh, own) in enumerate(pairs):
+        begin = begin if span.phase else 0.0
+        lengths = own.T * np.diff(mesh)[:, None]
+        t = (begin + own.T * mesh[:-1, None] + lengths * inside).ravel()
+        x = own.inner if made.degree else own.nodes[:, :-1]
+        u = np.repeat(own.u, inside.size, axis=1)
+        p = [points.chosen.get(v.name, x) for v, x in zip(span.model.p, span.p, strict=True)]
+        values = t[None, :], x, own.z, u, np.tile(np.reshape(p, (-1, 1)), (1, t.size))
+        yield _Points(number, span, begin, t, (lengths * made.weights).ravel(), values)
+        begin += own.T

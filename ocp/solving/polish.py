@@ -1,0 +1,66 @@
+"""Optimum of full precision from that of an interior-point method, by active sets."""
+
+import numpy as np
+
+from ocp.solving.active import Status
+from ocp.solving.linearised import Linearised
+from ocp.solving.optimum import STATIONARY, Optimum
+from ocp.transcription.program import worst_of
+
+STEPS = 10
+CONVERGED, CLOSE = 1e-8, 1e-5
+"""Change of scaled unknowns by the last step, and largest relative change of the cost."""
+MOST = 2
+"""Number of conditions that may be given up, in multiples of the number that are too many."""
+NEAREST = 1e-3
+"""Least ratio of multiplier and distance of a condition that may count as active."""
+
+
+def determined(optimum: Optimum) -> Linearised:
+    """Return the optimality conditions with active conditions that determine a strict minimum.
+
+    Near a switch of a bang-bang control both multiplier and distance from the bound are small. If
+    active conditions are too few or too many, those that are nearest to the limit are changed.
+    """
+    plain = Linearised(optimum)
+    if plain.regular:
+        return plain
+    active, _, _, fixed, ratio = Status.joined(*plain.status)
+    spare = plain.free.size - plain.held.size
+    near = ~active & (ratio > NEAREST) if spare > 0 else active & ~fixed
+    order = np.argsort(np.where(near, -ratio if spare > 0 else ratio, np.inf))
+    order = order[: min(int(near.sum()), max(spare, -MOST * spare))]
+    few, many = 0, order.size
+    if not Linearised(optimum, order).regular:
+        return plain
+    while many - few > 1:
+        middle = (few + many) // 2
+        enough = Linearised(optimum, order[:middle]).regular
+        few, many = (few, middle) if enough else (middle, many)
+    return Linearised(optimum, order[:many])
+
+
+def polished(optimum: Optimum) -> Linearised:
+    """Return the optimality conditions at an optimum of full precision.
+
+    A primal-dual active set method makes a condition active where it is violated, and inactive
+    where its multiplier has the wrong sign. If this does not converge, or changes the cost, the
+    optimum of the solver is kept.
+
+    Source: Hintermueller, Ito and Kunisch, SIAM J. Optimization 13(3), 2002, 865-888.
+
+    Raises:
+        ValueError: the point does not satisfy the optimality conditions.
+    """
+    first = now = determined(optimum)
+    for _ in range(STEPS):
+        if (step := now.stepped()) is None or not step.residual <= STATIONARY:
+            break
+        later, change = determined(step), np.abs(step.iterate.w - now.optimum.iterate.w).max()
+        same = np.array_equal(now.free, later.free) and np.array_equal(now.held, later.held)
+        if same and change < CONVERGED:
+            violation = worst_of(step.transcription.program, step.iterate.w, step.rows[0])
+            near = abs(step.cost - optimum.cost) <= CLOSE * max(abs(optimum.cost), optimum.size)
+            return later if near and violation < CLOSE else first
+        now = later
+    return first

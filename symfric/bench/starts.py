@@ -1,0 +1,139 @@
+"""Optimal control from random starts: how often symfric finds the best known solution.
+
+A run counts as verified if the simulation of the model confirms it and, in problems with dry
+friction, if the referee of `symfric bench ocp` finds no miss above 1e-4.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from math import inf, isfinite, nan, pi
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ocp.formulation.phase import Span, clipped, limits
+from ocp.formulation.problem import Problem
+from ocp.problems import READY, Ready
+from ocp.solve import solve
+from ocp.solving.solution import Solution
+from ocp.solving.starts import initial_points
+from ocp.transcription.schemes import Radau, make_meshes
+from ocp.transcription.transcribe import discretise
+from symfric.bench.ocp_cases import CASES
+from symfric.bench.ocp_contenders import held
+from symfric.bench.ocp_referee import judged
+from symfric.bench.report import Found, Progress, Report, timed
+from symfric.foundation.parameters import Variable
+
+Array = NDArray[np.float64]
+STARTS, RANDOM = 12, 50
+NEAR, FAR = 0.1, 0.5
+"""Scales of the starts, see `starts_of`: near the default guess, and anywhere in the bounds."""
+WAVES = 4
+"""Number of half waves in a perturbation."""
+WANTED = 1e-4
+"""Largest relative miss of a verified motion."""
+BEST = 1e-3
+"""Largest relative difference from the best cost that counts as equal."""
+TITLE = "Optimal control from random starts: medians over the starts"
+
+
+def bench(quick: bool = False, progress: Progress = None) -> Report:
+    """Solve each problem from 12 near starts (`quick`: 3) and, with friction, 50 far ones."""
+    tasks: dict[str, Callable[[], Iterator[Found]]] = {
+        f"{name}, {kind}": partial(_runs, ready, kind, count, scale)
+        for name, ready in READY.items()
+        for kind, count, scale in (("near", 3 if quick else STARTS, NEAR), ("far", RANDOM, FAR))
+        if kind == "near" or (ready.friction and not quick)
+    }
+    return Report().collect(tasks, progress)
+
+
+def _runs(ready: Ready, kind: str, count: int, scale: float) -> Iterator[Found]:
+    problem = ready.make()
+    runs = [
+        timed(partial(solve, problem, guess=guess, throw=False))
+        for guess in starts_of(problem, count, scale)
+    ]
+    yield row_of(ready, kind, runs)
+
+
+def row_of(ready: Ready, kind: str, runs: Sequence[tuple[float, Solution]]) -> Found:
+    """Return medians over runs (processor time, solution).
+
+    The best cost is the known cost or the best of these runs.
+    """
+    found = [solution for _, solution in runs]
+    misses = [missed(ready.name, solution) for solution in found]
+    good = [s.verified and not miss > WANTED for s, miss in zip(found, misses, strict=True)]
+    held = [s.cost for s, verified in zip(found, good, strict=True) if verified]
+    known = ready.optimum if isfinite(ready.optimum) else min(held, default=nan)
+    cost, size = median(s.cost for s in found), abs(known) or 1.0
+    share = 100.0 / len(runs)
+    return TITLE, {
+        "case": ready.name, "starts": f"{len(runs)} {kind}",
+        "reported as solved [%]": share * sum(s.status.ok for s in found),
+        "verified [%]": share * sum(good),
+        "best cost reached [%]": share * sum(c <= known + BEST * size for c in held),
+        "cost J": cost, "best known J": ready.optimum,
+        "cost above the best [%]": 100.0 * (cost - known) / size,
+        "relative miss": median(inf if miss != miss else miss for miss in misses),
+        "iterations": median(s.iterations for s in found),
+        "processor time [s]": median(seconds for seconds, _ in runs),
+    }  # fmt: skip
+
+
+def missed(name: str, solution: Solution) -> float:
+    """Return the relative miss under exact friction; 0 for problems without friction."""
+    cases = [case for case in CASES if case.name == name]
+    return judged(cases[0], *held(solution)).miss if cases else 0.0
+
+
+def starts_of(problem: Problem, count: int, scale: float) -> Iterator[dict[str, Array]]:
+    """Yield guesses of all states and inputs by name; the first near start is the default one.
+
+    A random sum of half waves is added to each signal. Its standard deviation is `scale` times half
+    the width of the bounds, or the larger of the largest and the nominal value without bounds. Free
+    durations are multiplied by exp(scale r / 2), r normal.
+    """
+    into = discretise(problem, Radau()).on(make_meshes(problem, 50))
+    model, first = problem.spans[0].model, int(scale == NEAR)
+    for seed in range(count):
+        random, begins = np.random.default_rng(seed), [0.0]
+        at, nodes, held = list[Array](), list[Array](), list[Array]()
+        parts = zip(problem.spans, into.meshes, initial_points(into).spans, strict=True)
+        for span, mesh, old in parts:
+            x, u, time = old.nodes, old.u, old.T
+            if seed >= first:
+                x = x + _waves(random, scale, span, model.x, x)(mesh)
+                u = u + _waves(random, scale, span, model.u, u)((mesh[1:] + mesh[:-1]) / 2)
+                time *= float(np.exp(0.5 * scale * random.standard_normal()))
+            time = clipped(time, limits(span.T))
+            at.append(begins[-1] + time * mesh)
+            begins.append(begins[-1] + time)
+            nodes.append(x)
+            held.append(np.hstack([u, u[:, -1:]]))
+        times = np.linspace(0.0, begins[-1], 201)
+        rows = zip((*model.x, *model.u), (*np.hstack(nodes), *np.hstack(held)), strict=True)
+        yield {v.name: np.interp(times, np.concatenate(at), row) for v, row in rows}
+
+
+def _waves(
+    random: np.random.Generator, scale: float, span: Span, group: Sequence[Variable], rows: Array
+) -> Callable[[Array], Array]:
+    """Return random sums of half waves over [0, 1], one row for each variable."""
+
+    def size(v: Variable, row: Array) -> float:
+        low, high = span.boxes[v.name]
+        bounded = isfinite(low) and isfinite(high)
+        return 0.5 * (high - low) if bounded else max(v.nominal, float(np.abs(row).max()))
+
+    sizes = [scale * size(v, row) for v, row in zip(group, rows, strict=True)]
+    a = [random.standard_normal((2, WAVES)) * one / np.sqrt(WAVES) for one in sizes]
+
+    def at(fractions: Array) -> Array:
+        angles = pi * np.arange(1, WAVES + 1)[:, None] * fractions
+        return np.array([one[0] @ np.sin(angles) + one[1] @ np.cos(angles) for one in a])
+
+    return at

@@ -1,0 +1,151 @@
+"""Sensitivities and the condition of optima against closed forms and re-solves."""
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from carts import CART, EFFORT, F, V, fastest, move, slope
+from phases import solve_once
+
+from ocp import (
+    Free,
+    Phase,
+    Problem,
+    Radau,
+    at_end,
+    integral,
+    load,
+    solve,
+)
+from symfric import BrownMcPhee, Model, Variable
+from symfric.scenes import drive
+
+# --- sensitivities ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "argument", "value"),
+    [
+        (move, "m", "m", 2.0),
+        (move, "k", "k", 0.0),
+        (move, "T", "T", 1.0),
+        (move, "v at the start", "v", 0.0),
+        (lambda **p: move(**({"limit": 8.5} | p)), "m", "m", 2.0),
+        (lambda **p: move(**({"limit": 8.5} | p)), "x at the end", "to", 1.0),
+        (fastest, "m", "m", 2.0),
+        (fastest, "upper bound on a", "high", 10.0),
+        (fastest, "lower bound on a", "low", -5.0),
+    ],
+)
+def test_sensitivities_are_differences_of_solves(
+    make: Callable[..., Problem], name: str, argument: str, value: float
+) -> None:
+    found = solve_once(make(), 31).sensitivity(name)
+    cost, signals = slope(make, argument, value, 31, Radau(3))
+    np.testing.assert_allclose(found.cost, cost, rtol=1e-5)
+    np.testing.assert_allclose(found.T, signals["t"][-1], rtol=1e-5, atol=1e-9)
+    for n, row in ({"t": found.t} | dict(found.signals)).items():
+        np.testing.assert_allclose(row, signals[n], atol=1e-4 * max(1.0, np.abs(signals[n]).max()))
+    assert not found.doubts
+
+
+def test_chosen_parameters_and_starts_that_depend_on_parameters() -> None:
+    """x(0) = 1 / k: the spring starts with a given force; its mass is chosen."""
+    k, m = Variable("k", "N/m", start=2.0), Variable("m", "kg", start=1.0)
+    x = Variable("x", "m", start=1.0 / k.symbol)
+    ode = ca.vertcat(V.symbol, (F.symbol - k.symbol * x.symbol) / m.symbol)
+    model = Model("spring", x=(x, V), u=(F,), p=(k, m), ode=ode)
+
+    def problem(k: float = 2.0) -> Problem:
+        phase = Phase(model, 1.0, end={"x": 0.0, "v": 0.0}, p={"k": k})
+        return Problem(phase, EFFORT + at_end(lambda s: 1 / s.m), choose={"m": (0.01, 10.0)})
+
+    found = solve_once(problem(), 20)
+    by, (cost, signals) = found.sensitivity("k"), slope(problem, "k", 2.0, 20, Radau(3))
+    np.testing.assert_allclose(by.cost, cost, rtol=1e-6)
+    np.testing.assert_allclose(by.signals["x"], signals["x"], atol=1e-6)
+    high, low = (solve_once(problem(2.0 + d), 20).chosen["m"] for d in (1e-4, -1e-4))
+    np.testing.assert_allclose(by.chosen["m"], (high - low) / 2e-4, rtol=1e-4)
+    with pytest.raises(ValueError, match=r"sensitivity: expected one of k, T, .* got m"):
+        found.sensitivity("m")
+
+
+def guided(T: float | Free, m: float = 1.0, to: float = 0.1) -> Problem:
+    law = BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-6)
+    stage = drive(law, m=1.0, N=1.0, free=["m", "mu_d"])
+    rest = {"x": 0.0, "v": 0.0}
+    phase = Phase(stage, T, start=rest, end=rest | {"x": to}, p={"m": m})
+    return Problem(phase, integral(lambda s: 100.0 + s.force**2))
+
+
+@pytest.mark.slow
+def test_sensitivities_of_a_sliding_mass_are_those_of_the_closed_form() -> None:
+    """J = T (100 + F^2) + 12 m^2 d^2 / T^3 with friction F: T^4 = 36 m^2 d^2 / (100 + F^2)."""
+    found = solve(guided(Free(0.1, 1.0)), starts=2)
+    assert [mode.kind for mode in found.modes["guide"]] == ["slip+"]
+    T = (0.36 / 116) ** 0.25
+    wanted = {
+        "m": (0.24 / T**3, T / 2),
+        "mu_d": (8 * T, -8 * T / 4 / 116),
+        "x at the end": (2.4 / T**3, T / 2 / 0.1),
+    }
+    for name, rates in wanted.items():
+        by = found.sensitivity(name)
+        np.testing.assert_allclose([by.cost, by.T], rates, rtol=1e-3)
+        assert not by.doubts
+    assert set(found.costates) == {"x", "v"}
+    np.testing.assert_allclose(found.costates["x"], -2.4 / T**3, rtol=1e-3)
+    np.testing.assert_allclose(found.hamiltonian, 0.0, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_sensitivities_pass_through_stick() -> None:
+    """In 3 s the mass rests first, moves 0.2 m in 0.5 s, and rests again, at any time."""
+    found = solve(guided(3.0, to=0.2))
+    assert [mode.kind for mode in found.modes["guide"]] == ["stick", "slip+", "stick"]
+    high, low = (solve(guided(3.0, m=1.0 + d, to=0.2)).cost for d in (2e-3, -2e-3))
+    by = found.sensitivity("m")
+    np.testing.assert_allclose(by.cost, (high - low) / 4e-3, rtol=1e-3)
+    assert "may not be unique" in by.doubts[-1]
+
+
+# --- condition, and what cannot be known --------------------------------------------------------
+
+
+def test_condition_counts_and_tests_the_second_order() -> None:
+    """20 forces and 2 prescribed ends leave 18 degrees of freedom; a maximum is no minimum."""
+    good = solve_once(move(), 20).condition
+    assert (good.degrees_of_freedom, good.sufficient) == (18, True)
+    assert good.number < 1e6
+    assert good.residual < 1e-8
+    assert "18 degrees of freedom; strict local minimum" in str(good)
+    saddle = integral(lambda s: s.a**2 - 200.0 * s.x**2)
+    phase = Phase(CART, 1.5, start={"x": 0.0, "v": 0.0}, end={"x": 0.0, "v": 0.0}, p={"m": 1.0})
+    bad = solve_once(Problem(phase, saddle), 20).condition
+    assert not bad.sufficient
+    assert "second-order conditions not met" in str(bad)
+
+
+def test_motion_that_is_not_unique_is_doubted() -> None:
+    """Any force that ends at x = 1 is optimal if the cost is x at the end."""
+    phase = Phase(CART, 1.0, start={"x": 0.0, "v": 0.0}, end={"x": 1.0})
+    found = solve_once(Problem(phase, at_end(lambda s: s.x)), 6)
+    assert found.condition.number > 1e12
+    by = found.sensitivity("x at the end")
+    np.testing.assert_allclose(by.cost, 1.0)
+    assert np.isnan(by.signals["a"]).all()
+    assert by.doubts == ("second-order conditions not met: the motion may not be unique",)
+
+
+def test_files_and_unsolved_motions_have_no_multipliers(tmp_path: Any) -> None:
+    found = solve_once(move(), 6)
+    found.save(tmp_path / "move.npz")
+    stored = load(tmp_path / "move.npz")
+    np.testing.assert_array_equal(stored["x"], found["x"])
+    for read in (lambda s: s.costates, lambda s: s.active(), lambda s: s.sensitivity("m")):
+        with pytest.raises(ValueError, match="expected an optimal solution of this session, got"):
+            read(stored)
+    with pytest.raises(ValueError, match=r"sensitivity: expected one of .* got x at the ende"):
+        found.sensitivity("x at the ende")

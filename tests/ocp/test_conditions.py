@@ -1,0 +1,262 @@
+"""Absolute values, maxima, soft, integral, point and complementary conditions against paper."""
+
+from collections.abc import Callable
+from math import asin, pi, sqrt
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from motions import double_integrator, stage
+from scipy.optimize import brentq
+
+from ocp import (
+    TIME,
+    Fatrop,
+    Free,
+    Legendre,
+    Phase,
+    Problem,
+    Shooting,
+    Sqp,
+    absolute,
+    at_end,
+    complementary,
+    integral,
+    largest,
+    load,
+    soft,
+    solve,
+    verify,
+    worst,
+)
+from symfric import Model, SolveError, Status, Variable
+
+MODEL = double_integrator(4.0)
+WIDE = double_integrator()
+EFFORT = integral(lambda s: s.a**2)
+REST = {"x": 0.0, "v": 0.0}
+MOVE = {"start": REST, "end": {"x": 1.0, "v": 0.0}}
+
+
+def carrier() -> Model:
+    """m x'' = force."""
+    x, v, force = Variable("x", "m"), Variable("v", "m/s"), Variable("force", "N")
+    m = Variable("m", "kg", start=1.0)
+    return Model("carrier", x=(x, v), u=(force,), p=(m,), ode=ca.vertcat(v, force / m))
+
+
+def hopper() -> Model:
+    """Unit mass on the ground: y'' = u + lam - 10."""
+    y, v = Variable("y", "m"), Variable("v", "m/s")
+    u, lam = (Variable(name, "m/s^2", nominal=10.0) for name in ("u", "lam"))
+    return Model("hopper", x=(y, v), u=(u, lam), ode=ca.vertcat(v, u + lam - 10.0))
+
+
+# --- absolute values and maxima -----------------------------------------------------------------
+
+
+def test_least_fuel_is_bang_off_bang() -> None:
+    move = solve(Problem(Phase(MODEL, 2.0, **MOVE), absolute(lambda s: s.a)))
+    burn = (2.0 - sqrt(3.0)) / 2.0  # 4 burn (T - burn) = 1
+    assert move.cost == pytest.approx(8.0 * burn, rel=2e-5)
+    assert move.verified
+    assert move.verification is not None
+    assert move.verification.cost == pytest.approx(move.cost, rel=1e-6)
+    off = (move.t_control > burn + 0.05) & (move.t_control < 2.0 - burn - 0.1)
+    assert np.abs(move.controls["a"][off]).max() < 1e-3
+    both = Problem(Phase(MODEL, 2.0, **MOVE), 2 * (absolute(lambda s: s.a, 0.5) + 0.25 * EFFORT))
+    assert Problem(both.phases, both.cost).spans[0].absolutes[0].linear == 1.0
+
+
+@pytest.mark.parametrize(("scheme", "N"), [(None, 7), (Legendre(2), 8)])
+def test_kink_within_an_interval_is_integrated_exactly_by_the_verification(
+    scheme: Legendre | None, N: int
+) -> None:
+    phase = Phase(WIDE, 1.0, start=REST, bounds={"a": 1.0})  # v = t
+    cost = absolute(lambda s: s.v - 0.37) + at_end(lambda s: s.x)
+    move = solve(Problem(phase, cost), scheme=scheme, intervals=N, refine=False, tolerance=0.1)
+    exact = (0.37**2 + 0.63**2) / 2 + 0.5
+    assert move.verification is not None
+    assert move.verification.cost == pytest.approx(exact, abs=1e-9)
+    assert move.cost == pytest.approx(exact, abs=0.5 / N**2)
+
+
+def test_largest_values_of_a_motion_of_phases_and_of_scenarios() -> None:
+    peak = largest(lambda s: abs(s.a))
+    coarse = {"intervals": 12, "refine": False}
+    alone = solve(Problem(Phase(WIDE, 2.0, **MOVE), peak), **coarse)
+    assert alone.cost == pytest.approx(1.0, rel=1e-4)
+    speed = solve(Problem(Phase(MODEL, 2.0, **MOVE), 3 * largest(lambda s: s.v)))
+    assert speed.cost == pytest.approx(12.0 - 6.0 * sqrt(3.0), rel=1e-4)  # trapezoid of v
+    assert speed.verified
+    out, back = Phase(WIDE, 2.0, **MOVE), Phase(WIDE, 1.0, end=REST)
+    both = solve(Problem(out >> back, peak), **coarse)
+    assert both.cost == pytest.approx(4.0, rel=1e-4)  # the second phase determines it
+    each = Phase(WIDE, 2.0, cost=peak, **MOVE) >> Phase(WIDE, 1.0, end=REST, cost=peak)
+    assert solve(Problem(each), **coarse).cost == pytest.approx(5.0, rel=1e-4)
+    masses = {"light": {"m": 1.0}, "heavy": {"m": 2.0}}
+    move, force = Phase(carrier(), 2.0, **MOVE), largest(lambda s: abs(s.force))
+    for cost, value in ((force, 1.5), (worst(force), 2.0)):
+        found = solve(Problem(move, cost, scenarios=masses, shared=[]), **coarse)
+        assert found.cost == pytest.approx(value, rel=1e-4)
+        assert found.verified
+
+
+def test_largest_value_between_nodes_is_the_cost_of_the_verification() -> None:
+    x, v = Variable("x", "m"), Variable("v", "m/s")
+    swing = Model("swing", x=(x, v), ode=ca.vertcat(v, -x))  # x = sin t
+    phase = Phase(swing, pi, start={"x": 0.0, "v": 1.0})
+    move = solve(Problem(phase, largest(lambda s: s.x)), intervals=3, refine=False, throw=False)
+    assert move.cost < 0.998
+    assert move.verification is not None
+    assert move.verification.cost == pytest.approx(1.0, abs=1e-4)
+    assert not move.verified
+    assert solve(Problem(phase, largest(lambda s: s.x)), intervals=3).cost > 0.999
+
+
+@pytest.mark.parametrize("term", [absolute(lambda s: s.a), largest(lambda s: s.v), worst(TIME)])
+def test_least_upper_bounds_are_only_minimised(term: object) -> None:
+    with pytest.raises(ValueError, match=r"expected a weight >= 0 of (absolute|largest|worst)"):
+        _ = -1.0 * term  # pyright: ignore[reportOperatorIssue]
+
+
+# --- soft conditions ----------------------------------------------------------------------------
+
+
+def test_linear_penalty_is_exact_above_the_multiplier() -> None:
+    # v <= 1.2 with cost a^2 / 2 over T = 1: a falls to zero in a quarter, with slope -38.4
+    def found(**weights: float) -> tuple[float, float]:
+        path = [soft(lambda s: s.v <= 1.2, **weights)]
+        move = solve(Problem(Phase(WIDE, 1.0, **MOVE), 0.5 * EFFORT, path=path), intervals=40)
+        assert move.verified
+        (penalty,) = move.soft.values()
+        assert f"largest violation {penalty.violation:.3g}" in str(move)
+        return move.cost - penalty.cost, penalty.violation
+
+    cost, violation = found(linear=40.0)
+    assert cost == pytest.approx(7.68, rel=1e-3)
+    assert violation < 1e-4
+    assert found(linear=36.0)[1] > 1e-3
+    assert 1e-4 < found(quadratic=1000.0)[1] < 0.05
+
+
+@pytest.mark.parametrize(
+    ("linear", "quadratic", "x"), [(100.0, 0.0, 1.0), (3.0, 0.0, 0.125), (0.0, 10.0, 20 / 44)]
+)
+def test_soft_end_balances_its_multiplier(
+    linear: float, quadratic: float, x: float, tmp_path: Path
+) -> None:
+    wall = soft(lambda s: s.x == 1.0, linear=linear, quadratic=quadratic)
+    phase = Phase(WIDE, 1.0, start=REST, end={"v": 0.0}, at={1.0: [wall]})
+    problem = Problem(phase, EFFORT, inputs={"a": "linear"})
+    move = solve(problem, intervals=10, refine=False)  # J = 12 x^2 + penalty of 1 - x
+    (penalty,) = move.soft.values()
+    assert penalty.violation == pytest.approx(1.0 - x, abs=1e-4)
+    assert penalty.cost == pytest.approx(
+        linear * (1 - x) + quadratic * (1 - x) ** 2, abs=1e-3
+    )  # 12 x^2 remains
+    assert move.cost - penalty.cost == pytest.approx(12 * x**2, rel=1e-3)
+    move.save(tmp_path / "soft")
+    again = load(tmp_path / "soft")
+    assert again.soft == move.soft
+    assert verify(again).ok
+
+
+def test_soft_conditions_with_other_solvers_and_their_limits() -> None:
+    phase = Phase(WIDE, 1.0, **MOVE)
+    near = Problem(
+        phase, EFFORT + largest(lambda s: s.v), path=[soft(lambda s: s.v <= 1.3, linear=9.0)]
+    )
+    costs = [solve(near, solver=solver, intervals=10, refine=False).cost
+             for solver in (None, Fatrop(), Sqp())]  # fmt: skip
+    assert np.ptp(costs) < 1e-4 * costs[0]
+    with pytest.raises(ValueError, match="got soft path conditions, which need collocation points"):
+        solve(near, scheme=Shooting())
+    assert solve(Problem(phase, EFFORT + largest(lambda s: s.v)), scheme=Shooting()).verified
+    with pytest.raises(ValueError, match=r"expected none of absolute.*, got soft conditions, larg"):
+        near.to_mpc(step=0.1)
+
+
+# --- integral and point conditions --------------------------------------------------------------
+
+
+def test_total_is_a_budget() -> None:
+    energy = {"energy": lambda s: s.a**2}
+    phase = Phase(WIDE, Free(0.1, 10.0), start=REST, end=MOVE["end"] | {"energy": (None, 12.0)})
+    fast = solve(
+        Problem(phase, TIME, totals=energy, inputs={"a": "linear"}), intervals=10, refine=False
+    )
+    assert pytest.approx(1.0, rel=1e-4) == fast.T  # energy 12 / T^3
+    assert fast["energy"][-1] == pytest.approx(12.0, rel=1e-6)
+    assert fast.verified
+
+
+def test_total_is_isoperimetric() -> None:
+    y, u = Variable("y", "m"), Variable("u", "1")
+    rope = Model("rope", x=(y,), u=(u,), ode=u.symbol)
+    phase = Phase(rope, 1.0, start={"y": 0.0}, end={"y": 0.0, "length": 1.2})
+    length = {"length": lambda s: ca.sqrt(1 + s.u**2)}
+    area = solve(Problem(phase, -integral(lambda s: s.y), totals=length, inputs={"u": "linear"}))
+    r = brentq(lambda r: 2 * r * asin(0.5 / r) - 1.2, 0.5001, 5.0)  # an arc over the chord 1
+    assert -area.cost == pytest.approx((r * 1.2 - sqrt(r**2 - 0.25)) / 2, rel=1e-4)
+
+
+def test_condition_at_a_fraction_equals_a_via_point() -> None:
+    via = Problem(Phase(WIDE, 1.0, via={0.5: {"x": (None, 0.3)}}, **MOVE), EFFORT)
+    at = Problem(Phase(WIDE, 1.0, at={0.5: [lambda s: 2 * s.x <= 0.6]}, **MOVE), EFFORT)
+    costs = [solve(problem, intervals=10, refine=False).cost for problem in (via, at)]
+    assert costs[0] == pytest.approx(costs[1], rel=1e-6)
+    assert costs[0] > 13.0
+    curve = Phase(WIDE, 1.0, at={1: [lambda s: s.x + s.v**2 == 1.0]}, start=REST)
+    end = solve(Problem(curve, EFFORT), intervals=20, refine=False)
+    assert end["x"][-1] + end["v"][-1] ** 2 == pytest.approx(1.0, rel=1e-6)
+
+
+# --- complementary signals ----------------------------------------------------------------------
+
+
+def test_lift_off_from_the_ground_is_found() -> None:
+    path = [complementary(lambda s: s.y, lambda s: s.lam)]
+    phase = Phase(hopper(), 1.5, start={"y": 0.0, "v": 0.0}, end={"y": 1.0, "v": 0.0})
+    problem = Problem(phase, integral(lambda s: s.u**2), path=path)
+    hop = solve(problem)
+    flight = sqrt(0.6)  # least of g^2 tau + 12 h^2 / tau^3
+    assert hop.cost == pytest.approx(100 * flight + 12 / flight**3, rel=3e-3)
+    assert hop.verified
+    assert "eps = 1e-08, largest product 2e-08" in hop.message
+    ground = hop["y"] < 1e-5
+    assert hop.t[ground].max() == pytest.approx(1.5 - flight, abs=0.05)
+    assert (hop["lam"] * hop["y"]).max() < 1e-6
+    with pytest.raises(SolveError) as stopped:
+        solve(problem, max_time=0.01)
+    assert stopped.value.status is Status.TIME_LIMIT
+    own = Problem(phase, problem.cost, path=path, p={"complementarity": 1e-2})
+    assert "eps = 0.01" in solve(own).message
+    with pytest.raises(ValueError, match=r"expected friction='smooth' with complementary"):
+        solve(Problem(Phase(stage(), 1.0), integral(lambda s: s.force**2),
+                      path=[complementary(lambda s: s.x, lambda s: s.v)]))  # fmt: skip
+
+
+# --- bad input ----------------------------------------------------------------------------------
+
+REFUSED: list[tuple[Callable[[], object], str]] = [
+    (lambda: soft(lambda s: s.x <= 1), r"soft: expected linear > 0 or quadratic > 0, got zeros"),
+    (lambda: soft(lambda s: s.x <= 1, linear=-1.0), "soft: linear"),
+    (lambda: soft(3, linear=1.0), "soft: expected a comparison such as"),  # pyright: ignore
+    (lambda: absolute(lambda s: s.x, -1.0), "absolute: weight"),
+    (lambda: complementary(lambda s: s.x, 1.0), "complementary: b: expected a function"),  # pyright: ignore
+    (lambda: Problem(Phase(WIDE, 1.0, at={2: [lambda s: s.x <= 1]}), EFFORT), "at: .* from 0 to 1"),
+    (lambda: Problem(Phase(WIDE, 1.0, at={1: [lambda s: s.y <= 1]}), EFFORT),
+     "condition 1 at the end: .* got y"),
+    (lambda: Problem(Phase(WIDE, 1.0, at=[1]), EFFORT), "at: expected conditions by"),  # pyright: ignore
+    (lambda: Problem(Phase(WIDE, 1.0), EFFORT, totals={"e": lambda s: s.y}), "totals: e: .* got y"),
+    (lambda: Problem(Phase(WIDE, 1.0), EFFORT, totals={"x": lambda s: s.v}), "totals: .* new"),
+    (lambda: Problem(Phase(WIDE, 1.0), absolute(lambda s: s.y)), "cost: .* got y"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "message"), REFUSED)
+def test_bad_conditions_are_refused(make: Callable[[], object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
