@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
 from math import cos, pi, sin, sqrt
 
 import casadi as ca
@@ -12,7 +12,7 @@ from motions import double_integrator
 from numpy.typing import NDArray
 from phases import SLIDER_CRANK, slider_crank, solve_once, unit_move
 
-from ocp.checking.interval_errors import cut_meshes, estimated_errors, local_errors, zoh_losses
+from ocp.checking.interval_errors import cut_meshes, local_errors, zoh_losses
 from ocp.checking.mesh_refinement import Goals, MeshErrors, refined, refined_solve
 from ocp.checking.resimulate import Arc, arcs_of, resimulated
 from ocp.checking.verify import verified, verified_arcs, verify
@@ -26,14 +26,12 @@ from ocp.problems import (
     bryson_denham,
     goddard,
     hang_glider,
-    out_and_back,
 )  # fmt: skip
 from ocp.solving.methods import Ipopt
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
-from ocp.solving.starts import initial_points
 from ocp.transcription.program import Progress
-from ocp.transcription.schemes import Legendre, Radau, make_meshes
+from ocp.transcription.schemes import make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric.foundation.parameters import Variable
 from symfric.foundation.status import Status
@@ -104,43 +102,6 @@ def test_local_errors_with_explicit_time_belong_to_their_intervals() -> None:
     np.testing.assert_allclose(local_errors([exact])[0], 0.0, atol=1e-6)
     off = replace(exact, nodes=exact.nodes + np.array([[0.0, 0.0, 0.8, 0.0, 0.0]]))
     np.testing.assert_allclose(local_errors([off])[0], [0.0, 0.1, 0.1, 0.0], atol=1e-6)
-
-
-def turned_crank() -> Problem:
-    turn = Phase(slider_crank(), 0.3, end={"crank": 2.0, "crank_rate": 0.0})
-    return Problem(turn, integral(lambda s: s.torque**2))
-
-
-@pytest.mark.parametrize("scheme", [Radau(2), Radau(3), Legendre(2)], ids=str)
-@pytest.mark.parametrize(
-    "make",
-    [brachistochrone, turned_crank, partial(out_and_back, v_t=0.2)],
-    ids=["ode", "loop", "dry"],
-)
-def test_estimates_of_local_errors_agree_with_simulations(
-    make: Callable[[], Problem], scheme: Radau | Legendre
-) -> None:
-    """An explicit model with free duration, a loop with reactions, and friction by two phases."""
-    problem = make()
-    made = discretise(problem, scheme).on(make_meshes(problem, 20))
-    solution = solve_once(problem, 20, scheme)
-    arcs = arcs_of(problem, made.meshes, solution.points)
-    found = estimated_errors(made, solution.iterate.w, made.program.values, arcs)
-    for estimate, error in zip(found, local_errors(arcs, 1e-10), strict=True):
-        small = error < 1e-5
-        np.testing.assert_allclose(estimate[small], error[small], rtol=0.05, atol=1e-8)
-        assert (abs(np.log2(estimate[~small] / error[~small])) < 1.0).all()
-
-
-def test_intervals_that_collocation_does_not_resolve_are_simulated() -> None:
-    """Layers a hundred thousand times narrower than the speeds."""
-    problem = out_and_back(v_t=1e-5)
-    made = discretise(problem, Radau(3)).on(make_meshes(problem, 10))
-    w = made.pack(initial_points(made))
-    arcs = arcs_of(problem, made.meshes, made.unpack(w))
-    found = estimated_errors(made, w, made.program.values, arcs)
-    for estimate, error in zip(found, local_errors(arcs, 1e-6), strict=True):
-        np.testing.assert_allclose(estimate, error, rtol=0.05, atol=1e-4)
 
 
 def test_phases_start_at_the_simulated_end_of_the_previous_one() -> None:
