@@ -103,7 +103,12 @@ def check_outputs(*paths: str | Path | None, picture: Path | None = None) -> Non
 
 def called_with(text: str, make: Callable[..., Any], values: dict[str, float]) -> Any:
     """Return the result of a function called with the numbers of --set."""
-    check_names(f"--set of {text}", values, list(signature(make).parameters))
+    known = signature(make).parameters
+    check_names(f"--set of {text}", values, list(known))
+    needed = [n for n, p in known.items() if p.default is p.empty and "*" not in str(p)]
+    if missing := [n for n in needed if n not in values]:
+        what = "a function whose arguments have defaults or numbers of --set"
+        raise ValueError(f"'{text}': expected {what}, got none for {', '.join(missing)}")
     return make(**values)
 
 
