@@ -135,7 +135,7 @@ class Search(Judge):
         narrow = own_level(problem, sharp.scales) < SHARPEST
         margins = found.margins if narrow else (*found.margins[:1], *found.margins[1:][-1:])
         margins = margins[-1:] if bristles(problem) else margins
-        judged: Judged | None = None
+        judged = Judged(sharp.solution, right=False)
         for margin in margins:
             exact, last = found.motion(margin), margin == margins[-1]
             if exact.status.stopped:
@@ -149,9 +149,8 @@ class Search(Judge):
                 exact = _after(own, exact) if own is not exact else exact
             if exact.ok or last:
                 judged = self.judged(exact)
-            if judged is not None and judged.right:
+            if judged.right:
                 return Judged(with_sentence(judged.solution, found.rests(margin, exact.cost)), True)
-        assert judged is not None
         return judged._replace(exact=judged.exact and narrow)
 
     def _by_own_law(self, exact: Solution) -> Solution:

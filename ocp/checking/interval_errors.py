@@ -58,11 +58,12 @@ def _collocated(transcription: Transcription, w: Array, values: Array, number: i
     """
     own, span = transcription.layout.spans[number], transcription.problem.spans[number]
     nx, nz, N, d = own.nodes.shape[0], own.z.shape[0], own.intervals, own.degree
-    ends, (piece, _) = np.full((nx, N), np.nan), _equations(transcription, number)
-    if piece is None or piece.block is None:
+    ends, equations = np.full((nx, N), np.nan), _equations(transcription, number)
+    if equations is None:
         return ends
+    piece, block, _ = equations
     n = 0 if span.model.holonomic is None else span.model.holonomic.n
-    first = piece.block.n - len(span.sides) - n
+    first = block.n - len(span.sides) - n
     old, new = transcription.scheme.coefficients(), FINER.coefficients()
     D = new.degree
     v, theta = (a[:, ::d] for a in _at_places(piece, w, transcription.program.p, values))
@@ -77,7 +78,7 @@ def _collocated(transcription: Transcription, w: Array, values: Array, number: i
         for _ in range(NEWTON_STEPS):
             at = np.flatnonzero(moving)
             step = _newton_step(
-                piece.block, (n, first), new, start[:, at], motion[:, at],
+                block, (n, first), new, start[:, at], motion[:, at],
                 *(a.reshape(-1, N, D)[:, at].reshape(a.shape[0], -1) for a in (v, theta)),
             )  # fmt: skip
             motion[:, at] += step
@@ -292,10 +293,11 @@ def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tupl
     """Return H_u and H_uu of each input at the collocation points of a phase, (nu, N, d) each."""
     own, program = transcription.layout.spans[number], transcription.program
     shape = (*own.u.shape, own.degree)
-    piece, at = _equations(transcription, number)
-    if piece is None or piece.block is None:
+    equations = _equations(transcription, number)
+    if equations is None:
         return np.zeros(shape), np.zeros(shape)
-    block, places = piece.block, piece.places
+    piece, block, at = equations
+    places = piece.places
     lam, sigma = iterate.lam_g[at], cost_weight(transcription, iterate.lam_g, number)
     v, theta = _at_places(piece, iterate.w, program.p, program.values)
     inputs = own.nodes.shape[0] + own.z.shape[0] + np.arange(shape[0])
@@ -317,22 +319,23 @@ def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tupl
     return H_u.reshape(shape), H_uu.reshape(shape)
 
 
-def _equations(transcription: Transcription, number: int) -> tuple[Piece | None, Indices]:
-    """Return the equations of a phase at collocation points, and their row numbers."""
-    skeleton = transcription.skeleton
+def _equations(transcription: Transcription, number: int) -> tuple[Piece, Block, Indices] | None:
+    """Return the equations of a phase at collocation points, their block and their row numbers."""
+    skeleton, first = transcription.skeleton, "the equation of"
     for piece, at in zip(skeleton.pieces, skeleton.assembled.at, strict=True):
-        first = "the equation of"
         if piece.span == number and any(name.startswith(first) for name in piece.names):
-            return (piece if piece.selection else None), at
-    return None, np.zeros(0, np.int64)
+            return (piece, piece.block, at) if piece.block is not None else None
+    return None
 
 
 def _at_places(piece: Piece, w: Array, p: ca.MX, values: Array) -> tuple[Array, Array]:
     """Return the local unknowns and parameters of a block at all its places."""
-    assert piece.block and piece.selection
+    theta = ca.Function("theta", [p], [piece.theta])(values).full()
+    if piece.block is None or piece.selection is None:
+        return np.zeros((0, piece.places)), theta
     v, selection = np.zeros((piece.block.n, piece.places)), piece.selection
     np.add.at(v, selection.local, (selection.weights * w[selection.columns]).T)
-    return v, ca.Function("theta", [p], [piece.theta])(values).full()
+    return v, theta
 
 
 def _entries(
