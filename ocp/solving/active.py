@@ -214,9 +214,14 @@ def per_unit(unit: str) -> str:
     return f"cost/({unit})" if " " in unit or "/" in unit else f"cost/{unit}"
 
 
-def active_conditions(optimum: Optimum) -> ActiveConditions:
-    """Return the active conditions in the order of time; consecutive times are joined."""
-    status = Status.joined(*statuses(optimum))
+def active_conditions(optimum: Optimum, each: tuple[Status, Status]) -> ActiveConditions:
+    """Return the active conditions in the order of time; consecutive times are joined.
+
+    Args:
+        optimum: the solution.
+        each: status of all unknowns and of all rows.
+    """
+    status = Status.joined(*each)
     groups: dict[tuple[str, int], list[Entry]] = {}
     for entry in entries(optimum):
         groups.setdefault((entry.name, entry.place.span), []).append(entry)
@@ -238,7 +243,11 @@ def in_words(optimum: Optimum, signals: Collection[str]) -> list[str]:
     """Return a line with the active bounds on `signals` and path conditions if they are few."""
     if not optimum.residual <= STATIONARY:
         return []
-    found = [one for one in active_conditions(optimum) if one.side != "=" and not one.weak]
+    found = [
+        one
+        for one in active_conditions(optimum, statuses(optimum))
+        if one.side != "=" and not one.weak
+    ]
     named = [one for one in found if one.name.removeprefix("the bound on ") in signals]
     named += [one for one in found if one.name.startswith("path condition")]
     return [f"active: {'; '.join(map(str, named))}"] if 0 < len(named) <= SHOWN else []

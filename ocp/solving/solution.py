@@ -227,7 +227,7 @@ class Solution(packed.Portable):
         Raises:
             ValueError: the solution is not optimal, or was loaded from a file.
         """
-        found = self._linearised("costates").optimum
+        found = self._linearised("costates").central
         series = found.over_time(found.costates)
         series = at_times(self.motions[0], series.pop("t"), series)
         return {name: row for name, row in series.items() if name in self.signals}
@@ -242,7 +242,7 @@ class Solution(packed.Portable):
         Raises:
             ValueError: as for `costates`, or shooting with a mechanism or algebraic variables.
         """
-        found = self._linearised("hamiltonian").optimum
+        found = self._linearised("hamiltonian").central
         series = found.over_time(found.hamiltonians, "H")
         return at_times(self.motions[0], series.pop("t"), series)["H"]
 
@@ -255,7 +255,8 @@ class Solution(packed.Portable):
         Raises:
             ValueError: as for `costates`.
         """
-        return active_conditions(self._linearised("active").optimum)
+        found = self._linearised("active")
+        return active_conditions(found.central, found.status)
 
     def sensitivity(self, name: str) -> "Sensitivity":
         """Return derivatives of cost, motion, durations and chosen parameters by one number.
