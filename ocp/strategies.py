@@ -13,23 +13,24 @@ from ocp.formulation.problem import Problem
 from ocp.friction.homotopy import FINE, LAST, Sharp, sharpened
 from ocp.friction.mode_optimisation import optimise_modes, refusal
 from ocp.friction.smooth_models import own_level, speeds_at, sticking
-from ocp.original_law import STEPS, OriginalLaw
+from ocp.original_law import (
+    FAILURES,
+    FOUND,
+    MISSED,
+    STEPS,
+    Judge,
+    Judged,
+    OriginalLaw,
+    bristles,
+    law_states,
+    reason_of,
+)  # fmt: skip
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solver
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start
 from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes
-from ocp.verdicts import (
-    FAILURES,
-    FOUND,
-    MISSED,
-    Judge,
-    Judged,
-    bristles,
-    law_states,
-    reason_of,
-)  # fmt: skip
 from symfric.foundation import checks
 from symfric.foundation.status import Status
 
