@@ -16,8 +16,7 @@ WEAK, SMALL, TINY, ROUNDING = 0.1, 1e-2, 1e-8, 1e-10
 """Ratio of distance and multiplier, both scaled and at most `SMALL`, above which it is not certain
 whether a condition is active; `TINY` is the error of both, `ROUNDING` that of distances alone."""
 EQUATIONS = ("the equation of", "the algebraic equation", "the continuity of", "the largest cost",
-             "the constraint", "the loop", "absolute value", "the violation of", "violation_",
-             "the bound largest_")  # fmt: skip
+             "the loop", "the rate of loop")  # fmt: skip
 """Rows of the equations of motion, whose multipliers are costates, and rows and unknowns that make
 up costs of absolute values, maxima and violations."""
 SAME_TIME = 1e-9

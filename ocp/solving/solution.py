@@ -222,7 +222,7 @@ class Solution(packed.Portable):
 
         The costate is the derivative of the optimal cost by the state at that time: at the start,
         by the start value. Where it jumps, it is the limit after the time. A motion by modes has no
-        states of laws.
+        states of laws. Costates of coordinates in loops depend on each other.
 
         Raises:
             ValueError: the solution is not optimal, or was loaded from a file.
@@ -315,7 +315,7 @@ class Solution(packed.Portable):
         """Plot signals over time, one panel each: optimised points and the re-simulated motion.
 
         Args:
-            names: signals to show, by default all.
+            names: signals to show, by default all; "costate x" is the costate of x.
             path: image file; its extension selects the format.
         """
         from ocp.solving.picture import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
