@@ -126,7 +126,7 @@ def solve(
         solver = solver.with_options(**{OVER: 1.0 / cost_size(posed)})
     goals = Goals.of(tolerance) if refine else replace(Goals.of(tolerance), passes=1)
     direct = Direct(posed, scheme, solver, intervals, goals, Supervisor(max_time, progress))
-    search = Search(tolerance, verify, direct, resting_margin)
+    search = Search(direct, tolerance, verify, resting_margin)
     solution = solved(search, friction, guess, starts)
     odd = "" if solution.ok else doubts(problem)
     if odd:

@@ -1,35 +1,36 @@
 """Strategies of `solve`: direct, by homotopy, by modes, and the order in which they are tried."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Literal, final
+from typing import Literal, NamedTuple, final
 
 from numpy.typing import ArrayLike
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
+from ocp.checking.verify import verified, verify
 from ocp.complementarity import solve_relaxed
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
+from ocp.friction.event_check import verify_exactly
 from ocp.friction.homotopy import FINE, LAST, Sharp, sharpened
 from ocp.friction.mode_optimisation import optimise_modes, refusal
-from ocp.friction.smooth_models import own_level, speeds_at, sticking
-from ocp.original_law import (
-    FAILURES,
-    FOUND,
-    MISSED,
-    STEPS,
-    Judge,
-    Judged,
-    OriginalLaw,
+from ocp.friction.smooth_models import (
     bristles,
+    is_exact,
     law_states,
-    reason_of,
+    narrowed,
+    own_level,
+    speeds_at,
+    sticking,
 )  # fmt: skip
+from ocp.original_law import FAILURES, STEPS, OriginalLaw, reason_of
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solver
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start
+from ocp.solving.verification import Verification
 from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes
 from symfric.foundation import checks
 from symfric.foundation.status import Status
@@ -43,6 +44,11 @@ CLOSE_PASSES, CLOSE_INTERVALS, CLOSE_ITERATIONS = 4, 400, 60
 SHARED_PASSES, SHARED_ITERATIONS = 4, 150
 """Limits if scenarios share inputs. Their contacts reverse at many times, and each finer mesh takes
 many iterations at these kinks for a thousandth of the cost."""
+EXACT_RTOL = 1e-7
+"""Relative tolerance of the simulation with exact friction, 1 % of the required accuracy."""
+MISSED = (Status.TERMINAL_MISS, Status.BOUND_MISS)
+FOUND = (*MISSED, Status.UNSTABLE)
+"""Statuses of a motion that was found but violates its conditions."""
 SHARPEST = 1e-4
 """Smallest smoothing width, in multiples of the speeds, of a direct solve."""
 
@@ -108,18 +114,104 @@ class Direct:
         )  # fmt: skip
 
 
+class Judged(NamedTuple):
+    """A motion by modes with the verdict of simulations.
+
+    Attributes:
+        solution: the motion.
+        right: True if it is valid with the user's laws and with exact friction.
+        exact: True if it is valid with exact friction only.
+    """
+
+    solution: Solution
+    right: bool
+    exact: bool = False
+
+
 @final
 @dataclass(frozen=True, eq=False)
-class Search(Judge):
+class Search:
     """Solution of a problem by its strategies, and verification of the motions that they find.
 
     Attributes:
         direct: direct solves of the problem.
+        tolerance: tolerance of the verification.
+        verify: True to verify motions.
         margin: margin of a contact at rest, as a share of its static level.
     """
 
     direct: Direct
+    tolerance: float
+    verify: bool
     margin: float
+
+    def checked(self, solution: Solution) -> Solution:
+        """Return `solution` with its verification.
+
+        The law states of a motion by modes are unknown, so their simulated values are not compared,
+        and local errors are not evaluated.
+        """
+        if not self.verify or solution.status.stopped:
+            return solution
+        chain = solution.problem.chain
+        laws = {c.name: c for phase in chain for c in phase.model.contacts if c.states}
+        try:
+            if not (solution.modes and laws):
+                return verified(solution, self.tolerance)
+            found = _without_law_states(solution, verify(solution, self.tolerance))
+            if is_exact(solution.problem) and (found.ok or not solution.ok):
+                return replace(solution, verification=found)
+        except FAILURES as error:
+            return with_sentence(solution, f"It was not verified: {reason_of(error)}.")
+        names = ", ".join(f"{name}: {type(c.law).__name__}" for name, c in laws.items())
+        text = f"{solution.message} Friction with states ({names}) was taken as its steady sliding"
+        text += " and its static level, and the motion verified with the law itself."
+        if not found.ok and solution.ok:
+            text = f"ocp '{solution.problem.name}': {found.sentence} {text}"
+            solution = replace(solution, status=found.status)
+        return replace(solution, verification=found, message=text)
+
+    def judged(self, solution: Solution) -> Judged:
+        """Return a motion by modes with the verdict of a simulation with exact friction."""
+        if not self.verify or not (solution.ok or solution.status in FOUND):
+            return Judged(solution, solution.ok)
+        if solution.ok and is_exact(solution.problem):
+            text = "It was verified with exact Coulomb friction, the law of the model."
+            return Judged(with_sentence(solution, text), right=True)
+        try:
+            exact = verify_exactly(solution, self.tolerance, EXACT_RTOL)
+            exact = _without_law_states(solution, exact)
+        except FAILURES as error:
+            text = f"With exact Coulomb friction it was not simulated: {reason_of(error)}."
+            return Judged(with_sentence(solution, text), solution.ok)
+        if exact.ok and not solution.ok:
+            return Judged(self._creeping(solution, exact.largest), right=False, exact=True)
+        text = f"it misses by {exact.largest:.1g}." if exact.ok else exact.sentence
+        text = f"With exact Coulomb friction{'' if exact.ok else ':'} {text}"
+        return Judged(with_sentence(solution, text), right=exact.ok)
+
+    def _creeping(self, solution: Solution, exact: float) -> Solution:
+        """Return a motion that is right only with exact friction, where it misses by `exact`."""
+        found, layers = solution.verification, ""
+        if found is None or not found.misses:
+            return solution
+        grows = (
+            f" and whose errors grow by a factor of {found.growth:.1g}" if found.unstable else ""
+        )
+        for factor in (0.5 * self.tolerance / found.largest, 0.05 * self.tolerance / found.largest):
+            problem, narrow = narrowed(solution.problem, factor)
+            with suppress(*FAILURES):
+                if narrow and verify(replace(solution, problem=problem), self.tolerance).ok:
+                    shown = checks.listed([f"{name} {v:.1g} m/s" for name, v in narrow.items()])
+                    layers = f"a layer of {shown}, "
+                    break
+        text = (
+            f"ocp '{solution.problem.name}': The motion is right with exact Coulomb friction "
+            f"(largest miss {exact:.1g}), but under the laws of the model, whose layers creep at "
+            f"rest{grows}, {found.misses[0].sentence}; {layers}feedback along the motion, or the "
+            "law ExactCoulomb closes the gap."
+        )
+        return replace(solution, message=text)
 
     def near(self, sharp: Sharp) -> Judged:
         """Return the best exact motion near a sharpened one or its rivals, with the user's laws.
@@ -160,24 +252,11 @@ class Search(Judge):
         return replace(_after(exact, own), modes=exact.modes)
 
     def by_original_law(self, exact: Solution) -> Solution:
-        """Return a motion with the law and its states, found by shooting from `exact`.
-
-        If shooting fails, return `exact` with the reason in its message.
-        """
+        """Return a motion with the law and its states, found by shooting from `exact`."""
         direct, scheme = self.direct, self.direct.scheme
         scheme = scheme if isinstance(scheme, Shooting) else Shooting("exponential", STEPS)
-        settings = direct.ipopt, self.tolerance, direct.supervisor
-        try:
-            own = OriginalLaw(direct.problem, scheme, *settings).solved(exact)
-        except FAILURES as error:  # shooting does not support all models
-            return with_sentence(exact, f"With the law itself: {reason_of(error)}.")
-        own = _after(exact, own)
-        if own.verified:
-            return replace(own, modes=exact.modes)
-        kept = with_sentence(exact, f"By {scheme} with the law itself: {own.message}")
-        kept = replace(kept, statistics=own.statistics)
-        stopped = own.status.stopped
-        return replace(kept, status=own.status, cause=own.cause) if stopped else kept
+        settings = scheme, direct.ipopt, self.tolerance, direct.supervisor
+        return OriginalLaw(direct.problem, *settings).continued(exact)
 
 
 def _stopped(exact: Solution, sharp: Solution) -> Solution:
@@ -306,3 +385,11 @@ def _refused(problem: Problem) -> str:
 def _after(first: Solution, later: Solution) -> Solution:
     """Return `later` with the statistics of both solves."""
     return replace(later, statistics=first.statistics.then(later.statistics))
+
+
+def _without_law_states(solution: Solution, found: Verification) -> Verification:
+    """Return `found` without checks of law states and local errors."""
+    if not (hidden := law_states(solution.problem)):
+        return found
+    kept = [m for m in found.checked if m.name not in hidden and m.what != "local error"]
+    return replace(found, checked=tuple(kept), restarted=None)

@@ -305,6 +305,17 @@ def is_exact(problem: Problem) -> bool:
     return bool(laws) and all(isinstance(law, ExactCoulomb) for law in laws)
 
 
+def law_states(problem: Problem) -> set[str]:
+    """Return the names of the states of laws, which a motion by modes does not contain."""
+    contacts = [c for phase in problem.chain for c in phase.model.contacts]
+    return {v.name for c in contacts for v in c.states}
+
+
+def bristles(problem: Problem) -> bool:
+    """Return True if a law has states other than the mode of `ExactCoulomb`."""
+    return bool(law_states(problem)) and not is_exact(problem)
+
+
 def own_level(problem: Problem, scales: Scales) -> float:
     """Return the smallest smoothing width of the user's laws, in multiples of the speeds.
 

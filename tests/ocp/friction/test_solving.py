@@ -24,7 +24,6 @@ from ocp import (
     Solution,
     at_end,
     integral,
-    original_law,
     problems,
     solve,
     strategies,
@@ -304,7 +303,7 @@ def test_failed_layers_end_in_the_smooth_motion(monkeypatch: pytest.MonkeyPatch)
         yield raising(INTERNAL)()
 
     monkeypatch.setattr(strategies, "sharpened", layers)
-    monkeypatch.setattr(original_law, "verified", raising(INTERNAL))
+    monkeypatch.setattr(strategies, "verified", raising(INTERNAL))
     found = solve(out_and_back(v_t=0.2), throw=False, intervals=10, refine=False)
     assert found.ok and not found.verified
     assert "Friction was not sharpened: internal error, RuntimeError: variables" in found.message
@@ -316,7 +315,7 @@ def test_failed_simulation_with_exact_friction_is_reported(
 ) -> None:
     sharpened_by(monkeypatch, steps)
     error = ValueError("expected no events, got 1")
-    monkeypatch.setattr(original_law, "verify_exactly", raising(error))
+    monkeypatch.setattr(strategies, "verify_exactly", raising(error))
     found_modes = SimpleNamespace(
         margins=(1e-2,), motion=lambda *_, **__: by_modes, rests=lambda *_: ""
     )
