@@ -6,7 +6,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from carts import CART, EFFORT, F, V, fastest, move, slope
+from carts import CART, EFFORT, F, V, fastest, move, slope, there_and_back
 from phases import solve_once
 
 from ocp import Free, Ipopt, Phase, Problem, Radau, at_end, integral, load, solve
@@ -26,6 +26,7 @@ from symfric.scenes import drive
         (move, "v at the start", "v", 0.0),
         (lambda **p: move(**({"limit": 8.5} | p)), "m", "m", 2.0),
         (lambda **p: move(**({"limit": 8.5} | p)), "x at the end", "to", 1.0),
+        (there_and_back, "T of out", "T", 1.0),
         (fastest, "m", "m", 2.0),
         (fastest, "upper bound on a", "high", 10.0),
         (fastest, "lower bound on a", "low", -5.0),
