@@ -41,7 +41,7 @@ TIME, COST, MISS = "processor time [s]", "cost by the referee", "relative miss b
 def bench(
     quick: bool = False, cases: Sequence[str] | None = None, progress: Progress = None
 ) -> Report:
-    """Compare the contenders in about ten minutes on one core, or in one minute with `quick`.
+    """Compare the contenders in 10 to 15 minutes on one core, or in one minute with `quick`.
 
     Args:
         quick: fewer problems, one width of smooth friction, no controllers.
