@@ -101,6 +101,7 @@ def _decreased(
         factor = factor if solved else sqrt(factor)
         eps = max(reached / factor, last)
     if found[-1].ok and reached > max(MOST, last):
-        text = f"ocp '{on.problem.name}': No solve with a smaller eps than {reached:.1g} succeeded."
+        text = f"ocp '{on.problem.name}': No solve with eps below {reached:.1g} succeeded; give "
+        text += "another guess, more intervals, or Ipopt()."
         found.append(replace(found[-1], status=Status.NO_STEP, message=text))
     return reached, replace(found[-1], statistics=reduce(SolverStatistics.then, statistics))
