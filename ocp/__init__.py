@@ -10,6 +10,8 @@ from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from ocp.checking.verify import verify as verify
+    from ocp.estimation import Estimate as Estimate
+    from ocp.estimation import estimate as estimate
     from ocp.formulation.expressions import TIME as TIME
     from ocp.formulation.expressions import Cost as Cost
     from ocp.formulation.expressions import Signals as Signals

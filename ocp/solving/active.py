@@ -16,8 +16,7 @@ WEAK, SMALL, TINY, ROUNDING = 0.1, 1e-2, 1e-8, 1e-10
 """Ratio of distance and multiplier, both scaled and at most `SMALL`, above which it is not certain
 whether a condition is active; `TINY` is the error of both, `ROUNDING` that of distances alone."""
 EQUATIONS = ("the equation of", "the algebraic equation", "the continuity of", "the largest cost",
-             "the constraint", "the loop", "absolute value", "the violation of", "violation_",
-             "the bound largest_")  # fmt: skip
+             "the loop", "the rate of loop")  # fmt: skip
 """Rows of the equations of motion, whose multipliers are costates, and rows and unknowns that make
 up costs of absolute values, maxima and violations."""
 SAME_TIME = 1e-9
@@ -214,9 +213,14 @@ def per_unit(unit: str) -> str:
     return f"cost/({unit})" if " " in unit or "/" in unit else f"cost/{unit}"
 
 
-def active_conditions(optimum: Optimum) -> ActiveConditions:
-    """Return the active conditions in the order of time; consecutive times are joined."""
-    status = Status.joined(*statuses(optimum))
+def active_conditions(optimum: Optimum, each: tuple[Status, Status]) -> ActiveConditions:
+    """Return the active conditions in the order of time; consecutive times are joined.
+
+    Args:
+        optimum: the solution.
+        each: status of all unknowns and of all rows.
+    """
+    status = Status.joined(*each)
     groups: dict[tuple[str, int], list[Entry]] = {}
     for entry in entries(optimum):
         groups.setdefault((entry.name, entry.place.span), []).append(entry)
@@ -238,7 +242,11 @@ def in_words(optimum: Optimum, signals: Collection[str]) -> list[str]:
     """Return a line with the active bounds on `signals` and path conditions if they are few."""
     if not optimum.residual <= STATIONARY:
         return []
-    found = [one for one in active_conditions(optimum) if one.side != "=" and not one.weak]
+    found = [
+        one
+        for one in active_conditions(optimum, statuses(optimum))
+        if one.side != "=" and not one.weak
+    ]
     named = [one for one in found if one.name.removeprefix("the bound on ") in signals]
     named += [one for one in found if one.name.startswith("path condition")]
     return [f"active: {'; '.join(map(str, named))}"] if 0 < len(named) <= SHOWN else []

@@ -74,6 +74,7 @@ class Linearised:
         optimum: the solution.
         changed: indices of unknowns, then of rows, that count as active although the distance from
             their bound exceeds their multiplier, or as inactive although it does not.
+        source: optimum of an interior-point method, if `optimum` is a more precise one.
 
     Raises:
         ValueError: the point does not satisfy the optimality conditions.
@@ -81,6 +82,7 @@ class Linearised:
 
     optimum: Optimum
     changed: Indices = field(default_factory=lambda: np.zeros(0, np.int64))
+    source: Optimum | None = None
 
     def __post_init__(self) -> None:
         if not self.optimum.residual <= STATIONARY:
@@ -93,6 +95,16 @@ class Linearised:
     def name(self) -> str:
         """Subject of messages."""
         return f"solution of '{self.optimum.transcription.problem.name}'"
+
+    @cached_property
+    def central(self) -> Optimum:
+        """Optimum with the multipliers of the interior-point method if they are not unique.
+
+        They are in the middle of the possible ones.
+        """
+        if self.source is None or not self.weak:
+            return self.optimum
+        return replace(self.optimum, iterate=replace(self.source.iterate, w=self.optimum.iterate.w))
 
     @cached_property
     def status(self) -> tuple[Status, Status]:
@@ -219,15 +231,16 @@ class Linearised:
 
     def by_condition(self, name: str) -> Change:
         """Return the effect of a prescribed value or of a bound."""
-        n, iterate = self.optimum.iterate.w.size, self.optimum.iterate
+        n, iterate = self.optimum.iterate.w.size, self.central.iterate
         active, high, _, equal, _ = Status.joined(*self.status)
-        lam, shift = np.concatenate([iterate.lam_w, iterate.lam_g]), np.zeros(active.size)
+        lam, shift, cost = np.append(iterate.lam_w, iterate.lam_g), np.zeros(active.size), 0.0
         for entry, upper in self.conditions[name]:
-            k = entry.number
+            k, scale = entry.number, entry.place.scale
+            cost -= (lam[k] if equal[k] or (lam[k] > 0) == upper else 0.0) / scale
             if active[k] and (equal[k] or bool(high[k]) == upper):
-                shift[k] = 1.0 / entry.place.scale
+                shift[k] = 1.0 / scale
         unit = self.conditions[name][0][0].unit
-        return Change(unit, np.zeros(n), -shift[n:], shift[:n], -float(lam @ shift))
+        return Change(unit, np.zeros(n), -shift[n:], shift[:n], float(cost))
 
     def by_number(self, name: str) -> Change:
         """Return the effect of a parameter or of a fixed duration.
@@ -236,7 +249,7 @@ class Linearised:
             ValueError: derivatives that are not finite, or a parameter that changes the start of a
                 mechanism with loops.
         """
-        optimum, (unit, at) = self.optimum, self.numbers[name]
+        optimum, (unit, at) = self.central, self.numbers[name]
         program, iterate = optimum.transcription.program, optimum.iterate
         now = optimum.values[at]
         h = STEP * (float(np.abs(now).max()) or 1.0)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any, NamedTuple, final
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -261,6 +262,23 @@ def _piece(
     values = dict(zip(model.signals, rows, strict=True))
     controls = {v.name: row for v, row in zip(model.u, points.u, strict=True)}
     return _Piece(t, at.nodes, values, begin + points.T * mesh, controls)
+
+
+def along_points(
+    span: Span, at: SpanPoints, column: ca.SX, *, starts: bool = False,
+    t: Array | float = 0.0, p: Array | None = None,
+) -> Array:  # fmt: skip
+    """Return `column` at the collocation points, or at the starts of intervals, (rows, points).
+
+    Without collocation points (shooting) the values are those at the starts. `t` are the times, and
+    `p` the values of the parameters, by default those of `span`.
+    """
+    N, inner = at.u.shape[1], at.inner.shape[1]
+    x, n = (at.nodes[:, :-1], N) if starts or not inner else (at.inner, inner)
+    z = at.z[:, :: at.z.shape[1] // n] if at.z.size else np.zeros((at.z.shape[0], n))
+    u, p = np.repeat(at.u, n // N, axis=1), np.tile((span.p if p is None else p)[:, None], (1, n))
+    function = ca.Function("along", span.symbols, [ca.densify(column)]).map(n)
+    return function(np.broadcast_to(t, (1, n)), x, z, u, p).full()
 
 
 class SpanMotion(NamedTuple):

@@ -8,9 +8,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.phase import Array, Span
+from ocp.formulation.phase import Span
 from ocp.solving.methods import Fatrop, Ipopt, Sqp
-from ocp.solving.motion import motions_of
+from ocp.solving.motion import along_points, motions_of
 from ocp.solving.optimum import Optimum
 from ocp.solving.solution import Solution
 from ocp.transcription.program import Outcome
@@ -105,15 +105,3 @@ def _narrow(contact: Contact, span: Span, at: SpanPoints) -> Iterator[str]:
             yield f"{name} = {value:.3g} {unit}".removesuffix(" 1")
     for name, variable in contact.widths.items():
         yield f"{name} = {number(variable.start):.3g} {variable.unit}"
-
-
-def along_points(span: Span, at: SpanPoints, column: ca.SX, *, starts: bool = False) -> Array:
-    """Return `column` at the collocation points, or at the starts of intervals, (rows, points).
-
-    Without collocation points (shooting) the values are those at the starts.
-    """
-    N, inner = at.u.shape[1], at.inner.shape[1]
-    x, n = (at.nodes[:, :-1], N) if starts or not inner else (at.inner, inner)
-    z = at.z[:, :: at.z.shape[1] // n] if at.z.size else np.zeros((at.z.shape[0], n))
-    u, p = np.repeat(at.u, n // N, axis=1), np.tile(span.p[:, None], (1, n))
-    return ca.Function("along", span.symbols, [column]).map(n)(np.zeros((1, n)), x, z, u, p).full()

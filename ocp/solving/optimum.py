@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ocp.formulation.phase import Array
-from ocp.solving.motion import joined, sampled
+from ocp.solving.motion import along_points, joined, sampled
 from ocp.transcription.blocks import Piece
 from ocp.transcription.program import Iterate
 from ocp.transcription.transcribe import Transcription
@@ -148,25 +148,19 @@ class Optimum:
             own[:] = np.column_stack([-M.T @ v for M, v in zip(columns, own.T, strict=True)])
         return values
 
-    def _along(self, number: int, column: ca.SX, at: str = "points") -> Array:
-        """Return `column` of a phase at its "points", the "starts" of intervals, or its "end"."""
+    def _along(self, number: int, column: ca.SX, *, end: bool = False) -> Array:
+        """Return `column` of a phase as `along_points` does, or at its end."""
         made, points = self.transcription, self.points.spans[number]
-        span, N, mesh = made.problem.spans[number], points.u.shape[1], made.meshes[number]
-        fractions, x, z = made.inner_fractions(number), points.inner, points.z
-        if at == "starts":
-            fractions, x, z = mesh[:-1], points.nodes[:, :-1], np.zeros((len(span.model.z), N))
-        elif at == "end":
-            fractions, x, z = mesh[-1:], points.nodes[:, -1:], points.z[:, -1:]
-            z = z if z.shape[1] else np.zeros((len(span.model.z), 1))
-        n, begin = fractions.size, sum(s.T for s in self.points.spans[number - span.phase : number])
-        first = self.offset(number)
+        span, mesh, first = made.problem.spans[number], made.meshes[number], self.offset(number)
+        fractions = made.inner_fractions(number) if points.inner.size else mesh[:-1]
+        if end:
+            fractions, nodes = mesh[-1:], points.nodes[:, [-1, -1]]
+            points = SpanPoints(points.T, nodes, nodes[:, :0], points.z[:, -1:], points.u[:, -1:])
         p = self.values[first : first + len(span.model.p)].copy()
         for i, v in enumerate(span.model.p):
             p[i] = self.points.chosen[v.name] if v.name in span.chosen else p[i]
-        t, u = begin + points.T * fractions[None, :], points.u[:, -1:]
-        u = u if at == "end" else np.repeat(points.u, n // N, axis=1)
-        function = ca.Function("along", span.symbols, [ca.densify(column)]).map(n)
-        return np.array(function(t, x, z, u, np.tile(p[:, None], (1, n))))
+        begin = sum(s.T for s in self.points.spans[number - span.phase : number])
+        return along_points(span, points, column, t=begin + points.T * fractions, p=p)
 
     def offset(self, number: int) -> int:
         """Return the index in `values` of the first parameter of a phase."""
@@ -205,7 +199,7 @@ class Optimum:
                 f"hamiltonian of '{model.name}': expected collocation for a mechanism or a model "
                 f"with algebraic variables, got {made.scheme}; use Radau(3)"
             )
-        rates = self._along(number, model.ode, "starts")
+        rates = self._along(number, model.ode)
         starts = running + (dual.nodes[:, :-1] * rates).sum(axis=0)
         nodes = np.append(starts, starts[-1])[None, :]
         return SpanPoints(points.T, nodes, np.zeros((1, 0)), none, np.zeros((0, N)))
@@ -215,10 +209,9 @@ class Optimum:
         made, spans = self.transcription, self.transcription.problem.spans
         last = number - spans[number].phase + len(made.problem.chain)
         weight = cost_weight(made, self.iterate.lam_g, number)
-        at = "points" if made.scheme.coefficients().degree else "starts"
-        total = self._along(number, spans[number].integrand, at)[0]
+        total = self._along(number, spans[number].integrand)[0]
         for k in range(number, last):
-            total = total + self._along(k, ca.jacobian(spans[k].end, spans[k].model.t), "end")[0]
+            total = total + self._along(k, ca.jacobian(spans[k].end, spans[k].model.t), end=True)[0]
         return weight * total
 
     def over_time(self, values: Sequence[SpanPoints], letters: str = "x") -> dict[str, Array]:

@@ -1,7 +1,7 @@
 """Figures of optimal motions: optimised points and simulated motion."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
@@ -11,8 +11,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from ocp.formulation.phase import Span
+from ocp.formulation.phase import Array, Span
 from ocp.formulation.problem import Problem
+from ocp.solving.active import per_unit
 from ocp.solving.motion import Motion, Stretch
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
@@ -32,6 +33,7 @@ WANTED = "0.35"
 
 Modes = Sequence[tuple[str, float, float]]
 """(kind, begin [s], end [s]) of the modes of a contact."""
+COSTATE = "costate "
 CIRCLES = 60
 """Approximate number of nodes drawn for a motion."""
 
@@ -90,6 +92,11 @@ class Plotted(Protocol):
         """Contact -> its modes in order."""
         ...
 
+    @property
+    def costates(self) -> Mapping[str, Array]:
+        """State -> costate at the times of the first motion."""
+        ...
+
 
 def plot_solutions(
     solutions: Mapping[str, Plotted],
@@ -105,26 +112,26 @@ def plot_solutions(
 
     Args:
         solutions: legend entry -> solution; each scenario is a separate motion.
-        names: signals to show, by default all signals common to the solutions.
+        names: signals to show, by default all signals common to the solutions; "costate x" is the
+            costate of the state x in the first scenario.
         path: image file; its extension selects the format.
 
     Raises:
-        ValueError: no solution, an unknown signal, or an unsupported file extension.
+        ValueError: no solution, an unknown signal, costates that are not known, or an unsupported
+            file extension.
     """
     if not solutions:
         raise checks.refused("plot", "at least one solution", solutions)
     first = next(iter(solutions.values()))
-    shared = [
-        n
-        for n in first.motions[0].signals
-        if all(n in s.motions[0].signals for s in solutions.values())
-    ]
+    motions = {label: _with_costates(one, names) for label, one in solutions.items()}
+    known = [each[0].signals for each in motions.values()]
+    shared = [name for name in known[0] if all(name in signals for signals in known)]
     check_names(f"plot of '{first.problem.name}'", names, shared)
     drawn: list[Drawn] = []
     for label, one in solutions.items():
         status = "" if one.status.ok else f", {one.status.name.lower().replace('_', ' ')}"
         status = ", verified" * one.verified + status
-        for motion in one.motions:
+        for motion in motions[label]:
             ending = f"T = {motion.T:.4g} s, J = {one.cost:.5g}{status}"
             runs = [run for k, run in enumerate(one.trajectories) if k in motion.spans]
             drawn.append(Drawn(f"{label} {motion.name}".strip(), motion, runs, ending))
@@ -132,6 +139,16 @@ def plot_solutions(
     spans = [first.problem.spans[i] for i in first.motions[0].spans] if alone else []
     modes = {name: [*map(astuple, each)] for name, each in first.modes.items()} if alone else {}
     return plot_motions(drawn, list(names) or shared, spans, modes, path)
+
+
+def _with_costates(solution: Plotted, names: Sequence[str]) -> tuple[Motion, ...]:
+    """Return the motions, or the first one with its costates if `names` contain some."""
+    if not any(name.startswith(COSTATE) for name in names):
+        return solution.motions
+    first = solution.motions[0]
+    rows = {f"{COSTATE}{name}": row for name, row in solution.costates.items()}
+    units = {f"{COSTATE}{name}": per_unit(first.units[name]) for name in solution.costates}
+    return (replace(first, signals=first.signals | rows, units=first.units | units),)
 
 
 def plot_motions(
@@ -203,7 +220,7 @@ def _signal(axis: "Axes", one: Drawn, name: str, look: Line) -> None:
     for run in one.runs:
         if name in run.units:
             axis.plot(run.t, run[name], linewidth=1.0, **look)
-    if not one.runs:
+    if not any(name in run.units for run in one.runs):
         axis.plot(motion.t, motion[name], linewidth=1.0, **look)
 
 

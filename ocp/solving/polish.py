@@ -1,5 +1,8 @@
 """Optimum of full precision from that of an interior-point method, by active sets."""
 
+from dataclasses import replace
+from functools import lru_cache
+
 import numpy as np
 
 from ocp.solving.active import Status
@@ -7,6 +10,8 @@ from ocp.solving.linearised import Linearised
 from ocp.solving.optimum import STATIONARY, Optimum
 from ocp.transcription.program import worst_of
 
+KEPT = 2
+"""Number of optima whose conditions are cached, as several properties of a solution need them."""
 STEPS = 10
 CONVERGED, CLOSE = 1e-8, 1e-5
 """Change of scaled unknowns by the last step, and largest relative change of the cost."""
@@ -40,6 +45,7 @@ def determined(optimum: Optimum) -> Linearised:
     return Linearised(optimum, order[:many])
 
 
+@lru_cache(KEPT)
 def polished(optimum: Optimum) -> Linearised:
     """Return the optimality conditions at an optimum of full precision.
 
@@ -61,6 +67,6 @@ def polished(optimum: Optimum) -> Linearised:
         if same and change < CONVERGED:
             violation = worst_of(step.transcription.program, step.iterate.w, step.rows[0])
             near = abs(step.cost - optimum.cost) <= CLOSE * max(abs(optimum.cost), optimum.size)
-            return later if near and violation < CLOSE else first
+            return replace(later, source=optimum) if near and violation < CLOSE else first
         now = later
     return first

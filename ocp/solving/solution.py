@@ -222,12 +222,12 @@ class Solution(packed.Portable):
 
         The costate is the derivative of the optimal cost by the state at that time: at the start,
         by the start value. Where it jumps, it is the limit after the time. A motion by modes has no
-        states of laws.
+        states of laws. Costates of coordinates in loops depend on each other.
 
         Raises:
             ValueError: the solution is not optimal, or was loaded from a file.
         """
-        found = self._linearised("costates").optimum
+        found = self._linearised("costates").central
         series = found.over_time(found.costates)
         series = at_times(self.motions[0], series.pop("t"), series)
         return {name: row for name, row in series.items() if name in self.signals}
@@ -242,7 +242,7 @@ class Solution(packed.Portable):
         Raises:
             ValueError: as for `costates`, or shooting with a mechanism or algebraic variables.
         """
-        found = self._linearised("hamiltonian").optimum
+        found = self._linearised("hamiltonian").central
         series = found.over_time(found.hamiltonians, "H")
         return at_times(self.motions[0], series.pop("t"), series)["H"]
 
@@ -255,7 +255,8 @@ class Solution(packed.Portable):
         Raises:
             ValueError: as for `costates`.
         """
-        return active_conditions(self._linearised("active").optimum)
+        found = self._linearised("active")
+        return active_conditions(found.central, found.status)
 
     def sensitivity(self, name: str) -> "Sensitivity":
         """Return derivatives of cost, motion, durations and chosen parameters by one number.
@@ -314,7 +315,7 @@ class Solution(packed.Portable):
         """Plot signals over time, one panel each: optimised points and the re-simulated motion.
 
         Args:
-            names: signals to show, by default all.
+            names: signals to show, by default all; "costate x" is the costate of x.
             path: image file; its extension selects the format.
         """
         from ocp.solving.picture import plot_solutions  # noqa: PLC0415  (matplotlib is slow)

@@ -312,6 +312,14 @@ def test_simulated_motions_are_drawn_where_there_are_some() -> None:
     assert "lines: optimised" in plain.plot("x").axes[-1].get_xlabel()
 
 
+def test_costates_are_drawn_on_request(back: Solution) -> None:
+    figure = back.plot("x", "costate x")
+    assert [axis.get_ylabel() for axis in figure.axes] == ["x [m]", "costate x [cost/m]"]
+    np.testing.assert_array_equal(curves(figure.axes[1])[1], back.costates["x"])
+    with pytest.raises(ValueError, match=r"plot of .* did you mean costate x"):
+        back.plot("costate y")
+
+
 def test_modes_are_shaded_in_a_band_for_each_contact(back: Solution) -> None:
     modes = {
         "guide": (Mode("slip+", 0.0, 0.9), Mode("stick", 0.9, 1.1), Mode("slip-", 1.1, 2.0)),

@@ -1,0 +1,282 @@
+"""States, law states and unknown loads from measurements over a moving horizon.
+
+At each sample the states x_s ... x_k of the last M samples minimise
+
+    |x_s - m|^2_P + sum |x_i+1 - flow(x_i, u_i)|^2_Q + sum |y_i - h(x_i, u_i)|^2_R
+
+with |e|^2_P = e' inv(P) e. Unknown loads are further states whose change per step is noise.
+Gauss-Newton steps solve the problem: each one is a Kalman filter and a Rauch-Tung-Striebel smoother
+of the linearised model, so that Q may be singular. The arrival cost (m, P) is the prediction from
+the sample that left the horizon, linearised at its last estimate. For linear models, every horizon
+gives the Kalman filter.
+Sources: Rao, Rawlings and Mayne, IEEE Trans. Autom. Control 48, 2003, 246-258 (arrival cost); Bell,
+SIAM J. Optim. 4, 1994, 626-636 (smoother as Gauss-Newton step).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import eigh
+
+from symfric.foundation import checks
+from symfric.foundation.parameters import Variable, check_names
+from symfric.integrator import flow
+from symfric.model import Model, check_model
+
+Array = NDArray[np.float64]
+ITERATIONS, TOLERANCE = 20, 1e-6
+"""Largest number of Gauss-Newton steps, and the last step in units of the spread."""
+INFORMED = 0.25
+"""Ratio of variances with and without measurements below which a combination is observable."""
+SHOWN = 0.1
+"""Smallest coefficient that is shown; the largest one is 1."""
+KNOWN = 0.1
+"""Deviation without measurements, in units of the spread, below which the model determines it."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Estimated states and loads, of which `estimate["v"]` is one signal.
+
+    Attributes:
+        t: times of the samples [s], shape (n,).
+        signals: state or load -> its estimate from the data up to each time, shape (n,).
+        deviations: state or load -> standard deviation of this estimate.
+        smooth: state or load -> its estimate over the last horizon from all data of the horizon.
+        unobservable: combinations of states and loads, in units of their spread, that the
+            measurements do not determine: without them the variance is at most 4 times as large.
+        unconverged: number of samples at which the Gauss-Newton method did not converge.
+    """
+
+    t: Array
+    signals: Mapping[str, Array]
+    deviations: Mapping[str, Array]
+    smooth: Mapping[str, Array]
+    unobservable: tuple[str, ...]
+    unconverged: int
+
+    def __getitem__(self, name: str) -> Array:
+        check_names("estimate", [name], self.signals)
+        return self.signals[name]
+
+
+def estimate(
+    model: Model,
+    data: Mapping[str, ArrayLike],
+    *,
+    step: float,
+    horizon: int,
+    noise: Mapping[str, float],
+    unknown: Sequence[str] = (),
+    start: Mapping[str, float] | None = None,
+    spread: Mapping[str, float] | None = None,
+    p: Mapping[str, float] | None = None,
+    steps: int = 4,
+) -> Estimate:
+    """Estimate the states of `model`, including those of its laws, and its unknown inputs.
+
+    Args:
+        model: explicit model without events and without algebraic variables; use a law that is
+            smooth over the speeds of the noise, or a bristle law.
+        data: input or signal -> samples at the times 0, step, ...; inputs are held over a step. A
+            missing sample of a signal is NaN.
+        step: sampling interval [s].
+        horizon: number of samples M of the horizon.
+        noise: measured signal -> standard deviation of a sample; state or unknown input ->
+            standard deviation of its random change in one second [unit/sqrt(s)], 0 by default.
+        unknown: inputs that are not measured (loads); they change by noise only.
+        start, spread: state or unknown input -> value at t = 0 and its standard deviation; by
+            default the start of the variable (0 for states of laws) and its nominal value.
+        p: parameter -> value.
+        steps: number of integration steps in each sampling interval.
+
+    Raises:
+        ValueError: all problems of the arguments at once.
+
+    Limits: no bounds on states. Gauss-Newton steps have no line search; `unconverged` counts the
+    samples without convergence.
+    """
+    check_model("estimate", model)
+    step = checks.number("estimate: step", step, above=0.0)
+    horizon = checks.count("estimate: horizon", horizon, least=2)
+    rows = _checked(model, data, noise, unknown)
+    measured = [name for name in rows if name not in {v.name for v in model.u}]
+    loads = [v for v in model.u if v.name in unknown]
+    states = [*model.x, *loads]
+    for what, given in (("start", start), ("spread", spread)):
+        check_names(f"estimate: {what}", given or {}, [v.name for v in states])
+    scale = np.array([(spread or {}).get(v.name, v.nominal) for v in states], dtype=float)
+    first = np.array([(start or {}).get(v.name, v.start) for v in states], dtype=float)
+    first = np.nan_to_num(first) / scale
+    walk = np.array([noise.get(v.name, 0.0) for v in states]) / scale
+    machine = _Machine(
+        *_functions(model, loads, measured, scale, step, model.values("p", p), steps),
+        Q=np.diag(walk**2 * step),
+        R=np.array([noise[name] ** 2 for name in measured]),
+    )
+    y = np.array([rows[name] for name in measured])
+    u = np.array([rows[v.name] for v in model.u if v.name in rows]).reshape(-1, y.shape[1])
+    return _moved(machine, y, u, first, horizon, [v.name for v in states], scale, step)
+
+
+def _checked(
+    model: Model, data: Mapping[str, ArrayLike], noise: Mapping[str, float], unknown: Sequence[str]
+) -> dict[str, Array]:
+    """Return the data as rows of equal length."""
+    inputs, wrong = [v.name for v in model.u], list[str]()
+    rows = {name: np.asarray(row, dtype=float) for name, row in data.items()}
+    measured = [name for name in rows if name not in inputs]
+    check_names("estimate: data", rows, model.signals)
+    check_names("estimate: unknown", unknown, inputs)
+    check_names("estimate: noise", noise, [*(v.name for v in model.x), *unknown, *measured])
+    if model.ode is None or model.z or model.events or ca.depends_on(model.ode, model.t):
+        wrong.append("an explicit model without events, algebraic variables and time")
+    if not measured:
+        wrong.append("data of at least one signal that is not an input")
+    wrong += [
+        f"data of the input '{name}', or its name in `unknown`"
+        for name in inputs
+        if (name in rows) == (name in unknown)
+    ]
+    wrong += [f"noise of '{name}' above 0" for name in measured if not noise.get(name, 0.0) > 0.0]
+    if len({row.shape for row in rows.values()}) > 1 or any(r.ndim != 1 for r in rows.values()):
+        wrong.append("rows of equal length")
+    wrong += [
+        f"finite samples of '{n}'" for n in inputs if n in rows and not np.isfinite(rows[n]).all()
+    ]
+    if wrong:
+        raise ValueError(f"estimate: model '{model.name}': expected {'; '.join(wrong)}")
+    return rows
+
+
+def _functions(
+    model: Model, loads: Sequence[Variable], measured: Sequence[str], scale: Array, step: float,
+    p: ArrayLike, steps: int,
+) -> tuple[ca.Function, ca.Function]:  # fmt: skip
+    """Return (xi, u) -> next xi and its Jacobian, and -> measured signals and their Jacobian.
+
+    xi are states and loads in units of their spread, u the measured inputs.
+    """
+    nx, given = len(model.x), [v for v in model.u if v not in loads]
+    xi, u = ca.MX.sym("xi", nx + len(loads)), ca.MX.sym("u", len(given))
+    x = xi * ca.DM(scale)
+    places = {v.name: u[i] for i, v in enumerate(given)}
+    places |= {v.name: x[nx + i] for i, v in enumerate(loads)}
+    inputs = ca.vertcat(*(places[v.name] for v in model.u)) if model.u else ca.MX(0, 1)
+    values = ca.DM(np.asarray(p, dtype=float))
+    after = ca.vertcat(flow(model, steps=steps)(x[:nx], inputs, values, step), x[nx:]) / ca.DM(
+        scale
+    )
+    symbols = [model.vector("x"), model.vector("u"), model.vector("p")]
+    seen = ca.vertcat(*(model.expression(name) for name in measured))
+    y = ca.Function("seen", symbols, [seen])(x[:nx], inputs, values)
+    return (
+        ca.Function("next", [xi, u], [after, ca.jacobian(after, xi)]),
+        ca.Function("measured", [xi, u], [y, ca.jacobian(y, xi)]),
+    )
+
+
+class _Machine(NamedTuple):
+    after: ca.Function
+    seen: ca.Function
+    Q: Array
+    R: Array
+
+
+class _Pass(NamedTuple):
+    """Result of a filter and smoother: means in columns, covariances of each sample."""
+
+    smooth: Array
+    filtered: list[Array]
+    predicted: list[tuple[Array, Array]]
+    slopes: list[Array]
+
+
+def _evaluated(f: ca.Function, xi: Array, u: Array) -> tuple[Array, list[Array]]:
+    """Return values in columns and Jacobians of a function at each sample."""
+    count = xi.shape[1]
+    value, slopes = f.map(count)(xi, u)
+    return value.full(), np.split(slopes.full(), count, axis=1)
+
+
+def _passed(machine: _Machine, xi: Array, y: Array, u: Array, prior: tuple[Array, Array]) -> _Pass:
+    """Filter and smooth the model that is linearised at the columns of `xi`."""
+    after, A = _evaluated(machine.after, xi, u)
+    seen, C = _evaluated(machine.seen, xi, u)
+    predicted, means, covariances = [prior], list[Array](), list[Array]()
+    for k in range(xi.shape[1]):
+        m, spread = predicted[-1]
+        there = np.isfinite(y[:, k])
+        H, R = C[k][there], np.diag(machine.R[there])
+        gain = np.linalg.solve(H @ spread @ H.T + R, H @ spread).T
+        m = m + gain @ (y[there, k] - seen[there, k] - H @ (m - xi[:, k]))
+        keep = np.eye(m.size) - gain @ H
+        P = keep @ spread @ keep.T + gain @ R @ gain.T
+        means.append(m)
+        covariances.append(P)
+        ahead = after[:, k] + A[k] @ (m - xi[:, k])
+        predicted.append((ahead, A[k] @ P @ A[k].T + machine.Q))
+    smooth = [means[-1]]
+    for k in range(xi.shape[1] - 2, -1, -1):
+        expected, spread = predicted[k + 1]
+        back = covariances[k] @ A[k].T @ np.linalg.pinv(spread, hermitian=True)
+        smooth.append(means[k] + back @ (smooth[-1] - expected))
+    return _Pass(np.array(smooth[::-1]).T, covariances, predicted, A)
+
+
+def _moved(
+    machine: _Machine, y: Array, u: Array, first: Array, horizon: int, names: Sequence[str],
+    scale: Array, step: float,
+) -> Estimate:  # fmt: skip
+    """Move the horizon over all samples."""
+    count = y.shape[1]
+    xi, prior, unconverged = first[:, None], (first, np.eye(first.size)), 0
+    free = prior[1]  # covariance at the first sample of the horizon without measurements
+    means, deviations = np.empty((first.size, count)), np.empty((first.size, count))
+    found = _passed(machine, xi, y[:, :1], u[:, :1], prior)
+    for k in range(count):
+        begin = max(0, k + 1 - horizon)
+        if k:
+            xi = np.column_stack([found.smooth, found.predicted[-1][0]])
+        if begin > max(0, k - horizon):
+            xi, prior = xi[:, 1:], found.predicted[1]
+            free = found.slopes[0] @ free @ found.slopes[0].T + machine.Q
+        here = slice(begin, k + 1)
+        for _ in range(ITERATIONS):
+            found = _passed(machine, xi, y[:, here], u[:, here], prior)
+            change, xi = float(np.abs(found.smooth - xi).max()), found.smooth
+            if not change > TOLERANCE:
+                break
+        else:
+            unconverged += 1
+        means[:, k] = found.smooth[:, -1]
+        deviations[:, k] = np.sqrt(np.diag(found.filtered[-1]))
+    for slope in found.slopes[:-1]:
+        free = slope @ free @ slope.T + machine.Q
+    smooth = found.smooth * scale[:, None]
+    return Estimate(
+        t=step * np.arange(count),
+        signals=dict(zip(names, means * scale[:, None], strict=True)),
+        deviations=dict(zip(names, deviations * scale[:, None], strict=True)),
+        smooth=dict(zip(names, smooth, strict=True)),
+        unobservable=_unobservable(found.filtered[-1], free, names),
+        unconverged=unconverged,
+    )
+
+
+def _unobservable(P: Array, free: Array, names: Sequence[str]) -> tuple[str, ...]:
+    """Return combinations whose variance the measurements reduce by less than `INFORMED`."""
+    ratios, vectors = eigh(P, free + 1e-12 * np.eye(len(names)))
+    found = list[str]()
+    for ratio, v in zip(ratios, vectors.T, strict=True):
+        if ratio > INFORMED and 1.0 / np.linalg.norm(v) > KNOWN:
+            v = v / v[np.argmax(np.abs(v))]
+            terms = ((c, n) for c, n in zip(v, names, strict=True) if abs(c) > SHOWN)
+            text = " ".join(f"{'-' if c < 0 else '+'} {abs(c):.2g} {n}" for c, n in terms)
+            found.append(text.removeprefix("+ "))
+    return tuple(found)

@@ -1,0 +1,142 @@
+"""The estimator equals dense least squares on linear models, and estimates bristles and loads."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from ocp import Estimate, estimate
+from symfric import Contact, ExactCoulomb, LuGre, Model, Output, Variable, drive, simulate
+from symfric.integrator import Hold
+
+STEP = 0.05
+RATES = np.array([[0.0, 1.0, 0.0], [-4.0, -0.3, 1.0], [0.0, 0.0, 0.0]])
+"""Of position, velocity and load of a mass with spring and damper."""
+NOISE = {"x": 0.1, "v": 0.2, "load": 0.5}
+WALK = np.array([0.03, 0.2, 0.5])
+
+
+def oscillator(loads: int = 1) -> Model:
+    x, v, f = Variable("x", "m"), Variable("v", "m/s"), Variable("f", "N")
+    w = [Variable(name, "N") for name in ("load", "other")[:loads]]
+    force = f.symbol + sum(a.symbol for a in w) - 4.0 * x.symbol - 0.3 * v.symbol
+    seen = {"seen": Output(x.symbol, "m")}
+    return Model("oscillator", x=(x, v), u=(f, *w), ode=ca.vertcat(v.symbol, force), outputs=seen)
+
+
+def dense(f: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return all states (n, 3) of the least-squares problem, and the deviations of the last one."""
+    n = y.size
+    whole = expm(STEP * np.block([[RATES, np.array([[0.0], [1.0], [0.0]])], [np.zeros((1, 4))]]))
+    A, b = whole[:3, :3], whole[:3, 3]
+    rows, right = np.zeros((3 + 3 * (n - 1) + n, 3 * n)), np.zeros(3 + 3 * (n - 1) + n)
+    rows[:3, :3] = np.eye(3)
+    for k in range(n - 1):
+        here, weight = slice(3 + 3 * k, 6 + 3 * k), 1 / (WALK * np.sqrt(STEP))[:, None]
+        rows[here, 3 * k : 3 * k + 3] = -weight * A
+        rows[here, 3 * k + 3 : 3 * k + 6] = weight * np.eye(3)
+        right[here] = weight[:, 0] * b * f[k]
+    for k in np.flatnonzero(np.isfinite(y)):
+        rows[3 * n + k, 3 * k], right[3 * n + k] = 1 / NOISE["x"], y[k] / NOISE["x"]
+    inverse = np.linalg.inv(rows.T @ rows)
+    return (inverse @ rows.T @ right).reshape(n, 3), np.sqrt(np.diag(inverse)[-3:])
+
+
+def measured(n: int) -> tuple[np.ndarray, np.ndarray]:
+    y = 0.1 * np.random.default_rng(2).standard_normal(n) + 0.3
+    y[[4, 5, n - 2]] = np.nan
+    return np.sin(np.arange(n)), y
+
+
+def estimated(f: np.ndarray, y: np.ndarray, horizon: int) -> Estimate:
+    noise = {"seen": NOISE["x"], "x": 0.03, "v": 0.2, "load": 0.5}
+    data = {"f": f, "seen": y}
+    return estimate(
+        oscillator(), data, step=STEP, horizon=horizon, noise=noise, unknown=["load"]
+    )  # fmt: skip
+
+
+def test_a_whole_horizon_is_the_least_squares_solution() -> None:
+    f, y = measured(25)
+    states, deviations = dense(f, y)
+    found = estimated(f, y, horizon=25)
+    for i, name in enumerate(("x", "v", "load")):
+        assert found.smooth[name] == pytest.approx(states[:, i], abs=1e-6)
+        assert found.deviations[name][-1] == pytest.approx(deviations[i], rel=1e-6)
+    assert found.unconverged == 0
+
+
+def test_each_estimate_is_that_of_all_data_so_far() -> None:
+    """The arrival cost keeps what left the horizon."""
+    f, y = measured(25)
+    found = estimated(f, y, horizon=4)
+    for k in (1, 6, 13, 24):
+        states, deviations = dense(f[: k + 1], y[: k + 1])
+        got = [found[name][k] for name in ("x", "v", "load")]
+        assert got == pytest.approx(states[-1].tolist(), abs=1e-6)
+        assert found.deviations["load"][k] == pytest.approx(deviations[2], rel=1e-6)
+    assert found.smooth["x"].size == 4
+
+
+@pytest.mark.slow
+def test_bristles_and_a_load_are_estimated_from_positions() -> None:
+    x, v = Variable("x", "m", nominal=0.1), Variable("v", "m/s", nominal=0.1)
+    motor, load = Variable("motor", "N"), Variable("load", "N")
+    law = LuGre(mu_s=6.0, mu_d=4.0, v_s=0.05, sigma_0=1e4, sigma_1=200.0, sigma_2=0.5)
+    guide = Contact("guide", v, 1.0, law)
+    ode = ca.vertcat(v, motor - load - guide.force)
+    plant = Model("axis", x=(x, v), u=(motor, load), ode=ode, contacts=(guide,))
+    t = 0.01 * np.arange(110)
+    push, weight = 10.0 * np.sin(4.0 * t), 2.0 * (t > 0.5)
+    true = simulate(plant, t[-1], u={"motor": Hold(t, push), "load": Hold(t, weight)}, t_eval=t)
+    errors, late = [], t > 0.7
+    for seed in range(2):
+        seen = true["x"] + 1e-5 * np.random.default_rng(seed).standard_normal(t.size)
+        found = estimate(
+            plant, {"motor": push, "x": seen}, step=0.01, horizon=8, unknown=["load"],
+            noise={"x": 1e-5, "load": 5.0}, spread={"x": 1e-4, "v": 1e-3, "guide_z": 1e-4},
+        )  # fmt: skip
+        assert (found.unconverged, found.unobservable) == (0, ())
+        errors.append((found["load"] - weight)[late] / found.deviations["load"][late])
+        assert np.abs(found["guide_z"] - true["guide_z"])[late].max() < 0.02 * 6e-4
+        assert np.abs(found["v"] - true["v"])[late].max() < 0.02
+    assert 0.1 < np.sqrt(np.mean(np.square(errors))) < 1.5
+
+
+def test_combinations_that_data_do_not_determine_are_reported() -> None:
+    f, y = measured(40)
+    noise = {"x": 0.01, "load": 0.1, "other": 0.1}
+    found = estimate(
+        oscillator(2), {"f": f, "x": y}, step=STEP, horizon=5, noise=noise,
+        unknown=("load", "other"),
+    )  # fmt: skip
+    (text,) = found.unobservable
+    assert text in ("1 load - 1 other", "- 1 load + 1 other")
+    sum_of_both = estimate(
+        oscillator(), {"f": f, "x": y}, step=STEP, horizon=5, noise={"x": 0.01, "load": 0.1},
+        unknown=("load",),
+    )  # fmt: skip
+    assert sum_of_both.unobservable == ()
+
+
+def test_bad_input_is_described_at_once() -> None:
+    row = np.zeros(5)
+    given = {"step": 0.1, "horizon": 3}
+    with pytest.raises(ValueError) as caught:
+        estimate(oscillator(), {"x": np.zeros(4), "f": row}, noise={"x": 0.0}, **given)
+    for part in ("input 'load'", "noise of 'x' above 0", "rows of equal length"):
+        assert part in str(caught.value)
+    good = {"x": row, "f": row, "load": row}
+    with pytest.raises(ValueError, match="signal that is not an input"):
+        estimate(oscillator(), {"f": row, "load": row}, noise={}, **given)
+    with pytest.raises(ValueError, match="finite samples of 'f'"):
+        estimate(oscillator(), good | {"f": row * np.nan}, noise={"x": 1.0}, **given)
+    with pytest.raises(ValueError, match="estimate: spread"):
+        estimate(oscillator(), good, noise={"x": 1.0}, spread={"mass": 1.0}, **given)
+    with pytest.raises(ValueError, match="without events"):
+        model = drive(ExactCoulomb(), m=1.0, N=1.0)
+        estimate(model, {"x": row, "force": row}, noise={"x": 1.0}, **given)
+    with pytest.raises(ValueError, match="estimate: horizon"):
+        estimate(oscillator(), good, noise={"x": 1.0}, step=0.1, horizon=1)
+    with pytest.raises(ValueError, match="mass"):
+        _ = estimate(oscillator(), good, noise={"x": 1.0}, **given)["mass"]
