@@ -29,12 +29,12 @@ from ocp.formulation.problem import Problem
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solved
 from ocp.solving.prepared import Option, Supervisor
-from ocp.solving.solution import Solution
+from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import start_of
 from ocp.transcription.program import Iterate, Program
 from ocp.transcription.schemes import Shooting
 from ocp.transcription.transcribe import Discretisation, Transcription, discretise
-from symfric.foundation.status import Status
+from symfric.foundation.status import SolveError, Status
 
 STEPS = 20
 """Default number of steps of an interval."""
@@ -47,6 +47,8 @@ GOAL = 0.3
 CLOSE: dict[str, Option] = {"tol": 1e-6, "mu_init": 1e-4, "max_iter": 100}
 MOST_ITERATIONS = 60
 COST: dict[str, Option] = {"tol": 1e-5, "mu_init": 1e-4, "max_iter": MOST_ITERATIONS}
+FAILURES = (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError)
+"""Exceptions after which the next strategy is tried."""
 KEPT = 1e-6
 """Violation of a scaled row below which an iterate is feasible."""
 
@@ -69,6 +71,20 @@ class OriginalLaw:
     solver: Ipopt
     tolerance: float
     supervisor: Supervisor
+
+    def continued(self, exact: Solution) -> Solution:
+        """Return the verified motion near `exact`, or `exact` with the reason of a failure."""
+        try:
+            own = self.solved(exact)
+        except FAILURES as error:  # shooting does not support all models
+            return with_sentence(exact, f"With the law itself: {reason_of(error)}.")
+        own = replace(own, statistics=exact.statistics.then(own.statistics))
+        if own.verified:
+            return replace(own, modes=exact.modes)
+        kept = with_sentence(exact, f"By {self.scheme} with the law itself: {own.message}")
+        kept = replace(kept, statistics=own.statistics)
+        stopped = own.status.stopped
+        return replace(kept, status=own.status, cause=own.cause) if stopped else kept
 
     def solved(self, static: Solution) -> Solution:
         """Return the verified motion with the law itself near `static`.
@@ -178,3 +194,11 @@ def project_control(transcription: Transcription, w: ArrayLike) -> Program:
         gradient=ca.Function("gradient", [x, p], [cost(x), scale * (x - goal)]),
         hessian=ca.Function("hessian", [x, p, lam_f, lam_g], [hessian]),
     )
+
+
+def reason_of(error: Exception) -> str:
+    """Return the message of `error` as a clause, with its type if it is an internal error."""
+    first = (str(error).strip().splitlines() or [""])[0].rstrip(".")
+    if isinstance(error, ValueError | SolveError):
+        return first
+    return f"internal error, {type(error).__name__}: {first}"

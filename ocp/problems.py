@@ -28,7 +28,7 @@ from symfric.scenes.blocks import drive
 @final
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """Predefined problem that `symfric ocp NAME` solves and `symfric bench ocp` measures.
+    """Predefined problem that `symfric ocp NAME` solves and `symfric bench starts` measures.
 
     Attributes:
         make: function that returns the problem; its keyword arguments are numbers such as v_t.
@@ -167,7 +167,7 @@ def _there_and_back(model: Model) -> Problem:
     return Problem(there >> back, FORCE, bounds={"force": (-40.0, 40.0)})
 
 
-@frictional(28.480, 3e-2, BEST)
+@frictional(28.469, 3e-2, BEST)
 def load_through_spring(v_t: float = V_T) -> Problem:
     """A load on a guide, moved there and back by a spring."""
     return _there_and_back(_coupled("load_through_spring", v_t, 0.0))

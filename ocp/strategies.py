@@ -1,8 +1,8 @@
 """Strategies of `solve`: direct, by homotopy, by modes, and the order in which they are tried."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import isfinite, nan
 from typing import Literal, NamedTuple, final
 
 from numpy.typing import ArrayLike
@@ -15,8 +15,16 @@ from ocp.formulation.problem import Problem
 from ocp.friction.event_check import verify_exactly
 from ocp.friction.homotopy import FINE, LAST, Sharp, sharpened
 from ocp.friction.mode_optimisation import optimise_modes, refusal
-from ocp.friction.smooth_models import own_level, speeds_at, sticking
-from ocp.original_law import STEPS, OriginalLaw
+from ocp.friction.smooth_models import (
+    bristles,
+    is_exact,
+    law_states,
+    narrowed,
+    own_level,
+    speeds_at,
+    sticking,
+)  # fmt: skip
+from ocp.original_law import FAILURES, STEPS, OriginalLaw, reason_of
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solver
 from ocp.solving.prepared import Supervisor
@@ -25,11 +33,9 @@ from ocp.solving.starts import Start
 from ocp.solving.verification import Verification
 from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes
 from symfric.foundation import checks
-from symfric.foundation.status import SolveError, Status
+from symfric.foundation.status import Status
 
 Friction = Literal["auto", "smooth", "sharpen", "modes"]
-Margins = Iterator[tuple[Solution, float]]
-"""Motions by modes with their friction margins."""
 INTERVALS = 50
 EARLY = 0.04
 """Largest smoothing width, in multiples of the speeds, from which modes are deduced."""
@@ -40,13 +46,11 @@ SHARED_PASSES, SHARED_ITERATIONS = 4, 150
 many iterations at these kinks for a thousandth of the cost."""
 EXACT_RTOL = 1e-7
 """Relative tolerance of the simulation with exact friction, 1 % of the required accuracy."""
-SHARPEST = 1e-4
-"""Smallest smoothing width, in multiples of the speeds, of a direct solve."""
 MISSED = (Status.TERMINAL_MISS, Status.BOUND_MISS)
 FOUND = (*MISSED, Status.UNSTABLE)
 """Statuses of a motion that was found but violates its conditions."""
-FAILURES = (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError)
-"""Exceptions after which the next strategy is tried."""
+SHARPEST = 1e-4
+"""Smallest smoothing width, in multiples of the speeds, of a direct solve."""
 
 
 @final
@@ -106,15 +110,22 @@ class Direct:
             intervals = sum(mesh.size - 1 for mesh in meshes[: len(self.problem.chain)])
         return sharpened(
             self.problem, self.scheme, self.solver, guess, intervals=intervals, starts=starts,
-            last=last, supervisor=self.supervisor,
+            last=last, rivals=last > 0 and not bristles(self.problem), supervisor=self.supervisor,
         )  # fmt: skip
 
 
 class Judged(NamedTuple):
-    """A motion by modes, and True if it is valid with the user's laws and with exact friction."""
+    """A motion by modes with the verdict of simulations.
+
+    Attributes:
+        solution: the motion.
+        right: True if it is valid with the user's laws and with exact friction.
+        exact: True if it is valid with exact friction only.
+    """
 
     solution: Solution
     right: bool
+    exact: bool = False
 
 
 @final
@@ -148,8 +159,10 @@ class Search:
             if not (solution.modes and laws):
                 return verified(solution, self.tolerance)
             found = _without_law_states(solution, verify(solution, self.tolerance))
+            if is_exact(solution.problem) and (found.ok or not solution.ok):
+                return replace(solution, verification=found)
         except FAILURES as error:
-            return with_sentence(solution, f"It was not verified: {_reason(error)}.")
+            return with_sentence(solution, f"It was not verified: {reason_of(error)}.")
         names = ", ".join(f"{name}: {type(c.law).__name__}" for name, c in laws.items())
         text = f"{solution.message} Friction with states ({names}) was taken as its steady sliding"
         text += " and its static level, and the motion verified with the law itself."
@@ -160,94 +173,99 @@ class Search:
 
     def judged(self, solution: Solution) -> Judged:
         """Return a motion by modes with the verdict of a simulation with exact friction."""
-        if not self.verify or not (solution.ok or solution.status in MISSED):
+        if not self.verify or not (solution.ok or solution.status in FOUND):
             return Judged(solution, solution.ok)
+        if solution.ok and is_exact(solution.problem):
+            text = "It was verified with exact Coulomb friction, the law of the model."
+            return Judged(with_sentence(solution, text), right=True)
         try:
             exact = verify_exactly(solution, self.tolerance, EXACT_RTOL)
             exact = _without_law_states(solution, exact)
         except FAILURES as error:
-            text = f"With exact Coulomb friction it was not simulated: {_reason(error)}."
+            text = f"With exact Coulomb friction it was not simulated: {reason_of(error)}."
             return Judged(with_sentence(solution, text), solution.ok)
-        if not exact.ok:
-            text = f"With exact Coulomb friction: {exact.sentence}"
-            return Judged(with_sentence(solution, text), right=False)
-        text = f"With exact Coulomb friction it misses by {exact.largest:.1g}"
-        if not solution.ok:
-            text += " only: the layers of the law creep at rest and break away later; make them "
-            text += "narrower, or allow this by `tolerance`"
-        return Judged(with_sentence(solution, f"{text}."), solution.ok)
+        if exact.ok and not solution.ok:
+            return Judged(self._creeping(solution, exact.largest), right=False, exact=True)
+        text = f"it misses by {exact.largest:.1g}." if exact.ok else exact.sentence
+        text = f"With exact Coulomb friction{'' if exact.ok else ':'} {text}"
+        return Judged(with_sentence(solution, text), right=exact.ok)
+
+    def _creeping(self, solution: Solution, exact: float) -> Solution:
+        """Return a motion that is right only with exact friction, where it misses by `exact`."""
+        found, layers = solution.verification, ""
+        if found is None or not found.misses:
+            return solution
+        grows = (
+            f" and whose errors grow by a factor of {found.growth:.1g}" if found.unstable else ""
+        )
+        for factor in (0.5 * self.tolerance / found.largest, 0.05 * self.tolerance / found.largest):
+            problem, narrow = narrowed(solution.problem, factor)
+            with suppress(*FAILURES):
+                if narrow and verify(replace(solution, problem=problem), self.tolerance).ok:
+                    shown = checks.listed([f"{name} {v:.1g} m/s" for name, v in narrow.items()])
+                    layers = f"a layer of {shown}, "
+                    break
+        text = (
+            f"ocp '{solution.problem.name}': The motion is right with exact Coulomb friction "
+            f"(largest miss {exact:.1g}), but under the laws of the model, whose layers creep at "
+            f"rest{grows}, {found.misses[0].sentence}; {layers}feedback along the motion, or the "
+            "law ExactCoulomb closes the gap."
+        )
+        return replace(solution, message=text)
 
     def near(self, sharp: Sharp) -> Judged:
-        """Return the exact motion near a sharpened one, verified with the user's laws."""
-        direct, problem = self.direct, self.direct.problem
-        speeds = speeds_at(problem, sharp.scales, sharp.level)
-        motions = optimise_modes(
-            sharp.solution, problem, speeds, solver=direct.ipopt, scheme=direct.scheme,
-            margin=self.margin, supervisor=direct.supervisor,
-        )  # fmt: skip
-        exact, margin = next(motions)
-        if exact.status.stopped and not exact.modes:
-            by = "The time limit was reached" if exact.status is Status.TIME_LIMIT else "Stopped"
-            text = f"ocp '{problem.name}': {by} while modes were sought; friction is still smooth."
-            both = _after(exact, sharp.solution)
-            stopped = replace(both, status=exact.status, message=text, cause=exact.cause)
-            return Judged(stopped, right=False)
-        exact = self.checked(_after(sharp.solution, exact))
-        if exact.status in MISSED and law_states(problem) and not direct.supervisor.over:
-            exact = self.by_original_law(exact)
-            if exact.verified:
-                return Judged(exact, True)
-        narrow = own_level(problem, sharp.scales) < SHARPEST
-        if exact.status in MISSED and not narrow and not direct.supervisor.over:
-            own = self.checked(direct.solved(exact, exact.meshes, close=True))
-            if own.verified:
-                return Judged(_after(exact, replace(own, modes=exact.modes)), True)
-            exact = _after(own, exact)
-        first = self.judged(exact)
-        return self._closer(first, margin, motions, sharp.solution) if first.right else first
+        """Return the best exact motion near a sharpened one or its rivals, with the user's laws.
 
-    def _closer(self, first: Judged, margin: float, motions: Margins, sharp: Solution) -> Judged:
-        """Return the valid motion with the smallest margin of contacts at rest."""
-        kept, slope, best, last = margin, nan, first, first.solution
-        for exact, less in motions:
-            last = _after(sharp, exact)
-            if exact.status is Status.INTERRUPTED:
-                return Judged(last, right=False)
-            if exact.ok:
-                slope = max(0.0, first.solution.cost - exact.cost) / (margin - less)
-            if exact.status.stopped or less < self.margin:
-                break
-            nearer = self.judged(self.checked(last)) if exact.ok else first
-            if exact.ok and nearer.right:
-                best, kept = nearer, less
-                break
-        if last is first.solution:
-            return first
-        found = replace(best.solution, statistics=last.statistics)
-        costs = f"about {slope * kept:.2g} of {found.cost:.6g}" if isfinite(slope) else "is open"
-        few = "" if kept <= self.margin else "; with less none was found that is right"
-        text = f"Rests keep {kept:.2g} of their static levels, which costs {costs}{few}."
-        return Judged(with_sentence(found, text), right=True)
+        Motions with small margins of contacts at rest are tried first.
+        """
+        direct, problem = self.direct, self.direct.problem
+        each = sharp.rivals or (sharp,)
+        found = optimise_modes(
+            [(one.solution, speeds_at(problem, one.scales, one.level)) for one in each],
+            problem, solver=direct.ipopt, scheme=direct.scheme, margin=self.margin,
+            supervisor=direct.supervisor,
+        )  # fmt: skip
+        narrow = own_level(problem, sharp.scales) < SHARPEST
+        margins = found.margins if narrow else (*found.margins[:1], *found.margins[1:][-1:])
+        margins = margins[-1:] if bristles(problem) else margins
+        judged = Judged(sharp.solution, right=False)
+        for margin in margins:
+            exact, last = found.motion(margin), margin == margins[-1]
+            if exact.status.stopped:
+                return Judged(_stopped(exact, sharp.solution), right=False)
+            exact = self.checked(_after(sharp.solution, exact))
+            if exact.status in MISSED and last and not direct.supervisor.over:
+                exact = self.by_original_law(exact) if bristles(problem) else exact
+                own = exact if narrow or exact.verified else self._by_own_law(exact)
+                if own.verified:
+                    return Judged(own, True)
+                exact = _after(own, exact) if own is not exact else exact
+            if exact.ok or last:
+                judged = self.judged(exact)
+            if judged.right:
+                return Judged(with_sentence(judged.solution, found.rests(margin, exact.cost)), True)
+        return judged._replace(exact=judged.exact and narrow)
+
+    def _by_own_law(self, exact: Solution) -> Solution:
+        """Return the verified motion with the laws of the problem, near a motion by modes."""
+        own = self.checked(self.direct.solved(exact, exact.meshes, close=True))
+        return replace(_after(exact, own), modes=exact.modes)
 
     def by_original_law(self, exact: Solution) -> Solution:
-        """Return a motion with the law and its states, found by shooting from `exact`.
-
-        If shooting fails, return `exact` with the reason in its message.
-        """
+        """Return a motion with the law and its states, found by shooting from `exact`."""
         direct, scheme = self.direct, self.direct.scheme
         scheme = scheme if isinstance(scheme, Shooting) else Shooting("exponential", STEPS)
-        settings = direct.ipopt, self.tolerance, direct.supervisor
-        try:
-            own = OriginalLaw(direct.problem, scheme, *settings).solved(exact)
-        except FAILURES as error:  # shooting does not support all models
-            return with_sentence(exact, f"With the law itself: {_reason(error)}.")
-        own = _after(exact, own)
-        if own.verified:
-            return replace(own, modes=exact.modes)
-        kept = with_sentence(exact, f"By {scheme} with the law itself: {own.message}")
-        kept = replace(kept, statistics=own.statistics)
-        stopped = own.status.stopped
-        return replace(kept, status=own.status, cause=own.cause) if stopped else kept
+        settings = scheme, direct.ipopt, self.tolerance, direct.supervisor
+        return OriginalLaw(direct.problem, *settings).continued(exact)
+
+
+def _stopped(exact: Solution, sharp: Solution) -> Solution:
+    """Return the motion of a stopped search: with modes if there are any, otherwise smooth."""
+    if exact.modes:
+        return _after(sharp, exact)
+    by = "The time limit was reached" if exact.status is Status.TIME_LIMIT else "Stopped"
+    text = f"ocp '{exact.problem.name}': {by} while modes were sought; friction is still smooth."
+    return replace(_after(exact, sharp), status=exact.status, message=text, cause=exact.cause)
 
 
 def solved(search: Search, friction: Friction, guess: Start, starts: int) -> Solution:
@@ -313,24 +331,25 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int) 
         if _events(problem):
             raise
         smooth = check(search.direct.solved(guess))
-        return with_sentence(smooth, f"Friction was not sharpened: {_reason(error)}.")
+        return with_sentence(smooth, f"Friction was not sharpened: {reason_of(error)}.")
     tried, text = list[Judged](), f"No motion by modes was sought: {reason}." if reason else ""
     while sharp.solution.ok:
         if friction != "modes" and sharp.level <= own_level(problem, sharp.scales) * 1.001:
             smooth = search.direct.solved(sharp.solution, sharp.solution.meshes)
             return check(_after(sharp.solution, smooth))
         early = sharp.level <= EARLY and not sharp.steady
-        if not reason and (early or sharp.level <= LAST * 1.001):
+        if not reason and (sharp.rivals or early or sharp.level <= LAST * 1.001):
             try:
                 tried.append(search.near(sharp))
-                if tried[-1].right or tried[-1].solution.status.stopped:
+                last = tried[-1]  # narrower layers would not change a motion that is exact
+                if last.right or last.exact or last.solution.status.stopped:
                     return tried[-1].solution
             except FAILURES as error:
-                text = f"Modes were not found: {_reason(error)}."
+                text = f"Modes were not found: {reason_of(error)}."
         try:
             sharp, before = next(path, sharp), sharp
         except FAILURES as error:
-            text, before = f"{text} Friction was not sharpened further: {_reason(error)}.", sharp
+            text, before = f"{text} Friction was not sharpened further: {reason_of(error)}.", sharp
         if sharp is before:
             break
     if any(one.solution.ok or one.solution.status in FOUND for one in tried):
@@ -348,21 +367,6 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int) 
     return with_sentence(check(sharp.solution), text)
 
 
-def law_states(problem: Problem) -> set[str]:
-    """Return the names of the states of laws, which a motion by modes does not contain."""
-    contacts = [c for phase in problem.chain for c in phase.model.contacts]
-    return {v.name for c in contacts for v in c.states}
-
-
-def _without_law_states(solution: Solution, found: Verification) -> Verification:
-    """Return `found` without checks of law states and local errors."""
-    hidden = law_states(solution.problem)
-    if not hidden:
-        return found
-    kept = [m for m in found.checked if m.name not in hidden and m.what != "local error"]
-    return replace(found, checked=tuple(kept), restarted=None)
-
-
 def _events(problem: Problem) -> list[str]:
     """Return the names of events of the models, which direct solves ignore."""
     return [*dict.fromkeys(e.name for span in problem.spans for e in span.model.events)]
@@ -373,17 +377,17 @@ def _refused(problem: Problem) -> str:
     try:
         return refusal(problem)
     except FAILURES as error:
-        return _reason(error)
-
-
-def _reason(error: Exception) -> str:
-    """Return the message of `error` as a clause, with its type if it is an internal error."""
-    first = (str(error).strip().splitlines() or [""])[0].rstrip(".")
-    if isinstance(error, ValueError | SolveError):
-        return first
-    return f"internal error, {type(error).__name__}: {first}"
+        return reason_of(error)
 
 
 def _after(first: Solution, later: Solution) -> Solution:
     """Return `later` with the statistics of both solves."""
     return replace(later, statistics=first.statistics.then(later.statistics))
+
+
+def _without_law_states(solution: Solution, found: Verification) -> Verification:
+    """Return `found` without checks of law states and local errors."""
+    if not (hidden := law_states(solution.problem)):
+        return found
+    kept = [m for m in found.checked if m.name not in hidden and m.what != "local error"]
+    return replace(found, checked=tuple(kept), restarted=None)

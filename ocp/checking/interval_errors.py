@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from ocp.checking.resimulate import Arc
 from ocp.solving.optimum import cost_weight
-from ocp.transcription.blocks import Array, Entries
+from ocp.transcription.blocks import Array, Block, Entries, Indices, Piece
 from ocp.transcription.program import Iterate
+from ocp.transcription.schemes import Coefficients, Radau
 from ocp.transcription.transcribe import Transcription
 from symfric.foundation.parameters import Variable
 from symfric.integrator import simulate_many
@@ -18,6 +19,127 @@ from symfric.model import Model
 
 RTOL = 1e-6
 """Relative tolerance of the flow over one interval."""
+FINER = Radau(5)
+"""Scheme whose solution over one interval replaces a simulation."""
+NEWTON_STEPS, CONVERGED = 8, 1e-8
+"""Largest number of steps of Newton's method, and the scaled step at which it has converged."""
+
+
+def estimated_errors(
+    transcription: Transcription, w: Array, values: Array, arcs: Sequence[Arc]
+) -> tuple[Array, ...]:
+    """Return `local_errors` of the motion `w`, with collocation of order 9 as the flow.
+
+    Newton's method solves the equations of `FINER` over all intervals at once, from the polynomials
+    of the motion, with the functions of the program. Intervals in which it does not converge, as in
+    friction layers much narrower than an interval, are simulated.
+
+    Args:
+        transcription: the transcription.
+        w: unknowns of its program.
+        values: parameters of its program.
+        arcs: the motion of `w`.
+    """
+    found: list[Array] = []
+    for number, arc in enumerate(arcs):
+        ends = _collocated(transcription, w, values, number)
+        unknown = np.flatnonzero(~np.isfinite(ends).all(axis=0))
+        if unknown.size:
+            ends[:, unknown] = _ends(arc, RTOL, unknown)
+        off = np.abs(ends - arc.nodes[:, 1:]) / arc.sizes[:, None]
+        found.append(np.max(off, axis=0, initial=0.0))
+    return tuple(found)
+
+
+def _collocated(transcription: Transcription, w: Array, values: Array, number: int) -> Array:
+    """Return the states at the ends of the intervals of a phase by `FINER`, (nx, N).
+
+    They are NaN where Newton's method does not converge, and without collocation points.
+    """
+    own, span = transcription.layout.spans[number], transcription.problem.spans[number]
+    nx, nz, N, d = own.nodes.shape[0], own.z.shape[0], own.intervals, own.degree
+    ends, equations = np.full((nx, N), np.nan), _equations(transcription, number)
+    if equations is None:
+        return ends
+    piece, block, _ = equations
+    n = 0 if span.model.holonomic is None else span.model.holonomic.n
+    first = block.n - len(span.sides) - n
+    old, new = transcription.scheme.coefficients(), FINER.coefficients()
+    D = new.degree
+    v, theta = (a[:, ::d] for a in _at_places(piece, w, transcription.program.p, values))
+    v, theta = np.repeat(v, D, axis=1), np.repeat(theta, D, axis=1)
+    theta[-2] += ((new.nodes[None, 1:] - old.nodes[1]) * theta[-3].reshape(N, D)).ravel()
+    to = _interpolation(old.nodes, new.nodes[1:])
+    x = np.einsum("irk,rj->ikj", w[own.carrying], to)  # (nx, N, D)
+    z = w[own.z].reshape(nz, N, d) @ _interpolation(old.nodes[1:], new.nodes[1:])
+    motion, start = np.concatenate([x, z]), w[own.nodes[:, :-1]]
+    moving = np.ones(N, dtype=bool)
+    with np.errstate(all="ignore"):
+        for _ in range(NEWTON_STEPS):
+            at = np.flatnonzero(moving)
+            step = _newton_step(
+                block, (n, first), new, start[:, at], motion[:, at],
+                *(a.reshape(-1, N, D)[:, at].reshape(a.shape[0], -1) for a in (v, theta)),
+            )  # fmt: skip
+            motion[:, at] += step
+            size = np.abs(step).max(axis=(0, 2), initial=0.0)
+            done = size < CONVERGED
+            ends[:, at[done]] = span.model.nominal("x")[:, None] * motion[:nx, at[done], -1]
+            moving[at[done | ~np.isfinite(size)]] = False
+            if not moving.any():
+                break
+    return ends
+
+
+def _newton_step(
+    block: Block, implicit: tuple[int, int], scheme: Coefficients, start: Array, motion: Array,
+    v: Array, theta: Array,
+) -> Array:  # fmt: skip
+    """Return the change of states and algebraic variables at all points, (nx + nz, N, D).
+
+    Args:
+        block: equations of a collocation point.
+        implicit: number of coordinates of a mechanism, whose accelerations are slopes of the
+            polynomials, and index of the first of these slopes among the local unknowns.
+        scheme: collocation with D points.
+        start: states at the starts of the intervals, (nx, N).
+        motion: states and algebraic variables at the points, (nx + nz, N, D).
+        v: local unknowns, (n, N D), of which only those after the motion are used.
+        theta: parameters, (k, N D).
+    """
+    nx, (n, N, D), (q, first) = start.shape[0], motion.shape, implicit
+    velocities = np.arange(q, 2 * q)
+    known = np.setdiff1d(np.arange(nx), velocities)
+    slopes = np.concatenate([start[:, :, None], motion[:nx]], axis=2) @ scheme.slopes
+    v[:n] = motion.reshape(n, -1)
+    v[first : first + q] = slopes[velocities].reshape(q, v.shape[1])
+    rows, entries = (np.array(a) for a in block.jacobian.map(N * D)(v, theta))
+    rows, slope = rows[:n].reshape(n, N, D), np.zeros((n, block.n, N, D))
+    for row, column, numbers in _entries(block.of_jacobian, entries, np.arange(block.n)):
+        if row < n:
+            slope[row, column] = numbers.reshape(N, D)
+    rows[known] -= slopes[known]
+    A = np.zeros((N, D, n, D, n))
+    for j in range(D):
+        A[:, j, :, j] = slope[:, :n, :, j].transpose(2, 0, 1)
+        for k in range(D):
+            factor = scheme.slopes[1 + k, j]
+            A[:, j, :, k, velocities] += factor * slope[:, first : first + q, :, j].transpose(
+                1, 2, 0
+            )
+            A[:, j, known, k, known] -= factor
+    b = rows.transpose(1, 2, 0).reshape(N, D * n)
+    try:
+        step = np.linalg.solve(A.reshape(N, D * n, D * n), -b[:, :, None])
+    except np.linalg.LinAlgError:
+        step = np.full((N, D * n), np.nan)
+    return np.asarray(step, dtype=float).reshape(N, D, n).transpose(2, 0, 1)
+
+
+def _interpolation(nodes: Array, at: Array) -> Array:
+    """Return l_r(at_j) of the polynomials through `nodes`, shape (nodes, points)."""
+    found = np.linalg.solve(np.vander(nodes).T, np.vander(at, nodes.size).T)
+    return np.asarray(found, dtype=float)
 
 
 def local_errors(arcs: Sequence[Arc], rtol: float = RTOL) -> tuple[Array, ...]:
@@ -63,16 +185,15 @@ def cut_meshes(
     return made
 
 
-def _ends(arc: Arc, rtol: float) -> Array:
-    """Return the states at the end of each interval, simulated from its start, (nx, N)."""
-    model, N = arc.span.model, arc.intervals
-    local = _local(model)
+def _ends(arc: Arc, rtol: float, which: Indices | slice = slice(None)) -> Array:
+    """Return the states at the ends of intervals, simulated from their starts, (nx, n)."""
+    model, t_end, t_start = arc.span.model, np.diff(arc.times)[which], arc.times[:-1][which]
+    local, N = _local(model), t_end.size
     p: dict[str, Any] = {name: np.full(N, x) for name, x in arc.parameters().items()}
-    t_end: Any = np.diff(arc.times)
     if local is not model:
-        p |= {local.p[-1].name: arc.times[:-1]}
-    x0 = {v.name: row[:-1] for v, row in zip(model.x, arc.nodes, strict=True)}
-    u = {v.name: row for v, row in zip(model.u, arc.u, strict=True)}
+        p |= {local.p[-1].name: t_start}
+    x0 = {v.name: row[:-1][which] for v, row in zip(model.x, arc.nodes, strict=True)}
+    u = {v.name: row[which] for v, row in zip(model.u, arc.u, strict=True)}
     # compilation takes longer than all passes together
     run = simulate_many(local, t_end, x0=x0, p=p, u=u, rtol=rtol, backend="vm", executor="serial")
     ends = np.array([run[v.name][:, 0] for v in model.x]).reshape(len(model.x), N)
@@ -170,22 +291,15 @@ def _reach(
 
 def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tuple[Array, Array]:
     """Return H_u and H_uu of each input at the collocation points of a phase, (nu, N, d) each."""
-    skeleton, own = transcription.skeleton, transcription.layout.spans[number]
+    own, program = transcription.layout.spans[number], transcription.program
     shape = (*own.u.shape, own.degree)
-    pairs = zip(skeleton.pieces, skeleton.assembled.at, strict=True)
-    equations = (
-        (piece, at)
-        for piece, at in pairs
-        if piece.span == number and any(n.startswith("the equation of") for n in piece.names)
-    )
-    piece, at = next(equations, (skeleton.pieces[0], np.zeros(0, np.int64)))
-    block, selection, places = piece.block, piece.selection, piece.places
-    if not at.size or block is None or selection is None:
+    equations = _equations(transcription, number)
+    if equations is None:
         return np.zeros(shape), np.zeros(shape)
+    piece, block, at = equations
+    places = piece.places
     lam, sigma = iterate.lam_g[at], cost_weight(transcription, iterate.lam_g, number)
-    v = np.zeros((block.n, places))
-    np.add.at(v, selection.local, (selection.weights * iterate.w[selection.columns]).T)
-    theta = ca.Function("theta", [skeleton.program.p], [piece.theta])(transcription.program.values)
+    v, theta = _at_places(piece, iterate.w, program.p, program.values)
     inputs = own.nodes.shape[0] + own.z.shape[0] + np.arange(shape[0])
     H_u, H_uu = np.zeros((shape[0], places)), np.zeros((shape[0], places))
 
@@ -203,6 +317,25 @@ def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tupl
         if row == inputs[j]:
             H_uu[j] += values
     return H_u.reshape(shape), H_uu.reshape(shape)
+
+
+def _equations(transcription: Transcription, number: int) -> tuple[Piece, Block, Indices] | None:
+    """Return the equations of a phase at collocation points, their block and their row numbers."""
+    skeleton, first = transcription.skeleton, "the equation of"
+    for piece, at in zip(skeleton.pieces, skeleton.assembled.at, strict=True):
+        if piece.span == number and any(name.startswith(first) for name in piece.names):
+            return (piece, piece.block, at) if piece.block is not None else None
+    return None
+
+
+def _at_places(piece: Piece, w: Array, p: ca.MX, values: Array) -> tuple[Array, Array]:
+    """Return the local unknowns and parameters of a block at all its places."""
+    theta = ca.Function("theta", [p], [piece.theta])(values).full()
+    if piece.block is None or piece.selection is None:
+        return np.zeros((0, piece.places)), theta
+    v, selection = np.zeros((piece.block.n, piece.places)), piece.selection
+    np.add.at(v, selection.local, (selection.weights * w[selection.columns]).T)
+    return v, theta
 
 
 def _entries(

@@ -12,7 +12,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from ocp.checking.interval_errors import local_errors, zoh_losses
+from ocp.checking.interval_errors import estimated_errors, zoh_losses
 from ocp.checking.resimulate import Arc, arcs_of
 from ocp.checking.verify import TOLERANCE, left_between, restarted
 from ocp.formulation.phase import Array
@@ -299,8 +299,9 @@ def finer_meshes(
     """Return refined meshes, or () if the goals are reached, and the excess over the goals."""
     problem, phases = made.problem, len(made.problem.chain)
     arcs = arcs_of(problem, solution.meshes, solution.points)
-    local = local_errors(arcs, min(1e-6, 0.1 * goals.local))
-    losses = zoh_losses(made.on(solution.meshes), solution.iterate)
+    on = made.on(solution.meshes)
+    local = estimated_errors(on, solution.iterate.w, on.program.values, arcs)
+    losses = zoh_losses(on, solution.iterate)
     allowed = goals.loss * abs(solution.cost)
     worst = max(float(e.max(initial=0.0)) for e in local) / goals.local
     lost = sum(float(loss.sum()) for loss in losses)

@@ -164,6 +164,10 @@ class ModeSolver:
         """True if the user or the time limit has stopped the last solve."""
         return self.tried[-1].outcome.status.stopped
 
+    def with_iterations(self, limit: int) -> "ModeSolver":
+        """Return the solver with another limit of the iterations of one solve."""
+        return replace(self, solver=self.solver.with_options(max_iter=limit))
+
     def with_margin(self, margin: float) -> "ModeSolver":
         """Return the solver with another friction margin."""
         return replace(self, rules=self.rules._replace(margin=margin))

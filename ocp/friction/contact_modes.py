@@ -44,6 +44,8 @@ LIFTED = 1e-9
 MANY = 8
 """Largest number of contacts without velocity whose modes are tried in all combinations."""
 NEWTON_STEPS, NEWTON_TOLERANCE = 60, 1e-11
+LOOKS = 5
+"""Number of entries of a row of `InModes.look`."""
 
 
 class Instant(NamedTuple):
@@ -69,16 +71,18 @@ class InModes(NamedTuple):
             overloaded.
         unknowns: (t, x, z, u, p) -> residual of the algebraic equations, and its Jacobian by z.
         look: (t, x, z, u, p) -> row of each contact: upper margin, lower margin, d slip/dt, F, N.
+        linear: True if the algebraic equations are affine in z, so that z is unique.
     """
 
     model: Model
     unknowns: ca.Function
     look: ca.Function
+    linear: bool
 
 
 @final
 class Machine:
-    """Model with contact modes, which caches an `InModes` for each combination of modes.
+    """Model with contact modes, with which an `InModes` of each combination is cached.
 
     Attributes:
         model: the user's model.
@@ -97,7 +101,8 @@ class Machine:
                 f"model '{model.name}': expected no events but those of contacts, got "
                 f"{', '.join(e.name for e in bare.events)}; their resets may start sliding"
             )
-        self._made: dict[tuple[int, ...], InModes] = {}
+        kept: dict[Any, dict[tuple[int, ...], InModes]] = model.memory
+        self._made = kept.setdefault("ocp machine", {})
         self.sizes = {c.name: nominal_load(model, c) for c in self.contacts}
         self.together = {c.name: (c.name,) for c in self.contacts}
         for loop in loops_of(model):
@@ -150,12 +155,13 @@ class Machine:
                 event(f"{c.name}_slips_{side}", share + OVERLOAD)
         states = tuple(Variable(name, "s") for name in margins)
         changes = further_states(model, states, stacked(margins.values()))
-        seen = ca.vertcat(ca.SX(0, 5), *(ca.horzcat(*map(ca.SX, row)) for row in rows))
+        seen = ca.vertcat(ca.SX(0, LOOKS), *(ca.horzcat(*map(ca.SX, row)) for row in rows))
         unknowns = [ca.densify(model.alg), ca.densify(ca.jacobian(model.alg, z))]
         return InModes(
             rebuilt(model, events=tuple(events), **changes),
             ca.Function("unknowns", symbols, unknowns),
             ca.Function("look", symbols, [ca.densify(seen)]),
+            not ca.depends_on(unknowns[1], z),
         )
 
     def slips(self, t: float, x: Array) -> tuple[Array, Array]:
@@ -240,6 +246,27 @@ class Machine:
                 return trial, found
             trial |= objection
         return self._tried(at, trial, free)
+
+    def changed(self, modes: Modes, t: Array, x: Array, z: Array, u: Array) -> int | None:
+        """Return the index of the first of several times at which `modes` are inconsistent.
+
+        Args:
+            modes: modes just before each time.
+            t: times [s], shape (n,).
+            x, z, u: states, algebraic unknowns and inputs just after each time, (rows, n).
+        """
+        if not t.size:
+            return None
+        look, p = self.within(modes).look, np.tile(self.p[:, None], (1, t.size))
+        rows = look.map(t.size)(t[None, :], x, z, u, p).full().reshape(-1, t.size, LOOKS)
+        for k in range(t.size):
+            slips = zip(self.contacts, self.slips(t[k], x[:, k])[0], self.still, strict=True)
+            free = [c.name for c, v, still in slips if abs(v) <= still]
+            seen = rows[:, k]
+            forces = {f"{c.name}_F": row[3] for c, row in zip(self.contacts, seen, strict=True)}
+            if self._objection(modes, free, forces, seen) is not None or self._lifted(seen):
+                return k
+        return None
 
     def _lifted(self, look: Array) -> str:
         """Return the name of the first contact with a negative normal force, or ""."""

@@ -3,10 +3,9 @@
     slip    F = law.sliding(v, N, side)     until v = 0
     stick   F with dv/dt = 0                until it reaches the static level of a side
 
-The motion consists of pieces that end at changes of mode and at jumps of inputs. Each piece is a
-smooth run of the model in its modes (`mode_models`). Between pieces `decided` (`contact_modes`)
-determines which contacts stick. The method has no smoothing width and no penalty; it simulates the
-limit of smooth laws.
+The motion consists of pieces that end at changes of mode. Each piece is a run of the model in its
+modes (`mode_models`). Between pieces `decided` (`contact_modes`) determines which contacts stick.
+The method has no smoothing width; it simulates the limit of smooth laws.
 
 `simulate` with `ExactCoulomb` supports the same explicit models and mechanisms. This module covers
 further cases: any law, by its sliding force and static level; normal forces that are algebraic
@@ -48,14 +47,13 @@ LATER = 1e-13
 """Relative time difference by which times just after a jump are found."""
 MOST, PILED = 10_000, 40
 """Largest number of mode changes in a run, and of consecutive ones without time between them."""
-CREEP = 1e4
-"""Sliding velocity, in zero thresholds, above which a loop moves although one contact stops."""
-APART = 1e-6
-"""Relative difference of an unknown above which two solvers have found different solutions."""
+CREEP, APART = 1e4, 1e-6
+"""Sliding velocity, in zero thresholds, above which a loop moves although one contact stops, and
+relative difference of an unknown above which two solvers have found different solutions."""
 
 
 class Piece(NamedTuple):
-    """Run in which no contact changes its mode and no input jumps."""
+    """Run in which no contact changes its mode."""
 
     run: Trajectory
     modes: Modes
@@ -74,7 +72,7 @@ class SetValued:
     Attributes:
         model: the user's model.
         t: times of the result [s].
-        pieces: runs between changes of mode and jumps of inputs.
+        pieces: runs between changes of mode.
         status, message: status of the simulation and its description.
         contacts: names of the contacts.
     """
@@ -247,7 +245,10 @@ def set_valued(
 
 @final
 class _Run:
-    """Simulation of a motion piece by piece, with its state after the last piece."""
+    """Simulation of a motion piece by piece, with its state after the last piece.
+
+    A piece covers `ahead` inputs unless its modes change, twice as many as the last one.
+    """
 
     def __init__(
         self, machine: Machine, p: dict[str, float], rtol: float,
@@ -259,15 +260,15 @@ class _Run:
         symbols = [model.t, self.inputs.data]
         self._values = ca.Function("inputs", symbols, [self.inputs.expression])
         self.names = [v.name for v in model.open.x]
-        self.pieces: list[Piece] = []
+        self.pieces, self.ahead = list[Piece](), 1
 
     def start(self, t: float, x0: dict[str, float], modes: dict[str, int]) -> None:
         """Set the state at the start, in which contacts without velocity stick by default."""
         machine, model = self.machine, self.machine.model
         names = [c.name for c in machine.contacts]
         checks.check_names("set_valued: modes", modes, names)
-        start = model.initial_state(x0, self.p)
-        values = {v.name: float(value) for v, value in zip(model.x, start, strict=True)}
+        start = zip(model.x, model.initial_state(x0, self.p), strict=True)
+        values = {v.name: float(value) for v, value in start}
         x = np.array([values[name] for name in self.names])
         found: Modes = {}
         for name, v, still in zip(names, machine.slips(t, x)[0], machine.still, strict=True):
@@ -285,33 +286,33 @@ class _Run:
                 return
             piled = piled + 1 if self.t - before <= 1e-12 * (end - before) else 0
             if piled > PILED:
-                raise SolveError(
-                    f"at t = {self.t:.9g} s: {Status.EVENT_STORM.value}", Status.EVENT_STORM
-                )
+                where = f"at t = {self.t:.9g} s: {Status.EVENT_STORM.value}"
+                raise SolveError(where, Status.EVENT_STORM)
         raise SolveError(f"more than {MOST} changes of mode", Status.EVENT_STORM)
 
     def piece(self) -> None:
-        """Decide the modes, and simulate to the next change."""
+        """Decide the modes, and simulate to their next change, over at most `ahead` inputs."""
         t, machine, inputs = self.t, self.machine, self.inputs
-        k = int(inputs.interval(np.array([t + LATER * max(1.0, abs(t))]))[0])
+        k = inputs.interval(np.array([t + LATER * max(1.0, abs(t))])).item()
         u = self._values(t, inputs.values[:, k]).full()[:, 0]
         modes, guess = machine.decided(Instant(t, self.x, u, self.guess), self.modes)
-        model = machine.within(modes).model
-        held = dict(zip((v.name for v in machine.model.u), u.tolist(), strict=True))
-        run = self._run(model, float(inputs.breaks[k + 1]), {
-            name: held[name] if isinstance(value, Hold) else value
-            for name, value in self.given.items()
-        })  # fmt: skip
+        model, _, _, linear = machine.within(modes)
+        breaks = inputs.breaks[k + 1 :][: self.ahead if linear else 1]
+        run = self._run(model, float(breaks[-1]))
         begin, reached = _unknowns(run, model, t), run.span[1]
         for v in model.z:
             value = begin[v.name]
             if abs(value - guess[v.name]) > APART * max(v.nominal, abs(value)):
-                raise machine.undecided(
-                    t, f"{v.name} is {guess[v.name]:.6g} or {value:.6g}: two solutions"
-                )
+                two = f"{v.name} is {guess[v.name]:.6g} or {value:.6g}: two solutions"
+                raise machine.undecided(t, two)
+        jumps = breaks[breaks < reached]
+        states = symbols_of([v for v in model.x if v.name in self.names])
+        rows = (run.express(c, jumps) for c in (states, *map(symbols_of, (model.z, model.u))))
+        changed = machine.changed(modes, jumps, *rows)
+        self.ahead = 2 * self.ahead if changed is None else 1
+        reached = reached if changed is None else float(jumps[changed])
         self.pieces.append(Piece(run, modes, t, reached))
-        states = run.states(np.array([reached]))
-        x = np.array([float(states[name][-1]) for name in self.names])
+        x = run.express(states, np.array([reached]))[:, -1]
         self.guess = guess | _unknowns(run, model, reached)
         self.modes = modes | self._stopped(modes, machine.slips(reached, x)[0])
         self.t, self.x = reached, machine.at_rest(reached, x, self.modes)
@@ -328,12 +329,12 @@ class _Run:
                 found |= {c.name: -modes[c.name]} if turns else dict.fromkeys(members, 0)
         return found
 
-    def _run(self, model: Model, end: float, u: Mapping[str, Input]) -> Trajectory:
+    def _run(self, model: Model, end: float) -> Trajectory:
         where, x0 = f"at t = {self.t:.9g} s", dict(zip(self.names, self.x.tolist(), strict=True))
         try:
             run = simulate(
-                model, end, t_start=self.t, x0=x0, u=u, p=self.p, rtol=self.rtol, samples=2,
-                throw=False,
+                model, end, t_start=self.t, x0=x0, u=self.given, p=self.p, rtol=self.rtol,
+                samples=2, throw=False,
             )  # fmt: skip
         except JammedError as error:
             raise SolveError(f"{where}: {error}", Status.JAMMED) from None

@@ -19,14 +19,14 @@ the number of intervals changes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import reduce
 from math import sqrt
 from typing import NamedTuple, final
 
 import numpy as np
 
-from ocp.checking.interval_errors import cut_meshes, local_errors
+from ocp.checking.interval_errors import cut_meshes, estimated_errors
 from ocp.checking.resimulate import arcs_of
 from ocp.formulation.phase import Array, initial
 from ocp.formulation.problem import Problem
@@ -34,7 +34,7 @@ from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
-from ocp.solving.one_solve import Solved, Solver
+from ocp.solving.one_solve import Solver, Step, finalists, least, same_cost
 from ocp.solving.optimum import Optimum
 from ocp.solving.prepared import Option, Prepared, Supervisor
 from ocp.solving.solution import Solution
@@ -44,10 +44,8 @@ from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
 from ocp.transcription.unknowns import Points
 
-FINALISTS = 3
-"""Number of coarse solutions that are solved again on the finer mesh."""
-ALIKE = 1e-3
-"""Relative difference of J below which motions count as equal."""
+AGREE = 3
+"""Number of equal motions after which no further starts are solved."""
 FIRST = 0.3
 """Smoothing width of the first solves, in multiples of the largest sliding velocity."""
 LAST = 1e-2
@@ -80,58 +78,12 @@ SAME = 3.0
 EARLY: dict[str, Option] = {"tol": 1e-4, "max_iter": 100}
 LATER: dict[str, Option] = {"tol": 1e-5, "max_iter": 60, "mu_init": 1e-3}
 ONTO = LATER | {"max_iter": 150}
+RIVAL, NEAR = 0.02, 0.1
+"""Width, in multiples of the speeds, to which coarse motions are continued on their mesh, and the
+largest width from which their modes are read if a step fails."""
 BOUNDING: dict[str, Option] = {"max_iter": 80}
 """Options for worst-case costs. With a small initial barrier parameter the initial multipliers of
 the bounds on the costs would be wrong, and with them the curvature."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Step(Solved):
-    """Solve with the smoothing width `level` and the `values` of all parameters.
-
-    Attributes:
-        accepted: False if the solve jumped to a worse motion.
-        error: largest local error of an interval.
-        errors: local errors of each interval, (N,) for each phase.
-    """
-
-    values: Array
-    level: float
-    accepted: bool = True
-    error: float = np.inf
-    errors: tuple[Array, ...] = ()
-
-    @property
-    def good(self) -> bool:
-        """True if the homotopy can continue from this step."""
-        return self.accepted and self.ok
-
-    @property
-    def ended(self) -> bool:
-        """True if the user or the time limit has stopped the solver."""
-        return self.outcome.status.stopped
-
-
-def least(steps: Sequence[Step]) -> Step:
-    """Return the stopped step, or the cheapest one, or the least violated if none is solved."""
-
-    def rank(step: Step) -> tuple[bool, bool, float]:
-        outcome = step.outcome
-        return not step.ended, not step.ok, outcome.cost if step.ok else outcome.violation
-
-    return min(steps, key=rank)
-
-
-def finalists(steps: Sequence[Step]) -> list[Step]:
-    """Return the best steps with different costs, which indicate different motions."""
-    kept: list[Step] = []
-    for step in sorted(steps, key=lambda one: (not one.good, one.outcome.cost)):
-        costs = [one.outcome.cost for one in kept]
-        new = all(abs(step.outcome.cost - cost) > ALIKE * abs(cost) for cost in costs)
-        if not kept or (new and step.good and len(kept) < FINALISTS):
-            kept.append(step)
-    return kept
 
 
 class Sharp(NamedTuple):
@@ -143,6 +95,7 @@ class Sharp(NamedTuple):
         scales: scales of the widths of each contact.
         steady: True if the step to this solution was not rejected before.
         error: largest local error of an interval.
+        rivals: different motions from all starts if this is the first of them; otherwise empty.
     """
 
     solution: Solution
@@ -150,6 +103,7 @@ class Sharp(NamedTuple):
     scales: Scales
     steady: bool
     error: float
+    rivals: "tuple[Sharp, ...]" = ()
 
 
 def sharpened(
@@ -161,12 +115,14 @@ def sharpened(
     intervals: int = FINE,
     starts: int = STARTS,
     last: float = LAST,
+    rivals: bool = False,
     supervisor: Supervisor | None = None,
 ) -> Iterator[Sharp]:
     """Yield solutions with decreasing smoothing widths, one solve at a time.
 
     The first solution has the width `FIRST`, and the last one has the width `last` or the smallest
     width reached. If the solver fails or is stopped, the status of the last solution reports it.
+    With `rivals`, motions on the coarse mesh at a width of about `RIVAL` precede them.
 
     Args:
         problem: the user's problem, with contacts.
@@ -175,10 +131,14 @@ def sharpened(
         intervals: total number of intervals before refinement.
         starts: number of coarse solves from different starts; the best one is continued.
         last: final smoothing width, in multiples of the speeds.
+        rivals: True to yield motions on the coarse mesh first.
         supervisor: time limit and progress.
     """
     path = _Path(problem, scheme, solver, supervisor or Supervisor())
-    step = path.first(guess, starts, intervals)
+    coarse = path.coarse(guess, starts)
+    if rivals and (found := path.rivals(coarse)):
+        yield found[0]._replace(rivals=found)
+    step = path.first(coarse, intervals)
     factor, steady = FACTOR, True
     yield path.sharp(step, steady)
     while step.good and step.level > last * 1.001:
@@ -213,8 +173,8 @@ class _Path:
         self.solves: list[SolverStatistics] = []
         self.prepared: dict[tuple[int, str], Prepared] = {}
 
-    def first(self, guess: Start, starts: int, intervals: int) -> Step:
-        """Return the best of several coarse solves with wide layers, on the finer mesh."""
+    def coarse(self, guess: Start, starts: int) -> list[Step]:
+        """Return coarse solves with wide layers that lead to different motions, the best first."""
         coarse = self.discretisation.on(_meshes(self.problem, COARSE))
         begin = coarse.unpack(start_of(coarse, guess)[0].w)
         straight = coarse.unpack(start_of(coarse, None)[0].w)
@@ -223,7 +183,7 @@ class _Path:
             tries += starts_around(coarse, straight, range(1, starts, 2), SPREAD)
         found = [scales_of(self.user, self.problem, points, {}) for points in tries]
         self.scales = smooth_models.guessed(self.user, found)
-        steps = self.each(coarse, tries)
+        steps = self.each(coarse, tries, sized=True)
         best = least(steps)
         for more in range(1, FURTHER + 1):
             if best.ended or best.good:
@@ -232,7 +192,7 @@ class _Path:
             steps += self.each(coarse, starts_around(coarse, straight, seeds, SPREAD))
             best = least(steps)
         if best.ended:
-            return best
+            return [best]
         before, self.scales = self.scales, self.scales_at(best)
         if not same_size(self.scales, before, SAME):
             again = self.each(coarse, [best.points, *tries])
@@ -240,10 +200,41 @@ class _Path:
                 steps = again
             else:  # the change of the widths is too large
                 self.scales = before
+        return finalists(steps)
+
+    def rivals(self, coarse: Sequence[Step]) -> tuple[Sharp, ...]:
+        """Return the motions of coarse solves with narrower layers on the same mesh.
+
+        There are none if the layers of the laws are wide, or with several contacts, whose sequences
+        require a finer mesh.
+        """
+        contacts = {
+            c.name for phase in self.user.chain for c in smooth_models.sticking(phase.model)
+        }
+        if smooth_models.own_level(self.user, self.scales) > LAST or len(contacts) > 1:
+            return ()
+        found: list[Sharp] = []
+        for step in coarse:
+            last = False
+            while step.good and not last:
+                level = max(step.level / FACTOR, RIVAL)
+                name, last = f"width {level:.2g}", level == RIVAL
+                narrower = self.solve(step.transcription, step.points, level, LATER, name)
+                if narrower.ended:
+                    return ()
+                step, last = (narrower, last) if narrower.good else (step, True)
+            if step.level <= NEAR:
+                found.append(self.sharp(step, steady=False))
+        return tuple(found)
+
+    def first(self, coarse: Sequence[Step], intervals: int) -> Step:
+        """Return the best of several coarse solves, solved again on the finer mesh."""
+        if coarse[0].ended:
+            return coarse[0]
         fine = self.discretisation.on(_meshes(self.problem, intervals))
-        step = least(self.each(fine, [self.moved(one, fine) for one in finalists(steps)], ONTO))
+        step = least(self.each(fine, [self.moved(one, fine) for one in coarse], ONTO))
         if not step.good and not step.ended:
-            step = least(self.each(fine, [self.moved(best, fine)], LATER | {"max_iter": 300}))
+            step = least(self.each(fine, [self.moved(coarse[0], fine)], LATER | {"max_iter": 300}))
         now = self.scales_at(step)
         self.scales = now if same_size(now, self.scales, SAME) else self.scales
         return self.refined(step, np.inf) if step.good else step
@@ -252,14 +243,27 @@ class _Path:
         """Return the scales of the motion of a step."""
         return scales_of(self.user, self.problem, step.points, self.scales)
 
+    def faster(self, step: Step) -> bool:
+        """Return True if a speed of a motion exceeds the one assumed by more than `SAME`."""
+        now = self.scales_at(step)
+        return any(now[name].speed > SAME * scale.speed for name, scale in self.scales.items())
+
     def each(
-        self, mesh: Transcription, tries: Sequence[Points], options: Mapping[str, Option] = EARLY
-    ) -> list[Step]:
-        """Solve with the widest layers from each start, until a solve is stopped."""
+        self, mesh: Transcription, tries: Sequence[Points],
+        options: Mapping[str, Option] = EARLY, *, sized: bool = False,
+    ) -> list[Step]:  # fmt: skip
+        """Solve with the widest layers from each start, until a solve is stopped or some agree.
+
+        With `sized`, also until the speeds of a motion exceed those assumed, as layers that are too
+        narrow take many iterations.
+        """
         steps: list[Step] = []
         for number, points in enumerate(tries, 1):
-            steps.append(self.solve(mesh, points, FIRST, options, f"start {number}"))
-            if steps[-1].ended:
+            step = self.solve(mesh, points, FIRST, options, f"start {number}")
+            steps.append(step)
+            alike = [s for s in steps if s.good and same_cost(s, step)]
+            faster = sized and step.good and self.faster(step)
+            if step.ended or faster or len(alike) == AGREE:
                 break
         return steps
 
@@ -339,7 +343,7 @@ class _Path:
         for k, arc in enumerate(arcs):
             pairs = zip(arc.span.model.p, arc.p, strict=True)
             arcs[k] = replace(arc, p=np.array([widths.get(v.name, x) for v, x in pairs]))
-        errors = local_errors(arcs, min(1e-6, 1e-2 * TOLERANCE))
+        errors = estimated_errors(step.transcription, step.outcome.iterate.w, step.values, arcs)
         worst = max((float(e.max()) for e in errors), default=0.0)
         return replace(step, error=worst, errors=errors)
 

@@ -18,13 +18,14 @@ Applied Optimal Control, 1975, 3.7 (conditions at free times).
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from itertools import product
+from dataclasses import dataclass, field, replace
+from itertools import islice, product
 from math import inf, sqrt
+from typing import final
 
 import numpy as np
 
-from ocp.checking.interval_errors import local_errors
+from ocp.checking.interval_errors import estimated_errors
 from ocp.checking.mesh_refinement import MeshErrors, refined
 from ocp.checking.resimulate import arcs_of
 from ocp.formulation.phase import Array
@@ -34,6 +35,7 @@ from ocp.friction.arc_solution import ModeSolver, SolvedSequence, StoppedError, 
 from ocp.friction.arcs import MARGIN, Rules
 from ocp.friction.mode_models import restless
 from ocp.friction.sequence import Legs, flat, inserted, neighbours, pruned, shown
+from ocp.friction.smooth_models import shortfall
 from ocp.friction.transfer import Known, Reader
 from ocp.solving.methods import Ipopt
 from ocp.solving.prepared import Supervisor
@@ -74,6 +76,8 @@ MOST_ITERATIONS, PATIENT = 100, 400
 sequence leads to a solution, the second limit applies: an arm whose joints stop takes 350."""
 CLOSER = 5.0
 """Divisor of the margin for a motion that is computed only to find the cost of a margin."""
+SURE = 1.5
+"""Factor by which a margin exceeds the share of the static level that a law does not reach."""
 LEAST_INTERVALS = 40
 MOST = 800
 
@@ -102,81 +106,145 @@ def rests_inside(solved: SolvedSequence) -> Legs | None:
     return pruned(legs, 0.0) if legs is not solved.legs else None
 
 
+@final
+@dataclass(frozen=True, eq=False)
+class ModeMotions:
+    """Result of a search for modes, from which motions with several margins are computed.
+
+    Attributes:
+        modes_solver: solver of sequences, with the margin of the search.
+        margin: the wanted margin.
+        possible: smallest margin at which the user's laws hold a contact.
+        pressed: True if the margin of the search is active.
+        coarse: margin -> sequence on few intervals; empty if no sequence led to a solution.
+    """
+
+    modes_solver: ModeSolver
+    margin: float
+    possible: float
+    pressed: bool = False
+    coarse: dict[float, SolvedSequence] = field(default_factory=dict[float, SolvedSequence])
+
+    @property
+    def first(self) -> float:
+        """Margin of the search."""
+        return self.modes_solver.rules.margin
+
+    @property
+    def least(self) -> float:
+        """Smallest margin, by which the cost of margins is found."""
+        least = max(self.margin, self.possible)
+        return least if least < self.first else self.margin / CLOSER
+
+    @property
+    def margins(self) -> tuple[float, ...]:
+        """Margins of possible motions, the smallest one first."""
+        if self.margin <= self.least and self.least in self.coarse:
+            return self.least, sqrt(self.least * self.first), self.first
+        return (self.first,)
+
+    def rests(self, margin: float, cost: float) -> str:
+        """Return a sentence about the margin of a motion and its share of `cost`, if active."""
+        if not self.pressed:
+            return ""
+        what = "is open"
+        if self.least in self.coarse:
+            more, less = (self.coarse[m].ideal_cost for m in (self.first, self.least))
+            slope = max(0.0, more - less) / (self.first - self.least)
+            what = f"about {slope * margin:.2g} of {cost:.6g}"
+        few = "" if margin <= self.margin else "; with less none was found that is right"
+        return f"Rests keep {margin:.2g} of their static levels, which costs {what}{few}."
+
+    def motion(self, margin: float) -> Solution:
+        """Return the motion with one of the `margins` on fine intervals."""
+        solver = self.modes_solver.with_margin(margin)
+        found = self.coarse.get(margin, self.coarse.get(self.first))
+        if found is not None and not solver.stopped:
+            with suppress(StoppedError):
+                found = found if margin in self.coarse else solver.again(found)
+                found = _fine(solver, found) if found.ok else found
+        return _solution(solver, found)
+
+
 def optimise_modes(
-    smooth: Solution,
+    smooth: Sequence[tuple[Solution, Mapping[str, float]]],
     problem: Problem,
-    widths: Mapping[str, float],
     *,
     solver: Ipopt | None = None,
     scheme: Scheme | None = None,
     margin: float = MARGIN,
     supervisor: Supervisor | None = None,
-) -> Iterator[tuple[Solution, float]]:
-    """Yield motions with exact friction near a sharpened one, with their friction margins.
+) -> ModeMotions:
+    """Return the best motion with exact friction near one of several sharpened motions.
 
-    The margin of the first motion is the larger one of `MARGIN` and `margin`. If the margin is
-    active, two motions with smaller margins follow: with `margin`, and with a value between both.
-    If `margin` is `MARGIN` or more, still smaller margins serve to find its cost.
+    The margin of the search is the larger one of `MARGIN` and `margin`. If it is active, the motion
+    with the smaller `margin` follows; if `margin` is `MARGIN` or more, a still smaller margin
+    serves to find its cost.
 
     Args:
-        smooth: solution of `problem` with smooth friction, with widths of about a hundredth of the
-            speeds; it need not be verified.
+        smooth: solutions of `problem` with smooth friction, with widths of about a hundredth of the
+            speeds, and contact -> sliding velocity [m/s] over which its friction is smoothed; they
+            need not be verified.
         problem: the user's problem.
-        widths: contact -> sliding velocity [m/s] over which its friction is smoothed in `smooth`.
         solver, scheme: as in `ocp.solve`.
         margin: margin between stiction and its static level, as a share of this level.
         supervisor: time limit and progress.
 
-    Yields:
-        A solution with `modes` for exact Coulomb friction with stiction, without verification, and
-        its margin. The status is not ok if no sequence led to a solution. The solution has no
+    Returns:
+        A search result, whose solutions have `modes` for exact Coulomb friction with stiction,
+        without verification. Their status is not ok if no sequence led to a solution. They have no
         `modes` if the search was stopped before.
 
     Raises:
         ValueError: an unsuitable problem; see `refusal`.
 
-    Limits: the sequence differs from that of the sharpened motion only by stick intervals,
+    Limits: the sequence differs from those of the sharpened motions only by stick intervals,
     superfluous arcs and active bounds; a qualitatively different motion is not found. Contacts with
     dependent slips (a loop of one degree of freedom) have no unique reactions in stick and are
     refused.
     """
     if reason := refusal(problem):
         raise ValueError(f"optimise_modes: {reason}")
-    solver = solver or Ipopt()
-    limits = [MOST_ITERATIONS, PATIENT]
+    solver, first = solver or Ipopt(), max(MARGIN, margin)
+    limits = [MOST_ITERATIONS] if len(smooth) > 1 else [MOST_ITERATIONS, PATIENT]
     if "max_iter" in solver.options:
         limits = [int(solver.options["max_iter"])]
-    known = Known.of(problem, smooth.motions[0], smooth.chosen)
-    N = max(LEAST_INTERVALS, smooth.motions[0].t_control.size // 2)
-    whole, first = known.motion.T, max(MARGIN, margin)
-    reader = Reader(problem, known)
-    at_rest = reader.starts_at_rest(widths)
-    rules = Rules(problem, reader.sizes(), at_rest, SHORTEST * whole, first)
-    first_solver = solver.with_options(max_iter=limits[0])
-    modes_solver = ModeSolver(
-        rules, first_solver, scheme or Radau(3), KICK * whole, supervisor or Supervisor()
-    )
-    best: SolvedSequence | None = None
-    with suppress(StoppedError):
-        for limit, legs in _attempts(limits, reader, widths):
-            patient = replace(modes_solver, solver=solver.with_options(max_iter=limit))
-            found = patient.solve(legs, known, N, 1e-2)
-            if found.ok:
-                best = found  # kept if the following steps are stopped
-                best = settled(modes_solver, best)
-                best = better(modes_solver, best, NEW_ARC * whole)
-                best = _fine(modes_solver, best)
-                break
-    yield _solution(modes_solver, best), first
-    if best is None or modes_solver.stopped or not best.pressed(first):
-        return
-    least = margin if margin < first else margin / CLOSER
-    for closer in (least, sqrt(least * first)):
-        near, found = modes_solver.with_margin(closer), None
+    shared = solver, scheme or Radau(3), supervisor or Supervisor(), list[SolvedSequence]()
+
+    def near(motion: Solution, widths: Mapping[str, float], most: int | None) -> ModeMotions:
+        known = Known.of(problem, motion.motions[0], motion.chosen)
+        N, whole = max(LEAST_INTERVALS, motion.motions[0].t_control.size // 2), known.motion.T
+        reader, best = Reader(problem, known), None
+        at_rest = reader.starts_at_rest(widths)
+        rules = Rules(problem, reader.sizes(), at_rest, SHORTEST * whole, first)
+        modes_solver = ModeSolver(rules, *shared[:2], KICK * whole, *shared[2:])
+        quick = modes_solver.with_iterations(limits[0])
         with suppress(StoppedError):
-            found = near.again(best)
-            found = _fine(near, found) if found.ok else found
-        yield _solution(modes_solver, found), closer
+            for limit, legs in islice(_attempts(limits, reader, widths), most):
+                found = modes_solver.with_iterations(limit).solve(legs, known, N, 1e-2)
+                if found.ok:
+                    best = found  # kept if the following step is stopped
+                    best = settled(quick, best)
+                    break
+        possible = SURE * max(shortfall(phase.model) for phase in problem.chain)
+        return ModeMotions(quick, margin, possible, False, {first: best} if best else {})
+
+    every: list[ModeMotions] = []
+    for pair in smooth:  # the sequences of rivals are tried once
+        every.append(near(*pair, 1 if any(one.coarse for one in every) else None))
+        if every[-1].modes_solver.stopped:
+            break
+    found = min(every, key=lambda one: min([inf, *(s.ideal_cost for s in one.coarse.values())]))
+    modes_solver = found.modes_solver
+    if found.coarse and not modes_solver.stopped:
+        best = found.coarse[first]
+        with suppress(StoppedError):
+            best = better(modes_solver, best, NEW_ARC * sum(leg.duration for leg in best.legs))
+            found.coarse[first], found = best, replace(found, pressed=best.pressed(first))
+            if found.pressed:
+                closer = modes_solver.with_margin(found.least).again(best)
+                found.coarse.update({found.least: closer} if closer.ok else {})
+    return found
 
 
 def _solution(modes_solver: ModeSolver, best: SolvedSequence | None) -> Solution:
@@ -278,7 +346,8 @@ def _fine(modes_solver: ModeSolver, solved: SolvedSequence) -> SolvedSequence:
     before = inf, inf
     for _ in range(ROUNDS):
         t, allowed = solved.transcription, FINE * abs(solved.outcome.cost) + ZERO
-        local = local_errors(arcs_of(t.problem, t.meshes, solved.points))
+        arcs = arcs_of(t.problem, t.meshes, solved.points)
+        local = estimated_errors(t, solved.outcome.iterate.w, t.program.values, arcs)
         agree = abs(solved.ideal_cost - before[0]) <= allowed
         enough = solved.loss <= allowed or 0.0 <= before[1] - solved.outcome.cost <= allowed
         exact = max(float(own.max()) for own in local) <= LOCAL

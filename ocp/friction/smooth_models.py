@@ -16,7 +16,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import tanh
 from symfric.foundation.parameters import Variable, parameters, with_values
 from symfric.foundation.variable import at_start, strays
-from symfric.laws import Law
+from symfric.laws import ExactCoulomb, Law
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Monitor
 
@@ -24,6 +24,9 @@ WIDTH = 1e-3
 """Default smoothing width [m/s] of a substitute for a law without a velocity scale."""
 LEAST = 0.1
 """Smallest ratio of the scale of a contact to its previous scale, for contacts that barely move."""
+
+LAYER = np.geomspace(0.1, 10.0, 101)
+"""Sliding velocities, in multiples of the velocity scale of a law, among which its peak lies."""
 
 
 class Width(NamedTuple):
@@ -170,6 +173,25 @@ def sticking(model: Model) -> tuple[Contact, ...]:
     return tuple(contact for contact in model.contacts if _jumps(model, contact))
 
 
+def shortfall(model: Model) -> float:
+    """Return the largest share of a static level that the law of a contact does not reach.
+
+    The peak of a smooth law may be below its static level, for Brown-McPhee by 5e-4. A contact
+    cannot rest under a force between both. Laws with states and jumps reach their levels.
+    """
+    shares = [0.0]
+    for contact in sticking(model):
+        law = _law(contact)
+        scale = float(at_start(law.velocity_scale, model.p))
+        if law.states or not law.widths or not isfinite(scale):
+            continue
+        given = dict.fromkeys(contact.further, 0.0)
+        level = at_start(law.static_level(1.0, 1, **given), model.p)
+        forces = [at_start(law.force(scale * x, 1.0, (), **given), model.p) for x in LAYER]
+        shares.append(1.0 - max(float(force) for force in forces) / float(level))
+    return max(shares)
+
+
 class Scale(NamedTuple):
     """Scales of the smoothing widths of one contact.
 
@@ -264,6 +286,34 @@ def speeds_at(problem: Problem, scales: Scales, level: float) -> dict[str, float
         for w in widths(phase.model)
         if w.layer is not None
     }
+
+
+def narrowed(problem: Problem, factor: float) -> tuple[Problem, dict[str, float]]:
+    """Return `problem` with layers narrower by `factor`, and contact -> its layer [m/s]."""
+    made, p, layers = smoothed(problem), dict[str, float](), dict[str, float]()
+    for phase in problem.chain:
+        for w in widths(phase.model):
+            if w.layer is not None and w.least > 0.0:
+                layers[w.contact] = factor * w.least
+                p[w.parameter] = w.at(layers[w.contact])
+    return replace(made, p=dict(made.p) | p), layers
+
+
+def is_exact(problem: Problem) -> bool:
+    """Return True if all contacts that can stick have the law `ExactCoulomb`."""
+    laws = [c.law for phase in problem.chain for c in sticking(phase.model)]
+    return bool(laws) and all(isinstance(law, ExactCoulomb) for law in laws)
+
+
+def law_states(problem: Problem) -> set[str]:
+    """Return the names of the states of laws, which a motion by modes does not contain."""
+    contacts = [c for phase in problem.chain for c in phase.model.contacts]
+    return {v.name for c in contacts for v in c.states}
+
+
+def bristles(problem: Problem) -> bool:
+    """Return True if a law has states other than the mode of `ExactCoulomb`."""
+    return bool(law_states(problem)) and not is_exact(problem)
 
 
 def own_level(problem: Problem, scales: Scales) -> float:

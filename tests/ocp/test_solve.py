@@ -1,5 +1,6 @@
 """`solve` from a problem to a verified solution: results, arguments, stops, imports."""
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -80,9 +81,39 @@ def test_laws_with_states_are_verified_with_themselves(law: Law) -> None:
     move = Phase(drive(law, m=1.0, N=1.0), 1.0, end={"x": 1.0, "v": 0.0})
     solution = solve(Problem(move, FORCE), starts=1)
     assert solution.verified
-    assert f"guide: {type(law).__name__}" in solution.message
-    assert "With exact Coulomb friction it misses by" in solution.message
+    if isinstance(law, ExactCoulomb):
+        assert "verified with exact Coulomb friction, the law of the model" in solution.message
+    else:
+        assert f"guide: {type(law).__name__}" in solution.message
+        assert "With exact Coulomb friction it misses by" in solution.message
     assert solution.modes["guide"][0].kind in ("stick", "slip+")
+
+
+def held_near_its_level(law: Law) -> Problem:
+    """A move of 0.1 m, and a rest of 1 s under a force of 5.9 N, just below the level of 6 N."""
+    guide = drive(law, m=1.0, N=1.0)
+    move = Phase(guide, 1.0, start={"x": 0.0, "v": 0.0}, end={"x": 0.1, "v": 0.0})
+    hold = Phase(guide, 1.0, end={"x": 0.1, "v": 0.0})
+    return Problem(move >> hold, integral(lambda s: (s.force - 5.9) ** 2))
+
+
+@pytest.mark.slow
+def test_motion_that_creeps_under_its_law_is_told_from_one_that_is_wrong() -> None:
+    """A smooth law needs a velocity of the width of its layer to hold a force near its level."""
+
+    def found(v_t: float) -> Any:
+        law = BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=v_t, N_t=1e-3)
+        return solve(held_near_its_level(law), tolerance=1e-4, starts=1, throw=False)
+
+    creeping = found(1.8e-5)
+    assert creeping.status is Status.TERMINAL_MISS
+    sentence = creeping.message.split(". ")[0]
+    assert "The motion is right with exact Coulomb friction (largest miss" in sentence
+    assert "under the laws of the model, whose layers creep at rest, " in sentence
+    assert "feedback along the motion, or the law ExactCoulomb closes the gap" in sentence
+    width = re.search(r"a layer of (\S+) \(guide\) m/s", sentence)
+    assert width is not None, sentence
+    assert found(float(width[1])).verified
 
 
 @pytest.mark.slow

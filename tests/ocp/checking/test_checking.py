@@ -19,7 +19,14 @@ from ocp.checking.verify import verified, verified_arcs, verify
 from ocp.formulation.expressions import TIME, integral
 from ocp.formulation.phase import FREE, Free, Phase
 from ocp.formulation.problem import Problem
-from ocp.problems import READY, alp_rider, brachistochrone, bryson_denham, goddard, hang_glider
+from ocp.problems import (
+    READY,
+    alp_rider,
+    brachistochrone,
+    bryson_denham,
+    goddard,
+    hang_glider,
+)  # fmt: skip
 from ocp.solving.methods import Ipopt
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
