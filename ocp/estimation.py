@@ -24,6 +24,7 @@ from scipy.linalg import eigh
 
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable, check_names
+from symfric.foundation.status import SolveError, Status
 from symfric.integrator import flow
 from symfric.model import Model, check_model
 
@@ -32,6 +33,10 @@ ITERATIONS, TOLERANCE = 20, 1e-6
 """Largest number of Gauss-Newton steps, and the last step in units of the spread."""
 INFORMED = 0.25
 """Ratio of variances with and without measurements below which a combination is observable."""
+DIVERGED = (
+    "estimate: the motion became infinite; take more `steps`, a smaller `spread` at the start, or "
+    "less noise of states"
+)
 SHOWN = 0.1
 """Smallest coefficient that is shown; the largest one is 1."""
 KNOWN = 0.1
@@ -97,6 +102,7 @@ def estimate(
 
     Raises:
         ValueError: all problems of the arguments at once.
+        SolveError: the motion becomes infinite.
 
     Limits: no bounds on states. Gauss-Newton steps have no line search; `unconverged` counts the
     samples without convergence.
@@ -167,9 +173,9 @@ def _functions(
     x = xi * ca.DM(scale)
     places = {v.name: u[i] for i, v in enumerate(given)}
     places |= {v.name: x[nx + i] for i, v in enumerate(loads)}
-    inputs = ca.vertcat(*(places[v.name] for v in model.u)) if model.u else ca.MX(0, 1)
+    inputs = ca.vertcat(ca.MX(0, 1), *(places[v.name] for v in model.u))
     values = ca.DM(np.asarray(p, dtype=float))
-    after = ca.vertcat(flow(model, steps=steps)(x[:nx], inputs, values, step), x[nx:]) / ca.DM(
+    after = ca.vertcat(flow(model, steps=steps)(x[:nx], inputs, values, step), x[nx:, 0]) / ca.DM(
         scale
     )
     symbols = [model.vector("x"), model.vector("u"), model.vector("p")]
@@ -208,6 +214,8 @@ def _passed(machine: _Machine, xi: Array, y: Array, u: Array, prior: tuple[Array
     """Filter and smooth the model that is linearised at the columns of `xi`."""
     after, A = _evaluated(machine.after, xi, u)
     seen, C = _evaluated(machine.seen, xi, u)
+    if not np.isfinite([*after.flat, *seen.flat]).all():
+        raise SolveError(DIVERGED, Status.NOT_FINITE)
     predicted, means, covariances = [prior], list[Array](), list[Array]()
     for k in range(xi.shape[1]):
         m, spread = predicted[-1]
@@ -250,7 +258,7 @@ def _moved(
         for _ in range(ITERATIONS):
             found = _passed(machine, xi, y[:, here], u[:, here], prior)
             change, xi = float(np.abs(found.smooth - xi).max()), found.smooth
-            if not change > TOLERANCE:
+            if change <= TOLERANCE:
                 break
         else:
             unconverged += 1

@@ -28,7 +28,7 @@ from symfric.scenes.blocks import drive
 @final
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """Predefined problem that `symfric ocp NAME` solves and `symfric bench ocp` measures.
+    """Predefined problem that `symfric ocp NAME` solves and `symfric bench starts` measures.
 
     Attributes:
         make: function that returns the problem; its keyword arguments are numbers such as v_t.

@@ -65,3 +65,9 @@ def slope(
     )
     signals = {n: (high[n] - low[n]) / (2 * h) for n in (*high.states, *high.inputs)}
     return (high.cost - low.cost) / (2 * h), signals | {"t": (high.t - low.t) / (2 * h)}
+
+
+def there_and_back(T: float = 1.0) -> Problem:
+    rest = {"x": 0.0, "v": 0.0}
+    out = Phase(CART, T, start=rest, end={"x": 1.0}, p={"k": 5.0}, name="out")
+    return Problem(out >> Phase(CART, 1.5, end=rest, p={"k": 5.0}, name="back"), EFFORT)

@@ -252,7 +252,9 @@ class Linearised:
         optimum, (unit, at) = self.central, self.numbers[name]
         program, iterate = optimum.transcription.program, optimum.iterate
         now = optimum.values[at]
-        h = STEP * (float(np.abs(now).max()) or 1.0)
+        sizes = (v.nominal for span in optimum.transcription.problem.spans for v in span.model.p
+                 if v.name == name)  # fmt: skip
+        h = STEP * (float(np.abs(now).max()) or next(sizes, 1.0))
 
         def lagrangian(times: int) -> Array:
             values = optimum.values.copy()

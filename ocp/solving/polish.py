@@ -50,8 +50,8 @@ def polished(optimum: Optimum) -> Linearised:
     """Return the optimality conditions at an optimum of full precision.
 
     A primal-dual active set method makes a condition active where it is violated, and inactive
-    where its multiplier has the wrong sign. If this does not converge, or changes the cost, the
-    optimum of the solver is kept.
+    where its multiplier has the wrong sign. If active conditions do not determine a strict minimum,
+    if this does not converge, or if it changes the cost, the optimum of the solver is kept.
 
     Source: Hintermueller, Ito and Kunisch, SIAM J. Optimization 13(3), 2002, 865-888.
 
@@ -59,7 +59,7 @@ def polished(optimum: Optimum) -> Linearised:
         ValueError: the point does not satisfy the optimality conditions.
     """
     first = now = determined(optimum)
-    for _ in range(STEPS):
+    for _ in range(STEPS if first.regular else 0):
         if (step := now.stepped()) is None or not step.residual <= STATIONARY:
             break
         later, change = determined(step), np.abs(step.iterate.w - now.optimum.iterate.w).max()

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 RTOL = 1e-9
 MARGIN = 1e-9
 """Relative excess over the static level at which sticking ends."""
+REST = 1e-13
+"""Speed [m/s] of the wrong sign at which a slip ends; it is positive where a slip begins."""
 MOST = 5000
 """Largest number of events."""
 
@@ -126,7 +128,7 @@ def _run(
     def event(i: int) -> Callable[[float, Array], float]:
         def room(t: float, y: Array) -> float:
             if modes[i]:
-                return modes[i] * y[case.slips[i]]
+                return modes[i] * y[case.slips[i]] + REST
             x = y.tolist()[:-1]
             level = case.levels[i][0] * _loads(case, x, u)[i] * (1 + MARGIN)
             return level - abs(_forces(case, x, u, modes)[i])

@@ -6,7 +6,17 @@ import pytest
 from scipy.linalg import expm
 
 from ocp import Estimate, estimate
-from symfric import Contact, ExactCoulomb, LuGre, Model, Output, Variable, drive, simulate
+from symfric import (
+    Contact,
+    ExactCoulomb,
+    LuGre,
+    Model,
+    Output,
+    SolveError,
+    Variable,
+    drive,
+    simulate,
+)
 from symfric.integrator import Hold
 
 STEP = 0.05
@@ -117,6 +127,13 @@ def test_combinations_that_data_do_not_determine_are_reported() -> None:
         unknown=("load",),
     )  # fmt: skip
     assert sum_of_both.unobservable == ()
+
+
+def test_a_motion_that_becomes_infinite_is_an_error() -> None:
+    x = Variable("x", "m")
+    model = Model("runaway", x=(x,), ode=x.symbol**3)
+    with pytest.raises(SolveError, match="became infinite"):
+        estimate(model, {"x": np.full(9, 1e3)}, step=10.0, horizon=3, noise={"x": 1e-3}, steps=20)
 
 
 def test_bad_input_is_described_at_once() -> None:

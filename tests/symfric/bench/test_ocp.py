@@ -45,6 +45,19 @@ def test_a_push_slides_sticks_and_returns_as_in_closed_form() -> None:
     assert off.miss == pytest.approx(1.0)
 
 
+def test_a_spring_with_friction_loses_the_same_stroke_each_half_period() -> None:
+    """x_n = (-1)^n (x_0 - 2 n F / k), and rest once |x_n| <= F / k."""
+
+    def rate(m: object, x: list[float], u: float, F: list[float]) -> list[float]:
+        return [x[1], u - F[0] - 400.0 * x[0]]
+
+    case = replace(
+        BLOCK, rate=rate, levels=((50.0, 50.0),), start=(1.1, 0.0), ends={1.0: {0: 1.2, 1: 0.0}}
+    )
+    miss = judged(case, even(case, 3), np.zeros(3)).miss
+    assert miss * 1.2 == pytest.approx(1.2 - (1.1 - 4 * 0.25), rel=1e-6)
+
+
 def test_bounds_are_part_of_the_miss_and_controls_are_clipped() -> None:
     case = replace(BLOCK, ends={1.0: {}}, bounds={0: (-inf, 1.0)}, limit=12.0)
     a, t = 12.0 - 5.886, 4.0
@@ -76,7 +89,12 @@ def test_formulas_by_hand_are_those_of_the_model(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "mean", "range"),
-    [("three_blocks", 0.0, 4.0), ("two_blocks", 0.0, 16.0), ("parcel_on_tray", 2.9, 0.5)],
+    [
+        ("voice_coil", 0.0, 5.0),
+        ("three_blocks", 0.0, 4.0),
+        ("two_blocks", 0.0, 16.0),
+        ("parcel_on_tray", 2.9, 0.5),
+    ],
 )
 def test_the_referee_agrees_with_the_engine(name: str, mean: float, range: float) -> None:
     """Both simulate a random control with exact friction; the miss is that of the last state."""

@@ -13,6 +13,7 @@ from symfric.bench import SUBJECTS, measure
 from symfric.bench.report import (
     GOALS,
     Found,
+    Progress,
     Report,
     best_time,
     compile_time,
@@ -168,6 +169,23 @@ def test_the_command_prints_and_writes(
     assert all((tmp_path / name).stat().st_size > 0 for name in files.values())
     printed = capsys.readouterr().out
     assert "0.00123" in printed and "A note." in printed
+
+
+def test_rows_are_printed_as_they_come_and_kept_after_an_interrupt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def two() -> Iterator[Found]:
+        yield "T", ROWS[0]
+        assert capsys.readouterr().err == "a  symfric  0.0001  2  1.23e+04\n"
+        raise KeyboardInterrupt
+
+    def bench(*of: object, progress: Progress) -> Report:
+        return Report().collect({"a": two}, progress)
+
+    monkeypatch.setattr("symfric.bench.multibody.bench", bench)
+    assert main(["bench", "multibody", "--csv", str(tmp_path / "t.csv")]) == 130
+    assert "Interrupted" in capsys.readouterr().out
+    assert len((tmp_path / "t.csv").read_text("utf-8").splitlines()) == 2
 
 
 @pytest.mark.parametrize(
