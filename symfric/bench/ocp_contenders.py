@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.problem import Problem
 from ocp.solve import solve
 from ocp.solving.solution import Solution
 from symfric.bench.ocp_cases import UNBOUNDED, Case
@@ -87,11 +88,21 @@ PATIENCE = 4.0
 
 def symfric(case: Case, limit: float) -> Attempt:
     """Return the solution of `ocp.solve` with its default settings, on intervals of its own."""
-    found = solve(case.problem(), throw=False, max_time=PATIENCE * limit)
-    if found.status is Status.INTERRUPTED:
-        raise KeyboardInterrupt
+    found = solved(case.problem(), max_time=PATIENCE * limit)
     status = "verified" if found.verified else found.status.name
     return Attempt(found.cost, status, *held(found))
+
+
+def solved(problem: Problem, **options: Any) -> Solution:
+    """Return the result of `ocp.solve`, also of a failure.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C, which `ocp.solve` turns into a status.
+    """
+    found = solve(problem, throw=False, **options)
+    if found.status is Status.INTERRUPTED:
+        raise KeyboardInterrupt
+    return found
 
 
 def held(solution: Solution) -> tuple[Array, Array]:
