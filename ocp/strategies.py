@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.checking.verify import verified, verify
-from ocp.complementarity import solve_relaxed
+from ocp.complementarity import solve_relaxed, with_products
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import verify_exactly
@@ -297,11 +297,9 @@ def _by_relaxation(search: Search, friction: Friction, guess: Start) -> Solution
             "solve: expected friction='smooth' with complementary(...), as modes and widths of "
             f"friction are not sought together with it, got {friction!r}"
         )
-    return search.checked(
-        solve_relaxed(
-            problem, meshes, direct.scheme, direct.solver, guess, direct.goals, direct.supervisor
-        )
-    )
+    settings = direct.goals, direct.supervisor
+    found = solve_relaxed(problem, meshes, direct.scheme, direct.solver, guess, *settings)
+    return with_products(search.checked(found))
 
 
 def _by_shooting(search: Search, guess: Start, starts: int) -> Solution:
