@@ -1,5 +1,6 @@
 """Forms of inputs: linear, cubic, polynomials; also with exact friction."""
 
+import casadi as ca
 import numpy as np
 import pytest
 from motions import double_integrator
@@ -7,7 +8,7 @@ from numpy.polynomial import polynomial
 
 from ocp import Phase, Polynomial, Problem, absolute, integral, largest, soft, solve
 from ocp.formulation.inputs import Form
-from symfric import BrownMcPhee, drive
+from symfric import BrownMcPhee, Model, Variable, drive
 
 MODEL = double_integrator()
 EFFORT = integral(lambda s: s.a**2)
@@ -71,6 +72,22 @@ def test_rates_bound_every_form() -> None:
     for key, fields in both.items():
         with pytest.raises(ValueError, match=messages[key]):
             Problem(OUT, EFFORT, **fields)
+
+
+@pytest.mark.parametrize("form", ["linear", "cubic", Polynomial(3)])
+def test_scenarios_share_the_whole_input(form: Form) -> None:
+    x, v, force = Variable("x", "m"), Variable("v", "m/s"), Variable("force", "N")
+    m = Variable("m", "kg", start=1.0)
+    cart = Model("cart", x=(x, v), u=(force,), p=(m,), ode=ca.vertcat(v, force / m))
+    out = Phase(cart, 1.0, start=REST, end={"x": (0.3, 2.0), "v": (-1.0, 1.0)})
+    back = Phase(cart, 1.0, end={"x": (None, 0.1)})
+    masses = {"light": {"m": 1.0}, "heavy": {"m": 1.4}}
+    cost = integral(lambda s: s.force**2) + largest(lambda s: s.v)
+    problem = Problem(out >> back, cost, scenarios=masses, inputs={"force": form})
+    found = solve(problem, intervals=8, refine=False)
+    light, heavy = (motion["force"] for motion in found.motions)
+    assert np.allclose(light, heavy, atol=1e-8)
+    assert np.ptp(light) > 1.0
 
 
 @pytest.mark.slow
