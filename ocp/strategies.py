@@ -195,15 +195,12 @@ class Search:
         found, layers = solution.verification, ""
         if found is None or not found.misses:
             return solution
-        grows = (
-            f" and whose errors grow by a factor of {found.growth:.1g}" if found.unstable else ""
-        )
-        for factor in (0.5 * self.tolerance / found.largest, 0.05 * self.tolerance / found.largest):
-            problem, narrow = narrowed(solution.problem, factor)
+        grows = " and whose errors grow" if found.unstable else ""
+        for share in (0.5, 0.05):
             with suppress(*FAILURES):
+                problem, narrow = narrowed(solution.problem, share * self.tolerance / found.largest)
                 if narrow and verify(replace(solution, problem=problem), self.tolerance).ok:
-                    shown = checks.listed([f"{name} {v:.1g} m/s" for name, v in narrow.items()])
-                    layers = f"a layer of {shown}, "
+                    layers = f"a layer of {checks.listed(narrow.values())}, "
                     break
         text = (
             f"ocp '{solution.problem.name}': The motion is right with exact Coulomb friction "
