@@ -51,8 +51,7 @@ def solve_relaxed(
 ) -> Solution:  # fmt: skip
     """Solve a problem with complementary signals; see `refined_solve` for the arguments.
 
-    The message gives the last eps and the largest product in the solution. The status is not ok if
-    eps remains above `MOST`.
+    The status is not ok if eps remains above `MOST`. The problem of the solution has the last eps.
     """
     later = solver
     if isinstance(solver, Ipopt):
@@ -70,7 +69,13 @@ def solve_relaxed(
         statistics = solution.statistics.then(finer.statistics)
         kept = finer if finer.ok or finer.status.stopped else solution
         solution = replace(kept, statistics=statistics)
-    product = largest_product(solution.problem, scheme, solution.meshes, solution.points)
+    return solution
+
+
+def with_products(solution: Solution) -> Solution:
+    """Return a solution with the last eps and the largest product in its message."""
+    given = solution.scheme, solution.meshes, solution.points
+    eps, product = solution.problem.p[EPS], largest_product(solution.problem, *given)
     text = f"Complementary signals: eps = {eps:.1g}, largest product {product:.1g}."
     return with_sentence(solution, text)
 
@@ -101,6 +106,7 @@ def _decreased(
         factor = factor if solved else sqrt(factor)
         eps = max(reached / factor, last)
     if found[-1].ok and reached > max(MOST, last):
-        text = f"ocp '{on.problem.name}': No solve with a smaller eps than {reached:.1g} succeeded."
+        text = f"ocp '{on.problem.name}': No solve with eps below {reached:.1g} succeeded; give "
+        text += "another guess, more intervals, or Ipopt()."
         found.append(replace(found[-1], status=Status.NO_STEP, message=text))
     return reached, replace(found[-1], statistics=reduce(SolverStatistics.then, statistics))

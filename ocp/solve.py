@@ -82,11 +82,12 @@ def solve(
         refine: refine the mesh where local errors are large or where constant inputs increase the
             cost. False keeps the mesh, unless friction is sharpened.
         verify: simulate the models under the control.
-        starts: with friction, number of coarse solves; the best one is continued.
+        starts: with friction, largest number of coarse solves, which end if three motions agree.
         resting_margin: margin between the friction of a contact at rest and its static level, as a
             share of this level, for motions by modes: a smooth law creeps just below the level. The
-            search starts at 0.01 and ends at this value if the motion still passes verification. If
-            the margin is active, the message gives its cost.
+            search starts at 0.01 and ends at this value, or at a larger one if the law does not
+            reach the level or verification requires it. If the margin is active, the message gives
+            its cost.
         progress: function called with a `Progress` after each iteration. Ctrl-C, or an exception
             raised in the function, stops the solver.
         max_time: wall time [s] of all solves; the best solution found by then is returned.

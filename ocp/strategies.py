@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.checking.verify import verified, verify
-from ocp.complementarity import solve_relaxed
+from ocp.complementarity import solve_relaxed, with_products
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import verify_exactly
@@ -195,15 +195,12 @@ class Search:
         found, layers = solution.verification, ""
         if found is None or not found.misses:
             return solution
-        grows = (
-            f" and whose errors grow by a factor of {found.growth:.1g}" if found.unstable else ""
-        )
-        for factor in (0.5 * self.tolerance / found.largest, 0.05 * self.tolerance / found.largest):
-            problem, narrow = narrowed(solution.problem, factor)
+        grows = " and whose errors grow" if found.unstable else ""
+        for share in (0.5, 0.05):
             with suppress(*FAILURES):
+                problem, narrow = narrowed(solution.problem, share * self.tolerance / found.largest)
                 if narrow and verify(replace(solution, problem=problem), self.tolerance).ok:
-                    shown = checks.listed([f"{name} {v:.1g} m/s" for name, v in narrow.items()])
-                    layers = f"a layer of {shown}, "
+                    layers = f"a layer of {checks.listed(narrow.values())}, "
                     break
         text = (
             f"ocp '{solution.problem.name}': The motion is right with exact Coulomb friction "
@@ -300,11 +297,9 @@ def _by_relaxation(search: Search, friction: Friction, guess: Start) -> Solution
             "solve: expected friction='smooth' with complementary(...), as modes and widths of "
             f"friction are not sought together with it, got {friction!r}"
         )
-    return search.checked(
-        solve_relaxed(
-            problem, meshes, direct.scheme, direct.solver, guess, direct.goals, direct.supervisor
-        )
-    )
+    settings = direct.goals, direct.supervisor
+    found = solve_relaxed(problem, meshes, direct.scheme, direct.solver, guess, *settings)
+    return with_products(search.checked(found))
 
 
 def _by_shooting(search: Search, guess: Start, starts: int) -> Solution:

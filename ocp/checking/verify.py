@@ -83,6 +83,7 @@ class _Kept(NamedTuple):
     box: Box
     unit: str = ""
     parts: tuple[ca.SX, ...] = ()
+    least: float = 0.0
 
     @staticmethod
     def of(row: Row) -> "_Kept":
@@ -95,13 +96,13 @@ class _Kept(NamedTuple):
         return np.where(np.isnan(outside), np.inf, outside)
 
     def magnitude(self, run: Run, times: Array) -> float:
-        """Return the largest magnitude of the bounds and of the values at `times`.
+        """Return the largest magnitude of the bounds and of the values at `times`, or `least`.
 
         The magnitude of a product is that of its factors.
         """
         bounds = [abs(b) for b in self.box if isfinite(b)]
         sizes = (float(np.abs(run.of(e, times)).max()) for e in self.parts or [self.expression])
-        return max([*bounds, prod(sizes)])
+        return max([*bounds, prod(sizes), self.least])
 
 
 def _kept(arc: Arc, *, peaks: bool) -> list[_Kept]:
@@ -110,8 +111,12 @@ def _kept(arc: Arc, *, peaks: bool) -> list[_Kept]:
     Conditions that define costs of largest values are included if `peaks`.
     """
     span = arc.span
-    known = [v for v in (*span.model.x, *span.model.z) if span.boxes[v.name] != FREE]
-    bounds = [_Kept("bound", v.name, v.symbol, span.boxes[v.name], v.unit) for v in known]
+    sizes = dict(zip((v.name for v in span.model.x), arc.sizes.tolist(), strict=True))
+    bounds = [
+        _Kept("bound", v.name, v.symbol, box, v.unit, least=sizes.get(v.name, 0.0))
+        for v in (*span.model.x, *span.model.z)
+        if (box := span.boxes[v.name]) != FREE
+    ]
     return bounds + [_Kept.of(row) for row in span.path if peaks or not row.is_peak]
 
 

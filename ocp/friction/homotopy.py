@@ -78,9 +78,10 @@ SAME = 3.0
 EARLY: dict[str, Option] = {"tol": 1e-4, "max_iter": 100}
 LATER: dict[str, Option] = {"tol": 1e-5, "max_iter": 60, "mu_init": 1e-3}
 ONTO = LATER | {"max_iter": 150}
-RIVAL, NEAR = 0.02, 0.1
-"""Width, in multiples of the speeds, to which coarse motions are continued on their mesh, and the
-largest width from which their modes are read if a step fails."""
+RIVAL, NEAR, CLOSE = 0.02, 0.1, 5e-3
+"""Width, in multiples of the speeds, to which coarse motions are continued on their mesh, the
+largest width from which their modes are read if a step fails, and the relative difference of their
+costs below which they are equal."""
 BOUNDING: dict[str, Option] = {"max_iter": 80}
 """Options for worst-case costs. With a small initial barrier parameter the initial multipliers of
 the bounds on the costs would be wrong, and with them the curvature."""
@@ -223,7 +224,9 @@ class _Path:
                 if narrower.ended:
                     return ()
                 step, last = (narrower, last) if narrower.good else (step, True)
-            if step.level <= NEAR:
+            known = any(abs(one.solution.cost - step.outcome.cost) < CLOSE * abs(step.outcome.cost)
+                        for one in found)  # fmt: skip
+            if step.level <= NEAR and not known:
                 found.append(self.sharp(step, steady=False))
         return tuple(found)
 

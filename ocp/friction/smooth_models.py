@@ -288,14 +288,16 @@ def speeds_at(problem: Problem, scales: Scales, level: float) -> dict[str, float
     }
 
 
-def narrowed(problem: Problem, factor: float) -> tuple[Problem, dict[str, float]]:
-    """Return `problem` with layers narrower by `factor`, and contact -> its layer [m/s]."""
-    made, p, layers = smoothed(problem), dict[str, float](), dict[str, float]()
+def narrowed(problem: Problem, factor: float) -> tuple[Problem, dict[str, str]]:
+    """Return `problem` with layers narrower by about `factor`, and contact -> its layer as text."""
+    made, p, layers = smoothed(problem), dict[str, float](), dict[str, str]()
+    contacts = {c.name: c for phase in problem.chain for c in phase.model.contacts}
     for phase in problem.chain:
         for w in widths(phase.model):
             if w.layer is not None and w.least > 0.0:
-                layers[w.contact] = factor * w.least
-                p[w.parameter] = w.at(layers[w.contact])
+                layer = f"{factor * w.least:.1g}"
+                layers[w.contact] = f"{layer} {contacts[w.contact].unit('m/s')} ({w.contact})"
+                p[w.parameter] = w.at(float(layer))
     return replace(made, p=dict(made.p) | p), layers
 
 

@@ -9,8 +9,9 @@ import numpy as np
 
 from ocp.formulation.phase import Array, Span
 from ocp.formulation.problem import Posed, Problem
+from ocp.solving.motion import along_points
 from ocp.transcription.schemes import Scheme
-from ocp.transcription.unknowns import Points
+from ocp.transcription.unknowns import Points, SpanPoints
 
 
 @final
@@ -37,8 +38,8 @@ def penalties_of(
 ) -> dict[str, Penalty]:
     """Return condition -> its penalty at the collocation points, or at its time."""
     found: dict[str, Penalty] = {}
-    for at in _all_points(problem, scheme, meshes, points):
-        span, own = at.span, points.spans[at.number]
+    for at in _phases(problem, scheme, meshes, points):
+        span = at.span
         scenario = problem.scenario_names[span.scenario : span.scenario + 1]
         label = ": ".join([*scenario, *[span.name] * (len(problem.chain) > 1), ""])
         for row in span.softened:
@@ -49,9 +50,9 @@ def penalties_of(
         for s, rows in span.rows_at.items():
             for row in (row for row in rows if row.linear or row.quadratic):
                 off = ca.Function("off", [span.model.vector("x")], list(row.parts))
-                size = max(0.0, float(off(own.nodes[:, -1])))  # a constant state
+                size = max(0.0, float(off(at.own.nodes[:, -1])))  # a constant state
                 cost = row.linear * size + row.quadratic * size**2
-                found[label + row.name] = Penalty(cost, size, at.begin + s * own.T)
+                found[label + row.name] = Penalty(cost, size, at.begin + s * at.own.T)
     return found
 
 
@@ -61,41 +62,37 @@ def largest_product(
     """Return the largest product of complementary signals, relative to its typical magnitude."""
     return max(
         float(at.of(row.parts[0] * row.parts[1]).max()) / row.nominal
-        for at in _all_points(problem, scheme, meshes, points)
+        for at in _phases(problem, scheme, meshes, points)
         for row in at.span.path
         if row.is_product
     )
 
 
-class _Points(NamedTuple):
-    """Values of one phase at its collocation points, or at the starts of intervals without them."""
+class _Phase(NamedTuple):
+    """Phase of a solution, with the times and quadrature weights of its collocation points [s]."""
 
-    number: int
     span: Span
+    own: SpanPoints
     begin: float
     t: Array
     weights: Array
-    values: tuple[Array, ...]
+    p: Array
 
     def of(self, expression: ca.SX) -> Array:
         """Return the values of an expression, shape (points,)."""
-        function = ca.Function("of", self.span.symbols, [expression]).map(self.t.size)
-        return np.array(function(*self.values))[0]
+        return along_points(self.span, self.own, expression, t=self.t, p=self.p)[0]
 
 
-def _all_points(
+def _phases(
     problem: Problem | Posed, scheme: Scheme, meshes: Sequence[Array], points: Points
-) -> Iterator[_Points]:
+) -> Iterator[_Phase]:
     made, begin = scheme.coefficients(), 0.0
     inside = made.nodes[1:] if made.degree else made.nodes
-    pairs = zip(problem.spans, meshes, points.spans, strict=True)
-    for number, (span, mesh, own) in enumerate(pairs):
+    for span, mesh, own in zip(problem.spans, meshes, points.spans, strict=True):
         begin = begin if span.phase else 0.0
         lengths = own.T * np.diff(mesh)[:, None]
         t = (begin + own.T * mesh[:-1, None] + lengths * inside).ravel()
-        x = own.inner if made.degree else own.nodes[:, :-1]
-        u = np.repeat(own.u, inside.size, axis=1)
         p = [points.chosen.get(v.name, x) for v, x in zip(span.model.p, span.p, strict=True)]
-        values = t[None, :], x, own.z, u, np.tile(np.reshape(p, (-1, 1)), (1, t.size))
-        yield _Points(number, span, begin, t, (lengths * made.weights).ravel(), values)
+        weights = (lengths * made.weights).ravel()
+        yield _Phase(span, own, begin, t, weights, np.array(p, dtype=float))
         begin += own.T

@@ -288,7 +288,11 @@ def _check(span: Span) -> None:
     """Raise ValueError if `span` has conditions that shooting does not support."""
     model, mechanics = span.model, span.model.holonomic
     conditions = [*span.path, *(row for rows in span.rows_at.values() for row in rows)]
-    kinds = {"soft path conditions": span.softened, "absolute(...)": span.absolutes}
+    kinds = {
+        "soft path conditions": span.softened,
+        "absolute(...)": span.absolutes,
+        "complementary(...)": [row for row in span.path if row.is_product],
+    }
     named = [(row.name, row.expression) for row in conditions] + [("the end cost", span.end)]
     problems = [
         f"{name} depends on algebraic variables"

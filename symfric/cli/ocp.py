@@ -127,6 +127,9 @@ def show_solution(
     if found.modes:
         rows = [(c, m.kind, m.begin, m.end) for c, modes in found.modes.items() for m in modes]
         output.show_table(["contact", "mode", "from [s]", "to [s]"], rows, "Modes")
+    if found.soft:
+        rows = [(n, p.cost, p.violation, p.time) for n, p in found.soft.items()]
+        output.show_table(["soft condition", "cost", "largest violation", "at [s]"], rows)
     if found.chosen:
         output.show_table(["chosen parameter", "value"], [[*pair] for pair in found.chosen.items()])
     if rates:

@@ -128,7 +128,8 @@ def test_linear_penalty_is_exact_above_the_multiplier() -> None:
     # v <= 1.2 with cost a^2 / 2 over T = 1: a falls to zero in a quarter, with slope -38.4
     def found(**weights: float) -> tuple[float, float]:
         path = [soft(lambda s: s.v <= 1.2, **weights)]
-        move = solve(Problem(Phase(WIDE, 1.0, **MOVE), 0.5 * EFFORT, path=path), intervals=40)
+        phase = Phase(WIDE, 1.0, inputs={"a": "linear"}, **MOVE)
+        move = solve(Problem(phase, 0.5 * EFFORT, path=path), intervals=24, refine=False)
         assert move.verified
         (penalty,) = move.soft.values()
         assert f"largest violation {penalty.violation:.3g}" in str(move)
@@ -178,6 +179,52 @@ def test_soft_conditions_with_other_solvers_and_their_limits() -> None:
         near.to_mpc(step=0.1)
 
 
+def test_soft_obstacle_and_absolute_value_agree_with_opti() -> None:
+    names = ("x", "y", "v", "w", "a", "b")
+    x, y, v, w, a, b = (Variable(name, "") for name in names)
+    plane = Model("plane", x=(x, y, v, w), u=(a, b), ode=ca.vertcat(v, w, a, b))
+    way = Phase(plane, 2.0, end={"x": 2.0, "y": 0.2, "v": 0.0, "w": 0.0})
+    cost = integral(lambda s: s.a**2 + s.b**2) + absolute(lambda s: s.w - 0.3 * s.v, 2.0)
+    disc = soft(lambda s: (s.x - 1.0) ** 2 + s.y**2 >= 0.25, linear=20.0, quadratic=5.0)
+    found = solve(Problem(way, cost, path=[disc], inputs=dict.fromkeys("ab", "linear")),
+                  intervals=30, refine=False)  # fmt: skip
+    assert found.cost == pytest.approx(_plane_by_opti(40), rel=1e-3)
+    assert found.verification is not None
+    assert found.verification.cost == pytest.approx(found.cost, rel=5e-4)
+
+
+def _plane_by_opti(N: int) -> float:
+    """Return the cost with accelerations that are linear on N intervals, by Simpson's rule."""
+    opti, h = ca.Opti(), 2.0 / N
+    u, places, rates = (opti.variable(2, N + 1) for _ in range(3))
+    total, every = 0, []
+    for k in range(N):
+        q, rate = places[:, k], rates[:, k]
+        left, slope = u[:, k], (u[:, k + 1] - u[:, k]) / h
+        for s in (0.0, 0.5 * h, h):
+            force = left + s * slope
+            v = rate + s * left + s**2 / 2 * slope
+            p = q + s * rate + s**2 / 2 * left + s**3 / 6 * slope
+            every.append((p, v, ca.sumsqr(force), (h / 6) * (4 if s == 0.5 * h else 1)))
+        opti.subject_to(places[:, k + 1] == p)
+        opti.subject_to(rates[:, k + 1] == v)
+    slack = opti.variable(2, len(every))
+    for (p, v, squares, weight), k in zip(every, range(len(every)), strict=True):
+        e = v[1] - 0.3 * v[0]
+        inside = 0.25 - (p[0] - 1.0) ** 2 - p[1] ** 2
+        opti.subject_to(opti.bounded(-slack[0, k], e, slack[0, k]))
+        opti.subject_to(inside <= slack[1, k])
+        opti.subject_to(slack[1, k] >= 0)
+        total += weight * (squares + 2 * slack[0, k] + 20 * slack[1, k] + 5 * slack[1, k] ** 2)
+    opti.subject_to(places[:, 0] == 0)
+    opti.subject_to(places[:, N] == ca.vertcat(2.0, 0.2))
+    opti.subject_to(ca.horzcat(rates[:, 0], rates[:, N]) == 0)
+    opti.minimize(total)
+    opti.set_initial(places[0, :], 2.0 * np.linspace(0.0, 1.0, N + 1))
+    opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes"})
+    return float(opti.solve().value(total))
+
+
 # --- integral and point conditions --------------------------------------------------------------
 
 
@@ -220,19 +267,21 @@ def test_lift_off_from_the_ground_is_found() -> None:
     path = [complementary(lambda s: s.y, lambda s: s.lam)]
     phase = Phase(hopper(), 1.5, start={"y": 0.0, "v": 0.0}, end={"y": 1.0, "v": 0.0})
     problem = Problem(phase, integral(lambda s: s.u**2), path=path)
-    hop = solve(problem)
+    hop = solve(problem, intervals=30, refine=False)
     flight = sqrt(0.6)  # least of g^2 tau + 12 h^2 / tau^3
-    assert hop.cost == pytest.approx(100 * flight + 12 / flight**3, rel=3e-3)
+    assert hop.cost == pytest.approx(100 * flight + 12 / flight**3, rel=5e-3)
     assert hop.verified
     assert "eps = 1e-08, largest product 2e-08" in hop.message
     ground = hop["y"] < 1e-5
-    assert hop.t[ground].max() == pytest.approx(1.5 - flight, abs=0.05)
+    assert hop.t[ground].max() == pytest.approx(1.5 - flight, abs=0.075)
     assert (hop["lam"] * hop["y"]).max() < 1e-6
     with pytest.raises(SolveError) as stopped:
         solve(problem, max_time=0.01)
     assert stopped.value.status is Status.TIME_LIMIT
     own = Problem(phase, problem.cost, path=path, p={"complementarity": 1e-2})
-    assert "eps = 0.01" in solve(own).message
+    assert "eps = 0.01" in solve(own, intervals=10, refine=False, throw=False).message
+    with pytest.raises(ValueError, match=r"got complementary.*, which need collocation points"):
+        solve(problem, scheme=Shooting())
     with pytest.raises(ValueError, match=r"expected friction='smooth' with complementary"):
         solve(Problem(Phase(stage(), 1.0), integral(lambda s: s.force**2),
                       path=[complementary(lambda s: s.x, lambda s: s.v)]))  # fmt: skip

@@ -111,7 +111,7 @@ def test_motion_that_creeps_under_its_law_is_told_from_one_that_is_wrong() -> No
     assert "The motion is right with exact Coulomb friction (largest miss" in sentence
     assert "under the laws of the model, whose layers creep at rest, " in sentence
     assert "feedback along the motion, or the law ExactCoulomb closes the gap" in sentence
-    width = re.search(r"a layer of (\S+) \(guide\) m/s", sentence)
+    width = re.search(r"a layer of (\S+) m/s \(guide\)", sentence)
     assert width is not None, sentence
     assert found(float(width[1])).verified
 

@@ -34,6 +34,26 @@ def test_a_problem_of_a_file_is_solved_and_written(symfric, mine) -> None:
     assert again["cost"] == pytest.approx(12 / 8, rel=1e-3)
 
 
+def test_a_soft_end_of_a_file_is_shown(symfric, tmp_path, monkeypatch) -> None:
+    """J = 12 x^2 + 3 (1 - x) has its least value at x = 1/8."""
+    monkeypatch.chdir(tmp_path)
+    Path("wall.py").write_text(
+        "from ocp import Phase, Problem, integral, soft\n"
+        "import casadi as ca\nfrom symfric import Model, Variable\n"
+        "wall = soft(lambda s: s.x == 1.0, linear=3.0)\n"
+        "x, v, force = (Variable(name, '') for name in ('x', 'v', 'force'))\n"
+        "model = Model('mass', x=(x, v), u=(force,), ode=ca.vertcat(v, force))\n"
+        "phase = Phase(model, 1.0, end={'v': 0.0}, at={1: [wall]})\n"
+        "problem = Problem(phase, integral(lambda s: s.force**2))\n"
+    )
+    shown = symfric("ocp wall.py --intervals 10").out
+    assert "condition 1 at the end" in shown
+    assert "2.625" in shown
+    assert "0.875" in shown
+    found = symfric("ocp wall.py --intervals 10 --json -").json
+    assert found["soft"]["condition 1 at the end"]["violation"] == pytest.approx(0.875, rel=1e-3)
+
+
 def test_options_are_the_arguments_of_solve(symfric, monkeypatch: pytest.MonkeyPatch) -> None:
     def solve(problem: object, **given: object) -> None:
         seen.update(given)
