@@ -13,6 +13,8 @@ Sources: Rao, Rawlings and Mayne, IEEE Trans. Autom. Control 48, 2003, 246-258 (
 SIAM J. Optim. 4, 1994, 626-636 (smoother as Gauss-Newton step).
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, final

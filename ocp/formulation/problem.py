@@ -227,6 +227,12 @@ class Posed:
     choose: tuple[str, ...]
     durations: tuple[tuple[int, ...], ...]
 
+    def __post_init__(self) -> None:
+        for span in self.spans:
+            if np.shape(span.p) != (len(span.model.p),):
+                what = f"{len(span.model.p)} values of parameters in phase '{span.name}'"
+                raise checks.refused(f"problem '{self.name}' of a file", what, span.p)
+
     def __repr__(self) -> str:
         return f"<problem '{self.name}' of a file: {len(self.chain)} phases>"
 

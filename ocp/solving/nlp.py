@@ -1,5 +1,7 @@
 """Nonlinear program of a problem as CasADi Functions, for solvers of the user."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, final

@@ -7,7 +7,7 @@ from typing import NamedTuple, final
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.phase import Array, Span
+from ocp.formulation.phase import Array, Row, Span
 from ocp.formulation.problem import Posed, Problem
 from ocp.solving.motion import along_points
 from ocp.transcription.schemes import Scheme
@@ -38,6 +38,8 @@ def penalties_of(
 ) -> dict[str, Penalty]:
     """Return condition -> its penalty at the collocation points, or at its time."""
     found: dict[str, Penalty] = {}
+    if not any(span.softened or _soft_rows(span) for span in problem.spans):
+        return found
     for at in _phases(problem, scheme, meshes, points):
         span = at.span
         scenario = problem.scenario_names[span.scenario : span.scenario + 1]
@@ -47,13 +49,18 @@ def penalties_of(
             k = int(np.argmax(violation))
             total = float(at.weights @ cost)
             found[label + row.name] = Penalty(total, float(violation[k]), float(at.t[k]))
-        for s, rows in span.rows_at.items():
-            for row in (row for row in rows if row.linear or row.quadratic):
-                off = ca.Function("off", [span.model.vector("x")], list(row.parts))
-                size = max(0.0, float(off(at.own.nodes[:, -1])))  # a constant state
-                cost = row.linear * size + row.quadratic * size**2
-                found[label + row.name] = Penalty(cost, size, at.begin + s * at.own.T)
+        for s, row in _soft_rows(span):
+            off = ca.Function("off", [span.model.vector("x")], list(row.parts))
+            size = max(0.0, float(off(at.own.nodes[:, -1])))  # a constant state
+            cost = row.linear * size + row.quadratic * size**2
+            found[label + row.name] = Penalty(cost, size, at.begin + s * at.own.T)
     return found
+
+
+def _soft_rows(span: Span) -> list[tuple[float, Row]]:
+    """Return the conditions at nodes with a penalty, with their fractions of T."""
+    rows = [(s, row) for s, rows in span.rows_at.items() for row in rows]
+    return [(s, row) for s, row in rows if row.linear or row.quadratic]
 
 
 def largest_product(
