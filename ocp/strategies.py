@@ -206,7 +206,7 @@ class Search:
             f"ocp '{solution.problem.name}': The motion is right with exact Coulomb friction "
             f"(largest miss {exact:.1g}), but under the laws of the model, whose layers creep at "
             f"rest{grows}, {found.misses[0].sentence}; {layers}feedback along the motion, or the "
-            "law ExactCoulomb closes the gap."
+            "law ExactCoulomb or Exact(law) closes the gap."
         )
         return replace(solution, message=text)
 

@@ -16,7 +16,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import tanh
 from symfric.foundation.parameters import Variable, parameters, with_values
 from symfric.foundation.variable import at_start, strays
-from symfric.laws import ExactCoulomb, Law
+from symfric.laws import Exact, ExactCoulomb, Law
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Monitor
 
@@ -302,9 +302,9 @@ def narrowed(problem: Problem, factor: float) -> tuple[Problem, dict[str, str]]:
 
 
 def is_exact(problem: Problem) -> bool:
-    """Return True if all contacts that can stick have the law `ExactCoulomb`."""
+    """Return True if all contacts that can stick have a set-valued law."""
     laws = [c.law for phase in problem.chain for c in sticking(phase.model)]
-    return bool(laws) and all(isinstance(law, ExactCoulomb) for law in laws)
+    return bool(laws) and all(isinstance(law, ExactCoulomb | Exact) for law in laws)
 
 
 def law_states(problem: Problem) -> set[str]:
@@ -314,7 +314,7 @@ def law_states(problem: Problem) -> set[str]:
 
 
 def bristles(problem: Problem) -> bool:
-    """Return True if a law has states other than the mode of `ExactCoulomb`."""
+    """Return True if a law has states other than the mode of a set-valued law."""
     return bool(law_states(problem)) and not is_exact(problem)
 
 

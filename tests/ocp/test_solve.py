@@ -22,7 +22,7 @@ from ocp.problems import READY, Ready, out_and_back
 from ocp.solving.starts import start_of
 from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
-from symfric import GMS, BrownMcPhee, ExactCoulomb, LuGre, SolveError, Status, drive
+from symfric import GMS, BrownMcPhee, Exact, ExactCoulomb, LuGre, SolveError, Status, drive
 from symfric.laws import Law
 
 FORCE = integral(lambda s: s.force**2)
@@ -75,13 +75,18 @@ def test_solution_is_a_start_for_another_mesh() -> None:
 
 
 @pytest.mark.parametrize(
-    "law", [ExactCoulomb(mu_s=6.0, mu_d=4.0), pytest.param(GMS(), marks=pytest.mark.slow)]
+    "law",
+    [
+        ExactCoulomb(mu_s=6.0, mu_d=4.0),
+        Exact(BrownMcPhee(mu_s=6.0, mu_d=4.0)),
+        pytest.param(GMS(), marks=pytest.mark.slow),
+    ],
 )
 def test_laws_with_states_are_verified_with_themselves(law: Law) -> None:
     move = Phase(drive(law, m=1.0, N=1.0), 1.0, end={"x": 1.0, "v": 0.0})
     solution = solve(Problem(move, FORCE), starts=1)
     assert solution.verified
-    if isinstance(law, ExactCoulomb):
+    if isinstance(law, ExactCoulomb | Exact):
         assert "verified with exact Coulomb friction, the law of the model" in solution.message
     else:
         assert f"guide: {type(law).__name__}" in solution.message
@@ -110,7 +115,7 @@ def test_motion_that_creeps_under_its_law_is_told_from_one_that_is_wrong() -> No
     sentence = creeping.message.split(". ")[0]
     assert "The motion is right with exact Coulomb friction (largest miss" in sentence
     assert "under the laws of the model, whose layers creep at rest, " in sentence
-    assert "feedback along the motion, or the law ExactCoulomb closes the gap" in sentence
+    assert "feedback along the motion, or the law ExactCoulomb or Exact(law) closes the gap" in sentence
     width = re.search(r"a layer of (\S+) m/s \(guide\)", sentence)
     assert width is not None, sentence
     assert found(float(width[1])).verified
