@@ -115,7 +115,7 @@ def test_motion_that_creeps_under_its_law_is_told_from_one_that_is_wrong() -> No
     sentence = creeping.message.split(". ")[0]
     assert "The motion is right with exact Coulomb friction (largest miss" in sentence
     assert "under the laws of the model, whose layers creep at rest, " in sentence
-    assert "feedback along the motion, or the law ExactCoulomb or Exact(law) closes the gap" in sentence
+    assert "feedback along the motion, or the law ExactCoulomb or Exact(law) closes" in sentence
     width = re.search(r"a layer of (\S+) m/s \(guide\)", sentence)
     assert width is not None, sentence
     assert found(float(width[1])).verified
