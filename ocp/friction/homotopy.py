@@ -34,7 +34,7 @@ from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
-from ocp.solving.one_solve import Solver, Step, finalists, least, same_cost
+from ocp.solving.one_solve import Solver, Step, finalists, least
 from ocp.solving.optimum import Optimum
 from ocp.solving.prepared import Option, Prepared, Supervisor
 from ocp.solving.solution import Solution
@@ -44,8 +44,6 @@ from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
 from ocp.transcription.unknowns import Points
 
-AGREE = 3
-"""Number of equal motions after which no further starts are solved."""
 FIRST = 0.3
 """Smoothing width of the first solves, in multiples of the largest sliding velocity."""
 LAST = 1e-2
@@ -184,7 +182,7 @@ class _Path:
             tries += starts_around(coarse, straight, range(1, starts, 2), SPREAD)
         found = [scales_of(self.user, self.problem, points, {}) for points in tries]
         self.scales = smooth_models.guessed(self.user, found)
-        steps = self.each(coarse, tries, sized=True)
+        steps = self.each(coarse, tries)
         best = least(steps)
         for more in range(1, FURTHER + 1):
             if best.ended or best.good:
@@ -246,27 +244,19 @@ class _Path:
         """Return the scales of the motion of a step."""
         return scales_of(self.user, self.problem, step.points, self.scales)
 
-    def faster(self, step: Step) -> bool:
-        """Return True if a speed of a motion exceeds the one assumed by more than `SAME`."""
-        now = self.scales_at(step)
-        return any(now[name].speed > SAME * scale.speed for name, scale in self.scales.items())
-
     def each(
         self, mesh: Transcription, tries: Sequence[Points],
-        options: Mapping[str, Option] = EARLY, *, sized: bool = False,
+        options: Mapping[str, Option] = EARLY,
     ) -> list[Step]:  # fmt: skip
-        """Solve with the widest layers from each start, until a solve is stopped or some agree.
+        """Solve with the widest layers from each start, until a solve is stopped.
 
-        With `sized`, also until the speeds of a motion exceed those assumed, as layers that are too
-        narrow take many iterations.
+        Equal motions of several starts may be a local optimum, so they do not end the search: three
+        starts of the cart-pole of nosnoc agree on hanging still.
         """
         steps: list[Step] = []
         for number, points in enumerate(tries, 1):
-            step = self.solve(mesh, points, FIRST, options, f"start {number}")
-            steps.append(step)
-            alike = [s for s in steps if s.good and same_cost(s, step)]
-            faster = sized and step.good and self.faster(step)
-            if step.ended or faster or len(alike) == AGREE:
+            steps.append(self.solve(mesh, points, FIRST, options, f"start {number}"))
+            if steps[-1].ended:
                 break
         return steps
 
