@@ -116,7 +116,11 @@ def _run(
     span: tuple[float, float],
     rtol: float,
 ) -> Any:
-    """Integrate the states and the cost with constant modes up to the first event."""
+    """Integrate the states and the cost with constant modes up to the first event.
+
+    A sliding velocity may become zero and recover within one step. Then it is negative at its
+    minimum, and the integration to this minimum ends at the zero.
+    """
 
     def rate(t: float, y: Array) -> list[float]:
         x = y.tolist()[:-1]
@@ -136,10 +140,26 @@ def _run(
         room.terminal, room.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
         return room
 
-    return solve_ivp(
+    def minimum(i: int) -> Callable[[float, Array], float]:
+        def change(t: float, y: Array) -> float:
+            return modes[i] * rate(t, y)[case.slips[i]]
+
+        change.direction = 1  # pyright: ignore[reportFunctionMemberAccess]
+        return change
+
+    n = len(modes)
+    run = solve_ivp(
         rate, span, start, "DOP853", rtol=rtol, atol=1e-3 * rtol, max_step=case.T / 200,
-        events=[event(i) for i in range(len(modes))],
+        events=[*map(event, range(n)), *map(minimum, range(n))],
     )  # fmt: skip
+    missed = [
+        float(t)
+        for i, mode in enumerate(modes)
+        for t, y in zip(run.t_events[n + i], run.y_events[n + i], strict=True)
+        if mode * y[case.slips[i]] < -REST
+    ]
+    run.t_events = run.t_events[:n]
+    return _run(case, start, u, modes, (span[0], min(missed)), rtol) if missed else run
 
 
 def _modes(

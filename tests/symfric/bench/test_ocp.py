@@ -58,6 +58,19 @@ def test_a_spring_with_friction_loses_the_same_stroke_each_half_period() -> None
     assert miss * 1.2 == pytest.approx(1.2 - (1.1 - 4 * 0.25), rel=1e-6)
 
 
+def test_a_slip_that_touches_zero_for_less_than_a_step_ends() -> None:
+    """v = (t - 1)^2 - 1e-9 in slip is negative for 60 us; at rest 4 + 2 (t - 1) is held."""
+
+    def rate(m: object, x: list[float], u: float, F: list[float]) -> list[float]:
+        return [x[1], 4.0 + 2.0 * (x[2] - 1.0) - F[0], 1.0]
+
+    case = replace(
+        BLOCK, states=("x", "v", "t"), rate=rate, levels=((6.0, 4.0),), T=1.9,
+        start=(0.0, 1.0 - 1e-9, 0.0), ends={1.0: {0: 1.0 / 3.0, 1: 0.0}},
+    )  # fmt: skip
+    assert judged(case, even(case, 1), np.zeros(1)).miss < 1e-8
+
+
 def test_bounds_are_part_of_the_miss_and_controls_are_clipped() -> None:
     case = replace(BLOCK, ends={1.0: {}}, bounds={0: (-inf, 1.0)}, limit=12.0)
     a, t = 12.0 - 5.886, 4.0
