@@ -17,7 +17,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, final
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, final
 
 import casadi as ca
 import numpy as np
@@ -25,10 +26,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eigh
 
 from symfric.foundation import checks
+from symfric.foundation.panels import panels, save
 from symfric.foundation.parameters import Variable, check_names
+from symfric.foundation.shown import brief
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator import flow
 from symfric.model import Model, check_model
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 ITERATIONS, TOLERANCE = 20, 1e-6
@@ -55,6 +61,7 @@ class Estimate:
         signals: state or load -> its estimate from the data up to each time, shape (n,).
         deviations: state or load -> standard deviation of this estimate.
         smooth: state or load -> its estimate over the last horizon from all data of the horizon.
+        units: unit of each state and load.
         unobservable: combinations of states and loads, in units of their spread, that the
             measurements do not determine: without them the variance is at most 4 times as large.
         unconverged: number of samples at which the Gauss-Newton method did not converge.
@@ -64,12 +71,33 @@ class Estimate:
     signals: Mapping[str, Array]
     deviations: Mapping[str, Array]
     smooth: Mapping[str, Array]
+    units: Mapping[str, str]
     unobservable: tuple[str, ...]
     unconverged: int
+
+    __repr__ = brief
 
     def __getitem__(self, name: str) -> Array:
         check_names("estimate", [name], self.signals)
         return self.signals[name]
+
+    def plot(self, *names: str, path: str | Path | None = None) -> Figure:
+        """Plot estimates over time, one panel each, with bands of two standard deviations.
+
+        Args:
+            names: states and loads to show, by default all.
+            path: image file; its extension selects the format.
+        """
+        check_names("plot of an estimate", names, self.signals)
+        shown = list(names) or list(self.signals)
+        figure, axes = panels(len(shown))
+        for axis, name in zip(axes, shown, strict=True):
+            value, deviation = self.signals[name], self.deviations[name]
+            axis.fill_between(self.t, value - 2 * deviation, value + 2 * deviation, alpha=0.2)
+            axis.plot(self.t, value, linewidth=1.2)
+            axis.set_ylabel(f"{name} [{self.units[name]}]")
+        axes[-1].set_xlabel("t [s]")
+        return save(figure, path)
 
 
 def estimate(
@@ -103,7 +131,7 @@ def estimate(
         steps: number of integration steps in each sampling interval.
 
     Raises:
-        ValueError: all problems of the arguments at once.
+        ValueError: bad input.
         SolveError: the motion becomes infinite.
 
     Limits: no bounds on states. Gauss-Newton steps have no line search; `unconverged` counts the
@@ -112,51 +140,64 @@ def estimate(
     check_model("estimate", model)
     step = checks.number("estimate: step", step, above=0.0)
     horizon = checks.count("estimate: horizon", horizon, least=2)
-    rows = _checked(model, data, noise, unknown)
+    steps = checks.count("estimate: steps", steps)
+    unknown = checks.names("estimate: unknown", unknown, [v.name for v in model.u])
+    rows = _checked(model, data, unknown)
     measured = [name for name in rows if name not in {v.name for v in model.u}]
-    loads = [v for v in model.u if v.name in unknown]
-    states = [*model.x, *loads]
-    for what, given in (("start", start), ("spread", spread)):
-        check_names(f"estimate: {what}", given or {}, [v.name for v in states])
-    scale = np.array([(spread or {}).get(v.name, v.nominal) for v in states], dtype=float)
-    first = np.array([(start or {}).get(v.name, v.start) for v in states], dtype=float)
-    first = np.nan_to_num(first) / scale
+    states = [*model.x, *(v for v in model.u if v.name in unknown)]
+    names = [v.name for v in states]
+    start, spread = _numbers("start", start, names), _numbers("spread", spread, names)
+    noise = _numbers("noise", noise, [*names, *measured])
+    wrong = [f"spread of '{n}' above 0" for n, x in spread.items() if not x > 0.0]
+    wrong += [f"noise of '{n}' above 0" for n in measured if not noise.get(n, 0.0) > 0.0]
+    wrong += [f"noise of '{n}' of at least 0" for n in names if noise.get(n, 0.0) < 0.0]
+    if wrong:
+        raise ValueError(f"estimate: expected {'; '.join(wrong)}")
+    scale = np.array([spread.get(v.name, v.nominal) for v in states], dtype=float)
+    first = np.array([start.get(v.name, v.start) for v in states], dtype=float)
+    first = np.nan_to_num(first) / scale  # states of laws have no start
     walk = np.array([noise.get(v.name, 0.0) for v in states]) / scale
+    loads, values = states[len(model.x) :], model.values("p", p)
     machine = _Machine(
-        *_functions(model, loads, measured, scale, step, model.values("p", p), steps),
+        *_functions(model, loads, measured, scale, step, values, steps),
         Q=np.diag(walk**2 * step),
         R=np.array([noise[name] ** 2 for name in measured]),
     )
     y = np.array([rows[name] for name in measured])
     u = np.array([rows[v.name] for v in model.u if v.name in rows]).reshape(-1, y.shape[1])
-    return _moved(machine, y, u, first, horizon, [v.name for v in states], scale, step)
+    return _moved(machine, y, u, first, horizon, states, scale, step)
+
+
+def _numbers(
+    what: str, given: Mapping[str, float] | None, known: Sequence[str]
+) -> dict[str, float]:
+    """Return finite numbers by name."""
+    found = checks.named(f"estimate: {what}", given, known)
+    return {n: checks.number(f"estimate: {what} of '{n}'", x) for n, x in found.items()}
 
 
 def _checked(
-    model: Model, data: Mapping[str, ArrayLike], noise: Mapping[str, float], unknown: Sequence[str]
+    model: Model, data: Mapping[str, ArrayLike], unknown: Sequence[str]
 ) -> dict[str, Array]:
     """Return the data as rows of equal length."""
     inputs, wrong = [v.name for v in model.u], list[str]()
-    rows = {name: np.asarray(row, dtype=float) for name, row in data.items()}
-    measured = [name for name in rows if name not in inputs]
-    check_names("estimate: data", rows, model.signals)
-    check_names("estimate: unknown", unknown, inputs)
-    check_names("estimate: noise", noise, [*(v.name for v in model.x), *unknown, *measured])
+    given = checks.named("estimate: data", data, list(model.signals))
+    rows = {
+        n: checks.array(f"estimate: data of '{n}'", row, nan=n not in inputs)
+        for n, row in given.items()
+    }
     if model.ode is None or model.z or model.events or ca.depends_on(model.ode, model.t):
         wrong.append("an explicit model without events, algebraic variables and time")
-    if not measured:
+    if not set(rows) - set(inputs):
         wrong.append("data of at least one signal that is not an input")
     wrong += [
         f"data of the input '{name}', or its name in `unknown`"
         for name in inputs
         if (name in rows) == (name in unknown)
     ]
-    wrong += [f"noise of '{name}' above 0" for name in measured if not noise.get(name, 0.0) > 0.0]
-    if len({row.shape for row in rows.values()}) > 1 or any(r.ndim != 1 for r in rows.values()):
-        wrong.append("rows of equal length")
-    wrong += [
-        f"finite samples of '{n}'" for n in inputs if n in rows and not np.isfinite(rows[n]).all()
-    ]
+    if len({row.size for row in rows.values()} | {0}) != 2:
+        wrong.append("rows of equal length, not empty")
+    wrong += [f"finite samples or NaN of '{n}'" for n in rows if np.isinf(rows[n]).any()]
     if wrong:
         raise ValueError(f"estimate: model '{model.name}': expected {'; '.join(wrong)}")
     return rows
@@ -190,6 +231,8 @@ def _functions(
 
 
 class _Machine(NamedTuple):
+    """Functions of `_functions`, and the covariances of changes and variances of samples."""
+
     after: ca.Function
     seen: ca.Function
     Q: Array
@@ -240,11 +283,11 @@ def _passed(machine: _Machine, xi: Array, y: Array, u: Array, prior: tuple[Array
 
 
 def _moved(
-    machine: _Machine, y: Array, u: Array, first: Array, horizon: int, names: Sequence[str],
-    scale: Array, step: float,
+    machine: _Machine, y: Array, u: Array, first: Array, horizon: int,
+    states: Sequence[Variable], scale: Array, step: float,
 ) -> Estimate:  # fmt: skip
     """Move the horizon over all samples."""
-    count = y.shape[1]
+    count, names = y.shape[1], [v.name for v in states]
     xi, prior, unconverged = first[:, None], (first, np.eye(first.size)), 0
     free = prior[1]  # covariance at the first sample of the horizon without measurements
     means, deviations = np.empty((first.size, count)), np.empty((first.size, count))
@@ -274,6 +317,7 @@ def _moved(
         signals=dict(zip(names, means * scale[:, None], strict=True)),
         deviations=dict(zip(names, deviations * scale[:, None], strict=True)),
         smooth=dict(zip(names, smooth, strict=True)),
+        units={v.name: v.unit for v in states},
         unobservable=_unobservable(found.filtered[-1], free, names),
         unconverged=unconverged,
     )

@@ -82,7 +82,7 @@ class ActiveConditions(tuple[Active, ...]):
     __repr__ = __str__
 
 
-class Status(NamedTuple):
+class BoundStatus(NamedTuple):
     """Rows or unknowns at their bounds.
 
     Attributes:
@@ -100,13 +100,13 @@ class Status(NamedTuple):
     ratio: Array
 
     @staticmethod
-    def joined(unknowns: "Status", rows: "Status") -> "Status":
+    def joined(unknowns: "BoundStatus", rows: "BoundStatus") -> "BoundStatus":
         """Return the status of unknowns, then of rows."""
         pairs: Any = zip(unknowns, rows, strict=True)
-        return Status(*map(np.concatenate, pairs))
+        return BoundStatus(*map(np.concatenate, pairs))
 
 
-def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> Status:
+def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> BoundStatus:
     """Return which of `values` are at a bound, where the multiplier exceeds the distance.
 
     Distances are relative to the range between the bounds. An interior-point method ends with a
@@ -122,10 +122,10 @@ def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> Sta
     smaller = np.fmin(np.abs(pressure), np.abs(distance))
     weak = ~fixed & (larger < SMALL) & (smaller >= WEAK * larger - TINY)
     ratio = pressure / np.maximum(distance, TINY)
-    return Status(fixed | (pressure > distance), high, weak, fixed, ratio)
+    return BoundStatus(fixed | (pressure > distance), high, weak, fixed, ratio)
 
 
-def statuses(optimum: Optimum) -> tuple[Status, Status]:
+def statuses(optimum: Optimum) -> tuple[BoundStatus, BoundStatus]:
     """Return the status of all unknowns and of all rows."""
     program, iterate, size = optimum.transcription.program, optimum.iterate, optimum.size
     return (
@@ -213,14 +213,14 @@ def per_unit(unit: str) -> str:
     return f"cost/({unit})" if " " in unit or "/" in unit else f"cost/{unit}"
 
 
-def active_conditions(optimum: Optimum, each: tuple[Status, Status]) -> ActiveConditions:
+def active_conditions(optimum: Optimum, each: tuple[BoundStatus, BoundStatus]) -> ActiveConditions:
     """Return the active conditions in the order of time; consecutive times are joined.
 
     Args:
         optimum: the solution.
         each: status of all unknowns and of all rows.
     """
-    status = Status.joined(*each)
+    status = BoundStatus.joined(*each)
     groups: dict[tuple[str, int], list[Entry]] = {}
     for entry in entries(optimum):
         groups.setdefault((entry.name, entry.place.span), []).append(entry)
@@ -252,7 +252,7 @@ def in_words(optimum: Optimum, signals: Collection[str]) -> list[str]:
     return [f"active: {'; '.join(map(str, named))}"] if 0 < len(named) <= SHOWN else []
 
 
-def _active(optimum: Optimum, status: Status, run: Sequence[Entry]) -> Active:
+def _active(optimum: Optimum, status: BoundStatus, run: Sequence[Entry]) -> Active:
     """Return the condition on the entries of a run, which are all active on the same side."""
     program, points = optimum.transcription.program, optimum.points.spans
     lam = np.concatenate([optimum.iterate.lam_w, optimum.iterate.lam_g])

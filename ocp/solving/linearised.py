@@ -23,7 +23,7 @@ import scipy.sparse as sp
 from scipy.sparse import linalg
 
 from ocp.formulation.phase import Array, fixed
-from ocp.solving.active import Entry, Status, entries, statuses
+from ocp.solving.active import BoundStatus, Entry, entries, statuses
 from ocp.solving.motion import Motion, at_times
 from ocp.solving.optimum import STATIONARY, Optimum, Sparse
 from ocp.solving.sensitivity import Condition, Sensitivity
@@ -107,8 +107,8 @@ class Linearised:
         return replace(self.optimum, iterate=replace(self.source.iterate, w=self.optimum.iterate.w))
 
     @cached_property
-    def status(self) -> tuple[Status, Status]:
-        """Status of all unknowns and of all rows, with the conditions `changed`."""
+    def status(self) -> tuple[BoundStatus, BoundStatus]:
+        """BoundStatus of all unknowns and of all rows, with the conditions `changed`."""
         w, g = statuses(self.optimum)
         active = np.concatenate([w.active, g.active])
         active[self.changed] ^= True
@@ -232,7 +232,7 @@ class Linearised:
     def by_condition(self, name: str) -> Change:
         """Return the effect of a prescribed value or of a bound."""
         n, iterate = self.optimum.iterate.w.size, self.central.iterate
-        active, high, _, equal, _ = Status.joined(*self.status)
+        active, high, _, equal, _ = BoundStatus.joined(*self.status)
         lam, shift, cost = np.append(iterate.lam_w, iterate.lam_g), np.zeros(active.size), 0.0
         for entry, upper in self.conditions[name]:
             k, scale = entry.number, entry.place.scale

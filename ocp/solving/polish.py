@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ocp.solving.active import Status
+from ocp.solving.active import BoundStatus
 from ocp.solving.linearised import Linearised
 from ocp.solving.optimum import STATIONARY, Optimum
 from ocp.transcription.program import worst_of
@@ -30,7 +30,7 @@ def determined(optimum: Optimum) -> Linearised:
     plain = Linearised(optimum)
     if plain.regular:
         return plain
-    active, _, _, fixed, ratio = Status.joined(*plain.status)
+    active, _, _, fixed, ratio = BoundStatus.joined(*plain.status)
     spare = plain.free.size - plain.held.size
     near = ~active & (ratio > NEAREST) if spare > 0 else active & ~fixed
     order = np.argsort(np.where(near, -ratio if spare > 0 else ratio, np.inf))

@@ -1,5 +1,7 @@
 """The estimator equals dense least squares on linear models, and estimates bristles and loads."""
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -88,6 +90,14 @@ def test_each_estimate_is_that_of_all_data_so_far() -> None:
     assert found.smooth["x"].size == 4
 
 
+def test_an_estimate_draws_its_signals_with_units() -> None:
+    found = estimated(*measured(9), horizon=4)
+    axes = found.plot("x", "load").axes
+    assert [axis.get_ylabel() for axis in axes] == ["x [m]", "load [N]"]
+    assert axes[1].lines[0].get_ydata() == pytest.approx(found["load"])
+    assert len(repr(found)) < 1000
+
+
 @pytest.mark.slow
 def test_bristles_and_a_load_are_estimated_from_positions() -> None:
     x, v = Variable("x", "m", nominal=0.1), Variable("v", "m/s", nominal=0.1)
@@ -140,16 +150,29 @@ def test_bad_input_is_described_at_once() -> None:
     row = np.zeros(5)
     given = {"step": 0.1, "horizon": 3}
     with pytest.raises(ValueError) as caught:
-        estimate(oscillator(), {"x": np.zeros(4), "f": row}, noise={"x": 0.0}, **given)
-    for part in ("input 'load'", "noise of 'x' above 0", "rows of equal length"):
+        estimate(oscillator(), {"x": np.zeros(4), "f": row}, noise={"x": 1.0}, **given)
+    for part in ("input 'load'", "rows of equal length"):
         assert part in str(caught.value)
     good = {"x": row, "f": row, "load": row}
     with pytest.raises(ValueError, match="signal that is not an input"):
         estimate(oscillator(), {"f": row, "load": row}, noise={}, **given)
-    with pytest.raises(ValueError, match="finite samples of 'f'"):
-        estimate(oscillator(), good | {"f": row * np.nan}, noise={"x": 1.0}, **given)
-    with pytest.raises(ValueError, match="estimate: spread"):
-        estimate(oscillator(), good, noise={"x": 1.0}, spread={"mass": 1.0}, **given)
+    changes: dict[str, dict[str, Any]] = {
+        "data of 'f': expected finite numbers, got nan": {"data": good | {"f": row * np.nan}},
+        "finite samples or NaN of 'x'": {"data": good | {"x": row + np.inf}},
+        "data of 'x': expected a sequence of numbers": {"data": good | {"x": ["a"] * 5}},
+        "data: expected values by name": {"data": 3},
+        "rows of equal length, not empty": {"data": dict.fromkeys(good, ())},
+        "spread: expected one of": {"spread": {"mass": 1.0}},
+        "spread of 'v' above 0": {"spread": {"v": 0.0}},
+        "start of 'x': expected a finite number": {"start": {"x": np.nan}},
+        "noise of 'x' above 0; noise of 'v' of at least 0": {"noise": {"v": -1.0}},
+        "noise of 'x': expected a finite number, got 'a'": {"noise": {"x": "a"}},
+        "unknown: expected a sequence of names": {"unknown": "load"},
+        "steps: expected a whole number >= 1": {"steps": 0},
+    }
+    for text, change in changes.items():
+        with pytest.raises(ValueError, match=f"estimate: .*{text}"):
+            estimate(oscillator(), **({"data": good, "noise": {"x": 1.0}} | given | change))
     with pytest.raises(ValueError, match="without events"):
         model = drive(ExactCoulomb(), m=1.0, N=1.0)
         estimate(model, {"x": row, "force": row}, noise={"x": 1.0}, **given)
