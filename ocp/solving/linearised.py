@@ -108,7 +108,7 @@ class Linearised:
 
     @cached_property
     def status(self) -> tuple[BoundStatus, BoundStatus]:
-        """BoundStatus of all unknowns and of all rows, with the conditions `changed`."""
+        """Status of all unknowns and of all rows, with the conditions `changed`."""
         w, g = statuses(self.optimum)
         active = np.concatenate([w.active, g.active])
         active[self.changed] ^= True
