@@ -207,14 +207,18 @@ def time_at(rows: Sequence[Row], error: float) -> float:
 
 # ---- curves ----
 
-ABREAST = 5
+ABREAST = 6
 """Largest number of panels in a row."""
 LEAST = 1e-14
 """Smallest value that is drawn."""
+DECADE = 10.0
+"""Ratio of the largest to the smallest ordinate below which their axis is linear."""
 
 
 def curves(panel: str, lines: Sequence[str], x: str, *ys: str) -> Draw:
     """Return a function that draws some columns over another column, with logarithmic axes.
+
+    The axis of ordinates within a decade is linear. The panels of a case are one below the other.
 
     Args:
         panel: column with a panel for each value.
@@ -236,18 +240,25 @@ def _draw_curves(
 
     cases = list(dict.fromkeys(row[panel] for row in rows))
     labels = list(dict.fromkeys(map(label, rows)))
-    points: dict[tuple[str, Cell, str], list[tuple[float, float]]] = {}
+    points: dict[tuple[str, Cell | None, str], list[tuple[float, float]]] = {}
     for y in ys:
         for row in rows:
             at, value = float(row[x]), float(row.get(y, "nan"))
             if isfinite(at) and isfinite(value):
                 points.setdefault((y, row[panel], label(row)), []).append((at, max(value, LEAST)))
-    tiles = [(y, case) for y in ys for case in cases if any(key[:2] == (y, case) for key in points)]
-    columns = min(len(tiles), ABREAST) or 1
-    height = -(-len(tiles) // columns) or 1
+    blocks = -(-len(cases) // ABREAST) or 1
+    columns = -(-len(cases) // blocks) or 1
+    height = blocks * len(ys)
     figure, grid_axes = grid(height, columns, 1.4 + 2.4 * max(columns, 3), 1.6 + 2.8 * height)
     axes = list(chain(*grid_axes))
-    for axis, (y, case) in zip(axes, tiles, strict=False):
+    padded = [*cases, *[None] * (blocks * columns - len(cases))]
+    starts = range(0, len(padded), columns)
+    tiles = [(y, case) for k in starts for y in ys for case in padded[k : k + columns]]
+    for axis, (y, case) in zip(axes, tiles, strict=True):
+        drawn = [b for key, line in points.items() if key[:2] == (y, case) for _, b in line]
+        if max(drawn, default=LEAST) <= LEAST:
+            axis.set_axis_off()
+            continue
         for k, name in enumerate(labels):
             line = points.get((y, case, name), [])
             bold = name.startswith("symfric")
@@ -259,13 +270,13 @@ def _draw_curves(
             )  # fmt: skip
             if len(line) > 1 and line[0][0] > line[-1][0] and not axis.xaxis_inverted():
                 axis.invert_xaxis()
+        if max(drawn) < DECADE * min(drawn):
+            axis.set_yscale("linear")
         axis.set_title(str(case).replace("_", " "), fontsize="small")
         axis.set_xlabel(x)
         axis.set_ylabel(y)
         axis.tick_params(which="both", labelsize="small")
         axis.xaxis.set_minor_formatter("")
-    for axis in axes[len(tiles) :]:
-        axis.set_axis_off()
     figure.legend(
         *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4,
         fontsize="small",
