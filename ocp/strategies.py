@@ -191,7 +191,7 @@ class Search:
         return Judged(with_sentence(solution, text), right=exact.ok)
 
     def _creeping(self, solution: Solution, exact: float) -> Solution:
-        """Return a motion that is right only with exact friction, where it misses by `exact`."""
+        """Return a motion that is valid only with exact friction, where it misses by `exact`."""
         found, layers = solution.verification, ""
         if found is None or not found.misses:
             return solution
@@ -203,7 +203,7 @@ class Search:
                     layers = f"a layer of {checks.listed(narrow.values())}, "
                     break
         text = (
-            f"ocp '{solution.problem.name}': The motion is right with exact Coulomb friction "
+            f"ocp '{solution.problem.name}': The motion is valid with exact Coulomb friction "
             f"(largest miss {exact:.1g}), but under the laws of the model, whose layers creep at "
             f"rest{grows}, {found.misses[0].sentence}; {layers}feedback along the motion, or the "
             "law ExactCoulomb or Exact(law) closes the gap."

@@ -23,7 +23,7 @@ of their typical magnitudes."""
 @final
 @dataclass(frozen=True, eq=False)
 class Soft:
-    """Condition that may be violated at a price; see `soft`."""
+    """Condition with a penalty for its violation; see `soft`."""
 
     condition: Callable[[Signals], object]
     linear: float

@@ -250,8 +250,8 @@ class _Path:
     ) -> list[Step]:  # fmt: skip
         """Solve with the widest layers from each start, until a solve is stopped.
 
-        Equal motions of several starts may be a local optimum, so they do not end the search: three
-        starts of the cart-pole of nosnoc agree on hanging still.
+        Equal motions of several starts do not end the search, as they may be a poor local optimum:
+        three starts of the cart-pole of nosnoc stay at the lower equilibrium.
         """
         steps: list[Step] = []
         for number, points in enumerate(tries, 1):

@@ -147,13 +147,13 @@ class ModeMotions:
         """Return a sentence about the margin of a motion and its share of `cost`, if active."""
         if not self.pressed:
             return ""
-        what = "is open"
+        what = "an unknown amount"
         if self.least in self.coarse:
             more, less = (self.coarse[m].ideal_cost for m in (self.first, self.least))
             slope = max(0.0, more - less) / (self.first - self.least)
             what = f"about {slope * margin:.2g} of {cost:.6g}"
-        few = "" if margin <= self.margin else "; with less none was found that is right"
-        return f"Rests keep {margin:.2g} of their static levels, which costs {what}{few}."
+        few = "" if margin <= self.margin else "; no valid motion was found with less"
+        return f"Stiction keeps {margin:.2g} of its level as a margin, which costs {what}{few}."
 
     def motion(self, margin: float) -> Solution:
         """Return the motion with one of the `margins` on fine intervals."""

@@ -130,15 +130,15 @@ def _run(
         return [*slope, case.running(math, x, u)]
 
     def event(i: int) -> Callable[[float, Array], float]:
-        def room(t: float, y: Array) -> float:
+        def distance(t: float, y: Array) -> float:
             if modes[i]:
                 return modes[i] * y[case.slips[i]] + REST
             x = y.tolist()[:-1]
             level = case.levels[i][0] * _loads(case, x, u)[i] * (1 + MARGIN)
             return level - abs(_forces(case, x, u, modes)[i])
 
-        room.terminal, room.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
-        return room
+        distance.terminal, distance.direction = True, -1  # pyright: ignore[reportFunctionMemberAccess]
+        return distance
 
     def minimum(i: int) -> Callable[[float, Array], float]:
         def change(t: float, y: Array) -> float:

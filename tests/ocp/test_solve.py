@@ -114,7 +114,7 @@ def test_motion_that_creeps_under_its_law_is_told_from_one_that_is_wrong() -> No
     creeping = found(1.8e-5)
     assert creeping.status is Status.TERMINAL_MISS
     sentence = creeping.message.split(". ")[0]
-    assert "The motion is right with exact Coulomb friction (largest miss" in sentence
+    assert "The motion is valid with exact Coulomb friction (largest miss" in sentence
     assert "under the laws of the model, whose layers creep at rest, " in sentence
     assert "feedback along the motion, or the law ExactCoulomb or Exact(law) closes" in sentence
     width = re.search(r"a layer of (\S+) m/s \(guide\)", sentence)
@@ -279,6 +279,6 @@ def test_ready_problems_have_contacts_and_a_program(ready: Ready) -> None:
 @pytest.mark.slow
 def test_equal_motions_of_some_starts_do_not_end_the_search() -> None:
     case = next(case for case in CASES if case.name == "cart_pole")
-    solution = solve(case.problem(), throw=False)  # three of its starts hang still, at 6470
+    solution = solve(case.problem(), throw=False)  # three starts stay down, at 6470
     assert solution.cost == pytest.approx(652.65, abs=0.05)
-    assert "right with exact Coulomb friction" in solution.message
+    assert "valid with exact Coulomb friction" in solution.message

@@ -256,7 +256,7 @@ def test_conveyor_has_its_closed_form_but_for_the_cost_of_its_margin(
 ) -> None:
     found = solve(conveyor(), resting_margin=margin)
     assert found.verified
-    text = re.search(r"Rests keep (\S+) of .*, which costs about (\S+) of", found.message)
+    text = re.search(r"Stiction keeps (\S+) of .*, which costs about (\S+) of", found.message)
     assert text is not None, found.message
     cost = float(text[2])
     assert float(text[1]) == margin
