@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
 
+import casadi as ca
 from numpy.typing import ArrayLike
 
+from ocp.formulation.expressions import kinks
 from ocp.formulation.problem import Problem, cost_size, sized
 from ocp.formulation.validate import doubts
 from ocp.solving.methods import Fatrop, Ipopt, Sqp
@@ -129,9 +131,10 @@ def solve(
     direct = Direct(posed, scheme, solver, intervals, goals, Supervisor(max_time, progress))
     search = Search(direct, tolerance, verify, resting_margin)
     solution = solved(search, friction, guess, starts)
-    odd = "" if solution.ok else doubts(problem)
-    if odd:
-        solution = replace(solution, message=f"{solution.message} {odd}")
+    if not solution.ok:
+        costs = dict.fromkeys(kinks(ca.vertcat(span.running, span.end)) for span in posed.spans)
+        causes = filter(None, [solution.message, doubts(problem), *costs])
+        solution = replace(solution, message=" ".join(causes))
     if throw and not solution.ok:
         raise SolveError(solution.message, solution.status, solution) from solution.cause
     return solution

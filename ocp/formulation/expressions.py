@@ -119,6 +119,22 @@ def constants(expression: ca.SX) -> Iterator[float]:
             yield float(f.instruction_constant(k))
 
 
+KINKS = {ca.OP_FABS: "abs", ca.OP_FMAX: "fmax", ca.OP_FMIN: "fmin"}
+"""Operation -> its name, of operations whose derivatives jump."""
+
+
+def kinks(expression: ca.SX) -> str:
+    """Return a sentence about operations in a cost whose derivatives jump, or ""."""
+    f = ca.Function("f", ca.symvar(expression), [expression])
+    found = {KINKS.get(f.instruction_id(k), "") for k in range(f.n_instructions())} - {""}
+    if not found:
+        return ""
+    return (
+        f"The cost contains {' and '.join(sorted(found))}, whose derivative jumps; write "
+        "absolute(...) for the integral of an absolute value, and largest(...) for a maximum."
+    )
+
+
 def comparisons(function: Callable[..., Any], *signals: Any) -> list[Comparison]:
     """Return the rows of the comparison `a <= b`, `a >= b` or `a == b` that `function` returns.
 

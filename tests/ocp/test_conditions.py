@@ -1,4 +1,4 @@
-"""Absolute values, maxima, soft, integral, point and complementary conditions against paper."""
+"""Absolute values, maxima, soft, integral, point and complementary conditions against closed forms."""
 
 from collections.abc import Callable
 from math import asin, pi, sqrt
@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 from ocp import (
     TIME,
+    Cost,
     Fatrop,
     Free,
     Legendre,
@@ -309,3 +310,13 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
 def test_bad_conditions_are_refused(make: Callable[[], object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         make()
+
+
+@pytest.mark.parametrize(
+    ("name", "cost"),
+    [("abs", integral(lambda s: abs(s.a))), ("fmax", integral(lambda s: ca.fmax(s.a, 0.0)))],
+)
+def test_a_kink_in_the_cost_is_named_with_its_remedy(name: str, cost: Cost) -> None:
+    solution = solve(Problem(Phase(MODEL, 2.0, **MOVE), cost), throw=False)
+    assert not solution.ok
+    assert f"The cost contains {name}, whose derivative jumps; write absolute" in solution.message
