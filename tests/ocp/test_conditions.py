@@ -1,4 +1,4 @@
-"""Absolute values, maxima, soft, integral, point and complementary conditions against closed forms."""
+"""Costs of absolute values and maxima, and further conditions, against closed forms."""
 
 from collections.abc import Callable
 from math import asin, pi, sqrt
