@@ -20,6 +20,7 @@ from symfric.foundation.panels import panels, save
 from symfric.foundation.parameters import check_names
 from symfric.foundation.status import Status
 from symfric.foundation.style import Line, colour, line
+from symfric.results.pictures import level
 from symfric.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -177,6 +178,8 @@ def plot_motions(
         for phase, span in zip(first.phases, spans, strict=False):
             _wanted(axis, phase, span, name)
         _modes(axis, modes)
+        if name.startswith(COSTATE):  # other signals have bounds that remain visible
+            level(axis, [one.motion[name] for one in drawn])
         axis.set_ylabel(f"{name} [{first.units[name]}]")
     _explain(axes[0], drawn, modes)
     lines = "lines: simulated" if all(one.runs for one in drawn) else "lines: optimised"
