@@ -36,7 +36,7 @@ from symfric.foundation.status import Status
 
 ROUNDING = 1e-6
 """Error of simulation and interpolation, relative to the range of a signal."""
-BALANCE = 1e-3
+BALANCE = 2e-4
 """The same error for a force, limited by filtering and differentiation of the motion."""
 FORCES = ("N", "N m")
 
@@ -98,8 +98,8 @@ WHITE = 0.05
 """Level of the test of one channel for white noise, which does not affect the verdict."""
 SHARE = 0.05
 """Share of the variance of the residuals below which a dependence is ignored."""
-SMOOTHED = 5e-3
-"""Size of an ignored dependence on a smoothed acceleration, relative to the range of a signal."""
+MOVED = 1.0
+"""Change of the fitted values by the missing term, in standard errors, below which it is ignored."""
 UNEXPLAINED = 0.7
 """Ratio of residuals to the spread of the signal above which a model explains almost nothing."""
 LITTLE = 0.9
@@ -233,10 +233,9 @@ def _independent(
     name, unit, r = found.label(channel), channel.unit, found.r[channel.rows]
     fine, weighted = resolution(channel.measured, channel.unit), float(np.linalg.norm(r))
     level = float(np.linalg.norm(found.raw[channel.rows])) / weighted if weighted > 0 else 1.0
-    for family, (statistic, p, explained) in some:
+    for family, (statistic, p, explained, moved) in some:
         size, share = explained * level, explained**2 / (float(r @ r) / r.size)
-        least = SMOOTHED * float(np.ptp(channel.measured)) if family.smoothed else fine
-        passed = p >= limit or size <= least or share < SHARE
+        passed = p >= limit or size <= fine or (share < SHARE and moved < MOVED)
         text = (
             f"The residuals of {name} depend on {family.what}: {size:.2g} {unit} rms, "
             f"{100 * min(share, 1.0):.0f} % of their variance ({family.hint})."

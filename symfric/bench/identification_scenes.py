@@ -34,7 +34,7 @@ STAGE = {"m": M, "offset": OFFSET}
 BRISTLE = {"sigma_0": 1e5, "sigma_1": 300.0}
 SPEED, SECONDS, RATE, FINE = 0.08, 12.0, 500.0, 10
 """Largest speed [m/s], length [s] and sampling rate [1/s] of a record; fine steps per sample."""
-NOISE, FINEST = 0.5, 2e-8
+NOISE, FINEST = 0.5, 1e-9
 """Standard deviations of the noise of a force [N], and of a position that is as good as exact [m]."""
 
 
