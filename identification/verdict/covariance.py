@@ -34,11 +34,13 @@ class Levels(NamedTuple):
             coefficient.
         largest: largest friction force in the data [N or N m].
         unit: unit of the forces.
+        curve: largest force of the law in steady sliding at the measured speeds, in both directions.
     """
 
     loads: Mapping[str, float]
     largest: float
     unit: str = "N"
+    curve: float = 0.0
 
     def beyond(self, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
         """Yield the name of each level far above all forces, with a message."""
@@ -54,8 +56,6 @@ LEVEL = 0.95
 """Confidence level of the intervals."""
 TOGETHER = 0.98
 """Correlation above which two estimates are reported as strongly correlated."""
-FEW = 3.0
-"""Effective samples per unknown below which intervals are unreliable."""
 HARDLY = 0.5
 """Ratio of standard error to value above which a value is reported as poorly identified."""
 DECADES = 8.0
@@ -132,8 +132,7 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     """Compute the uncertainty of the values at a minimum.
 
     Limits: linear in the values, or in the logarithms of logarithmic unknowns; see `profile` for
-    nonlinear intervals. Channels are independent. With fewer effective samples than three times the
-    number of unknowns, the intervals are too small, and a message says so.
+    nonlinear intervals. Channels are independent.
 
     Args:
         found: the minimum.
@@ -158,7 +157,7 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     effective = {n: c.effective for n, c in zip(labels, inside.colours, strict=True)}
     weak = _weak(found, matrix, low, high, {*far, *gone})
     alone = [sentence for _, sentence in lost]
-    messages = (*alone, *far.values(), *gone.values(), *weak, *_few(found, effective))
+    messages = (*alone, *far.values(), *gone.values(), *weak)
     notes = dict.fromkeys(gone, LOST) | dict.fromkeys(far, BEYOND)
     out = np.array([name in notes for name in names], dtype=bool)
     return Covariance(
@@ -252,10 +251,3 @@ def _weak(
             f"{units.get(name, '')} with 95 %{goes}."
         )
 
-
-def _few(found: Minimum, effective: dict[str, float]) -> Iterator[str]:
-    count = sum(effective.values())
-    n = int((~found.held).sum())
-    if n and count < FEW * n:
-        text = f"The autocorrelated residuals are worth only {count:.0f} independent samples for "
-        yield f"{text}{n} unknowns: the intervals are likely too small."

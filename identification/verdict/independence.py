@@ -283,7 +283,7 @@ def _added(
         return None
     weights = new.T @ rest
     explained = float(weights @ weights)
-    left = max(float(rest @ rest) - explained, np.finfo(float).tiny)
+    left = max(float(rest @ rest) - explained, 1e-15 * float(rest @ rest), np.finfo(float).tiny)
     statistic = explained / q / (left / free)
     weights, *_ = np.linalg.lstsq(clean, rest, rcond=1e-6)
     part = _without(basis, plain @ weights)  # explained part before whitening

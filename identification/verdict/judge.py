@@ -15,8 +15,7 @@ Therefore
 
 The tests have two limits. Residuals below the `resolution` of a measured signal carry no
 information. Bristles are assumed relaxed where a record starts near rest; if the machine was loaded
-before, the force is wrong until they have slid once, which biases stiffness and damping
-(`beginnings`).
+before, the force is wrong until they have slid once, which biases stiffness and damping.
 """
 
 from collections.abc import Iterator, Mapping
@@ -30,6 +29,7 @@ from identification.data.findings import Findings
 from identification.residuals.evaluation import Array, Channel
 from identification.residuals.sampled import moving_start
 from identification.verdict.colour import Colour, Whiteness, whiteness
+from identification.verdict.covariance import FAR, Levels
 from identification.verdict.independence import Dependence, Family, dependences, inputs_of
 from identification.verdict.minimum import Minimum, positions
 from symfric.foundation.status import Status
@@ -70,8 +70,13 @@ white or autocorrelated, exceed it in 1 of 10 000 cases.
 """
 
 
-def beginnings(found: Minimum) -> Iterator[str]:
-    """Yield a message for each channel whose first residuals are much larger than later ones.
+def _rms(r: Array) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(r**2)))
+
+
+def _beginnings(found: Minimum) -> Iterator["Test"]:
+    """Test whether the first residuals of a channel are much larger than later ones.
 
     Limits: only records in order of time with a velocity among the regressors. A model that is
     wrong at the beginning for another reason, such as a decay from its largest swing, gives the
@@ -82,14 +87,13 @@ def beginnings(found: Minimum) -> Iterator[str]:
         count = int(FIRST * r.size)
         if v is None or not channel.ordered or count < FEWEST or moving_start(v) != 0.0:
             continue
-        first, later = (float(np.sqrt(np.mean(part**2))) for part in (r[:count], r[count:]))
-        ratio = first / max(later, 1e-300)
-        if ratio > LARGER:
-            yield (
-                f"The residuals of {found.label(channel)} are {ratio:.2g} times as large in its "
-                f"first {count} samples as after: the record starts under load or in another "
-                "unknown state; start it in sliding, or unloaded."
-            )
+        ratio, name = _rms(r[:count]) / max(_rms(r[count:]), 1e-300), found.label(channel)
+        text = (
+            f"The residuals of {name} are {ratio:.2g} times as large in its "
+            f"first {count} samples as after: the record starts under load or in another "
+            "unknown state; start it in sliding, or unloaded."
+        )
+        yield Test(name, "start", ratio, 0.0, LARGER, ratio <= LARGER, True, text)
 
 
 ALARM = 0.02
@@ -106,6 +110,8 @@ LITTLE = 0.9
 """The same ratio without a value at a bound; the fit then explains a fifth of the variance."""
 CHANCE = 10.0
 """Smallest ratio of the explained variance to that of as many regressors of pure noise."""
+FEW = 2.0
+"""Effective samples per unknown below which a fit is doubtful; intervals are honest above it."""
 INERTIA = ("kg", "kg m^2")
 NEARLY = 0.1
 """Predicted gain of an unfinished search, relative to the cost, below which tests are valid."""
@@ -180,8 +186,16 @@ class Verdict:
         return Status.IMPLAUSIBLE if self.nonsense else Status.DOUBTFUL
 
 
-def judge(found: Minimum, findings: Findings | None = None) -> Verdict:
-    """Assess a minimum; errors in its data make the result implausible."""
+def judge(
+    found: Minimum, findings: Findings | None = None, levels: Levels | None = None
+) -> Verdict:
+    """Assess a minimum.
+
+    Args:
+        found: the minimum.
+        findings: findings in the data; errors make the result implausible.
+        levels: forces of the law and of the data, if known.
+    """
     white = dict[str, Whiteness]()
     tests, effective = list[Test](), dict[str, float]()
     each = list[tuple[Channel, list[tuple[Family, Dependence]]]]()
@@ -198,13 +212,15 @@ def judge(found: Minimum, findings: Findings | None = None) -> Verdict:
     count = sum(len(some) for _, some in each)
     for channel, some in each:
         tests += _independent(found, channel, some, ALARM / max(count, 1))
-    tests += _explained(found)
+    tests += [*_explained(found), *_few(found, effective), *_box(found), *_beginnings(found)]
+    tests += _extrapolated(levels) if levels is not None else []
     errors = () if findings is None else tuple(e.sentence for e in findings.errors)
     nonsense = (*errors, *_unexplained(found, effective), *_no_mass(found))
-    bounds = [f"Values at a bound: {', '.join(at)}."] if (at := _at_bound(found)) else []
+    at = [name for name in _at_bound(found) if name not in _at_box(found)]
+    bounds = [f"Values at a bound: {', '.join(at)}."] if at else []
     failed = [t for t in tests if not t.passed]
     failed.sort(key=lambda t: (not t.decides, t.p))
-    messages = (*nonsense, *beginnings(found), *(t.sentence for t in failed), *bounds)
+    messages = (*nonsense, *(t.sentence for t in failed), *bounds)
     return Verdict(tuple(tests), effective, white, nonsense, messages)
 
 
@@ -259,7 +275,7 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
     name = found.label(channel)
     robust = bool((found.gain[channel.rows] != 1.0).any())
     left = sigma * found.r[channel.rows] if robust else found.raw[channel.rows]
-    rms = float(np.sqrt(np.mean(left**2)))
+    rms = _rms(left)
     free = max(colour.effective * colour.freedom / colour.rows, 1.0)
     p = float(chdtrc(free, free * (rms / sigma) ** 2))
     limit = ALARM / len(found.channels)
@@ -294,6 +310,42 @@ def _explained(found: Minimum) -> Iterator[Test]:
         yield Test(signal, "explained", share, 0.0, limit, share < limit, True, text)
 
 
+def _few(found: Minimum, effective: Mapping[str, float]) -> Iterator[Test]:
+    """Test whether the residuals are worth enough independent samples for the unknowns.
+
+    Fewer samples determine neither the intervals nor whether the residuals are noise at all: slow
+    model errors and slow noise look alike.
+    """
+    n, count = int((~found.held).sum()), sum(effective.values())
+    exact = all(_rms(found.raw[c.rows]) <= resolution(c.measured, c.unit) for c in found.channels)
+    if not n or exact or count >= sum(c.t.size for c in found.channels):
+        return
+    text = (
+        f"The autocorrelated residuals are worth only {count:.0f} independent samples for {n} "
+        "unknowns: they may be a model error, and the intervals are likely too small."
+    )
+    share = count / n
+    yield Test("all", "effective samples", share, 0.0, FEW, share >= FEW, True, text)
+
+
+def _box(found: Minimum) -> Iterator[Test]:
+    """Test whether a value is at a bound of the search."""
+    if at := _at_box(found):
+        text = f"Values at a bound of the search: {', '.join(at)}; the data do not determine them."
+        yield Test("all", "bound", float(len(at)), 0.0, 0.0, False, True, text)
+
+
+def _extrapolated(levels: Levels) -> Iterator[Test]:
+    """Test whether the law stays near the measured forces at all measured speeds, both ways."""
+    ratio = levels.curve / levels.largest if levels.largest > 0 else 0.0
+    text = (
+        f"The friction of the law reaches {levels.curve:.3g} {levels.unit} within the measured "
+        f"speeds, the data only {levels.largest:.3g} {levels.unit}: a direction or a speed "
+        "is missing in the data."
+    )
+    yield Test("all", "extrapolation", ratio, 0.0, FAR, ratio <= FAR, True, text)
+
+
 def _unexplained(found: Minimum, effective: Mapping[str, float]) -> Iterator[str]:
     """Yield a message for each signal that is almost entirely unexplained.
 
@@ -321,6 +373,17 @@ def _no_mass(found: Minimum) -> Iterator[str]:
                 f"{unknown.name} is at its lower bound, {value:.3g} {unknown.unit}: the force does "
                 "not depend on the acceleration, or one of them has the wrong sign."
             )
+
+
+def _at_box(found: Minimum) -> list[str]:
+    """Return the values at a bound that is neither zero nor another value, and that matter."""
+    both = zip(found.unknowns, found.held, np.abs(found.J).max(axis=0, initial=0.0), strict=True)
+    names = [
+        u.name
+        for u, held, effect in both
+        if held and effect > 0 and not u.partner and not u.nuisance and 0.0 not in (u.lower, u.upper)
+    ]
+    return names
 
 
 def _at_bound(found: Minimum) -> list[str]:

@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 M, OFFSET = 95.0, -3.0
 """Mass [kg] and constant force [N] of the stage."""
 CURVE = {"mu_s": 28.0, "mu_d": 20.0, "v_s": 0.01, "sigma_2": 200.0}
+HIDDEN = CURVE | {"v_s": 1e-3}
 PLAIN = {"mu_d": 20.0, "sigma_2": 200.0}
 STAGE = {"m": M, "offset": OFFSET}
 BRISTLE = {"sigma_0": 1e5, "sigma_1": 300.0}
@@ -344,12 +345,13 @@ SCENES = (
     Scene("stage, no peak, stribeck fitted", "right", partial(stage, friction=flat, position=FINEST),
           COULOMB),
     Scene("stage, peak hardly in the data", "right",
-          partial(stage, position=FINEST, noise=2.0, fast=2.0), STRIBECK),
+          partial(wrong, friction=partial(curve, **HIDDEN), noise=2.0), STAGE | HIDDEN),
     Scene("bristles", "right", memory, BRISTLE),
     Scene("creeping bristles", "right", partial(memory, creeping=True),
           {"sigma_0": BRISTLE["sigma_0"]}),
     Scene("shooting", "right", shooting, BLOCK),
-    Scene("shooting, AR(1) 0.9", "right", partial(shooting, rho=0.9), BLOCK),
+    Scene("shooting, AR(1) 0.6", "right", partial(shooting, rho=0.6), BLOCK),
+    Scene("shooting, AR(1) 0.9", "record", partial(shooting, rho=0.9), BLOCK),
     Scene("stage, position noise 0.1 um", "record", stage, STRIBECK),
     Scene("stage, position noise 1 um", "record", partial(stage, position=1e-6), STRIBECK),
     Scene("stage, position noise 5 um", "record", partial(stage, position=5e-6), STRIBECK),
