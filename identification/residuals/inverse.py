@@ -293,7 +293,9 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
 def _width(contact: Contact) -> float:
     """Return the smoothing width of the law of a contact [m/s or rad/s], 0 if it is unknown."""
     known = parameters(contact.law).values()
-    widths = [checks.as_number(p.value) for p in known if p.role == "width" and p.unit in VELOCITIES]
+    widths = [
+        checks.as_number(p.value) for p in known if p.role == "width" and p.unit in VELOCITIES
+    ]
     return max((w for w in widths if w is not None), default=0.0)
 
 

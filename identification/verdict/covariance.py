@@ -34,7 +34,7 @@ class Levels(NamedTuple):
             coefficient.
         largest: largest friction force in the data [N or N m].
         unit: unit of the forces.
-        curve: largest force of the law in steady sliding at the measured speeds, in both directions.
+        curve: largest force of the law in steady sliding at the measured speeds, both ways.
     """
 
     loads: Mapping[str, float]
@@ -250,4 +250,3 @@ def _weak(
             f"{name} is poorly identified: between {low[i]:.3g} and {high[i]:.3g}"
             f"{units.get(name, '')} with 95 %{goes}."
         )
-

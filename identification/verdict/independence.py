@@ -77,9 +77,7 @@ class Family(NamedTuple):
     columns: Array
 
 
-def families(
-    regressors: Sequence[Regressor], position: Count, basis: Array
-) -> Iterator[Family]:
+def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> Iterator[Family]:
     """Yield the families of all `regressors`, with fewer columns if there are few rows.
 
     Args:
@@ -262,9 +260,7 @@ def _best(
     return k, best._replace(p=min(1.0, best.p * len(found)))
 
 
-def _added(
-    known: Array, basis: Array, r: Array, columns: Array, plain: Array
-) -> Dependence | None:
+def _added(known: Array, basis: Array, r: Array, columns: Array, plain: Array) -> Dependence | None:
     """Return F of added columns.
 
     Args:

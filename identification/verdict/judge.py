@@ -103,7 +103,7 @@ WHITE = 0.05
 SHARE = 0.05
 """Share of the variance of the residuals below which a dependence is ignored."""
 MOVED = 1.0
-"""Change of the fitted values by the missing term, in standard errors, below which it is ignored."""
+"""Change of the fitted values by a missing term, in standard errors, below which it is ignored."""
 UNEXPLAINED = 0.7
 """Ratio of residuals to the spread of the signal above which a model explains almost nothing."""
 LITTLE = 0.9
@@ -378,12 +378,8 @@ def _no_mass(found: Minimum) -> Iterator[str]:
 def _at_box(found: Minimum) -> list[str]:
     """Return the values at a bound that is neither zero nor another value, and that matter."""
     both = zip(found.unknowns, found.held, np.abs(found.J).max(axis=0, initial=0.0), strict=True)
-    names = [
-        u.name
-        for u, held, effect in both
-        if held and effect > 0 and not u.partner and not u.nuisance and 0.0 not in (u.lower, u.upper)
-    ]
-    return names
+    inside = [u for u, held, effect in both if held and effect > 0 and not u.nuisance]
+    return [u.name for u in inside if not u.partner and 0.0 not in (u.lower, u.upper)]
 
 
 def _at_bound(found: Minimum) -> list[str]:

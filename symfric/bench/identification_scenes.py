@@ -36,7 +36,7 @@ BRISTLE = {"sigma_0": 1e5, "sigma_1": 300.0}
 SPEED, SECONDS, RATE, FINE = 0.08, 12.0, 500.0, 10
 """Largest speed [m/s], length [s] and sampling rate [1/s] of a record; fine steps per sample."""
 NOISE, FINEST = 0.5, 1e-9
-"""Standard deviations of the noise of a force [N], and of a position that is as good as exact [m]."""
+"""Standard deviations of the noise of a force [N] and of a nearly exact position [m]."""
 
 
 @final
@@ -193,8 +193,8 @@ def memory(
     Args:
         rng: generator of motion and noise.
         start: deflection of the bristles at the first sample, relative to mu_s / sigma_0.
-        noise, position: standard deviations of the noise of force [N] and position [m]; the velocity
-            is the derivative of the noisy position.
+        noise, position: standard deviations of the noise of force [N] and position [m]; the
+            velocity is the derivative of the noisy position.
         creeping: only the stiffness is unknown, in slow motion.
     """
     whole = motion(rng, 2e-3 if creeping else 0.03, 0.0)
@@ -330,8 +330,8 @@ def root(v: Array) -> Array:
 STRIBECK = STAGE | CURVE
 COULOMB = STAGE | PLAIN
 flat = partial(plain, **PLAIN)
-wrong = partial(stage, position=FINEST)
-simple = partial(wrong, law="coulomb+viscous", friction=flat, position=FINEST)
+fine = partial(stage, position=FINEST)
+simple = partial(fine, law="coulomb+viscous", friction=flat, position=FINEST)
 """Stage with Coulomb and viscous friction, truly and in the model."""
 
 SCENES = (
@@ -340,12 +340,11 @@ SCENES = (
     Scene("curve, stribeck", "right", points, CURVE),
     Scene("stage, coulomb+viscous", "right", simple, COULOMB),
     Scene("stage, coulomb+viscous, AR(1) 0.9", "right", partial(simple, rho=0.9), COULOMB),
-    Scene("stage, stribeck", "right", partial(stage, position=FINEST), STRIBECK),
-    Scene("stage, stribeck, AR(1) 0.9", "right", partial(stage, position=FINEST, rho=0.9), STRIBECK),
-    Scene("stage, no peak, stribeck fitted", "right", partial(stage, friction=flat, position=FINEST),
-          COULOMB),
+    Scene("stage, stribeck", "right", fine, STRIBECK),
+    Scene("stage, stribeck, AR(1) 0.9", "right", partial(fine, rho=0.9), STRIBECK),
+    Scene("stage, no peak, stribeck fitted", "right", partial(fine, friction=flat), COULOMB),
     Scene("stage, peak hardly in the data", "right",
-          partial(wrong, friction=partial(curve, **HIDDEN), noise=2.0), STAGE | HIDDEN),
+          partial(fine, friction=partial(curve, **HIDDEN), noise=2.0), STAGE | HIDDEN),
     Scene("bristles", "right", memory, BRISTLE),
     Scene("creeping bristles", "right", partial(memory, creeping=True),
           {"sigma_0": BRISTLE["sigma_0"]}),
@@ -366,14 +365,14 @@ SCENES = (
     Scene("bristles, position noise 0.2 um", "record",
           partial(memory, creeping=True, position=2e-7), {"sigma_0": BRISTLE["sigma_0"]}),
     Scene("bristles, loaded start", "record", partial(memory, start=0.9), BRISTLE),
-    Scene("stage, drift in time", "wrong", partial(wrong, change=drift), STRIBECK),
-    Scene("stage, warming up", "wrong", partial(wrong, change=warm_up), STRIBECK),
-    Scene("stage, uneven track", "wrong", partial(wrong, change=uneven), STRIBECK),
-    Scene("stage, cogging", "wrong", partial(wrong, change=cogging), STRIBECK),
-    Scene("stage, wrong mass", "wrong", partial(wrong, given={"fixed": {"m": 0.95 * M}}), STRIBECK),
-    Scene("stage, no peak in the model", "wrong", partial(wrong, law="coulomb+viscous"), COULOMB),
+    Scene("stage, drift in time", "wrong", partial(fine, change=drift), STRIBECK),
+    Scene("stage, warming up", "wrong", partial(fine, change=warm_up), STRIBECK),
+    Scene("stage, uneven track", "wrong", partial(fine, change=uneven), STRIBECK),
+    Scene("stage, cogging", "wrong", partial(fine, change=cogging), STRIBECK),
+    Scene("stage, wrong mass", "wrong", partial(fine, given={"fixed": {"m": 0.95 * M}}), STRIBECK),
+    Scene("stage, no peak in the model", "wrong", partial(fine, law="coulomb+viscous"), COULOMB),
     Scene("stage, bristles as coulomb+viscous", "wrong",
-          partial(wrong, law="coulomb+viscous", bristles=True), COULOMB),
+          partial(fine, law="coulomb+viscous", bristles=True), COULOMB),
     Scene("stage, asymmetric", "wrong", partial(simple, friction=asymmetric), COULOMB),
     Scene("curve, quadratic drag", "wrong",
           partial(points, law="coulomb+viscous", friction=quadratic), PLAIN),
@@ -386,7 +385,7 @@ SCENES = (
           STAGE | {"mu_d_pos": 22.0, "mu_d_neg": 20.0, "sigma_2_pos": 220.0, "sigma_2_neg": 200.0},
           True),
     Scene("kept: curve of few points", "right", partial(points, count=30), CURVE, True),
-    Scene("kept: stage, held force", "record", partial(wrong, change=held), STRIBECK, True),
+    Scene("kept: stage, held force", "record", partial(fine, change=held), STRIBECK, True),
     Scene("kept: stage, encoder 1 um, AR(1) 0.7", "record",
           partial(stage, position=0.0, change=encoder(1e-6), rho=0.7), STRIBECK, True),
     Scene("kept: stage, one-sided gain", "wrong", partial(simple, change=gained), COULOMB, True),
