@@ -15,6 +15,7 @@ from identification.solving.task import Point, Task
 from identification.unknowns.subject import Closed, Subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.covariance import Covariance, Levels, covariance
+from identification.verdict.identifiable import assured
 from identification.verdict.minimum import Minimum, minimum
 from symfric.foundation import checks
 
@@ -82,8 +83,8 @@ class Live:
 
     @cached_property
     def covariance(self) -> Covariance:
-        """Covariance of the values at the minimum."""
-        return covariance(self.minimum, self.levels)
+        """Covariance of the values at the minimum, with the intervals of nonlinear models."""
+        return assured(self.task, self.point, covariance(self.minimum, self.levels))
 
     @cached_property
     def closed(self) -> Closed:

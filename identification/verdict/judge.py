@@ -4,12 +4,14 @@ A least-squares fit reaches a minimum for any model. The residuals of a correct 
 is independent of inputs and motion, ideally white noise with the size of the sensor noise.
 Therefore
 
-* dependence on inputs, speed, direction, position or history makes a fit doubtful, because the
-  model is wrong;
+* dependence on inputs, speed, direction, position, time or history makes a fit doubtful, because
+  the model is wrong;
 * residuals larger than a given noise level make it doubtful;
+* so do autocorrelated residuals that are worth few independent samples, values at bounds of the
+  search, friction far beyond the measured forces, and a record that starts under load;
 * a signal that is almost entirely unexplained makes it doubtful, even if its residuals look like
   noise; so does a value at its bound if much is unexplained;
-* autocorrelation alone does not, because the intervals account for it, see `covariance`;
+* other autocorrelation does not, because the intervals account for it, see `covariance`;
 * errors in the data, a mass at its bound, or residuals as large as the signal make a result
   implausible.
 
@@ -26,39 +28,14 @@ from typing import final
 import numpy as np
 
 from identification.data.findings import Findings
-from identification.residuals.evaluation import Array, Channel
+from identification.residuals.evaluation import Channel
 from identification.residuals.sampled import moving_start
-from identification.verdict.colour import Colour, Whiteness, whiteness
+from identification.verdict.colour import Colour, Whiteness, span, whiteness
 from identification.verdict.covariance import FAR, Levels
 from identification.verdict.independence import Dependence, Family, dependences, inputs_of
 from identification.verdict.minimum import Minimum, positions
+from identification.verdict.resolution import resolution, rms
 from symfric.foundation.status import Status
-
-ROUNDING = 1e-6
-"""Error of simulation and interpolation, relative to the range of a signal."""
-BALANCE = 2e-4
-"""The same error for a force, limited by filtering and differentiation of the motion."""
-FORCES = ("N", "N m")
-
-
-def resolution(measured: Array, unit: str) -> float:
-    """Return the rms error of rounding and simulation, in the unit of the signal.
-
-    A signal is rounded if its values are multiples of the smallest step between them.
-    """
-    values = np.unique(measured)
-    reach = float(values[-1] - values[0])
-    floor = (BALANCE if unit in FORCES else ROUNDING) * max(
-        reach, 1e-3 * float(np.abs(values).max())
-    )
-    steps = np.diff(values)
-    steps = steps[steps > 1e-9 * reach]
-    if not steps.size:
-        return floor
-    count = (values - values[0]) / float(steps.min())
-    rounded = np.abs(count - np.rint(count)).max() < 0.1 and values.size < 0.9 * measured.size
-    return max(floor, float(steps.min()) / np.sqrt(12)) if rounded else floor
-
 
 FIRST = 0.05
 """Initial share of a record that is compared with the remaining record."""
@@ -68,11 +45,6 @@ LARGER = 4.0
 """Ratio of initial residuals to later ones above which a message is given; Gaussian residuals,
 white or autocorrelated, exceed it in 1 of 10 000 cases.
 """
-
-
-def _rms(r: Array) -> float:
-    """Return the root mean square."""
-    return float(np.sqrt(np.mean(r**2)))
 
 
 def _beginnings(found: Minimum) -> Iterator["Test"]:
@@ -87,7 +59,7 @@ def _beginnings(found: Minimum) -> Iterator["Test"]:
         count = int(FIRST * r.size)
         if v is None or not channel.ordered or count < FEWEST or moving_start(v) != 0.0:
             continue
-        ratio, name = _rms(r[:count]) / max(_rms(r[count:]), 1e-300), found.label(channel)
+        ratio, name = rms(r[:count]) / max(rms(r[count:]), 1e-300), found.label(channel)
         text = (
             f"The residuals of {name} are {ratio:.2g} times as large in its "
             f"first {count} samples as after: the record starts under load or in another "
@@ -112,6 +84,8 @@ CHANCE = 10.0
 """Smallest ratio of the explained variance to that of as many regressors of pure noise."""
 FEW = 2.0
 """Effective samples per unknown below which a fit is doubtful; intervals are honest above it."""
+SCORE = 3.84
+"""Score of a bound above which a value at the bound matters, chi2 with 5 %."""
 INERTIA = ("kg", "kg m^2")
 NEARLY = 0.1
 """Predicted gain of an unfinished search, relative to the cost, below which tests are valid."""
@@ -275,16 +249,16 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
     name = found.label(channel)
     robust = bool((found.gain[channel.rows] != 1.0).any())
     left = sigma * found.r[channel.rows] if robust else found.raw[channel.rows]
-    rms = _rms(left)
+    size = rms(left)
     free = max(colour.effective * colour.freedom / colour.rows, 1.0)
-    p = float(chdtrc(free, free * (rms / sigma) ** 2))
+    p = float(chdtrc(free, free * (size / sigma) ** 2))
     limit = ALARM / len(found.channels)
-    passed = p >= limit or rms <= resolution(channel.measured, channel.unit)
+    passed = p >= limit or size <= resolution(channel.measured, channel.unit)
     text = (
-        f"The residuals of {name} are {rms:.2g} {channel.unit}, {rms / sigma:.2g} times the given "
-        f"noise level."
+        f"The residuals of {name} are {size:.2g} {channel.unit}, {size / sigma:.2g} times the "
+        f"given noise level."
     )
-    yield Test(name, "size", rms / sigma, p, limit, passed, True, text)
+    yield Test(name, "size", size / sigma, p, limit, passed, True, text)
 
 
 def _left(found: Minimum) -> Iterator[tuple[str, float, float]]:
@@ -317,7 +291,7 @@ def _few(found: Minimum, effective: Mapping[str, float]) -> Iterator[Test]:
     model errors and slow noise look alike.
     """
     n, count = int((~found.held).sum()), sum(effective.values())
-    exact = all(_rms(found.raw[c.rows]) <= resolution(c.measured, c.unit) for c in found.channels)
+    exact = all(rms(found.raw[c.rows]) <= resolution(c.measured, c.unit) for c in found.channels)
     if not n or exact or count >= sum(c.t.size for c in found.channels):
         return
     text = (
@@ -376,10 +350,23 @@ def _no_mass(found: Minimum) -> Iterator[str]:
 
 
 def _at_box(found: Minimum) -> list[str]:
-    """Return the values at a bound that is neither zero nor another value, and that matter."""
-    both = zip(found.unknowns, found.held, np.abs(found.J).max(axis=0, initial=0.0), strict=True)
-    inside = [u for u, held, effect in both if held and effect > 0 and not u.nuisance]
-    return [u.name for u in inside if not u.partner and 0.0 not in (u.lower, u.upper)]
+    """Return the values at a bound that is neither zero nor another value, and that matter.
+
+    A value matters if the cost would fall significantly beyond the bound: a score test (Lagrange
+    multiplier) with the effective number of samples.
+    """
+    basis = span(found.J * ~found.held)
+    worth = sum(c.effective for c in found.sandwich.colours) / found.r.size
+    names = list[str]()
+    for u, held, column in zip(found.unknowns, found.held, found.J.T, strict=True):
+        if not held or u.partner or u.nuisance or 0.0 in (u.lower, u.upper):
+            continue
+        clean = column - basis @ (basis.T @ column)
+        size = float(np.linalg.norm(clean))
+        if size > 1e-9 * float(np.linalg.norm(column)):
+            score = float(clean @ found.r) / size / max(rms(found.r), 1e-300)
+            names += [u.name] * (score**2 * worth > SCORE)
+    return names
 
 
 def _at_bound(found: Minimum) -> list[str]:
