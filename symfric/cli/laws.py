@@ -63,7 +63,7 @@ def laws(
     if check:
         if not name:
             raise ValueError("--check: expected the name of a law before it, got none")
-        report = check_law(opt.with_settings(opt.any_named_law(name), name, texts))
+        report = check_law(opt.with_settings(opt.named_law(name), name, texts))
         content = {"law": name, "remarks": [one._asdict() for one in report.remarks]}
         show = partial(output.show_table, ["check", "result", "finding"], report.remarks)
         return output.finish(content, json, show)

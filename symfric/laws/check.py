@@ -347,8 +347,8 @@ def _states(s: Subject) -> Results:
     v = s.scale * np.array([-1000.0, -300.0, 300.0, 1000.0])
     z, usual = s.steady(v, 1.0), np.abs(s.steady(s.speeds, 1.0)).max(axis=1)
     rate, other = np.abs(s.at(v, 1.0, z)[3]), np.abs(s.at(v, 1.0, 0.9 * z)[3])
-    moving = (rate > CLOSE * other).any(axis=1) & (other > 0).any(axis=1)
-    for state, wrong, size in zip(s.law.states, moving, usual, strict=True):
+    moving = np.any(rate > CLOSE * other, axis=1) & np.any(other > 0, axis=1)
+    for state, wrong, size in zip(s.law.states, moving.tolist(), usual, strict=True):
         yield "moving" if wrong and not state.whole else "constant", {"name": state.name}
         if size and not 1e-3 < state.nominal / size < 1e3:
             values = {"nominal": state.nominal, "unit": spaced(state.unit), "size": size}
