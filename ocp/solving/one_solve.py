@@ -101,26 +101,27 @@ class Step(Solved):
         return self.outcome.status.stopped
 
 
+def rank(outcome: Outcome) -> tuple[bool, bool, float]:
+    """Return the order of outcomes: a stopped one, then by cost, or by violation if not solved."""
+    ok = outcome.status.ok
+    return not outcome.status.stopped, not ok, outcome.cost if ok else outcome.violation
+
+
 def least(steps: Sequence[Step]) -> Step:
     """Return the stopped step, or the cheapest one, or the least violated if none is solved."""
-
-    def rank(step: Step) -> tuple[bool, bool, float]:
-        outcome = step.outcome
-        return not step.ended, not step.ok, outcome.cost if step.ok else outcome.violation
-
-    return min(steps, key=rank)
+    return min(steps, key=lambda step: rank(step.outcome))
 
 
-def same_cost(a: Step, b: Step) -> bool:
-    """Return True if the costs of two steps indicate the same motion."""
-    return abs(a.outcome.cost - b.outcome.cost) <= ALIKE * abs(b.outcome.cost)
+def same_cost(a: Outcome, b: Outcome) -> bool:
+    """Return True if the costs of two outcomes indicate the same motion."""
+    return abs(a.cost - b.cost) <= ALIKE * abs(b.cost)
 
 
 def finalists(steps: Sequence[Step]) -> list[Step]:
     """Return the best steps with different costs, which indicate different motions."""
     kept: list[Step] = []
     for step in sorted(steps, key=lambda one: (not one.good, one.outcome.cost)):
-        new = not any(same_cost(step, one) for one in kept)
+        new = not any(same_cost(step.outcome, one.outcome) for one in kept)
         if not kept or (new and step.good and len(kept) < FINALISTS):
             kept.append(step)
     return kept
