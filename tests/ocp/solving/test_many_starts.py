@@ -72,20 +72,22 @@ def test_interruption_of_starts_keeps_the_best() -> None:
 
 @pytest.mark.slow
 def test_solutions_by_modes_are_resumed(tmp_path: Path) -> None:
-    """From a neighbouring problem, the optimum of other starts is reached in fewer solves."""
+    """From a neighbouring problem, the optimum of six starts is reached without any of them."""
 
     def move(m: float = 1.0, T: float = 1.4, mu_d: float = 4.0) -> Problem:
         stage = drive(BrownMcPhee(mu_s=6.0, mu_d=mu_d, mu_v=0.5, v_t=1e-5), m=m, N=1.0)
         rest = {"x": 0.0, "v": 0.0}
-        return Problem(Phase(stage, T, start=rest, end=rest | {"x": 0.1}), EFFORT)
+        phase = Phase(stage, T, start=rest, end=rest | {"x": 0.1})
+        return Problem(phase, EFFORT, bounds={"force": (-50.0, 50.0)})
 
     solve(move()).save(tmp_path / "move.npz")
     guess = load(tmp_path / "move.npz")
-    for problem in (move(m=2.0), move(T=1.0), move(mu_d=5.0)):
-        cold, warm = solve(problem), solve(problem, guess=guess)
+    for problem in (move(m=2.0), move(T=1.0)):
+        seen: list[Progress] = []
+        cold, warm = solve(problem), solve(problem, guess=guess, progress=seen.append)
         assert warm.verified
         np.testing.assert_allclose(warm.cost, cold.cost, rtol=1e-4)
-        assert warm.statistics.solves < cold.statistics.solves / 2
+        assert not any(now.stage.startswith("start") for now in seen)
 
 
 def test_executor_and_starts_are_checked() -> None:
