@@ -20,7 +20,7 @@ from ocp.solving.solution import Solution
 from ocp.solving.starts import Start
 from ocp.solving.watch import Report
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting, make_meshes
-from symfric.foundation import checks, executors
+from symfric.foundation import checks
 from symfric.foundation.status import SolveError
 
 if TYPE_CHECKING:
@@ -136,7 +136,10 @@ def solve(
     if posed is not problem and isinstance(solver, Ipopt) and OVER not in solver.options:
         solver = solver.with_options(**{OVER: 1.0 / cost_size(posed)})
     goals = Goals.of(tolerance) if refine else replace(Goals.of(tolerance), passes=1)
-    supervisor = Supervisor(max_time, progress, executors.checked("solve: executor", executor))
+    if not isinstance(executor, Executor | None):  # pyright: ignore[reportUnnecessaryIsInstance]
+        what = "an executor of concurrent.futures, or None"
+        raise checks.refused("solve: executor", what, executor)
+    supervisor = Supervisor(max_time, progress, executor)
     direct = Direct(posed, scheme, solver, intervals, goals, supervisor)
     search = Search(direct, tolerance, verify, resting_margin)
     solution = solved(search, friction, guess, starts)

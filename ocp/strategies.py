@@ -25,9 +25,8 @@ from ocp.friction.smooth_models import (
     sticking,
 )  # fmt: skip
 from ocp.original_law import FAILURES, STEPS, OriginalLaw, reason_of
-from ocp.solving.many_starts import STARTS
 from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import Solver
+from ocp.solving.one_solve import STARTS, Solver
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start

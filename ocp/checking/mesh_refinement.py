@@ -17,9 +17,8 @@ from ocp.checking.resimulate import Arc, arcs_of
 from ocp.checking.verify import TOLERANCE, left_between, restarted
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
-from ocp.solving.many_starts import Starts, starts_around
 from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import Solved, Solver
+from ocp.solving.one_solve import Solved, Solver, Starts, starts_around
 from ocp.solving.prepared import Prepared, Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start, start_of

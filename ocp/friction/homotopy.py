@@ -32,10 +32,9 @@ from ocp.formulation.phase import Array, initial
 from ocp.formulation.problem import Problem
 from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
-from ocp.solving.many_starts import STARTS, Starts, starts_around
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
-from ocp.solving.one_solve import Solver, Step, finalists, least
+from ocp.solving.one_solve import STARTS, Solver, Starts, Step, finalists, least, starts_around
 from ocp.solving.optimum import Optimum
 from ocp.solving.prepared import Option, Prepared, Supervisor
 from ocp.solving.solution import Solution

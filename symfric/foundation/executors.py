@@ -7,8 +7,6 @@ from functools import lru_cache
 from threading import get_ident
 from typing import Any, TypeVar
 
-from symfric.foundation import checks
-
 Result = TypeVar("Result")
 
 
@@ -52,10 +50,3 @@ def _unpacked(packed: bytes, thread: int) -> Any:
     """Return the object of this thread; what it compiles is kept for its next call."""
     del thread
     return pickle.loads(packed)
-
-
-def checked(where: str, executor: object) -> Executor | None:
-    """Return an executor or None; raise ValueError for other objects."""
-    if executor is None or isinstance(executor, Executor):
-        return executor
-    raise checks.refused(where, "an executor of concurrent.futures, or None", executor)
