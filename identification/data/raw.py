@@ -1,14 +1,14 @@
 """Raw columns of a file, and their conversion to a record with names, SI units and time."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from re import fullmatch
+from re import DOTALL, fullmatch
 from typing import Literal, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import Array, Record
+from identification.data.record import Array, Record, first_of
 from identification.data.units import CHANNELS, by_channel, is_common, unit
 from symfric.foundation import checks
 
@@ -318,5 +318,16 @@ def gathered(works: Sequence[Callable[[], T]]) -> list[T]:
         except ValueError as error:
             problems.append(str(error))
     if problems:
-        raise ValueError("\n".join(problems))
+        raise ValueError("\n".join(_once(problems)))
     return found
+
+
+def _once(problems: Sequence[str]) -> Iterator[str]:
+    """Yield each message once, with the number of the other files that have the same problem."""
+    alike = dict[tuple[str, str], list[str]]()
+    for problem in problems:
+        match = fullmatch(r"(\w+) '([^']*)'(:.*)", problem, DOTALL)
+        verb, name, rest = match.groups() if match else ("", problem, "")
+        alike.setdefault((verb, rest), []).append(f"{verb} '{name}'" if match else name)
+    for (_, rest), names in alike.items():
+        yield f"{first_of(names)}{rest}" if rest else "\n".join(names)
