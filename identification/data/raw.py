@@ -8,7 +8,7 @@ from typing import Literal, TypeVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import Array, Record, first_of
+from identification.data.record import Array, Record
 from identification.data.units import CHANNELS, by_channel, is_common, unit
 from symfric.foundation import checks
 
@@ -322,12 +322,17 @@ def gathered(works: Sequence[Callable[[], T]]) -> list[T]:
     return found
 
 
+SHOWN = 3
+"""Number of files with the same problem that a message names."""
+
+
 def _once(problems: Sequence[str]) -> Iterator[str]:
-    """Yield each message once, with the number of the other files that have the same problem."""
+    """Yield each message once, with the names of all files that have the same problem."""
     alike = dict[tuple[str, str], list[str]]()
     for problem in problems:
-        match = fullmatch(r"(\w+) '([^']*)'(:.*)", problem, DOTALL)
-        verb, name, rest = match.groups() if match else ("", problem, "")
-        alike.setdefault((verb, rest), []).append(f"{verb} '{name}'" if match else name)
-    for (_, rest), names in alike.items():
-        yield f"{first_of(names)}{rest}" if rest else "\n".join(names)
+        match = fullmatch(r"(\w+ )('[^']*')(:.*)", problem, DOTALL)
+        verb, name, rest = match.groups() if match else (problem, "", "")
+        alike.setdefault((verb, rest), []).append(name)
+    for (verb, rest), names in alike.items():
+        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        yield f"{verb}{', '.join(names[:SHOWN])}{more}{rest}"
