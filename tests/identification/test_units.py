@@ -101,7 +101,9 @@ def test_units_of_a_force_balance_do_not_matter() -> None:
 
 
 def test_positive_numbers_below_a_smallest_bound_are_parameters() -> None:
-    assert ALL_LAWS["stribeck"](v_s=1e-20).force(1e-19, 1.0) == pytest.approx(0.1, rel=1e-9)
+    assert ALL_LAWS["stribeck"](v_s=1e-20, v_eps=0.0).force(1e-19, 1.0) == pytest.approx(
+        0.1, rel=1e-9
+    )
     for v_s in (0.0, -1e-20):
         with pytest.raises(ValueError, match="v_s: expected 1e-12 <= v_s"):
             ALL_LAWS["stribeck"](v_s=v_s)
