@@ -2,8 +2,9 @@
 
 import signal
 import threading
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from time import perf_counter
 from types import FrameType
 from typing import NamedTuple, final
@@ -12,7 +13,9 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Array
-from ocp.transcription.program import Program, Progress, Report, worst_of
+from ocp.solving.motion import Motion, motions_of
+from ocp.transcription.program import Program, worst_of
+from ocp.transcription.transcribe import Transcription
 from symfric.foundation.status import Status
 
 FEASIBLE = 1e-6
@@ -23,6 +26,55 @@ FAR = 1e10
 """Magnitude of scaled unknowns above which they count as diverging."""
 RESTING = 1e-6
 """Size of steps of scaled unknowns below which they count as zero."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """State of the optimisation after an iteration.
+
+    Attributes:
+        iteration: number of iterations in this solve.
+        cost: J of the iterate.
+        violation: largest violation of an equation, a constraint or a bound, scaled.
+        stage: name of one of several solves, such as "widths 0.1"; empty for a single solve.
+        w: scaled unknowns.
+        transcription: program of the solve; None if a solver is used without it.
+    """
+
+    iteration: int
+    cost: float
+    violation: float
+    stage: str
+    w: Array
+    transcription: Transcription | None = None
+
+    @property
+    def motion(self) -> Motion:
+        """Motion of the iterate in the first scenario, evaluated on each access.
+
+        Its model is that of the current solve: with smooth friction, or the arcs of modes.
+
+        Raises:
+            ValueError: the program is unknown.
+        """
+        made = self.transcription
+        if made is None:
+            raise ValueError("progress: expected a solve of a problem, got a program alone")
+        scheme, points = made.scheme.coefficients(), made.unpack(self.w)
+        return motions_of(made.problem, made.meshes, scheme, points)[0]
+
+
+Report = Callable[[Progress], object]
+
+
+def in_stage(
+    progress: Report | None, stage: str, transcription: Transcription | None = None
+) -> Report | None:
+    """Return `progress` with the name of a solve and its program added to its argument."""
+    if progress is None:
+        return None
+    return lambda now: progress(replace(now, stage=stage, transcription=transcription))
 
 
 class Seen(NamedTuple):
@@ -91,7 +143,7 @@ class Watch:
             self.halt = self.halt or Status.UNBOUNDED
         if self._progress is not None:
             try:
-                self._progress(Progress(self.iterations, f, violation))
+                self._progress(Progress(self.iterations, f, violation, "", w))
             except KeyboardInterrupt:
                 self.halt = Status.INTERRUPTED
             # Exceptions cannot pass through C++, so it is stored and raised again later.
