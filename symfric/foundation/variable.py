@@ -77,10 +77,9 @@ class Variable(Symbolic):
 
     def within(self, where: str, value: object) -> float:
         """Return `value`, which must be a finite number within the bounds."""
-        low: dict[str, float] = {"lower": self.lower}
         if 0 < self.lower <= POSITIVE:
-            low = {"above": 0.0}
-        return checks.number(where, value, unit=self.unit, upper=self.upper, **low)
+            return checks.number(where, value, unit=self.unit, above=0.0, upper=self.upper)
+        return checks.number(where, value, unit=self.unit, lower=self.lower, upper=self.upper)
 
 
 def take_si(where: str, given: object, *names: str) -> None:
