@@ -5,11 +5,13 @@ result of a fit does not depend on the units of force, length and time.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, prod
 from re import sub
 from typing import TypeVar, final
 
+from identification.unknowns import roles
+from identification.unknowns.spec import Draft, Unknown
 from symfric.foundation.parameters import Parameter, Parametric, parameters, with_values
 from symfric.foundation.units import parsed
 from symfric.foundation.variable import POSITIVE
@@ -61,6 +63,23 @@ class Natural:
         sizes = self.sizes(whole)
         values = {n: float(p.value) / sizes[n] for n, p in parameters(whole).items()}
         return with_values(whole, values)
+
+
+def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds, size: float) -> Draft:
+    """Return the draft of a parameter of a law or a scene according to its role.
+
+    Its default is a number in its natural unit `size`.
+    """
+    value, logarithmic = float(parameter.value), roles.is_logarithmic(parameter)
+    default = size * parameter.default
+    if 0 < parameter.lower <= POSITIVE:
+        parameter = replace(parameter, lower=0.0)
+    start = default if value == parameter.default else value
+    unknown = Unknown(
+        parameter.name, unit, start, *roles.window(parameter, speeds),
+        scale=abs(start) or abs(default) or size, logarithmic=logarithmic,
+    )  # fmt: skip
+    return Draft(unknown, parameter.lower, parameter.upper)
 
 
 def _powers(unit: str) -> dict[str, float]:

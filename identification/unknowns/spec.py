@@ -8,10 +8,8 @@ from dataclasses import dataclass, replace
 from math import inf, sqrt
 from typing import Any, NamedTuple, final
 
-from identification.unknowns import roles
 from symfric.foundation import checks
-from symfric.foundation.parameters import Parameter
-from symfric.foundation.variable import POSITIVE, Variable
+from symfric.foundation.variable import Variable
 
 
 @final
@@ -262,23 +260,6 @@ class Draft(NamedTuple):
     unknown: Unknown
     lower: float
     upper: float
-
-
-def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds, size: float) -> Draft:
-    """Return the draft of a parameter of a law or a scene according to its role.
-
-    Its default is a number in its natural unit `size`.
-    """
-    value, logarithmic = float(parameter.value), roles.is_logarithmic(parameter)
-    default = size * parameter.default
-    if 0 < parameter.lower <= POSITIVE:
-        parameter = replace(parameter, lower=0.0)
-    start = default if value == parameter.default else value
-    unknown = Unknown(
-        parameter.name, unit, start, *roles.window(parameter, speeds),
-        scale=abs(start) or abs(default) or size, logarithmic=logarithmic,
-    )  # fmt: skip
-    return Draft(unknown, parameter.lower, parameter.upper)
 
 
 def of_variable(v: Variable) -> Draft:

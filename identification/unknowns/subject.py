@@ -8,13 +8,12 @@ from typing import NamedTuple, final
 import casadi as ca
 
 from identification.unknowns import roles
-from identification.unknowns.natural import Natural
+from identification.unknowns.natural import Natural, of_parameter
 from identification.unknowns.spec import (
     Requests,
     Tied,
     Unknown,
     drafted,
-    of_parameter,
     of_variable,
     refuse,
 )
