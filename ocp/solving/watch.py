@@ -199,16 +199,22 @@ class IterationHook(Shaped):
         n, m, k = program.w.numel(), program.g.numel(), program.p.numel()
         rows = {"x": n, "lam_x": n, "g": m, "lam_g": m, "f": 1, "lam_p": k}
         names = [ca.nlpsol_out(i) for i in range(ca.nlpsol_n_out())]
+        self._shown = [names.index(name) for name in ("x", "f", "g", "lam_x", "lam_g")]
         self.watch: Watch | None = None
         columns = [ca.Sparsity.dense(rows[name], 1) for name in names]
         super().__init__("watch", columns, ca.Sparsity.dense(1))
 
-    def eval(self, arg: Sequence[ca.DM]) -> list[float]:  # noqa: D102
-        if self.watch is None:
-            return [0.0]
-        at = {ca.nlpsol_out(i): value.full().ravel() for i, value in enumerate(arg)}
-        stop = self.watch.see(at["x"], float(at["f"][0]), at["g"], at["lam_x"], at["lam_g"])
-        return [float(stop)]
+    def has_eval_buffer(self) -> bool:  # noqa: D102
+        return True
+
+    def eval_buffer(self, arg: Sequence[memoryview], res: Sequence[memoryview]) -> int:
+        """Report an iterate; a `DM` of each argument would take as long as a step of Ipopt."""
+        stop = False
+        if self.watch is not None:
+            w, f, g, lam_w, lam_g = (np.frombuffer(arg[i]).copy() for i in self._shown)
+            stop = self.watch.see(w, float(f[0]), g, lam_w, lam_g)
+        np.frombuffer(res[0])[:] = stop
+        return 0
 
 
 @final
