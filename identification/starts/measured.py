@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.record import runs
-from identification.unknowns.natural import Natural
+from identification.unknowns.roles import Natural
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]

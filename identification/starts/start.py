@@ -10,8 +10,7 @@ import numpy as np
 from identification.starts.maxwell_slip import Elements, fit_elements
 from identification.starts.measured import Array, Hysteresis, Measured, hysteresis, travelled
 from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve, fit_law
-from identification.unknowns.natural import Natural
-from identification.unknowns.roles import orders, parts, velocity
+from identification.unknowns.roles import Natural, orders, parts, velocity
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, parameters
 from symfric.laws.base.law import Law
