@@ -1,8 +1,8 @@
 """Roles of law parameters: which parameters are fitted, why others are held, natural units.
 
-Natural units of data are a force, a load, a length and a time in which measured numbers are of order
-one. Defaults of a law are numbers for one machine. In natural units they suit any machine, so that
-the result of a fit does not depend on the units of force, length and time.
+Natural units of data are a force, a load, a length and a time in which measured numbers are of
+order one. Defaults of a law are numbers for one machine. In natural units they suit any machine, so
+that the result of a fit does not depend on the units of force, length and time.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
