@@ -9,7 +9,7 @@ the contact sticking. `Model.contacts` contains the contacts, `Model.open` has t
 inputs, and `Model.with_forces` closes the open model with other forces.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite
@@ -191,21 +191,13 @@ class Contact:
         sides = [ca.SX(self.law.most_held(self.N, s, **self.further)) for s in (1, -1)]
         return ca.fmax(*sides)
 
-    def events(self) -> tuple[Event, ...]:
-        """Return the changes of mode of the law as events of the model."""
-        names = {s.name: v.name for s, v in zip(self.law.states, self.states, strict=True)}
-        return tuple(
-            Event(
-                self.called(s.name),
-                s.expression,
-                s.direction,
-                reset={names[name]: value for name, value in s.reset.items()}
-                | (dict(self.rest) if s.halts else {}),
-                at_start=s.at_start,
-                rtol=s.rtol,
-            )
-            for s in self.law.switches(self.slip, self.N, symbols_of(self.states), **self.given)
-        )
+    def events(self, *, sticks: bool = False) -> tuple[Event, ...]:
+        """Return the changes of mode of the law as events of the model.
+
+        `sticks`: True if a contact that stops always sticks first.
+        """
+        z, given = symbols_of(self.states), self.given
+        return mode_events(self.law, (self.slip, self.N, z), given, self.called, self.rest, sticks)
 
     def monitors(self, p: Sequence[Variable]) -> tuple[Monitor, ...]:
         """Return the monitor of the sliding velocity for error control, as a tuple.
@@ -215,3 +207,30 @@ class Contact:
         """
         scale = self.law.velocity_scale
         return (Monitor(self.slip, scale),) if isfinite(float(at_start(scale, p))) else ()
+
+
+def mode_events(
+    law: FrictionLaw, at: tuple[Scalar, Scalar, Scalar], given: Mapping[str, Scalar],
+    called: Callable[[str], str], rest: Mapping[str, Scalar], sticks: bool,
+) -> tuple[Event, ...]:  # fmt: skip
+    """Return the changes of mode of a law as events.
+
+    Args:
+        law: the law.
+        at, given: sliding velocity, normal force and states, and further inputs by name.
+        called: name of a state or event of the law -> its name in the model.
+        rest: resets when sliding ends.
+        sticks: True if a contact that stops always sticks first. It then breaks away again if it
+            cannot hold; F_e need not be exact while it slides.
+    """
+    switches = law.switches(*at, **given)
+    idle = law.switches(*at, **{**given, APPLIED: 0.0}) if sticks else switches
+    return tuple(
+        Event(
+            called(s.name), s.expression, s.direction,
+            reset={called(name): x for name, x in (still if s.halts else s).reset.items()}
+            | (dict(rest) if s.halts else {}),
+            at_start=s.at_start, rtol=s.rtol,
+        )
+        for s, still in zip(switches, idle, strict=True)
+    )  # fmt: skip

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.equations.expressions import divided_once
+from symfric.integrator.running.contact_modes import switching
 from symfric.integrator.running.record import Record
 from symfric.model import Model
 
@@ -118,6 +119,7 @@ class Crossings:
         record: layout of a row.
         directions, terminal: direction of each event, and True if it is terminal.
         resets: event number and state number of each reset, in order.
+        together: True for each event of a contact whose mode is decided together with others.
         follows: True if algebraic unknowns have to follow a reset.
         closes: True if loops have to be closed again after a reset.
     """
@@ -133,6 +135,7 @@ class Crossings:
     directions: tuple[int, ...]
     terminal: tuple[bool, ...]
     resets: tuple[tuple[int, int], ...]
+    together: tuple[bool, ...]
     follows: bool
     closes: bool
 
@@ -192,6 +195,8 @@ def crossings(
         follows, closes: as in `Crossings`.
     """
     events, states = model.events, [v.name for v in model.x]
+    contacts = switching(model)
+    together = {i for c in contacts for i in c.events} if len(contacts) > 1 else set[int]()
     at = Record(values.numel_in(1), rows)
     row, d = ca.SX.sym("row", at.width), ca.SX.sym("d", values.numel_in(2))
     theta, low, end = ca.SX.sym("theta"), ca.SX.sym("low"), (row[at.T1], row[at.y1])
@@ -209,6 +214,7 @@ def crossings(
         tuple(e.direction for e in events),
         tuple(e.terminal for e in events),
         tuple((i, states.index(name)) for i, e in enumerate(events) for name in e.reset),
+        tuple(i in together for i in range(len(events))),
         follows,
         closes,
     )

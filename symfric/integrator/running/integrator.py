@@ -20,6 +20,7 @@ from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.method import Method, suited
+from symfric.integrator.running.contact_modes import ContactModes, switching
 from symfric.integrator.running.crossings import Crossings, crossings
 from symfric.integrator.running.engine import (
     BATCH,
@@ -190,6 +191,23 @@ class Integrator:
             return None
         projected = manifold.project(s.y, s.d)[: s.nx]
         return Columns(ca.Function("states", [s.y, s.d], [projected], {"cse": True}))
+
+    @cached_property
+    def contact_modes(self) -> ContactModes:
+        """Decision of the modes of several contacts at one time."""
+        return ContactModes.of(self.model, switching(self.model), self.of_time)
+
+    def decided(self, t: float, y: Array, d: Array) -> Array:
+        """Return `y` with consistent modes of all contacts; unchanged if there are none."""
+
+        def solve(y: Array) -> Array:
+            if self.follow is None:
+                return y
+            found = self.follow(y, d)
+            return self.consistent(f"model '{self.model.name}'", y, d) if found is None else found
+
+        found = self.contact_modes.decided(t, y, d, solve)
+        return y if found is None else found
 
     def start(self, y: Array, d: Array) -> Array:
         """Return `y` with consistent algebraic unknowns; cached for runs from the same start.
