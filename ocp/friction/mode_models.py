@@ -101,7 +101,8 @@ def loops_of(model: Model) -> tuple[Loop, ...]:
             if G.nnz() and {*G.sparsity().get_col()} <= {*columns}
         ]
         if len(members) > 1:
-            loops.append(Loop(*zip(*members, strict=True), tangent))
+            contacts, along = zip(*members, strict=True)
+            loops.append(Loop(contacts, along, tangent))
     return tuple(loops)
 
 

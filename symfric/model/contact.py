@@ -196,8 +196,9 @@ class Contact:
 
         `sticks`: True if a contact that stops always sticks first.
         """
-        z, given = symbols_of(self.states), self.given
-        return mode_events(self.law, (self.slip, self.N, z), given, self.called, self.rest, sticks)
+        z = symbols_of(self.states)
+        at, switches = (self.slip, self.N, z), self.law.switches
+        return mode_events(switches, at, self.given, self.called, self.rest, sticks)
 
     def monitors(self, p: Sequence[Variable]) -> tuple[Monitor, ...]:
         """Return the monitor of the sliding velocity for error control, as a tuple.
@@ -210,21 +211,22 @@ class Contact:
 
 
 def mode_events(
-    law: FrictionLaw, at: tuple[Scalar, Scalar, Scalar], given: Mapping[str, Scalar],
+    switches: Callable[..., tuple[Any, ...]], at: tuple[Scalar, Scalar, Scalar],
+    given: Mapping[str, Scalar],
     called: Callable[[str], str], rest: Mapping[str, Scalar], sticks: bool,
 ) -> tuple[Event, ...]:  # fmt: skip
     """Return the changes of mode of a law as events.
 
     Args:
-        law: the law.
+        switches: function of the law that returns its changes of mode.
         at, given: sliding velocity, normal force and states, and further inputs by name.
         called: name of a state or event of the law -> its name in the model.
         rest: resets when sliding ends.
         sticks: True if a contact that stops always sticks first. It then breaks away again if it
             cannot hold; F_e need not be exact while it slides.
     """
-    switches = law.switches(*at, **given)
-    idle = law.switches(*at, **{**given, APPLIED: 0.0}) if sticks else switches
+    own = switches(*at, **given)
+    idle = switches(*at, **{**given, APPLIED: 0.0}) if sticks else own
     return tuple(
         Event(
             called(s.name), s.expression, s.direction,
@@ -232,5 +234,5 @@ def mode_events(
             | (dict(rest) if s.halts else {}),
             at_start=s.at_start, rtol=s.rtol,
         )
-        for s, still in zip(switches, idle, strict=True)
+        for s, still in zip(own, idle, strict=True)
     )  # fmt: skip

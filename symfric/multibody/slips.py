@@ -145,7 +145,9 @@ def _of_contact(slip: Slip, rest: dict[str, float]) -> tuple[Event, ...]:
     """
     contact, z = slip.contact, symbols_of(slip.states)
     at, sticks = (contact.slip, slip.N, z), bool(slip.inputs)
-    return mode_events(contact.law, at, slip.inputs, f"{contact.name}_{{}}".format, rest, sticks)
+    return mode_events(
+        contact.law.switches, at, slip.inputs, f"{contact.name}_{{}}".format, rest, sticks
+    )
 
 
 def _of_loop(rest: Rest, contacts: Sequence[Slip]) -> Iterator[Event]:

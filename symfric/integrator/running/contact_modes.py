@@ -2,7 +2,8 @@
 
 The switches of a law change the mode of its contact while all others keep theirs. If a second
 contact changes at the same time, the order of changes must not decide, so the modes of all contacts
-without velocity are decided together:
+without velocity are decided together. The same happens after events whose resets change sliding
+velocities.
 
     A contact without velocity sticks if its force is within the static levels of both directions;
     otherwise it slips in the overloaded direction.
@@ -73,6 +74,20 @@ def switching(model: Model) -> tuple[Switching, ...]:
     return tuple(found)
 
 
+def changes(model: Model) -> tuple[int, ...]:
+    """Return a number for each event of `model`.
+
+    It is 1 for events of contacts that may change together, 2 for other events with resets in a
+    model with contacts that have modes, and otherwise 0.
+    """
+    contacts = switching(model)
+    own = {i for c in contacts for i in c.events}
+    return tuple(
+        int(len(contacts) > 1) if i in own else 2 if contacts and e.reset else 0
+        for i, e in enumerate(model.events)
+    )
+
+
 def slip_rate(model: Model, contact: Contact) -> ca.SX:
     """Return the rate of a sliding velocity, which depends on `holonomic.a` for a mechanism."""
     x, mechanics, slip = model.vector("x"), model.holonomic, ca.SX(contact.slip)
@@ -115,12 +130,17 @@ class ContactModes:
         look = of_time("contacts", ca.densify(stacked(rows)))
         return ContactModes(tuple(contacts), look, np.array(still))
 
-    def decided(self, t: float, y: Array, d: Array, solve: Solve) -> Array | None:
-        """Return `y` with consistent modes, or None if there are none."""
+    def decided(self, t: float, before: Array, y: Array, d: Array, solve: Solve) -> Array | None:
+        """Return `y` with consistent modes, or None if there are none.
+
+        `before` contains the unknowns before the events that led to `y`. Their resets may have
+        changed sliding velocities, as an impact does.
+        """
         at = [c.mode for c in self.contacts]
         modes, slips = np.round(y[at]), self._rows(t, y, d)[:, SLIP]
-        free = (np.abs(slips) <= self.still) | (modes == 0)
-        trial = np.where(free, 0.0, modes)
+        kicked = np.abs(slips - self._rows(t, before, d)[:, SLIP]) > self.still
+        free = (np.abs(slips) <= self.still) | ((modes == 0) & ~kicked)
+        trial = np.where(free, 0.0, np.where(kicked, np.sign(slips), modes))
         for modes in self._trials(trial, free):
             moved = y.copy()
             moved[at] = modes

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.equations.expressions import divided_once
-from symfric.integrator.running.contact_modes import switching
+from symfric.integrator.running.contact_modes import changes
 from symfric.integrator.running.record import Record
 from symfric.model import Model
 
@@ -119,7 +119,7 @@ class Crossings:
         record: layout of a row.
         directions, terminal: direction of each event, and True if it is terminal.
         resets: event number and state number of each reset, in order.
-        together: True for each event of a contact whose mode is decided together with others.
+        changes: how each event changes modes of contacts, see `contact_modes.changes`.
         follows: True if algebraic unknowns have to follow a reset.
         closes: True if loops have to be closed again after a reset.
     """
@@ -135,9 +135,14 @@ class Crossings:
     directions: tuple[int, ...]
     terminal: tuple[bool, ...]
     resets: tuple[tuple[int, int], ...]
-    together: tuple[bool, ...]
+    changes: tuple[int, ...]
     follows: bool
     closes: bool
+
+    @cached_property
+    def decided(self) -> NDArray[np.bool_]:
+        """Mask of the events of contacts whose modes are decided together."""
+        return np.array(self.changes) == 1
 
     @property
     def count(self) -> int:
@@ -195,8 +200,6 @@ def crossings(
         follows, closes: as in `Crossings`.
     """
     events, states = model.events, [v.name for v in model.x]
-    contacts = switching(model)
-    together = {i for c in contacts for i in c.events} if len(contacts) > 1 else set[int]()
     at = Record(values.numel_in(1), rows)
     row, d = ca.SX.sym("row", at.width), ca.SX.sym("d", values.numel_in(2))
     theta, low, end = ca.SX.sym("theta"), ca.SX.sym("low"), (row[at.T1], row[at.y1])
@@ -214,7 +217,7 @@ def crossings(
         tuple(e.direction for e in events),
         tuple(e.terminal for e in events),
         tuple((i, states.index(name)) for i, e in enumerate(events) for name in e.reset),
-        tuple(i in together for i in range(len(events))),
+        changes(model),
         follows,
         closes,
     )

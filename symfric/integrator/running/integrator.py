@@ -197,8 +197,11 @@ class Integrator:
         """Decision of the modes of several contacts at one time."""
         return ContactModes.of(self.model, switching(self.model), self.of_time)
 
-    def decided(self, t: float, y: Array, d: Array) -> Array:
-        """Return `y` with consistent modes of all contacts; unchanged if there are none."""
+    def decided(self, t: float, before: Array, y: Array, d: Array) -> Array:
+        """Return `y` with consistent modes of all contacts; unchanged if there are none.
+
+        `before` contains the unknowns before the events that led to `y`.
+        """
 
         def solve(y: Array) -> Array:
             if self.follow is None:
@@ -206,7 +209,7 @@ class Integrator:
             found = self.follow(y, d)
             return self.consistent(f"model '{self.model.name}'", y, d) if found is None else found
 
-        found = self.contact_modes.decided(t, y, d, solve)
+        found = self.contact_modes.decided(t, before, y, d, solve)
         return y if found is None else found
 
     def start(self, y: Array, d: Array) -> Array:

@@ -264,7 +264,8 @@ class InPython:
                     return SEARCH
             if stop is Stop.DECIDE:
                 S, d = self.work.S, self.work.R[Given.d(self.integrator.system.nx)].copy()
-                S[State.Y] = self.integrator.decided(float(S[State.T]), S[State.Y].copy(), d)
+                t, before = float(S[State.T]), jumps.before[-1].copy()
+                S[State.Y] = self.integrator.decided(t, before, S[State.Y].copy(), d)
                 events.decided()
         return ATTEMPTS
 

@@ -276,7 +276,8 @@ class _March:
             last = run.jumps[-1]
             self._make_consistent(any(events[i].reset for i in np.flatnonzero(last.which[-1])))
             if reason is Stop.DECIDE and run.status is Status.SUCCESS and self.events is not None:
-                self.y[:] = self.integrator.decided(self.t, self.y.copy(), self.d)
+                before = last.before[-1].copy()
+                self.y[:] = self.integrator.decided(self.t, before, self.y.copy(), self.d)
                 self.events.decided()
             last.after[-1] = self.y
 

@@ -8,7 +8,7 @@ enum { NOTHING, RESUMED, CUT, DROPPED };
 static const double symfric_look_at[] = { $at_looks };
 static const int symfric_directions[] = { $directions };
 static const int symfric_terminal[] = { $terminal };
-static const int symfric_together[] = { $together };
+static const int symfric_changes[] = { $changes };
 static const int symfric_by_event[] = { $by_event };
 static const int symfric_of_state[] = { $of_state };
 
@@ -238,8 +238,8 @@ static int symfric_piled(const double *M, double t, const double *which)
   int i, own = 0, last = 0;
   double apart = nextafter(fabs(t), HUGE_VAL) - fabs(t);
   for (i = 0; i < EVENTS; ++i) {
-    own += symfric_together[i] && which[i] != 0;
-    last += symfric_together[i] && M[LAST + i] != 0;
+    if (which[i] != 0) own += symfric_changes[i];
+    last += symfric_changes[i] == 1 && M[LAST + i] != 0;
   }
   if (own != 1 || !last) return own > 1;
   if (apart < M[TOLERANCE]) apart = M[TOLERANCE];
