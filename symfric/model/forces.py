@@ -58,6 +58,9 @@ def completed(model: System) -> tuple[tuple[Contact, ...], dict[str, Variable]]:
             c.name: Variable(f"{c.name}_{APPLIED}", c.unit("N"), doc=doc)
             for c in contacts if _mode(c) is not None and not _complete(c)
         }  # fmt: skip
+    for c in contacts:
+        if c.name in unknown:
+            _refuse_inputs(c, ca.vertcat(symbols_of(model.z), symbols_of(model.u)))
     contacts = tuple(_with(c, unknown[c.name].symbol) if c.name in unknown else c for c in contacts)
     pairs = enumerate(contacts)
     done = (c if _complete(c) else _with(c, _applied(i, contacts, model)) for i, c in pairs)
@@ -126,8 +129,7 @@ def _applied(i: int, contacts: tuple[Contact, ...], model: System) -> ca.SX:
     z, u = symbols_of(model.z), symbols_of(model.u)
     if ca.depends_on(chosen, z) and ca.depends_on(model.alg, F):
         raise _refused(contacts[i], "equations without algebraic variables that depend on friction")
-    if ca.depends_on(ca.SX(contacts[i].slip), u):
-        raise _refused(contacts[i], "a sliding velocity without inputs, whose rates are unknown")
+    _refuse_inputs(contacts[i], u)
     constant = ca.substitute(chosen, unknown, ca.SX.zeros(unknown.numel()))
     found = _last_unknown(slopes, -constant)
     if found is None:
@@ -179,6 +181,11 @@ def _last_unknown(A: ca.SX, b: ca.SX) -> ca.SX | None:
                 rows[i, k] = 0
     pivot = ca.sparsify(rows[n - 1, n - 1])
     return rows[n - 1, n] / pivot if pivot.nnz() else None
+
+
+def _refuse_inputs(c: Contact, u: ca.SX) -> None:
+    if ca.depends_on(ca.SX(c.slip), u):
+        raise _refused(c, "a sliding velocity without inputs, whose rates are unknown")
 
 
 def _refused(c: Contact, expected: str) -> ValueError:
