@@ -144,7 +144,7 @@ def stages_of(
     problem: Problem, layout: Layout, pieces: Sequence[Piece], made: Assembled
 ) -> tuple[Stages | None, str]:
     """Return the stages and "", or None and the coupling that prevents them."""
-    if len(problem.scenarios) > 1:
+    if len(problem.scenario_names) > 1:
         return None, "several scenarios"
     if problem.chosen:
         return None, f"the chosen parameter {problem.chosen[0].name}"

@@ -16,7 +16,7 @@ from symfric.foundation import checks
 from symfric.foundation.variable import starts_of, symbols_of
 from symfric.laws import Law, law_name
 from symfric.laws.base import smooth
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import require_law
 from symfric.model import Output
 from symfric.scenes import Drive
 
@@ -86,7 +86,7 @@ def compensator(
             offset=offset or None if s.offset is None else s.offset,
         )
         law, turning = law.law, law.turning or turning
-    check_law(where, law)
+    require_law(where, law)
     where = f"compensator '{law_name(law)}'"
     inner = law_block(law, h=h if law.states else None)
     if len(inner.inputs) > 2:

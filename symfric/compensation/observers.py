@@ -17,7 +17,7 @@ from symfric.foundation.parameters import parameters, with_values
 from symfric.foundation.variable import symbols_of
 from symfric.laws import GMS, Law, LuGre, LuGreNormalised, LuGrePassive, law_name
 from symfric.laws.base import smooth
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import require_law
 from symfric.model import Output
 
 USE = "Call it once per sample, and add F to the force that the controller commands."
@@ -145,7 +145,7 @@ def _springs(
 
 
 def _check(what: str, law: Law, kinds: type[Law] | UnionType, such_as: str, gain: object) -> str:
-    check_law(what, law)
+    require_law(what, law)
     if not isinstance(law, kinds):
         raise checks.refused(what, f"a law such as {such_as}", law)
     where = f"{what} '{law_name(law)}'"

@@ -8,7 +8,7 @@ contains its terms.
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import Field, dataclass, field, fields, replace
 from math import inf
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, dataclass_transform
 
@@ -133,6 +133,9 @@ class Parametric:
 
     def __new__(cls, *_: Any, **given: Any) -> Self:
         """Create an object; the error for an unknown field offers the nearest name."""
+        if bare := [name for name, value in vars(cls).items() if isinstance(value, Field)]:
+            what, got = f"@parametric above class {cls.__name__}", f"none for {', '.join(bare)}"
+            raise ValueError(f"{cls.__name__}: expected the decorator {what}, got {got}")
         if not given.keys() <= cls.__dataclass_fields__.keys():
             check_names(cls.__name__, given, [item.name for item in fields(cls)])
         return super().__new__(cls)
