@@ -16,7 +16,7 @@ modes repeat, all combinations are tried, those with most contacts in stick firs
 
 Limits: for mu_s > mu_d several combinations may be consistent, and one is chosen. If none is found,
 the modes remain those of the switches. Contacts of a loop of one degree of freedom stick together
-and keep their own events.
+and keep their own events. A run records the events that led to the decision, not its result.
 Source: Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, ch. 5.
 """
 
