@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite
-from typing import Any, Protocol, final
+from typing import Any, NamedTuple, Protocol, final
 
 import casadi as ca
 
@@ -236,3 +236,44 @@ def mode_events(
         )
         for s, still in zip(own, idle, strict=True)
     )  # fmt: skip
+
+
+class Switching(NamedTuple):
+    """Contact whose mode is a state of its own.
+
+    Attributes:
+        contact: the contact.
+        mode: index of its mode among the states.
+        events: indices of its events.
+    """
+
+    contact: Contact
+    mode: int
+    events: tuple[int, int]
+
+
+def switching(
+    contacts: Sequence[Contact], x: Variables, events: Sequence[Event]
+) -> tuple[Switching, ...]:
+    """Return the contacts of a model with states `x` whose modes can be decided together."""
+    states, numbers = [v.name for v in x], {e.name: i for i, e in enumerate(events)}
+    found: list[Switching] = []
+    for c in contacts:
+        modes = [v.name for s, v in zip(c.law.states, c.states, strict=True) if s.whole]
+        own = [numbers[name] for name in map(c.called, ("stick", "slip")) if name in numbers]
+        if APPLIED in c.given and len(modes) == 1 and len(own) == 2:
+            found.append(Switching(c, states.index(modes[0]), (own[0], own[1])))
+    return tuple(found)
+
+
+def mode_changes(contacts: Sequence[Switching], events: Sequence[Event]) -> tuple[int, ...]:
+    """Return a number for each event of a model with `contacts` whose modes can be decided.
+
+    It is 1 for events of contacts that may change together, 2 for other events with resets, which
+    may start sliding, and otherwise 0.
+    """
+    own = {i for c in contacts for i in c.events}
+    return tuple(
+        int(len(contacts) > 1) if i in own else 2 if contacts and e.reset else 0
+        for i, e in enumerate(events)
+    )

@@ -20,10 +20,10 @@ and keep their own events. A run records the events that led to the decision, no
 Source: Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, ch. 5.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple, final
+from typing import final
 
 import casadi as ca
 import numpy as np
@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from symfric.foundation.numeric import evaluate
 from symfric.foundation.variable import stacked
 from symfric.model import Contact, Model
-from symfric.model.contact import APPLIED
+from symfric.model.contact import APPLIED, Switching, switching
 
 Array = NDArray[np.float64]
 Solve = Callable[[Array], Array]
@@ -45,47 +45,6 @@ MANY = 8
 """Largest number of contacts without velocity whose modes are tried in all combinations."""
 UP, DOWN, CHANGE, SLIP = range(4)
 """Columns of a row of a contact: margins to both levels, rate of the slip, and the slip."""
-
-
-class Switching(NamedTuple):
-    """Contact whose mode is a state of its own.
-
-    Attributes:
-        contact: the contact.
-        mode: index of its mode among the states.
-        events: indices of its events.
-    """
-
-    contact: Contact
-    mode: int
-    events: tuple[int, int]
-
-
-def switching(model: Model) -> tuple[Switching, ...]:
-    """Return the contacts whose modes can be decided together."""
-    states = [v.name for v in model.x]
-    events = {e.name: i for i, e in enumerate(model.events)}
-    found: list[Switching] = []
-    for c in model.contacts:
-        modes = [v.name for s, v in zip(c.law.states, c.states, strict=True) if s.whole]
-        own = [events[name] for name in map(c.called, ("stick", "slip")) if name in events]
-        if APPLIED in c.given and len(modes) == 1 and len(own) == 2:
-            found.append(Switching(c, states.index(modes[0]), (own[0], own[1])))
-    return tuple(found)
-
-
-def changes(model: Model) -> tuple[int, ...]:
-    """Return a number for each event of `model`.
-
-    It is 1 for events of contacts that may change together, 2 for other events with resets in a
-    model with contacts that have modes, and otherwise 0.
-    """
-    contacts = switching(model)
-    own = {i for c in contacts for i in c.events}
-    return tuple(
-        int(len(contacts) > 1) if i in own else 2 if contacts and e.reset else 0
-        for i, e in enumerate(model.events)
-    )
 
 
 def slip_rate(model: Model, contact: Contact) -> ca.SX:
@@ -113,10 +72,9 @@ class ContactModes:
     still: Array
 
     @staticmethod
-    def of(
-        model: Model, contacts: Sequence[Switching], of_time: Callable[[str, ca.SX], ca.Function]
-    ) -> "ContactModes":
-        """Return the decision for `contacts` of `model`; `of_time` makes Functions of (t, y, d)."""
+    def of(model: Model, of_time: Callable[[str, ca.SX], ca.Function]) -> "ContactModes":
+        """Return the decision for a model; `of_time` makes Functions of (t, y, d)."""
+        contacts = switching(model.contacts, model.x, model.events)
         rows, nominal, x = list[ca.SX](), model.nominal("x"), model.vector("x")
         still: list[float] = []
         for c, *_ in contacts:
@@ -128,7 +86,7 @@ class ContactModes:
             slope = ca.DM(ca.jacobian(ca.SX(c.slip), x).sparsity(), 1).full()[0] != 0
             still.append(STILL * max(nominal[slope], default=1.0))
         look = of_time("contacts", ca.densify(stacked(rows)))
-        return ContactModes(tuple(contacts), look, np.array(still))
+        return ContactModes(contacts, look, np.array(still))
 
     def decided(self, t: float, before: Array, y: Array, d: Array, solve: Solve) -> Array | None:
         """Return `y` with consistent modes, or None if there are none.

@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.integrator.equations.expressions import divided_once
-from symfric.integrator.running.contact_modes import changes
 from symfric.integrator.running.record import Record
 from symfric.model import Model
+from symfric.model.contact import mode_changes, switching
 
 Array = NDArray[np.float64]
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -119,7 +119,7 @@ class Crossings:
         record: layout of a row.
         directions, terminal: direction of each event, and True if it is terminal.
         resets: event number and state number of each reset, in order.
-        changes: how each event changes modes of contacts, see `contact_modes.changes`.
+        changes: how each event changes modes of contacts, see `symfric.model.contact.mode_changes`.
         follows: True if algebraic unknowns have to follow a reset.
         closes: True if loops have to be closed again after a reset.
     """
@@ -217,7 +217,7 @@ def crossings(
         tuple(e.direction for e in events),
         tuple(e.terminal for e in events),
         tuple((i, states.index(name)) for i, e in enumerate(events) for name in e.reset),
-        changes(model),
+        mode_changes(switching(model.contacts, model.x, events), events),
         follows,
         closes,
     )
