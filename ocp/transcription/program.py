@@ -195,34 +195,6 @@ def _owners(
 
 
 @final
-@dataclass(frozen=True)
-class Progress:
-    """State of the optimisation after an iteration.
-
-    Attributes:
-        iteration: number of iterations in this solve.
-        cost: J of the iterate.
-        violation: largest violation of an equation, a constraint or a bound, scaled.
-        stage: name of one of several solves, such as "widths 0.1"; empty for a single solve.
-    """
-
-    iteration: int
-    cost: float
-    violation: float
-    stage: str = ""
-
-
-Report = Callable[[Progress], object]
-
-
-def in_stage(progress: Report | None, stage: str) -> Report | None:
-    """Return `progress` with the name of a solve added to its argument."""
-    if progress is None:
-        return None
-    return lambda now: progress(replace(now, stage=stage))
-
-
-@final
 @dataclass(frozen=True, eq=False)
 class Iterate:
     """Scaled unknowns and multipliers, from which a solver can restart."""
