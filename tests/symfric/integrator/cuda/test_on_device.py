@@ -215,25 +215,6 @@ def test_the_kernel_is_c_and_cpp_without_a_warning(compiler: str) -> None:
         )  # fmt: skip
 
 
-def test_the_kernel_has_only_what_it_needs() -> None:
-    own = integrator(rabinowicz(BrownMcPhee()))
-    between, ends = kernel_of(own), kernel_of(own, between=False)
-    assert between is kernel_of(own)
-    assert ends.operations < between.operations
-    assert "real *D)" not in ends.text
-    for kernel in (between, ends):
-        assert "symfric_round(const" not in kernel.text
-        assert "#define FOLLOWS 0" in kernel.text
-    follows = kernel_of(integrator(switched()))
-    assert "symfric_round(const" in follows.text
-    assert "#define FOLLOWS 2" in follows.text
-    single = kernel_of(own, real=REALS["float"])
-    attempt = single.text[single.text.index("symfric_attempt(") : single.text.index("#define N ")]
-    assert "double" not in attempt
-    assert "1.1754944e-38f" in attempt
-    assert "#define SF_POWF powf" in single.text
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("law", [BrownMcPhee(), LuGre()], ids=lambda law: type(law).__name__)
 @pytest.mark.parametrize("name", ALL_SCENES)

@@ -1,18 +1,15 @@
 """Solutions with the iteration matrix; algebraic unknowns after a jump, by two loops."""
 
-import ctypes
 from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
 import pytest
-from backends import needs_compiler
 from closed_forms import assemble, smooth_dae
 from numpy.typing import NDArray
 
 import symfric.integrator.equations.blocks as module
 from symfric import BrownMcPhee, LuGre, Model, Variable, Viscous, rabinowicz
-from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import (
     Following,
     at_rest,
@@ -152,24 +149,3 @@ def test_a_jam_is_left_to_the_search_which_names_it() -> None:
         assert (follow(y, d) is not None) is free
     with pytest.raises(ValueError, match="friction jams"):
         consistent(system, "here", y, d)
-
-
-@needs_compiler
-def test_the_loop_in_c_gives_the_same_bits() -> None:
-    for model in (CUBIC, MACHINES["loop"]()):
-        system, follow = of(model)
-        generator = ca.CodeGenerator("follow.c", {"static_aux": True})
-        generator.add(follow.round)
-        library = load(generator.dump() + follow.c_source, "symfric_follow")
-        library.symfric_follow.argtypes = [ctypes.c_void_p] * 2
-        y, d, rng = at_start(system, model), model.values("p"), np.random.default_rng(2)
-        ends = set[int]()
-        for spread in (1e-12, 0.1, 0.5, 3.0, 30.0):
-            guess = y * rng.uniform(1 - spread, 1 + spread, y.size)
-            guess[: system.nx] = y[: system.nx]
-            there, here = guess.copy(), follow(guess, d)
-            end = library.symfric_follow(there.ctypes.data, d.ctypes.data)
-            np.testing.assert_array_equal(there, guess if here is None else here)
-            assert end == (here is None)
-            ends.add(end)
-        assert ends == ({0, 1} if system.n == 2 else {0})

@@ -107,13 +107,6 @@ def test_many_start_as_each_one_alone(
             assert found[m] == pytest.approx(alone, rel=1e-12, abs=1e-12)
 
 
-def test_bristle_starts_in_steady_sliding() -> None:
-    """At -0.1 m/s far above the Stribeck velocity: z = -mu_d N / sigma_0."""
-    run = sf.simulate(sf.rabinowicz(sf.LuGre()), 1e-3)
-    assert run["z"][0] == pytest.approx(-0.1 * 0.8 * 9.81 / 1e5, rel=1e-9)
-    assert run["z"] == pytest.approx(run["z"][0], rel=1e-6)
-
-
 def test_transients_and_spans_of_any_length_are_started_and_ended() -> None:
     """Fast parts that last 1 / rate; a start where the last digit of t is 0.1 us; 5 t^4 from 0."""
     for rate in (1e-3, 1.0, 1e3, 1e6, 1e9):

@@ -76,14 +76,6 @@ def test_statistics_add_up(law: sf.Law, backend: str) -> None:
     assert simulate(DECAY, 1.0).statistics.rejections == 0
 
 
-def test_steps_end_at_the_ends_of_input_intervals() -> None:
-    ends = [0.3, 0.31, 1.1, 1.7]
-    force = Hold([0.0, *ends], [1.0, -3.0, 2.0, 0.5, 4.0])
-    run = simulate(sf.drive(sf.BrownMcPhee()), 2.0, u={"force": force})
-    assert {0.0, *ends, 2.0} <= set(run.step_times.tolist())
-    assert (np.diff(run.step_times) > 0).all()
-
-
 def test_near_jumps_take_no_search_and_jumps_without_a_solution_fail(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -74,15 +74,6 @@ def test_graph_of_blocks_computes_what_the_flat_expression_does(model: Model, me
             assert other.full() == pytest.approx(one.full(), rel=1e-6, abs=1e-12)
 
 
-def test_graph_of_blocks_is_smaller_for_a_large_system() -> None:
-    states = tuple(Variable(f"x_{i}", "1", start=1.0) for i in range(12))
-    every = ca.vertcat(*(v.symbol for v in states))
-    ode = ca.vertcat(every[1:] - every[:-1], -every[-1]) - every
-    system = assemble(Model("chain", x=states, ode=ode + ca.sin(every) * ca.sum1(every) / 12))
-    flat, blocks = (build_step(system, RODAS5P, kind) for kind in (ca.SX, ca.MX))
-    assert blocks.n_instructions() < flat.n_instructions() / 4
-
-
 @pytest.mark.parametrize("case", [smooth_ode(), smooth_dae(), timed_ode()])
 def test_accepted_attempt_is_the_bare_step(case: ClosedForm) -> None:
     h, y = 0.01, case.exact(0.0)
@@ -108,18 +99,6 @@ def test_what_is_rejected_first_is_hardly_above_the_tolerance() -> None:
     errors = [(0.85 * h / less) ** 5 for h, (less, no) in zip(lengths, ends, strict=True) if no]
     assert 0 < len(errors) < lengths.size
     assert 1.0 < errors[0] < 2.0
-
-
-@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10])
-def test_step_size_settles_where_the_error_is_just_allowed(rtol: float) -> None:
-    """The error of a step goes with h^5 (estimate of order 4), so h goes with rtol^(1/5)."""
-    memory = [column(())] * 2
-    for _ in range(8):
-        memory = [
-            attempt(smooth_ode(), np.array([0.0, *m[1:MEMORY], 1.0, 1.0]), rtol=r)
-            for m, r in zip(memory, (rtol, rtol / 32), strict=True)
-        ]
-    assert memory[0][H] / memory[1][H] == pytest.approx(2.0, rel=0.25)
 
 
 def test_growth_and_shrinkage_of_a_step_are_bounded_and_forbidden_after_a_rejection() -> None:

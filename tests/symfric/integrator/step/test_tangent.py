@@ -132,16 +132,6 @@ def test_charts_follow_constraints_that_move() -> None:
     assert one["drive_force"] == pytest.approx(other["drive_force"], abs=1e-5)
 
 
-def test_dense_output_between_steps_is_as_good_as_the_steps() -> None:
-    model = smooth(SCENES["four_mass"]).build(index=0)
-    run = simulate(model, 2.0, rtol=1e-7)
-    exact = simulate(model, 2.0, rtol=1e-12)
-    between = np.linspace(0.013, 1.987, 301)
-    coarse, fine = run.at(between), exact.at(between)
-    for name in ("x1", "x1_rate", "x4_rate"):
-        assert coarse[name] == pytest.approx(fine[name], abs=2e-5)
-
-
 def test_derivatives_in_charts_are_those_in_all_coordinates() -> None:
     scene, p = symbolise(FourMass(BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.1)), "k_4")
     models = (scene.mechanism().build(p, index=i) for i in (0, 1))
