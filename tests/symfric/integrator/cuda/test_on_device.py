@@ -25,7 +25,6 @@ from symfric.integrator.cuda.on_device import OnDevice
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
-from symfric.model import Event
 from symfric.scenes.catalogue import ALL_SCENES
 
 TWENTY: dict[str, Any] = {"x0": {"x": np.linspace(0.5, 2.0, 20)}, "backend": "cuda"}
@@ -148,27 +147,6 @@ def test_the_size_of_a_chunk_depends_on_its_work_and_its_results() -> None:
         task.kernel = replace(kernel, real=REALS[real])
         task.job = replace(task.job, times=np.broadcast_to(1.0, (times,)))
         assert task.chunk(SimpleNamespace(own={})) == size  # type: ignore[arg-type]
-
-
-def with_events() -> Model:
-    model = oscillator()
-    return replace(model, events=(Event("through", model.x[0].symbol),))
-
-
-REFUSED: list[tuple[dict[str, Any], str]] = [
-    ({"model": with_events()}, "a model without events, got 'oscillator' with through; use"),
-    ({"executor": "processes"}, "no executor and no workers.*, got executor = 'processes'"),
-    ({"workers": 2}, "no executor and no workers.*, got workers = 2"),
-    ({"real": "half"}, "simulate_many: real: expected one of double, float, got half"),
-    ({"real": "float"}, "rtol: expected at least 1e-05 with real='float', got 1e-06"),
-    ({"real": "float", "backend": "auto"}, "expected double for this backend, got float"),
-]
-
-
-def test_unsupported_arguments_are_refused() -> None:
-    for arguments, message in REFUSED:
-        with pytest.raises(ValueError, match=message):
-            simulate_many(**{"model": oscillator(), "t_end": 1.0, "backend": "cuda"} | arguments)
 
 
 def test_the_device_of_cupy(cupy: FakeCupy, monkeypatch: pytest.MonkeyPatch) -> None:

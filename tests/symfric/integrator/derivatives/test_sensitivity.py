@@ -217,26 +217,3 @@ def test_run_that_failed_at_once_has_no_derivatives() -> None:
         _ = run.sensitivities
     with pytest.raises(sf.SolveError):
         simulate(model, 1.0, sensitivities=["p"])
-
-
-def test_bad_requests_are_refused_with_what_is_possible() -> None:
-    run, plain = (simulate(oscillator(), 2.0, samples=5, sensitivities=s) for s in (["k"], []))
-    fixed = sf.rabinowicz(sf.LuGre(), free=["k"])
-    requests: list[tuple[Callable[[], object], str]] = [
-        (lambda: simulate(oscillator(), 1.0, sensitivities=["kk"]), r"one of k, c, x0\.x, x0\.v, "),
-        (lambda: simulate(oscillator(), 1.0, sensitivities=["x0.w"]), r"x0\.w; did you mean x0\."),
-        (
-            lambda: simulate(fixed, 1.0, sensitivities=["mu_s"]),
-            r"'rabinowicz' \(parameters must be free\): expected one of k, .* got mu_s",
-        ),
-        (lambda: plain.sensitivities, r"got none; request them by\s+simulate\(\.\.\., sens"),
-        (lambda: plain.gradient({"x": 1.0}), "expected sensitivities, got none"),
-        (lambda: run.gradient({"y": 1.0}), "gradient: expected one of x, v, u, energy, got y"),
-        (
-            lambda: run.gradient({"x": [1.0, 2.0]}),
-            r"expected numbers or arrays of 5 weights, got x of shape \(2,\)",
-        ),
-    ]
-    for request, message in requests:
-        with pytest.raises(ValueError, match=message):
-            request()

@@ -11,13 +11,7 @@ from scipy.integrate import RK45
 import symfric as sf
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.methods.families import SMALL, eigenbasis, eliminated, exp_phi1_phi2
-from symfric.integrator.methods.tableaux import (
-    BACKWARD_EULER,
-    DOPRI5,
-    EXPONENTIAL,
-    RADAU5,
-    RODAS5P,
-)
+from symfric.integrator.methods.tableaux import BACKWARD_EULER, DOPRI5, EXPONENTIAL, RADAU5, RODAS5P
 from symfric.integrator.running.record import Dense
 from symfric.integrator.step.attempt import (
     KAPPA,
