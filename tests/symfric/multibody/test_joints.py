@@ -72,9 +72,7 @@ def twist_derivatives(kind: type[mb.Joint], R: np.ndarray, p: np.ndarray) -> np.
 
 
 @each_joint
-def test_constraints_are_independent_and_hold_what_joints_transmit(
-    kind: type[mb.Joint],
-) -> None:
+def test_constraints_are_independent_and_hold_what_joints_transmit(kind: type[mb.Joint]) -> None:
     apart = np.array([0.0, 0.0, 1.0]) if kind.closes else np.zeros(3)
     C = twist_derivatives(kind, np.eye(3), apart)
     assert C.shape[0] == np.linalg.matrix_rank(C)

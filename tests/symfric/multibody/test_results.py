@@ -111,9 +111,7 @@ def test_components_left_out_are_those_a_joint_cannot_transmit() -> None:
         assert large.tolist() == given, kind
 
 
-def test_details_cost_the_model_nothing_unless_requested(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_details_cost_the_model_nothing_unless_requested(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
     monkeypatch.setattr("symfric.multibody.results._reactions", lambda *_: calls.append("r") or ())
     model = FourMass(LAW).model()

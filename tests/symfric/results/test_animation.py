@@ -13,15 +13,7 @@ from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 from PIL import Image
 
-from symfric import (
-    BrownMcPhee,
-    ExactCoulomb,
-    Model,
-    Trajectory,
-    Variable,
-    rabinowicz,
-    simulate,
-)
+from symfric import BrownMcPhee, ExactCoulomb, Model, Trajectory, Variable, rabinowicz, simulate
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
 from symfric.multibody import Distance, Mechanism, PinInSlot, Prismatic, Revolute, Spherical
 from symfric.multibody.results import SPRING

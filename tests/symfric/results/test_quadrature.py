@@ -15,7 +15,6 @@ from symfric import (
     BrownMcPhee,
     Coulomb,
     Hold,
-    LuGre,
     Model,
     SolveError,
     Trajectory,
@@ -160,14 +159,6 @@ def test_integral_sees_the_jumps_of_an_input() -> None:
     run = simulate(block.build(), 2.0, u=u, rtol=1e-9, t_eval=[2.0])
     assert run.integral("F") == pytest.approx([5 * 0.7 - 2 * 0.4 + 0.9])
     assert run.energy_balance().defect == pytest.approx([0.0], abs=1e-9)
-
-
-def test_work_of_friction_is_the_heat_of_the_belt() -> None:
-    """Of a block at rest on average, the belt's power m g mu v and that of friction add up."""
-    run = simulate(rabinowicz(LuGre()), 2.0, rtol=1e-8)
-    kinetic = 0.4 * (run["v"] ** 2 - run["v"][0] ** 2) + 1.05 * (run["x"] ** 2 - run["x"][0] ** 2)
-    belt = np.array([-0.1 * w for w in run.integral("friction")])
-    assert kinetic == pytest.approx(belt - run.integral("power"), abs=1e-7)
 
 
 def test_damper_dissipates_the_energy_of_the_closed_form() -> None:
