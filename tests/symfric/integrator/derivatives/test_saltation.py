@@ -13,7 +13,6 @@ from stored import stored
 
 import symfric as sf
 from symfric import Hold, Linear, Model, Trajectory, Variable, simulate
-from symfric.integrator.derivatives import saltation as module
 from symfric.model import Event
 from symfric.scenes import PendulumBox
 
@@ -139,20 +138,6 @@ def test_laws_by_events_meet_differences_of_tight_runs(case: str) -> None:
     weights = dict(zip(signals(case), (np.cos(run.t), np.ones(run.t.size)), strict=True))
     by_hand = [np.cos(run.t) @ found[2 * i] + found[2 * i + 1].sum() for i in range(len(names))]
     assert [*run.gradient(weights).values()] == pytest.approx(by_hand, rel=1e-9)
-
-
-def test_many_events_at_once_are_those_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = [v.name for v in CASES["gms_drive"][0].p]
-    together = run_of("gms_drive", {}, sensitivities=names)
-    monkeypatch.setattr(module, "_is_single", lambda *_: False)  # pyright: ignore[reportUnknownLambdaType]
-    alone = run_of("gms_drive", {}, sensitivities=names)
-    for name in names:
-        assert together.sensitivities[name]["x"] == pytest.approx(
-            alone.sensitivities[name]["x"], rel=1e-12
-        )
-        assert together.event_sensitivities[name] == pytest.approx(
-            alone.event_sensitivities[name], rel=1e-11
-        )
 
 
 def struck() -> Model:

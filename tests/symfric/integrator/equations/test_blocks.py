@@ -72,23 +72,9 @@ def with_z(alg: ca.SX) -> Model:
     return Model("alg", x=(x,), z=(z,), ode=-x.symbol, alg=alg + 0 * x.symbol)
 
 
-CUBIC = with_z(z.symbol + z.symbol**3 - x.symbol)
-
-
 def at_start(system: System, model: Model) -> Array:
     guess = first_guess(system, model, model.initial_state())
     return consistent(system, "here", guess, model.values("p"))
-
-
-def test_a_round_is_of_order_three_and_exact_for_linear_equations() -> None:
-    """At x = 2 is z = 1; half the error before a round is an eighth of the error behind it."""
-    _, follow = of(CUBIC)
-    errors = [float(follow.round([2.0, 1 + e], [])[0][1]) - 1 for e in (0.02, 0.01, 0.005)]
-    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx([3.0, 3.0], abs=0.1)
-    _, follow = of(with_z(3 * z.symbol - x.symbol))
-    after, look = follow.round([6.0, 100.0], [])
-    assert after.full().ravel() == pytest.approx([6.0, 2.0], rel=1e-15)
-    assert look.full().ravel() == pytest.approx([49.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from symfric.foundation.parameters import symbolise
 from symfric.integrator.equations.system import System
 from symfric.integrator.step.tangent import Tangent, tangent
 from symfric.multibody import Mechanism, PrescribedMotion
-from symfric.scenes import FourBar, FourMass, MechanismScene, PendulumBox, SliderCrank
+from symfric.scenes import FourBar, FourMass, MechanismScene, SliderCrank
 
 pytestmark = pytest.mark.heavy
 
@@ -49,17 +49,6 @@ def test_charts_lead_where_all_coordinates_lead(name: str) -> None:
     assert one["constraint_position"].max() < 1e-12
     assert one["constraint_velocity"].max() < 1e-12
     assert one["constraint_acceleration"].max() < 1e-9
-
-
-def test_as_many_differential_unknowns_as_degrees_of_freedom() -> None:
-    """A tree needs no chart."""
-    for name, n, degrees in (("four_mass", 4, 2), ("slider_crank", 2, 1), ("four_bar", 3, 1)):
-        whole, chart = unknowns(smooth(SCENES[name]).build(index=0))
-        constraints = n - degrees
-        assert chart.reduced.nx == 2 * degrees
-        assert chart.reduced.n == 2 * degrees + n + constraints
-        assert whole.n == 2 * n + n + constraints + n * degrees
-    assert tangent(assemble(PendulumBox(LAW).mechanism().build(index=0))) is None
 
 
 def start_of(model: Model) -> np.ndarray:
@@ -100,15 +89,6 @@ def test_order_of_a_method_is_kept_in_charts(method: str, order: int) -> None:
         end = flow(model, steps=steps, method=method)(x0=model.initial_state(), T=1.0)["xf"]
         found.append(float(np.abs(end.full().ravel() - reference).max()))
     assert np.log2(found[0] / found[1]) > order - 0.35
-
-
-def test_fixed_step_ends_on_the_constraints() -> None:
-    model = smooth(SCENES["slider_crank"]).build(index=0)
-    whole = assemble(model)
-    end = flow(model, steps=1)(x0=model.initial_state(), T=0.02)["xf"].full().ravel()
-    y = np.concatenate([end, np.zeros(whole.n - end.size)])
-    assert whole.manifold is not None
-    assert np.abs(whole.manifold.defect(y, []).full()).max() < 1e-12
 
 
 def test_charts_follow_full_turns() -> None:
