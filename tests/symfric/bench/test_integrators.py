@@ -28,7 +28,14 @@ def exact(model: Model) -> np.ndarray:
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", [n for n in MECHANISMS if MECHANISMS[n][0] == "joint"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(n, marks=pytest.mark.slow) if "rosenbrock" in n else n
+        for n in MECHANISMS
+        if MECHANISMS[n][0] == "joint"
+    ],
+)
 def test_every_solver_finds_the_slider(name: str, model: Model, exact: np.ndarray) -> None:
     contender = MECHANISMS[name][1](model, WHAT.times, ("slider",), 1e-5)
     found, count = contender.solve()

@@ -100,6 +100,9 @@ CASES = {
 }
 
 
+OFTEN = ("leine_belt", "exact_drive", "gms_drive")
+
+
 def run_of(case: str, p: Mapping[str, float], **how: object) -> Trajectory:
     model, t_end, force = CASES[case]
     u = None if force is None else {"force": force}
@@ -126,7 +129,9 @@ def quotients(case: str) -> Array:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(c, marks=pytest.mark.slow) if c in OFTEN else c for c in CASES]
+)
 def test_laws_by_events_meet_differences_of_tight_runs(case: str) -> None:
     names = [v.name for v in CASES[case][0].p]
     run = run_of(case, {}, rtol=1e-9, sensitivities=names)

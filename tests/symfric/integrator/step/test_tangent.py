@@ -112,6 +112,7 @@ def test_charts_follow_constraints_that_move() -> None:
     assert one["drive_force"] == pytest.approx(other["drive_force"], abs=1e-5)
 
 
+@pytest.mark.slow
 def test_derivatives_in_charts_are_those_in_all_coordinates() -> None:
     scene, p = symbolise(FourMass(BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.1)), "k_4")
     models = (scene.mechanism().build(p, index=i) for i in (0, 1))
