@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from backends import BACKENDS, each_backend, needs_compiler
+from differentiable import followed
 from numpy.typing import NDArray
 
 from symfric import (
@@ -30,12 +31,6 @@ from symfric.scenes import SliderCrank
 Array = NDArray[np.float64]
 LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 x, z, u = Variable("x", "m"), Variable("z", "1"), Variable("u", "N")
-
-
-def followed() -> Model:
-    """x' = z with z + z^3 = u - x: an algebraic unknown that follows what is held."""
-    alg = z.symbol + z.symbol**3 - u.symbol + x.symbol
-    return Model("followed", x=(x,), z=(z,), u=(u,), ode=z.symbol, alg=alg)
 
 
 def burst() -> Model:
