@@ -14,12 +14,15 @@ if TYPE_CHECKING:
     from symfric.laws.base.law import Law as Law
     from symfric.laws.base.law import State as State
     from symfric.laws.base.law import StaticLaw as StaticLaw
+    from symfric.laws.base.law import Switch as Switch
     from symfric.laws.base.phenomena import PHENOMENA as PHENOMENA
     from symfric.laws.catalogue import ALL_LAWS as ALL_LAWS
     from symfric.laws.catalogue import POPULATIONS as POPULATIONS
     from symfric.laws.catalogue import any_from_text as any_from_text
     from symfric.laws.catalogue import law_from_text as law_from_text
     from symfric.laws.catalogue import law_name as law_name
+    from symfric.laws.check import LawReport as LawReport
+    from symfric.laws.check import check_law as check_law
     from symfric.laws.composed.compose import Asymmetric as Asymmetric
     from symfric.laws.composed.compose import LoadDependent as LoadDependent
     from symfric.laws.composed.compose import Sum as Sum

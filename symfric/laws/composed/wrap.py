@@ -10,7 +10,7 @@ from symfric.foundation.numeric import Scalar, column, empty, exp, smallest, tot
 from symfric.foundation.parameters import distinct, parameters, parametric, with_values
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.families import WithModes, carried
-from symfric.laws.base.law import FORCE, Facts, Input, Law, State, Switch, check_law, chosen
+from symfric.laws.base.law import FORCE, Facts, Input, Law, State, Switch, chosen, require_law
 
 
 class Composed(Law):
@@ -148,7 +148,7 @@ class Wrapper(Composed):
     def __post_init__(self) -> None:
         for item in fields_of(self):
             if "unit" not in item.metadata:
-                check_law(type(self).__name__, getattr(self, item.name))
+                require_law(type(self).__name__, getattr(self, item.name))
         super().__post_init__()
 
     @property
@@ -189,7 +189,7 @@ class Exact(WithModes):
     law: Law
 
     def __post_init__(self) -> None:
-        check_law("Exact", self.law)
+        require_law("Exact", self.law)
         super().__post_init__()
         self.law.sliding(0.0, 1.0, 1)  # raises an error if it is not defined
         self.law.static_level(1.0)
