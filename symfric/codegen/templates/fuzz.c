@@ -140,7 +140,7 @@ int main(int argc, char **argv)
     for (long k = 0; k < steps; k++) {
         real before[STATES + 1], after[STATES + 1], shown[OUTPUTS + 1];
         unsigned int must;
-        int own = 0; /* 1 if a parameter differs from its default */
+        int own = 0; /* 1 for other parameters than the defaults, or random bits */
         @default
         for (int i = 0; i < INPUTS; i++) {
             in[i] = valid((double)IN_LOW[i], (double)IN_HIGH[i], (double)IN_NOMINAL[i]);
@@ -166,7 +166,8 @@ int main(int argc, char **argv)
         if (one_in(4)) { /* a memory error */
             for (int i = 0; i < STATES; i++) { state[i] = any_bits(); }
             for (int i = 0; i < INPUTS && one_in(2); i++) { in[i] = any_bits(); }
-            for (int i = 0; i < PARAMS && one_in(16); i++) { param[i] = any_bits(); own = 1; }
+            for (int i = 0; i < PARAMS && one_in(16); i++) { param[i] = any_bits(); }
+            own = 1;
             if (MOST >= 0 && one_in(2)) {
                 param[MOST < 0 ? 0 : MOST] = typed(pow(10.0, 6.0 * uniform() - 3.0));
             }
