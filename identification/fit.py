@@ -157,6 +157,7 @@ class Fit:
             turning=self.data.rotary,
             v_max=0.0 if seen is None else seen.fastest,
             v_min=slowest(kind, seen),
+            natural=None if seen is None or self.start == "law" else seen.natural,
         )
         checks.check_names("Fit: start", given, found.names)
         values = centre(found, None if self.start == "law" else seen, given)

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from ocp.mpc.controller import controller_of as controller_of
     from ocp.solve import solve as solve
     from ocp.solving.active import Active as Active
+    from ocp.solving.live import LivePlot as LivePlot
     from ocp.solving.methods import Fatrop as Fatrop
     from ocp.solving.methods import Ipopt as Ipopt
     from ocp.solving.methods import Sqp as Sqp
@@ -54,7 +55,7 @@ if TYPE_CHECKING:
     from ocp.solving.starts import Guess as Guess
     from ocp.solving.verification import Miss as Miss
     from ocp.solving.verification import Verification as Verification
-    from ocp.transcription.program import Progress as Progress
+    from ocp.solving.watch import Progress as Progress
     from ocp.transcription.program import SolverStatistics as SolverStatistics
     from ocp.transcription.schemes import Legendre as Legendre
     from ocp.transcription.schemes import Radau as Radau

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from typing import TYPE_CHECKING, get_args
 
@@ -16,8 +17,8 @@ from ocp.solving.methods import Fatrop, Ipopt, Sqp
 from ocp.solving.one_solve import Solver
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
-from ocp.solving.starts import STARTS, Start
-from ocp.transcription.program import Report
+from ocp.solving.starts import Start
+from ocp.solving.watch import Report
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting, make_meshes
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError
@@ -40,7 +41,8 @@ def solve(
     tolerance: float = 1e-3,
     refine: bool = True,
     verify: bool = True,
-    starts: int = STARTS,
+    starts: int | None = None,
+    executor: Executor | None = None,
     resting_margin: float = 1e-4,
     progress: Report | None = None,
     max_time: float | None = None,
@@ -77,20 +79,26 @@ def solve(
         intervals: number of intervals of each phase, fractions of T, or a list of these; 50 by
             default. While layers narrow, total number of equal intervals, 60 by default.
         solver: `Ipopt()` by default; `Fatrop()` or `Sqp()`.
-        guess: values by name (see `ocp.solving.starts`), a solution, or a saved solution. With
-            friction, further starts are generated around it.
+        guess: values by name (numbers, samples over the duration, or functions of time), a
+            solution of this session or from a file, a run of `simulate` or of a closed loop, each
+            of any duration, mesh and law. With friction, further starts are generated around it,
+            unless `starts` is None and modes near those of a solution lead to a valid motion.
         friction: see above.
         tolerance: tolerance of the verification, relative to the largest magnitude of each state.
         refine: refine the mesh where local errors are large or where constant inputs increase the
             cost. False keeps the mesh, unless friction is sharpened.
         verify: simulate the models under the control.
-        starts: with friction, largest number of coarse solves, which end if three motions agree.
+        starts: number of solves from starts around the guess, of which the best is continued: with
+            friction, coarse ones, 6 by default; otherwise on the first mesh, 1 by default.
+        executor: executor of `concurrent.futures` for these solves, such as
+            `ProcessPoolExecutor()`; the result is bit-identical. It is not shut down.
         resting_margin: margin between the friction of a contact at rest and its static level, as a
             share of this level, for motions by modes: a smooth law creeps just below the level. The
             search starts at 0.01 and ends at this value, or at a larger one if the law does not
             reach the level or verification requires it. If the margin is active, the message gives
             its cost.
-        progress: function called with a `Progress` after each iteration. Ctrl-C, or an exception
+        progress: function called with a `Progress` (cost, violation, motion) after each iteration,
+            such as `LivePlot()`; with an executor, also after each start. Ctrl-C, or an exception
             raised in the function, stops the solver.
         max_time: wall time [s] of all solves; the best solution found by then is returned.
         throw: raise `SolveError` on failure; False returns the solution with its status.
@@ -109,7 +117,7 @@ def solve(
     tolerance = checks.number("solve: tolerance", tolerance, above=0.0)
     for name, flag in (("refine", refine), ("verify", verify), ("throw", throw)):
         checks.flag(f"solve: {name}", flag)
-    starts = checks.count("solve: starts", starts)
+    starts = None if starts is None else checks.count("solve: starts", starts)
     resting_margin = checks.number("solve: resting_margin", resting_margin, above=0.0, upper=0.1)
     if progress is not None:
         checks.function("solve: progress", progress, "a function of the progress")
@@ -128,7 +136,11 @@ def solve(
     if posed is not problem and isinstance(solver, Ipopt) and OVER not in solver.options:
         solver = solver.with_options(**{OVER: 1.0 / cost_size(posed)})
     goals = Goals.of(tolerance) if refine else replace(Goals.of(tolerance), passes=1)
-    direct = Direct(posed, scheme, solver, intervals, goals, Supervisor(max_time, progress))
+    if not isinstance(executor, Executor | None):  # pyright: ignore[reportUnnecessaryIsInstance]
+        what = "an executor of concurrent.futures, or None"
+        raise checks.refused("solve: executor", what, executor)
+    supervisor = Supervisor(max_time, progress, executor)
+    direct = Direct(posed, scheme, solver, intervals, goals, supervisor)
     search = Search(direct, tolerance, verify, resting_margin)
     solution = solved(search, friction, guess, starts)
     if not solution.ok:

@@ -13,7 +13,7 @@ from ocp.complementarity import solve_relaxed, with_products
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.friction.event_check import verify_exactly
-from ocp.friction.homotopy import FINE, LAST, Sharp, sharpened
+from ocp.friction.homotopy import FINE, LAST, Sharp, resumed, sharpened
 from ocp.friction.mode_optimisation import optimise_modes, refusal
 from ocp.friction.smooth_models import (
     bristles,
@@ -26,7 +26,7 @@ from ocp.friction.smooth_models import (
 )  # fmt: skip
 from ocp.original_law import FAILURES, STEPS, OriginalLaw, reason_of
 from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import Solver
+from ocp.solving.one_solve import STARTS, Solver
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start
@@ -83,9 +83,10 @@ class Direct:
         return make_meshes(self.problem, wanted)
 
     def solved(
-        self, guess: Start, meshes: Sequence[Array] | None = None, *, close: bool = False
-    ) -> Solution:
-        """Solve the problem from `guess`; `close` limits passes, intervals and iterations."""
+        self, guess: Start, meshes: Sequence[Array] | None = None, *, close: bool = False,
+        starts: int | None = None,
+    ) -> Solution:  # fmt: skip
+        """Solve from `starts` starts around `guess`; `close` limits passes and iterations."""
         goals, solver, most = self.goals, self.solver, 0
         if meshes is None:
             meshes = self.meshes
@@ -99,18 +100,19 @@ class Direct:
             solver = solver.with_options(max_iter=most)
         return refined_solve(
             self.problem, meshes, self.scheme, solver, guess, goals=goals,
-            supervisor=self.supervisor,
+            supervisor=self.supervisor, starts=starts or 1,
         )  # fmt: skip
 
-    def sharpened(self, guess: Start, starts: int, last: float) -> Iterator[Sharp]:
+    def sharpened(self, guess: Start, starts: int | None, last: float) -> Iterator[Sharp]:
         """Yield motions with decreasing smoothing widths, down to `last`."""
         intervals = FINE
         if self.intervals is not None:
             meshes = make_meshes(self.problem, self.intervals)
             intervals = sum(mesh.size - 1 for mesh in meshes[: len(self.problem.chain)])
         return sharpened(
-            self.problem, self.scheme, self.solver, guess, intervals=intervals, starts=starts,
-            last=last, rivals=last > 0 and not bristles(self.problem), supervisor=self.supervisor,
+            self.problem, self.scheme, self.solver, guess, intervals=intervals,
+            starts=starts or STARTS, last=last,
+            rivals=last > 0 and not bristles(self.problem), supervisor=self.supervisor,
         )  # fmt: skip
 
 
@@ -265,7 +267,7 @@ def _stopped(exact: Solution, sharp: Solution) -> Solution:
     return replace(_after(exact, sharp), status=exact.status, message=text, cause=exact.cause)
 
 
-def solved(search: Search, friction: Friction, guess: Start, starts: int) -> Solution:
+def solved(search: Search, friction: Friction, guess: Start, starts: int | None) -> Solution:
     """Solve the problem of `search.direct` by the strategy that it requires."""
     direct, check = search.direct, search.checked
     if any(row.is_product for span in direct.problem.spans for row in span.path):
@@ -285,7 +287,7 @@ def solved(search: Search, friction: Friction, guess: Start, starts: int) -> Sol
             f"solve: expected models without events, got {checks.listed(events)}; with "
             "collocation friction='modes' or 'sharpen' replaces laws that have them"
         )
-    return check(direct.solved(guess))
+    return check(direct.solved(guess, starts=starts))
 
 
 def _by_relaxation(search: Search, friction: Friction, guess: Start) -> Solution:
@@ -302,7 +304,7 @@ def _by_relaxation(search: Search, friction: Friction, guess: Start) -> Solution
     return with_products(search.checked(found))
 
 
-def _by_shooting(search: Search, guess: Start, starts: int) -> Solution:
+def _by_shooting(search: Search, guess: Start, starts: int | None) -> Solution:
     """Solve with laws with states by shooting, started from the motion with static friction."""
     collocation = replace(search, direct=replace(search.direct, scheme=Radau()), verify=False)
     static = _by_homotopy(collocation, "modes", guess, starts)
@@ -312,7 +314,7 @@ def _by_shooting(search: Search, guess: Start, starts: int) -> Solution:
     return own if own.verification is not None else search.checked(own)
 
 
-def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int) -> Solution:
+def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int | None) -> Solution:
     """Return the first valid motion on the path of decreasing widths.
 
     If there is none, return the best motion, with a message about the steps that failed.
@@ -321,13 +323,19 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int) 
     reason = _refused(problem) if friction != "sharpen" else "not requested"
     if reason and friction == "modes":
         raise ValueError(f"solve: friction 'modes': {reason}")
+    if isinstance(guess, Solution) and guess.modes and starts is None and not reason:
+        with suppress(*FAILURES):
+            direct = search.direct
+            last = resumed(problem, direct.scheme, direct.solver, guess, direct.supervisor)
+            if last.solution.ok and (found := search.near(last)).right:
+                return found.solution
     path = search.direct.sharpened(guess, starts, 0.0 if reason else LAST)
     try:
         sharp = next(path)
     except FAILURES as error:
         if _events(problem):
             raise
-        smooth = check(search.direct.solved(guess))
+        smooth = check(search.direct.solved(guess, starts=starts))
         return with_sentence(smooth, f"Friction was not sharpened: {reason_of(error)}.")
     tried, text = list[Judged](), f"No motion by modes was sought: {reason}." if reason else ""
     while sharp.solution.ok:

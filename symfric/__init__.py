@@ -10,8 +10,9 @@
 Contents; `help` describes each name:
 
     laws        LuGre, BrownMcPhee, GMS, ... (ALL_LAWS by name, POPULATIONS of random contacts);
-                Law, StaticLaw, State, Input, Facts (PHENOMENA) to write laws, Element and Slider to
-                compose them; law_from_text and any_from_text (AnyLaw), law_name; steady_force,
+                Law, StaticLaw, State, Input, Switch, Facts (PHENOMENA), parametric, param, smooth
+                to write laws, check_law (LawReport) to check them, Element and Slider to compose
+                them; law_from_text and any_from_text (AnyLaw), law_name; steady_force,
                 steady_inputs; PlanarSlip and SpatialSlip in a plane and in space
     machines    rabinowicz, drive; more in symfric.scenes (ALL_SCENES by name)
     equations   Model of Variable, Output, Event and Monitor; contact adds a law to it (Contact)
@@ -46,7 +47,9 @@ if TYPE_CHECKING:
     from symfric.foundation.panels import for_print as for_print
     from symfric.foundation.parameters import Parameter as Parameter
     from symfric.foundation.parameters import Variable as Variable
+    from symfric.foundation.parameters import param as param
     from symfric.foundation.parameters import parameters as parameters
+    from symfric.foundation.parameters import parametric as parametric
     from symfric.foundation.parameters import symbolise as symbolise
     from symfric.foundation.parameters import with_values as with_values
     from symfric.foundation.status import EnergyWarning as EnergyWarning

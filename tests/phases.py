@@ -14,7 +14,7 @@ from ocp.solving.one_solve import Solver
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Start
-from ocp.transcription.program import Report
+from ocp.solving.watch import Report
 from ocp.transcription.schemes import Scheme, make_meshes
 from symfric import BrownMcPhee, Model, Variable
 from symfric.multibody import JointSpringDamper

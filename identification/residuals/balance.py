@@ -12,7 +12,7 @@ from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.laws import Law
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import require_law
 from symfric.model import Model
 from symfric.model.contact import Contact
 
@@ -195,7 +195,7 @@ def _states(
         if not c.states:
             continue
         at = f"{where}: contact '{c.name}'"
-        check_law(at, c.law)
+        require_law(at, c.law)
         law = cast(Law, c.law)
         here = [put(x) for x in (c.slip, c.N, *c.given.values())]
         then = [ca.substitute(x, now, later) for x in here]

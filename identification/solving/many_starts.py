@@ -11,12 +11,10 @@ dropped, so that the outcome does not depend on the executor.
 Source: M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21, 1979.
 """
 
-import pickle
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, Executor
 from dataclasses import replace
-from functools import lru_cache, partial
-from threading import get_ident
+from functools import partial
 
 import numpy as np
 
@@ -25,6 +23,7 @@ from identification.solving.descent import Start, descend, descend_easier_first
 from identification.solving.task import Point, Task, square
 from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns
+from symfric.foundation.executors import in_order
 from symfric.foundation.status import SolveError, Status
 
 REACH = 5.0
@@ -159,32 +158,12 @@ def _in_turn(
             tell = None if progress is None else partial(_tell, progress, number, len(starts))
             yield descend_easier_first(task, w, number, evaluations, tell)
         return
-    packed = pickle.dumps(task)
-    waiting: list[Future[Start]] = [
-        executor.submit(_descend_packed, packed, w, number, evaluations)
-        for number, w in enumerate(starts)
-    ]
-    try:
-        for future in waiting:
-            yield future.result()
-    finally:
-        for future in waiting:
-            future.cancel()
+    calls = [(w, number, evaluations) for number, w in enumerate(starts)]
+    yield from in_order(executor, descend_easier_first, task, calls)
 
 
 def _tell(progress: Progress, number: int, count: int, evaluation: int) -> None:
     progress(f"start {number + 1} of {count}, evaluation {evaluation}", number / count)
-
-
-def _descend_packed(packed: bytes, w: Array, number: int, evaluations: int) -> Start:
-    return descend_easier_first(_unpacked(packed, get_ident()), w, number, evaluations)
-
-
-@lru_cache(maxsize=4)
-def _unpacked(packed: bytes, thread: int) -> Task:
-    """Return the task of this thread, unpickled only once because compilation is expensive."""
-    del thread
-    return pickle.loads(packed)
 
 
 def _enough(task: Task, done: Sequence[Start], agree: int) -> bool:

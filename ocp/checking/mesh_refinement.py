@@ -18,7 +18,7 @@ from ocp.checking.verify import TOLERANCE, left_between, restarted
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import Solved, Solver
+from ocp.solving.one_solve import Solved, Solver, Starts, starts_around
 from ocp.solving.prepared import Prepared, Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start, start_of
@@ -185,6 +185,7 @@ def refined_solve(
     *,
     goals: Goals | None = None,
     supervisor: Supervisor | None = None,
+    starts: int = 1,
 ) -> Solution:
     """Solve `problem` repeatedly, each time on meshes derived from the remaining errors.
 
@@ -200,6 +201,8 @@ def refined_solve(
         guess: see `ocp.solving.starts`.
         goals: criteria for a fine mesh, by default for a verification within 1e-3.
         supervisor: time limit and progress.
+        starts: number of solves on the first mesh from starts around the guess; the best one is
+            continued.
 
     Returns:
         The last successful solution with the statistics of all passes, or the first solution if it
@@ -211,6 +214,7 @@ def refined_solve(
     goals, supervisor = goals or Goals.of(TOLERANCE), supervisor or Supervisor()
     solver, made = solver or Ipopt(), discretise(problem, scheme or Radau())
     ready: dict[tuple[Skeleton, bool, bool], Prepared] = {}
+    texts: list[str] = []
 
     def solved(meshes: Sequence[Array], guess: Start, number: int, capped: bool) -> Solution:
         began = begin if number == 1 else perf_counter()
@@ -224,9 +228,15 @@ def refined_solve(
             own = solver.with_options(**(later | dict(solver.options))) if again else solver
             ready[key] = own.prepared(transcription.program)
         start, warm = start_of(transcription, guess)
-        outcome = supervisor.run(
-            transcription, ready[key], start, f"mesh {number}", warm=warm, begin=began
-        )
+        if number == 1 and starts > 1:
+            each = Starts(transcription, solver, ready[key], transcription.program.values)
+            around = starts_around(transcription, transcription.unpack(start.w), range(starts))
+            outcome, text = each.best(around, supervisor)
+            texts.append(text)
+        else:
+            outcome = supervisor.run(
+                transcription, ready[key], start, f"mesh {number}", warm=warm, begin=began
+            )
         return Solved(transcription, outcome).solution
 
     new = best = solved(meshes, guess, 1, capped=False)
@@ -251,7 +261,7 @@ def refined_solve(
             message = f"{new.message} The result is the solution on the previous mesh."
             best = replace(best, status=new.status, message=message, cause=new.cause)
         best = new if new.ok else best
-    return replace(best, statistics=statistics)
+    return with_sentence(replace(best, statistics=statistics), " ".join(texts))
 
 
 class Excess(NamedTuple):

@@ -195,25 +195,28 @@ def _with_nominals(model: Model, sizes: Mapping[str, float]) -> Model:
 @final
 @dataclass(frozen=True, eq=False)
 class PosedPhase:
-    """Phase of a problem from a file: its name, the user's model and its duration [s]."""
+    """Phase of a problem from a file: name, user's model, duration [s], states with a start."""
 
     name: str
     model: Model
     T: float | Free
+    start: tuple[str, ...] = ()
 
 
 @final
 @dataclass(frozen=True, eq=False, repr=False)
 class Posed:
-    """Problem from a file, which suffices to verify and plot its solution or to use it as guess.
+    """Problem from a file, which suffices to transcribe it, and to verify and plot its solution.
 
     Costs, conditions and links are expressions in `spans`. The user's functions are not stored, so
-    the problem cannot be solved again: write it again, and pass the solution as `guess`.
+    phases cannot be solved by modes again: write the problem again, and pass the solution as
+    `guess`.
 
     Attributes:
-        name, spans, chain, chosen, kind, scenario_names, shared_inputs: as in `Problem`.
+        name, spans, chain, chosen, kind, scenario_names, shared_inputs, shared_starts: as in
+            `Problem`.
         periodic, choose: names of periodic states and of chosen parameters.
-        durations: indices of the phases with a condition on the sum of their durations.
+        durations: as in `Problem`; in older files only the indices of the phases.
     """
 
     name: str
@@ -225,7 +228,8 @@ class Posed:
     shared_inputs: tuple[str, ...]
     periodic: tuple[str, ...]
     choose: tuple[str, ...]
-    durations: tuple[tuple[int, ...], ...]
+    durations: tuple[tuple[tuple[int, ...], float | Free], ...] | tuple[tuple[int, ...], ...]
+    shared_starts: tuple[tuple[int, str], ...] = ()
 
     def __post_init__(self) -> None:
         for span in self.spans:
@@ -252,14 +256,15 @@ def posed(problem: Problem | Posed) -> Posed:
     return Posed(
         problem.name,
         problem.spans,
-        tuple(PosedPhase(phase.name, phase.model, phase.T) for phase in problem.chain),
+        tuple(PosedPhase(one.name, one.model, one.T, tuple(one.start)) for one in problem.chain),
         problem.chosen,
         problem.kind,
         problem.scenario_names,
         problem.shared_inputs,
         tuple(problem.periodic),
         tuple(problem.choose),
-        tuple(tuple(phases) for phases, _ in problem.durations),
+        tuple((tuple(phases), total) for phases, total in problem.durations),
+        problem.shared_starts,
     )
 
 

@@ -34,12 +34,12 @@ from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
 from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
-from ocp.solving.one_solve import Solver, Step, finalists, least
+from ocp.solving.one_solve import STARTS, Solver, Starts, Step, finalists, least, starts_around
 from ocp.solving.optimum import Optimum
 from ocp.solving.prepared import Option, Prepared, Supervisor
 from ocp.solving.solution import Solution
-from ocp.solving.starts import STARTS, Start, resample, start_of, starts_around
-from ocp.transcription.program import Iterate, SolverStatistics
+from ocp.solving.starts import Start, resample, start_of
+from ocp.transcription.program import SolverStatistics
 from ocp.transcription.schemes import Scheme, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
 from ocp.transcription.unknowns import Points
@@ -67,8 +67,6 @@ TOLERANCE = 1e-3
 """Permitted local error of an interval, relative to the magnitude of the states."""
 PASSES = 4
 """Largest number of meshes at one width."""
-SPREAD = 0.5
-"""Spread of additional starts around the given one; see `starts_around`."""
 FURTHER = 2
 """Number of repetitions with new starts around straight lines if no start leads to a solution."""
 SAME = 3.0
@@ -158,6 +156,22 @@ def sharpened(
             return
 
 
+def resumed(
+    problem: Problem, scheme: Scheme, solver: Solver, guess: Solution, supervisor: Supervisor
+) -> Sharp:
+    """Return the motion with the width `LAST` near a solution by modes.
+
+    Raises:
+        ValueError: its meshes do not suit the problem.
+    """
+    path = _Path(problem, scheme, solver, supervisor)
+    same = len(guess.meshes) == len(problem.spans)
+    on = path.discretisation.on(guess.meshes if same else _meshes(problem, FINE))
+    points = on.unpack(start_of(on, guess)[0].w)
+    path.scales = scales_of(problem, path.problem, points, {})
+    return path.sharp(path.solve(on, points, LAST, ONTO, "guess"), steady=True)
+
+
 @final
 class _Path:
     """Problem with smooth models, scales and prepared solvers, shared by all steps."""
@@ -169,17 +183,17 @@ class _Path:
         self.problem = smooth_models.smoothed(user)
         self.discretisation = discretise(self.problem, scheme)
         self.scales: Scales = {}
-        self.solves: list[SolverStatistics] = []
-        self.prepared: dict[tuple[int, str], Prepared] = {}
+        self.spent: list[SolverStatistics] = []
+        self.prepared: dict[tuple[int, str], tuple[Solver, Prepared]] = {}
 
     def coarse(self, guess: Start, starts: int) -> list[Step]:
         """Return coarse solves with wide layers that lead to different motions, the best first."""
         coarse = self.discretisation.on(_meshes(self.problem, COARSE))
         begin = coarse.unpack(start_of(coarse, guess)[0].w)
         straight = coarse.unpack(start_of(coarse, None)[0].w)
-        tries = starts_around(coarse, begin, range(starts), SPREAD)
+        tries = starts_around(coarse, begin, range(starts))
         if guess is not None:
-            tries += starts_around(coarse, straight, range(1, starts, 2), SPREAD)
+            tries += starts_around(coarse, straight, range(1, starts, 2))
         found = [scales_of(self.user, self.problem, points, {}) for points in tries]
         self.scales = smooth_models.guessed(self.user, found)
         steps = self.each(coarse, tries)
@@ -188,7 +202,7 @@ class _Path:
             if best.ended or best.good:
                 break
             seeds = range(more * starts, (more + 1) * starts)
-            steps += self.each(coarse, starts_around(coarse, straight, seeds, SPREAD))
+            steps += self.each(coarse, starts_around(coarse, straight, seeds))
             best = least(steps)
         if best.ended:
             return [best]
@@ -253,12 +267,8 @@ class _Path:
         Equal motions of several starts do not end the search, as they may be a poor local optimum:
         three starts of the cart-pole of nosnoc stay at the lower equilibrium.
         """
-        steps: list[Step] = []
-        for number, points in enumerate(tries, 1):
-            steps.append(self.solve(mesh, points, FIRST, options, f"start {number}"))
-            if steps[-1].ended:
-                break
-        return steps
+        stages = [f"start {number}" for number in range(1, len(tries) + 1)]
+        return self.solves(mesh, tries, FIRST, options, stages)
 
     def narrower(self, before: Step, level: float) -> Step:
         """Solve with the smaller width `level`, and refine the mesh for it.
@@ -309,6 +319,13 @@ class _Path:
         stage: str,
     ) -> Step:
         """Solve once with the smoothing width `level`."""
+        return self.solves(transcription, [points], level, options, [stage])[0]
+
+    def solves(
+        self, transcription: Transcription, tries: Sequence[Points], level: float,
+        options: Mapping[str, Option], stages: Sequence[str],
+    ) -> list[Step]:  # fmt: skip
+        """Solve from several starts with the smoothing width `level`, until a solve is stopped."""
         values = transcription.values(widths_at(self.user, self.scales, level))
         if self.problem.kind == "worst":
             options = {name: v for name, v in options.items() if name != "mu_init"} | BOUNDING
@@ -317,11 +334,11 @@ class _Path:
             solver = self.solver
             if isinstance(solver, Ipopt):
                 solver = Ipopt(max_time=solver.max_time, **(dict(options) | dict(solver.options)))
-            self.prepared[key] = solver.prepared(transcription.program)
-        start = Iterate.cold(transcription.pack(points), transcription.program.g.numel())
-        outcome = self.supervisor.run(transcription, self.prepared[key], start, stage, values)
-        self.solves.append(outcome.statistics)
-        return Step(transcription, outcome, values, level)
+            self.prepared[key] = solver, solver.prepared(transcription.program)
+        starts = Starts(transcription, *self.prepared[key], values)
+        outcomes = [*starts.outcomes(tries, self.supervisor, stages)]
+        self.spent += [outcome.statistics for outcome in outcomes]
+        return [Step(transcription, outcome, values, level) for outcome in outcomes]
 
     def moved(self, step: Step, into: Transcription) -> Points:
         """Return the motion of a step interpolated to the meshes of `into`."""
@@ -344,7 +361,7 @@ class _Path:
         """Return a step as a solution of the problem with its widths."""
         widths = widths_at(self.user, self.scales, step.level)
         problem = replace(self.problem, p=dict(self.problem.p) | widths)
-        statistics = reduce(SolverStatistics.then, self.solves)
+        statistics = reduce(SolverStatistics.then, self.spent)
         optimum = Optimum(step.transcription, step.outcome.iterate, step.values)
         solution = replace(step.solution, problem=problem, statistics=statistics, optimum=optimum)
         return Sharp(solution, step.level, self.scales, steady, step.error)

@@ -197,7 +197,7 @@ LEAN: dict[str, Option] = {
     "no_nlp_grad": True,
 }
 """Options of all solvers for no output and no unused derivatives."""
-QUIET: dict[str, Option] = {"print_level": 0, "sb": "yes"}
+QUIET: dict[str, Option] = {"print_level": 0, "sb": "yes", "mumps_mem_percent": 5}
 """Options of Ipopt for no output."""
 WARM: dict[str, Option] = {
     "warm_start_init_point": "yes",

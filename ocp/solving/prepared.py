@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any, NamedTuple, final
@@ -10,15 +11,13 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Array
-from ocp.solving.watch import FAR, FEASIBLE, Hook, Seen, Watch, interrupts
+from ocp.solving.watch import FAR, FEASIBLE, Hook, Report, Seen, Watch, in_stage, interrupts
 from ocp.transcription.program import (
     Iterate,
     Outcome,
     Place,
     Program,
-    Report,
     SolverStatistics,
-    in_stage,
     outside,
     worst_of,
 )
@@ -289,10 +288,12 @@ class Supervisor:
     Attributes:
         max_time: total wall time [s], or None for no limit.
         progress: function called with a `Progress` after each iteration.
+        executor: executor of solves from several starts; None: one after the other.
     """
 
     max_time: float | None = None
     progress: Report | None = None
+    executor: Executor | None = None
     started: float = field(default_factory=perf_counter)
 
     @property
@@ -316,7 +317,7 @@ class Supervisor:
         if left is not None and (prepared.max_time is None or prepared.max_time > left):
             prepared = replace(prepared, max_time=left, told_time=self.max_time)
         values = transcription.program.values if values is None else values
-        report = in_stage(self.progress, stage)
+        report = in_stage(self.progress, stage, transcription)
         return prepared.run(start, values, report, warm, transcription.when, begin)
 
 

@@ -74,7 +74,7 @@ class Solution(packed.Portable):
         verification: result of the re-simulation; None without verification.
         cause: exception in `progress` that stopped the solver, if any.
         optimum: the program with its multipliers; that of the arcs for a motion by modes. None
-            after loading from a file.
+            in files of older versions.
     """
 
     problem: Problem = field(metadata={"packed": Posed})
@@ -225,7 +225,7 @@ class Solution(packed.Portable):
         states of laws. Costates of coordinates in loops depend on each other.
 
         Raises:
-            ValueError: the solution is not optimal, or was loaded from a file.
+            ValueError: the solution is not optimal, or was saved by an older version.
         """
         found = self._linearised("costates").central
         series = found.over_time(found.costates)
@@ -287,19 +287,20 @@ class Solution(packed.Portable):
         from ocp.solving.polish import polished  # noqa: PLC0415  (loads scipy.sparse)
 
         if self.optimum is None or self.status.stopped:
-            got = "one from a file" if self.optimum is None else self.status.name
+            old = "one from a file of an older version"
+            got = old if self.optimum is None else self.status.name
             raise ValueError(
-                f"solution of '{self.problem.name}': {what}: expected an optimal solution of this "
-                f"session, got {got}; solve the problem with this solution as guess"
+                f"solution of '{self.problem.name}': {what}: expected an optimal solution with its "
+                f"multipliers, got {got}; solve the problem with this solution as guess"
             )
         return polished(self.optimum)
 
     def save(self, path: str | Path) -> None:
         """Write the solution to a file, which `ocp.load` reads without loss.
 
-        A loaded solution has signals, modes and re-simulated motions. It can be plotted, written,
-        verified again, and used as `guess` on any mesh or model. Functions such as costs are stored
-        as the expressions that they returned.
+        A loaded solution has signals, modes, re-simulated motions, costates and sensitivities. It
+        can be plotted, written, verified again, and used as `guess` on any mesh or model. Functions
+        such as costs are stored as the expressions that they returned.
 
         Raises:
             ValueError: the file cannot be written.
@@ -308,8 +309,7 @@ class Solution(packed.Portable):
 
     def to_pack(self) -> dict[str, Any]:
         """Return the fields for a file, with the problem in its resolved form."""
-        none = dict.fromkeys(("cause", "optimum"))
-        return packed.state_of(self) | none | {"problem": posed(self.problem)}
+        return packed.state_of(self) | {"cause": None, "problem": posed(self.problem)}
 
     def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
         """Plot signals over time, one panel each: optimised points and the re-simulated motion.
@@ -382,7 +382,7 @@ def with_sentence(solution: Solution, sentence: str) -> Solution:
     return replace(solution, message=f"{solution.message} {sentence}".rstrip())
 
 
-SOLUTION = Format("symfric ocp solution", 3, "ocp.load", "a saved solution", Solution)
+SOLUTION = Format("symfric ocp solution", 4, "ocp.load", "a saved solution", Solution)
 
 
 def load(path: str | Path, own: Iterable[type | Callable[..., Any]] = ()) -> Solution:

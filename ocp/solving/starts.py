@@ -1,9 +1,11 @@
 """Initial guesses of the optimiser from prescribed values, the user's guess or a solution."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import isfinite, pi
+from functools import partial
+from math import isfinite
 from pathlib import Path
+from typing import Protocol, runtime_checkable
 
 import casadi as ca
 import numpy as np
@@ -17,22 +19,30 @@ from ocp.transcription.program import Iterate
 from ocp.transcription.transcribe import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks
-from symfric.foundation.variable import Variable
 from symfric.model import Model
 
 Guess = float | ArrayLike | Callable[[Array], ArrayLike]
 """A constant, equally spaced samples from 0 to the end, or a function of the times [s]."""
 
-Start = Mapping[str, Guess] | Solution | Points | None
-"""Guesses by name, a solution of this or a similar problem, points, or None."""
 
-STARTS = 6
-"""Number of coarse solves of a problem with friction; the best one is continued."""
-HALF_WAVES = np.arange(1, 4)
-"""Numbers of half waves over the whole motion in a deviation."""
-STILL = 0.3
-"""Deviation, relative to the nominal value, of a state that is constant in the given start if all
-states of its unit are constant."""
+@runtime_checkable
+class Run(Protocol):
+    """Signals over time, such as a run of `simulate` or of a closed loop.
+
+    Attributes:
+        t: times [s], shape (n,).
+        signals: name -> values, shape (n,).
+    """
+
+    @property
+    def t(self) -> Array: ...  # noqa: D102
+
+    @property
+    def signals(self) -> Mapping[str, Array]: ...  # noqa: D102
+
+
+Start = Mapping[str, Guess] | Solution | Run | Points | None
+"""Guesses by name, a solution of this or a similar problem, a run, points, or None."""
 
 
 def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
@@ -49,9 +59,10 @@ def start_of(into: Transcription, guess: Start) -> tuple[Iterate, bool]:
         _check_shapes(into, guess)
         return Iterate.cold(into.pack(guess), rows), False
     if not isinstance(guess, Solution):
-        if guess is not None and not isinstance(guess, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+        if guess is not None and not isinstance(guess, Mapping | Run):  # pyright: ignore[reportUnnecessaryIsInstance]
             hint = "a file is read by ocp.load(path)" if isinstance(guess, str | Path) else ""
-            raise checks.refused("guess", "values by name, a solution, or points", guess, hint)
+            what = "values by name, a solution, a run, or points"
+            raise checks.refused("guess", what, guess, hint)
         return Iterate.cold(into.pack(initial_points(into, guess)), rows), False
     spans = span_motions(guess.problem, guess.scheme, guess.meshes, guess.points)
     w, old = into.pack(resample(into, spans, guess.chosen)), guess.iterate
@@ -80,8 +91,10 @@ def _check_shapes(into: Transcription, points: Points) -> None:
         )
 
 
-def initial_points(into: Transcription, given: Mapping[str, Guess] | None = None) -> Points:
+def initial_points(into: Transcription, given: Mapping[str, Guess] | Run | None = None) -> Points:
     """Return initial points from `given` values by name, and default values for other signals.
+
+    A run is stretched to the duration; free durations are scaled to its duration.
 
     States are piecewise linear through the middles of their conditions at the start, at via points
     and at the end, over all phases in which they are continuous. A state that is the rate of
@@ -96,9 +109,13 @@ def initial_points(into: Transcription, given: Mapping[str, Guess] | None = None
     problem = into.problem
     models = [span.model for span in problem.spans]
     known = dict.fromkeys(v.name for m in models for group in (m.x, m.z, m.u) for v in group)
-    guesses = checks.named("guess", given, list(known))
-    durations = _durations(problem)
+    run = given if isinstance(given, Run) else None
+    durations = _durations(problem, None if run is None else float(run.t[-1] - run.t[0]))
     total = float(sum(durations[: len(problem.chain)]))
+    if run is not None:
+        at, rows = total * (run.t - run.t[0]) / (run.t[-1] - run.t[0]), run.signals
+        given = {n: partial(np.interp, xp=at, fp=rows[n][: at.size]) for n in known if n in rows}
+    guesses = checks.named("guess", given, list(known))
 
     def value(number: int, name: str, fractions: Array) -> Array | None:
         if name not in guesses:
@@ -240,15 +257,19 @@ def _prescribed(span: Span, name: str, fraction: float) -> bool:
     return finite and (box != span.boxes[name] or (span.phase == 0 and fraction == 0.0))
 
 
-def _durations(problem: Problem) -> list[float]:
-    """Return the initial durations [s], scaled to prescribed sums."""
+def _durations(problem: Problem, total: float | None = None) -> list[float]:
+    """Return the initial durations [s], scaled to prescribed sums; free ones, first to `total`."""
     spans = problem.spans
     durations = [initial(span.T) for span in spans]
-    for phases, total in problem.durations:
+    if total is not None:
+        factor = total / sum(durations[: len(problem.chain)])
+        pairs = zip(durations, spans, strict=True)
+        durations = [float(clipped(T * factor, limits(span.T))) for T, span in pairs]
+    for phases, whole in problem.durations:
         for first in range(0, len(spans), len(problem.chain)):
             numbers = [first + k for k in phases]
             free = [n for n in numbers if isinstance(spans[n].T, Free)]
-            rest = initial(total) - sum(durations[n] for n in numbers if n not in free)
+            rest = initial(whole) - sum(durations[n] for n in numbers if n not in free)
             have = sum(durations[n] for n in free)
             for n in free:
                 durations[n] = clipped(durations[n] * rest / have, limits(spans[n].T))
@@ -301,77 +322,3 @@ def _middle(box: Box) -> float:
 def _rest(box: Box) -> float:
     """Return zero, or the middle of `box` if it does not contain zero."""
     return 0.0 if box[0] <= 0.0 <= box[1] else _middle(box)
-
-
-def starts_around(
-    into: Transcription, begin: Points, seeds: Iterable[int], spread: float
-) -> tuple[Points, ...]:
-    """Return `begin` for the seed 0, and `begin` with a random smooth deviation for other seeds.
-
-    The deviation of a state is a sum of half waves over the whole motion, with amplitudes of
-    `spread` times its range in `begin`, smaller in short waves. The deviation of a rate of another
-    state (x' = v) is the rate of that deviation. Amplitudes of inputs are `spread` times a quarter
-    of the range of their bounds, or times their nominal value.
-
-    Args:
-        into: transcription of the points.
-        begin: the first start.
-        seeds: seeds of NumPy's default generator.
-        spread: relative size of the deviations; 0.5 finds most local optima of a swing-up.
-    """
-    return tuple(_around(into, begin, spread, seed) if seed else begin for seed in seeds)
-
-
-def _around(into: Transcription, begin: Points, spread: float, seed: int) -> Points:
-    problem, phases = into.problem, len(into.problem.chain)
-    random = np.random.default_rng(seed)
-    names = {v.name for s in problem.spans for group in (s.model.x, s.model.u) for v in group}
-    waves = {name: spread * random.standard_normal(HALF_WAVES.size) for name in sorted(names)}
-    sizes = _ranges(into, begin)
-    spans: list[SpanPoints] = []
-    for number, (span, old) in enumerate(zip(problem.spans, begin.spans, strict=True)):
-        first = number - span.phase
-        whole = sum(points.T for points in begin.spans[first : first + phases])
-        start = sum(points.T for points in begin.spans[first:number]) / whole
-        mesh, positions = into.meshes[number], rates_of(span.model)
-
-        def angles(fractions: Array, start: float = start, share: float = old.T / whole) -> Array:
-            return pi * (start + share * fractions)[:, None] * HALF_WAVES
-
-        nodes, points, u = old.nodes.copy(), old.inner.copy(), old.u.copy()
-        for states, fractions in ((nodes, mesh), (points, into.inner_fractions(number))):
-            at = angles(fractions)
-            for row, v in zip(states, span.model.x, strict=True):
-                name = positions.get(v.name)
-                if name is None:
-                    row += sizes[v.name] * (np.sin(at) / HALF_WAVES) @ waves[v.name]
-                else:
-                    row += sizes[name] * pi / whole * np.cos(at) @ waves[name]
-        at = angles((mesh[1:] + mesh[:-1]) / 2)
-        for row, v in zip(u, span.model.u, strict=True):
-            low, high = span.boxes[v.name]
-            size = 0.25 * (high - low) if isfinite(low) and isfinite(high) else v.nominal
-            row += size * np.sin(at) @ waves[v.name]
-        spans.append(SpanPoints(old.T, nodes, points, old.z, u))
-    return Points(tuple(spans), begin.chosen)
-
-
-def _ranges(into: Transcription, begin: Points) -> dict[str, float]:
-    """Return state -> range of its values in `begin`, over all phases.
-
-    A constant state has the largest range of the states of its unit.
-    """
-    states: dict[str, Variable] = {}
-    values: dict[str, list[float]] = {}
-    for span, points in zip(into.problem.spans, begin.spans, strict=True):
-        for v, row in zip(span.model.x, points.nodes, strict=True):
-            values.setdefault(v.name, []).extend((float(row.min()), float(row.max())))
-            states[v.name] = v
-    ranges = {name: max(found) - min(found) for name, found in values.items()}
-    largest: dict[str, float] = {}
-    for name, v in states.items():
-        largest[v.unit] = max(largest.get(v.unit, 0.0), ranges[name])
-    return {
-        n: size or largest[states[n].unit] or STILL * states[n].nominal
-        for n, size in ranges.items()
-    }

@@ -2,8 +2,9 @@
 
 import signal
 import threading
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from time import perf_counter
 from types import FrameType
 from typing import NamedTuple, final
@@ -12,7 +13,9 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Array
-from ocp.transcription.program import Program, Progress, Report, worst_of
+from ocp.solving.motion import Motion, motions_of
+from ocp.transcription.program import Program, worst_of
+from ocp.transcription.transcribe import Transcription
 from symfric.foundation.status import Status
 
 FEASIBLE = 1e-6
@@ -23,6 +26,55 @@ FAR = 1e10
 """Magnitude of scaled unknowns above which they count as diverging."""
 RESTING = 1e-6
 """Size of steps of scaled unknowns below which they count as zero."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """State of the optimisation after an iteration.
+
+    Attributes:
+        iteration: number of iterations in this solve.
+        cost: J of the iterate.
+        violation: largest violation of an equation, a constraint or a bound, scaled.
+        stage: name of one of several solves, such as "widths 0.1"; empty for a single solve.
+        w: scaled unknowns.
+        transcription: program of the solve; None if a solver is used without it.
+    """
+
+    iteration: int
+    cost: float
+    violation: float
+    stage: str
+    w: Array
+    transcription: Transcription | None = None
+
+    @property
+    def motion(self) -> Motion:
+        """Motion of the iterate in the first scenario, evaluated on each access.
+
+        Its model is that of the current solve: with smooth friction, or the arcs of modes.
+
+        Raises:
+            ValueError: the program is unknown.
+        """
+        made = self.transcription
+        if made is None:
+            raise ValueError("progress: expected a solve of a problem, got a program alone")
+        scheme, points = made.scheme.coefficients(), made.unpack(self.w)
+        return motions_of(made.problem, made.meshes, scheme, points)[0]
+
+
+Report = Callable[[Progress], object]
+
+
+def in_stage(
+    progress: Report | None, stage: str, transcription: Transcription | None = None
+) -> Report | None:
+    """Return `progress` with the name of a solve and its program added to its argument."""
+    if progress is None:
+        return None
+    return lambda now: progress(replace(now, stage=stage, transcription=transcription))
 
 
 class Seen(NamedTuple):
@@ -91,7 +143,7 @@ class Watch:
             self.halt = self.halt or Status.UNBOUNDED
         if self._progress is not None:
             try:
-                self._progress(Progress(self.iterations, f, violation))
+                self._progress(Progress(self.iterations, f, violation, "", w))
             except KeyboardInterrupt:
                 self.halt = Status.INTERRUPTED
             # Exceptions cannot pass through C++, so it is stored and raised again later.
@@ -147,16 +199,22 @@ class IterationHook(Shaped):
         n, m, k = program.w.numel(), program.g.numel(), program.p.numel()
         rows = {"x": n, "lam_x": n, "g": m, "lam_g": m, "f": 1, "lam_p": k}
         names = [ca.nlpsol_out(i) for i in range(ca.nlpsol_n_out())]
+        self._shown = [names.index(name) for name in ("x", "f", "g", "lam_x", "lam_g")]
         self.watch: Watch | None = None
         columns = [ca.Sparsity.dense(rows[name], 1) for name in names]
         super().__init__("watch", columns, ca.Sparsity.dense(1))
 
-    def eval(self, arg: Sequence[ca.DM]) -> list[float]:  # noqa: D102
-        if self.watch is None:
-            return [0.0]
-        at = {ca.nlpsol_out(i): value.full().ravel() for i, value in enumerate(arg)}
-        stop = self.watch.see(at["x"], float(at["f"][0]), at["g"], at["lam_x"], at["lam_g"])
-        return [float(stop)]
+    def has_eval_buffer(self) -> bool:  # noqa: D102
+        return True
+
+    def eval_buffer(self, arg: Sequence[memoryview], res: Sequence[memoryview]) -> int:
+        """Report an iterate; a `DM` of each argument would take as long as a step of Ipopt."""
+        stop = False
+        if self.watch is not None:
+            w, f, g, lam_w, lam_g = (np.frombuffer(arg[i]).copy() for i in self._shown)
+            stop = self.watch.see(w, float(f[0]), g, lam_w, lam_g)
+        np.frombuffer(res[0])[:] = stop
+        return 0
 
 
 @final

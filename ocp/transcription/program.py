@@ -144,7 +144,7 @@ def stages_of(
     problem: Problem, layout: Layout, pieces: Sequence[Piece], made: Assembled
 ) -> tuple[Stages | None, str]:
     """Return the stages and "", or None and the coupling that prevents them."""
-    if len(problem.scenarios) > 1:
+    if len(problem.scenario_names) > 1:
         return None, "several scenarios"
     if problem.chosen:
         return None, f"the chosen parameter {problem.chosen[0].name}"
@@ -192,34 +192,6 @@ def _owners(
         owner[at] = np.where(known, stage, begins[-1] - 1)
         gap[at] = known & ((piece.order & 63) == 0)
     return owner, gap
-
-
-@final
-@dataclass(frozen=True)
-class Progress:
-    """State of the optimisation after an iteration.
-
-    Attributes:
-        iteration: number of iterations in this solve.
-        cost: J of the iterate.
-        violation: largest violation of an equation, a constraint or a bound, scaled.
-        stage: name of one of several solves, such as "widths 0.1"; empty for a single solve.
-    """
-
-    iteration: int
-    cost: float
-    violation: float
-    stage: str = ""
-
-
-Report = Callable[[Progress], object]
-
-
-def in_stage(progress: Report | None, stage: str) -> Report | None:
-    """Return `progress` with the name of a solve added to its argument."""
-    if progress is None:
-        return None
-    return lambda now: progress(replace(now, stage=stage))
 
 
 @final

@@ -16,8 +16,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ocp.formulation.phase import Free, Row, Span, limits
-from ocp.formulation.problem import Problem
+from ocp.formulation.phase import Free, Row, limits
+from ocp.formulation.problem import Posed, Problem, posed
 from ocp.transcription import conditions, intervals, unknowns
 from ocp.transcription.assembly import Assembled, Slot, assemble
 from ocp.transcription.blocks import Array, Indices, Piece
@@ -26,7 +26,8 @@ from ocp.transcription.conditions import Maker
 from ocp.transcription.intervals import PointEquations, Shot
 from ocp.transcription.program import Place, Program, Stages, bounds_of, stages_of
 from ocp.transcription.schemes import Scheme, Shooting, check_meshes, nodes_of
-from ocp.transcription.unknowns import Grid, Layout, Local, Points, SpanLayout, SpanPoints
+from ocp.transcription.unknowns import Grid, Layout, Local, Points, SpanPoints
+from symfric.foundation import packed
 from symfric.foundation.parameters import check_names
 
 KEPT = 4
@@ -46,6 +47,7 @@ class Discretisation:
         spans: for each phase, the equations at its collocation points or of its intervals.
         closing: for each phase, the constraints of its mechanism; None if it has none.
         conditions: conditions at single nodes, at starts of intervals, and between phases.
+        starts: index of a phase -> further conditions at the starts of its intervals.
     """
 
     problem: Problem
@@ -53,6 +55,7 @@ class Discretisation:
     spans: tuple[PointEquations | Shot, ...]
     closing: tuple[Closing | None, ...]
     conditions: tuple[Maker, ...]
+    starts: Mapping[int, Sequence[Row]]
     _made: dict[Key, Any] = field(default_factory=dict[Key, Any])
 
     def on(self, meshes: Sequence[Array]) -> "Transcription":
@@ -64,8 +67,12 @@ class Discretisation:
         Raises:
             ValueError: invalid meshes.
         """
+        meshes = check_meshes(self.problem, meshes)
+        return Transcription(self.problem, self.scheme, meshes, self.starts, self.skeleton(meshes))
+
+    def skeleton(self, meshes: Sequence[Array]) -> "Skeleton":
+        """Return the common part of programs with the numbers of intervals of `meshes`."""
         problem = self.problem
-        meshes = check_meshes(problem, meshes)
         nodes = [nodes_of(span, mesh) for span, mesh in zip(problem.spans, meshes, strict=True)]
         key = tuple((mesh.size - 1, *at.values()) for mesh, at in zip(meshes, nodes, strict=True))
         skeleton: Skeleton = self._made.pop(key, None) or self._skeleton(
@@ -74,7 +81,7 @@ class Discretisation:
         self._made[key] = skeleton  # the most recent one is last
         for old in list(self._made)[:-KEPT]:
             del self._made[old]
-        return Transcription(problem, self.scheme, meshes, skeleton)
+        return skeleton
 
     def _skeleton(
         self, intervals: Sequence[int], nodes: Sequence[Mapping[float, int]]
@@ -174,7 +181,8 @@ def discretise(
     nodes += [
         conditions.at_starts(spans[k].local, rows, 1) for k, rows in (starts or {}).items() if rows
     ]
-    return Discretisation(problem, scheme, tuple(spans), tuple(loops), (*nodes, *joined))
+    more = (*nodes, *joined)
+    return Discretisation(problem, scheme, tuple(spans), tuple(loops), more, starts or {})
 
 
 @final
@@ -227,20 +235,33 @@ class Skeleton:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Transcription:
+class Transcription(packed.Portable):
     """Nonlinear program of a problem on meshes, and its conversion to named values.
+
+    Files and pickles contain the statement only, and the program is built when it is first used.
 
     Attributes:
         problem, scheme: the problem and its scheme.
         meshes: for each phase, fractions of T that bound the intervals.
-        skeleton: common part of programs with the same numbers of intervals.
-        program: program for a solver.
+        starts: index of a phase -> further conditions at the starts of its intervals.
+        made: skeleton that was already built; None in files.
     """
 
-    problem: Problem
+    problem: Problem = field(metadata={"packed": Posed})
     scheme: Scheme
     meshes: tuple[Array, ...]
-    skeleton: Skeleton
+    starts: Mapping[int, Sequence[Row]]
+    made: Skeleton | None
+
+    def to_pack(self) -> dict[str, Any]:
+        """Return the fields for a file, with the problem in its resolved form."""
+        return packed.state_of(self) | {"problem": posed(self.problem), "made": None}
+
+    @cached_property
+    def skeleton(self) -> Skeleton:
+        """Common part of programs with the same numbers of intervals."""
+        made = self.made
+        return made or discretise(self.problem, self.scheme, self.starts).skeleton(self.meshes)
 
     @cached_property
     def program(self) -> Program:
@@ -367,7 +388,7 @@ class Transcription:
             [*enumerate(zip(self.problem.spans, self.layout.spans, strict=True))]
         ):
             mesh, inner = self.meshes[number], self.inner_fractions(number)
-            groups = _names(span, own), (mesh, inner, inner, mesh[:-1], mesh[:-1])
+            groups = own.names(span), (mesh, inner, inner, mesh[:-1], mesh[:-1])
             for names, columns, at in zip(groups[0], own[1:], groups[1], strict=True):
                 for name, row in zip(names, columns.tolist(), strict=True):
                     for k, fraction in zip(row, at.tolist(), strict=True):
@@ -377,11 +398,3 @@ class Transcription:
         for k, choice in zip(self.layout.chosen.tolist(), self.problem.chosen, strict=True):
             places[k] = Place(choice.name, 0, np.nan, scale[k])
         return places
-
-
-def _names(span: Span, own: SpanLayout) -> list[list[str]]:
-    """Return names of nodes, inner points, algebraic variables, inputs and extra unknowns."""
-    x, z, u = ([v.name for v in getattr(span.model, letter)] for letter in "xzu")
-    slacks = [f"the violation of {span.penalised[k].name}" for k, _ in span.sides] * own.degree
-    loops = [f"correction {k + 1}" for k in range(own.extra.shape[0] - len(slacks))]
-    return [x, x, z, u, [*loops, *slacks]]

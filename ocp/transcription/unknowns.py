@@ -76,6 +76,13 @@ class SpanLayout(NamedTuple):
         """Number of collocation points of an interval."""
         return self.inner.shape[1] // self.intervals
 
+    def names(self, span: Span) -> list[list[str]]:
+        """Return names of nodes, inner points, algebraic variables, inputs and extra unknowns."""
+        x, z, u = ([v.name for v in getattr(span.model, letter)] for letter in "xzu")
+        slacks = [f"the violation of {span.penalised[k].name}" for k, _ in span.sides] * self.degree
+        loops = [f"correction {k + 1}" for k in range(self.extra.shape[0] - len(slacks))]
+        return [x, x, z, u, [*loops, *slacks]]
+
     def slacks(self, count: int) -> Indices:
         """Return the indices of `count` violations at each collocation point, (count, d, N)."""
         last = self.extra[self.extra.shape[0] - count * self.degree :]

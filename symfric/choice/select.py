@@ -21,8 +21,8 @@ from symfric.foundation import checks
 from symfric.foundation.files import write_table, write_text
 from symfric.foundation.workers import Crashed, outcomes
 from symfric.integrator.equations.inputs import Input
-from symfric.laws import ALL_LAWS, BrownMcPhee, Law
-from symfric.laws.base.law import check_law
+from symfric.laws import ALL_LAWS, BrownMcPhee, Law, law_name
+from symfric.laws.base.law import require_law
 from symfric.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def flat(row: Row) -> dict[str, Any]:
 
 
 Progress = Callable[[str, float], None]
-Candidates = Mapping[str, Law | Sequence[Law]] | Sequence[str]
+Candidates = Mapping[str, Law | Sequence[Law]] | Sequence[str | Law]
 """Laws, or sequences of forms of a law, by name; or a sequence of names of laws."""
 Forms = Mapping[str, tuple[Law, ...]]
 
@@ -145,9 +145,9 @@ def select(
     Args:
         scene: a scene, a class of scenes (`Rabinowicz`), or a function law -> scene or `Model`,
             such as `partial(PendulumBox.preset, "jing_mi_table_7")`.
-        laws: laws by name, or names of laws; by default the whole catalogue. A law given by its
-            name is tried in its form with events, if it has one, and then, unless that form is
-            ranked, in its default form (in reverse order if no C can be generated from the form
+        laws: laws by name, or a list of names and laws; by default the whole catalogue. A law given
+            by its name is tried in its form with events, if it has one, and then, unless that form
+            is ranked, in its default form (in reverse order if no C can be generated from the form
             with events). Its row states the form. A sequence of laws is tried in its order.
         needs: words of `symfric.choice.NEEDS`, such as "stiction", "presliding", "drift-free".
         accuracy: largest error relative to the size of the motion, between 0 and 1.
@@ -239,10 +239,13 @@ def laws_of(where: str, laws: Candidates | None) -> Forms:
         found = {n: tuple(x) if isinstance(x, list | tuple) else (x,) for n, x in given.items()}
         for name, several in found.items():
             for law in several or (several,):
-                check_law(f"{where}: laws: {name}", law)
+                require_law(f"{where}: laws: {name}", law)
     else:
-        names = ALL_LAWS if laws is None else checks.names(f"{where}: laws", laws, ALL_LAWS)
-        found = {name: forms(ALL_LAWS[name]()) for name in names}
+        listed = laws if isinstance(laws, list | tuple) else ()
+        own = {law_name(law): (law,) for law in listed if isinstance(law, Law)}
+        names = [x for x in listed if not isinstance(x, Law)] if listed else laws
+        known = ALL_LAWS if names is None else checks.names(f"{where}: laws", names, ALL_LAWS)
+        found = {name: forms(ALL_LAWS[name]()) for name in known} | own
     if not found:
         raise ValueError(f"{where}: laws: expected at least one, got none")
     return found

@@ -1,8 +1,6 @@
 """`symfric identify`: fit friction laws to measured data and assess the result."""
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from math import inf
@@ -31,7 +29,6 @@ from symfric.foundation.parameters import check_names
 
 KINDS = ("points", "inverse", "shooting", "loop")
 RULES: dict[str, Callable[..., Any]] = {"log": log, "linear": linear, "above": above, "tied": tied}
-MOST_WORKERS = 256
 
 
 def reader(
@@ -181,14 +178,13 @@ def identify(
         "loss": loss,
         "starts": starts,
     }
-    checks.count("--workers", workers, most=MOST_WORKERS)
+    pool = opt.processes(workers)
     records = read(data)
     other = read(validate) if validate else None
     if profiles:
         one = Fit(chosen, first, records, **request).prepared()
         check_names("--profile", profiles, one.task.unknowns.fitted)
     ranking: Ranking | None = None
-    pool = nullcontext() if workers == 1 else ProcessPoolExecutor(workers)
     with output.progress(f"identify {' and '.join(laws)}") as tell, pool as executor:
         how: dict[str, Any] = {"executor": executor, "progress": tell}
         if len(laws) > 1:

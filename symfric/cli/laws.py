@@ -17,7 +17,7 @@ from symfric.figures.data import parts, phenomena
 from symfric.figures.motion import NORMAL_FORCE
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names, options
-from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population
+from symfric.laws import PHENOMENA, POPULATIONS, AnyLaw, Population, check_law
 from symfric.laws.catalogue import ALIASES
 from symfric.laws.composed.populations import cost
 from symfric.scenes import ALL_SCENES
@@ -30,6 +30,7 @@ def laws(
     figure: str | None = None,
     others: Strings = None,
     normal_force: float | None = None,
+    check: bool = False,
     json: str | None = None,
 ) -> None:
     """List the friction laws, or show one in full.
@@ -37,7 +38,7 @@ def laws(
     A law in full has its equation, limits, source, parameters with units and bounds, and a picture.
     --figure and --compare show the behaviour of laws instead, computed as in the papers; --figure
     also accepts scenes such as rabinowicz. --set then applies to every law, and --set gms.C=10 to
-    the law gms only.
+    the law gms only. --check checks a law, such as FILE.py:NAME, numerically.
 
     Example: symfric laws gms --figure hysteresis --compare lugre --plot loops.png
     """
@@ -59,6 +60,13 @@ def laws(
             data.plot(plot)
         return output.finish(data.to_dict(), json, partial(show_figure, data), plot)
     texts = opt.assignments("--set", settings)
+    if check:
+        if not name:
+            raise ValueError("--check: expected the name of a law before it, got none")
+        report = check_law(opt.with_settings(opt.named_law(name), name, texts))
+        content = {"law": name, "remarks": [one._asdict() for one in report.remarks]}
+        show = partial(output.show_table, ["check", "result", "finding"], report.remarks)
+        return output.finish(content, json, show)
     every = [name] if name else [*ALL_LAWS, *POPULATIONS]
     chosen = {text: opt.with_settings(opt.any_named_law(text), text, texts) for text in every}
     if plot:

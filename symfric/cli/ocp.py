@@ -31,6 +31,10 @@ def ocp(
     resting_margin: float = 1e-4,
     max_time: float | None = None,
     guess: Path | None = None,
+    starts: int | None = None,
+    workers: int = 1,
+    refine: bool = True,
+    verify: bool = True,
     sensitivity: str | None = None,
     save: Path | None = None,
     csv: Path | None = None,
@@ -65,7 +69,8 @@ def ocp(
         ready = None if values else READY[problem]
         request = opt.called_with(problem, READY[problem].make, values)
     start = None if guess is None else load(guess)
-    with output.progress(f"ocp {problem}") as tell:
+    pool = opt.processes(workers)
+    with output.progress(f"ocp {problem}") as tell, pool as executor:
         found = solve(
             request,
             scheme=scheme_of(scheme),
@@ -76,6 +81,10 @@ def ocp(
             intervals=intervals,
             max_time=max_time,
             guess=start,
+            starts=starts,
+            executor=executor,
+            refine=refine,
+            verify=verify,
             progress=lambda now: tell(min(1.0, now.iteration / 1000)),
             throw=False,
         )

@@ -3,7 +3,8 @@
 import runpy
 import traceback
 from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import contextmanager
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from inspect import isclass, isfunction, signature
 from pathlib import Path
@@ -19,6 +20,13 @@ from symfric.laws import AnyLaw
 L = TypeVar("L", Law, AnyLaw)
 Strings = list[str] | None
 PICTURES = (".png", ".pdf", ".svg", ".jpg")
+MOST_WORKERS = 256
+
+
+def processes(workers: int) -> AbstractContextManager[Executor | None]:
+    """Return an executor of --workers processes; None within the context of one."""
+    checks.count("--workers", workers, most=MOST_WORKERS)
+    return nullcontext() if workers == 1 else ProcessPoolExecutor(workers)
 
 
 def assignments(option: str, texts: Iterable[str] | None) -> dict[str, str]:

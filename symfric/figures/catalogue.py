@@ -12,7 +12,7 @@ from symfric.foundation.parameters import check_names, distinct
 from symfric.foundation.status import SolveError
 from symfric.integrator import Input, simulate
 from symfric.laws import AnyLaw, Law, Population, any_from_text, law_name, steady_inputs
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import require_law
 from symfric.model.kinds import ENERGY
 from symfric.results.kinds import main
 from symfric.results.trajectory import Trajectory
@@ -55,7 +55,7 @@ def in_scene(law: AnyLaw, scene: str) -> Trajectory:
             f"{scene} with {law_name(law)}: expected a law with equations, got a population of "
             "random contacts; it has figures"
         )
-    check_law(scene, law)
+    require_law(scene, law)
     kind = ALL_SCENES[scene]
     inputs: dict[str, Input] = {name: given.function for name, given in kind.inputs.items()}
     return simulate(kind(law).model(), kind.t_end, u=inputs)

@@ -23,7 +23,7 @@ from symfric.laws import (
     Population,
     law_name,
 )
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import require_law
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -244,7 +244,7 @@ def phenomena(law: AnyLaw) -> list[str]:
 def check_any(where: str, law: object) -> None:
     """Raise an error if `law` is neither a law nor a population of contacts."""
     if not isinstance(law, Population):
-        check_law(where, law)
+        require_law(where, law)
 
 
 def finite(where: str, law: AnyLaw, F: Array) -> Array:

@@ -27,7 +27,7 @@ from symfric.foundation.shown import WIDTH, Showing, Shown
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.inputs import Input
 from symfric.laws import Law
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import require_law
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -150,7 +150,7 @@ def recommended(
     shorten it or compare other numbers. Runs are compared at 2001 times.
     """
     where = "recommended"
-    check_law(f"{where}: law", law)
+    require_law(f"{where}: law", law)
     wanted = checks.number(f"{where}: error", error, above=0.0, upper=1.0)
     rtol = checks.number(f"{where}: rtol", rtol, lower=1e-12, upper=1e-3)
     machine = machine_of(where, scene, t_end, of, u, law)
@@ -158,7 +158,7 @@ def recommended(
     if exact is None:
         search.settle()
     else:
-        check_law(f"{where}: exact", exact)
+        require_law(f"{where}: exact", exact)
         search.compare(exact)
     return search.choose()
 

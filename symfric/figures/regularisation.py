@@ -38,7 +38,7 @@ from symfric.integrator.equations.inputs import Input
 from symfric.integrator.simulate import simulate
 from symfric.laws import Law
 from symfric.laws.base.families import WithModes
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import require_law
 from symfric.model import Model
 from symfric.model.kinds import FRICTION_STATE, MODE, POSITION
 from symfric.results.trajectory import Trajectory
@@ -94,7 +94,7 @@ def regularisation(
         ValueError: `law` is not a law, a parameter does not exist, or the law has several velocity
             scales and `parameter` is not given.
     """
-    check_law(f"{where}: law", law)
+    require_law(f"{where}: law", law)
     known = parameters(law)
     if parameter is not None:
         given = [parameter] if isinstance(parameter, str) else parameter

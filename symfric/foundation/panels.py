@@ -46,21 +46,28 @@ class Picture(Figure):
         """
         import matplotlib.pyplot as plt  # noqa: PLC0415  (only needed for windows)
 
-        manager = self.canvas.manager
-        if manager is None:
+        if not self.has_window():
+            raise ValueError(
+                "show: expected a Matplotlib backend with windows, got "
+                f"'{plt.get_backend().lower()}'; pass path= to plot(), or choose a backend, "
+                "such as MPLBACKEND=TkAgg; in a notebook the figure shows itself as the last "
+                "line of a cell"
+            )
+        plt.show()
+
+    def has_window(self) -> bool:
+        """Create a window for the figure, and return False if the backend has no windows."""
+        import matplotlib.pyplot as plt  # noqa: PLC0415  (only needed for windows)
+
+        if self.canvas.manager is None:
             empty = plt.figure(figsize=tuple(self.get_size_inches()))
             manager = empty.canvas.manager
             if manager is None or type(manager) is FigureManagerBase:
                 plt.close(empty)
-                raise ValueError(
-                    "show: expected a Matplotlib backend with windows, got "
-                    f"'{plt.get_backend().lower()}'; pass path= to plot(), or choose a backend, "
-                    "such as MPLBACKEND=TkAgg; in a notebook the figure shows itself as the last "
-                    "line of a cell"
-                )
+                return False
             self.set_canvas(manager.canvas)
             manager.canvas.figure = self
-        plt.show()
+        return True
 
 
 def blank(width: float = WIDE, height: float = 4.0, *, free: bool = False) -> Figure:

@@ -9,17 +9,21 @@ from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.laws.base import smooth as smooth
+    from symfric.laws.base.families import Exact as Exact
     from symfric.laws.base.law import Facts as Facts
     from symfric.laws.base.law import Input as Input
     from symfric.laws.base.law import Law as Law
     from symfric.laws.base.law import State as State
     from symfric.laws.base.law import StaticLaw as StaticLaw
+    from symfric.laws.base.law import Switch as Switch
     from symfric.laws.base.phenomena import PHENOMENA as PHENOMENA
     from symfric.laws.catalogue import ALL_LAWS as ALL_LAWS
     from symfric.laws.catalogue import POPULATIONS as POPULATIONS
     from symfric.laws.catalogue import any_from_text as any_from_text
     from symfric.laws.catalogue import law_from_text as law_from_text
     from symfric.laws.catalogue import law_name as law_name
+    from symfric.laws.check import LawReport as LawReport
+    from symfric.laws.check import check_law as check_law
     from symfric.laws.composed.compose import Asymmetric as Asymmetric
     from symfric.laws.composed.compose import LoadDependent as LoadDependent
     from symfric.laws.composed.compose import Sum as Sum
@@ -31,7 +35,6 @@ if TYPE_CHECKING:
     from symfric.laws.composed.populations import RandomBristles as RandomBristles
     from symfric.laws.composed.populations import steady_force as steady_force
     from symfric.laws.composed.populations import steady_inputs as steady_inputs
-    from symfric.laws.composed.wrap import Exact as Exact
     from symfric.laws.composed.wrap import Lagged as Lagged
     from symfric.laws.composed.wrap import LoadNormalised as LoadNormalised
     from symfric.laws.composed.wrap import TemperatureDependent as TemperatureDependent

@@ -5,10 +5,11 @@ from re import fullmatch, sub
 
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
-from symfric.laws.base.law import Law, check_law
+from symfric.laws.base.families import Exact
+from symfric.laws.base.law import Law, require_law
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.composed.populations import AnyLaw, GenericAsperity, Population, RandomBristles
-from symfric.laws.composed.wrap import Exact, Lagged, LoadNormalised, TemperatureDependent
+from symfric.laws.composed.wrap import Lagged, LoadNormalised, TemperatureDependent
 from symfric.laws.dynamic import dahl, dwell, lugre, maxwell_slip, stick_slip
 from symfric.laws.static import (
     applied_force,
@@ -125,7 +126,7 @@ DEEPEST = 20
 def law_name(law: AnyLaw) -> str:
     """Return the text from which `any_from_text` creates the law; the class name if unknown."""
     if not isinstance(law, Law | Population):  # pyright: ignore[reportUnnecessaryIsInstance]
-        check_law("law_name", law)
+        require_law("law_name", law)
     if isinstance(law, Sum):
         return "+".join(law_name(term) for term in law.laws)
     name = NAMES.get(type(law), type(law).__name__)

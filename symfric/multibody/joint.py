@@ -42,7 +42,7 @@ from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.foundation.units import turned
 from symfric.foundation.variable import take_si
 from symfric.laws import Law
-from symfric.laws.base.law import FORCE, check_law
+from symfric.laws.base.law import FORCE, require_law
 from symfric.laws.composed.isotropic import SpatialSlip, anisotropy
 from symfric.model.sketch import Symbol
 
@@ -102,7 +102,7 @@ class JointFriction:
     turning: bool = False
 
     def __post_init__(self) -> None:
-        check_law("friction", self.law)
+        require_law("friction", self.law)
         take_si("friction", self, "radius", "length", "width", "preload", "normal", "eps")
 
     def problems(self, rubs: Sequence[str]) -> Iterator[str]:

@@ -13,7 +13,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, equals, is_number, is_symbolic
 from symfric.foundation.parameters import check_names, parameters, with_values
 from symfric.laws import Coulomb, Law, Sum, Viscous
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import require_law
 from symfric.multibody.constraints import Gear
 from symfric.multibody.forces import JointSpringDamper
 from symfric.multibody.joint import Joint, JointFriction
@@ -82,10 +82,10 @@ def read_urdf(
     mass matrix at the start is not positive definite.
     """
     if law is not None:
-        check_law("urdf: law", law)
+        require_law("urdf: law", law)
     laws, bearings = checks.named("urdf: laws", laws), checks.named("urdf: bearings", bearings)
     for name, own in laws.items():
-        check_law(f"urdf: law of '{name}'", own)
+        require_law(f"urdf: law of '{name}'", own)
     if not is_symbolic(level):
         checks.number("urdf: level", level, lower=0.0)
     for name, bearing in bearings.items():

@@ -23,7 +23,7 @@ from symfric.foundation.parameters import (
 from symfric.foundation.shown import WIDTH
 from symfric.foundation.variable import check_si, strays, symbols_of
 from symfric.laws import Law
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import require_law
 from symfric.model import Contact, Model, Output, Variables
 from symfric.model.contact import APPLIED
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
@@ -192,7 +192,7 @@ class Scene(Parametric, ABC):
         where = f"{cls.__name__}: preset"
         checks.text(where, name, "the name of a preset")
         checks.check_names(where, [name], cls.presets)
-        check_law(cls.__name__, law)
+        require_law(cls.__name__, law)
         chosen = cls.presets[name]
         laws = {"law": law} | {place: law for place in cls.places() if place in chosen.friction}
         laws |= {n: value for n, value in others.items() if isinstance(value, Law)}
@@ -220,10 +220,10 @@ class Scene(Parametric, ABC):
         return self.law.thumbnail()
 
     def __post_init__(self) -> None:
-        check_law(type(self).__name__, self.law)
+        require_law(type(self).__name__, self.law)
         for place in type(self).places():
             if getattr(self, place) is not None:
-                check_law(f"{type(self).__name__}: {place}", getattr(self, place))
+                require_law(f"{type(self).__name__}: {place}", getattr(self, place))
         super().__post_init__()
         several = [n for n, p in parameters(self).items() if not _is_scalar(p.value)]
         if several:
@@ -320,7 +320,7 @@ def contact(
             a unit that is not an SI unit.
     """
     where = f"contact '{checks.text('contact: name', name, 'a text, and then a law')}'"
-    check_law(f"{where}: law", law)
+    require_law(f"{where}: law", law)
     check_si(f"{where}: v", v)
     if isinstance(N, Variable) and N.unit in ("m/s", "rad/s"):
         raise checks.refused(f"{where}: N", "a normal force", N, "v comes before N")

@@ -7,7 +7,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import parametric
 from symfric.laws import Law
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import require_law
 from symfric.multibody import (
     Distance,
     JointFriction,
@@ -151,7 +151,7 @@ class Robot(MechanismScene):
 
     def __post_init__(self) -> None:
         for law in checks.many("Robot: laws", self.laws, "laws"):
-            check_law("Robot: laws", law)
+            require_law("Robot: laws", law)
         if len(checks.many("Robot: joints", self.joints, "names of joints")) != len(self.laws):
             raise ValueError(
                 f"Robot: expected a law for every one of the joints, got {len(self.joints)} joints "

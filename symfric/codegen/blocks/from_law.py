@@ -36,7 +36,7 @@ from symfric.foundation.parameters import Variable, parameters, symbolise
 from symfric.foundation.units import turned
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.laws import Law, Population, law_name
-from symfric.laws.base.law import check_law
+from symfric.laws.base.law import require_law
 from symfric.model import Output, Variables
 
 
@@ -103,7 +103,7 @@ def law_block(
             step (exact Coulomb, Karnopp and Leine by events); a force that is not finite at rest (a
             smoothing width of 0 left variable).
     """
-    check_law("codegen", law)
+    require_law("codegen", law)
     where = f"codegen '{law_name(law)}'"
     checks.flag(f"{where}: turning", turning)
     if name is not None:

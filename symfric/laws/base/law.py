@@ -9,6 +9,7 @@ from math import inf, isfinite
 from re import DOTALL, search
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import casadi as ca
 import numpy as np
 
 from symfric.foundation import checks
@@ -122,11 +123,7 @@ class Switch:
 
 
 def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Wrap `method(law, v, N, z)` so that it accepts and checks states in any common form.
-
-    Raises:
-        ValueError: a wrong number of states, an integer too large for a float, an unsuitable value.
-    """
+    """Wrap `method(law, v, N, z)` so that it accepts states in any common form, with checks."""
 
     @wraps(method)
     def checked(law: "Law", v: Scalar, N: Scalar, z: Scalar = (), *more: Any, **inputs: Any) -> Any:
@@ -145,8 +142,11 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
             if not isinstance(slip, np.ndarray) and "truth value" not in str(error):
                 raise
             raise _unsuitable(where, slip, error) from error
-        numbers = not is_casadi(slip, load, states, *inputs.values())
-        if isinstance(value, list | tuple) or (numbers and is_casadi(value)):
+        if isinstance(value, ca.DM) and not is_casadi(slip, load, states, *inputs.values()):
+            shape = np.shape(slip) if method.__name__ == "force" else np.shape(states)
+            fits = value.numel() == np.prod(shape, dtype=int)
+            value = value.full().ravel("F").reshape(shape)[()] if fits else None
+        if value is None or isinstance(value, list | tuple):
             raise _unsuitable(where, slip, value)
         return value
 
@@ -331,7 +331,7 @@ def chosen(law: Law, inputs: Mapping[str, Scalar]) -> dict[str, Scalar]:
     return {i.name: inputs[i.name] for i in law.inputs if i.name in inputs}
 
 
-def check_law(where: str, law: object) -> None:
+def require_law(where: str, law: object) -> None:
     """Raise an error if `law` is not a law; the hint covers the class and the name of a law."""
     if isinstance(law, Law):
         return

@@ -12,7 +12,7 @@ from symfric.foundation.parameters import (
     with_values,
 )
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.law import Facts, Law, check_law
+from symfric.laws.base.law import Facts, Law, require_law
 from symfric.laws.composed.wrap import Composed, Wrapper
 
 
@@ -35,7 +35,7 @@ class Sum(Composed):
     def __post_init__(self) -> None:
         laws = checks.many("Sum", self.laws, "laws")
         for law in laws:
-            check_law("Sum", law)
+            require_law("Sum", law)
         if len(laws) < 2:
             raise ValueError(f"Sum: expected at least two laws, got {len(laws)}")
         terms = (law.laws if isinstance(law, Sum) else (law,) for law in laws)

@@ -11,7 +11,7 @@ from symfric.foundation.numeric import Scalar, column, empty
 from symfric.foundation.parameters import Parametric, parametric
 from symfric.foundation.vector import NotIsotropicError, Vector, Vectors
 from symfric.laws.base import fields
-from symfric.laws.base.law import Input, Law, State, Switch, check_law, chosen
+from symfric.laws.base.law import Input, Law, State, Switch, chosen, require_law
 from symfric.laws.composed.compose import Asymmetric, Sum
 from symfric.laws.composed.wrap import Lagged
 
@@ -49,7 +49,7 @@ class Isotropic(Parametric):
 
     def __post_init__(self) -> None:
         name = type(self).__name__
-        check_law(name, self.law)
+        require_law(name, self.law)
         super().__post_init__()
         if reason := anisotropy(self.law):
             kind = type(self.law).__name__

@@ -30,7 +30,7 @@ from ocp.problems import (
 from ocp.solving.methods import Ipopt
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
-from ocp.transcription.program import Progress
+from ocp.solving.watch import Progress
 from ocp.transcription.schemes import make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric.foundation.parameters import Variable

@@ -18,7 +18,8 @@ from ocp.friction.smooth_models import smoothed, widths
 from ocp.friction.transfer import Known, Reader
 from ocp.problems import cart_pendulum, load_through_spring, out_and_back
 from ocp.solving.methods import Ipopt
-from ocp.solving.starts import initial_points, starts_around
+from ocp.solving.one_solve import starts_around
+from ocp.solving.starts import initial_points
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
 

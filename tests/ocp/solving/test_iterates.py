@@ -23,7 +23,7 @@ from ocp.transcription.program import Place, Program, SolverStatistics, outside,
 from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
 from ocp.transcription.unknowns import SpanPoints
-from symfric import Status
+from symfric import Model, Status, simulate
 
 EFFORT = integral(lambda s: s.a**2)
 
@@ -97,7 +97,22 @@ def test_guess_is_a_number_samples_or_a_function_of_time(given: Guess) -> None:
     assert (initial_points(into, {"v": 2.0}).spans[1].nodes[1] == 2.0).all()
 
 
-WHAT = "guess: expected values by name, a solution, or points"
+WHAT = "guess: expected values by name, a solution, a run, or points"
+
+
+def test_runs_are_guesses() -> None:
+    """x = t^2 within 1.5 s is stretched to a given duration; a free one starts with 1.5 s."""
+    fall = Model("fall", x=(UNIT.x[0], UNIT.x[1]), ode=ca.vertcat(UNIT.x[1].symbol, 2.0))
+    run = simulate(fall, 1.5, t_eval=np.linspace(0.0, 1.5, 101))
+    for T, expected in ((3.0, 3.0), (Free(0.1, 9.0), 1.5), (Free(0.1, 1.0), 1.0)):
+        into = on(unit_move(T=T))
+        (span,) = initial_points(into, run).spans
+        np.testing.assert_equal(span.T, expected)
+        np.testing.assert_allclose(span.nodes[0], (1.5 * into.meshes[0]) ** 2, atol=1e-3)
+        np.testing.assert_allclose(span.nodes[1], 3.0 * into.meshes[0], atol=1e-6)
+    found = solve_once(unit_move(), 5)
+    again = initial_points(on(unit_move(), 5), found.motions[0]).spans[0]
+    np.testing.assert_allclose(again.nodes, found.points.spans[0].nodes, atol=1e-2)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,8 @@
 """Sensitivities and the condition of optima against closed forms and re-solves."""
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import replace
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from carts import CART, EFFORT, F, V, fastest, move, slope, there_and_back
 from phases import solve_once
 
-from ocp import Free, Ipopt, Phase, Problem, Radau, at_end, integral, load, solve
+from ocp import Free, Ipopt, Phase, Problem, Radau, at_end, integral, load, soft, solve
 from ocp.solving.linearised import Linearised
 from symfric import BrownMcPhee, Model, Variable
 from symfric.scenes import drive
@@ -146,13 +147,34 @@ def test_motion_that_is_not_unique_is_doubted() -> None:
     assert by.doubts == ("second-order conditions not met: the motion may not be unique",)
 
 
-def test_files_and_unsolved_motions_have_no_multipliers(tmp_path: Any) -> None:
+def test_files_keep_multipliers(tmp_path: Path) -> None:
+    """Scenarios share the start of a linear input; durations have a sum; a path has a penalty."""
+    ends = {"start": {"x": 0.0, "v": 0.0}, "end": {"x": 0.1, "v": 0.0}}
+    goals = {"light": {"m": 1.0}, "heavy": {"m": 2.0}}
+    shared = Problem(Phase(CART, 1.0, **ends), EFFORT, scenarios=goals, inputs={"a": "linear"})
+    parts = Phase(CART, Free(0.2, 1.0), name="out") >> Phase(CART, Free(0.2, 1.0), end={"x": 0.1})
+    sums = Problem(parts, EFFORT, durations=[((0, 1), 1.0)], p={"m": 2.0}, periodic=["v"])
+    path = [soft(lambda s: s.v <= 0.1, linear=0.5)]
+    for problem in (move(), shared, sums, Problem(Phase(CART, 1.0, **ends), EFFORT, path=path)):
+        found = solve_once(problem, 8)
+        found.save(tmp_path / "move.npz")
+        stored = load(tmp_path / "move.npz")
+        assert str(stored.active()) == str(found.active())
+        assert stored.condition == found.condition
+        for name, row in found.costates.items():
+            np.testing.assert_array_equal(stored.costates[name], row)
+        np.testing.assert_array_equal(stored.hamiltonian, found.hamiltonian)
+        name = "m" if problem is not shared else "T"
+        one, other = (vars(s.sensitivity(name)) for s in (found, stored))
+        np.testing.assert_equal(other, one)
+
+
+def test_motions_without_multipliers_are_refused(tmp_path: Path) -> None:
     found = solve_once(move(), 6)
-    found.save(tmp_path / "move.npz")
-    stored = load(tmp_path / "move.npz")
-    np.testing.assert_array_equal(stored["x"], found["x"])
+    older = replace(found, optimum=None)
+    older.save(tmp_path / "move.npz")
     for read in (lambda s: s.costates, lambda s: s.active(), lambda s: s.sensitivity("m")):
-        with pytest.raises(ValueError, match="expected an optimal solution of this session, got"):
-            read(stored)
+        with pytest.raises(ValueError, match="expected an optimal solution with its multipliers"):
+            read(load(tmp_path / "move.npz"))
     with pytest.raises(ValueError, match=r"sensitivity: expected one of .* got x at the ende"):
         found.sensitivity("x at the ende")

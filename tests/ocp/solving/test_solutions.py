@@ -226,6 +226,8 @@ def test_all_of_a_solution_is_saved_to_the_bit(tmp_path: Path) -> None:
             t = np.linspace(*one.span, 77)
             np.testing.assert_array_equal(one.at(t)["v"], other.at(t)["v"])
         assert len(copy.plot().axes) == len(found.plot().axes)
+        assert str(copy.active()) == str(found.active())
+        assert copy.condition == found.condition
     assert verify(back).to_dict() == verify(found).to_dict()
     assert solve_once(found.problem, 12, guess=back).ok
     with pytest.raises(ValueError, match="solve: expected a problem"):
@@ -248,7 +250,7 @@ def test_files_of_other_programs_and_versions_are_refused(tmp_path: Path) -> Non
         "some.json": foreign, "other.npz": foreign, "one.npy": foreign, "pickled.npz": foreign,
         "missing.npz": "load .*: expected a saved solution, got no such",
         "": "ocp.load .*: expected a saved solution, got a folder",
-        "late.npz": "expected format 3 or older, got 99; it was written by a",
+        "late.npz": "expected format 4 or older, got 99; it was written by a",
         "part.npz": r"ocp\.load '",
     }.items():  # fmt: skip
         with pytest.raises(ValueError, match=text):

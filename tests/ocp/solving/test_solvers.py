@@ -20,10 +20,7 @@ from ocp.formulation.problem import Problem
 from ocp.solving.methods import ANSWERS, Fatrop, Ipopt, Sqp
 from ocp.solving.solution import Solution
 from ocp.solving.starts import start_of
-from ocp.transcription.program import (
-    Progress,
-    in_stage,
-)
+from ocp.solving.watch import Progress, in_stage
 from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
 from ocp.transcription.transcribe import discretise
 from symfric import Model, Status, Variable

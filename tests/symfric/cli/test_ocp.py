@@ -62,12 +62,14 @@ def test_options_are_the_arguments_of_solve(symfric, monkeypatch: pytest.MonkeyP
     seen: dict[str, object] = {}
     monkeypatch.setattr(command, "solve", solve)
     options = "--intervals 7 --tolerance 0.1 --resting-margin 0.002 --max-time 3 --solver sqp"
+    options += " --starts 4 --no-refine --no-verify"
     symfric(f"ocp out_and_back --scheme radau5 --friction smooth {options}", 2)
     del seen["progress"]
     assert str(seen.pop("solver")).startswith("Sqp")
     assert seen == {
         "scheme": Radau(5), "friction": "smooth", "tolerance": 0.1, "resting_margin": 0.002,
         "intervals": 7, "max_time": 3.0, "guess": None, "throw": False,
+        "starts": 4, "executor": None, "refine": False, "verify": False,
     }  # fmt: skip
 
 
