@@ -77,7 +77,7 @@ def _profiled(found: Covariance, walk: Walk, name: str, bent: list[float]) -> Co
         if bend > BENT:
             _, end, why = walk.side(side, POINTS)
             if end is None:
-                return _none(found, [name], why, "not identifiable: its profile is open")
+                return _none(found, [name], why)
             ends[i] = end
     return replace(found, low=low, high=high)
 
@@ -116,10 +116,10 @@ def _without(found: Covariance, name: str, there: Point, unit: str) -> Covarianc
     verb = "is" if len(lost) == 1 else "are"
     why = f"{name} = {value:.3g}{'' if unit == '1' else ' ' + unit} fits as well"
     text = f"{' and '.join(lost)} {verb} not identifiable: {why}; the other intervals include both."
-    return _none(replace(found, low=low, high=high), lost, text, f"not identifiable: {why}")
+    return _none(replace(found, low=low, high=high), lost, text)
 
 
-def _none(found: Covariance, lost: list[str], text: str, note: str) -> Covariance:
+def _none(found: Covariance, lost: list[str], text: str) -> Covariance:
     """Return `found` without intervals and errors of the values in `lost`."""
     out = np.array([n in lost for n in found.names])
     both = out[:, None] | out
@@ -130,5 +130,5 @@ def _none(found: Covariance, lost: list[str], text: str, note: str) -> Covarianc
         low=np.where(out, np.nan, found.low),
         high=np.where(out, np.nan, found.high),
         sentences=(*found.sentences, text),
-        notes={**found.notes, **dict.fromkeys(lost, note)},
+        notes={**found.notes, **dict.fromkeys(lost, "not identifiable")},
     )
