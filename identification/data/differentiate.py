@@ -18,12 +18,12 @@ from identification.data.dataset import Dataset
 from identification.data.filters import (
     Decimation,
     Filter,
-    Velocity,
     central_difference,
     choose_filter,
     lowpass,
 )  # fmt: skip
 from identification.data.record import Array, Record, runs
+from identification.data.velocity import Velocity
 from symfric.foundation import checks
 from symfric.foundation.shown import brief
 
@@ -149,7 +149,7 @@ def differentiate(
     mixer = Velocity.of(*measured, step)
     chosen = filter or choose_filter(record[force], step, [mixer.band(*measured, step)])
     motion = derivatives(*measured, step, chosen, mixer)
-    slow = uncertain(motion[1], mixer.deviation(chosen, step), step, chosen)
+    slow = uncertain(motion[1], mixer.errors(chosen, step)[0], step, chosen)
     inside = chosen.inside(record.size, step)
     cut = (y[inside] for y in (record.time, *motion, record[force]))
     signals = MotionSignals(record.name, *cut, filter=chosen, slow=slow[inside])
