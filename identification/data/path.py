@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from identification.data.differentiate import Velocity, position_noise
 from identification.data.filters import smoothed, smoother_gain, spectrum, without_line
 from identification.data.record import JITTER, Array, Record
-from identification.data.velocity import Velocity, position_noise
 
 SMOOTHER = 2.0
 """Cut-off frequency of a smoothed path, relative to the highest frequency of its motion."""

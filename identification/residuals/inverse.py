@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.differentiate import derivatives, uncertain
+from identification.data.differentiate import Velocity, derivatives, levels, uncertain
 from identification.data.filters import Decimation, Filter, choose_filter
 from identification.data.record import Record
-from identification.data.velocity import Velocity, levels
 from identification.residuals.balance import Balance, Coordinate, Mask, Row, balance, coordinates
 from identification.residuals.evaluation import Array, Blocks, Channel
 from identification.residuals.sampled import Sampled, moving_start

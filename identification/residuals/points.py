@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
+from identification.data.differentiate import levels
 from identification.data.path import SmoothPath, smooth_path
 from identification.data.record import Record
-from identification.data.velocity import levels
 from identification.residuals.evaluation import Array, Blocks, Channel
 from identification.residuals.path_noise import PathNoise
 from identification.residuals.sampled import (

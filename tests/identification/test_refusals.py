@@ -14,9 +14,9 @@ from scipy import io
 import identification
 import symfric
 from identification.data.dataset import Dataset
+from identification.data.differentiate import Velocity
 from identification.data.record import Record
 from identification.data.units import by_channel
-from identification.data.velocity import Velocity
 from identification.fit import Fit
 from identification.residuals.closed_loop import ClosedLoop
 from identification.residuals.initial import cut

@@ -5,10 +5,10 @@ import pytest
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.differentiate import differentiate, plateaus
+from identification.data.differentiate import Velocity, differentiate
 from identification.data.filters import Filter, lowpass
 from identification.data.record import Record
-from identification.data.velocity import Velocity
+from identification.data.regression import plateaus
 from symfric.laws import Stribeck
 
 T = np.arange(4001) * 1e-3

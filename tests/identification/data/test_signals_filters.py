@@ -3,6 +3,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from identification.data.differentiate import position_noise
 from identification.data.filters import (
     Decimation,
     bandwidth,
@@ -13,7 +14,6 @@ from identification.data.filters import (
     smoothed,
     spectrum,
 )
-from identification.data.velocity import position_noise
 
 
 @pytest.mark.parametrize(("cutoff", "order"), [(100.0, 4), (30.0, 2), (200.0, 3)])

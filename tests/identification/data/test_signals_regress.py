@@ -7,16 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.differentiate import (
-    LinearFit,
-    derivatives,
-    differentiate,
-    linear_regression,
-)
+from identification.data.differentiate import Velocity, derivatives, differentiate
 from identification.data.filters import Filter, lowpass
 from identification.data.record import Record
+from identification.data.regression import LinearFit, linear_regression
 from identification.data.synthetic import synthetic_drive_data
-from identification.data.velocity import Velocity
 from symfric.laws import Coulomb, Sum, Viscous
 
 PUBLISHED = {
