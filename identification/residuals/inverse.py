@@ -20,7 +20,7 @@ from identification.unknowns.roles import VELOCITIES
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
-from symfric.foundation.parameters import parameters
+from symfric.foundation.parameters import Parametric, parameters
 from symfric.model import Contact, Model
 
 WHERE = "InverseDynamics"
@@ -318,7 +318,8 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
 
 def _width(contact: Contact) -> float:
     """Return the smoothing width of the law of a contact [m/s or rad/s], 0 if it is unknown."""
-    known = parameters(contact.law).values()
+    law = contact.law
+    known = parameters(law).values() if isinstance(law, Parametric) else ()
     widths = [
         checks.as_number(p.value) for p in known if p.role == "width" and p.unit in VELOCITIES
     ]

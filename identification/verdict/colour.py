@@ -175,7 +175,8 @@ def deviance(partial: Array, r: Array, basis: Array, position: Count) -> float:
     """
     both = whitened(np.column_stack([basis, r]), partial, position)
     n, k = basis.shape
-    left = float(np.linalg.qr(both, mode="r")[k, k]) ** 2
+    R: Array = np.asarray(np.linalg.qr(both, mode="r"))
+    left = float(R[k, k]) ** 2
     spread = predictors(partial)[1][np.minimum(position, partial.size)]
     unlikely = n * np.log(max(left, np.finfo(float).tiny) / n) + float(np.log(spread).sum())
     return unlikely + (k + partial.size) * float(np.log(n))

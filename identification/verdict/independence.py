@@ -41,7 +41,7 @@ from identification.verdict.colour import Colour, Count, deviance, span, whitene
 from identification.verdict.colour import colour as autoregressive
 from identification.verdict.minimum import Minimum, lagged, positions
 
-Kind = Literal["position", "velocity", "time", "delay", ""]
+Kind = Literal["position", "velocity", "acceleration", "time", "delay", ""]
 
 DELAYS = (0, 1, 2, 4, 8, 16, 32)
 """Delays of a regressor that are tested [samples]."""
@@ -70,11 +70,13 @@ class Family(NamedTuple):
         what: name of the dependence in a message: "the residuals of x depend on ...".
         hint: likely cause of the dependence.
         columns: columns of the regression, shape (n, q); of alternatives, shape (n, q, m).
+        smoothed: True for columns from a smoothed signal, which leaves systematic errors.
     """
 
     what: str
     hint: str
     columns: Array
+    smoothed: bool = False
 
 
 def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> Iterator[Family]:
@@ -106,7 +108,7 @@ def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> 
             continue
         columns = np.column_stack([lagged(signal, position, d) for d in delays])
         hint = f"dynamics or a delay from {name} is missing"
-        yield Family(f"the present and past of {name}", hint, columns)
+        yield Family(f"the present and past of {name}", hint, columns, kind == "acceleration")
         if kind != "velocity":
             continue
         speed, size = np.abs(signal), np.abs(signal).max()
@@ -152,7 +154,7 @@ def _since_reversal(v: Array, position: Count) -> Array:
 
 
 POSITIONS, VELOCITIES = ("m", "rad"), ("m/s", "rad/s")
-KINDS: Mapping[str, Kind] = {"x": "position", "v": "velocity"}
+KINDS: Mapping[str, Kind] = {"x": "position", "v": "velocity", "a": "acceleration"}
 """Types of regressors by the first part of their names."""
 
 

@@ -74,8 +74,10 @@ WHITE = 0.05
 """Level of the test of one channel for white noise, which does not affect the verdict."""
 SHARE = 0.05
 """Share of the variance of the residuals below which a dependence is ignored."""
-MOVED = 1.0
+MOVED = 2.0
 """Change of the fitted values by a missing term, in standard errors, below which it is ignored."""
+SMOOTHED = 1e-3
+"""Size of an ignored dependence on a smoothed acceleration, relative to the range of a signal."""
 UNEXPLAINED = 0.7
 """Ratio of residuals to the spread of the signal above which a model explains almost nothing."""
 LITTLE = 0.9
@@ -225,7 +227,8 @@ def _independent(
     level = float(np.linalg.norm(found.raw[channel.rows])) / weighted if weighted > 0 else 1.0
     for family, (statistic, p, explained, moved) in some:
         size, share = explained * level, explained**2 / (float(r @ r) / r.size)
-        passed = p >= limit or size <= fine or (share < SHARE and moved < MOVED)
+        least = SMOOTHED * float(np.ptp(channel.measured)) if family.smoothed else fine
+        passed = p >= limit or size <= least or (share < SHARE and moved < MOVED)
         text = (
             f"The residuals of {name} depend on {family.what}: {size:.2g} {unit} rms, "
             f"{100 * min(share, 1.0):.0f} % of their variance ({family.hint})."

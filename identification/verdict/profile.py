@@ -281,10 +281,10 @@ class Walk:
             if found is None:
                 raise ArithmeticError(why)
             J, slope = found.reduced[1], found.slope[self.index]
-            J = J[:, others] - J[:, [own]] * (slope[others] / slope[own])
-            if not np.isfinite(J).all():
+            reduced = J[:, others] - J[:, [own]] * (slope[others] / slope[own])
+            if not np.isfinite(reduced).all():
                 raise ArithmeticError(why)
-            return J
+            return reduced
 
         low, high = box.lower[others], box.upper[others]
         start = np.clip(w[others], low, high)

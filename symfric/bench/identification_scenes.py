@@ -160,15 +160,11 @@ def stage(
         moves: arguments of `motion`.
     """
     whole = motion(rng, **moves)
-    if bristles:
-        F = bristle(whole.t, whole.v)[::FINE]
-        m = whole.sampled()
-    else:
-        m = whole.sampled()
-        F = (partial(curve, **CURVE) if friction is None else friction)(m.v)
-    F = M * m.a + F + OFFSET + ar(rng, m.t.size, rho, noise)
-    x, F = change(rng, m, F)
-    data = Dataset.of(t=m.t, x=x + position * rng.standard_normal(x.size), force=F)
+    m, of_v = whole.sampled(), partial(curve, **CURVE) if friction is None else friction
+    rubbed = bristle(whole.t, whole.v)[::FINE] if bristles else of_v(m.v)
+    noisy = M * m.a + rubbed + OFFSET + ar(rng, m.t.size, rho, noise)
+    x, force = change(rng, m, noisy)
+    data = Dataset.of(t=m.t, x=x + position * rng.standard_normal(x.size), force=force)
     return Fit(InverseDynamics(), law, data, **(given or {}))
 
 
@@ -204,9 +200,8 @@ def memory(
     if position:
         v = np.gradient(m.x + position * rng.standard_normal(m.x.size), m.t)
     data = Dataset.of(t=m.t, v=v, F=F + noise * rng.standard_normal(F.size))
-    known = CURVE | {"sigma_1": BRISTLE["sigma_1"]}
-    more = {"fixed": known} if creeping else {}
-    return Fit(Points(), LuGre(**CURVE, **BRISTLE), data, free=["sigma_0"], **more)
+    fixed = CURVE | {"sigma_1": BRISTLE["sigma_1"]} if creeping else None
+    return Fit(Points(), LuGre(**CURVE, **BRISTLE), data, free=["sigma_0"], fixed=fixed)
 
 
 T = np.linspace(0.0, 4.0, 201)
@@ -224,8 +219,8 @@ def block(law: Law) -> Model:
 def simulated(law: Law, spring: float = 0.0) -> Trajectory:
     """Return the motion of a block, with a spring of stiffness `spring` [N/m]."""
     model, u = block(law), {"force": Linear(T, U)}
-    ode = ca.vertcat(model.ode[0], model.ode[1] - spring / BLOCK["m"] * model.x[0].symbol)
-    model = replace(model, ode=ode)
+    pull = spring / BLOCK["m"] * model.x[0].symbol
+    model = replace(model, ode=ca.SX(model.ode) - ca.vertcat(0, pull))
     return simulate(model, 4.0, p=BLOCK, t_eval=T, u=u, x0={"x": 0.0, "v": 0.0}, rtol=1e-9)
 
 
