@@ -17,6 +17,7 @@ from identification.data.dataset import Dataset
 from identification.data.record import Array, Record
 from identification.fit import Fit
 from identification.result.fitted import Fitted
+from identification.verdict.judge import FORCES
 from symfric.foundation import checks
 from symfric.foundation.shown import brief
 from symfric.foundation.status import SolveError
@@ -40,6 +41,8 @@ class Left:
         t: times of the residuals [s]; for points, velocities.
         r: predicted - measured [SI], shape of t.
         spread: standard deviation of the measured signal [SI].
+        mean: mean of a measured force over the record [SI]; 0 for other signals, whose records may
+            be at different places.
     """
 
     record: str
@@ -48,6 +51,7 @@ class Left:
     t: Array
     r: Array
     spread: float
+    mean: float = 0.0
 
     __repr__ = brief
 
@@ -123,7 +127,8 @@ def left_of(fit: Fitted, data: Dataset) -> list[Left]:
     left = list[Left]()
     for c in residuals.channels:
         spread = float(np.std(c.measured)) or float(np.abs(c.measured).max(initial=0.0)) or 1.0
-        left.append(Left(data[c.record].name, c.signal, c.unit, c.t, r[c.rows], spread))
+        mean = float(c.measured.mean()) if c.unit in FORCES else 0.0
+        left.append(Left(data[c.record].name, c.signal, c.unit, c.t, r[c.rows], spread, mean))
     return left
 
 
@@ -138,8 +143,9 @@ def relative(left: Sequence[Left]) -> float:
     each = list[float]()
     for some in by_signal(left).values():
         rows = [part.r.size for part in some]
-        spread = np.sqrt(np.average([part.spread**2 for part in some], weights=rows))
-        each.append(_rms(some) / float(spread))
+        mean = np.average([part.mean for part in some], weights=rows)
+        squares = [part.spread**2 + (part.mean - mean) ** 2 for part in some]
+        each.append(_rms(some) / float(np.sqrt(np.average(squares, weights=rows))))
     return 100 * float(np.sqrt(np.mean(np.square(each)))) if each else nan
 
 

@@ -10,12 +10,11 @@ from identification.data.findings import (
     Finding,
     Rough,
     View,
-    constant_runs,
-    count_of,
     rough_model,
     smoothed,
     white_part,
 )
+from identification.data.record import constant_runs, count_of
 
 FAR = 12.0
 """Least distance of a spike from the running median, relative to its 95 % quantile."""

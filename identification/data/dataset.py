@@ -12,7 +12,7 @@ from identification.data.findings import Findings
 from identification.data.merge import merged
 from identification.data.raw import Missing, Wanted, record
 from identification.data.reading import ASSUMED, Paths, columns_of, files, read_records, to_csv
-from identification.data.record import Record
+from identification.data.record import Record, first_of
 from identification.data.resample import delayed, resampled, scaled, unwrapped, without_spikes
 from symfric.foundation import checks
 
@@ -41,9 +41,7 @@ class Dataset:
         if not records:
             raise ValueError("Dataset: expected at least one record, got none")
         object.__setattr__(self, "records", records)
-        first, *others = [record.name for record in records]
-        more = f" and {len(others)} more" if others else ""
-        object.__setattr__(self, "name", self.name or f"{first}{more}")
+        object.__setattr__(self, "name", self.name or first_of([r.name for r in records]))
         names = {_turns(r): r.name for r in reversed(records)}
         if {True, False} <= names.keys():
             raise ValueError(

@@ -8,7 +8,7 @@ explained variance reveal wrong signs, exchanged columns, delay and drift; it is
 """
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, partialmethod
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import Array, Record
+from identification.data.record import Array, Record, count_of, first_of
 from symfric.foundation import checks
 
 Severity = Literal["error", "warning"]
@@ -93,9 +93,25 @@ class Findings:
     def __str__(self) -> str:
         if not self.items:
             return f"{self.name}: no problems found"
-        of = [f"{name}: " if len(self.records) > 1 else "" for name in self.records]
-        lines = [f"  {f.severity}: {of[f.record]}{f.sentence}" for f in self.items]
-        return "\n".join([f"{self.name}:", *lines])
+        return "\n".join([f"{self.name}:", *(f"  {text}" for text in texts(self, self.records))])
+
+
+def grouped(
+    items: Iterable[Finding], records: Sequence[str]
+) -> Iterator[tuple[tuple[str, ...], Finding]]:
+    """Yield the names of all records with the same finding, and that finding."""
+    alike = dict[tuple[str, str, str], list[Finding]]()
+    for f in items:
+        alike.setdefault((f.severity, f.signal, f.sentence), []).append(f)
+    for some in alike.values():
+        yield tuple(dict.fromkeys(records[f.record] for f in some)), some[0]
+
+
+def texts(items: Iterable[Finding], records: Sequence[str]) -> Iterator[str]:
+    """Yield severity, records and sentence of each finding, once for records that share it."""
+    for names, f in grouped(items, records):
+        where = f"{first_of(names)}: " if len(records) > 1 else ""
+        yield f"{f.severity}: {where}{f.sentence}"
 
 
 @cache
@@ -195,23 +211,6 @@ class View:
         t = self.record.t
         place = self.record.place(sample)
         return place if t is None else f"t = {t[sample]:.6g} s ({place})"
-
-
-def constant_runs(y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return first samples and lengths of all runs of equal values in a signal."""
-    first = np.concatenate([[0], np.flatnonzero(np.diff(y) != 0) + 1])
-    return first, np.diff(np.concatenate([first, [y.size]]))
-
-
-def count_of(y: Array) -> float:
-    """Return the smallest step between values of a signal; 0 if they are not on a coarse grid."""
-    levels = np.unique(y)
-    if levels.size < 2 or levels.size > 0.5 * y.size:
-        return 0.0
-    steps = np.diff(levels)
-    smallest = float(np.quantile(steps, 0.05))
-    off = np.abs(steps / smallest - np.rint(steps / smallest)) if smallest > 0 else np.ones(1)
-    return smallest if np.median(off) < 0.02 and smallest > 1e-12 * np.ptp(y) else 0.0
 
 
 WIDTHS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 100.0)

@@ -1,8 +1,8 @@
 """Raw columns of a file, and their conversion to a record with names, SI units and time."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from re import fullmatch
+from re import DOTALL, fullmatch
 from typing import Literal, TypeVar, final
 
 import numpy as np
@@ -318,5 +318,21 @@ def gathered(works: Sequence[Callable[[], T]]) -> list[T]:
         except ValueError as error:
             problems.append(str(error))
     if problems:
-        raise ValueError("\n".join(problems))
+        raise ValueError("\n".join(_once(problems)))
     return found
+
+
+SHOWN = 3
+"""Number of files with the same problem that a message names."""
+
+
+def _once(problems: Sequence[str]) -> Iterator[str]:
+    """Yield each message once, with the names of all files that have the same problem."""
+    alike = dict[tuple[str, str], list[str]]()
+    for problem in problems:
+        match = fullmatch(r"(\w+ )('[^']*')(:.*)", problem, DOTALL)
+        verb, name, rest = match.groups() if match else (problem, "", "")
+        alike.setdefault((verb, rest), []).append(name)
+    for (verb, rest), names in alike.items():
+        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        yield f"{verb}{', '.join(names[:SHOWN])}{more}{rest}"

@@ -1,6 +1,6 @@
 """Class `Record`: signals over time or points without time; and its controller `PositionLoop`."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import final
@@ -75,6 +75,28 @@ def runs(there: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first and end (exclusive) of each run of True values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def constant_runs(y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return first samples and lengths of all runs of equal values in a signal."""
+    first = np.concatenate([[0], np.flatnonzero(np.diff(y) != 0) + 1])
+    return first, np.diff(np.concatenate([first, [y.size]]))
+
+
+def count_of(y: Array) -> float:
+    """Return the smallest step between values of a signal; 0 if they are not on a coarse grid."""
+    levels = np.unique(y)
+    if levels.size < 2 or levels.size > 0.5 * y.size:
+        return 0.0
+    steps = np.diff(levels)
+    smallest = float(np.quantile(steps, 0.05))
+    off = np.abs(steps / smallest - np.rint(steps / smallest)) if smallest > 0 else np.ones(1)
+    return smallest if np.median(off) < 0.02 and smallest > 1e-12 * np.ptp(y) else 0.0
+
+
+def first_of(names: Sequence[str]) -> str:
+    """Return the first name, with the number of the others."""
+    return f"{names[0]} and {len(names) - 1} more" if len(names) > 1 else names[0]
 
 
 @final

@@ -211,8 +211,9 @@ class ClosedLoop:
                 rows, unit = slice(first, first := first + y.size), units[name]
                 channels.append(Channel(number, name, unit, rows, record.time, y, regressors))
             unit = units.get("x", "m")
-            for name, value, of in zip("xv", run.first.tolist(), (unit, f"{unit}/s"), strict=True):
-                scale, start_value = max(abs(value), 1e-3), f"x0.{name}[{number}]"
+            for k, of in enumerate((unit, f"{unit}/s")):
+                value, start_value = float(run.first[k]), f"x0.{'xv'[k]}[{number}]"
+                scale = max(abs(value), subject.model.x[k].nominal)
                 own.append(Unknown(start_value, of, value, scale=scale, nuisance=True))
         free = tuple(own) if self.x0 == "estimate" else ()
         return LoopRows(subject.names, free, tuple(channels), tuple(runs))

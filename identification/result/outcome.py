@@ -6,7 +6,7 @@ from itertools import zip_longest
 from math import floor, isfinite, log10
 from textwrap import wrap
 
-from identification.data.findings import Finding
+from identification.data.findings import Finding, texts
 from identification.residuals.evaluation import Array
 from identification.result.live import Asked, Live
 from identification.result.series import Curve, Errors, Estimate, Series, Tried
@@ -265,9 +265,6 @@ def errors_table(title: str, errors: Errors) -> Iterator[str]:
 
 
 def _data(fit: Outcome) -> Iterator[str]:
-    several = len(fit.records) > 1
     if fit.findings:
         yield "doubtful in the data"
-        for f in fit.findings:
-            where = f"{fit.records[f.record]}: " if several else ""
-            yield from _indented([f"{f.severity}: {where}{f.sentence}"])
+        yield from _indented([*texts(fit.findings, fit.records)])

@@ -6,6 +6,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from identification.data.findings import grouped
+from identification.data.record import first_of
 from identification.result.outcome import (
     MANY,
     SAME,
@@ -295,7 +297,10 @@ def _cell(value: object) -> str:
 
 
 def _findings(fit: Outcome) -> Iterator[str]:
-    rows = [(fit.records[f.record], f.signal, f.kind, f.severity, f.sentence) for f in fit.findings]
+    rows = [
+        (first_of(names), f.signal, f.kind, f.severity, f.sentence)
+        for names, f in grouped(fit.findings, fit.records)
+    ]
     header = ("record", "signal", "kind", "severity", "what and where")
     yield html.table("Findings of the checks", header, rows, (), ["note"] * len(rows))
 

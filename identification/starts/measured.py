@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.record import runs
+from identification.unknowns.roles import Natural
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]
@@ -78,6 +79,21 @@ class Measured:
     def fastest(self) -> float:
         """Largest speed [m/s]."""
         return float(np.abs(self.v).max())
+
+    @property
+    def natural(self) -> Natural:
+        """Natural units: root mean square of F, N, and travel in the time at the largest speed."""
+        force, speed = float(np.sqrt(np.mean(self.F**2))) or 1.0, self.fastest or 1.0
+        length = speed if self.x is None else float(np.ptp(self.x)) or speed
+        return Natural(force, self.N, length, length / speed)
+
+    def rescaled(self, units: Natural) -> "Measured":
+        """Return the samples in natural units."""
+        speed = units.length / units.time
+        parts = {"v": speed, "F": units.force, "x": units.length, "t": units.time}
+        parts["a"] = speed / units.time
+        scaled = {n: None if (y := getattr(self, n)) is None else y / s for n, s in parts.items()}
+        return Measured(**scaled, N=self.N / units.load, breaks=self.breaks)  # pyright: ignore[reportArgumentType]
 
 
 def _samples(name: str, given: object, size: int) -> Array:

@@ -1,6 +1,6 @@
 """Start values of any law from data, assigned by the roles of the parameters."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite, sqrt
 from typing import NamedTuple
@@ -10,7 +10,7 @@ import numpy as np
 from identification.starts.maxwell_slip import Elements, fit_elements
 from identification.starts.measured import Array, Hysteresis, Measured, hysteresis, travelled
 from identification.starts.stribeck import BINS, Curve, StribeckCurve, binned, fit_curve, fit_law
-from identification.unknowns.roles import orders, parts, velocity
+from identification.unknowns.roles import Natural, orders, parts, velocity
 from symfric.foundation import checks
 from symfric.foundation.parameters import Parameter, parameters
 from symfric.laws.base.law import Law
@@ -76,9 +76,20 @@ def start_values(
         ValueError: unknown names, or data without motion.
     """
     names = checks.names("start_values: free", tuple(free), parameters(what))
-    law = what.law if isinstance(what, Drive) else what
-    N = float(what.N) if isinstance(what, Drive) else measured.N
-    facts = facts_of(replace(measured, N=N), mass="m" in names, offset="offset" in names)
+    if isinstance(what, Drive):
+        measured = replace(measured, N=float(what.N))
+    units = measured.natural
+    sizes = units.sizes(what)
+    if {*sizes.values()} == {1.0}:
+        units = Natural()
+    found = _start_values(units.rescaled(what), measured.rescaled(units), names)
+    return {n: sizes[n] * x for n, x in found.items()}
+
+
+def _start_values(what: Law | Drive, measured: Measured, names: Sequence[str]) -> dict[str, float]:
+    """Return start values in natural units."""
+    law, N = what.law if isinstance(what, Drive) else what, measured.N
+    facts = facts_of(measured, mass="m" in names, offset="offset" in names)
     known = parameters(what)
     values = {n: _guess(known[n], facts, law) for n in names}
     shift = facts.stribeck.offset

@@ -1,15 +1,29 @@
-"""Roles of law parameters: which parameters are fitted, and why others are held."""
+"""Roles of law parameters: which parameters are fitted, why others are held, natural units.
 
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import fields
-from math import floor, log10
-from typing import NamedTuple
+Natural units of data are a force, a load, a length and a time in which measured numbers are of
+order one. Defaults of a law are numbers for one machine. In natural units they suit any machine, so
+that the result of a fit does not depend on the units of force, length and time.
+"""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from math import floor, isfinite, log10, prod
+from re import sub
+from typing import NamedTuple, TypeVar, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.parameters import Parameter, Parametric, parameters, symbolise
+from symfric.foundation.parameters import (
+    Parameter,
+    Parametric,
+    parameters,
+    symbolise,
+    with_values,
+)
+from symfric.foundation.units import parsed
+from symfric.foundation.variable import POSITIVE
 from symfric.laws import Asymmetric, Law
 
 Array = NDArray[np.float64]
@@ -250,3 +264,60 @@ def _same_effect(columns: Array, kept: Sequence[int], i: int) -> list[int] | Non
         return None
     least = 1e-3 * np.abs(shares).max(initial=0.0)
     return [k for k, share in zip(kept, shares, strict=True) if abs(share) > least]
+
+
+P = TypeVar("P", bound=Parametric)
+
+PER_LOAD = ("level", "viscous", "stiffness", "damping")
+"""Roles of parameters that multiply the normal force if their unit contains no force."""
+SLIDING = (("N m", "N"), ("kg m^2", "kg"), ("rad", "m"))
+"""Units of rotation and the corresponding units of sliding."""
+
+
+@final
+@dataclass(frozen=True)
+class Natural:
+    """Natural units of force, normal force, length and time, in SI units."""
+
+    force: float = 1.0
+    load: float = 1.0
+    length: float = 1.0
+    time: float = 1.0
+
+    def size(self, parameter: Parameter, known: Mapping[str, Parameter]) -> float:
+        """Return the natural unit of a parameter; letters in exponents are names in `known`."""
+        text = sub(r"\^([a-z])\b", lambda m: f"^{float(known[m[1]].value):g}", parameter.unit)
+        powers = _powers(text)
+        if parameter.role == "load":
+            return self.load ** powers.get("N", 0.0)
+        shared = parameter.role in PER_LOAD and not {"N", "kg"} & powers.keys()
+        return self.of_unit(text) * (self.force / self.load if shared else 1.0)
+
+    def of_unit(self, unit: str) -> float:
+        """Return the natural unit of a quantity other than a normal force."""
+        units = {"N": self.force, "m": self.length, "s": self.time}
+        units["kg"] = self.force * self.time**2 / self.length
+        return prod(units.get(symbol, 1.0) ** power for symbol, power in _powers(unit).items())
+
+    def sizes(self, whole: Parametric) -> dict[str, float]:
+        """Return the natural units of all parameters; 1 if bounds of `whole` are in SI units."""
+        known = parameters(whole)
+        found = {name: self.size(p, known) for name, p in known.items()}
+        bounds = [b for n, p in known.items() if found[n] != 1.0 for b in (p.lower, p.upper)]
+        if any(isfinite(b) and not 0.0 <= b <= POSITIVE for b in bounds):
+            return dict.fromkeys(found, 1.0)
+        return found
+
+    def rescaled(self, whole: P) -> P:
+        """Return a law or a scene with its numbers in natural units."""
+        sizes = self.sizes(whole)
+        values = {n: float(p.value) / sizes[n] for n, p in parameters(whole).items()}
+        return with_values(whole, values)
+
+
+def _powers(unit: str) -> dict[str, float]:
+    """Return the powers of the symbols in a unit, with those of sliding for rotation."""
+    for turning, sliding in SLIDING:
+        unit = unit.replace(turning, sliding)
+    found = parsed(unit)
+    return {} if found is None else dict(found.powers)

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from math import inf, sqrt
 from typing import Any, NamedTuple, final
 
-from identification.unknowns import roles
 from symfric.foundation import checks
-from symfric.foundation.parameters import Parameter, Variable
+from symfric.foundation.variable import Variable
 
 
 @final
@@ -261,17 +260,6 @@ class Draft(NamedTuple):
     unknown: Unknown
     lower: float
     upper: float
-
-
-def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds) -> Draft:
-    """Return the draft of a parameter of a law or a scene according to its role."""
-    value = float(parameter.value)
-    unknown = Unknown(
-        parameter.name, unit, value, *roles.window(parameter, speeds),
-        scale=abs(value) or abs(parameter.default) or 1.0,
-        logarithmic=roles.is_logarithmic(parameter),
-    )  # fmt: skip
-    return Draft(unknown, parameter.lower, parameter.upper)
 
 
 def of_variable(v: Variable) -> Draft:

@@ -9,19 +9,19 @@ import casadi as ca
 
 from identification.unknowns import roles
 from identification.unknowns.spec import (
+    Draft,
     Requests,
     Tied,
     Unknown,
     drafted,
-    of_parameter,
     of_variable,
     refuse,
 )
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_number, is_symbolic
-from symfric.foundation.parameters import Variable, parameters, symbolise, with_values
+from symfric.foundation.parameters import Parameter, Variable, parameters, symbolise, with_values
 from symfric.foundation.units import turned
-from symfric.foundation.variable import symbols_of
+from symfric.foundation.variable import POSITIVE, symbols_of
 from symfric.laws import Law
 from symfric.model import Model, Output, Variables
 from symfric.scenes import Drive
@@ -123,6 +123,7 @@ def subject(
     turning: bool = False,
     v_max: float = 0.0,
     v_min: float = 0.0,
+    natural: roles.Natural | None = None,
 ) -> Subject:
     """Decide which parameters are fitted, and formulate the model with symbols.
 
@@ -138,6 +139,7 @@ def subject(
         turning: True if positions are angles.
         v_max: largest speed in the data [m/s or rad/s]; 0: unknown.
         v_min: smallest speed of measured points; 0: unknown, or a motion through rest.
+        natural: natural units of the data of a law or a drive.
 
     Raises:
         ValueError: all problems, in one error.
@@ -160,12 +162,13 @@ def subject(
     elif isinstance(what, Drive):
         turning = what.turning
     moving = not points if moving is None else moving
-    return _of_parts(what, requests, load, moving, turning, roles.Speeds(v_max, v_min))
+    known = natural if natural is not None and isinstance(what, Law | Drive) else roles.Natural()
+    return _of_parts(what, requests, load, moving, turning, roles.Speeds(v_max, v_min), known)
 
 
 def _of_parts(
     whole: Scene | Law, requests: Requests, load: float, moving: bool, turning: bool,
-    speeds: roles.Speeds,
+    speeds: roles.Speeds, natural: roles.Natural,
 ) -> Subject:  # fmt: skip
     """Return the subject of a law (for points) or of a scene (for a motion)."""
     from symfric.laws import law_name  # noqa: PLC0415 (slow to import)
@@ -184,15 +187,35 @@ def _of_parts(
     reasons = _reasons(whole, requests, load, moving)
     given = requests.fixed
     held = {n: given.get(n, roles.held_value(known[n], speeds)) for n in reasons}
-    drafts = [of_parameter(p, units[n], speeds) for n, p in known.items() if n not in reasons]
+    sizes, free = natural.sizes(whole), [n for n in known if n not in reasons]
+    drafts = [of_parameter(known[n], units[n], speeds, sizes[n]) for n in free]
     free = drafted(drafts, requests, held, roles.orders(whole))
     whole = with_values(whole, held | {n: u.start for n, u in free.items()})
     symbolic, p = symbolise(whole, *free)
     law, scene = (whole, None) if isinstance(whole, Law) else (whole.law, whole)
     model = points_model(symbolic, load, p) if isinstance(symbolic, Law) else symbolic.equations(p)
+    x = tuple(replace(v, nominal=v.nominal * natural.of_unit(v.unit)) for v in model.x)
+    model = replace(model, x=x)
     guard = partial(with_values, whole)
     why = {n: reasons[n] for n in variables if n in reasons}
     return Subject(law_name(law), free, requests, model, law, scene, why, held, variables, guard)
+
+
+def of_parameter(parameter: Parameter, unit: str, speeds: roles.Speeds, size: float) -> Draft:
+    """Return the draft of a parameter of a law or a scene according to its role.
+
+    Its default is a number in its natural unit `size`.
+    """
+    value, logarithmic = float(parameter.value), roles.is_logarithmic(parameter)
+    default = size * parameter.default
+    if 0 < parameter.lower <= POSITIVE:
+        parameter = replace(parameter, lower=0.0)
+    start = default if value == parameter.default else value
+    unknown = Unknown(
+        parameter.name, unit, start, *roles.window(parameter, speeds),
+        scale=abs(start) or abs(default) or size, logarithmic=logarithmic,
+    )  # fmt: skip
+    return Draft(unknown, parameter.lower, parameter.upper)
 
 
 def _reasons(whole: Scene | Law, requests: Requests, load: float, moving: bool) -> dict[str, str]:

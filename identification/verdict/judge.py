@@ -273,11 +273,18 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
 
 
 def _left(found: Minimum) -> Iterator[tuple[str, float, float]]:
-    """Yield each signal with the sums of squares of its residuals and of the centred signal."""
+    """Yield each signal with the sums of squares of its residuals and of the centred signal.
+
+    A force is centred over all records, because each may be at a constant speed; other signals are
+    centred in each record, because records may be at different places.
+    """
     for signal in dict.fromkeys(c.signal for c in found.channels):
         some = [c for c in found.channels if c.signal == signal]
         left = sum(float(np.sum(found.raw[c.rows] ** 2)) for c in some)
-        yield signal, left, sum(float(np.sum((c.measured - c.measured.mean()) ** 2)) for c in some)
+        parts = [c.measured for c in some]
+        if some[0].unit in FORCES:
+            parts = [np.concatenate(parts)]
+        yield signal, left, sum(part.size * float(np.var(part)) for part in parts)
 
 
 def _explained(found: Minimum) -> Iterator[Test]:

@@ -1,11 +1,12 @@
 """Fuzz test of guarded C under sanitizers: random steps neither crash nor change valid data.
 
-A C program generates the inputs. In three of four steps they are valid (including the ends of
-their ranges, zeros, denormals and step sizes of 1e-9 ... 1e3 s); in the others, an input, a
-parameter or a state is NaN, infinite, huge, denormal or negative. After every step the program
-checks that
+A C program generates the inputs. In half of the steps they are valid (including the ends of their
+ranges, zeros, denormals and step sizes of 1e-9 ... 1e3 s); in the others, an input, a parameter or
+a state is NaN, infinite, huge, denormal or negative, or all states and some inputs and parameters
+are random bits. After every step the program checks that
 
     outputs are finite (the next step detects states that are not),
+    a force F with a limit F_max is within this limit,
     the status agrees with the ranges of inputs, parameters and states before the step, and
     if the status is 0, all bits equal those of the same step generated without guards.
 
@@ -34,7 +35,7 @@ SANITIZED = ("-std=c99", "-O1", "-g", "-ffp-contract=off", "-fsanitize=undefined
              "-fno-sanitize-recover=all")  # fmt: skip
 
 STEPS = 1_000_000
-COUNTS = ("valid", "repaired", "altered", "unflagged", "unfinished", "last_resort")
+COUNTS = ("valid", "repaired", "altered", "unflagged", "unfinished", "last_resort", "beyond")
 
 
 @final
@@ -49,7 +50,9 @@ class Fuzzed:
         unflagged: steps with a wrong status.
         unfinished: steps after which an output is not finite.
         last_resort: steps with default parameters in which an output was not finite and has been
-            replaced by 0; with other parameters, such as mu_s = 0, an output may be undefined.
+            replaced by 0; with other parameters, such as mu_s = 0, or random bits, an output may be
+            undefined.
+        beyond: steps with a force F above its limit F_max.
         report: output of a sanitizer, or "".
     """
 
@@ -62,12 +65,14 @@ class Fuzzed:
     unflagged: int = 0
     unfinished: int = 0
     last_resort: int = 0
+    beyond: int = 0
     report: str = ""
 
     @property
     def ok(self) -> bool:
-        """True if there was no crash, no missing status and no change of valid data."""
-        return not (self.altered or self.unflagged or self.unfinished or self.report)
+        """True without a crash, a missing status, a change of valid data, or too large a force."""
+        wrong = self.altered + self.unflagged + self.unfinished + self.beyond
+        return not (wrong or self.report)
 
 
 def fuzz(block: Block, real: str, compiler: Compiler, *, steps: int = STEPS) -> Fuzzed:
@@ -116,7 +121,7 @@ def _program(c: CBlock, bare: CBlock) -> str:
         "STATE_LIMIT": [state_limit(v) for v in block.states],
         "STATE_START": [float(v.start) for v in block.states],
     }
-    sizes = [i for i, v in enumerate(block.parameters) if v.name == STEP_SIZE]
+    places = {v.name: i for i, v in enumerate(block.parameters)}
     default = "memcpy(param, &{0}_default, sizeof {0}_default);" if block.parameters else ""
     return filled(
         TEMPLATES / "fuzz.c",
@@ -124,7 +129,9 @@ def _program(c: CBlock, bare: CBlock) -> str:
         bare=bare.name,
         step_bare=bare.flat_step,
         double=int(c.real.size == 8),
-        size=sizes[0] if sizes else -1,
+        size=places.get(STEP_SIZE, -1),
+        force=[*block.outputs].index("F") if "F" in block.outputs else -1,
+        most=places.get("F_max", -1),
         columns="\n".join(_column(name, values, c.real) for name, values in columns.items()),
         default=default.format(c.name),
     )

@@ -10,7 +10,7 @@ import casadi as ca
 from symfric.codegen import Block, law_block
 from symfric.codegen.blocks.from_law import in_turning
 from symfric.codegen.blocks.variables import arranged, step_size
-from symfric.compensation.force import TABLES, Parts, Terms, finished, terms
+from symfric.compensation.force import LIMITED, TABLES, Parts, Terms, finished, terms, within_load
 from symfric.compensation.settings import Compensation, chosen_settings, formula
 from symfric.foundation import checks
 from symfric.foundation.variable import starts_of, symbols_of
@@ -44,7 +44,7 @@ def compensator(
     """Return the block of a friction compensator: the force to add, in the units of the drive.
 
         v_c = dead zone of the blend of v_ref + delay a_ref + error_gain e and v
-        F   = slew(limit(ramp [scaled law(v_c, N) + inertia a_ref + stick + dither]))
+        F   = limit(slew(ramp [scaled law(v_c, N) + inertia a_ref + stick + dither]))
 
     The law makes the step of `law_block`. Scales act on forces and not on the states of the law, so
     that they can be changed while the machine moves.
@@ -98,7 +98,9 @@ def compensator(
         normal = parts.given("N")
     else:
         normal = parts.parameter("N", 1.0 if s.N is None else s.N)
-    old, new = ca.vertcat(found.v, found.N), ca.vertcat(moved, normal)
+    z = symbols_of(inner.states)
+    old = ca.vertcat(found.v, found.N, z)
+    new = ca.vertcat(moved, normal, within_load(found.law, z, normal) if inner.states else z)
     parts.next = ca.vertsplit(ca.substitute(inner.next, old, new)) if inner.states else []
     if s.build_up is not None:
         if law.states:
@@ -121,7 +123,7 @@ def compensator(
         constants=dict(inner.constants) | size.constants,
         equations=f"{formula(s)}\n\n{inner.equations}",
         discretisation=without_end(inner.discretisation),
-        use=USE,
+        use=(*USE, *[LIMITED] * (s.limit is not None)),
         limits=(OVER, *inner.limits),
         sources=inner.sources,
         **parts.variables(tuple(used)),
@@ -185,7 +187,7 @@ def built_up(
     b+ = b + 2 v h / distance, within [-1, 1]: linear in the travel since the reversal, or shaped
     by the table. A shorter travel back leaves the remaining share, as in a Maxwell element.
     """
-    way, x = parts.parameter("d_build", distance), parts.state("built")
+    way, x = parts.parameter("d_build", distance), smooth.clip(parts.state("built"), -1.0, 1.0)
     end = ca.SX(smooth.clip(x + 2 * v * h / way, -1.0, 1.0))
     mean = (x + end) / 2
     if table:
@@ -239,7 +241,7 @@ def freed(
         numbers: start values of F_stick [N], t_stick [s] and v_stick [m/s].
     """
     most, pace, slow = map(parts.parameter, ("F_stick", "t_stick", "v_stick"), numbers)
-    q = parts.state("stuck")
+    q = smooth.clip(parts.state("stuck"), -1.0, 1.0)
     rests = smooth.clip(2 - ca.fabs(v) / slow, 0.0, 1.0)
     moves = smooth.clip(ca.fabs(wanted) / slow - 1, 0.0, 1.0)
     goal = ca.sign(wanted) * moves * rests
@@ -264,9 +266,4 @@ def _added(
         end = ca.SX(smooth.fraction(parts.state("phase") + pace * h))
         parts.next.append(end)
         force = force + amplitude * ca.sin(2 * ca.pi * end)
-    force = finished(parts, force, s.ramp, s.limit, h, where)
-    if s.slew is not None:
-        rate, last = parts.parameter("F_rate", s.slew), parts.state("F_last")
-        force = ca.SX(last + smooth.clip(force - last, -rate * h, rate * h))
-        parts.next.append(force)
-    return force
+    return finished(parts, force, s.ramp, s.limit, h, where, s.slew)

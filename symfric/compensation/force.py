@@ -31,6 +31,10 @@ TABLES: dict[str, dict[str, Any]] = tomllib.loads(
 TERMS: dict[str, str] = TABLES["terms"]
 """Terms of friction that can be scaled separately."""
 
+LIMITED = (
+    "F is within +-F_max for all bits of states, inputs and parameters, also while it fades and at "
+    "once after F_max is lowered. F_max outside its range is replaced by its default."
+)
 LEAST = 1e-9
 """Smallest load [N] of laws with states, which divide by the load."""
 
@@ -261,13 +265,15 @@ def finished(
     limit: float | None,
     h: ca.SX | float,
     where: str,
+    slew: float | None = None,
 ) -> ca.SX:
-    """Return the force with fading by `enable` and a limit.
+    """Return the force with fading by `enable`, a limit of its rate, and last a limit.
 
-    The force fades in (C1) over t_ramp while `enable` is above 1/2, and stays within +-F_max.
+    The force fades in (C1) over t_ramp while `enable` is above 1/2. It changes by at most F_rate h
+    per step, and stays within +-F_max for all values of states, inputs and other parameters.
 
     Args:
-        ramp, limit: time [s] and largest force [N]; None if not chosen.
+        ramp, limit, slew: time [s], largest force [N] and rate [N/s]; None if not chosen.
     """
     if ramp is not None:
         checks.number(f"{where}: ramp", ramp, unit="s", above=0.0)
@@ -276,8 +282,37 @@ def finished(
         end = ca.SX(smooth.clip(e + ca.if_else(on > 0.5, h, -h) / duration, 0.0, 1.0))
         parts.next.append(end)
         force = force * smooth.step3(end)
+    if slew is not None:
+        rate, last = parts.parameter("F_rate", slew), parts.state("F_last")
+        force = ca.SX(last + smooth.clip(force - last, -rate * h, rate * h))
     if limit is not None:
         checks.number(f"{where}: limit", limit, unit="N", lower=0.0)
         most = parts.parameter("F_max", limit)
         force = ca.SX(smooth.clip(force, -most, most))
+    if slew is not None:
+        parts.next.append(force)
     return force
+
+
+def within_load(law: Law, z: ca.SX, N: ca.SX) -> ca.SX:
+    """Return the states z, limited to deflections that the load N can hold.
+
+        |z_i| <= 1.001 most_held(N) / |dF/dz_i|   at v = 0
+
+    The margin leaves rounding errors of states at the limit unchanged. A memory error or a fallen
+    load then causes no force above that of stiction. A state is not limited if its slope depends on
+    the states or is zero, or if the law has no known level.
+    """
+    v = ca.SX(0)
+    slopes = ca.densify(ca.jacobian(law.force(v, N, z), z))
+    try:
+        most = 1.001 * ca.SX(law.most_held(N))
+    except ValueError:
+        return z
+    limited = list[ca.SX]()
+    for i, slope in enumerate(ca.horzsplit(slopes)):
+        if slope.is_zero() or ca.depends_on(slope, z):
+            limited.append(z[i])
+        else:
+            limited.append(ca.SX(smooth.clip(z[i], -most / slope, most / slope)))
+    return ca.vertcat(*limited)

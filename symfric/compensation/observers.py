@@ -11,7 +11,7 @@ from symfric.codegen.blocks.from_law import in_turning
 from symfric.codegen.blocks.held_step import held_step
 from symfric.codegen.blocks.variables import arranged, step_size
 from symfric.compensation.compensator import without_end
-from symfric.compensation.force import LEAST, Parts, finished
+from symfric.compensation.force import LEAST, LIMITED, Parts, finished, within_load
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters, with_values
 from symfric.foundation.variable import symbols_of
@@ -184,7 +184,9 @@ def _observer(
     load = checks.number(f"{where}: N", N, unit="N", lower=0.0)
     least = ca.fmax(parts.parameter("N", load), LEAST)
     v, z = inner.inputs[0].symbol, symbols_of(inner.states)
-    end, force = corrected(with_values(law, own), v, least, z, push, size.h, where)
+    observed = with_values(law, own)
+    results = corrected(observed, v, least, z, push, size.h, where)
+    end, force = ca.substitute([*results], [z], [within_load(observed, z, least)])
     parts.next = ca.vertsplit(end)
     force = finished(parts, force, ramp, limit, size.h, where)
     block = arranged(Block(
@@ -192,7 +194,7 @@ def _observer(
         doc=f"Observer of the {what} by the position error. {inner.doc}",
         equations=f"{formula}\n\n{inner.equations}",
         discretisation=without_end(inner.discretisation),
-        use=(USE, ERROR),
+        use=(USE, ERROR, *[LIMITED] * (limit is not None)),
         outputs={"F": Output(force, "N", ESTIMATE)},
         constants=inner.constants,
         about=inner.about,
@@ -268,7 +270,7 @@ def disturbance_observer(
             f"d+ = d + (1 - exp(-w h)) (f - d){', twice' if order == 2 else ''}\nF  = d+"
         ),
         discretisation="The balance of impulse over the last interval, and an exact filter of it.",
-        use=(USE,),
+        use=(USE, *[LIMITED] * (limit is not None)),
         outputs={"F": Output(force, "N", "estimated opposing force, to add to the command")},
         constants=size.constants,
         **parts.variables(size.parameters),

@@ -191,8 +191,8 @@ def formula(s: Compensation) -> str:
     lines.append(f"F = {force}, terms of the law by their scales")
     stages = (
         ("faded in by enable over t_ramp", s.ramp),
-        ("within +-F_max", s.limit),
         ("changed by at most F_rate h per step", s.slew),
+        ("within +-F_max", s.limit),
     )
     last = ", ".join(text for text, value in stages if value is not None)
     return "\n".join([*lines, *[f"F {last}"] * bool(last)])

@@ -20,8 +20,8 @@ from symfric.foundation import checks, units
 from symfric.foundation.checks import check_names as check_names
 from symfric.foundation.numeric import Scalar, is_casadi, is_number, is_symbolic
 from symfric.foundation.shown import Shown, Table, figure_of
+from symfric.foundation.variable import POSITIVE, take_si
 from symfric.foundation.variable import Variable as Variable
-from symfric.foundation.variable import take_si
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,7 +63,8 @@ def param(
             generator recognise parameters; "" if unspecified.
         width: for a parameter that smooths a jump, its exponent in the smoothing width: 1 for the
             width itself, -1 for a steepness; 0 for other parameters.
-        lower, upper: closed bounds, which are also the bounds in identification.
+        lower, upper: closed bounds, which are also the bounds in identification; a lower bound
+            in (0, `POSITIVE`] admits all positive numbers.
 
     Raises:
         ValueError: the role is unknown.
@@ -173,8 +174,8 @@ def _problems(obj: Parametric) -> Iterator[str]:
         if not numbers.size or not np.isfinite(numbers).all():
             got = checks.shown(value)
             yield f"{item.name}: expected a finite number [{unit}] or a symbol, got {got}"
-        elif not ((low <= numbers) & (numbers <= high)).all():
-            beyond = numbers[(numbers < low) | (numbers > high)][0]
+        elif not (inside := _reaches(low, numbers) & (numbers <= high)).all():
+            beyond = numbers[~inside][0]
             yield (
                 f"{item.name}: expected {low:g} <= {item.name} <= {high:g} [{unit}], got {beyond:g}"
             )
@@ -186,6 +187,11 @@ def _problems(obj: Parametric) -> Iterator[str]:
             if fit and (first > last if sign == "<=" else first >= last).any():
                 shown = f"{low} = {_shown(a)} and {high} = {_shown(b)}"
                 yield f"expected {low} {sign} {high}, got {shown}"
+
+
+def _reaches(low: float, numbers: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return a mask of the numbers at or above a lower bound."""
+    return numbers > 0 if 0 < low <= POSITIVE else numbers >= low
 
 
 def _numbers(value: Any) -> NDArray[np.float64]:

@@ -12,6 +12,9 @@ from symfric.foundation.numeric import Scalar
 from symfric.foundation.shown import figure_of
 from symfric.foundation.symbolic import Symbolic, take_symbols
 
+POSITIVE = 1e-12
+"""Largest lower bound that stands for all positive numbers, because laws divide by the value."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Variable(Symbolic):
@@ -74,6 +77,8 @@ class Variable(Symbolic):
 
     def within(self, where: str, value: object) -> float:
         """Return `value`, which must be a finite number within the bounds."""
+        if 0 < self.lower <= POSITIVE:
+            return checks.number(where, value, unit=self.unit, above=0.0, upper=self.upper)
         return checks.number(where, value, unit=self.unit, lower=self.lower, upper=self.upper)
 
 

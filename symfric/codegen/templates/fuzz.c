@@ -11,6 +11,7 @@
 typedef @real real;
 enum { STATES = @states, PARAMS = @params, INPUTS = @inputs, OUTPUTS = @outputs };
 enum { SIZE = @size }; /* index of the parameter that is the step size, or -1 */
+enum { FORCE = @force, MOST = @most }; /* indices of the output F and of its limit F_max, or -1 */
 @columns
 
 static uint64_t seed = 88172645463325252u;
@@ -65,6 +66,14 @@ static real valid(double low, double high, double nominal)
     }
 }
 
+static real any_bits(void)
+{
+    const uint64_t word = bits();
+    real found;
+    memcpy(&found, &word, sizeof found);
+    return found;
+}
+
 static real state[STATES + 1], param[PARAMS + 1], in[INPUTS + 1], out[OUTPUTS + 1];
 static unsigned int bits_of_status, *const status = &bits_of_status;
 
@@ -112,15 +121,31 @@ static unsigned int expected(void) /* the status that the numbers require */
     return found;
 }
 
+static int beyond_limit(void) /* the force exceeds its limit; a flagged limit is the default */
+{
+    double most;
+    if (FORCE < 0 || MOST < 0) { return 0; }
+    most = (double)param[MOST < 0 ? 0 : MOST];
+    if ((*status & 8u) != 0u && !(most >= (double)PARAM_START[MOST < 0 ? 0 : MOST])) {
+        most = (double)PARAM_START[MOST < 0 ? 0 : MOST];
+    }
+    return !(fabs((double)out[FORCE < 0 ? 0 : FORCE]) <= most);
+}
+
 int main(int argc, char **argv)
 {
     const long steps = argc > 1 ? strtol(argv[1], NULL, 10) : 0;
-    long good = 0, repaired = 0, altered = 0, unflagged = 0, unfinished = 0, last = 0;
+    long good = 0, repaired = 0, altered = 0, unflagged = 0, unfinished = 0, last = 0, beyond = 0;
+    int garbage = 0; /* 1 if states may follow from random bits */
     memcpy(state, STATE_START, sizeof(real) * STATES);
     for (long k = 0; k < steps; k++) {
         real before[STATES + 1], after[STATES + 1], shown[OUTPUTS + 1];
         unsigned int must;
         int own = 0; /* 1 if a parameter differs from its default */
+        if (garbage != 0 && one_in(2)) { /* otherwise steps follow from random states */
+            memcpy(state, STATE_START, sizeof(real) * STATES);
+            garbage = 0;
+        }
         @default
         for (int i = 0; i < INPUTS; i++) {
             in[i] = valid((double)IN_LOW[i], (double)IN_HIGH[i], (double)IN_NOMINAL[i]);
@@ -143,11 +168,21 @@ int main(int argc, char **argv)
                 state[i] = typed(bad((double)STATE_LIMIT[i] * 1e-10));
             }
         }
+        if (one_in(4)) { /* a memory error */
+            for (int i = 0; i < STATES; i++) { state[i] = any_bits(); }
+            for (int i = 0; i < INPUTS && one_in(2); i++) { in[i] = any_bits(); }
+            for (int i = 0; i < PARAMS && one_in(16); i++) { param[i] = any_bits(); }
+            garbage = own = 1;
+            if (MOST >= 0 && one_in(2)) {
+                param[MOST < 0 ? 0 : MOST] = typed(pow(10.0, 6.0 * uniform() - 3.0));
+            }
+        }
         must = expected();
         memcpy(before, state, sizeof before);
         guarded();
         if (!all_finite(out, OUTPUTS)) { unfinished++; }
-        if ((*status & 16u) != 0u && !own) { last++; }
+        if (beyond_limit()) { beyond++; }
+        if ((*status & 16u) != 0u && !own && garbage == 0) { last++; }
         if ((*status & 15u) != must) { unflagged++; }
         if (*status != 0u) { repaired++; continue; }
         good++;
@@ -158,6 +193,7 @@ int main(int argc, char **argv)
         if (differs(after, state, STATES) || differs(shown, out, OUTPUTS)) { altered++; }
         memcpy(state, after, sizeof after);
     }
-    printf("%ld %ld %ld %ld %ld %ld\n", good, repaired, altered, unflagged, unfinished, last);
+    printf("%ld %ld %ld %ld ", good, repaired, altered, unflagged);
+    printf("%ld %ld %ld\n", unfinished, last, beyond);
     return 0;
 }

@@ -57,11 +57,12 @@ VISCOUS = Stribeck(mu_s=0.0, mu_d=0.0, sigma_2=1.0, v_eps=1e-3)
 
 @pytest.mark.parametrize("law", [STEP, LuGre(), GMS(form="event"), Dahl(), BrownMcPhee()])
 def test_without_features_a_compensator_is_the_block_of_its_law(law: Law) -> None:
-    """It has no further operation, and the same bits."""
+    """It has the same bits, and no further operation except the limit of its states."""
     alone, bare = law_block(law), compensator(law, **BARE)
     wanted = ca.vertcat(ca.SX(0, 1), alone.next, alone.outputs["F"].expression)
     inputs = ca.vertcat(*(v.symbol for v in (*alone.states, *alone.parameters, *alone.inputs)))
-    assert len(graph(bare.step).nodes) == len(graph(ca.Function("f", [inputs], [wanted])).nodes)
+    nodes = len(graph(ca.Function("f", [inputs], [wanted])).nodes)
+    assert nodes <= len(graph(bare.step).nodes) <= nodes + 8 * len(law.states)
     one, other, random = Machine(bare), Machine(alone), np.random.default_rng(1)
     for v in 0.02 * random.standard_normal(50):
         assert one(v_ref=v) == other(v=v, N=1.0)
@@ -235,6 +236,30 @@ def test_dither_limit_slew_offset_and_inertia_have_their_closed_forms() -> None:
     assert forth[-1] == pytest.approx(force(STEP, {"v_ref": 0.1}))
     back = [go(v_ref=-0.1) for _ in range(100)]
     assert np.allclose(np.diff([forth[-1], *back]), -0.1)
+
+
+def test_the_limit_is_the_last_operation() -> None:
+    """A wrong state, a lower limit and fading do not lead beyond it."""
+    go = machine(STEP, slew=100.0, limit=5.0, ramp=0.1)
+    for _ in range(200):
+        go(v_ref=0.1)
+    go.x[:] = 5000.0
+    assert go(v_ref=0.1) == 5.0
+    go.x[:] = -5000.0
+    fading = np.array([go(v_ref=0.1, enable=0.0) for _ in range(200)])
+    assert (fading[0], fading[-1]) == (-5.0, 0.0)
+    assert np.all(np.diff(fading) <= 100.0 * H * (1 + 1e-9))
+    go.x[:] = 5000.0
+    go.p[[v.name for v in go.block.parameters].index("F_max")] = 0.5
+    assert go(v_ref=0.1) == 0.5
+
+
+@pytest.mark.parametrize("law", [LuGre(**CURVE), GMS(C=400.0, **CURVE, form="event"), Dahl()])
+def test_a_wrong_state_causes_no_force_above_stiction(law: Law) -> None:
+    go = machine(law, N=2.0)
+    go.x[:] = 1e3
+    most = float(law.most_held(2.0)) * len(law.states)
+    assert 0.5 * most <= go() <= most * 1.0011
 
 
 def test_the_integrator_is_held_at_rest_near_the_goal() -> None:

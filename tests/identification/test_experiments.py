@@ -1,0 +1,57 @@
+"""Usual experiments: one file for each speed, plateaus, sweeps, swings; each fits its law."""
+
+import numpy as np
+import pytest
+
+from identification import Dataset, Fit, Points, cross_validate
+from symfric.foundation.status import Status
+from symfric.laws import Stribeck
+
+LAW = Stribeck(mu_s=4.5, mu_d=2.5, v_s=0.1, sigma_2=1.0, v_eps=1e-4)
+TRUE = {"mu_s": 4.5, "mu_d": 2.5, "v_s": 0.1, "sigma_2": 1.0}
+
+
+def at_speed(v: float, jitter: float, count: int = 100) -> Dataset:
+    """Return points near one speed, with noise of the force."""
+    rng = np.random.default_rng(round(1e3 * abs(v)) + (v > 0))
+    speeds = v * (1 + jitter * rng.standard_normal(count))
+    forces = np.array([float(LAW.force(x, 1.0)) for x in speeds])
+    return Dataset.of(
+        v=speeds, F=forces + 0.1 * rng.standard_normal(count), points=True, name=f"at {v:g}"
+    )
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.01])
+def test_one_record_for_each_speed_is_a_curve(jitter: float) -> None:
+    size = np.array([0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.2])
+    some = [at_speed(v, jitter) for v in np.concatenate([-size, size]).tolist()]
+    data = Dataset(tuple(one[0] for one in some))
+    assert not data.check()
+    fit = Fit(Points(), "stribeck", data, starts=1)
+    found = fit.solve()
+    assert found.status is Status.SOLVED
+    for name, true in TRUE.items():
+        p = found.parameters[name]
+        assert abs(p.value - true) < 4 * (p.standard_error or 0.0), name
+    left = cross_validate(fit, folds=7, start=TRUE)
+    assert left.relative < 5, str(left)
+
+
+def test_speeds_of_one_direction_get_one_warning() -> None:
+    data = Dataset(tuple(at_speed(v, 0.01)[0] for v in (0.05, 0.1, 0.4, 1.0)))
+    text = str(data.check())
+    assert text.count("one direction") == 1
+    assert "at 0.05 and 3 more: All points have one direction" in text
+    found = Fit(Points(), "stribeck", data, starts=1).solve(throw=False)
+    assert str(found).count("one direction") == 1
+
+
+def test_forces_that_no_speed_explains_are_refused() -> None:
+    """The spread over all records does not hide a useless model."""
+    rng = np.random.default_rng(0)
+    some = [
+        Dataset.of(v=np.full(100, v), F=rng.standard_normal(100), points=True, name=f"{v}")[0]
+        for v in (-1.0, -0.5, 0.5, 1.0)
+    ]
+    found = Fit(Points(), "coulomb", Dataset(tuple(some)), starts=1).solve(throw=False)
+    assert found.status is Status.IMPLAUSIBLE
