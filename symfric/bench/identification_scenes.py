@@ -219,8 +219,9 @@ def block(law: Law) -> Model:
 def simulated(law: Law, spring: float = 0.0) -> Trajectory:
     """Return the motion of a block, with a spring of stiffness `spring` [N/m]."""
     model, u = block(law), {"force": Linear(T, U)}
-    pull = spring / BLOCK["m"] * model.x[0].symbol
-    model = replace(model, ode=ca.SX(model.ode) - ca.vertcat(0, pull))
+    if spring and model.ode is not None:
+        pull = spring / BLOCK["m"] * model.x[0].symbol
+        model = replace(model, ode=model.ode - ca.vertcat(0, pull))
     return simulate(model, 4.0, p=BLOCK, t_eval=T, u=u, x0={"x": 0.0, "v": 0.0}, rtol=1e-9)
 
 
