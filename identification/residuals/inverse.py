@@ -13,15 +13,21 @@ from identification.data.dataset import Dataset
 from identification.data.differentiate import Velocity, derivatives, levels, uncertain
 from identification.data.filters import Decimation, Filter, choose_filter
 from identification.data.record import Record
-from identification.residuals.balance import Balance, Coordinate, Mask, Row, balance, coordinates
+from identification.residuals.balance import (
+    Balance,
+    Coordinate,
+    Mask,
+    Row,
+    balance,
+    coordinates,
+    smoothing_width,
+)
 from identification.residuals.evaluation import Array, Blocks, Channel
 from identification.residuals.sampled import Sampled, moving_start
-from identification.unknowns.roles import VELOCITIES
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
-from symfric.foundation.parameters import Parametric, parameters
-from symfric.model import Contact, Model
+from symfric.model import Model
 
 WHERE = "InverseDynamics"
 RANK = 1e-9
@@ -311,19 +317,10 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
     gains = np.median(np.abs(slopes), axis=1).reshape(errors.size, len(model.contacts)).T
     noise = [float(np.linalg.norm(gain * errors)) for gain in gains]
     return [
-        uncertain(v[k], max(noise[k], _width(c)), motion.step, motion.filter) & (not c.states)
+        uncertain(v[k], max(noise[k], smoothing_width(c)), motion.step, motion.filter)
+        & (not c.states)
         for k, c in enumerate(model.contacts)
     ]
-
-
-def _width(contact: Contact) -> float:
-    """Return the smoothing width of the law of a contact [m/s or rad/s], 0 if it is unknown."""
-    law = contact.law
-    known = parameters(law).values() if isinstance(law, Parametric) else ()
-    widths = [
-        checks.as_number(p.value) for p in known if p.role == "width" and p.unit in VELOCITIES
-    ]
-    return max((w for w in widths if w is not None), default=0.0)
 
 
 def _channels(rows: Sequence[Row], pieces: Sequence[Piece]) -> Iterator[Channel]:
