@@ -21,6 +21,7 @@ import casadi as ca
 import numpy as np
 import scipy.sparse as sp
 
+from ocp.formulation.expressions import offered
 from ocp.formulation.phase import Array, fixed
 from ocp.solving.active import BoundStatus, Entry, entries, statuses
 from ocp.solving.equations import Equations
@@ -272,7 +273,8 @@ class Linearised:
         Raises:
             ValueError: an unknown name, or derivatives that are not finite.
         """
-        check_names("sensitivity", [name], [*self.numbers, *self.conditions])
+        names = offered([*self.numbers, *self.conditions], [name])
+        check_names("sensitivity", [name], names)
         change = self.by_condition(name) if name in self.conditions else self.by_number(name)
         moved = change.bounds.copy()
         right = change.gradient / self.optimum.size + self.hessian @ moved
