@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.residuals.sampled import Sampled, imposed_step
-from identification.unknowns.roles import VELOCITIES
-from symfric.foundation import checks
 from symfric.foundation.numeric import is_number
-from symfric.foundation.parameters import Parametric, Variable, parameters
+from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.laws import Law
 from symfric.laws.base.law import require_law
@@ -262,13 +260,3 @@ def _pattern(slopes: ca.SX) -> Mask:
 
 def _number(start: object, otherwise: float) -> float:
     return float(start) if is_number(start) else otherwise  # type: ignore[arg-type]
-
-
-def smoothing_width(contact: Contact) -> float:
-    """Return the smoothing width of the law of a contact [m/s or rad/s], 0 if it is unknown."""
-    law = contact.law
-    known = parameters(law).values() if isinstance(law, Parametric) else ()
-    widths = [
-        checks.as_number(p.value) for p in known if p.role == "width" and p.unit in VELOCITIES
-    ]
-    return max((w for w in widths if w is not None), default=0.0)

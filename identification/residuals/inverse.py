@@ -13,17 +13,10 @@ from identification.data.dataset import Dataset
 from identification.data.differentiate import Velocity, derivatives, levels, uncertain
 from identification.data.filters import Decimation, Filter, choose_filter
 from identification.data.record import Record
-from identification.residuals.balance import (
-    Balance,
-    Coordinate,
-    Mask,
-    Row,
-    balance,
-    coordinates,
-    smoothing_width,
-)
+from identification.residuals.balance import Balance, Coordinate, Mask, Row, balance, coordinates
 from identification.residuals.evaluation import Array, Blocks, Channel
 from identification.residuals.sampled import Sampled, moving_start
+from identification.unknowns.roles import width_of
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
@@ -317,9 +310,8 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
     gains = np.median(np.abs(slopes), axis=1).reshape(errors.size, len(model.contacts)).T
     noise = [float(np.linalg.norm(gain * errors)) for gain in gains]
     return [
-        uncertain(v[k], max(noise[k], smoothing_width(c)), motion.step, motion.filter)
-        & (not c.states)
-        for k, c in enumerate(model.contacts)
+        uncertain(v[k], max(s, width_of(c.law)), motion.step, motion.filter) & (not c.states)
+        for k, (c, s) in enumerate(zip(model.contacts, noise, strict=True))
     ]
 
 
