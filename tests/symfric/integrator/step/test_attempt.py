@@ -12,14 +12,7 @@ from numpy.typing import NDArray
 from symfric import LuGre, Model, Variable, rabinowicz
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
-from symfric.integrator.step.attempt import (
-    GROW,
-    SHRINK,
-    Given,
-    State,
-    build_fixed,
-    build_step,
-)
+from symfric.integrator.step.attempt import GROW, SHRINK, Given, State, build_fixed, build_step
 from symfric.model import Monitor
 
 Array = NDArray[np.float64]
