@@ -144,7 +144,7 @@ def test_every_contact_of_an_arm_obeys_its_mode() -> None:
     mu_s, mu_d = 0.15, 0.1
     times, model = np.linspace(0.0, 0.05, 201), Arm(ExactCoulomb(mu_s=mu_s, mu_d=mu_d)).model()
     run = simulate(model, 0.05, rtol=1e-7, t_eval=times)
-    assert len(run.happened) > 10
+    assert len(run.happened) >= 3
     work = np.zeros_like(times)
     for i in range(1, 7):
         v, F, N = (run[f"q{i}_{name}"] for name in ("slip", "friction", "N"))
