@@ -112,8 +112,8 @@ class Sampled:
         z_{k+1} = step(z_k, w_k, y_k, w_{k+1}, y_{k+1}, h, p),   z_0 = start(w_0, y_0, p)
         r = rows(w, z, y, p)
 
-    Laws with states run in compiled code if there is a compiler, all other laws in CasADi's virtual
-    machine; the results are bit-identical.
+    Laws with states run in compiled code if there is a compiler, other laws in CasADi's virtual
+    machine until compiling is expected to save time; the results are bit-identical.
 
     Attributes:
         rows, g, start: Functions of (w, y), z, p with derivatives by (z, y, p).
@@ -194,7 +194,7 @@ class Sampled:
                 return self._columns[name](rows, first, "compiled")
             except CompileError:  # a broken compiler does not prevent the evaluation
                 pass
-        return self._columns[name](rows, first, "vm")
+        return self._columns[name](rows, first, "vm" if name == "start" else "auto")
 
     def along(self, w: Array, h: float | Array, p: Array, begin: Array | None = None) -> Path | str:
         """Return rows at all samples and their derivatives by p, or a message on failure.

@@ -288,6 +288,8 @@ class Natural:
         """Return the natural unit of a parameter; letters in exponents are names in `known`."""
         text = sub(r"\^([a-z])\b", lambda m: f"^{float(known[m[1]].value):g}", parameter.unit)
         powers = _powers(text)
+        if parameter.unit == "rad" and parameter.role == "geometry":  # an angle, not a path
+            return 1.0
         if parameter.role == "load":
             return self.load ** powers.get("N", 0.0)
         shared = parameter.role in PER_LOAD and not {"N", "kg"} & powers.keys()
