@@ -85,8 +85,8 @@ class Dataset:
             variable: struct, matrix or nested part of a `.mat` or `.npz` file: "run(2).log".
             points: rows are points (v, F) of a friction curve; no time is needed.
             missing: "drop" leaves out rows in which a channel has no finite number (an empty cell,
-                NaN) and rows that repeat the previous row including its time; `resampled` then makes
-                the intervals equal and splits records at long gaps.
+                NaN) and rows that repeat the previous row including its time; `resampled` then
+                makes the intervals equal and splits records at long gaps.
 
         Raises:
             ValueError: unusable data, with file, row and column; for several files all errors.
