@@ -14,11 +14,8 @@ from symfric.foundation.lazy import load_lazily
 if TYPE_CHECKING:
     from identification.cross import cross_validate as cross_validate
     from identification.data.dataset import Dataset as Dataset
-    from identification.data.differentiate import LinearFit as LinearFit
     from identification.data.differentiate import MotionSignals as MotionSignals
     from identification.data.differentiate import differentiate as differentiate
-    from identification.data.differentiate import linear_regression as linear_regression
-    from identification.data.differentiate import plateaus as plateaus
     from identification.data.filters import Filter as Filter
     from identification.data.filters import central_difference as central_difference
     from identification.data.filters import lowpass as lowpass
@@ -26,6 +23,9 @@ if TYPE_CHECKING:
     from identification.data.findings import Findings as Findings
     from identification.data.record import PositionLoop as PositionLoop
     from identification.data.record import Record as Record
+    from identification.data.regression import LinearFit as LinearFit
+    from identification.data.regression import linear_regression as linear_regression
+    from identification.data.regression import plateaus as plateaus
     from identification.data.synthetic import synthetic_drive_data as synthetic_drive_data
     from identification.fit import Fit as Fit
     from identification.residuals.closed_loop import ClosedLoop as ClosedLoop

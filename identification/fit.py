@@ -8,20 +8,26 @@ Steps: data, type of residuals, unknowns, least squares from several starts, ver
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from time import perf_counter
-from typing import Any, NamedTuple, final
+from typing import Any, NamedTuple, cast, final
 
 import numpy as np
 
 from identification.data.dataset import Dataset
-from identification.data.differentiate import differentiate
 from identification.data.findings import Findings
+from identification.from_data import (
+    centre,
+    explained,
+    findings_of,
+    measured,
+    slowest,
+    strongest,
+)  # fmt: skip
 from identification.residuals.evaluation import Array, Residuals
 from identification.residuals.inverse import InverseDynamics
-from identification.residuals.points import Points
+from identification.residuals.points import PointRows, Points
 from identification.result.build import fitted, levels_of, written
 from identification.result.fitted import Fitted
 from identification.result.live import Asked, Kind, Live
@@ -29,15 +35,12 @@ from identification.solving.descent import Start, descend, remaining
 from identification.solving.many_starts import Progress, best_of, many_starts, scattered
 from identification.solving.task import THRESHOLD, Point, Task, task
 from identification.starts.measured import Measured
-from identification.starts.start import start_values
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.judge import Verdict, judge
 from identification.verdict.minimum import shortened
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
-from symfric.laws import Law
-from symfric.scenes import Drive
 
 MOST_STARTS = 10_000
 QUICK = 40
@@ -63,7 +66,8 @@ class Fit:
             fitted by their role; of a model, all are. "x0" and "dead_time" are passed to `kind`.
         fixed: name -> value of parameters held constant; "others": all that are not in `free`.
         normal_force: normal force of a law [N]; with 1 N its coefficients are forces.
-        noise: "estimate", or signal -> standard deviation [SI]; others are estimated.
+        noise: "estimate", or signal -> standard deviation [SI], also of positions that are not
+            compared; others are estimated.
         loss: "squares", or a loss robust against outliers: "huber", "soft_l1", "cauchy", "arctan".
         starts: largest number of starts; fewer if others are unnecessary (see `many_starts`).
         start: parameter -> value; or "data", estimates from the data; or "law", values of the law.
@@ -123,6 +127,9 @@ class Fit:
         end = best_of(starts)
         made = made.with_noise(end.noise)
         point = made.at(end.w)
+        if isinstance(point, Point) and getattr(made.residuals, "noises", ()):
+            asked, made, end = self._again(asked, made, point)
+            starts, point = (end,), made.at(end.w)
         if isinstance(point, str):
             message = f"Fit: {asked.subject.name}: no start has residuals: {point}"
             raise SolveError(message, Status.NOT_FINITE)
@@ -139,6 +146,15 @@ class Fit:
         if throw and not status.ok:
             raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)
         return result
+
+    def _again(self, asked: "Prepared", made: Task, point: Point) -> tuple["Prepared", Task, Start]:
+        """Fit again with the noise of the path linearised at the values of a first fit."""
+        rows = cast(PointRows, made.residuals)
+        near = dict(zip(rows.names, point.values.tolist(), strict=True))
+        made = replace(made, residuals=rows.whitened(point.values))
+        end = descend(made, point.w, 0, self.evaluations)
+        kind = replace(cast(Points, asked.kind), near=near)
+        return asked._replace(kind=kind), made.with_noise(end.noise), end
 
     def prepared(self) -> "Prepared":
         """Check the data, choose the subject and set up the residuals, without solving."""
@@ -161,6 +177,7 @@ class Fit:
             natural=None if seen is None or self.start == "law" else seen.natural,
         )
         checks.check_names("Fit: start", given, found.names)
+        kind, noise = _with_noise(kind, self.noise, found, self.data)
         values = centre(found, None if self.start == "law" else seen, given)
         try:
             if getattr(kind, "windows", None) == "choose":
@@ -171,8 +188,8 @@ class Fit:
             residuals = kind.prepare(found, self.data, values)
         except ValueError as error:
             raise explained(error, findings) from None
-        made = self._task(residuals, found)
-        easier = tuple(self._task(r, found) for r in getattr(residuals, "easier", ()))
+        made = self._task(residuals, found, noise)
+        easier = tuple(self._task(r, found, noise) for r in getattr(residuals, "easier", ()))
         made = replace(made, easier=easier)
         return Prepared(kind, found, findings, made, made.unknowns.of(values), seen)
 
@@ -204,7 +221,7 @@ class Fit:
         end = descend(asked.task, asked.centre, 0, min(self.evaluations, QUICK))
         return asked.task.unknowns.named(end.w) if np.isfinite(end.cost) else None
 
-    def _task(self, residuals: Residuals, found: Subject) -> Task:
+    def _task(self, residuals: Residuals, found: Subject, noise: object) -> Task:
         """Return the least-squares problem of the residuals.
 
         Raises:
@@ -219,7 +236,7 @@ class Fit:
                 f"Fit: expected at least {len(unknowns.unknowns)} residuals for as many unknowns, "
                 f"got {rows}; hold some, or add data"
             )
-        return task(residuals, unknowns, self.noise, self.loss, found.guard)
+        return task(residuals, unknowns, noise, self.loss, found.guard)
 
 
 class Prepared(NamedTuple):
@@ -275,6 +292,16 @@ def _to_kind(kind: Kind, free: Any) -> tuple[Kind, Any]:
     return (replace(kind, **mine) if mine else kind), given  # pyright: ignore[reportArgumentType, reportUnknownVariableType]
 
 
+def _with_noise(kind: Kind, noise: Any, found: Subject, data: Dataset) -> tuple[Kind, Any]:
+    """Pass the noise of channels that are not compared to the residuals; return both."""
+    if not isinstance(noise, Mapping) or not isinstance(kind, Points | InverseDynamics):
+        return kind, noise
+    compared = {"F"} if isinstance(kind, Points) else {u.name for u in found.model.u}
+    given = checks.named("Fit: noise", noise)
+    mine = {n: given[n] for n in given if n not in compared and any(n in r for r in data)}
+    return replace(kind, noise=mine or kind.noise), {n: given[n] for n in given if n not in mine}
+
+
 def _check_kind(where: str, kind: object) -> None:
     if isinstance(kind, type) or not callable(getattr(kind, "prepare", None)):
         such = "a type of residuals, such as Points(), InverseDynamics() or Shooting()"
@@ -298,81 +325,3 @@ CHECKS: Mapping[str, Callable[[str, Any], object]] = {
     "evaluations": partial(checks.count, least=2),
     "start": _check_start,
 }
-
-
-FEW = 0.01
-"""Share of points whose speed may be arbitrarily small, such as noise about rest."""
-
-
-def findings_of(kind: object, data: Dataset) -> Findings:
-    """Return the findings of the data check for these residuals."""
-    if isinstance(kind, Points):
-        return data.check()
-    called = {part: name for part, name in _roles(kind).items() if any(name in r for r in data)}
-    return data.check(**called)
-
-
-def explained(error: ValueError, findings: Findings) -> ValueError:
-    """Return the error of failed residuals, preceded by the first error found in the data."""
-    if not findings.errors:
-        return error
-    sentence = findings.errors[0].sentence.rstrip(".")
-    return ValueError(f"data '{findings.name}': {sentence}; then {error}")
-
-
-def _roles(kind: object) -> dict[str, str]:
-    """Return the names of the channels of position and force of a drive."""
-    names = {name: getattr(kind, name, name) for name in ("x", "force")}
-    return {name: given if isinstance(given, str) else name for name, given in names.items()}
-
-
-def measured(kind: object, data: Dataset, load: float) -> Measured | None:
-    """Return velocity and force of all points or of a drive; None if unavailable."""
-    try:
-        if isinstance(kind, Points):
-            timed = all(r.t is not None for r in data)
-            names = {"v": kind.v, "F": kind.F} | ({"t": "t"} if timed else {})
-            each = [{part: r[name] for part, name in names.items()} for r in data]
-        else:
-            called, chosen = _roles(kind), getattr(kind, "filter", None)
-            motions = [differentiate(r, chosen, **called) for r in data]
-            each = [{"v": m.v, "F": m.force, "x": m.x, "t": m.t, "a": m.a} for m in motions]
-        signals = {part: np.concatenate([one[part] for one in each]) for part in each[0]}
-        breaks = tuple(np.cumsum([one["v"].size for one in each])[:-1].tolist())
-        return Measured(**signals, N=load, breaks=breaks)
-    except ValueError:  # preparing the residuals reports missing channels
-        return None
-
-
-def strongest(
-    kind: object, data: Dataset, seen: Measured | None, mass: float | None
-) -> float | None:
-    """Return the largest force on the friction of points or of a drive [N]; None if unknown.
-
-    The force is F - m a in sliding and F at rest; unknown for points with a measured normal force.
-    """
-    loaded = isinstance(kind, Points) and (kind.N is not None or any("N" in r for r in data))
-    if seen is None or loaded:
-        return None
-    if seen.a is None or mass is None:
-        return float(np.abs(seen.F).max())
-    return float(max(np.abs(seen.F).max(), np.abs(seen.F - mass * seen.a).max()))
-
-
-def slowest(kind: object, seen: Measured | None) -> float:
-    """Return the speed [m/s] above which nearly all points not at rest lie; 0 for motions."""
-    if seen is None or not isinstance(kind, Points):
-        return 0.0
-    speeds = np.abs(seen.v[seen.v != 0])
-    return float(np.quantile(speeds, FEW)) if speeds.size else 0.0
-
-
-def centre(subject: Subject, seen: Measured | None, given: Mapping[str, float]) -> dict[str, float]:
-    """Return the start of each free parameter: from the user, otherwise the data, then the law."""
-    values, found = {u.name: u.start for u in subject.unknowns}, dict[str, float]()
-    whole: Law | Drive | None = subject.law if subject.scene is None else subject.drive
-    if whole is not None and seen is not None:
-        with suppress(ValueError):  # without motion in the data, keep the values of the law
-            found = start_values(whole, seen, free=[*values])
-    started = subject.requests.started
-    return values | {n: x for n, x in found.items() if n not in started} | dict(given)

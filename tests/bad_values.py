@@ -123,6 +123,19 @@ def entry_point(
     return EntryPoint(names[0], call, good[0], bad)
 
 
+def listed(table: Mapping[str, dict[str, str]], names: Mapping[str, Any]) -> Iterator[EntryPoint]:
+    """Yield the entry points of a TOML table, whose texts are expressions of `names`."""
+    known = globals() | dict(names)
+    for name, row in table.items():
+        if row.get("call") == "":
+            continue  # arguments that other rows share
+        row = {"call": name} | row
+        while "like" in row:
+            row = table[row.pop("like")] | row
+        found = {argument: eval(text, known) for argument, text in row.items()}
+        yield EntryPoint(name, found.pop("call"), found.pop("good", {}), found)
+
+
 def _text(value: Any) -> str:
     if isinstance(value, dict):
         return "{" + ", ".join(f"{k!r}: {shown(v)}" for k, v in value.items()) + "}"

@@ -32,6 +32,13 @@ def root() -> Model:
     )
 
 
+def followed() -> Model:
+    """x' = z with z + z^3 = u - x: an algebraic unknown that follows what is held."""
+    x, z, u = Variable("x", "m"), Variable("z", "1"), Variable("u", "N")
+    alg = z.symbol + z.symbol**3 - u.symbol + x.symbol
+    return Model("followed", x=(x,), z=(z,), u=(u,), ode=z.symbol, alg=alg)
+
+
 def switched() -> Model:
     """x' = -z with z = p u x: x = exp(-p int u), z jumps with u."""
     x, z = Variable("x", "m", start=1.0), Variable("z", "m/s", start=0.0)

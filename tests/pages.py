@@ -5,40 +5,57 @@ from html.parser import HTMLParser
 
 from symfric.foundation.shown import HEIGHT, WIDTH
 
+EMPTY = {"meta", "img", "path", "rect", "br"}
 
-class Page(HTMLParser):
-    """Tags that are open at the end, all tags, pictures and text."""
+
+class Balanced(HTMLParser):
+    """Every element is closed where it should be; cells of tables, and addresses."""
 
     def __init__(self, text: str) -> None:
-        super().__init__(convert_charrefs=True)
+        super().__init__()
         self.open: list[str] = []
-        self.tags: set[str] = set()
-        self.pictures: list[bytes] = []
-        self.words = ""
+        self.cells: list[str] = []
+        self.sources: list[str] = []
         self.feed(text)
         self.close()
+        assert not self.open
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
-        given = dict(attrs)
-        if tag == "img":
-            kind, _, data = str(given["src"]).partition(",")
-            assert kind == "data:image/png;base64"
-            self.pictures.append(b64decode(data))
-        else:
+        self.sources += [value or "" for name, value in attrs if name in ("src", "href")]
+        if tag not in EMPTY:
             self.open.append(tag)
-        assert not any(name.startswith("on") for name in given)
 
     def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
+        assert tag in EMPTY or self.open.pop() == tag
 
     def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] in ("td", "th"):
+            self.cells.append(data)
+
+
+class Page(Balanced):
+    """All tags, pictures and text; nothing in it runs."""
+
+    def __init__(self, text: str) -> None:
+        self.tags: set[str] = set()
+        self.words = ""
+        super().__init__(text)
+        parts = [source.partition(",") for source in self.sources]
+        assert all(kind == "data:image/png;base64" for kind, _, _ in parts)
+        self.pictures = [b64decode(data) for _, _, data in parts]
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        super().handle_starttag(tag, attrs)
+        self.tags.add(tag)
+        assert not any(name.startswith("on") for name, _ in attrs)
+
+    def handle_data(self, data: str) -> None:
+        super().handle_data(data)
         self.words += data
 
 
 def parsed(text: str) -> Page:
     page = Page(text)
-    assert not page.open
     assert page.tags <= {"div", "b", "table", "thead", "tbody", "tr", "th", "td", "img"}
     assert all(picture.startswith(b"\x89PNG") for picture in page.pictures)
     return page

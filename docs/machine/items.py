@@ -15,10 +15,11 @@ from symfric.cli.laws import costs
 from symfric.figures.data import phenomena
 from symfric.foundation.parameters import options
 from symfric.laws import PHENOMENA, AnyLaw
+from symfric.laws.base.families import Exact
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.composed.isotropic import PlanarSlip, SpatialSlip
 from symfric.laws.composed.populations import cost
-from symfric.laws.composed.wrap import Exact, Lagged, LoadNormalised, TemperatureDependent
+from symfric.laws.composed.wrap import Lagged, LoadNormalised, TemperatureDependent
 from symfric.laws.static.coulomb import Table
 from symfric.scenes import ALL_SCENES, Scene
 

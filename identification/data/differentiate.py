@@ -1,12 +1,6 @@
-"""Velocity and acceleration of a record, means at constant velocity, and linear regression.
+"""Velocity and acceleration of a record from measured position and velocity, and their noise."""
 
-    force = m a + F_v v + F_c sign(v) + offset
-
-Source: Janot, Gautier and Brunot, Data set and reference models of EMPS, 2019.
-"""
-
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
 from typing import final
@@ -14,20 +8,186 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.dataset import Dataset
 from identification.data.filters import (
     Decimation,
     Filter,
-    Velocity,
+    averaged,
+    band_above,
     central_difference,
     choose_filter,
     lowpass,
+    noise_level,
+    position_band,
+    rounded_level,
+    spectrum,
+    without_line,
 )  # fmt: skip
-from identification.data.record import Array, Record, runs
+from identification.data.record import Array, Record
 from symfric.foundation import checks
 from symfric.foundation.shown import brief
 
 Mask = NDArray[np.bool_]
+
+WIDTH = 99
+"""Least number of neighbours for the mean of a spectrum; the level is accurate to one eighth."""
+CENTRAL, BACKWARD = 0.3, 1.4
+"""Limits of the ratio of powers that distinguish differenced positions from white noise."""
+
+
+def levels(where: str, noise: object) -> None:
+    """Check a mapping of channels to standard deviations; None is allowed.
+
+    Raises:
+        ValueError: a name is not text, or a number is not above 0.
+    """
+    for name, value in checks.named(where, {} if noise is None else noise).items():
+        checks.number(f"{where}: {name}", value, above=0.0)
+
+
+def position_noise(power: Array) -> tuple[float, Array] | None:
+    """Return power and gain of the position noise of a velocity that was derived from a position.
+
+        S sin^2(w h) (central difference),   4 S sin^2(w h / 2) (backward difference)
+
+    They differ from white noise by the ratio of the power near the Nyquist frequency and at half of
+    it: below 0.1, 2, and 1 for white noise, for which the result is None.
+    """
+    f = np.linspace(0.0, 0.5, power.size)
+    top, middle = power[f > 0.45], power[(f > 0.2) & (f < 0.3)]
+    if not (top.size and middle.size and np.median(middle) > 0):
+        return None
+    ratio = float(np.median(top) / np.median(middle))
+    if CENTRAL < ratio < BACKWARD:
+        return None
+    gain = np.sin(2 * np.pi * f) ** 2 if ratio <= CENTRAL else 4 * np.sin(np.pi * f) ** 2
+    known = (f >= 0.25) & (f < 0.45)
+    return float(np.median(power[known] / gain[known])) / float(np.log(2)), gain
+
+
+def velocity_noise(power: Array) -> Array:
+    """Return the spectrum of the noise of a velocity: white, or see `position_noise`."""
+    found = position_noise(power)
+    return np.full(power.size, noise_level(power)) if found is None else found[0] * found[1]
+
+
+SURE = 2.0
+"""Factor by which two mean levels must differ to be treated as different."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Velocity:
+    """Two measurements of one velocity, combined at each frequency by their noise.
+
+        V = V_x + W (V_v - V_x),   W = E_x / (E_x + E_v),   E = E_x E_v / (E_x + E_v)
+
+    This has the least noise of all unbiased combinations. E_x is white noise of the position after
+    the central difference s = sin(w h) / h, plus the bias of this difference:
+
+        E_x = S_x s^2 + (1 - s / w)^2 (|V_v|^2 - S_v)
+
+    E_v is at least the white noise S_v of the measured velocity. If |V_v - V_x|^2 clearly exceeds
+    E_x, the excess is an error of the velocity channel: its scale, delay, drift or filter. If it
+    is clearly lower, the noise of both is common (a velocity derived from the position), and E_v is
+    at least the difference.
+
+    Attributes:
+        frequency: frequencies of the spectra in cycles per sample, shape (k,).
+        weight: W of the measured velocity; 0 without one, 1 without a position.
+        noise: E [(m/s)^2 per sample]; white noise of variance e^2 has E = e^2.
+        power, level: spectrum of the position or of the combined velocity, and of its noise; they
+            determine the band of the motion and its gain.
+        order: number of derivatives from this signal to the acceleration.
+
+    Limits: noise levels are those of the upper half of the spectra, assumed white below it, unless
+    they are given.
+    """
+
+    frequency: Array
+    weight: Array
+    noise: Array
+    power: Array
+    level: Array
+    order: int
+
+    @staticmethod
+    def of(
+        x: Array | None,
+        v: Array | None,
+        step: float,
+        x_noise: float | None = None,
+        v_noise: float | None = None,
+    ) -> "Velocity":
+        """Compute the combination from position and velocity, one of which may be missing.
+
+        Args:
+            x, v: samples of position and velocity, shape (n,).
+            step: sample interval [s].
+            x_noise, v_noise: standard deviations of their white noise; None: from the spectra.
+
+        Raises:
+            ValueError: both are missing.
+        """
+        known = v if x is None else x
+        if known is None:
+            raise ValueError("velocity: expected a position or a velocity, got neither")
+        frequency: Array = np.asarray(np.fft.rfftfreq(known.size), np.float64)
+        power = spectrum(without_line(known))
+        ones = np.ones(power.size)
+        of_x = ones * (rounded_level(known, power) if x_noise is None else x_noise**2)
+        by_x = of_x * (np.sin(2 * np.pi * frequency) / step) ** 2
+        if v is None:
+            return Velocity(frequency, 0 * ones, by_x, power, of_x, 2)
+        measured = power if x is None else spectrum(without_line(v))
+        of_v = velocity_noise(measured) if v_noise is None else ones * v_noise**2
+        if x is None:
+            return Velocity(frequency, ones, of_v, power, of_v, 1)
+        deficit = 1 - np.sinc(2 * frequency)
+        short = deficit**2 * np.maximum(averaged(measured, step, WIDTH) - of_v, 0.0)
+        usual = averaged(by_x, step, WIDTH) + short
+        apart = averaged(spectrum(v - central_difference(x, step)), step, WIDTH)
+        differ = (apart > SURE * usual) | (SURE * apart < usual)
+        of_v = np.maximum(of_v, np.where(differ, np.abs(apart - usual), 0.0))
+        by_x = by_x + short
+        both = by_x + of_v
+        weight = np.divide(by_x, both, out=np.ones(both.size), where=both > 0)
+        found = Velocity(frequency, weight, weight * of_v, measured, weight * of_v, 1)
+        mixed = spectrum(without_line(found.mixed(central_difference(x, step), v)))
+        return replace(found, power=mixed)
+
+    def mixed(self, of_x: Array, of_v: Array) -> Array:
+        """Combine a signal derived from the position with one from the velocity, shape (n,)."""
+        apart = of_v - of_x
+        periodic = np.concatenate([apart, apart[-2:0:-1]])
+        weight = np.interp(np.fft.rfftfreq(periodic.size), self.frequency, self.weight)
+        return of_x + np.fft.irfft(np.fft.rfft(periodic) * weight, periodic.size)[: apart.size]
+
+    def errors(self, filter: Filter, step: float, taps: Array | None = None) -> Array:
+        """Return standard deviations of the noise of velocity and acceleration, shape (2,).
+
+        Args:
+            filter: low-pass filter of the position.
+            step: sample interval [s].
+            taps: weights of a further symmetric filter, such as a decimation; None: none.
+        """
+        f = self.frequency[1:-1]
+        gain = filter.gain(f, step)
+        if taps is not None:
+            wide = np.fft.rfft(taps, 8 * taps.size)
+            gain *= np.interp(f, np.linspace(0.0, 0.5, wide.size), np.abs(wide))
+        left = gain**2 * self.noise[1:-1]
+        w = 2 * np.pi * f / step
+        return np.sqrt([np.mean(left), np.mean(w**2 * left)])
+
+    def band(self, x: Array | None, v: Array | None, step: float) -> float:
+        """Return the frequency [Hz] up to which the motion exceeds its noise; see `position_band`.
+
+        If position and velocity are given, it is at least that of the position alone.
+        """
+        cut = slice(None) if self.order == 2 or x is None else slice(-1)
+        found = band_above(self.power[cut], self.level[cut], step, self.order)
+        return max(position_band(x, step), found) if x is not None and v is not None else found
+
 
 CERTAIN = 4.0
 """Number of standard deviations of noise within which a velocity may be zero."""
@@ -149,7 +309,7 @@ def differentiate(
     mixer = Velocity.of(*measured, step)
     chosen = filter or choose_filter(record[force], step, [mixer.band(*measured, step)])
     motion = derivatives(*measured, step, chosen, mixer)
-    slow = uncertain(motion[1], mixer.deviation(chosen, step), step, chosen)
+    slow = uncertain(motion[1], mixer.errors(chosen, step)[0], step, chosen)
     inside = chosen.inside(record.size, step)
     cut = (y[inside] for y in (record.time, *motion, record[force]))
     signals = MotionSignals(record.name, *cut, filter=chosen, slow=slow[inside])
@@ -159,148 +319,3 @@ def differentiate(
             f"{record.size}; raise the cut-off, lower the decimation or v_min"
         )
     return signals
-
-
-SMOOTHINGS = 2.0
-"""Cut-off frequency of the evaluated velocity, relative to 1 / (shortest plateau)."""
-REST = 1e-3
-"""Speed relative to the largest one below which an interval is rest and not a point of a curve."""
-
-
-def plateaus(
-    data: Dataset,
-    *,
-    force: str = "force",
-    v: str | None = None,
-    x: str = "x",
-    shortest: float = 0.2,
-    change: float = 0.05,
-    settle: float = 0.2,
-) -> Dataset:
-    """Return means of velocity and force over intervals of constant velocity, for `Points`.
-
-    Suitable records have a staircase of speeds or triangles of positions. A plateau is an interval
-    of at least `shortest` in which the smoothed velocity changes by less than the share `change`
-    per `shortest`. The initial share `settle` of a plateau is left out, and rest is excluded. On a
-    plateau the acceleration is zero: the mean force is friction plus constant forces like weight.
-
-    Args:
-        data: equally spaced records; each one is converted to a record of points.
-        force: channel of the driving force or torque.
-        v: channel of the velocity; None: "v" if there is one, otherwise the derivative of `x`.
-        x: channel of the position.
-        shortest: shortest duration of a plateau [s].
-        change: largest relative change of the velocity.
-        settle: share of a plateau that is left out, 0 <= settle <= 0.9.
-
-    Returns:
-        Records with the channels v, F, `n` (samples per mean, for `Points(weight="n")`), `spread`
-        (standard deviation of the force) and `t_mean` (mean time).
-
-    Raises:
-        ValueError: no record has two plateaus, intervals are unequal, or an argument is out of
-            range.
-    """
-    shortest = checks.number("plateaus: shortest", shortest, unit="s", above=0.0)
-    change = checks.number("plateaus: change", change, above=0.0)
-    settle = checks.number("plateaus: settle", settle, lower=0.0, upper=0.9)
-    found: list[Record] = []
-    for record in data:
-        name = v or ("v" if "v" in record else x)
-        step, F = record.uniform().step, record[force]
-        velocity = record[name] if v or name != x else central_difference(record[x], step)
-        smooth = lowpass(velocity, min(SMOOTHINGS / shortest, 0.45 / step), step)
-        steady = np.abs(central_difference(smooth, step)) * shortest < change * np.abs(smooth)
-        steady &= np.abs(smooth) > REST * np.abs(smooth).max()
-        long = [(b, e) for b, e in runs(steady) if (e - b) * step >= shortest]
-        cut = [slice(b + ceil(settle * (e - b)), e) for b, e in long]
-        if len(cut) < 2:
-            continue
-        unit = record.unit(force) or "N"
-        columns = {
-            "v": ("rad/s" if record.unit(name).startswith("rad") else "m/s", velocity, np.mean),
-            "F": (unit, F, np.mean),
-            "n": ("1", F, np.size),
-            "spread": (unit, F, np.std),
-            "t_mean": ("s", record.time, np.mean),
-        }
-        signals = {n: np.array([of(y[s]) for s in cut], float) for n, (_, y, of) in columns.items()}
-        units = {n: unit for n, (unit, *_) in columns.items()}
-        found.append(Record(f"plateaus of {record.name}", None, signals, units))
-    if not found:
-        raise ValueError(
-            f"data '{data.name}': plateaus: expected at least two stretches of {shortest:g} s with "
-            f"a velocity constant to {change:.0%}, got none; lower shortest= or raise change="
-        )
-    return Dataset(tuple(found), f"plateaus of {data.name}")
-
-
-RANK = 1e-7
-"""Smallest singular value of the scaled regressors taken as nonzero, relative to the largest."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class LinearFit:
-    """Estimated parameters with standard errors, and the remaining force error.
-
-    Attributes:
-        values: m [kg], F_v [N s/m], F_c [N], offset [N]; by direction: F_v_pos, F_v_neg, ...
-        standard_errors: standard errors of the values for white residuals after decimation; None
-            for values that are not identifiable.
-        force_relative: norm of the force error relative to the norm of the force [%].
-        force_rms: root mean square force error [N].
-    """
-
-    values: dict[str, float]
-    standard_errors: dict[str, float | None]
-    force_relative: float
-    force_rms: float
-
-
-def linear_regression(
-    signals: MotionSignals | Sequence[MotionSignals], directions: bool = False
-) -> LinearFit:
-    """Fit mass, friction and offset by least squares to the decimated equations of all records.
-
-    Args:
-        signals: differentiated records.
-        directions: estimate F_v and F_c separately for the two directions, without an offset.
-
-    If the drive moves in one direction only, Coulomb friction and offset are not separable. Then
-    the minimum-norm values are returned, without standard errors.
-    """
-    records = [signals] if isinstance(signals, MotionSignals) else list(signals)
-    parts = [_regressors(record, directions) for record in records]
-    X = np.vstack([np.column_stack([*part.values()]) for part in parts])
-    y = np.concatenate([record.equations(record.force) for record in records])
-    values = np.linalg.lstsq(X, y, rcond=None)[0]
-    error = y - X @ values
-    names = list(parts[0])
-    return LinearFit(
-        dict(zip(names, values.tolist(), strict=True)),
-        dict(zip(names, _standard_errors(X, error), strict=True)),
-        100 * float(np.linalg.norm(error) / max(np.linalg.norm(y), 1e-300)),
-        float(np.sqrt(np.mean(error**2))),
-    )
-
-
-def _regressors(signals: MotionSignals, directions: bool) -> dict[str, Array]:
-    v, sign = signals.v, np.sign(signals.v)
-    columns: dict[str, Array] = {"F_v": v, "F_c": sign, "offset": np.ones_like(v)}
-    if directions:
-        sides = {"pos": v > 0, "neg": v < 0}.items()
-        columns = {f"F_{k}_{s}": y * on for s, on in sides for k, y in (("v", v), ("c", sign))}
-    return {name: signals.equations(y) for name, y in {"m": signals.a, **columns}.items()}
-
-
-def _standard_errors(X: Array, error: Array) -> list[float | None]:
-    """Return standard errors; None for columns that are linear combinations of other columns."""
-    size = np.linalg.norm(X, axis=0)
-    scale = np.where(size > 0, size, 1.0)
-    _, s, Vt = np.linalg.svd(X / scale, full_matrices=False)
-    kept = s > RANK * max(s[0], 1e-300)
-    undetermined = np.sqrt(np.sum(Vt[~kept] ** 2, axis=0)) > 1e-3
-    spread = np.sqrt(np.sum((Vt[kept] / s[kept, None]) ** 2, axis=0)) / scale
-    noise = np.sqrt(error @ error / max(1, error.size - X.shape[1]))
-    return [None if u else float(noise * e) for u, e in zip(undetermined, spread, strict=True)]

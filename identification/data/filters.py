@@ -14,6 +14,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.data.record import count_of
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]
@@ -24,6 +25,12 @@ PASS = 0.9
 """Cut-off (-6 dB) of the decimation filter, relative to the Nyquist frequency after decimation."""
 ABOVE = 4.0
 """Power relative to the noise power above which a motion is significant."""
+LOST = 0.01
+"""Largest share of noise in the acceleration of the used band."""
+DIFFERENCE = (1.0, -2.0, 1.0)
+"""Coefficients of the second difference."""
+FEW = 9
+"""Least number of neighbours for the mean of a spectrum in which motion is separated from noise."""
 
 
 @final
@@ -99,6 +106,36 @@ def lowpass(signal: Array, cutoff: float, step: float, order: int = 4) -> Array:
     ratio = np.tan(np.pi * np.fft.rfftfreq(periodic.size)) / np.tan(np.pi * cutoff * step)
     gain = 1 / (1 + ratio ** (2 * order))
     return line + np.fft.irfft(np.fft.rfft(periodic) * gain, periodic.size)[:n]
+
+
+def smoother_gain(frequency: Array, cutoff: float) -> Array:
+    """Return the gain of `smoothed` at frequencies in cycles per sample."""
+    return 1 / (1 + (np.sin(np.pi * frequency) / np.sin(np.pi * cutoff)) ** 4)
+
+
+def smoothed(signal: Array, cutoff: float) -> Array:
+    """Return the discrete smoothing spline y of a signal u, without reflection at the ends.
+
+        min |u - y|^2 + |D y|^2 / (2 sin(pi f_c))^4,   gain 1 / (1 + (sin(pi f) / sin(pi f_c))^4)
+
+    D are second differences.
+    Source: E. T. Whittaker, Proc. Edinb. Math. Soc. 41, 1923; P. Eilers, Anal. Chem. 75, 2003.
+
+    Args:
+        signal: samples, shape (n,).
+        cutoff: f_c in cycles per sample, where the gain is 1/2.
+    """
+    from scipy.linalg import solveh_banded  # noqa: PLC0415 (slow to import)
+
+    n = signal.size
+    bands = np.zeros((3, n))  # upper form of 1 + penalty D'D
+    for shift in range(3):
+        for i in range(3 - shift):
+            here = slice(shift + i, n - 2 + shift + i)
+            bands[2 - shift, here] += DIFFERENCE[i] * DIFFERENCE[i + shift]
+    bands *= (2 * np.sin(np.pi * cutoff)) ** -4
+    bands[2] += 1.0
+    return np.asarray(solveh_banded(bands, signal))
 
 
 def central_difference(signal: Array, step: float) -> Array:
@@ -189,6 +226,23 @@ def noise_level(power: Array) -> float:
     return float(np.median(power[power.size // 2 :])) / float(np.log(2))
 
 
+def rounded_level(signal: Array, power: Array) -> float:
+    """Return the power of the noise of a signal, at least that of its rounding, count^2 / 12."""
+    return max(noise_level(power), count_of(signal) ** 2 / 12)
+
+
+def averaged(power: Array, step: float, least: int = FEW) -> Array:
+    """Return a spectrum averaged over 1 Hz or `least` neighbours, whichever is wider."""
+    ones = np.ones(_width(power, step, least))
+    count = np.convolve(np.ones(power.size), ones, mode="same")
+    return np.convolve(power, ones, mode="same") / count
+
+
+def _width(power: Array, step: float, least: int) -> int:
+    """Return the number of entries of a spectrum in 1 Hz, at least `least` and at most all."""
+    return min(max(least, 2 * round((power.size - 1) * step) + 1), power.size)
+
+
 def position_band(x: Array, step: float) -> float:
     """Return the frequency [Hz] above which the noise of the position exceeds its motion.
 
@@ -196,15 +250,20 @@ def position_band(x: Array, step: float) -> float:
     are noise.
     """
     power = spectrum(without_line(x))
-    return band_above(power, np.full(power.size, noise_level(power)), step)
+    return band_above(power, np.full(power.size, rounded_level(x, power)), step, 2)
 
 
-def band_above(power: Array, noise: Array, step: float) -> float:
-    """Return the highest frequency [Hz] at which the 1 Hz mean exceeds `ABOVE` times the noise."""
+def band_above(power: Array, noise: Array, step: float, order: int) -> float:
+    """Return the highest frequency [Hz] at which the 1 Hz mean exceeds `ABOVE` times the noise.
+
+    The noise of the acceleration, derivative number `order`, up to this frequency is at most the
+    share `LOST` of its motion. Isolated lines far above the motion, such as those of a coarse
+    encoder, are therefore ignored.
+    """
     frequency = np.linspace(0.0, 0.5 / step, power.size)
-    width = _width(power, step, 9)
-    smooth = np.convolve(power, np.ones(width) / width, mode="same")
-    known = np.flatnonzero(smooth > ABOVE * noise)
+    weight = np.arange(power.size) ** (2.0 * order)
+    lost = np.cumsum(weight * noise) > LOST * np.cumsum(weight * np.maximum(power - noise, 0.0))
+    known = np.flatnonzero((averaged(power, step) > ABOVE * noise) & ~lost)
     return float(frequency[max(1, known[-1])] if known.size else frequency[1])
 
 
@@ -228,104 +287,3 @@ def choose_filter(
     wanted = max(round(0.4 * nyquist / f_b), round(PASS * nyquist / known))
     decimation = min(wanted, force.size // (rows + 4 * LOBES))
     return Filter(min(5 * f_b, 0.5 * nyquist), max(1, decimation))
-
-
-WIDTH = 99
-"""Least number of neighbours for the mean of a spectrum; the level is accurate to one eighth."""
-SURE = 2.0
-"""Factor by which two mean levels must differ to be treated as different."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Velocity:
-    """Two measurements of one velocity, combined at each frequency by their noise.
-
-        V = V_x + W (V_v - V_x),   W = E_x / (E_x + E_v),   E = E_x E_v / (E_x + E_v)
-
-    This has the least noise of all unbiased combinations. E_x is white noise of the position after
-    the central difference s = sin(w h) / h, plus the bias of this difference:
-
-        E_x = S_x s^2 + (1 - s / w)^2 |V_v|^2
-
-    E_v is at least the white noise S_v of the measured velocity. If |V_v - V_x|^2 clearly exceeds
-    E_x, the excess is an error of the velocity channel: its scale, delay, drift or filter. If it
-    is clearly lower, the noise of both is common (a velocity derived from the position), and E_v is
-    at least the difference.
-
-    Attributes:
-        frequency: frequencies of the spectra in cycles per sample, shape (k,).
-        weight: W of the measured velocity; 0 without one, 1 without a position.
-        noise: E [(m/s)^2 per sample]; white noise of variance e^2 has E = e^2.
-
-    Limits: noise levels are those of the upper half of the spectra, assumed white below it.
-    """
-
-    frequency: Array
-    weight: Array
-    noise: Array
-
-    @staticmethod
-    def of(x: Array | None, v: Array | None, step: float) -> "Velocity":
-        """Compute the combination from position and velocity, one of which may be missing.
-
-        Raises:
-            ValueError: both are missing.
-        """
-        known = v if x is None else x
-        if known is None:
-            raise ValueError("velocity: expected a position or a velocity, got neither")
-        frequency: Array = np.asarray(np.fft.rfftfreq(known.size), np.float64)
-        power = spectrum(without_line(known))
-        of_x = noise_level(power) * (np.sin(2 * np.pi * frequency) / step) ** 2
-        if v is None:
-            return Velocity(frequency, np.zeros(of_x.size), of_x)
-        measured = power if x is None else spectrum(without_line(v))
-        of_v = np.full(of_x.size, noise_level(measured))
-        if x is None:
-            return Velocity(frequency, np.ones(of_x.size), of_v)
-        deficit = 1 - np.sinc(2 * frequency)
-        of_x = _averaged(of_x + deficit**2 * measured, step)
-        apart = _averaged(spectrum(v - central_difference(x, step)), step)
-        differ = (apart > SURE * of_x) | (SURE * apart < of_x)
-        of_v = np.maximum(of_v, np.where(differ, np.abs(apart - of_x), 0.0))
-        both = of_x + of_v
-        weight = np.divide(of_x, both, out=np.ones(both.size), where=both > 0)
-        return Velocity(frequency, weight, weight * of_v)
-
-    def mixed(self, of_x: Array, of_v: Array) -> Array:
-        """Combine a signal derived from the position with one from the velocity, shape (n,)."""
-        apart = of_v - of_x
-        periodic = np.concatenate([apart, apart[-2:0:-1]])
-        weight = np.interp(np.fft.rfftfreq(periodic.size), self.frequency, self.weight)
-        return of_x + np.fft.irfft(np.fft.rfft(periodic) * weight, periodic.size)[: apart.size]
-
-    def deviation(self, filter: Filter, step: float) -> float:
-        """Return the standard deviation of the noise after the low-pass `filter` [m/s]."""
-        inside = slice(1, -1)
-        gain = filter.gain(self.frequency[inside], step)
-        return float(np.sqrt(np.mean(gain**2 * self.noise[inside])))
-
-    def band(self, x: Array | None, v: Array | None, step: float) -> float:
-        """Return the frequency [Hz] up to which the motion exceeds its noise; see `position_band`.
-
-        If position and velocity are given, it is at least that of the position alone.
-        """
-        if x is None or v is None:
-            known = v if x is None else x
-            return 0.5 / step if known is None else position_band(known, step)
-        mixed = without_line(self.mixed(central_difference(x, step), v))
-        both = band_above(spectrum(mixed)[:-1], self.noise[:-1], step)
-        return max(position_band(x, step), both)
-
-
-def _averaged(power: Array, step: float) -> Array:
-    """Return a spectrum averaged over 1 Hz or `WIDTH` neighbours, whichever is wider."""
-    ones = np.ones(_width(power, step, WIDTH))
-    count = np.convolve(np.ones(power.size), ones, mode="same")
-    return np.convolve(power, ones, mode="same") / count
-
-
-def _width(power: Array, step: float, least: int) -> int:
-    """Return the number of entries of a spectrum in 1 Hz, at least `least` and at most all."""
-    return min(max(least, 2 * round((power.size - 1) * step) + 1), power.size)

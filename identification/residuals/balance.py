@@ -63,12 +63,15 @@ class Balance(NamedTuple):
         rows: descriptions of the rows of `equations`.
         equations: equations in w and the unknown parameters p.
         slips: (w, p) -> sliding velocities of the contacts and their derivatives by the rates.
+        slopes: derivatives of the rows by rates and accelerations in steady sliding, row by row;
+            None for rows with algebraic unknowns.
         loaded: True if a law depends on the applied force.
     """
 
     rows: tuple[Row, ...]
     equations: Sampled
     slips: ca.Function
+    slopes: Sampled | None
     loaded: bool
 
 
@@ -165,7 +168,10 @@ def balance(
     equations = Sampled.of(
         w, p, rows, z=z, start=start, step=step, later=later, h=h, y=y, g=g, guess=guess
     )
-    return Balance(tuple(known), equations, slipping, ca.depends_on(ca.vertcat(g, step), u))
+    moved = ca.jacobian(ca.substitute(rows, z, start), w[count : 3 * count, 0])
+    slopes = None if y.numel() else Sampled.of(w, p, ca.vec(ca.densify(moved).T))
+    loaded = ca.depends_on(ca.vertcat(g, step), u)
+    return Balance(tuple(known), equations, slipping, slopes, loaded)
 
 
 def _balances(model: Model, found: Sequence[Coordinate]) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:

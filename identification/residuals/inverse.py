@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple, cast, final
 
 import casadi as ca
@@ -9,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.differentiate import derivatives, uncertain
-from identification.data.filters import Decimation, Filter, Velocity, choose_filter
+from identification.data.differentiate import Velocity, derivatives, levels, uncertain
+from identification.data.filters import Decimation, Filter, choose_filter
 from identification.data.record import Record
 from identification.residuals.balance import Balance, Coordinate, Mask, Row, balance, coordinates
 from identification.residuals.evaluation import Array, Blocks, Channel
@@ -21,6 +22,8 @@ from symfric.foundation import checks
 from symfric.model import Model
 
 WHERE = "InverseDynamics"
+RANK = 1e-9
+"""Smallest nonzero singular value of sensitivities, relative to the largest."""
 FEWEST, ENOUGH = 10, 100
 """Smallest number of equations of a signal, and target number if the filter is adapted."""
 
@@ -49,14 +52,18 @@ class InverseDynamics:
             accurate.
         filter: cut-off and decimation of all records; None: from force and motion of each record.
         dead_time: bounds of the time [s] by which the measured force leads the acting force, an
-            additional unknown of each record; None: no dead time.
+            additional unknown of each record; it is negative for a force recorded late. (0, T)
+            permits both, -T to T. None: no dead time.
+        noise: channel of a position or velocity -> standard deviation of its white noise; others
+            are those of the spectrum and of rounding. `Fit(noise=...)` passes such entries.
 
     Limits: a force that is held for a sample leads by half a sample, which lowers the viscous
     coefficient by about m w^2 h / 2 for motion at w [rad/s]; dead_time=(0, h) estimates this lead.
-    The motion is treated as exact, and its remaining noise lowers the mass. Therefore the automatic
-    decimation is limited to the band in which the motion exceeds its noise (`choose_filter`); a
-    filter of the user may not be. Errors are those of the force up to the cut-off of the record:
-    a force of pulses is wide-band and includes all noise and every resonance, so its percentage is
+    The automatic decimation is limited to the band in which the motion exceeds its noise
+    (`choose_filter`). The remaining bias by white noise is corrected to second order, except in
+    rows with algebraic unknowns; with a filter of the user, the noise of the acceleration must be
+    small against the acceleration. Errors are those of the force up to the cut-off of the record: a
+    force of pulses is wide-band and includes all noise and every resonance, so its percentage is
     not comparable with that of a slow record (EMPS: 10.9 % of the pulses, 5.9 % with the filter of
     the slow record; the mass is the same within .2 %). Channels of a model have the names of its
     states and inputs; velocities without a channel are derived from the positions.
@@ -68,6 +75,7 @@ class InverseDynamics:
     v: str | None = None
     filter: Filter | None = None
     dead_time: tuple[float, float] | None = None
+    noise: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
         for name in ("force", "x"):
@@ -76,6 +84,7 @@ class InverseDynamics:
             checks.text(f"{WHERE}: v", self.v, "the name of a channel")
         if self.filter is not None:
             checks.kind(f"{WHERE}: filter", self.filter, Filter, "a filter, such as Filter(100.0)")
+        levels(f"{WHERE}: noise", self.noise)
         if self.dead_time is not None:
             pair = checks.many(f"{WHERE}: dead_time", self.dead_time, "bounds (low, high) [s]")
             bounds = [checks.number(f"{WHERE}: dead_time", b, unit="s") for b in pair]
@@ -98,7 +107,8 @@ class InverseDynamics:
         called = {"x": self.x, "force": self.force} if subject.drive is not None else {}
         if subject.drive is not None and self.v is not None:
             called["v"] = self.v
-        motions = [measure(model, found, record, called, self.filter) for record in data]
+        noise = self.noise or {}
+        motions = [measure(model, found, record, called, self.filter, noise) for record in data]
         typical = np.median(np.hstack([m.w for m in motions]), axis=1)
         made = balance(model, subject.names, found, typical, where)
         own = tuple[Unknown, ...]()
@@ -107,6 +117,7 @@ class InverseDynamics:
                 such = "expected laws without the applied force"
                 raise ValueError(f"{where}: dead_time: {such}")
             low, high = self.dead_time
+            low = low or -high
             first = min(max(0.0, low), high)
             own = tuple(
                 Unknown(f"dead_time[{k}]", "s", first, low, high, motion.step, nuisance=True)
@@ -115,7 +126,8 @@ class InverseDynamics:
         p = np.array([float(v.start) for v in model.p if v.name in subject.names])
         pieces = tuple(_piece(made, motion, model, p, self.filter is None) for motion in motions)
         channels = tuple(_channels(made.rows, pieces))
-        return InverseRows(subject.names, own, channels, made.equations, made.rows, pieces)
+        equations = made.equations, made.rows, pieces, made.slopes
+        return InverseRows(subject.names, own, channels, *equations)
 
 
 class Motion(NamedTuple):
@@ -126,7 +138,7 @@ class Motion(NamedTuple):
         t: times (n,) [s].
         step: sample interval [s].
         w: positions, rates, accelerations, inputs, time, shape (nw, n).
-        noise: standard deviations of the filtered rates.
+        velocities: measured rates with the spectra of their noise.
         filter: filter of the record.
     """
 
@@ -134,13 +146,13 @@ class Motion(NamedTuple):
     t: Array
     step: float
     w: Array
-    noise: Array
+    velocities: tuple[Velocity, ...]
     filter: Filter
 
     @property
     def inputs(self) -> slice:
         """Rows of `w` that contain the inputs."""
-        return slice(3 * self.noise.size, -1)
+        return slice(3 * len(self.velocities), -1)
 
     @property
     def inside(self) -> slice:
@@ -150,7 +162,7 @@ class Motion(NamedTuple):
     @property
     def begin(self) -> Array:
         """First sample of `w`, with rates near rest set to zero."""
-        first, count = self.w[:, 0].copy(), self.noise.size
+        first, count = self.w[:, 0].copy(), len(self.velocities)
         first[count : 2 * count] = [moving_start(v) for v in self.w[count : 2 * count]]
         return first
 
@@ -161,6 +173,7 @@ def measure(
     record: Record,
     called: Mapping[str, str],
     filter: Filter | None,
+    noise: Mapping[str, float],
 ) -> Motion:
     """Differentiate a record with the channels that the model needs.
 
@@ -171,6 +184,7 @@ def measure(
         called: name in the model -> channel, if they differ.
         filter: the filter; None: chosen for the fastest input, or without inputs for the fastest
             motion.
+        noise: channel -> standard deviation of its noise, if known.
 
     Raises:
         ValueError: channels are missing, or intervals are unequal.
@@ -178,6 +192,7 @@ def measure(
     step = record.uniform().step
     known = ca.vertcat(ca.SX(0, 1) if model.ode is None else model.ode, model.alg)
     missing, raw = list[str](), list[tuple[Array | None, Array | None]]()
+    known_noise = list[tuple[float | None, ...]]()
     for c in found:
         names = [None if s is None else called.get(s.name, s.name) for s in (c.position, c.rate)]
         x, v = (record[n] if n is not None and n in record else None for n in names)
@@ -185,6 +200,7 @@ def measure(
         if given is None and (v is None or ca.depends_on(known, needed.symbol)):
             missing.append(called.get(needed.name, needed.name))
         raw.append((x, v))
+        known_noise.append(tuple(None if n is None else noise.get(n) for n in names))
     inputs = [called.get(u.name, u.name) for u in model.u]
     missing += [n for n in inputs if n not in record]
     if missing:
@@ -194,7 +210,8 @@ def measure(
             "Shooting() for motion that is not measured"
         )
     forces = [record[n] for n in inputs]
-    velocities = [Velocity.of(x, v, step) for x, v in raw]
+    both = zip(raw, known_noise, strict=True)
+    velocities = tuple(Velocity.of(*signals, step, *sizes) for signals, sizes in both)
     if filter is None:
         moved = [np.gradient(cast(Array, x), step) if v is None else v for x, v in raw]
         bands = [t.band(x, v, step) for t, (x, v) in zip(velocities, raw, strict=True)]
@@ -202,11 +219,12 @@ def measure(
         filter = max(each, key=lambda f: f.cutoff)
     motion = [derivatives(x, v, step, filter, t) for t, (x, v) in zip(velocities, raw, strict=True)]
     w = np.vstack([*(part[k] for k in range(3) for part in motion), *forces, record.time])
-    noise = np.array([velocity.deviation(filter, step) for velocity in velocities])
-    return Motion(record.name, record.time, step, w, noise, filter)
+    return Motion(record.name, record.time, step, w, velocities, filter)
 
 
-class Piece(NamedTuple):
+@final
+@dataclass(frozen=True, eq=False)
+class Piece:
     """Measured motion of a record with its decimation.
 
     Attributes:
@@ -222,6 +240,13 @@ class Piece(NamedTuple):
     def equations(self, row: int, signals: Array) -> Array:
         """Return the columns of `signals`, shape (n, k), decimated to the equations of a row."""
         return self.decimation.columns(signals[self.motion.inside])[self.kept[row]]
+
+    @cached_property
+    def errors(self) -> Array:
+        """Standard deviations of decimated rates, then accelerations, (2 coordinates,)."""
+        motion, taps = self.motion, self.decimation.taps
+        each = [u.errors(motion.filter, motion.step, taps) for u in motion.velocities]
+        return np.ravel(np.array(each).T)
 
     @property
     def fewest(self) -> int:
@@ -280,8 +305,9 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
         return []
     n = motion.t.size
     v, slopes = (part.full() for part in made.slips.map(n)(motion.w, np.repeat(p[:, None], n, 1)))
-    gains = np.median(np.abs(slopes), axis=1).reshape(motion.noise.size, len(model.contacts)).T
-    noise = [float(np.linalg.norm(gain * motion.noise)) for gain in gains]
+    errors = np.array([u.errors(motion.filter, motion.step)[0] for u in motion.velocities])
+    gains = np.median(np.abs(slopes), axis=1).reshape(errors.size, len(model.contacts)).T
+    noise = [float(np.linalg.norm(gain * errors)) for gain in gains]
     return [
         uncertain(v[k], noise[k], motion.step, motion.filter) & (not c.states)
         for k, c in enumerate(model.contacts)
@@ -295,7 +321,7 @@ def _channels(rows: Sequence[Row], pieces: Sequence[Piece]) -> Iterator[Channel]
         motion = part.motion
         times = part.decimation.centres(motion.t[motion.inside])
         for k, row in enumerate(rows):
-            kept, count = part.kept[k], motion.noise.size
+            kept, count = part.kept[k], len(motion.velocities)
             q, v, a = motion.w[row.coordinate : 3 * count : count]
             signals = {"x": q, "v": v, "sign(v)": np.sign(v), "a": a}
             force = np.zeros_like(q) if row.input is None else motion.w[motion.inputs][row.input]
@@ -311,11 +337,21 @@ def _channels(rows: Sequence[Row], pieces: Sequence[Piece]) -> Iterator[Channel]
 @final
 @dataclass(frozen=True, eq=False)
 class InverseRows(Blocks):
-    """Residuals D (force needed - force measured) of `InverseDynamics`."""
+    """Residuals D (force needed - force measured) of `InverseDynamics`.
+
+    The noise e of rates and accelerations enters residuals r and sensitivities J. Their product is
+    biased by c = E[dJ' dr], which lowers the mass. The residuals are therefore corrected,
+
+        r - J (J'J)^-1 c,   c = 1/2 d/dp sum_i |G_i S|^2,   G = dr/d(v, a),   S from spectra
+
+    so that the gradient of their squares has mean zero at the true values (corrected score).
+    Source: Stefanski, Commun. Stat. Theory Methods 18(12), 1989; Nakamura, Biometrika 77(1), 1990.
+    """
 
     sampled: Sampled
     rows: tuple[Row, ...]
     pieces: tuple[Piece, ...]
+    slopes: Sampled | None
 
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
         """Yield the residuals of each balance of each record; `own` contains the dead times."""
@@ -332,7 +368,24 @@ class InverseRows(Blocks):
                 if own.size and row.input is not None:
                     J[:, p.size + number] = rates[row.input]
                 both = part.equations(k, np.column_stack([path.rows[:, k], J]))
-                yield both[:, 0], both[:, 1:]
+                yield both[:, 0] - self._bias(part, k, p, both[:, 1:]), both[:, 1:]
+
+    def _bias(self, part: Piece, k: int, p: Array, J: Array) -> Array:
+        """Return J (J'J)^-1 c for row k of a record, shape (rows,)."""
+        if self.slopes is None or not p.size:
+            return np.zeros(len(J))
+        motion = part.motion
+        at = part.decimation.centres(np.arange(motion.t.size)[motion.inside])[part.kept[k]]
+        found = self.slopes.along(motion.w[:, at], motion.step, p)
+        if isinstance(found, str):
+            return np.zeros(len(J))
+        count = part.errors.size
+        place = slice(k * count, (k + 1) * count)
+        c = np.einsum("ij,j,ijp->p", found.rows[:, place], part.errors**2, found.slopes[:, place])
+        c = np.append(c, np.zeros(J.shape[1] - p.size))
+        U, s, Vt = np.linalg.svd(J, full_matrices=False)
+        kept = s > RANK * s.max(initial=1e-300)
+        return U[:, kept] @ ((Vt[kept] @ c) / s[kept])
 
 
 def _shifted(motion: Motion, delay: float) -> tuple[Array, Array]:

@@ -1,7 +1,7 @@
 """Residuals of friction forces at given velocities: points of a curve, or a record over time."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, final
 
 import casadi as ca
@@ -9,9 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
+from identification.data.differentiate import levels
+from identification.data.path import SmoothPath, smooth_path
 from identification.data.record import Record
 from identification.residuals.evaluation import Array, Blocks, Channel
-from identification.residuals.sampled import Sampled, imposed_step, moving_start
+from identification.residuals.path_noise import PathNoise
+from identification.residuals.sampled import (
+    Sampled,
+    begun,
+    imposed_step,
+    moving_start,
+    preload,
+    usual,
+)  # fmt: skip
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
@@ -29,14 +39,16 @@ class Points:
     """Residuals F(v, N) - F_measured of velocities and forces, with or without time.
 
     A static law is a curve through the points, and so is a law with states in steady sliding. Over
-    time, the states of a law follow the measured velocity instead, z' = rate(z, v(t), N(t)). They
-    start in steady sliding at the first sample, or relaxed if it is slower than a twentieth of the
-    usual speed. A record that begins slowly under load is modelled wrongly until the contact has
-    slid once; the verdict reports this if it is visible. Points without time at exactly v = 0 are
-    break-away forces, compared with the static level of the law.
+    time, the states of a law follow the measured velocity instead, z' = rate(z, v(t), N(t)). Noise
+    of this velocity would accumulate in them. Most of it is removed by a smoothing spline
+    (`smooth_path`); the remaining noise is part of the covariance of the residuals (`PathNoise`).
+    The initial deflection of the bristles of a record is an unknown "preload[k]", relative to
+    steady sliding. Points without time at exactly v = 0 are break-away forces, compared with the
+    static level of the law.
 
     Attributes:
         v, F: channels of the sliding velocity and of the friction force, of equal sign in sliding.
+        x: channel of the sliding distance over time, used if there is no channel `v`.
         N: channel of the normal force, or a number [N]; None: the channel "N" if it exists,
             otherwise the normal force of the fit.
         weight: channel of weights, such as the number of samples of a mean: rows are multiplied by
@@ -45,22 +57,33 @@ class Points:
             over time, or "auto": imposed if every record has times.
         offset: also fit a constant force, such as the zero of a load cell, as an unknown "offset"
             common to all records. It requires motion in both directions.
+        noise: channel of x or v over time -> standard deviation of its white noise; others are
+            estimated from the spectrum. `Fit(noise=...)` passes its entries that are not compared.
+        near: values at which the effect of this noise is linearised; None: those of the
+            start, then those of the fit.
+
+    Limits: points without time and static laws take the velocity as exact. States that change sign
+    with the velocity share one preload: a partial reversal before the record is not represented.
     """
 
     v: str = "v"
     F: str = "F"
+    x: str = "x"
     N: str | float | None = None
     weight: str | None = None
     states: str = "auto"
     offset: bool = False
+    noise: Mapping[str, float] | None = None
+    near: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
-        for name, value in (("v", self.v), ("F", self.F), ("weight", self.weight)):
+        for name, value in (("v", self.v), ("F", self.F), ("x", self.x), ("weight", self.weight)):
             if value is not None or name != "weight":
                 checks.text(f"Points: {name}", value, "the name of a channel")
         if self.N is not None and not isinstance(self.N, str):
             checks.number("Points: N", self.N, unit="N", lower=0.0)
         checks.choice("Points: states", self.states, MODES)
+        levels("Points: noise", self.noise)
         checks.flag("Points: offset", self.offset)
 
     def imposed(self, law: Law, data: Dataset) -> bool:
@@ -86,33 +109,50 @@ class Points:
             ValueError: the subject has no law, channels are missing, or break-away points need a
                 static level that the law does not have or that depends on an applied force.
         """
-        del start
         law = subject.law
         if law is None:
             raise ValueError("Points: expected a law to fit to points, got a model; pass its law")
         imposed = self.imposed(law, data)
         load = float(subject.model.u[1].start) if len(subject.model.u) > 1 else 1.0
-        tables = tuple(self._table(record, load, law) for record in data)
+        tables = tuple(self._table(record, load, law, imposed) for record in data)
         symbolic, variables = symbolise(law, *subject.names)
         p = symbols_of(variables)
-        slides, breaks = _sliding(symbolic, p, imposed), None
+        speed = usual(np.concatenate([table.w[0] for table in tables]))
+        slides, breaks = _sliding(symbolic, p, speed if imposed else None), None
         if not imposed and any(table.rest.any() for table in tables):
             breaks = _break_away(symbolic, p)
         units = {unit for record in data if (unit := record.unit(self.F))}
-        unit, own = units.pop() if len(units) == 1 else "N", ()
+        unit, own = units.pop() if len(units) == 1 else "N", list[Unknown]()
+        preloads = imposed and not all(state.even for state in law.states)
+        if preloads:
+            own += [preload(f"preload[{k}]", table.w[0]) for k, table in enumerate(tables)]
         if self.offset:
             size = max(float(np.abs(table.F).max(initial=0.0)) for table in tables) or 1.0
-            own = (Unknown("offset", unit, _middle(tables), scale=size, nuisance=True),)
+            own.append(Unknown("offset", unit, _middle(tables), scale=size, nuisance=True))
         channels, first = list[Channel](), 0
         for number, (t, w, F, *_) in enumerate(tables):
             rows, v = slice(first, first := first + F.size), w[0]
             signals = {"v": v, "sign(v)": np.sign(v)}
             t, ordered = (v, False) if t is None else (t, True)
             channels.append(Channel(number, "F", unit, rows, t, F, signals, ordered=ordered))
-        return PointRows(subject.names, own, tuple(channels), slides, breaks, tables, imposed)
+        rows = PointRows(
+            subject.names, tuple(own), tuple(channels), slides, breaks, tables, imposed, preloads
+        )
+        if not any(table.errors.size for table in tables):
+            return rows
+        values = {v.name: float(v.start) for v in (*variables, *own)}
+        values |= {**(start or {}), **(self.near or {})}
+        return rows.whitened(np.array([values[n] for n in rows.names]))
 
-    def _table(self, record: Record, load: float, law: Law) -> "Table":
-        v, F = record[self.v], record[self.F]
+    def path(self, record: Record) -> SmoothPath:
+        """Return the velocity over time of a law with states, and its noise."""
+        return smooth_path(record, self.x, self.v, self.noise)
+
+    def _table(self, record: Record, load: float, law: Law, imposed: bool) -> "Table":
+        F, path = record[self.F], SmoothPath(np.zeros(0), np.zeros((record.size, 0)))
+        if imposed or (self.v not in record and self.x in record):
+            path = self.path(record)
+        v = path.v if path.v.size else record[self.v]
         channel = "N" if self.N is None and "N" in record else self.N
         number = load if channel is None or isinstance(channel, str) else float(channel)
         N = record[channel] if isinstance(channel, str) else np.full(record.size, number)
@@ -126,64 +166,109 @@ class Points:
                 raise ValueError(f"data '{record.name}': weight: expected >= 0 and some > 0")
             weights = np.sqrt(weights / weights.mean())
         w = np.vstack([v, N, *(record[i.name] for i in law.inputs)])
-        return Table(record.t, w, F, weights, (v == 0) & (record.t is None))
+        return Table(record.t, w, F, weights, (v == 0) & (record.t is None), path.errors)
 
 
 class Table(NamedTuple):
-    """Imposed values (2 + inputs, n), forces, weights and break-away points of a record."""
+    """Imposed values (2 + inputs, n), forces, weights and break-away points of a record.
+
+    `errors` (n, m) are those of the velocity, see `SmoothPath`.
+    """
 
     t: Array | None
     w: Array
     F: Array
     weights: Array
     rest: NDArray[np.bool_]
+    errors: Array
 
 
 @final
 @dataclass(frozen=True, eq=False)
 class PointRows(Blocks):
-    """Residuals weight (F(v, N) + offset - F_measured) [N] of `Points`."""
+    """Residuals weight (F(v, N) + offset - F_measured) [N] of `Points`.
+
+    With `preloads`, `own` contains the preload of each record, then the offset. `noises` whiten the
+    residuals of each record; empty: no whitening.
+    """
 
     slides: Sampled
     breaks: Sampled | None
     tables: tuple[Table, ...]
     imposed: bool
+    preloads: bool
+    noises: tuple[PathNoise, ...] = ()
 
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
         """Yield the residuals of each record, and their derivatives."""
-        for table in self.tables:
-            F, J = np.zeros(table.F.size), np.ones((table.F.size, p.size + own.size))
-            h = np.diff(table.t) if table.t is not None and self.imposed else 1.0
-            sides = np.vstack([table.w, np.sign(table.F)])
-            both = (~table.rest, table.w, self.slides), (table.rest, sides, self.breaks)
-            for rows, w, what in both:
-                if what is None or not rows.any():
-                    continue
-                begin = w[:, rows][:, 0].copy()
-                if self.imposed:
-                    begin[0] = moving_start(w[0, rows])
-                path = what.along(w[:, rows], h, p, begin)
-                if isinstance(path, str):
-                    yield path
-                    return
-                F[rows], J[rows, : p.size] = path.rows[:, 0], path.slopes[:, 0]
-            yield table.weights * (F + own.sum() - table.F), table.weights[:, None] * J
+        count = len(self.tables) if self.preloads else 0
+        offset = float(own[count:].sum())
+        for k, table in enumerate(self.tables):
+            found = self._forces(k, table.w, p, own)
+            if isinstance(found, str):
+                yield found
+                return
+            F, slopes = found
+            J = np.zeros((F.size, p.size + own.size))
+            J[:, : p.size], J[:, p.size + count :] = slopes[:, : p.size], 1.0
+            if self.preloads:
+                J[:, p.size + k] = slopes[:, p.size]
+            both = table.weights * (F + offset - table.F), table.weights[:, None] * J
+            yield (self.noises[k](both[0]), self.noises[k](both[1])) if self.noises else both
+
+    def whitened(self, values: Array) -> "PointRows":
+        """Return the residuals whitened at `values`, see `PathNoise`."""
+        p, own = np.split(values, [len(self.parameters)])
+        noises = list[PathNoise]()
+        for k, table in enumerate(self.tables):
+
+            def force(v: Array, k: int = k, table: Table = table) -> Array:
+                found = self._forces(k, np.vstack([v, table.w[1:]]), p, own)
+                return table.weights * (np.zeros(v.size) if isinstance(found, str) else found[0])
+
+            noises.append(PathNoise.of(force, table.w[0], table.errors, table.F))
+        return replace(self, noises=tuple(noises))
+
+    def _forces(self, k: int, w: Array, p: Array, own: Array) -> tuple[Array, Array] | str:
+        """Return the forces of record k for imposed values w (2 + inputs, n), and derivatives."""
+        table, share = self.tables[k], own[k : k + 1] if self.preloads else np.zeros(1)
+        p = np.append(p, share) if self.imposed else p
+        F, slopes = np.zeros(table.F.size), np.zeros((table.F.size, p.size))
+        h = np.diff(table.t) if table.t is not None and self.imposed else 1.0
+        sides = np.vstack([w, np.sign(table.F)])
+        for rows, some, what in (~table.rest, w, self.slides), (table.rest, sides, self.breaks):
+            if what is None or not rows.any():
+                continue
+            begin = some[:, rows][:, 0].copy()
+            if self.imposed:
+                begin[0] = moving_start(some[0, rows])
+            path = what.along(some[:, rows], h, p, begin)
+            if isinstance(path, str):
+                return path
+            F[rows], slopes[rows] = path.rows[:, 0], path.slopes[:, 0]
+        return F, slopes
 
 
-def _sliding(law: Law, p: ca.SX, imposed: bool) -> Sampled:
-    """Return the force in sliding at one sample; `p` are the symbols in `law`."""
+def _sliding(law: Law, p: ca.SX, speed: float | None) -> Sampled:
+    """Return the force in sliding at one sample; `p` are the symbols in `law`.
+
+    With the usual speed of the records over time, the unknowns are p and the preload.
+    """
     where = f"Points: {type(law).__name__}"
     w = ca.SX.sym("w", 2 + len(law.inputs))
     given = {i.name: w[2 + k] for k, i in enumerate(law.inputs)}
     v, N = w[0], w[1]
-    steady = ca.SX(law.steady_state(v, N)) if law.states else ca.SX(0, 1)
-    if not imposed:
+    if speed is None:
+        steady = ca.SX(law.steady_state(v, N)) if law.states else ca.SX(0, 1)
         return Sampled.of(w, p, ca.SX(law.force(v, N, steady, **given)))
+    share = ca.SX.sym("preload")
+    start = begun(law, (v, N), speed, share)
     z, later, h = ca.SX.sym("z", len(law.states)), ca.SX.sym("later", w.numel()), ca.SX.sym("h")
     then = {i.name: later[2 + k] for k, i in enumerate(law.inputs)}
     step = imposed_step(law, z, (v, N, given), (later[0], later[1], then), h, where)
     force = ca.SX(law.force(v, N, z, **given))
-    return Sampled.of(w, p, force, z=z, start=steady, step=step, later=later, h=h)
+    p = ca.vertcat(p, share)
+    return Sampled.of(w, p, force, z=z, start=start, step=step, later=later, h=h)
 
 
 def _break_away(law: Law, p: ca.SX) -> Sampled:

@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.unknowns.spec import Unknown
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.integrator.compiled.columns import Columns
@@ -85,7 +86,42 @@ def moving_start(v: Array) -> float:
 
     A bristle that has slid far is fully bent at the smallest speed; at rest it is assumed relaxed.
     """
-    return float(v[0]) if abs(v[0]) > NEAR_REST * float(np.sqrt(np.mean(v**2))) else 0.0
+    return float(v[0]) if abs(v[0]) > NEAR_REST * usual(v) else 0.0
+
+
+PRELOAD = 2.0
+"""Largest initial deflection of a bristle relative to that of steady sliding."""
+
+
+def begun(law: Law, start: tuple[Scalar, Scalar], usual: float, share: ca.SX) -> ca.SX:
+    """Return the states of `law` at the start of a record, (nz, 1).
+
+    Bristles, the states that change sign with the velocity, have a common share of their values in
+    steady sliding. Other states, such as the age of a contact, have those of steady sliding.
+
+    Args:
+        law: law with states.
+        start: initial velocity and normal force.
+        usual: speed at which the share is one.
+        share: symbol of the share, from -1 (slid backwards before) to 1, 0 relaxed.
+    """
+    steady, bent = (ca.SX(law.steady_state(v, start[1])) for v in (start[0], usual))
+    even = [state.even for state in law.states]
+    return ca.vertcat(*(steady[i] if e else share * bent[i] for i, e in enumerate(even)))
+
+
+def preload(name: str, v: Array) -> Unknown:
+    """Return the unknown share of `begun` for the velocity v over time of one record.
+
+    It starts in steady sliding, or relaxed if the first sample is near rest.
+    """
+    first = float(np.sign(moving_start(v)))
+    return Unknown(name, "1", first, -PRELOAD, PRELOAD, 1.0, nuisance=True)
+
+
+def usual(v: Array) -> float:
+    """Return the root mean square of a velocity, or 1 for one at rest."""
+    return float(np.sqrt(np.mean(v**2))) or 1.0
 
 
 NEWTON = 20

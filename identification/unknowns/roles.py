@@ -310,10 +310,11 @@ class Natural:
             return dict.fromkeys(found, 1.0)
         return found
 
-    def rescaled(self, whole: P) -> P:
-        """Return a law or a scene with its numbers in natural units."""
-        sizes = self.sizes(whole)
-        values = {n: float(p.value) / sizes[n] for n, p in parameters(whole).items()}
+    def rescaled(self, whole: P, *, defaults: bool = False) -> P:
+        """Return a law or a scene in natural units; with `defaults`, they are unchanged numbers."""
+        sizes, known = self.sizes(whole), parameters(whole)
+        kept = {n for n, p in known.items() if defaults and p.value == p.default}
+        values = {n: float(p.value) / sizes[n] for n, p in known.items() if n not in kept}
         return with_values(whole, values)
 
 

@@ -61,10 +61,12 @@ class Loop(NamedTuple):
     Attributes:
         members: the contacts, two or more.
         along: g_i of each contact, as a function of the coordinates.
+        tangent: unit vector along the tangent of the constraints, SX (n, 1).
     """
 
     members: tuple[Contact, ...]
     along: tuple[ca.SX, ...]
+    tangent: ca.SX
 
     def shares(self, force: ca.SX) -> list[ca.SX]:
         """Return F_i [N] of each member for the holding `force` T."""
@@ -99,7 +101,8 @@ def loops_of(model: Model) -> tuple[Loop, ...]:
             if G.nnz() and {*G.sparsity().get_col()} <= {*columns}
         ]
         if len(members) > 1:
-            loops.append(Loop(*zip(*members, strict=True)))
+            contacts, along = zip(*members, strict=True)
+            loops.append(Loop(contacts, along, tangent))
     return tuple(loops)
 
 

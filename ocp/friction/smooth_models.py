@@ -116,7 +116,7 @@ def _smooth_force(model: Model, contact: Contact) -> tuple[ca.SX, list[Variable]
         name, unit = f"{contact.name}_{name}", contact.unit(unit)
         return Variable(name, unit, start=start, nominal=start, **more)
 
-    law = _law(contact)
+    law = law_of(contact)
     by_itself = not law.states and not any(i.name not in contact.further for i in law.inputs)
     if by_itself and (law.widths or not _jumps(model, contact)):
         known = parameters(law)
@@ -137,7 +137,7 @@ def _smooth_force(model: Model, contact: Contact) -> tuple[ca.SX, list[Variable]
 
 def _substitute(contact: Contact, width: ca.SX) -> ca.SX:
     """Return the smooth force [N] that replaces the law of `contact`; see `smooth_model`."""
-    v, N, law, given = contact.slip, contact.N, _law(contact), contact.further
+    v, N, law, given = contact.slip, contact.N, law_of(contact), contact.further
     x, speed = v / width, smooth.magnitude(v, width)
     s, bump = tanh(4 * x), x / (0.25 * (x * x) + 0.75) ** 2
     force = ca.SX(0)
@@ -149,7 +149,8 @@ def _substitute(contact: Contact, width: ca.SX) -> ca.SX:
     return force
 
 
-def _law(contact: Contact) -> Law:
+def law_of(contact: Contact) -> Law:
+    """Return the law of a contact; raise ValueError if it is not a `Law`."""
     law = contact.law
     if not isinstance(law, Law):
         raise checks.refused(f"contact '{contact.name}': law", "a law such as LuGre()", law)
@@ -161,7 +162,7 @@ def _jumps(model: Model, contact: Contact) -> bool:
 
     It is zero for viscous friction and for an unloaded contact.
     """
-    law = _law(contact)
+    law = law_of(contact)
     if ca.SX(contact.N).is_zero():
         return False
     one = law.static_level(1.0, 1, **dict.fromkeys(contact.further, 0.0))
@@ -181,7 +182,7 @@ def shortfall(model: Model) -> float:
     """
     shares = [0.0]
     for contact in sticking(model):
-        law = _law(contact)
+        law = law_of(contact)
         scale = float(at_start(law.velocity_scale, model.p))
         if law.states or not law.widths or not isfinite(scale):
             continue

@@ -22,6 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse import linalg
 
+from ocp.formulation.expressions import offered
 from ocp.formulation.phase import Array, fixed
 from ocp.solving.active import BoundStatus, Entry, entries, statuses
 from ocp.solving.motion import Motion, at_times
@@ -304,7 +305,8 @@ class Linearised:
         Raises:
             ValueError: an unknown name, or derivatives that are not finite.
         """
-        check_names("sensitivity", [name], [*self.numbers, *self.conditions])
+        names = offered([*self.numbers, *self.conditions], [name])
+        check_names("sensitivity", [name], names)
         change = self.by_condition(name) if name in self.conditions else self.by_number(name)
         moved = change.bounds.copy()
         right = change.gradient / self.optimum.size + self.hessian @ moved

@@ -1,6 +1,6 @@
 """`symfric codegen`: generate C99 for a friction law or a plant and verify it on this machine."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
@@ -103,6 +103,7 @@ def codegen(
     tunable_gravity: bool = False,
     compensator: bool = False,
     compensation: Strings = None,
+    accept: Strings = None,
     compiler: str | None = None,
     json: str | None = None,
 ) -> None:
@@ -111,7 +112,8 @@ def codegen(
     The C is compiled and compared with CasADi over more than 20 000 steps, including bad inputs and
     other parameters. The exit status is 1 if the results differ or could not be compared, for
     example without a compiler; the files are written in any case. The law of a fit has the fitted
-    parameters; with `--scene drive` the drive also has them.
+    parameters; with `--scene drive` the drive also has them. A parameter that the data do not
+    determine is refused, unless --set gives its value or --accept names it.
 
     Example: symfric codegen lugre --out build --step-size 0.001
 
@@ -126,7 +128,8 @@ def codegen(
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
     if fit and not law and fit.suffix.lower() not in (".json", ".urdf") and not fit.is_file():
         fit, law = None, str(fit)
-    chosen = None if inverse_dynamics else chosen_law(fit, law)
+    texts = opt.assignments("--set", settings)
+    chosen = None if inverse_dynamics else chosen_law(fit, law, accept or (), texts)
     subject = subject_of(chosen, scene, compensator)
     kind = ("double" if subject == PLANT else "both") if real is None else real
     check_names("--real", [kind], REALS)
@@ -136,7 +139,6 @@ def codegen(
         "--tunable-gravity": tunable_gravity or None, "--preset": preset, "--law-of": law_of,
     }  # fmt: skip
     check_applicable(subject, [option for option, value in given.items() if value is not None])
-    texts = opt.assignments("--set", settings)
     own: dict[str, Any] = {"fold": fold or None, "free": free, "name": name, "h": step_size}
     own = {option: value for option, value in own.items() if value is not None}
     options, adjustable = dict[str, Any](), None
@@ -236,17 +238,22 @@ def check_applicable(subject: str, given: list[str]) -> None:
         raise ValueError("codegen: " + "; ".join(problems))
 
 
-def chosen_law(fit: Path | None, law: str | None) -> Chosen:
+def chosen_law(
+    fit: Path | None, law: str | None, accepted: Sequence[str], given: Mapping[str, str]
+) -> Chosen:
     """Return the law of a fit or of a name.
 
     Raises:
-        ValueError: both or neither, the file of a robot, a file without a fit, or a fit without a
-            law of the catalogue.
+        ValueError: both or neither, the file of a robot, a file without a fit, a fit without a law
+            of the catalogue, or one with a parameter without an interval that is neither `accepted`
+            nor `given`.
     """
     if (fit is None) == (law is None):
         got = "neither" if fit is None else "both"
         raise ValueError(f"codegen: expected the name of a law or the file of a fit, got {got}")
     if fit is None:
+        if accepted:
+            raise ValueError("--accept: expected with a fit only, got the name of a law")
         text = str(law)
         return Chosen(text, opt.any_named_law(text))
     from identification.result.fitted import Fitted  # noqa: PLC0415  (slow to import)
@@ -266,6 +273,13 @@ def chosen_law(fit: Path | None, law: str | None) -> Chosen:
         first = found.message.partition(". ")[0].rstrip(".")
         output.note(f"{fit}: status of the fit {found.status.name}: {first}.")
     units = {n: p.unit for n, p in parameters(found.law).items()}
+    free = {n: e for n, e in found.parameters.items() if n in units and not e.fixed}
+    check_names("--accept", accepted, free)
+    if vague := [n for n, e in free.items() if e.low is None and n not in {*accepted, *given}]:
+        raise ValueError(
+            f"codegen '{fit}': expected parameters that the data determine, got {', '.join(vague)} "
+            f"without an interval; give --set {vague[0]}=VALUE or --accept {vague[0]}"
+        )
     forces = [n for n, e in found.parameters.items() if units.get(n) == "1" and e.unit != "1"]
     return Chosen(found.name, found.law, found.drive, tuple(forces))
 

@@ -50,7 +50,8 @@ class Fuzzed:
         unflagged: steps with a wrong status.
         unfinished: steps after which an output is not finite.
         last_resort: steps with default parameters in which an output was not finite and has been
-            replaced by 0; with other parameters, such as mu_s = 0, an output may be undefined.
+            replaced by 0; with other parameters, such as mu_s = 0, or random bits, an output may be
+            undefined.
         beyond: steps with a force F above its limit F_max.
         report: output of a sanitizer, or "".
     """

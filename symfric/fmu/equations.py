@@ -256,7 +256,7 @@ def _events(own: Equations) -> Iterator[str]:
             name = f"model_{function.name().removeprefix('symfric_')}"
             yield routine(function, name)
             yield _called(function.name(), name, function.n_in(), function.n_out())
-        yield search_source(crossings, own.integrator.step.numel_in(1))
+        yield search_source(crossings, own.integrator.step.numel_in(1), decides=False)
     if events:
         yield routine(own.integrator.events, "model_events")
         signs = [-event.direction if event.at_start else 0 for event in events]

@@ -372,8 +372,11 @@ def check_names(where: str, given: Iterable[str], known: Collection[str], hint: 
     unknown = [name for name in listed if name not in known]
     if not unknown:
         return
+    text = Path(__file__).with_name("synonyms.txt").read_text("utf-8")
+    same = [set(line.split()) for line in text.splitlines() if not line.startswith("#")]
     close = [
-        [one for one in known if one.endswith((f".{name}", f"_{name}"))]
+        [one for one in known if any({one, name} <= names for names in same)]
+        or [one for one in known if one.endswith((f".{name}", f"_{name}"))]
         or get_close_matches(name, list(known), n=1, cutoff=0.4)
         for name in unknown
     ]

@@ -36,8 +36,8 @@ def names() -> Mapping[str, Any]:
 
 def current(path: str) -> str:
     """Return the current path of a class or function, given a current or an older path."""
-    place, _, name = path.partition(":")
-    return f"{names()['moved'].get(place, place)}:{name}"
+    moved, (place, _, name) = names()["moved"], path.partition(":")
+    return moved.get(path) or f"{moved.get(place, place)}:{name}"
 
 
 def found_at(path: str) -> Any:

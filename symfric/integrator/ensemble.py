@@ -35,11 +35,10 @@ from symfric.integrator.many.member_data import MemberData, MemberInput, ends_of
 from symfric.integrator.many.members import program
 from symfric.integrator.many.store import Store
 from symfric.integrator.running.doubts import of_members
-from symfric.integrator.running.integrator import Integrator, built
+from symfric.integrator.running.integrator import Integrator, built, in_results
 from symfric.integrator.running.run import Tolerances
 from symfric.integrator.step.attempt import State
 from symfric.model import Model
-from symfric.model.kinds import in_results
 from symfric.results.ensemble import Ensemble
 
 if TYPE_CHECKING:

@@ -18,10 +18,9 @@ from symfric.integrator.derivatives.path import Path, Seeds
 from symfric.integrator.derivatives.sensitivity import Differentiated
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.methods.tableaux import METHODS, key_of
-from symfric.integrator.running.integrator import Integrator, built
+from symfric.integrator.running.integrator import Integrator, built, in_results
 from symfric.integrator.running.record import Dense, Jumps, Outputs, Run
 from symfric.model import Model
-from symfric.model.kinds import in_results
 from symfric.results.stored import Format, Statistics
 from symfric.results.trajectory import Trajectory
 

@@ -9,6 +9,7 @@ from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.laws.base import smooth as smooth
+    from symfric.laws.base.families import Exact as Exact
     from symfric.laws.base.law import Facts as Facts
     from symfric.laws.base.law import Input as Input
     from symfric.laws.base.law import Law as Law
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from symfric.laws.composed.populations import RandomBristles as RandomBristles
     from symfric.laws.composed.populations import steady_force as steady_force
     from symfric.laws.composed.populations import steady_inputs as steady_inputs
-    from symfric.laws.composed.wrap import Exact as Exact
     from symfric.laws.composed.wrap import Lagged as Lagged
     from symfric.laws.composed.wrap import LoadNormalised as LoadNormalised
     from symfric.laws.composed.wrap import TemperatureDependent as TemperatureDependent

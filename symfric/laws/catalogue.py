@@ -5,10 +5,11 @@ from re import fullmatch, sub
 
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
+from symfric.laws.base.families import Exact
 from symfric.laws.base.law import Law, require_law
 from symfric.laws.composed.compose import Asymmetric, LoadDependent, Sum
 from symfric.laws.composed.populations import AnyLaw, GenericAsperity, Population, RandomBristles
-from symfric.laws.composed.wrap import Exact, Lagged, LoadNormalised, TemperatureDependent
+from symfric.laws.composed.wrap import Lagged, LoadNormalised, TemperatureDependent
 from symfric.laws.dynamic import dahl, dwell, lugre, maxwell_slip, stick_slip
 from symfric.laws.static import (
     applied_force,

@@ -9,11 +9,11 @@ the contact sticking. `Model.contacts` contains the contacts, `Model.open` has t
 inputs, and `Model.with_forces` closes the open model with other forces.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import isfinite
-from typing import Any, Protocol, final
+from typing import Any, NamedTuple, Protocol, final
 
 import casadi as ca
 
@@ -191,21 +191,14 @@ class Contact:
         sides = [ca.SX(self.law.most_held(self.N, s, **self.further)) for s in (1, -1)]
         return ca.fmax(*sides)
 
-    def events(self) -> tuple[Event, ...]:
-        """Return the changes of mode of the law as events of the model."""
-        names = {s.name: v.name for s, v in zip(self.law.states, self.states, strict=True)}
-        return tuple(
-            Event(
-                self.called(s.name),
-                s.expression,
-                s.direction,
-                reset={names[name]: value for name, value in s.reset.items()}
-                | (dict(self.rest) if s.halts else {}),
-                at_start=s.at_start,
-                rtol=s.rtol,
-            )
-            for s in self.law.switches(self.slip, self.N, symbols_of(self.states), **self.given)
-        )
+    def events(self, *, sticks: bool = False) -> tuple[Event, ...]:
+        """Return the changes of mode of the law as events of the model.
+
+        `sticks`: True if a contact that stops always sticks first.
+        """
+        z = symbols_of(self.states)
+        at, switches = (self.slip, self.N, z), self.law.switches
+        return mode_events(switches, at, self.given, self.called, self.rest, sticks)
 
     def monitors(self, p: Sequence[Variable]) -> tuple[Monitor, ...]:
         """Return the monitor of the sliding velocity for error control, as a tuple.
@@ -215,3 +208,72 @@ class Contact:
         """
         scale = self.law.velocity_scale
         return (Monitor(self.slip, scale),) if isfinite(float(at_start(scale, p))) else ()
+
+
+def mode_events(
+    switches: Callable[..., tuple[Any, ...]], at: tuple[Scalar, Scalar, Scalar],
+    given: Mapping[str, Scalar],
+    called: Callable[[str], str], rest: Mapping[str, Scalar], sticks: bool,
+) -> tuple[Event, ...]:  # fmt: skip
+    """Return the changes of mode of a law as events.
+
+    Args:
+        switches: function of the law that returns its changes of mode.
+        at, given: sliding velocity, normal force and states, and further inputs by name.
+        called: name of a state or event of the law -> its name in the model.
+        rest: resets when sliding ends.
+        sticks: True if a contact that stops always sticks first. It then breaks away again if it
+            cannot hold; F_e need not be exact while it slides.
+    """
+    own = switches(*at, **given)
+    idle = switches(*at, **{**given, APPLIED: 0.0}) if sticks else own
+    return tuple(
+        Event(
+            called(s.name), s.expression, s.direction,
+            reset={called(name): x for name, x in (still if s.halts else s).reset.items()}
+            | (dict(rest) if s.halts else {}),
+            at_start=s.at_start, rtol=s.rtol,
+        )
+        for s, still in zip(own, idle, strict=True)
+    )  # fmt: skip
+
+
+class Switching(NamedTuple):
+    """Contact whose mode is a state of its own.
+
+    Attributes:
+        contact: the contact.
+        mode: index of its mode among the states.
+        events: indices of its events.
+    """
+
+    contact: Contact
+    mode: int
+    events: tuple[int, int]
+
+
+def switching(
+    contacts: Sequence[Contact], x: Variables, events: Sequence[Event]
+) -> tuple[Switching, ...]:
+    """Return the contacts of a model with states `x` whose modes can be decided together."""
+    states, numbers = [v.name for v in x], {e.name: i for i, e in enumerate(events)}
+    found: list[Switching] = []
+    for c in contacts:
+        modes = [v.name for s, v in zip(c.law.states, c.states, strict=True) if s.whole]
+        own = [numbers[name] for name in map(c.called, ("stick", "slip")) if name in numbers]
+        if APPLIED in c.given and len(modes) == 1 and len(own) == 2:
+            found.append(Switching(c, states.index(modes[0]), (own[0], own[1])))
+    return tuple(found)
+
+
+def mode_changes(contacts: Sequence[Switching], events: Sequence[Event]) -> tuple[int, ...]:
+    """Return a number for each event of a model with `contacts` whose modes can be decided.
+
+    It is 1 for events of contacts that may change together, 2 for other events with resets, which
+    may start sliding, and otherwise 0.
+    """
+    own = {i for c in contacts for i in c.events}
+    return tuple(
+        int(len(contacts) > 1) if i in own else 2 if contacts and e.reset else 0
+        for i, e in enumerate(events)
+    )

@@ -11,7 +11,13 @@ their modes: they slide with the force of their law, or they stick with constant
     ds_i/dt = 0,   and for j != i   ds_j/dt = 0 if j sticks, else F_j = force of its law
 
 These linear equations are solved symbolically. For contacts that do not interact the solution is
-F_e = a_i / M_ii.
+F_e = a_i / M_ii. If algebraic variables depend on friction, as a normal force may, F_e is an
+algebraic variable of a contact with modes,
+
+    0 = F_i + ds_i/dt - F_e
+
+which is exact in stick, where F_i = F_e. While the contact slides, F_e exceeds its static level in
+the direction of sliding only if the contact accelerates in it.
 Source: Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, ch. 5.
 """
 
@@ -35,18 +41,34 @@ STICKS = 0.5
 integration errors."""
 
 
-def completed(model: System) -> tuple[Contact, ...]:
+def completed(model: System) -> tuple[tuple[Contact, ...], dict[str, Variable]]:
     """Return the contacts of an open model with default values of `F_e`, `rest` and `bare`.
+
+    The second result contains applied forces that are algebraic variables, by contact.
 
     Raises:
         ValueError: the equations do not determine an applied force.
     """
     contacts = tuple(_named(c, len(model.contacts)) for c in model.contacts)
     contacts = tuple(_resting(c, model) if _mode(c) is not None else c for c in contacts)
-    return tuple(
-        c if _complete(c) else replace(c, given={**c.given, APPLIED: _applied(i, contacts, model)})
-        for i, c in enumerate(contacts)
-    )
+    unknown: dict[str, Variable] = {}
+    if ca.depends_on(model.alg, stacked(c.force for c in contacts)):
+        doc = "friction force for zero sliding acceleration"
+        unknown = {
+            c.name: Variable(f"{c.name}_{APPLIED}", c.unit("N"), doc=doc)
+            for c in contacts if _mode(c) is not None and not _complete(c)
+        }  # fmt: skip
+    for c in contacts:
+        if c.name in unknown:
+            _refuse_inputs(c, ca.vertcat(symbols_of(model.z), symbols_of(model.u)))
+    contacts = tuple(_with(c, unknown[c.name].symbol) if c.name in unknown else c for c in contacts)
+    pairs = enumerate(contacts)
+    done = (c if _complete(c) else _with(c, _applied(i, contacts, model)) for i, c in pairs)
+    return tuple(done), unknown
+
+
+def _with(c: Contact, F_e: ca.SX) -> Contact:
+    return replace(c, given={**c.given, APPLIED: F_e})
 
 
 def _named(c: Contact, count: int) -> Contact:
@@ -107,8 +129,7 @@ def _applied(i: int, contacts: tuple[Contact, ...], model: System) -> ca.SX:
     z, u = symbols_of(model.z), symbols_of(model.u)
     if ca.depends_on(chosen, z) and ca.depends_on(model.alg, F):
         raise _refused(contacts[i], "equations without algebraic variables that depend on friction")
-    if ca.depends_on(ca.SX(contacts[i].slip), u):
-        raise _refused(contacts[i], "a sliding velocity without inputs, whose rates are unknown")
+    _refuse_inputs(contacts[i], u)
     constant = ca.substitute(chosen, unknown, ca.SX.zeros(unknown.numel()))
     found = _last_unknown(slopes, -constant)
     if found is None:
@@ -162,6 +183,11 @@ def _last_unknown(A: ca.SX, b: ca.SX) -> ca.SX | None:
     return rows[n - 1, n] / pivot if pivot.nnz() else None
 
 
+def _refuse_inputs(c: Contact, u: ca.SX) -> None:
+    if ca.depends_on(ca.SX(c.slip), u):
+        raise _refused(c, "a sliding velocity without inputs, whose rates are unknown")
+
+
 def _refused(c: Contact, expected: str) -> ValueError:
     return checks.refused(
         f"contact '{c.name}': {APPLIED}", expected, None,
@@ -195,9 +221,13 @@ def closed(model: System) -> dict[str, Any]:
         raise checks.refused(
             where, "none together with `holonomic`; a Mechanism makes them", model.contacts
         )
-    contacts = completed(model)
+    contacts, unknown = completed(model)
     put = _Put(where, contacts, {c.name: c.friction for c in contacts})
     changes = put.explicit(model)
+    held = [(c, unknown[c.name].symbol) for c in contacts if c.name in unknown]
+    rows = [put(c.friction + _change(c, model) - F_e) for c, F_e in held]
+    changes["z"] = (*model.z, *unknown.values())
+    changes["alg"] = ca.vertcat(changes["alg"], *rows)
     changes["contacts"] = contacts
     changes["x"] = (*model.x, *(v for c in contacts for v in c.states))
     rates = [row for c in contacts for row in ca.vertsplit(put(c.rate))]
@@ -205,7 +235,7 @@ def closed(model: System) -> dict[str, Any]:
     watched = [m for c in contacts for m in c.monitors(model.p)]
     changes["monitors"] = (*map(put.monitor, watched), *changes["monitors"])
     changes["events"] = (
-        *(put.event(e) for c in contacts for e in c.events()),
+        *(put.event(e) for c in contacts for e in c.events(sticks=c.name in unknown)),
         *changes["events"],
     )
     return changes

@@ -6,7 +6,7 @@ algebraic variables z, inputs u, parameters p.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -107,7 +107,8 @@ class Model(Showing, System):
 
     def _close(self) -> None:
         """Replace the contact forces by those of their laws, and store the open form."""
-        object.__setattr__(self, "opening", partial(opened, self.__getstate__(), Model))
+        given = {item.name: getattr(self, item.name) for item in fields(self)}
+        object.__setattr__(self, "opening", partial(opened, given, Model))
         for name, value in closed(self).items():
             object.__setattr__(self, name, value)
 

@@ -1,7 +1,7 @@
 """Friction laws in the contacts of a mechanism: their unknowns, states and events."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import final
 
 import casadi as ca
@@ -13,6 +13,7 @@ from symfric.laws.base import smooth
 from symfric.laws.base.families import FINEST, rests
 from symfric.laws.base.law import FORCE
 from symfric.model import Event, Variables, kinds
+from symfric.model.contact import mode_events
 from symfric.multibody.applied import Rest, capacity_of, forward, switches_at
 from symfric.multibody.equations import Equations
 from symfric.multibody.joint import Contact
@@ -136,26 +137,17 @@ def events(contacts: Sequence[Slip], groups: Sequence[Rest], rates: Variables) -
     return tuple(found)
 
 
-def _of_contact(slip: Slip, rest: dict[str, float]) -> Iterator[Event]:
-    """Yield the mode changes of a single contact; a stop also sets the states in `rest`.
+def _of_contact(slip: Slip, rest: dict[str, float]) -> tuple[Event, ...]:
+    """Return the mode changes of a single contact; a stop also sets the states in `rest`.
 
     A contact that stops always sticks first: only the solution of the stick equations determines
     whether it breaks away again.
     """
     contact, z = slip.contact, symbols_of(slip.states)
-    found = contact.law.switches(contact.slip, slip.N, z, **slip.inputs)
-    if slip.inputs:
-        idle = switches_at(contact.law, contact.slip, slip.N, z, ca.SX(0.0))
-        found = tuple(
-            replace(s, reset=at_rest.reset) if s.halts else s
-            for s, at_rest in zip(found, idle, strict=True)
-        )
-    for s in found:
-        reset = {f"{contact.name}_{state}": value for state, value in s.reset.items()}
-        yield Event(
-            f"{contact.name}_{s.name}", s.expression, s.direction,
-            reset=reset | (rest if s.halts else {}), at_start=s.at_start, rtol=s.rtol,
-        )  # fmt: skip
+    at, sticks = (contact.slip, slip.N, z), bool(slip.inputs)
+    return mode_events(
+        contact.law.switches, at, slip.inputs, f"{contact.name}_{{}}".format, rest, sticks
+    )
 
 
 def _of_loop(rest: Rest, contacts: Sequence[Slip]) -> Iterator[Event]:

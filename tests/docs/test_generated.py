@@ -98,16 +98,6 @@ def test_every_example_has_its_docstring_and_code() -> None:
     assert "def problem()" in pages["out_and_back"]
 
 
-def test_publications_are_collected() -> None:
-    doc = "T.\n\nSource: A, J. X 1(2), 1999, p. 3; B,\nThesis 2001 (part); with words.\n\nMore: C."
-    assert [*lists.sources(doc)] == [
-        "A, J. X 1(2), 1999, p. 3", "B, Thesis 2001 (part); with words"
-    ]  # fmt: skip
-    assert any(where.startswith("symfric.integrator.") for _, where in lists.methods())
-    named = [name for names in lists.laws().values() for name in names]
-    assert sorted(named) == sorted(ALL_LAWS | POPULATIONS)
-
-
 # ---- measurements ----
 
 
@@ -123,20 +113,6 @@ def test_stored_measurements_are_complete() -> None:
             assert all({*row} == {*one["rows"][0]} for row in one["rows"]), name
     page = measure.page()
     assert "symfric bench ivp" in page and "Summarised by hand" in page and "; load " in page
-
-
-def test_tools_are_compared_in_columns() -> None:
-    shown = measure.tables()
-    moves = measure.stored()["interop"]["tables"][0]["rows"]
-    for row in moves:
-        if not row["status"]:
-            miss = f"{float(row['miss [m]']):.1e}".replace("e-0", "e-")
-            text = f"{miss}, {row['iterations']}, {row['processor time [s]']} s"
-            assert text in shown["interop_moves"], row
-    late = sum(m["status"] == "out of time" for m in moves)
-    assert shown["interop_moves"].count("out of time") == late
-    assert "`cvodes`" in shown["interop_integrators"] and "stops" in shown["interop_integrators"]
-    assert "symfric bench interop" in shown["interop_by"]
 
 
 def test_a_measurement_is_stored_with_machine_load_and_commit(

@@ -14,7 +14,7 @@ from scipy import io
 import identification
 import symfric
 from identification.data.dataset import Dataset
-from identification.data.filters import Velocity
+from identification.data.differentiate import Velocity
 from identification.data.record import Record
 from identification.data.units import by_channel
 from identification.fit import Fit

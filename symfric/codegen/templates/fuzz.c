@@ -136,11 +136,16 @@ int main(int argc, char **argv)
 {
     const long steps = argc > 1 ? strtol(argv[1], NULL, 10) : 0;
     long good = 0, repaired = 0, altered = 0, unflagged = 0, unfinished = 0, last = 0, beyond = 0;
+    int garbage = 0; /* 1 if states may follow from random bits */
     memcpy(state, STATE_START, sizeof(real) * STATES);
     for (long k = 0; k < steps; k++) {
         real before[STATES + 1], after[STATES + 1], shown[OUTPUTS + 1];
         unsigned int must;
         int own = 0; /* 1 if a parameter differs from its default */
+        if (garbage != 0 && one_in(2)) { /* otherwise steps follow from random states */
+            memcpy(state, STATE_START, sizeof(real) * STATES);
+            garbage = 0;
+        }
         @default
         for (int i = 0; i < INPUTS; i++) {
             in[i] = valid((double)IN_LOW[i], (double)IN_HIGH[i], (double)IN_NOMINAL[i]);
@@ -166,7 +171,8 @@ int main(int argc, char **argv)
         if (one_in(4)) { /* a memory error */
             for (int i = 0; i < STATES; i++) { state[i] = any_bits(); }
             for (int i = 0; i < INPUTS && one_in(2); i++) { in[i] = any_bits(); }
-            for (int i = 0; i < PARAMS && one_in(16); i++) { param[i] = any_bits(); own = 1; }
+            for (int i = 0; i < PARAMS && one_in(16); i++) { param[i] = any_bits(); }
+            garbage = own = 1;
             if (MOST >= 0 && one_in(2)) {
                 param[MOST < 0 ? 0 : MOST] = typed(pow(10.0, 6.0 * uniform() - 3.0));
             }
@@ -176,7 +182,7 @@ int main(int argc, char **argv)
         guarded();
         if (!all_finite(out, OUTPUTS)) { unfinished++; }
         if (beyond_limit()) { beyond++; }
-        if ((*status & 16u) != 0u && !own) { last++; }
+        if ((*status & 16u) != 0u && !own && garbage == 0) { last++; }
         if ((*status & 15u) != must) { unflagged++; }
         if (*status != 0u) { repaired++; continue; }
         good++;

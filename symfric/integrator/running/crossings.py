@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from symfric.integrator.equations.expressions import divided_once
 from symfric.integrator.running.record import Record
 from symfric.model import Model
+from symfric.model.contact import mode_changes, switching
 
 Array = NDArray[np.float64]
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -118,6 +119,7 @@ class Crossings:
         record: layout of a row.
         directions, terminal: direction of each event, and True if it is terminal.
         resets: event number and state number of each reset, in order.
+        changes: how each event changes modes of contacts, see `symfric.model.contact.mode_changes`.
         follows: True if algebraic unknowns have to follow a reset.
         closes: True if loops have to be closed again after a reset.
     """
@@ -133,8 +135,14 @@ class Crossings:
     directions: tuple[int, ...]
     terminal: tuple[bool, ...]
     resets: tuple[tuple[int, int], ...]
+    changes: tuple[int, ...]
     follows: bool
     closes: bool
+
+    @cached_property
+    def decided(self) -> NDArray[np.bool_]:
+        """Mask of the events of contacts whose modes are decided together."""
+        return np.array(self.changes) == 1
 
     @property
     def count(self) -> int:
@@ -209,6 +217,7 @@ def crossings(
         tuple(e.direction for e in events),
         tuple(e.terminal for e in events),
         tuple((i, states.index(name)) for i, e in enumerate(events) for name in e.reset),
+        mode_changes(switching(model.contacts, model.x, events), events),
         follows,
         closes,
     )

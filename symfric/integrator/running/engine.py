@@ -324,14 +324,19 @@ def loop_source(
     return c_source(step, dense_rows, follow.round, crossings=crossings) + follow.c_source + march
 
 
-def search_source(crossings: Crossings, given: int) -> str:
-    """Return the C of the event search in an accepted step; `given` is the length of R."""
+def search_source(crossings: Crossings, given: int, *, decides: bool = True) -> str:
+    """Return the C of the event search in an accepted step; `given` is the length of R.
+
+    `decides`: True if the caller decides the modes of several contacts together.
+    """
     record, resets = crossings.record, crossings.resets
+    changes = [own if decides else 0 for own in crossings.changes]
     return filled(
         FOLDER / "search.c", *crossings.functions,
         n=record.n, row=record.width, y0=record.y0.start, y1=record.y1.start,
         events=crossings.count, resets=len(resets),
         directions=_table(crossings.directions), terminal=_table(crossings.terminal),
+        changes=_table(changes),
         by_event=_table(i for i, _ in resets), of_state=_table(j for _, j in resets),
         follows=int(crossings.follows),
         looks=len(LOOKS) - 1, at_looks=", ".join(map(repr, LOOKS)), kept=limits.KEPT,

@@ -37,7 +37,7 @@ class Stop(IntEnum):
     """Reason why an engine returned; some of the reasons are requests of events.
 
     `SEARCH`: algebraic unknowns need a full search after a jump of inputs. `FOLLOW`: algebraic
-    unknowns have to follow an event.
+    unknowns have to follow an event. `DECIDE`: the modes of contacts have to be decided together.
     """
 
     END = 0
@@ -48,6 +48,7 @@ class Stop(IntEnum):
     STORM = 5
     FOLLOW = 6
     SEARCH = 7
+    DECIDE = 8
 
 
 class Change(IntEnum):
@@ -104,6 +105,12 @@ class Eventful:
         if self.memory[Memory.PHASE] == Memory.ON:
             self.memory[Memory.PHASE] = Memory.JUMPED
 
+    def decided(self) -> None:
+        """Record that the modes of all contacts were decided, so none of them has to change."""
+        count = self.crossings.count
+        self.memory[Memory.before(count)][self.crossings.decided] = np.nan
+        self.memory[Memory.last(count)][self.crossings.decided] = 0.0
+
     def started(self, events: Sequence[Event], values: Array) -> None:
         """Store values just before the start for events that have already happened at the start.
 
@@ -128,6 +135,7 @@ class Search:
         self._looks, self._noise, _, self._values, self._cut, self._jump = functions
         self._doubts = _called(self.crossings.doubts)
         self._directions = np.array(self.crossings.directions)
+        self._changes = np.array(self.crossings.changes)
         count = self.crossings.count
         self._none, self._first = np.zeros((2, count))
         self._ends = np.zeros((AT_ONCE, count))
@@ -201,8 +209,11 @@ class Search:
         """Return the request of the events `which` at time `t`."""
         if any(over for over, here in zip(self.crossings.terminal, which, strict=True) if here):
             return Stop.TERMINAL
+        several = piled(self.memory, t, which, self._changes)
         if storm(self.memory, t, which):
             return Stop.STORM
+        if several:
+            return Stop.DECIDE
         return Stop.FOLLOW if self.crossings.follows else None
 
     def _crossing(self, row: Array, d: Array) -> tuple[float, NDArray[np.bool_]] | None:
@@ -259,6 +270,19 @@ def _called(function: ca.Function) -> Callable[..., list[Array]]:
         return results
 
     return called
+
+
+def piled(memory: Array, t: float, which: NDArray[np.bool_], changes: NDArray[np.intp]) -> bool:
+    """Return True if events `which` change several modes at time `t`, at once or one by one.
+
+    `changes` are those of `Crossings`; an event with the number 2 may change all modes.
+    """
+    own, last = int(changes[which].sum()), memory[Memory.last(which.size)] != 0
+    if own != 1 or not (changes[last] == 1).any():
+        return own > 1
+    count = int(memory[Memory.COUNT])
+    apart = max(float(memory[Memory.TOLERANCE]), float(np.spacing(abs(t))))
+    return t - float(memory[Memory.TIMES][(count - 1) % limits.KEPT]) < 10 * apart
 
 
 def storm(memory: Array, t: float, which: NDArray[np.bool_]) -> bool:

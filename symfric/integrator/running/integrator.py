@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.memory import remember
+from symfric.foundation.numeric import Scalar, is_casadi
 from symfric.foundation.programs import CompileError
 from symfric.foundation.variable import stacked
 from symfric.integrator.compiled.background import Prospect
@@ -20,6 +21,7 @@ from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.method import Method, suited
+from symfric.integrator.running.contact_modes import ContactModes
 from symfric.integrator.running.crossings import Crossings, crossings
 from symfric.integrator.running.engine import (
     BATCH,
@@ -31,7 +33,7 @@ from symfric.integrator.running.engine import (
 )
 from symfric.integrator.step.attempt import written
 from symfric.model import Model
-from symfric.model.kinds import in_results
+from symfric.model.kinds import MODE
 
 Array = NDArray[np.float64]
 JUDGED = 4
@@ -191,6 +193,26 @@ class Integrator:
         projected = manifold.project(s.y, s.d)[: s.nx]
         return Columns(ca.Function("states", [s.y, s.d], [projected], {"cse": True}))
 
+    @cached_property
+    def contact_modes(self) -> ContactModes:
+        """Decision of the modes of several contacts at one time."""
+        return ContactModes.of(self.model, self.of_time)
+
+    def decided(self, t: float, before: Array, y: Array, d: Array) -> Array:
+        """Return `y` with consistent modes of all contacts; unchanged if there are none.
+
+        `before` contains the unknowns before the events that led to `y`.
+        """
+
+        def solve(y: Array) -> Array:
+            if self.follow is None:
+                return y
+            found = self.follow(y, d)
+            return self.consistent(f"model '{self.model.name}'", y, d) if found is None else found
+
+        found = self.contact_modes.decided(t, before, y, d, solve)
+        return y if found is None else found
+
     def start(self, y: Array, d: Array) -> Array:
         """Return `y` with consistent algebraic unknowns; cached for runs from the same start.
 
@@ -295,6 +317,13 @@ class Integrator:
             except CompileError:  # simulate in the VM if the compiler is broken
                 self.prospect.hopeless = True
         return self.vm
+
+
+def in_results(kind: str, value: Scalar) -> Scalar:
+    """Return the value of a variable of this kind for results; modes are rounded to integers."""
+    if kind != MODE:
+        return value
+    return ca.floor(value + 0.5) if is_casadi(value) else np.floor(value + 0.5)
 
 
 def built(model: Model, inputs: InputData, method: Method) -> tuple[Integrator, bool]:

@@ -257,10 +257,16 @@ class InPython:
                 plants.happened += [(b, t, model.events[i].name) for i in np.flatnonzero(which)]
             if stop in WHY:
                 return WHY[stop]
-            if stop is Stop.FOLLOW:
+            if stop in (Stop.FOLLOW, Stop.DECIDE):
                 moved = any(model.events[i].reset for i in np.flatnonzero(jumps.which[-1]))
-                if (moved and manifold is not None and manifold.m) or not self._follow():
+                closes = moved and manifold is not None and manifold.m
+                if closes or not self._follow():
                     return SEARCH
+            if stop is Stop.DECIDE:
+                S, d = self.work.S, self.work.R[Given.d(self.integrator.system.nx)].copy()
+                t, before = float(S[State.T]), jumps.before[-1].copy()
+                S[State.Y] = self.integrator.decided(t, before, S[State.Y].copy(), d)
+                events.decided()
         return ATTEMPTS
 
 

@@ -272,9 +272,13 @@ class _March:
             run.stop(Status.EVENT_STORM, f"{Status.EVENT_STORM.value} {stopped}")
         elif reason is Stop.SEARCH:
             self._make_consistent()
-        elif reason is Stop.FOLLOW:
+        elif reason in (Stop.FOLLOW, Stop.DECIDE):
             last = run.jumps[-1]
             self._make_consistent(any(events[i].reset for i in np.flatnonzero(last.which[-1])))
+            if reason is Stop.DECIDE and run.status is Status.SUCCESS and self.events is not None:
+                before = last.before[-1].copy()
+                self.y[:] = self.integrator.decided(self.t, before, self.y.copy(), self.d)
+                self.events.decided()
             last.after[-1] = self.y
 
     def _make_consistent(self, moved: bool = False) -> None:

@@ -8,6 +8,7 @@ enum { NOTHING, RESUMED, CUT, DROPPED };
 static const double symfric_look_at[] = { $at_looks };
 static const int symfric_directions[] = { $directions };
 static const int symfric_terminal[] = { $terminal };
+static const int symfric_changes[] = { $changes };
 static const int symfric_by_event[] = { $by_event };
 static const int symfric_of_state[] = { $of_state };
 
@@ -231,6 +232,20 @@ static double symfric_crossing(const symfric_place *p, double *M, double *which)
   return -1;
 }
 
+/* Returns 1 if the events at time t change several modes (see `piled` in events.py). */
+static int symfric_piled(const double *M, double t, const double *which)
+{
+  int i, own = 0, last = 0;
+  double apart = nextafter(fabs(t), HUGE_VAL) - fabs(t);
+  for (i = 0; i < EVENTS; ++i) {
+    if (which[i] != 0) own += symfric_changes[i];
+    last += symfric_changes[i] == 1 && M[LAST + i] != 0;
+  }
+  if (own != 1 || !last) return own > 1;
+  if (apart < M[TOLERANCE]) apart = M[TOLERANCE];
+  return t - M[TIMES + ((long long)M[COUNT] - 1) % KEPT] < 10 * apart;
+}
+
 /* Returns 1 if the events at time t complete a storm (see `storm` in events.py). */
 static int symfric_storm(double *M, double t, const double *which)
 {
@@ -266,7 +281,7 @@ static int symfric_search(double *row, double *S, const double *R, double *M, do
   double *res[$res], *which = jump + 3 + 2 * UNKNOWNS, *after = jump + 3 + UNKNOWNS;
   double cut[$row], fresh[RESETS + 1], theta = symfric_crossing(&p, M, which);
   double h = row[1] - row[0], least;
-  int i, over = 0, kept;
+  int i, over = 0, kept, several;
   if (theta < 0) {
     h = R[$h_max] < M[RESUME] ? R[$h_max] : M[RESUME];
     M[RESUME] = 0;
@@ -308,10 +323,13 @@ static int symfric_search(double *row, double *S, const double *R, double *M, do
   for (i = 0; i < UNKNOWNS; ++i) S[$memory + i] = after[i];
   for (i = 0; i < EVENTS; ++i)
     if (which[i] != 0 && symfric_terminal[i]) over = 1;
+  several = symfric_piled(M, cut[1], which);
   if (over)
     *stop = 4;
   else if (symfric_storm(M, cut[1], which))
     *stop = 5;
+  else if (several)
+    *stop = 8;
   else if ($follows)
     *stop = 6;
   return kept ? CUT : DROPPED;

@@ -1,14 +1,26 @@
-"""Base classes of laws with two levels, with one formula for both directions, or with stick."""
+"""Base classes of laws with two levels, one formula for both directions, or stick; `Exact`."""
 
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import fields as fields_of
 from functools import partial
+from math import inf
 
 from symfric.foundation.numeric import Scalar, column, empty, tanh
-from symfric.foundation.parameters import parametric
+from symfric.foundation.parameters import parameters, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.law import APPLIED_FORCE, Input, Law, State, StaticLaw, Switch
+from symfric.laws.base.law import (
+    APPLIED_FORCE,
+    FORCE,
+    Facts,
+    Input,
+    Law,
+    State,
+    StaticLaw,
+    Switch,
+    chosen,
+    require_law,
+)
 
 Fall = Callable[[Scalar, Scalar, Scalar], Scalar]
 """Function that maps (v, v_s, delta) to the Stribeck weight exp(-|v / v_s|^delta)."""
@@ -175,3 +187,71 @@ def carried(mode: Scalar, F_e: Scalar, slip: Scalar) -> Scalar:
     beyond the end of stick, as does the dense output on which this end is located.
     """
     return smooth.choose(rests(mode), F_e, slip)
+
+
+@parametric
+class Exact(WithModes):
+    """Set-valued form of a law, with stick and slip as modes instead of smoothing (one state).
+
+        F = sliding force of the law to the side of the mode   slip, until v passes through zero
+        F = F_e                                                stick, up to the static level
+
+    `Law.sliding` and `Law.static_level` are the limits of the law for zero widths. A law with
+    states is replaced by its steady sliding, without presliding and lag. For the modes, F_e and the
+    tolerance see `ExactCoulomb`, which is `Exact` of Coulomb friction with a static level.
+    Limits: the smooth law for v far from its width. Each side of an asymmetric law has its own
+    sliding force and static level. Requires a model with events.
+    Source: Acary and Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, 2.
+    """
+
+    facts = Facts(("D", "S"), "set-valued at v = 0, exact by modes", "constructed")
+
+    law: Law
+
+    def __post_init__(self) -> None:
+        require_law("Exact", self.law)
+        super().__post_init__()
+        self.law.sliding(0.0, 1.0, 1)  # raises an error if it is not defined
+        self.law.static_level(1.0)
+
+    @property
+    def inner(self) -> Law:
+        """Law whose sliding force and static level are used."""
+        return self.law
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Applied force F_e [N], and the further inputs of the law."""
+        return *super().inputs, *(i for i in self.law.inputs if i.name != FORCE)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """First velocity scale of the law that is not a width [m/s]; inf without one."""
+        known = parameters(self.law).values()
+        scales = [p for p in known if p.role == "velocity scale" and not p.width]
+        return scales[0].value if scales else inf
+
+    @property
+    def widths(self) -> dict[str, int]:
+        """Empty, since widths of the law are not used."""
+        return {}
+
+    def sliding(self, v: Scalar, N: Scalar, side: int, **inputs: Scalar) -> Scalar:
+        """Return the sliding force [N] of the law to one side."""
+        return self.law.sliding(v, N, side, **chosen(self.law, inputs))
+
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the static level [N] of the law against a pull to one side."""
+        return self.law.static_level(N, side, **chosen(self.law, inputs))
+
+    def level_towards(self, direction: Scalar, N: Scalar, **inputs: Scalar) -> Scalar:
+        """Return the static level [N] of the law on the side of `direction`."""
+        back, ahead = (self.static_level(N, side, **inputs) for side in (-1, 1))
+        return smooth.choose(direction < 0, back, ahead)
+
+    def force(
+        self, v: Scalar, N: Scalar, z: Scalar = (), *, F_e: Scalar = 0.0, **inputs: Scalar
+    ) -> Scalar:
+        """Return the friction force [N]."""
+        back, ahead = (self.sliding(v, N, side, **inputs) for side in (-1, 1))
+        return carried(z[0], F_e, smooth.choose(z[0] < 0, back, ahead))

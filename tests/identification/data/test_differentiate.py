@@ -5,9 +5,10 @@ import pytest
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.differentiate import differentiate, plateaus
-from identification.data.filters import Filter, Velocity, lowpass
+from identification.data.differentiate import Velocity, differentiate
+from identification.data.filters import Filter, lowpass
 from identification.data.record import Record
+from identification.data.regression import plateaus
 from symfric.laws import Stribeck
 
 T = np.arange(4001) * 1e-3
@@ -62,9 +63,9 @@ def test_noise_of_the_velocity_is_that_of_the_filtered_noise() -> None:
     x: NDArray[np.float64] = np.sin(W * T) + noise
     filter = Filter(100.0)
     expected = np.gradient(lowpass(noise, 100.0, 1e-3), 1e-3)[50:-50].std()
-    found = Velocity.of(x, None, 1e-3).deviation(filter, 1e-3)
+    found = Velocity.of(x, None, 1e-3).errors(filter, 1e-3)[0]
     assert found == pytest.approx(expected, rel=0.15)
-    measured = Velocity.of(None, np.cos(W * T) + noise, 1e-3).deviation(filter, 1e-3)
+    measured = Velocity.of(None, np.cos(W * T) + noise, 1e-3).errors(filter, 1e-3)[0]
     assert measured == pytest.approx(lowpass(noise, 100.0, 1e-3).std(), rel=0.15)
 
 

@@ -1,6 +1,9 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
+from identification.data.differentiate import position_noise
 from identification.data.filters import (
     Decimation,
     bandwidth,
@@ -8,6 +11,8 @@ from identification.data.filters import (
     choose_filter,
     lowpass,
     position_band,
+    smoothed,
+    spectrum,
 )
 
 
@@ -95,6 +100,30 @@ def test_noise_of_the_position_narrows_the_filter() -> None:
     assert (wide.cutoff, wide.decimation) == (100.0, 10)
     assert narrow.cutoff < wide.cutoff
     assert narrow.decimation > wide.decimation
+
+
+def test_the_smoothing_spline_is_the_solution_of_the_dense_problem() -> None:
+    n, cutoff = 60, 0.03
+    u = np.random.default_rng(0).standard_normal(n)
+    D = np.diff(np.eye(n), 2, axis=0)
+    dense = np.eye(n) + D.T @ D / (2 * np.sin(np.pi * cutoff)) ** 4
+    np.testing.assert_allclose(smoothed(u, cutoff), np.linalg.solve(dense, u), atol=1e-12)
+    np.testing.assert_allclose(smoothed(3.0 + 0.1 * np.arange(n), cutoff), 3.0 + 0.1 * np.arange(n))
+
+
+def test_a_line_of_a_coarse_encoder_does_not_widen_the_band() -> None:
+    """At 1 um per sample and counts of 5 um, a line lies at 200 Hz, far above the motion."""
+    t = np.arange(10_000) * 1e-3
+    x = 5e-3 * np.sin(2 * np.pi * 1.3 * t) * (t < 5) + 1e-3 * np.maximum(t - 5, 0)
+    assert position_band(5e-6 * np.round(x / 5e-6), 1e-3) < 60.0
+
+
+@pytest.mark.parametrize("rate", [np.gradient, lambda x: np.diff(x, append=0.0), None])
+def test_noise_of_a_differenced_position_is_recognised(rate: Any) -> None:
+    noise = 2e-3 * np.random.default_rng(0).standard_normal(20_000)
+    found = position_noise(spectrum(noise if rate is None else rate(noise)))
+    assert (found is None) == (rate is None)
+    assert found is None or np.sqrt(found[0]) == pytest.approx(2e-3, rel=0.1)
 
 
 def test_band_of_a_position_sampled_slower_than_once_a_second() -> None:

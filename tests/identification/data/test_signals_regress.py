@@ -7,14 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.differentiate import (
-    LinearFit,
-    derivatives,
-    differentiate,
-    linear_regression,
-)
-from identification.data.filters import Filter, Velocity, lowpass
+from identification.data.differentiate import Velocity, derivatives, differentiate
+from identification.data.filters import Filter, lowpass
 from identification.data.record import Record
+from identification.data.regression import LinearFit, linear_regression
 from identification.data.synthetic import synthetic_drive_data
 from symfric.laws import Coulomb, Sum, Viscous
 
@@ -129,7 +125,7 @@ def off(x: Array, v: Array | None) -> tuple[float, float]:
     """Root mean square error of the velocity, and the standard deviation that is stated."""
     reported = Velocity.of(x, v, STEP)
     found = derivatives(x, v, STEP, PLAIN, reported)[1]
-    return float(np.std((found - V)[INSIDE])), reported.deviation(PLAIN, STEP)
+    return float(np.std((found - V)[INSIDE])), float(reported.errors(PLAIN, STEP)[0])
 
 
 def test_the_mixture_is_less_noisy_than_either_and_reports_its_noise() -> None:

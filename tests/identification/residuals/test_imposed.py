@@ -37,8 +37,9 @@ def imposed(law: Law, t: np.ndarray = T, v: np.ndarray = V) -> Evaluation:
     one = subject(law, points=True, moving=True)
     known = parameters(one.law)
     data = Dataset.of(t=t, v=v, F=0 * t, units={"v": "m/s", "F": "N"})
-    values = np.array([float(known[n].value) for n in one.names])
-    return evaluated(Points().prepare(one, data), values)
+    rows = Points().prepare(one, data)
+    values = [float(known[n].value) for n in one.names] + [u.start for u in rows.own]
+    return evaluated(rows, np.array(values))
 
 
 SOFT = LuGre(mu_s=0.4, mu_d=0.3, v_s=0.02, sigma_0=500.0, sigma_1=0.5, sigma_2=0.5)

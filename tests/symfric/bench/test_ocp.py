@@ -104,8 +104,8 @@ def test_formulas_by_hand_are_those_of_the_model(name: str) -> None:
     ("name", "mean", "range"),
     [
         ("voice_coil", 0.0, 5.0),
-        ("three_blocks", 0.0, 4.0),
-        ("two_blocks", 0.0, 16.0),
+        pytest.param("three_blocks", 0.0, 4.0, marks=pytest.mark.slow),
+        pytest.param("two_blocks", 0.0, 16.0, marks=pytest.mark.slow),
         ("parcel_on_tray", 2.9, 0.5),
     ],
 )
@@ -173,6 +173,7 @@ def test_quick_has_fewer_contenders() -> None:
     assert {*contenders(True)} < {*contenders(False)}
 
 
+@pytest.mark.slow
 def test_opti_solves_the_smooth_problem_and_misses_with_dry_friction() -> None:
     """Without friction, 10 m from rest to rest cost 12 (10 m)^2 / T^3."""
     found = opti(replace(BLOCK, ends={1.0: {0: 10.0, 1: 0.0}}), 10.0, width=0.01)

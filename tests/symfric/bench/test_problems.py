@@ -183,6 +183,7 @@ def test_the_cycle_of_dry_friction_is_that_of_the_closed_form() -> None:
     assert last_cycle(simulate(scene.model(), 1.0)).size == 0
 
 
+@pytest.mark.slow
 def test_break_away_is_late_by_the_passage_of_a_fold(measured: dict[str, list[Row]]) -> None:
     """Riccati's m v_t w' = k v_b t + N c w^2 blows up at the first zero of the Airy function.
 

@@ -162,6 +162,16 @@ def test_the_c_of_a_fit_has_its_numbers(symfric) -> None:
         Path("f.json").write_text(json.dumps(changed | {"status": status}), encoding="utf-8")
         err = symfric("codegen f.json --real double --no-kit --out d").err
         assert ("f.json: status of the fit DOUBTFUL" in err) is noted
+    changed["parameters"]["v_s"] |= {"low": None, "high": None, "standard_error": None}
+    Path("f.json").write_text(json.dumps(changed), encoding="utf-8")
+    assert (
+        "got v_s without an interval; give --set v_s=VALUE"
+        in symfric("codegen f.json --out e", 2).err
+    )
+    for option in ("--accept v_s", "--set v_s=0.01"):
+        symfric(f"codegen f.json --real double --no-kit --out e {option}")
+    assert "--accept: expected one of" in symfric("codegen f.json --out e --accept v_x", 2).err
+    assert "--accept: expected with a fit" in symfric("codegen lugre --out e --accept mu_s", 2).err
 
 
 def test_sizes_are_measured_on_cores_without_a_compiler(

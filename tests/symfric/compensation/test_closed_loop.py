@@ -79,6 +79,7 @@ def test_wrong_levels_compensate_less_and_excessive_ones_hunt() -> None:
     assert "! too much: hunts at rest" in found.table()
 
 
+@pytest.mark.slow
 @heavy
 def test_observers_find_what_a_law_or_a_weak_compensator_leaves() -> None:
     """The law on the measured velocity: 77 times smaller with the error as input, 5 without."""

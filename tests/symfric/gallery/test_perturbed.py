@@ -54,6 +54,7 @@ def unseen(changes: Sequence[Job], quick: bool = True) -> set[str]:
     return {job for job, message in verdicts(changes, quick).items() if not message}
 
 
+@pytest.mark.slow
 def test_a_changed_number_and_a_changed_law_change_a_verdict() -> None:
     """One of each kind, in the figure that shows it."""
     table = Job("symfric/gallery/selection/tables.py", "PRINTED", 1, "", ("selection/fig_02",))

@@ -39,7 +39,12 @@ COSTLY = dict.fromkeys(
     ("generalized_maxwell_slip/fig_05_presliding", "selection/fig_07_box_displacement",
      "generalized_maxwell_slip/fig_02_lag_of_the_generic_model", "self_tuning/fig_13_jitter",
      "laminator_nips/fig_5_7_stick_slip", "generalized_maxwell_slip/fig_07_transition",
-     "generalized_maxwell_slip/fig_09_drift"), pytest.mark.slow,
+     "generalized_maxwell_slip/fig_09_drift", "generalized_maxwell_slip/fig_06_frictional_lag",
+     "self_tuning/fig_14_four_mass_positions", "self_tuning/fig_15_four_mass_velocities",
+     "self_tuning/fig_16_four_mass_accelerations", "selection/fig_06_pendulum_box",
+     "selection/fig_08_box_velocity", "selection/fig_09_box_acceleration",
+     "selection/fig_10_pendulum_angle", "selection/fig_11_pendulum_velocity",
+     "selection/fig_12_pendulum_acceleration"), pytest.mark.slow,
 )  # fmt: skip
 """Figures above a second; others of their modules run in every suite."""
 

@@ -1,7 +1,5 @@
 """The flow of a model as a Function: values, and derivatives of both orders."""
 
-from typing import Any
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -10,7 +8,6 @@ from scipy.linalg import expm
 
 from symfric import BrownMcPhee, LuGre, Model, Variable, flow, rabinowicz, simulate
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.model import Event
 
 K, C, START = 4.0, 0.3, np.array([1.0, 0.5])
 
@@ -97,19 +94,3 @@ def test_derivatives_of_both_orders_meet_the_matrix_exponential() -> None:
     assert by_k == pytest.approx((tower[:2, 2:4] @ START)[0], rel=1e-6)
     assert by_kk == pytest.approx(2 * (tower[:2, 4:] @ START)[0], rel=1e-5)
     assert by_T == pytest.approx(exact(2.0)[1], rel=1e-6)
-
-
-def falling() -> Model:
-    x = Variable("x", "m", start=1.0)
-    return Model("falling", x=(x,), ode=ca.SX(-1.0), events=(Event("ground", x.symbol),))
-
-
-def test_bad_requests_are_refused() -> None:
-    cases: tuple[tuple[Model, dict[str, Any], str], ...] = (
-        (oscillator(), {"steps": 0}, "flow: steps: expected a whole number >= 1, got 0"),
-        (oscillator(), {"method": "euler"}, "flow: method: expected one of .*rodas5p.*, got euler"),
-        (falling(), {}, "flow: expected a model without events, got 1 in 'falling'"),
-    )
-    for model, arguments, message in cases:
-        with pytest.raises(ValueError, match=message):
-            flow(model, **arguments)

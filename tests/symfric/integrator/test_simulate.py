@@ -211,34 +211,6 @@ def test_a_long_run_runs_on_and_one_without_progress_stops(monkeypatch: pytest.M
     assert few.statistics.steps + few.statistics.rejections == 60
 
 
-BAD: list[tuple[dict[str, Any], str]] = [
-    ({"t_end": 0.0}, r"expected t_end > t_start = 0 s, got 0 s"),
-    ({"t_start": "soon"}, r"t_start: expected a finite number \[s\], got 'soon'"),
-    ({"rtol": 0.0}, r"rtol: expected 1e-13 <= number <= 0.1, got 0"),
-    ({"backend": "matlab"}, r"backend: expected .*auto, .* got '?matlab"),
-    ({"x0": {"vel": 1.0}}, r"model 'drive' x0: .* got vel"),
-    ({"u": {"torque": 1.0}}, r"model 'drive' u: expected one of force, got torque"),
-    ({"p": {"m": 1.0}}, r"model 'drive' p: expected no names, got m"),
-    ({"t_eval": [0.0, 0.5, 0.5]}, r"t_eval: expected increasing times in \[0, 1\] s"),
-    ({"max_step": 0.0}, r"max_step: expected a number > 0 \[s\], got 0"),
-    ({"times": [0.5, 0.5]}, r"simulate: times: expected increasing times in \[0, 1\] s"),
-    ({"t_eval": [[0.0, 1.0]]}, r"t_eval: expected increasing times .* got \[\[0.0, 1.0\]\]"),
-]
-
-
-def test_bad_input_is_refused_with_its_place() -> None:
-    for given, message in BAD:
-        with pytest.raises(ValueError, match=message):
-            simulate(cart(), **{"t_end": 1.0, **given})
-
-
-def test_algebraic_equation_without_a_solution_is_reported() -> None:
-    z = Variable("z", "1", start=1.0)
-    model = Model("none", x=(x,), z=(z,), ode=-z.symbol, alg=z.symbol**2 + 1)
-    with pytest.raises((ValueError, SolveError), match=r"consistent|stopped at t = 0 s"):
-        simulate(model, 1.0)
-
-
 def test_nominal_values_scale_the_absolute_tolerance() -> None:
     """In micrometres the same model must not be solved a million times worse."""
     slow = Variable("s", "um", start=1e6, nominal=1e6)

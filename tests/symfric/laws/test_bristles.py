@@ -10,15 +10,7 @@ from oracles import dahl_virgin
 from rigs import prescribed_motion, through
 from scipy.integrate import solve_ivp
 
-from symfric import (
-    Dahl,
-    Law,
-    LuGre,
-    OverloadWarning,
-    drive,
-    rabinowicz,
-    simulate,
-)
+from symfric import Dahl, Law, LuGre, OverloadWarning, drive, rabinowicz, simulate
 from symfric.laws import (
     BlimanSorine,
     BoucWen,
@@ -151,14 +143,6 @@ def test_passive_form_fades_the_damping() -> None:
     assert "sigma_2 = 0 is below sigma_1 (mu_s - mu_d) / mu_d = 95" in warning
     laws = LuGre(sigma_2=95.1), LuGrePassive(), LuGre(sigma_1=ca.SX.sym("c")), LuGreNormalised()
     assert [len(law.warnings()) for law in laws] == [0, 0, 0, 1]
-
-
-def test_lifting_off_while_stuck_lets_go_in_the_normalised_form_only() -> None:
-    law, stuck = LuGreNormalised(), 0.9 * LuGre().steady_state(1e-6, N)
-    z = 0.9 * law.steady_state(1e-6, N)
-    assert law.force(0.0, N, z) == pytest.approx(0.9 * STATIC, rel=1e-6)
-    assert law.force(0.0, 0.0, z) == law.force(0.1, 0.0, z) == 0.0
-    assert LuGre().force(0.0, 1e-9, stuck) == pytest.approx(0.9 * STATIC, rel=1e-6)
 
 
 def test_slow_belts_take_the_block_to_the_static_level_and_no_further() -> None:

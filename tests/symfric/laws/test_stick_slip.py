@@ -97,22 +97,6 @@ def test_contact_without_load_or_friction_slides_from_the_start() -> None:
         assert run.final["v"] == pytest.approx((1 - np.cos(3)) / 2.4, rel=1e-7)
 
 
-def test_strong_load_turns_the_motion_around_without_stick() -> None:
-    run = simulate(BLOCK_MODEL, 2.0, x0={"v": -1.0}, u={"force": 2.0}, rtol=1e-9)
-    stop = 0.8 * 1.0 / (2.0 + 0.1 * LOAD)
-    assert [name for _, name in run.happened] == ["stick"]
-    assert run.happened[0][0] == pytest.approx(stop, abs=1e-9)
-    assert run.final["v"] == pytest.approx((2.0 - 0.1 * LOAD) / 0.8 * (2.0 - stop), rel=1e-8)
-
-
-def test_weak_load_stops_for_good() -> None:
-    run = simulate(BLOCK_MODEL, 5.0, x0={"v": 1.0}, u={"force": 0.5}, rtol=1e-9)
-    deceleration = (0.1 * LOAD - 0.5) / 0.8
-    assert run.final["v"] == 0.0
-    assert run.final["x"] == pytest.approx(0.5 / deceleration, rel=1e-8)
-    assert run.final["friction"] == 0.5
-
-
 def test_work_of_the_contact_is_what_the_block_loses() -> None:
     run = simulate(BLOCK_MODEL, 2.0, x0={"v": 1.0}, rtol=1e-9, samples=20_001)
     assert np.trapezoid(run["power"], run.t) == pytest.approx(0.4, rel=1e-6)
@@ -204,6 +188,13 @@ def test_weak_load_stops_for_good_and_a_strong_one_turns_the_motion_around() -> 
         run = simulate(model, 2.0, x0={"v": -0.5}, u={"force": 2.0}, rtol=1e-9)
         assert run.final["v"] > 1.0, name
         assert len(run.happened) <= 2, name
+    weak, strong = (0.1 * LOAD - 0.5) / 0.8, (2.0 + 0.1 * LOAD) / 0.8  # decelerations [m/s^2]
+    run = simulate(BLOCK_MODEL, 2.0, x0={"v": 0.1}, u={"force": 0.5}, rtol=1e-9)
+    assert run.final["x"] == pytest.approx(0.1**2 / 2 / weak, rel=1e-8)
+    run = simulate(BLOCK_MODEL, 2.0, x0={"v": -0.5}, u={"force": 2.0}, rtol=1e-9)
+    assert run.happened == ((pytest.approx(0.5 / strong, abs=1e-9), "stick"),)
+    after = (2.0 - 0.1 * LOAD) / 0.8 * (2.0 - 0.5 / strong)
+    assert run.final["v"] == pytest.approx(after, rel=1e-8)
 
 
 def test_contact_takes_power_and_stays_below_its_static_level() -> None:

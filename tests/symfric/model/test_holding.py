@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from symfric import ExactCoulomb, Karnopp, Law, LuGre, Model, Variable, contact, simulate
+from symfric import ExactCoulomb, Hold, Karnopp, Law, LuGre, Model, Variable, contact, simulate
 
 COULOMB = ExactCoulomb(mu_s=0.3, mu_d=0.2)
 
@@ -168,7 +168,9 @@ UNDETERMINED: dict[str, dict[str, Any]] = {
     "no other contact on it whose law needs F_e":
         {"contacts": (ONE, TWO), "ode": U - ONE.force - TWO.force},
     "equations without algebraic variables that depend on friction":
-        {"ode": A.symbol, "z": (A,), "alg": 2 * A + FLOOR.force - U},
+        {"contacts": (ONE,), "ode": A.symbol, "z": (A,), "alg": 2 * A + ONE.force - U},
+    "a sliding velocity without inputs, whose":
+        {"contacts": (MOVED,), "ode": A.symbol, "z": (A,), "alg": 2 * A + MOVED.force - U},
     "explicit equations":
         {"xdot": RATES, "residual": RATES + ca.vertcat(-V, RATES[1] + FLOOR.force, 0)},
 }  # fmt: skip
@@ -181,3 +183,33 @@ def test_forces_that_the_equations_do_not_determine_are_refused() -> None:
             parts = parts | {"ode": ca.vertcat(V, parts["ode"])}
         with pytest.raises(ValueError, match=f"F_e: expected {expected}.*contact.*F_e=pull"):
             Model("own", x=(X, V), u=(U,), **{"contacts": (FLOOR,)} | parts)
+
+
+def blocks(implicit: bool) -> Model:
+    """Two blocks with a spring between them; their accelerations are algebraic variables or not.
+
+    A tenth of the friction of the first block also acts on the second one.
+    """
+    x = [Variable(f"x{i}", "m") for i in range(2)]
+    v = [Variable(f"v{i}", "m/s") for i in range(2)]
+    a = [Variable(f"a{i}", "m/s^2") for i in range(2)]
+    u, speeds = Variable("u", "N"), [s.symbol for s in v]
+    pull = 40.0 * (x[0] - x[1])
+    c = [contact(f"c{i}", ExactCoulomb(mu_s=0.3, mu_d=0.3), v[i], 10.0 + 5 * i) for i in range(2)]
+    rates = [(u - pull - c[0].force) / 2.0, pull - c[1].force - 0.1 * c[0].force]
+    parts: dict[str, Any] = {"ode": ca.vertcat(*speeds, *rates)}
+    if implicit:
+        accelerations = [s.symbol for s in a]
+        alg = ca.vertcat(*accelerations) - ca.vertcat(*rates)
+        parts = {"z": tuple(a), "ode": ca.vertcat(*speeds, *accelerations), "alg": alg}
+    return Model("blocks", x=(*x, *v), u=(u,), contacts=tuple(c), **parts)
+
+
+def test_applied_forces_may_be_algebraic_variables() -> None:
+    """Both forms of the equations have the same motion, also if the modes change together."""
+    rng = np.random.default_rng(4)
+    u = {"u": Hold(np.linspace(0.0, 2.5, 10, endpoint=False), rng.uniform(-20, 20, 10))}
+    one, other = (simulate(blocks(form), 2.5, u=u, rtol=1e-10) for form in (False, True))
+    assert len(one.happened) > 5
+    for name in ("x0", "x1", "v0", "v1"):
+        np.testing.assert_allclose(one[name], other[name], rtol=0, atol=1e-7)

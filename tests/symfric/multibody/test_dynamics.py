@@ -10,9 +10,7 @@ from chains import TREE, at_start, chain, in_both, rod, solve, state
 
 from symfric import BrownMcPhee, LuGre
 from symfric import multibody as mb
-from symfric.foundation.parameters import Variable
 from symfric.multibody.dynamics import kinetic_energy
-from symfric.multibody.equations import equations
 from symfric.multibody.forces import Force
 from symfric.multibody.prepare import Prepared
 from symfric.scenes import MECHANISMS, Arm, FourMass
@@ -207,18 +205,6 @@ def test_dampers_take_energy() -> None:
         assert rate == 0.0
 
 
-def test_absent_terms_cost_nothing() -> None:
-    """A spring without damping has no velocity in it, one without length no root."""
-    made = made_in("joint", False)
-    topology, t, counts = made.eq.kin.topology, made.eq.kin.t, list[int]()
-    for more in ((), (1.0,), (1.0, 2.0)):
-        eq = equations(topology, [mb.SpringDamper("s", "ground", "b1", 3.0, *more)], [],
-                       made.eq.q, made.eq.qd, t)  # fmt: skip
-        b = ca.Function("b", [eq.q, eq.qd, eq.a, eq.lam], [eq.balance])
-        counts.append(b.n_instructions())
-    assert counts == sorted(set(counts))
-
-
 def test_mass_bias_and_inverse_dynamics_fit_each_other() -> None:
     m = chain()
     f, made = mb.functions(m), m.prepare()
@@ -254,20 +240,3 @@ def test_constraints_and_energy_are_those_of_the_model() -> None:
     kinetic, potential = (float(e) for e in f["energy"].call([x[:4], x[4:8], []]))
     assert kinetic == pytest.approx(3.0)
     assert kinetic + potential == pytest.approx(387.9365209137809)
-
-
-def test_poses_give_the_positions_of_the_bodies() -> None:
-    pose = mb.functions(rod())["poses"]([np.pi / 2], []).full()
-    assert pose[:, 3] == pytest.approx([-0.4, 0.0, 0.0])
-    assert pose[:, :3] @ pose[:, :3].T == pytest.approx(np.eye(3))
-
-
-def test_parameters_enter_by_their_symbols() -> None:
-    radius = Variable("radius", "m", start=0.1)
-    friction = mb.JointFriction(BrownMcPhee(), radius=radius.symbol)
-    f = mb.functions(rod(friction), (radius,))["inverse_dynamics"]
-    still, sliding = (
-        [float(f([0.0], [w], [0.0], [], [], [], [r])) for r in (0.1, 0.2)] for w in (0.0, 1.0)
-    )
-    assert still == pytest.approx([0.0, 0.0])
-    assert sliding[1] == pytest.approx(2 * sliding[0], rel=1e-3)

@@ -9,12 +9,12 @@ import casadi as ca
 import numpy as np
 import pytest
 from chains import X, Y, Z, attach, in_joint_coordinates_first, rod
+from tables import table
 
 from symfric import BrownMcPhee, LuGre, SolveError, Viscous, simulate
 from symfric import multibody as mb
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
-from symfric.multibody.start import following
 
 LAW = BrownMcPhee()
 
@@ -65,16 +65,6 @@ def slider_on_a_rod(start: float = 0.8, length: Scalar = 1.0) -> mb.Mechanism:
     attach(m, mb.Prismatic, "z", "block_z", z=Z, start=0.6)
     m.joint(mb.Distance("rod", "block_x", "block_z", length=length))
     return m
-
-
-def test_rates_that_cannot_stay_move_to_the_nearest() -> None:
-    J, still = np.array([[0.8, 0.6]]), np.zeros(1)
-    assert following(J, np.array([1.0, 1.0]), still) == pytest.approx([0.6 * -0.2, 0.8 * 0.2])
-    assert following(J, np.array([1.0, 0.0]), still) == pytest.approx([1.0, -4 / 3])
-    assert following(np.array([[1.0, 0.0]]), np.array([1.0, 0.0]), still) == pytest.approx([0, 0])
-    assert following(J, np.zeros(2), np.array([0.5])) == pytest.approx([-0.4, -0.3])
-    twice = np.array([[0.8, 0.6], [1.6, 1.2]])
-    assert following(twice, np.array([0.0, 3.0]), np.zeros(2)) == pytest.approx([-9 / 4, 3.0])
 
 
 def test_loops_that_cannot_be_closed_are_refused() -> None:
@@ -209,97 +199,17 @@ def held(expression: Callable[[Any], Any]) -> Change:
 
 
 pushed = partial(force, mb.UserForce, "push", "rod")
-PUSH, HELD = "'push' > expression: expected a force and", "'held' > expression: expected one or a"
-PIN, BOB, POSITIONS = ("pin", "rod", "ground"), "> body 'bob'", "expected positions only, got velo"
-
-MISTAKES: list[tuple[Change, str]] = [
-    (body(0.0, J), f"{BOB} > mass: expected > 0 kg, got 0"),
-    (body("1", J), f"{BOB} > mass: expected a number [kg], got '1'"),
-    (body(10**400, J), f"{BOB} > mass"),
-    (body(np.inf, J), f"{BOB} > mass"),
-    (body(ca.SX.sym("load"), J), f"{BOB}: expected only declared parameters, got load; pass the"),
-    (body(1.0, (0, 0, 0)), f"{BOB} > inertia: expected positive principal moments, got 0, 0, 0"),
-    (body(1.0, (1, 1, 1, 2, 0, 0)), "> inertia: expected positive principal moments, got -1, 1, 3"),
-    (body(1.0, (1, 1, 3)), "largest principal moment to be at most the sum of the others, got 1, "),
-    (body(1.0, (1, 1)), "> inertia: expected 3 or 6 numbers [kg m^2], got 2; write (Jxx, Jyy, Jzz"),
-    (body(1.0, np.eye(3)), f"{BOB} > inertia: expected 3 or 6 numbers"),
-    (body(1.0, (np.inf,) * 3), f"{BOB} > inertia"),
-    (body(1.0, J), f"{BOB}: expected joints with coordinates up to the ground, found none; "
-                   "a Floating joint lets it move freely"),
-    (lambda m: m.body("the bob", 1.0, J), "body 'the bob': expected a name that is a C identifier"),
-    (lambda m: m.body("hinge", 1.0, J), "> joint 'hinge': expected every name once"),
-    (lambda m: [m.body("bob", 1.0, J) for _ in "ab"], f"{BOB}: expected every name once"),
-    (lambda m: m.input("hinge", "N"), "> input 'hinge': expected every name once"),
-    (lambda m: m.frame("bob.tip"), "> frame 'bob.tip': expected 'body.frame' of a known body"),
-    (lambda m: m.frame("rod.tip", z=(0, 0, 0)), "'rod.tip' > z: expected three numbers that are"),
-    (lambda m: m.frame("rod.hinge", z=X), "> frame 'rod.hinge': expected every name once"),
-    (lambda m: m.joint("hinge"), "> joint: expected a Joint of symfric.multibody, got 'hinge'"),
-    (joint(mb.Fixed, "weld", "rodd", "ground"), "or 'body.frame', got rodd; did you mean rod?"),
-    (joint(mb.Fixed, "weld", "rod.tip", "ground"), "expected one of the frames hinge, got rod."),
-    (joint(mb.Fixed, "weld", "rod", "rod.hinge"), "'weld': expected two bodies, got rod twice"),
-    (joint(mb.Fixed, "weld", "", "ground"), "> joint 'weld': expected a body or 'body.frame', go"),
-    (joint(mb.Revolute, *PIN, axis=X), "got axis; the axis of a joint is the z"),
-    (joint(mb.Revolute, *PIN, friction=LAW), "expected JointFriction(law, radius=...), got Brown"),
-    (joint(mb.Revolute, *PIN, friction=mb.JointFriction(LAW, radius=ca.SX.sym("R"))),
-     "> joint 'pin' > friction: expected only declared parameters and inputs, got R"),
-    (joint(mb.Distance, "stay", "ground", "rod", length=0.0), "'stay' > length: expected > 0 m,"),
-    (joint(mb.Distance, "stay", "ground.hinge", "rod.hinge", length=2.0),
-     "> start: expected positions that satisfy stay_lambda, got -2; no position near it satis"),
-    (of_bob(mb.Floating, "pose", friction=mb.JointFriction(LAW)),
-     "> joint 'pose' > friction: expected a joint with friction"),
-    (of_bob(mb.Spherical, "ball", start=(1.0, 0.0)), "'ball' > start: expected 4 numbers, got 2"),
-    (of_bob(mb.Revolute, "pin", rate=np.nan), "'pin' > rate: expected finite numbers, got nan"),
-    (force(mb.SpringDamper, "s", "ground", "bob"), "'s': expected a body or 'body.frame', got bob"),
-    (force(mb.SpringDamper, "s", "ground", "rod", np.nan), "> stiffness: expected a finite number"),
-    (force(mb.SpringDamper, "s", "ground.hinge", "rod.hinge", 1.0, 0.1),
-     "> force 's': expected a finite force at the start, got nan; do its places coincide"),
-    (force(mb.JointSpringDamper, "motor", "hing"), "> force 'motor': expected a joint, got hing"),
-    (force(mb.JointSpringDamper, "motor", "hinge", actuator=ca.SX.sym("torque")),
-     "> force 'motor': expected only declared positions, velocities, time, parameters and inputs, "
-     "got torque"),
-    (force(mb.JointSpringDamper, "e", "hinge", "slide"), "> direction: expected turn, got slide"),
-    (lambda m: (of_bob(mb.Universal, "u", "ground")(m), m.force(mb.JointSpringDamper("e", "u"))),
-     "> force 'e' > direction: expected x or y, got none"),
-    (drive("d", "hinge", 0.3), "> drive 'd' > motion: expected a function of time, got 0.3"),
-    (drive("d", "y", lambda t: t), "> drive 'd': expected a joint, got y"),
-    (drive("d", "hinge", lambda t: t, "slide"), "'d' > direction: expected turn, got slide"),
-    (drive("d", "hinge", lambda t: ca.vertcat(t, t)), "> motion: expected one expression, got 2"),
-    (drive("d", "hinge", lambda t: ca.SX.sym("w") * t),
-     "> drive 'd': expected an expression of positions, time and parameters, got w; the two deriv"),
-    (drive("d", "hinge", ca.sqrt), "start: expected a finite velocity of d_moment"),
-    (drive("hinge", "hinge", lambda t: t), "> drive 'hinge': expected every name once"),
-    (lambda m: (u := m.input("wish", "m"), drive("d", "hinge", lambda t: u)(m)),
-     "got wish; the two derivatives of an input are unknown"),
-    (lambda m: m.constraint(mb.Screw("j", "a", 0.1, friction=None)),  # type: ignore[call-arg]
-     "expected name, joint, lead, offset, got fric"),
-    (coupled(mb.Gear, "hinge", "r9", 2.0), "'c': expected a joint, got r9"),
-    (coupled(mb.Gear, "hinge", "r1", 0.0), "'c' > ratio: expected a finite number other than 0"),
-    (coupled(mb.Rolling, "hinge", "hinge", 1.0), "'c' > direction: expected turn, got slide"),
-    (coupled(mb.Rolling, "hinge", "r1", np.nan), "'c' > radius: expected a finite number"),
-    (coupled(mb.Screw, "hinge", 1.0), "'c' > direction: expected turn, got slide"),
-    (coupled(mb.Gear, "hinge", "hinge", 1.0, np.inf), "'c' > offset: expected a finite"),
-    (coupled(mb.Gear, "hinge", "hinge", 2.0), "'c' > expected two displacements, got turn of hin"),
-    (pushed(lambda kin: None), PUSH),
-    (pushed(lambda kin: (0, 0, 0)), PUSH),
-    (pushed(lambda kin: ((0, 0), (0, 0, 0))), PUSH),
-    (pushed(lambda kin: ("abc", "def")), PUSH),
-    (pushed(lambda kin: ((np.nan, 0, 0), (0, 0, 0))), PUSH),
-    (pushed(lambda kin: (kin.point("c.x")[0], (0, 0, 0))), "expected a place 'body.frame', got c"),
-    (held(lambda kin: None), HELD),
-    (held(lambda kin: "z"), HELD),
-    (held(lambda kin: kin.motion["rod"].R), HELD),
-    (held(lambda kin: ca.SX(0, 1)), HELD),
-    (held(lambda kin: kin.point("rod")[1][0]), f"constraint 'held' > expression: {POSITIONS}"),
-]  # fmt: skip
+PIN = ("pin", "rod", "ground")
 
 
 def test_mistakes_are_described_with_their_path() -> None:
-    for change, message in MISTAKES:
+    """Changes of rod() in mistakes.toml."""
+    for change, message in table(__file__, "mistakes").items():
         m = rod()
         with pytest.raises(ValueError) as caught:
-            change(m)
+            eval(change, globals() | {"ca": ca})(m)
             m.build()
-        assert message in str(caught.value)
+        assert message in str(caught.value), change
         assert "mechanism 'rod' > " in str(caught.value) or not message.startswith(">")
 
 

@@ -1,11 +1,11 @@
 """Charts and pages as text: parsed as XML, with points where they belong and nothing unescaped."""
 
 import xml.etree.ElementTree as ET
-from html.parser import HTMLParser
 from re import findall
 
 import numpy as np
 import pytest
+from pages import Balanced
 
 from symfric.page import html
 from symfric.page.svg import (
@@ -25,21 +25,6 @@ from symfric.page.svg import (
 )
 
 NASTY = "<script>alert('1')</script> & \"x\""
-
-
-class Balanced(HTMLParser):
-    """Every element is closed where it should be."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag != "meta":
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
 
 
 def test_points_are_at_their_numbers_and_a_missing_number_splits_a_line() -> None:
@@ -123,9 +108,7 @@ def test_a_page_is_one_document_with_escaped_text() -> None:
     page = html.page(NASTY, "en", "".join(body))
     assert "<script" not in page
     assert page.startswith("<!DOCTYPE html>")
-    check = Balanced()
-    check.feed(page)
-    assert check.open == []
+    Balanced(page)
     assert page.count("&lt;script&gt;") == 17
 
 

@@ -13,17 +13,9 @@ from matplotlib.colors import to_hex
 from numpy.typing import NDArray
 from PIL import Image
 
-from symfric import (
-    BrownMcPhee,
-    ExactCoulomb,
-    Model,
-    Trajectory,
-    Variable,
-    rabinowicz,
-    simulate,
-)
+from symfric import BrownMcPhee, ExactCoulomb, Model, Trajectory, Variable, rabinowicz, simulate
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
-from symfric.multibody import Distance, Mechanism, PinInSlot, Prismatic, Revolute, Spherical
+from symfric.multibody import Distance, Mechanism, PinInSlot, Prismatic, Revolute
 from symfric.multibody.results import SPRING
 from symfric.results.animation import SLIDES, STICKS, frame_times, picture
 from symfric.results.strokes import Poses, Stroke, View, look, strokes
@@ -251,14 +243,6 @@ def test_a_spring_runs_from_end_to_end_and_swings_in_the_picture() -> None:
     assert np.linalg.norm(off, axis=1).max() == pytest.approx(0.1)
     towards_the_eye = drawn(SPRING, A, np.array([0.0, 2.0, 0.0]))["spring"].points
     assert np.isfinite(towards_the_eye).all()
-
-
-def test_a_block_has_the_twelve_edges_of_a_cube() -> None:
-    points = drawn(Spherical.symbol, A, B)["block"].points[:, :, 0].reshape(12, 3, 3)
-    assert np.isnan(points[:, 2]).all()
-    lengths = np.linalg.norm(points[:, 0] - points[:, 1], axis=1)
-    assert lengths == pytest.approx(np.full(12, 0.24))
-    assert np.mean(points[:, :2], axis=(0, 1)) == pytest.approx(B)
 
 
 def test_a_guide_reaches_beyond_the_slide_on_the_axis_of_its_parent() -> None:

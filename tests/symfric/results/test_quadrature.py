@@ -15,7 +15,6 @@ from symfric import (
     BrownMcPhee,
     Coulomb,
     Hold,
-    LuGre,
     Model,
     SolveError,
     Trajectory,
@@ -30,7 +29,7 @@ from symfric.multibody import JointSpringDamper, Mechanism, PrescribedMotion, Pr
 from symfric.results.pictures import plot_trajectories
 from symfric.results.quadrature import extremes, looks
 from symfric.results.trajectory import EnergyBalance
-from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, Prescribed, SliderCrank
+from symfric.scenes import MECHANISMS, FourMass, Pendulum, Prescribed, SliderCrank
 
 
 def circle() -> Trajectory:
@@ -162,14 +161,6 @@ def test_integral_sees_the_jumps_of_an_input() -> None:
     assert run.energy_balance().defect == pytest.approx([0.0], abs=1e-9)
 
 
-def test_work_of_friction_is_the_heat_of_the_belt() -> None:
-    """Of a block at rest on average, the belt's power m g mu v and that of friction add up."""
-    run = simulate(rabinowicz(LuGre()), 2.0, rtol=1e-8)
-    kinetic = 0.4 * (run["v"] ** 2 - run["v"][0] ** 2) + 1.05 * (run["x"] ** 2 - run["x"][0] ** 2)
-    belt = np.array([-0.1 * w for w in run.integral("friction")])
-    assert kinetic == pytest.approx(belt - run.integral("power"), abs=1e-7)
-
-
 def test_damper_dissipates_the_energy_of_the_closed_form() -> None:
     """m v' = -d v: the energy falls with exp(-2 d t / m), all of it into the damper."""
     run = simulate(slider(JointSpringDamper("oil", "x", "slide", damping=0.8)).build(), 3.0,
@@ -237,16 +228,6 @@ def test_a_wrong_friction_power_shows() -> None:
     )
     assert wrong.relative > 1e3 * right.relative
     assert wrong.defect[-1] == pytest.approx(-1e-4 * right.work["friction"][-1], rel=1e-2)
-
-
-@pytest.mark.parametrize(("method", "order"), [("rodas3", 3), ("rodas5p", 5)])
-def test_the_defect_has_the_order_of_the_method(method: str, order: int) -> None:
-    model = FourBar(BrownMcPhee(v_t=0.1)).model()
-    runs = [simulate(model, 0.25, rtol=rtol, method=method) for rtol in (1e-6, 1e-9)]
-    steps = [run.statistics.steps for run in runs]
-    defects = [abs(run.energy_balance().defect).max() for run in runs]
-    found = np.log(defects[0] / defects[1]) / np.log(steps[1] / steps[0])
-    assert found == pytest.approx(order, abs=0.8)
 
 
 def test_energy_that_a_reset_takes_is_defect() -> None:

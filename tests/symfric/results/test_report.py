@@ -1,10 +1,10 @@
 """Runs as one page."""
 
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from pages import Balanced
 from robots import SMALL
 
 from symfric import BrownMcPhee, LuGre, parameters, report, simulate
@@ -13,34 +13,6 @@ from symfric.multibody.urdf import read_urdf
 from symfric.page.html import STYLE
 from symfric.results.pictures import plot_trajectories
 from symfric.scenes import Rabinowicz
-
-EMPTY = {"meta", "img", "path", "rect", "br"}
-
-
-class Page(HTMLParser):
-    """Tags that close, and the cells of tables."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.cells: list[str] = []
-        self.sources: list[str] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.sources += [value or "" for name, value in attrs if name in ("src", "href")]
-        if tag not in EMPTY:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        pass
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        if self.open and self.open[-1] in ("td", "th"):
-            self.cells.append(data)
 
 
 def _places(cells: list[str], name: str) -> list[int]:
@@ -54,8 +26,7 @@ def test_a_page_holds_the_numbers_of_the_runs_and_needs_nothing(tmp_path: Path) 
     runs = {n: simulate(s.model(), 2.0, measure_error=True) for n, s in scenes.items()}
     text = report(runs, tmp_path / "p.html", settings={n: parameters(s) for n, s in scenes.items()})
     assert (tmp_path / "p.html").read_text("utf-8") == text
-    page = Page(text)
-    assert page.open == []
+    page = Balanced(text)
     assert all(s.startswith(("#", "data:")) for s in page.sources)
     assert "<b>" not in text.replace("&lt;b&gt;", "")
     for run in runs.values():
@@ -94,7 +65,7 @@ def test_the_command_writes_one_page_of_several_laws(tmp_path: Path) -> None:
     out = tmp_path / "r.html"
     words = "report rabinowicz --law dahl --law coulomb --t-end 2 --set m=0.5 --html"
     assert main([*words.split(), str(out)]) == 0
-    cells = Page(out.read_text("utf-8")).cells
+    cells = Balanced(out.read_text("utf-8")).cells
     assert {"dahl", "coulomb", "0.5", "sigma_0"} <= set(cells)
     assert main([*words.split()[:-3], "--set", "mm=1", "--out", str(tmp_path / "n.html")]) == 2
     assert not (tmp_path / "n.html").exists()

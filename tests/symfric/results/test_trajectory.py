@@ -163,14 +163,6 @@ def test_modes_of_a_run_are_whole_numbers_everywhere(name: str, tmp_path: Path) 
     assert whole([[row.split(",")[i] for i in columns] for row in rows])
 
 
-def test_what_error_control_adds_to_a_mode_is_there_in_the_states() -> None:
-    """Without it the rounding would have nothing to do."""
-    run = simulate(MODEL["exact"], 8.0, method="dopri5", rtol=1e-6)
-    mode = MODEL["exact"].x[2]
-    raw = run.of(mode.symbol, run.looks)
-    assert 0 < np.abs(raw - np.round(raw)).max() < 1e-3
-
-
 @pytest.mark.parametrize("times", [None, np.linspace(0.0, 8.0, 41)])
 def test_modes_of_an_ensemble_are_whole_numbers(times: np.ndarray | None) -> None:
     starts, how = {"x": np.linspace(0.0, 0.3, 3)}, {"method": "dopri5", "backend": "vm"}

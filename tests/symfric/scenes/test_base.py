@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from law_cases import CASES
 from refusing import not_refused
+from tables import table
 
 import symfric as sf
 from symfric.laws.catalogue import DYNAMIC_LAWS
@@ -19,16 +20,8 @@ from symfric.scenes.rigs import ANY
 SINGLE = {name: kind for name, kind in ALL_SCENES.items() if name not in MECHANISMS}
 """Scenes that write their own equations; mechanisms are tested in test_mechanism.py."""
 
-STATES = {
-    "rabinowicz": 2,
-    "drive": 2,
-    "quarter_car": 4,
-    "coupled_blocks": 4,
-    "drill_string": 9,
-    "clutch": 3,
-    "nip": 3,
-    "prescribed": 1,
-}
+TABLE = table(__file__)
+STATES: dict[str, int] = TABLE["states"]
 OFFERED = {name: {"F_e"} for name in STATES} | {
     "quarter_car": {"F_e", "x_rel", "v_rel"},
     "prescribed": {i.name for law in CASES.values() for i in law.inputs} - {"F_e"},
@@ -140,39 +133,13 @@ def test_no_load_runs_or_is_refused_where_the_law_divides_by_it() -> None:
     assert refused == 7
 
 
-IDEAL, WITHOUT_STICTION = 0.5705, 0.4354
-
-REACH: dict[str, tuple[float, float]] = {
-    "dahl": (0.4352, 1e-3),
-    "bliman_sorine": (0.508, 5e-3),
-    "haessig_friedland": (0.547, 5e-3),
-    "lugre": (0.5667, 5e-4),
-    "lugre_normalised": (0.5667, 5e-4),
-    "lugre_passive": (0.5670, 1e-3),
-    "elasto_plastic": (0.5670, 5e-4),
-    "leuven": (IDEAL, 5e-3),
-    "maxwell_slip": (WITHOUT_STICTION, 1e-3),
-    "gms": (IDEAL, 0.015),
-    "stick_slip": (IDEAL, 0.01),
-    "gonthier": (0.5745, 2e-3),
-    "bristle_2d": (IDEAL, 5e-3),
-    "bouc_wen": (WITHOUT_STICTION, 1e-3),
-    "rate_and_state": (0.53836, 1e-4),  # SciPy's Radau at 1e-9
-    "armstrong": (0.523, 5e-3),
-    "exact_coulomb": (IDEAL, 5e-5),
-}
-"""Largest elongation [m] and how far off it may be: published (0.4352, 0.5667, 0.5670, 0.5745),
-the closed forms with and without stiction, or, where the law has no such counterpart (a peak, a
-dwell or a logarithm that depends on the time), what was computed here."""
-
-
 @pytest.mark.parametrize("name", DYNAMIC_LAWS)
 def test_block_is_carried_as_far_as_stated(name: str) -> None:
     law: sf.Law = DYNAMIC_LAWS[name]()
     # unloaded at first, as the published runs were
     start = {"z": 0.0, "s_dw": 0.0} if name == "gonthier" else {}
     run = sf.simulate(sf.rabinowicz(law), 20.0, x0=start, rtol=1e-6, samples=8001)
-    reach, error = REACH[name]
+    reach, error = TABLE["reach"][name]
     assert run["x"].max() == pytest.approx(reach, abs=error)
 
 
@@ -237,18 +204,7 @@ def test_the_docstring_of_the_package_names_all_public_objects() -> None:
     assert (error.value.name, error.value.obj) == ("Lugre", sf)  # Python offers LuGre by these
 
 
-RUBS = {
-    ("double_pendulum", "lower"): "phi_2",
-    ("pendulum_box", "hinge"): "phi",
-    ("four_mass", "guide_2"): "y2",
-    ("four_mass", "guide_3"): "z3",
-    ("four_mass", "guide_4"): "x4",
-    ("slider_crank", "guide"): "slider",
-    ("four_bar", "hinge_coupler"): "theta_coupler",
-    ("four_bar", "hinge_rocker"): "theta_rocker",
-    ("four_bar", "pin"): "pin",
-    **{("arm", f"q{i}"): f"q{i}" for i in range(2, 7)},
-}
+RUBS = {(scene, place): joint for scene, place, joint in TABLE["rubs"]}
 """Scene and place -> the joint whose friction it is."""
 
 WITHOUT = {"guide", "pin"}

@@ -13,12 +13,6 @@ from stored import stored
 
 import symfric as sf
 from symfric import Hold, Linear, Model, Trajectory, Variable, simulate
-from symfric.integrator.derivatives import saltation as module
-from symfric.integrator.derivatives.functions import derivatives
-from symfric.integrator.derivatives.path import seeds
-from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.running.integrator import built
 from symfric.model import Event
 from symfric.scenes import PendulumBox
 
@@ -106,6 +100,9 @@ CASES = {
 }
 
 
+OFTEN = ("leine_belt", "exact_drive", "gms_drive")
+
+
 def run_of(case: str, p: Mapping[str, float], **how: object) -> Trajectory:
     model, t_end, force = CASES[case]
     u = None if force is None else {"force": force}
@@ -132,7 +129,9 @@ def quotients(case: str) -> Array:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(c, marks=pytest.mark.slow) if c in OFTEN else c for c in CASES]
+)
 def test_laws_by_events_meet_differences_of_tight_runs(case: str) -> None:
     names = [v.name for v in CASES[case][0].p]
     run = run_of(case, {}, rtol=1e-9, sensitivities=names)
@@ -144,20 +143,6 @@ def test_laws_by_events_meet_differences_of_tight_runs(case: str) -> None:
     weights = dict(zip(signals(case), (np.cos(run.t), np.ones(run.t.size)), strict=True))
     by_hand = [np.cos(run.t) @ found[2 * i] + found[2 * i + 1].sum() for i in range(len(names))]
     assert [*run.gradient(weights).values()] == pytest.approx(by_hand, rel=1e-9)
-
-
-def test_many_events_at_once_are_those_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = [v.name for v in CASES["gms_drive"][0].p]
-    together = run_of("gms_drive", {}, sensitivities=names)
-    monkeypatch.setattr(module, "_is_single", lambda *_: False)  # pyright: ignore[reportUnknownLambdaType]
-    alone = run_of("gms_drive", {}, sensitivities=names)
-    for name in names:
-        assert together.sensitivities[name]["x"] == pytest.approx(
-            alone.sensitivities[name]["x"], rel=1e-12
-        )
-        assert together.event_sensitivities[name] == pytest.approx(
-            alone.event_sensitivities[name], rel=1e-11
-        )
 
 
 def struck() -> Model:
@@ -189,21 +174,6 @@ def test_mechanism_stays_on_its_constraints_behind_an_event() -> None:
         for n in ("l", "x0.vx")
     ]
     assert [*run.gradient(weights).values()] == pytest.approx(by_hand, rel=1e-10)
-
-
-def test_sweeps_cost_what_they_are_written_for() -> None:
-    """Instructions of a step of Rabinowicz: itself, by four parameters, backwards, with jumps."""
-    model = sf.rabinowicz(sf.BrownMcPhee(), free=["mu_s", "mu_d", "k", "m"])
-    integrator, _ = built(model, input_data(model, None, 0.0, 1.0), METHODS["rodas5p"])
-    made = derivatives(integrator)
-    which = seeds(model, ["mu_s", "mu_d", "k", "m"], None, None)
-    count = [
-        made.step, made.forward(which.parameters, False).function, made.reverse(False).function,
-        made.forward(which.parameters, True).function, made.reverse(True).function,
-    ]  # fmt: skip
-    most = [580, 2900, 1400, 3320, 1540]
-    found = [f.n_instructions() for f in count]
-    assert all(f <= m for f, m in zip(found, most, strict=True)), found
 
 
 def events_of(

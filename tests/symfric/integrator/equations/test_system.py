@@ -12,7 +12,7 @@ from symfric.integrator.equations.inputs import Input, input_data
 from symfric.integrator.equations.system import System, system
 
 x, y = Variable("x", "m", start=1.0), Variable("y", "m", start=2.0, nominal=0.1)
-z, u = Variable("z", "1"), Variable("u", "N", start=3.0)
+z = Variable("z", "1")
 X, Y, Z = x.symbol, y.symbol, z.symbol
 t, r = ca.SX.sym("t"), ca.SX.sym("rates", 2)
 STIFF = ("rodas5p", "rodas4p", "rodas3", "radau5")
@@ -60,31 +60,6 @@ def test_unknowns_are_time_and_rates_only_where_equations_need_them(
     assert s.d.numel() == 0
 
 
-@pytest.mark.parametrize(
-    ("signal", "unknowns", "data"),
-    [
-        (2.0, 2, 1),
-        (sf.Hold([0.0, 1.0], [0.0, 1.0]), 2, 1),
-        (sf.Linear([0.0, 1.0], [1.0, 1.0]), 2, 1),
-        (sf.Linear([0.0, 1.0], [0.0, 1.0]), 3, 3),
-        (ca.sin, 3, 0),
-    ],
-    ids=["number", "hold", "level", "linear", "expression"],
-)
-def test_inputs_cost_only_the_data_they_need(signal: Input, unknowns: int, data: int) -> None:
-    """A linear input has value, slope and start of its interval; only it needs time."""
-    s = assembled(sf.drive(sf.BrownMcPhee()), force=signal)
-    assert (s.n, s.d.numel()) == (unknowns, data)
-
-
-def test_parameters_come_before_input_data() -> None:
-    s = assembled(sf.drive(sf.BrownMcPhee(), free=["m", "offset"]), force=2.0)
-    assert [str(name) for name in ca.vertsplit(s.d)][:2] == ["m", "offset"]
-    free, force = value(s, [0.0, 0.0], [4.0, 0.0, 2.0]), value(s, [0.0, 0.0], [4.0, 1.0, 5.0])
-    assert free == pytest.approx([0.0, 2.0 / 4.0])
-    assert force == pytest.approx([0.0, (5.0 - 1.0) / 4.0])
-
-
 def test_constant_mass_matrices_are_kept_and_algebraic_rows_and_columns_are_found() -> None:
     """Equations without rates and unknowns without rates need not stand at the same place."""
     s = assembled(dae(-Z * t, Z - X))
@@ -107,24 +82,6 @@ def test_permuted_equations_of_an_implicit_model_are_solved() -> None:
     """Row 1 holds the rate of y and row 2 that of x: no pivot stands on the diagonal."""
     final = sf.simulate(implicit(r[1] + Y, r[0] + X), 1.0, rtol=1e-9).final
     assert [final["x"], final["y"]] == pytest.approx([np.exp(-1), 2 * np.exp(-1)], rel=1e-8)
-
-
-def test_monitors_and_nominal_values_are_carried_along() -> None:
-    watched = (sf.model.Monitor(X - u.symbol, 1e-3), sf.model.Monitor(Y, 2.0))
-    s = assembled(Model("watched", x=(x, y), u=(u,), ode=ca.SX([0, 0]), monitors=watched))
-    assert s.nominal.tolist() == [1.0, 0.1]
-    assert ca.DM(s.monitor_nominal).full().ravel().tolist() == [1e-3, 2.0]
-    monitors = ca.Function("m", [s.y, s.d], [s.monitors])([5.0, 6.0], [3.0])
-    assert monitors.full().ravel().tolist() == [2.0, 6.0]
-
-
-def test_consistent_values_solve_the_algebraic_equations_and_keep_the_rest() -> None:
-    root = assembled(Model("root", x=(x,), z=(z,), ode=-Z, alg=Z**3 + Z - 10 * X))
-    found = consistent(root, "here", np.array([1.0, 0.5]), np.zeros(0))
-    assert found == pytest.approx([1.0, 2.0], rel=1e-12)
-    start = np.array([1.0, 2.0])
-    untouched = consistent(assembled(sf.rabinowicz(sf.BrownMcPhee())), "here", start, np.zeros(0))
-    assert untouched is start
 
 
 v, w, lam = Variable("v", "m/s"), Variable("w", "m/s"), Variable("lam", "N/m")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from backends import needs_compiler
+from differentiable import followed
 from numpy.typing import NDArray
 
 from symfric import LuGre, Model, Plant, SolveError, Variable, drive, stepper
@@ -19,12 +20,6 @@ def batch(model: Model, dt: float, members: int = MEMBERS) -> Plant:
     plant = stepper(model, dt, batch=members, backend="compiled")
     assert ("lanes" in plant._integrator.memory) is (members >= LEAST_PLANTS)
     return plant
-
-
-def followed() -> Model:
-    """x' = z with z + z^3 = u - x."""
-    alg = z.symbol + z.symbol**3 - u.symbol + x.symbol
-    return Model("followed", x=(x,), z=(z,), u=(u,), ode=z.symbol, alg=alg)
 
 
 @pytest.mark.parametrize("model", [drive(LuGre()), followed()], ids=lambda m: m.name)

@@ -15,7 +15,7 @@ from symfric import Event, Linear, MaxwellSlip, Model, Status, Variable, drive, 
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.crossings import Memory
-from symfric.integrator.running.engine import CompiledEngine, loop_source
+from symfric.integrator.running.engine import CompiledEngine
 from symfric.integrator.running.events import storm
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Dense, Jumps
@@ -25,10 +25,6 @@ Array = NDArray[np.float64]
 ATOL = np.full(2, 1e-7)
 x, y = Variable("x", "m"), Variable("y", "m", start=2.0)
 X, Y = x.symbol, y.symbol
-
-
-def waves(t: ca.SX) -> ca.SX:
-    return 12 * ca.sin(3 * t)
 
 
 def jumps_of(model: Model, y0: Array, p: Array, span: float, backend: str) -> tuple[Dense, Jumps]:
@@ -105,25 +101,6 @@ def test_no_attempt_behind_an_event_is_made_in_vain() -> None:
     assert run.statistics.steps < 2.1 * 499
 
 
-def test_exact_memory_takes_fewer_attempts_than_its_smooth_form() -> None:
-    """Elements that begin to slip one by one, and all stick at every turn."""
-    force = {"force": waves}
-    attempts: list[int] = []
-    for form in ("smooth", "event"):
-        run = simulate(drive(MaxwellSlip(form=form)), 4.0, u=force, backend="vm", samples=2)
-        attempts.append(run.statistics.steps + run.statistics.rejections)
-    assert len(run.happened) > 15
-    assert attempts[1] < 0.5 * attempts[0]
-
-
-def test_a_model_without_events_has_nothing_of_them_in_its_code() -> None:
-    for events, found in (((), False), ((Event("one", X - 1),), True)):
-        model = Model("clock", x=(x,), ode=ca.SX(1), events=events)
-        made = Integrator(model, input_data(model, None, 0.0, 1.0), RODAS5P)
-        source = loop_source(made.step, RODAS5P.H.shape[0], made.crossings)
-        assert ("static int symfric_search" in source) == found
-
-
 @needs_compiler
 def test_a_jump_of_an_input_does_not_leave_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor does an event: 100 samples and 40 events are one call."""
@@ -173,23 +150,6 @@ def test_each_passage_is_one_event(backend: str, form: str, rtol: float) -> None
         first = (asin(x / size) - atan2(0.1, 1.0)) % (2 * pi)  # x = size sin(t + atan2(0.1, 1))
         times = np.arange(first, SPAN, 2 * pi)
         assert [t for t, _ in run.happened] == pytest.approx(times, abs=30 * rtol)
-
-
-def test_events_of_coupled_variables_grow_with_their_number() -> None:
-    """Without the zeros of their equations: by a QR factorisation their length went with n^2."""
-
-    def length(n: int) -> int:
-        x, z = Variable("x", "1"), [Variable(f"z_{i}", "1") for i in range(n)]
-        own = [x.symbol, *(v.symbol for v in z), 0.0]
-        equations = [own[i] - 3 * own[i + 1] - own[i + 1] ** 3 + own[i + 2] for i in range(n)]
-        events = (Event("up", z[n // 2].symbol - 0.1),)
-        model = Model(
-            "chain", x=(x,), z=tuple(z), ode=ca.SX(1), alg=ca.vertcat(*equations), events=events
-        )
-        data = input_data(model, None, 0.0, 1.0)
-        return int(Integrator(model, data, RODAS5P).events.n_instructions())
-
-    assert length(20) < 2.5 * length(10)
 
 
 TOLERANCE = 2.0**-33

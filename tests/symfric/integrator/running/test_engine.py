@@ -1,16 +1,14 @@
 """Virtual machine and compiled loop: the same steps, the same reasons to stop."""
 
 import numpy as np
-import pytest
 from backends import each_backend, needs_compiler
-from closed_forms import assemble, smooth_dae, smooth_ode, timed_ode
+from closed_forms import assemble
 from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, LuGre, Model, rabinowicz
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
 from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, Work, loop_source
 from symfric.integrator.running.events import Stop
-from symfric.integrator.running.record import Record
 from symfric.integrator.step.attempt import Given, State, build_step
 
 Array = NDArray[np.float64]
@@ -47,35 +45,6 @@ def data(n: int, t_end: float, rtol: float = 1e-8) -> Array:
 
 BELT = rabinowicz(BrownMcPhee())
 BRISTLE = rabinowicz(LuGre())
-CASES = {
-    "brown_mcphee": (BELT, (0.0, 0.0)),
-    "lugre": (BRISTLE, (0.0, 0.0, -1e-5)),
-    "dae": (smooth_dae().model, (1.0, 1.0, 1.0)),
-    "timed": (timed_ode().model, (1.0, 0.0)),
-}
-
-
-def trace(runner: Engine, case: str, method: str = "rodas5p") -> tuple[Array, Array]:
-    """Records and last values of 2 s."""
-    (_, y), dense = CASES[case], ADAPTIVE[method].H.shape[0]
-    before, given = start(y), data(len(CASES[case][0].x), 2.0, 1e-6)
-    records, made, stop = run(runner, before, given, 9999, 9999, 0.0, dense)
-    assert stop is Stop.END
-    assert made >= records.shape[0]
-    return records, before[State.MEMORY :]
-
-
-@needs_compiler
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("method", ADAPTIVE)
-def test_both_engines_give_the_same_bits(method: str, case: str) -> None:
-    """On 4f644ad they differed from the first step on: fused operations, reciprocals."""
-    if case == "dae" and not ADAPTIVE[method].dae:
-        pytest.skip("an explicit method")
-    vm, compiled = (trace(engine(kind, CASES[case][0], method), case, method) for kind in KINDS)
-    assert vm[0].shape[1] == Record(vm[1].size, ADAPTIVE[method].H.shape[0]).width
-    for one, other in zip(vm, compiled, strict=True):
-        np.testing.assert_array_equal(one, other)
 
 
 @needs_compiler
@@ -93,23 +62,6 @@ def test_both_engines_stop_after_the_same_attempt() -> None:
 
 
 @each_backend
-def test_records_are_a_chain_from_start_to_end(backend: str) -> None:
-    """At the end nothing is done."""
-    runner, S = engine(backend, smooth_ode().model), start((1.0, 1.0))
-    records, _, _ = run(runner, S, data(2, 1.0), 9999, 9999, 0.0)
-    t0, t1, y0, y1 = records[:, 0], records[:, 1], records[:, 2:4], records[:, 4:6]
-    assert (t0[0], t1[-1], S[0]) == (0.0, 1.0, 1.0)
-    assert (t1[:-1] == t0[1:]).all()
-    assert (y1[:-1] == y0[1:]).all()
-    assert y0[0].tolist() == [1.0, 1.0]
-    assert y1[-1].tolist() == S[State.MEMORY :].tolist()
-    assert y1 == pytest.approx(np.array([smooth_ode().exact(t) for t in t1]), rel=1e-6)
-    before = S.copy()
-    records, made, stop = run(runner, S, data(2, 1.0), 9, 9, 0.0)
-    assert (records.shape[0], made, stop, S.tolist()) == (0, 0, Stop.END, before.tolist())
-
-
-@each_backend
 def test_full_record_is_continued_without_a_trace(backend: str) -> None:
     runner = engine(backend, BELT)
     whole, made, _ = run(runner, start((0.0, 0.0)), data(2, 3.0), 9999, 99999, 0.0)
@@ -121,11 +73,3 @@ def test_full_record_is_continued_without_a_trace(backend: str) -> None:
     assert (stop, attempts) == (Stop.END, made)
     assert len(parts) > 2
     np.testing.assert_array_equal(np.vstack(parts), whole)
-
-
-def test_source_of_a_model_does_not_change_when_it_is_built_again() -> None:
-    """Its hash is the name in the cache."""
-    one, other = (
-        loop_source(build_step(assemble(rabinowicz(LuGre())), RODAS5P), ROWS) for _ in range(2)
-    )
-    assert one == other

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from itertools import product
 from typing import Any
 
 import casadi as ca
@@ -72,24 +71,6 @@ def test_value_at_a_jump_is_that_after_it() -> None:
     assert both(np.array([1.0]))[0, 0] == second.y0[0, 0]
     assert both(np.array([np.nextafter(1.0, 0)]))[0, 0] == pytest.approx(first.y1[0, 0])
     assert both(np.array([2.0]))[0, 0] == pytest.approx(second.y1[0, 0])
-
-
-def test_records_are_taken_apart() -> None:
-    for count, rows in product((0, 1, 4), (0, 2, 3)):
-        records = RNG.normal(size=(count, Record(3, rows).width))
-        dense = Dense.of(records, 3)
-        assert dense.D.shape == (count, rows, 3)
-        np.testing.assert_array_equal(dense.rows, records)
-
-
-@pytest.mark.parametrize("method", ["rodas5p", "rodas4p", "rodas3"])
-def test_dense_output_is_as_accurate_as_the_steps(method: str) -> None:
-    model = sf.rabinowicz(sf.LuGre())
-    run = sf.simulate(model, 8.0, method=method, rtol=1e-6)
-    reference = sf.simulate(model, 8.0, rtol=1e-11)
-    at_steps = np.abs(run.at(run.step_times)["x"] - reference.at(run.step_times)["x"]).max()
-    between = np.abs(run["x"] - reference["x"]).max()
-    assert between < 3 * at_steps + 1e-6
 
 
 TIMES = [0.0, 0.1, 0.3, 0.30001, 0.4, 0.9, 1.7, 2.0]

@@ -11,12 +11,7 @@ from robots import SMALL, rod
 from symfric import Coulomb, LuGre, Sum, Viscous, parameters, simulate
 from symfric.laws import Stribeck
 from symfric.multibody import JointFriction, Mechanism, Universal, functions
-from symfric.multibody.urdf import (
-    holding,
-    read_urdf,
-    relative,
-    tag_friction,
-)  # fmt: skip
+from symfric.multibody.urdf import holding, read_urdf, relative, tag_friction  # fmt: skip
 from symfric.multibody.urdf_file import parse
 
 
