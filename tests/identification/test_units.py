@@ -28,9 +28,10 @@ UNITS += [(1.0, x, 1.0) for x in (1e-9, 1e9)] + [(1.0, 1.0, t) for t in (1e-9, 1
 """Sizes of the units of force, length and time."""
 Sizes = tuple[float, float, float]
 FREE_OF_INPUTS = [name for name, law in ALL_LAWS.items() if not law().inputs]
-AMBIGUOUS = ("makkar_dixon", "bittencourt", "leuven")
+AMBIGUOUS = ("makkar_dixon", "bittencourt", "leuven", "gonthier", "rate_and_state")
 """Laws with several sets of parameters that fit equally well, of which rounding selects one: equal
-terms, terms that only a temperature separates, elements without influence on steady sliding."""
+terms, terms that only a temperature separates, elements and speeds without influence on steady
+sliding; and a law with a lower bound of a coefficient as a number (a >= 1e-6)."""
 
 
 def size(unit: str, sizes: Sizes, values: Mapping[str, float]) -> float:
