@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.residuals.evaluation import Array
+from identification.solving.task import Point, Task
 from identification.verdict.minimum import Minimum, groups
 from symfric.foundation.shown import brief
 
@@ -62,6 +63,9 @@ DECADES = 8.0
 """Width of the interval of a logarithmic value above which the interval is dropped [decades]."""
 WIDE = 1e4
 """Width of other intervals, relative to value and scale, above which the interval is dropped."""
+LINEAR = 0.05
+"""Relative deviation of the residuals from their linear change, at the ends of all intervals
+together, below which all intervals are linear."""
 ROUNDING = 1e-14
 """Slope of a value relative to its largest slope below which it is rounding error."""
 CLEAN = 1e-13
@@ -250,3 +254,35 @@ def _weak(
             f"{name} is poorly identified: between {low[i]:.3g} and {high[i]:.3g}"
             f"{units.get(name, '')} with 95 %{goes}."
         )
+
+
+def steps_of(task: Task, point: Point, linear: Covariance) -> dict[str, Array]:
+    """Return the changes of the coordinates to the upper ends of the intervals, none if linear.
+
+    They are none if the residuals are linear up to all ends together.
+    """
+    box, names = task.unknowns, linear.names
+    out = {*box.nuisance, *linear.at_bound}
+    kept = [n for n in box.fitted if n not in out and np.isfinite(linear.low[names.index(n)])]
+    steps = {n: _direction(point, linear, n) for n in kept}
+    whole = sum(steps.values(), np.zeros(point.w.size))
+    return steps if steps and bend(task, point, whole) > LINEAR else {}
+
+
+def _direction(point: Point, linear: Covariance, name: str) -> Array:
+    """Return the change of the coordinates to the upper end of the linear interval, shape (n,)."""
+    i = linear.names.index(name)
+    change = np.nan_to_num(linear.white[:, i] / linear.white[i, i])
+    reach = (linear.high[i] - linear.low[i]) / 2
+    return np.linalg.lstsq(point.slope, change * reach, rcond=1e-9)[0]
+
+
+def bend(task: Task, point: Point, step: Array) -> float:
+    """Return the deviation of the residuals from their linear change, relative to this change."""
+    box = task.unknowns
+    step = np.clip(point.w + step, box.lower, box.upper) - point.w
+    there, change = task.at(point.w + step), point.J @ step
+    if isinstance(there, str):
+        return np.inf
+    bent = float(np.linalg.norm(there.evaluation.r / task.sigma - point.r - change))
+    return bent / max(float(np.linalg.norm(change)), 1e-300)

@@ -13,20 +13,18 @@ exists only under the alternative); the limit is that of Kass and Raftery, J. Am
 1995, for -2 log of a likelihood ratio.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from identification.residuals.evaluation import Array
 from identification.solving.task import Point, Task
-from identification.verdict.covariance import Covariance
+from identification.verdict.covariance import LINEAR, Covariance, bend
 from identification.verdict.profile import Walk
 
-LINEAR = 0.01
-"""Relative deviation of the residuals from their linear change, at the ends of all intervals
-together, below which all intervals are linear."""
 BENT = 0.1
-"""The same deviation for one value above which its interval follows from its profile."""
+"""Deviation from linearity (`bend`) above which an interval follows from its profile."""
 SHOWN = 10.0
 """Rise of the cost at the ends of the range of a value that shows the value."""
 DECADES = 3.0
@@ -35,20 +33,16 @@ POINTS = 3
 """Approximate number of points of a profile to each side."""
 
 
-def assured(task: Task, point: Point, linear: Covariance) -> Covariance:
+def assured(task: Task, point: Point, linear: Covariance, steps: Mapping[str, Array]) -> Covariance:
     """Return the covariance with intervals for nonlinear models, without those that are not shown.
 
     Args:
         task, point: solved task and its minimum.
         linear: linear covariance and intervals.
+        steps: changes of the coordinates to the ends of the linear intervals, see `steps_of`.
     """
-    box, nuisance = task.unknowns, task.unknowns.nuisance
-    names = [n for n in box.fitted if n not in (*nuisance, *linear.at_bound)]
-    names = [n for n in names if np.isfinite(linear.low[linear.names.index(n)])]
-    steps = {n: _direction(point, linear, n) for n in names}
-    if not names or _bend(task, point, sum(steps.values(), np.zeros(point.w.size))) < LINEAR:
-        return linear
-    bent = {n: [_bend(task, point, side * steps[n]) for side in (-1.0, 1.0)] for n in names}
+    names = [*steps]
+    bent = {n: [bend(task, point, side * steps[n]) for side in (-1.0, 1.0)] for n in names}
     walks = {n: Walk(task, point, linear, n) for n in names if max(bent[n]) > LINEAR}
     found = linear
     for name, walk in walks.items():
@@ -73,32 +67,13 @@ def _elsewhere(point: Point, walk: Walk) -> Point | None:
 def _profiled(found: Covariance, walk: Walk, name: str, bent: list[float]) -> Covariance:
     """Return `found` with the ends of a profile where the residuals are not linear."""
     low, high, i = found.low.copy(), found.high.copy(), found.names.index(name)
-    for side, bend, ends in ((-1, bent[0], low), (1, bent[1], high)):
-        if bend > BENT:
+    for side, curved, ends in ((-1, bent[0], low), (1, bent[1], high)):
+        if curved > BENT:
             _, end, why = walk.side(side, POINTS)
             if end is None:
                 return _none(found, [name], why)
             ends[i] = end
     return replace(found, low=low, high=high)
-
-
-def _direction(point: Point, linear: Covariance, name: str) -> Array:
-    """Return the change of the coordinates to the upper end of the linear interval, shape (n,)."""
-    i = linear.names.index(name)
-    change = np.nan_to_num(linear.white[:, i] / linear.white[i, i])
-    reach = (linear.high[i] - linear.low[i]) / 2
-    return np.linalg.lstsq(point.slope, change * reach, rcond=1e-9)[0]
-
-
-def _bend(task: Task, point: Point, step: Array) -> float:
-    """Return the deviation of the residuals from their linear change, relative to this change."""
-    box = task.unknowns
-    step = np.clip(point.w + step, box.lower, box.upper) - point.w
-    there, change = task.at(point.w + step), point.J @ step
-    if isinstance(there, str):
-        return np.inf
-    bent = float(np.linalg.norm(there.evaluation.r / task.sigma - point.r - change))
-    return bent / max(float(np.linalg.norm(change)), 1e-300)
 
 
 def _without(found: Covariance, name: str, there: Point, unit: str) -> Covariance:

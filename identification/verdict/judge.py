@@ -32,9 +32,16 @@ from identification.residuals.evaluation import Channel
 from identification.residuals.sampled import moving_start
 from identification.verdict.colour import Colour, Whiteness, span, whiteness
 from identification.verdict.covariance import FAR, Levels
-from identification.verdict.independence import Dependence, Family, dependences, inputs_of
+from identification.verdict.independence import (
+    FORCES,
+    Dependence,
+    Family,
+    dependences,
+    inputs_of,
+    resolution,
+    rms,
+)
 from identification.verdict.minimum import Minimum, positions
-from identification.verdict.resolution import FORCES, resolution, rms
 from symfric.foundation.status import Status
 
 FIRST = 0.05
