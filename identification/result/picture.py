@@ -60,9 +60,9 @@ def _legend(axis: Axes, columns: int = 3) -> None:
 
 def _curve(axis: Axes, curve: Curve, name: str) -> None:
     few = sum(line.t.size for line in curve.measured.values()) < FEW
-    style = {"ms": 8.0 if few else 1.8, "alpha": 0.6, "mew": 0.0}
+    size = 8.0 if few else 1.8
     for line in curve.measured.values():
-        axis.plot(line.t, line.y, ".", color="0.6", rasterized=True, **style)
+        axis.plot(line.t, line.y, ".", color="0.6", ms=size, mew=0, alpha=0.6, rasterized=True)
     axis.plot([], [], ".", color="0.6", label=curve.says)
     axis.plot(curve.law.t, curve.law.y, color=colour(1), lw=1.5, label=name)
     low, high = limits(curve)
