@@ -38,6 +38,7 @@ from identification.starts.measured import Measured
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.judge import Verdict, judge
+from identification.verdict.minimum import shortened
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
@@ -133,7 +134,7 @@ class Fit:
             message = f"Fit: {asked.subject.name}: no start has residuals: {point}"
             raise SolveError(message, Status.NOT_FINITE)
         live = self._live(asked, made, point)
-        verdict = judge(live.minimum, asked.findings)
+        verdict = judge(shortened(live.minimum), asked.findings)
         gain = remaining(made, point) / max(point.cost, 1e-300)
         status, message = _status(asked, end, verdict, gain)
         result = fitted(
