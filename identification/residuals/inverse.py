@@ -16,6 +16,7 @@ from identification.data.record import Record
 from identification.residuals.balance import Balance, Coordinate, Mask, Row, balance, coordinates
 from identification.residuals.evaluation import Array, Blocks, Channel
 from identification.residuals.sampled import Sampled, moving_start
+from identification.unknowns.roles import width_of
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
@@ -309,8 +310,8 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
     gains = np.median(np.abs(slopes), axis=1).reshape(errors.size, len(model.contacts)).T
     noise = [float(np.linalg.norm(gain * errors)) for gain in gains]
     return [
-        uncertain(v[k], noise[k], motion.step, motion.filter) & (not c.states)
-        for k, c in enumerate(model.contacts)
+        uncertain(v[k], max(s, width_of(c.law)), motion.step, motion.filter) & (not c.states)
+        for k, (c, s) in enumerate(zip(model.contacts, noise, strict=True))
     ]
 
 
