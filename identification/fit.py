@@ -38,7 +38,7 @@ from identification.starts.measured import Measured
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.judge import Verdict, judge
-from identification.verdict.minimum import minimum
+from identification.verdict.minimum import minimum, shortened
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
@@ -143,7 +143,7 @@ class Fit:
             message = f"Fit: {asked.subject.name}: no start has residuals: {point}"
             raise SolveError(message, Status.NOT_FINITE)
         live = self._live(asked, made, point)
-        verdict = judge(live.minimum, asked.findings)
+        verdict = judge(shortened(live.minimum), asked.findings)
         gain = remaining(made, point) / max(point.cost, 1e-300)
         status, message = _status(asked, end, verdict, gain)
         result = fitted(

@@ -16,9 +16,9 @@ from functools import reduce
 from math import sqrt
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
+from ocp.formulation.expressions import EPS
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
-from ocp.formulation.relaxed import EPS
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solved, Solver
 from ocp.solving.penalties import largest_product

@@ -11,7 +11,7 @@ import casadi as ca
 from numpy.typing import ArrayLike
 
 from ocp.formulation.expressions import kinks
-from ocp.formulation.problem import Problem, cost_size, sized
+from ocp.formulation.problem import FAR, Problem, cost_size, sized
 from ocp.formulation.validate import doubts
 from ocp.solving.methods import Fatrop, Ipopt, Sqp
 from ocp.solving.one_solve import Solver
@@ -133,8 +133,10 @@ def solve(
     if intervals is not None:
         make_meshes(problem, intervals)  # raises ValueError for invalid meshes of any strategy
     posed = sized(problem)
-    if posed is not problem and isinstance(solver, Ipopt) and OVER not in solver.options:
-        solver = solver.with_options(**{OVER: 1.0 / cost_size(posed)})
+    if isinstance(solver, Ipopt) and OVER not in solver.options:
+        size = cost_size(posed)
+        if posed is not problem or size < 1.0 / FAR:  # Ipopt itself scales large costs
+            solver = solver.with_options(**{OVER: 1.0 / size})
     goals = Goals.of(tolerance) if refine else replace(Goals.of(tolerance), passes=1)
     if not isinstance(executor, Executor | None):  # pyright: ignore[reportUnnecessaryIsInstance]
         what = "an executor of concurrent.futures, or None"

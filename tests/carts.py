@@ -6,17 +6,7 @@ from typing import Any
 import casadi as ca
 from phases import solve_once
 
-from ocp import (
-    TIME,
-    Free,
-    Ipopt,
-    Legendre,
-    Phase,
-    Problem,
-    Radau,
-    Shooting,
-    integral,
-)
+from ocp import TIME, Free, Ipopt, Legendre, Phase, Problem, Radau, Shooting, integral
 from ocp.transcription.schemes import Scheme
 from symfric import Model, Variable
 

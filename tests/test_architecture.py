@@ -14,6 +14,8 @@ ON_TOP = tuple(ALLOWED["on_top"])
 PACKAGES = ("symfric", "ocp", "identification")
 SOURCES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
+FUNCTIONS = ast.FunctionDef | ast.AsyncFunctionDef
+KEPT = FUNCTIONS | ast.Import | ast.ImportFrom | ast.Call | ast.Assert
 
 FRONTS = tuple(".".join(p.parent.relative_to(ROOT).parts) for p in SOURCES if p.stem == "__init__")
 """Packages; their modules do not import from their `__init__`."""
@@ -32,7 +34,7 @@ def within(module: str, unit: str) -> bool:
 def imported(path: Path) -> frozenset[str]:
     """Modules of this project that a file names, `from symfric import x` resolved to the module."""
     found = set[str]()
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -53,8 +55,10 @@ def is_module(name: str) -> bool:
 
 
 @cache
-def parsed(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"), str(path))
+def nodes(path: Path) -> list[ast.AST]:
+    """Imports, functions, calls and assertions of a file."""
+    tree = ast.parse(path.read_text(encoding="utf-8"), str(path))
+    return [node for node in ast.walk(tree) if isinstance(node, KEPT)]
 
 
 @cache
@@ -131,9 +135,9 @@ def test_file_is_short(path: Path) -> object:
     return len(path.read_text(encoding="utf-8").splitlines()) > 400
 
 
-def calls(tree: ast.AST, apart_from: str = "") -> Iterator[str]:
+def calls(path: Path, apart_from: str = "") -> Iterator[str]:
     """Names that are called, bare or as an attribute of something other than `apart_from`."""
-    for node in ast.walk(tree):
+    for node in nodes(path):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             yield node.func.id
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
@@ -148,9 +152,9 @@ NONSMOOTH = {"fabs", "sign", "if_else", "fmin", "fmax", "norm", "norm_1", "norm_
 @each_source
 def test_rules_of_the_source(path: Path) -> object:
     """Functions below 60 lines, absolute imports, no assert, no print, one place for kinks."""
-    module, tree, wrong = dotted(path), parsed(path), list[str]()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+    module, wrong = dotted(path), list[str]()
+    for node in nodes(path):
+        if isinstance(node, FUNCTIONS):
             body = node.body[1:] if ast.get_docstring(node) else node.body
             if body and (body[-1].end_lineno or 0) - body[0].lineno + 1 > 60:
                 wrong.append(f"{node.name} is long")
@@ -158,11 +162,11 @@ def test_rules_of_the_source(path: Path) -> object:
             wrong.append(f"relative import in line {node.lineno}")
         elif isinstance(node, ast.Assert):
             wrong.append(f"assert in line {node.lineno}")
-    if not on_top(module) and "print" in calls(tree):
+    if not on_top(module) and "print" in calls(path):
         wrong.append("print")
     formulas = within(module, "symfric.laws") or within(module, "symfric.scenes")
     if formulas and module != "symfric.laws.base.smooth":
-        wrong += NONSMOOTH & set(calls(tree, apart_from="smooth"))
+        wrong += NONSMOOTH & set(calls(path, apart_from="smooth"))
     return wrong
 
 

@@ -73,7 +73,7 @@ def test_a_call_runs_code_in_few_files(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", COUNT + SIMULATE + FIT + SOLVE + GENERATE], cwd=tmp_path,
         capture_output=True, text=True, check=True,
-        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
+        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1"},
     )  # fmt: skip
     found = dict(zip(MOST, map(int, done.stdout.split()), strict=True))
     assert all(0 < n <= MOST[name] for name, n in found.items()), found

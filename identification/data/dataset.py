@@ -61,11 +61,12 @@ class Dataset:
         points: bool = False,
         missing: Missing = "refuse",
     ) -> "Dataset":
-        """Read records from files: CSV and other text, `.mat` up to version 7, `.npz`, `.npy`.
+        """Read records from files: text, `.mat` up to version 7, `.npz`, `.npy`, HDF5, Parquet.
 
         Text: comma, semicolon, tab or spaces; decimal commas unless commas separate cells; comment
-        lines; a header such as `t [s], x [mm], F [N]` or none; a row of units below it or none.
-        MATLAB: variables, structs (nested; a vector of structs is several records), matrices.
+        lines; rows of a data logger; a header such as `t [s], x [mm], F [N]` or none; a row of
+        units below it or none. MATLAB: variables, structs (nested; a vector of structs is several
+        records), matrices. HDF5 (groups are structs) needs the package h5py, Parquet needs pyarrow.
 
         A column becomes the channel t, x, v, a or force if its name is that of the channel or a
         usual alias (time, q, pos, angle, vel, omega, torque, ...) and no other column matches. All
@@ -75,16 +76,17 @@ class Dataset:
 
         Args:
             paths: a file, a pattern such as "run*.csv", or a list of these.
-            columns: channel -> column ({"x": "encoder [mm]"}), or the names of all columns in
-                order (["t [ms]", "x", "-", "force"]; "-" leaves a column out).
+            columns: channel -> column ({"x": "encoder [mm]"}) or a pattern ({"x": "*pos*"}), or
+                the names of all columns in order (["t [ms]", "x", "-", "force"]; "-" leaves a
+                column out).
             units: "rad, N m" for canonical channels whose columns have no unit, or channel ->
                 unit ({"x": "mm", "theta_2": "deg"}), which overrides the file.
             step: sample interval [s] of files without time.
             variable: struct, matrix or nested part of a `.mat` or `.npz` file: "run(2).log".
             points: rows are points (v, F) of a friction curve; no time is needed.
-            missing: "drop" leaves out rows in which a channel has no number (an empty cell, NaN)
-                and rows that repeat the previous row including its time; `resampled` then makes
-                the intervals equal and splits records at long gaps.
+            missing: "drop" leaves out rows in which a channel has no finite number (an empty cell,
+                NaN) and rows that repeat the previous row including its time; `resampled` then
+                makes the intervals equal and splits records at long gaps.
 
         Raises:
             ValueError: unusable data, with file, row and column; for several files all errors.

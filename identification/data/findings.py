@@ -223,6 +223,8 @@ KNOTS = np.array([0.0, 0.05, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0])
 """Quantiles of the speed at the knots of a free friction curve."""
 HUBER = 2.5
 ROUNDS = 5
+ENOUGH = 10_000
+"""Number of rows of a regression, which are evenly spaced."""
 MOVING = 0.02
 """Share of the largest speed above which the drive is moving."""
 
@@ -247,22 +249,21 @@ class Rough:
     ) -> None:  # fmt: skip
         self.t, self.v, self.a, self.force, self.columns = t, v, a, force, columns
         self.step, self.clean = step, clean
-        self.every = max(1, int(2 * width))
-        self.values, self.errors, self.explained = self.fit(columns, force)
-
-    def fit(self, columns: Array, force: Array) -> tuple[Array, Array, float]:
-        """Regress a force on columns; return values, standard errors and the explained share."""
+        self.every = max(1, int(2 * width), force.size // ENOUGH)
         A, b = columns[:: self.every], force[:: self.every]
-        values, errors = _robust(A, b)
-        return values, errors, _explained(A, b, values)
+        self.values, self.errors = _robust(A, b)
+        self.explained = _explained(A, b, self.values)
 
     def unexplained_when_late(self, late: float) -> float:
         """Return the unexplained share of the force after correcting a delay of `late` [s]."""
-        return 1 - self.fit(self.columns, np.interp(self.t + late, self.t, self.force))[2]
+        A = self.columns[:: self.every]
+        b = np.interp(self.t[:: self.every] + late, self.t, self.force)
+        return 1 - _explained(A, b, _robust(A, b)[0])
 
     def with_column(self, column: Array) -> tuple[float, float]:
         """Return value and standard error of an additional regressor, shape (rows,)."""
-        values, errors, _ = self.fit(np.column_stack([self.columns, column]), self.force)
+        A = np.column_stack([self.columns[:: self.every], column[:: self.every]])
+        values, errors = _robust(A, self.force[:: self.every])
         return float(values[-1]), float(errors[-1])
 
     @cached_property

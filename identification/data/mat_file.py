@@ -206,12 +206,19 @@ def read_variables(file: Path, variable: str | None) -> Record | list[Raw]:
             f"{where}: expected a {such}, got a damaged or another file: {error}"
         ) from None
     content = {key: value for key, value in content.items() if key and key[:2] != "__"}
-    if variable is None and all(name in content for name in EMPS):
-        return _emps(where, file.name, content)
+    return of_variables(where, file.name, content, variable)
+
+
+def of_variables(
+    where: str, name: str, content: Mapping[str, Node], variable: str | None
+) -> Record | list[Raw]:
+    """Return the columns of variables, or of the one at a path such as "run(2).log"."""
+    if variable is None and all(key in content for key in EMPS):
+        return _emps(where, name, content)
     if variable is not None:
-        return list(_records(where, file.name, _found(where, content, variable), variable))
+        return list(_records(where, name, _found(where, content, variable), variable))
     if sum(map(_is_vector, content.values())) > 1:
-        return [_raw(where, file.name, content)]
+        return [_raw(where, name, content)]
     tables = {k: v for k, v in content.items() if _is_matrix(v) or isinstance(v, dict | list)}
     fields = {frozenset(v) if isinstance(v, dict) else None for v in tables.values()}
     if (len(tables) > 1 and (len(fields) > 1 or None in fields)) or not tables:
@@ -219,7 +226,7 @@ def read_variables(file: Path, variable: str | None) -> Record | list[Raw]:
             f"{where}: expected one struct or matrix, or vectors of one length, got "
             f"{_described(content) or 'no variables'}; name one with variable="
         )
-    names = {k: f"{file.name}: {k}" if len(tables) > 1 else file.name for k in tables}
+    names = {k: f"{name}: {k}" if len(tables) > 1 else name for k in tables}
     return [raw for k, v in tables.items() for raw in _records(where, names[k], v, k)]
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from re import DOTALL, fullmatch
 from typing import Literal, TypeVar, final
 
@@ -31,7 +32,7 @@ class Column:
         unit: unit in the file; "" if there is none.
         values: numbers, NaN for missing ones, shape (n,).
         problem: first bad cell, with its location; "" if all cells are numbers.
-        gaps: True if empty cells (or NaN) are the only problem.
+        gaps: True if empty cells (or NaN, or infinite numbers) are the only problem.
     """
 
     label: str
@@ -47,7 +48,7 @@ class Column:
         if bad.size:
             got = f"{values[bad[0]]} ({bad.size} such)"
             problem = f"sample {bad[0]}: expected a finite number, got {got}"
-        return cls(label, unit, values, problem, bool(bad.size and not np.isinf(values).any()))
+        return cls(label, unit, values, problem, bool(bad.size))
 
     def __str__(self) -> str:
         return f"{self.label} [{self.unit}]" if self.unit else self.label
@@ -114,6 +115,11 @@ def label(cell: str) -> tuple[str, str]:
     if match and is_common(match[2]) and any(_matches(match[1], n) for n in MOTION):
         return match[1], match[2]
     return cell, ""
+
+
+def is_channel(name: str) -> bool:
+    """Return True if `name` is a usual name of a channel."""
+    return any(_matches(name, channel) for channel in CHANNELS)
 
 
 def _matches(name: str, channel: str) -> bool:
@@ -214,6 +220,7 @@ def _channels(
         for key, name in checks.named(f"{where}: columns", wanted.columns).items():
             name = checks.text(f"{where}: columns: {key}", name, "the name of a column")
             hits = [c for c in columns if name in (c.label, str(c))]
+            hits = hits or [c for c in columns if fnmatchcase(c.label.lower(), name.lower())]
             if len(hits) != 1:
                 got = f"{len(hits)} of them" if hits else have
                 raise ValueError(f"{where}: expected one column '{name}' for {key}, got {got}")

@@ -124,6 +124,8 @@ def usual(v: Array) -> float:
     return float(np.sqrt(np.mean(v**2))) or 1.0
 
 
+LONG = 20_000
+"""Number of samples above which a static law is compiled if that is expected to save time."""
 NEWTON = 20
 """Largest number of Newton steps for the algebraic unknowns of all samples together."""
 ROUNDS = 40
@@ -148,8 +150,9 @@ class Sampled:
         z_{k+1} = step(z_k, w_k, y_k, w_{k+1}, y_{k+1}, h, p),   z_0 = start(w_0, y_0, p)
         r = rows(w, z, y, p)
 
-    Laws with states run in compiled code if there is a compiler, all other laws in CasADi's virtual
-    machine; the results are bit-identical.
+    Laws with states run in compiled code if there is a compiler, other laws in CasADi's virtual
+    machine; for a long record, until compiling is expected to save time. The results are
+    bit-identical.
 
     Attributes:
         rows, g, start: Functions of (w, y), z, p with derivatives by (z, y, p).
@@ -230,7 +233,7 @@ class Sampled:
                 return self._columns[name](rows, first, "compiled")
             except CompileError:  # a broken compiler does not prevent the evaluation
                 pass
-        return self._columns[name](rows, first, "vm")
+        return self._columns[name](rows, first, "auto" if rows[0].shape[0] > LONG else "vm")
 
     def along(self, w: Array, h: float | Array, p: Array, begin: Array | None = None) -> Path | str:
         """Return rows at all samples and their derivatives by p, or a message on failure.

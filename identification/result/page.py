@@ -25,7 +25,7 @@ from identification.result.outcome import (
     unit_of,
     with_unit,
 )
-from identification.result.series import Curve, Errors, Estimate, Series, limits
+from identification.result.series import FEW, Curve, Errors, Estimate, Series, limits
 from identification.result.stored import source_of
 from identification.verdict.judge import Test
 from symfric.foundation.status import Status
@@ -83,7 +83,9 @@ def lags(one: Series) -> str:
 
 def friction(curve: Curve, name: str) -> str:
     """Return the chart of friction over velocity, with dots for the data and a line for the law."""
-    dots = [Dots("measured", line.t, line.y) for line in curve.measured.values()]
+    few = sum(line.t.size for line in curve.measured.values()) < FEW
+    kind = "measured sample" if few else "measured"
+    dots = [Dots(kind, line.t, line.y) for line in curve.measured.values()]
     low, high = limits(curve)
     x = around("v", curve.v_unit, [curve.law.t, *(line.t for line in curve.measured.values())])
     marks: list[Mark] = [
@@ -145,6 +147,8 @@ def page_of(fit: Outcome, ranking: Ranking | None = None) -> str:
     if fit.status.ok:
         solved = fit.status is Status.SOLVED
         verdict = ("good", "Good") if solved else ("doubtful", "Doubtful")
+        if solved and (unknown := sorted({name for some in fit.undetermined for name in some})):
+            verdict = ("doubtful", f"Good fit; not identifiable: {', '.join(unknown)}")
     top = [
         f"<header>{html.title(fit.name)}",
         html.paragraph(f"fitted to {', '.join(fit.records)} by {fit.kind}", "soft"),

@@ -284,6 +284,12 @@ def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
     return _curve(drive.law, float(drive.N), lines, drive.turning, says)
 
 
+REST = 1e-3
+"""Share of the largest speed above which a point has a direction."""
+FEW = 500
+"""Number of points below which each is drawn larger than the line."""
+
+
 def _curve(law: Law, N: float, lines: dict[str, Line], turning: bool, says: str) -> Curve:
     """Return the curve with every n-th point of the lines, at most about `DOTS` in total."""
     every = max(1, -(-sum(line.t.size for line in lines.values()) // DOTS))
@@ -293,7 +299,11 @@ def _curve(law: Law, N: float, lines: dict[str, Line], turning: bool, says: str)
         scale = law.velocity_scale
         top = 10.0 * float(scale) if np.isfinite(float(scale)) else 1.0
     side = np.geomspace(1e-6 * top, top, SIDE)
+    seen = [np.sign(line.t[np.abs(line.t) > REST * top]) for line in measured.values()]
+    ways = np.unique(np.concatenate(seen)) if seen else np.zeros(0)
     v = np.concatenate([-side[::-1], [0.0], side])
+    if ways.size == 1:  # the data do not show the other direction
+        v = np.sort(ways[0] * side)
     unit = turned if turning else str
     return Curve(unit("m/s"), unit("N"), Line(v, steady_force(law, v, N)), measured, says)
 

@@ -97,9 +97,12 @@ def many_starts(
 
     Returns:
         The ends in the order of the start numbers, with costs for the noise levels of the best
-        one. After Ctrl-C, the starts finished so far and the state of the interrupted start.
+        one. One end if the residuals are linear, because there is only one minimum. After Ctrl-C,
+        the starts finished so far and the state of the interrupted start.
     """
     done: list[Start] = []
+    if len(starts) > 1 and task.is_linear(starts[0]):
+        starts = starts[:1]
     found = _in_turn(task, starts, executor, progress, evaluations)
     try:
         for start in found:

@@ -211,6 +211,16 @@ class Task:
             return f"with {_shown(names, values)}: residuals or derivatives are not finite"
         return Point(w, values, found, self.sigma, self.unknowns.slope(w), self.loss)
 
+    def is_linear(self, w: Array) -> bool:
+        """Return True if the residuals are linear in the coordinates: there is one minimum."""
+        if self.loss != "squares" or len(self.estimated) > 1:
+            return False
+        wide = np.minimum(1.0, self.unknowns.upper - self.unknowns.lower)
+        here, there = (self.at(self.unknowns.inside(w + share * wide)) for share in (0.0, 0.4))
+        if isinstance(here, str) or isinstance(there, str):
+            return False
+        return bool(np.allclose(here.J, there.J, rtol=1e-9, atol=1e-12 * np.abs(here.J).max()))
+
     def again(self, point: Point) -> Point:
         """Return the point with the noise levels of this task."""
         return replace(point, sigma=self.sigma)

@@ -288,6 +288,8 @@ class Natural:
         """Return the natural unit of a parameter; letters in exponents are names in `known`."""
         text = sub(r"\^([a-z])\b", lambda m: f"^{float(known[m[1]].value):g}", parameter.unit)
         powers = _powers(text)
+        if parameter.unit == "rad" and parameter.role == "geometry":  # an angle, not a path
+            return 1.0
         if parameter.role == "load":
             return self.load ** powers.get("N", 0.0)
         shared = parameter.role in PER_LOAD and not {"N", "kg"} & powers.keys()
@@ -308,10 +310,11 @@ class Natural:
             return dict.fromkeys(found, 1.0)
         return found
 
-    def rescaled(self, whole: P) -> P:
-        """Return a law or a scene with its numbers in natural units."""
-        sizes = self.sizes(whole)
-        values = {n: float(p.value) / sizes[n] for n, p in parameters(whole).items()}
+    def rescaled(self, whole: P, *, defaults: bool = False) -> P:
+        """Return a law or a scene in natural units; with `defaults`, they are unchanged numbers."""
+        sizes, known = self.sizes(whole), parameters(whole)
+        kept = {n for n, p in known.items() if defaults and p.value == p.default}
+        values = {n: float(p.value) / sizes[n] for n, p in known.items() if n not in kept}
         return with_values(whole, values)
 
 

@@ -184,7 +184,8 @@ def _of_parts(
         n: Variable(n, units[n], q.value, lower=q.lower, upper=q.upper, doc=q.doc)
         for n, q in known.items()
     }
-    reasons = _reasons(whole, requests, load, moving)
+    small = natural.rescaled(whole, defaults=True) if natural != roles.Natural() else whole
+    reasons = _reasons(small, requests, load / natural.load, moving)
     given = requests.fixed
     held = {n: given.get(n, roles.held_value(known[n], speeds)) for n in reasons}
     sizes, free = natural.sizes(whole), [n for n in known if n not in reasons]

@@ -6,7 +6,7 @@ descriptions fit at one point, the residuals are evaluated a small distance away
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple, final
 
@@ -172,10 +172,12 @@ class Minimum:
         k = len(self.names)
         coloured, white, spread = np.zeros((k, k)), np.zeros((k, k)), np.zeros(k)
         colours = list[Colour]()
-        for channel in self.channels:
-            B = bread[channel.rows]
-            there = positions(channel, across_windows=True)
-            seen = colour(self.r[channel.rows], sensitivity[channel.rows], there)
+        short = shortened(replace(self, J=sensitivity))
+        for channel, part in zip(self.channels, short.channels, strict=True):
+            B, n = bread[channel.rows], channel.t.size
+            there = positions(part, across_windows=True)
+            seen = colour(short.r[part.rows], short.J[part.rows], there)
+            seen = seen._replace(rows=n, freedom=seen.freedom + n - seen.rows)
             C, wide = _meat(seen, B, places(channel))
             coloured, white, spread = coloured + C, white + seen.white * B.T @ B, spread + wide
             colours.append(seen)
@@ -188,6 +190,47 @@ class Minimum:
         coloured, white = back * coloured, back * white
         freedom = np.maximum(freedom, 1.0)
         return Sandwich(coloured, white, freedom, null / size[:, None], tuple(colours))
+
+
+LONG, BLOCKS = 50_000, 20
+"""Number of rows of a channel that are tested, and number of blocks that contain them."""
+
+
+def shortened(found: Minimum) -> Minimum:
+    """Return a minimum whose long channels have only the rows of evenly spaced blocks.
+
+    The tests of residuals need neighbours, but not all rows of a long record. Points have every
+    n-th row.
+    """
+    some = [_tested(channel) for channel in found.channels]
+    ends = np.cumsum([0, *(rows.size for rows in some)]).tolist()
+    if ends[-1] == found.r.size:
+        return found
+    channels = list[Channel]()
+    for channel, rows, begin, end in zip(found.channels, some, ends, ends[1:], strict=False):
+        regressors = {name: y[rows] for name, y in channel.regressors.items()}
+        breaks = tuple(np.flatnonzero(np.isin(rows, channel.breaks)).tolist())
+        t, measured, place = channel.t[rows], channel.measured[rows], slice(begin, end)
+        channels.append(
+            replace(
+                channel, rows=place, t=t, measured=measured, regressors=regressors, breaks=breaks
+            )
+        )
+    rows = np.concatenate([c.rows.start + k for c, k in zip(found.channels, some, strict=True)])
+    parts = {name: getattr(found, name)[rows] for name in ("r", "J", "gain", "raw")}
+    return replace(found, channels=channels, **parts)
+
+
+def _tested(channel: Channel) -> NDArray[np.int64]:
+    """Return the rows of a channel that are tested."""
+    n = channel.t.size
+    if n <= LONG:
+        return np.arange(n, dtype=np.int64)
+    if not channel.ordered:
+        return np.linspace(0, n - 1, LONG).astype(np.int64)
+    size = LONG // BLOCKS
+    starts = np.linspace(0, n - size, BLOCKS).astype(np.int64)
+    return (starts[:, None] + np.arange(size)).ravel()
 
 
 def minimum(task: Task, point: Point) -> Minimum:

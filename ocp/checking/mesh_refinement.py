@@ -202,7 +202,8 @@ def refined_solve(
         goals: criteria for a fine mesh, by default for a verification within 1e-3.
         supervisor: time limit and progress.
         starts: number of solves on the first mesh from starts around the guess; the best one is
-            continued.
+            continued. If the solution is the only start, another start is tried, as the gradient
+            of the cost is also zero at a saddle or a maximum.
 
     Returns:
         The last successful solution with the statistics of all passes, or the first solution if it
@@ -228,8 +229,8 @@ def refined_solve(
             own = solver.with_options(**(later | dict(solver.options))) if again else solver
             ready[key] = own.prepared(transcription.program)
         start, warm = start_of(transcription, guess)
+        each = Starts(transcription, solver, ready[key], transcription.program.values)
         if number == 1 and starts > 1:
-            each = Starts(transcription, solver, ready[key], transcription.program.values)
             around = starts_around(transcription, transcription.unpack(start.w), range(starts))
             outcome, text = each.best(around, supervisor)
             texts.append(text)
@@ -237,6 +238,9 @@ def refined_solve(
             outcome = supervisor.run(
                 transcription, ready[key], start, f"mesh {number}", warm=warm, begin=began
             )
+            if number == 1 and not isinstance(guess, Solution):
+                outcome, text = each.lower(outcome, start.w, supervisor)
+                texts.append(text)
         return Solved(transcription, outcome).solution
 
     new = best = solved(meshes, guess, 1, capped=False)
@@ -261,7 +265,7 @@ def refined_solve(
             message = f"{new.message} The result is the solution on the previous mesh."
             best = replace(best, status=new.status, message=message, cause=new.cause)
         best = new if new.ok else best
-    return with_sentence(replace(best, statistics=statistics), " ".join(texts))
+    return with_sentence(replace(best, statistics=statistics), " ".join(filter(None, texts)))
 
 
 class Excess(NamedTuple):

@@ -1,6 +1,6 @@
 """Functions of the signals of a model: their expressions, comparisons and costs."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from math import inf, isfinite, isnan
 from typing import Any, final
@@ -11,6 +11,9 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
 from symfric.model import Model
 
+EPS = "complementarity"
+"""Parameter of problems with complementary signals: the largest product of two of them, as a share
+of the product of their typical magnitudes. `solve` decreases it; messages do not offer its name."""
 EXPRESSION = "one expression of the signals, such as lambda s: s.x**2"
 MATH = "write casadi functions for those of math: ca.sin, ca.sqrt, ca.fmax"
 BRANCH = "expressions have no truth value: no if, and, max or a <= x <= b in here"
@@ -23,6 +26,11 @@ Comparison = tuple[ca.SX, float, float]
 @final
 class MissingError(ValueError):
     """Error for a name that a model does not have."""
+
+
+def offered(known: Iterable[str], given: Iterable[str] = ()) -> list[str]:
+    """Return the names that messages offer: `known` without `EPS`, unless it is `given`."""
+    return [name for name in known if name != EPS or EPS in given]
 
 
 @final
@@ -44,7 +52,7 @@ class Signals:
         if name not in (*known, *model.outputs):
             if name not in model.further:
                 try:
-                    names = [*known, *model.outputs]
+                    names = offered([*known, *model.outputs])
                     checks.check_names(f"signals of '{model.name}'", [name], names)
                 except ValueError as error:
                     raise MissingError(str(error)) from None

@@ -15,10 +15,6 @@ import casadi as ca
 from ocp.formulation.expressions import Expression, Signals, value_of
 from symfric.foundation import checks
 
-EPS = "complementarity"
-"""Parameter of the problem: largest product of two complementary signals, as a share of the product
-of their typical magnitudes."""
-
 
 @final
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from math import inf, isfinite, sqrt
 from typing import Any, NamedTuple, TypeVar, final
 
 from ocp.formulation.changed_models import with_forms, with_parameters, with_totals
-from ocp.formulation.expressions import Cost, Expression
+from ocp.formulation.expressions import EPS, Cost, Expression
 from ocp.formulation.inputs import Form, Forms, Polynomial, is_form, order_of, rate_name, states_of
 from ocp.formulation.phase import (
     Chain,
@@ -21,7 +21,7 @@ from ocp.formulation.phase import (
     meet,
     size_of,
 )
-from ocp.formulation.relaxed import EPS, relaxes
+from ocp.formulation.relaxed import relaxes
 from symfric.foundation import checks
 from symfric.model import Model
 

@@ -9,7 +9,7 @@ from math import inf, isfinite
 from typing import Any, cast
 
 from ocp.formulation import statement
-from ocp.formulation.expressions import Cost
+from ocp.formulation.expressions import Cost, offered
 from ocp.formulation.inputs import FORM, is_form, order_of, rate_name
 from ocp.formulation.phase import RANGE, Chain, Free, Phase, as_box, is_range, limits
 from ocp.formulation.statement import Setting, Statement
@@ -36,7 +36,8 @@ def message(check: Callable[..., Any], *arguments: Any, **named: Any) -> str:
 
 
 def _unknown(where: str, names: Iterable[str], known: Iterable[str], hint: str = "") -> str:
-    return message(checks.check_names, where, names, known, hint)
+    names = list(names)
+    return message(checks.check_names, where, names, offered(known, names), hint)
 
 
 def type_problems(problem: Statement) -> Iterator[str]:

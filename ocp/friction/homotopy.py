@@ -18,7 +18,7 @@ Widths and mesh fractions are parameters of the nonlinear program, so the progra
 the number of intervals changes.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
 from math import sqrt
@@ -135,6 +135,8 @@ def sharpened(
     coarse = path.coarse(guess, starts)
     if rivals and (found := path.rivals(coarse)):
         yield found[0]._replace(rivals=found)
+        if found[0].solution.status.stopped:
+            return
     step = path.first(coarse, intervals)
     factor, steady = FACTOR, True
     yield path.sharp(step, steady)
@@ -196,7 +198,7 @@ class _Path:
             tries += starts_around(coarse, straight, range(1, starts, 2))
         found = [scales_of(self.user, self.problem, points, {}) for points in tries]
         self.scales = smooth_models.guessed(self.user, found)
-        steps = self.each(coarse, tries)
+        steps = self.each(coarse, tries, until=self.faster)
         best = least(steps)
         for more in range(1, FURTHER + 1):
             if best.ended or best.good:
@@ -213,7 +215,18 @@ class _Path:
                 steps = again
             else:  # the change of the widths is too large
                 self.scales = before
+                steps += self.each(coarse, tries[len(steps) :])
         return finalists(steps)
+
+    def faster(self, steps: Sequence[Step]) -> bool:
+        """Return True if the best motion so far is much faster than the scales.
+
+        Layers are then too narrow for all starts, and lead to many iterations and poor motions.
+        """
+        best = least(steps)
+        found = scales_of(self.user, self.problem, best.points, {})
+        faster = (scale.speed > SAME * self.scales[name].speed for name, scale in found.items())
+        return best.good and any(faster)
 
     def rivals(self, coarse: Sequence[Step]) -> tuple[Sharp, ...]:
         """Return the motions of coarse solves with narrower layers on the same mesh.
@@ -234,7 +247,7 @@ class _Path:
                 name, last = f"width {level:.2g}", level == RIVAL
                 narrower = self.solve(step.transcription, step.points, level, LATER, name)
                 if narrower.ended:
-                    return ()
+                    return (self.sharp(narrower, steady=False),)
                 step, last = (narrower, last) if narrower.good else (step, True)
             known = any(abs(one.solution.cost - step.outcome.cost) < CLOSE * abs(step.outcome.cost)
                         for one in found)  # fmt: skip
@@ -261,14 +274,15 @@ class _Path:
     def each(
         self, mesh: Transcription, tries: Sequence[Points],
         options: Mapping[str, Option] = EARLY,
+        until: Callable[[Sequence[Step]], bool] | None = None,
     ) -> list[Step]:  # fmt: skip
-        """Solve with the widest layers from each start, until a solve is stopped.
+        """Solve with the widest layers from each start, until a solve is stopped or `until` holds.
 
         Equal motions of several starts do not end the search, as they may be a poor local optimum:
         three starts of the cart-pole of nosnoc stay at the lower equilibrium.
         """
         stages = [f"start {number}" for number in range(1, len(tries) + 1)]
-        return self.solves(mesh, tries, FIRST, options, stages)
+        return self.solves(mesh, tries, FIRST, options, stages, until)
 
     def narrower(self, before: Step, level: float) -> Step:
         """Solve with the smaller width `level`, and refine the mesh for it.
@@ -324,8 +338,9 @@ class _Path:
     def solves(
         self, transcription: Transcription, tries: Sequence[Points], level: float,
         options: Mapping[str, Option], stages: Sequence[str],
+        until: Callable[[Sequence[Step]], bool] | None = None,
     ) -> list[Step]:  # fmt: skip
-        """Solve from several starts with the smoothing width `level`, until a solve is stopped."""
+        """Solve from several starts with the smoothing width `level`; see `each`."""
         values = transcription.values(widths_at(self.user, self.scales, level))
         if self.problem.kind == "worst":
             options = {name: v for name, v in options.items() if name != "mu_init"} | BOUNDING
@@ -336,9 +351,13 @@ class _Path:
                 solver = Ipopt(max_time=solver.max_time, **(dict(options) | dict(solver.options)))
             self.prepared[key] = solver, solver.prepared(transcription.program)
         starts = Starts(transcription, *self.prepared[key], values)
-        outcomes = [*starts.outcomes(tries, self.supervisor, stages)]
-        self.spent += [outcome.statistics for outcome in outcomes]
-        return [Step(transcription, outcome, values, level) for outcome in outcomes]
+        steps: list[Step] = []
+        for outcome in starts.outcomes(tries, self.supervisor, stages):
+            self.spent.append(outcome.statistics)
+            steps.append(Step(transcription, outcome, values, level))
+            if until is not None and until(steps):
+                break
+        return steps
 
     def moved(self, step: Step, into: Transcription) -> Points:
         """Return the motion of a step interpolated to the meshes of `into`."""

@@ -15,36 +15,28 @@ Nocedal and Wright, Numerical Optimization, 2006, 12.5, 16.1 (second-order condi
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse import linalg
 
+from ocp.formulation.expressions import offered
 from ocp.formulation.phase import Array, fixed
 from ocp.solving.active import BoundStatus, Entry, entries, statuses
+from ocp.solving.equations import Equations
 from ocp.solving.motion import Motion, at_times
 from ocp.solving.optimum import STATIONARY, Optimum, Sparse
 from ocp.solving.sensitivity import Condition, Sensitivity
 from ocp.transcription.blocks import Indices
-from ocp.transcription.program import Iterate
+from ocp.transcription.program import Iterate, worst_of
 from ocp.transcription.unknowns import SpanPoints
 from symfric.foundation.parameters import check_names
 
 STEP = 1e-3
 """Step of differences relative to a parameter."""
-SOFT, TINY = 1e-11, 1e-14
-"""Regularisation of dependent conditions and of a Hessian without curvature, whose effect iterative
-refinement removes."""
-ROUNDS = 5
-SINGULAR = 1e-5
-"""Largest relative residual of the linear equations."""
-LARGE, UNSOLVABLE = 1e12, 1e15
-"""Condition numbers above which active conditions count as dependent, and above which the linear
-equations have no unique solution."""
-PENALTY, FLAT = 1e6, 1e-6
-"""Weight of A'A in the test of second-order conditions, and least pivot of a positive matrix."""
+LARGE = 1e11
+"""Condition number above which active conditions count as dependent."""
 
 
 class Change(NamedTuple):
@@ -85,10 +77,13 @@ class Linearised:
     source: Optimum | None = None
 
     def __post_init__(self) -> None:
-        if not self.optimum.residual <= STATIONARY:
+        optimum, program = self.optimum, self.optimum.transcription.program
+        violation = worst_of(program, optimum.iterate.w, optimum.rows[0])
+        if not max(optimum.residual, violation) <= STATIONARY:
             raise ValueError(
                 f"{self.name}: expected a solution that satisfies the optimality conditions, got a "
-                f"residual of {self.optimum.residual:.1g}; solve again from this guess"
+                f"residual of {optimum.residual:.1g} and a violation of {violation:.1g}; solve "
+                "again from this guess"
             )
 
     @property
@@ -145,36 +140,10 @@ class Linearised:
         return (upper + sp.triu(upper, 1).T) / self.optimum.size
 
     @cached_property
-    def active(self) -> Sparse:
-        """Jacobian of the active rows by the free unknowns."""
-        return sp.csr_matrix(self.optimum.rows[1])[self.held][:, self.free]
-
-    @cached_property
-    def matrix(self) -> Sparse:
-        """Matrix of the linear equations."""
-        H = self.hessian[self.free][:, self.free]
-        return sp.bmat([[H, self.active.T], [self.active, None]], format="csc")
-
-    @cached_property
-    def factors(self) -> Any:
-        """LU factors of the slightly regularised matrix; None if it is singular."""
-        soft = np.append(np.full(self.free.size, TINY), np.full(self.held.size, -SOFT))
-        try:
-            return linalg.splu(sp.csc_matrix(self.matrix + sp.diags(soft)))
-        except RuntimeError:
-            return None
-
-    def solved(self, right: Array) -> Array | None:
-        """Return the solution of the linear equations, or None if there is no unique one."""
-        found, size, rest = np.zeros(right.size), float(np.abs(right).max(initial=0.0)), right
-        for _ in range(ROUNDS if self.number < UNSOLVABLE else 0):  # iterative refinement
-            found = found + self.factors.solve(rest)
-            rest = right - self.matrix @ found
-            if not np.isfinite(rest).all():
-                return None
-            if np.abs(rest).max(initial=0.0) <= 1e-12 * size:
-                return found
-        return found if np.abs(rest).max(initial=0.0) <= SINGULAR * size else None
+    def equations(self) -> Equations:
+        """Linear equations in the free unknowns and the multipliers of the active rows."""
+        active = sp.csr_matrix(self.optimum.rows[1])[self.held][:, self.free]
+        return Equations(self.hessian[self.free][:, self.free], active)
 
     def stepped(self) -> Optimum | None:
         """Return the optimum after a Newton step with these active conditions, None without one."""
@@ -185,7 +154,7 @@ class Linearised:
         wanted = np.where(rows.upper, program.upper_g, program.lower_g)
         first = optimum.slope / optimum.size + self.hessian @ moved
         last = (J @ moved)[self.held] + (g - wanted)[self.held]
-        found = self.solved(-np.concatenate([first[self.free], last]))
+        found = self.equations.solved(-np.concatenate([first[self.free], last]))
         if found is None:
             return None
         lam_g, moved[self.free] = np.zeros(g.size), found[:n]
@@ -304,13 +273,14 @@ class Linearised:
         Raises:
             ValueError: an unknown name, or derivatives that are not finite.
         """
-        check_names("sensitivity", [name], [*self.numbers, *self.conditions])
+        names = offered([*self.numbers, *self.conditions], [name])
+        check_names("sensitivity", [name], names)
         change = self.by_condition(name) if name in self.conditions else self.by_number(name)
         moved = change.bounds.copy()
         right = change.gradient / self.optimum.size + self.hessian @ moved
         rows = change.rows + self.optimum.rows[1] @ moved
         right = -np.concatenate([right[self.free], rows[self.held]])
-        found = self.solved(right)
+        found = self.equations.solved(right)
         moved[self.free] = np.nan if found is None else found[: self.free.size]
         return change, moved
 
@@ -335,56 +305,24 @@ class Linearised:
             rates["t"], {n: row for n, row in rates.items() if n in motion.signals}, self.doubts,
         )  # fmt: skip
 
-    @cached_property
-    def number(self) -> float:
-        """Estimated 1-norm condition number of the linear equations; inf if they are singular."""
-        if self.factors is None:
-            return np.inf
-        shape, solve = self.matrix.shape, self.factors.solve
-        operator: Any = linalg.LinearOperator  # whose stubs lack its arguments
-        inverse = operator(shape, matvec=solve, rmatvec=solve)
-        estimate: Any = linalg.onenormest(inverse, t=1)  # the only value without random columns
-        with np.errstate(over="ignore", invalid="ignore"):
-            return float(np.nan_to_num(estimate * linalg.norm(self.matrix, 1), nan=np.inf))
-
-    @cached_property
-    def sufficient(self) -> bool:
-        """True if the Hessian is positive definite on the active conditions."""
-        norms = linalg.norm(self.active, axis=1)
-        A = sp.diags(1.0 / np.maximum(norms, 1e-300)) @ self.active
-        return _positive(self.hessian[self.free][:, self.free] + PENALTY * (A.T @ A))
-
     @property
     def regular(self) -> bool:
         """True if the linear equations have a unique solution, at a strict minimum."""
-        return self.number < LARGE and self.sufficient
+        return self.equations.number < LARGE and self.equations.sufficient
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """Reasons why derivatives may be wrong."""
         weak = (f"weakly active: {', '.join(self.weak)}",) if self.weak else ()
-        if not self.sufficient:
+        if not self.equations.sufficient:
             return *weak, "second-order conditions not met: the motion may not be unique"
         many = "active conditions depend on each other: multipliers are not unique"
-        return (*weak, many) if self.number > LARGE else weak
+        return (*weak, many) if self.equations.number > LARGE else weak
 
     @property
     def condition(self) -> Condition:
         """Condition of the optimum."""
         size, free, held = self.optimum.iterate.w.size, self.free.size, self.held.size
         known = size, held + size - free, free - held, self.optimum.residual
-        return Condition(*known, self.number, self.sufficient, self.weak)
-
-
-def _positive(matrix: Sparse) -> bool:
-    """Return True if a symmetric matrix is positive definite, by the pivots of LDL'."""
-    if not matrix.shape[0]:
-        return True
-    try:
-        lu = linalg.splu(
-            sp.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )  # fmt: skip
-    except RuntimeError:
-        return False
-    return bool((lu.perm_r == lu.perm_c).all() and (lu.U.diagonal() > FLAT).all())
+        equations = self.equations
+        return Condition(*known, equations.number, equations.sufficient, self.weak)

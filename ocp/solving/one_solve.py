@@ -39,6 +39,8 @@ FINALISTS = 3
 """Number of coarse solutions that are continued."""
 ALIKE = 1e-3
 """Relative difference of J below which motions count as equal."""
+STAYED = 1e-5
+"""Largest change of scaled unknowns of a solution that counts as its own start."""
 STARTS = 6
 """Default number of coarse solves of a problem with friction; the best one is continued."""
 SPREAD = 0.5
@@ -262,6 +264,23 @@ class Starts:
         text += f"{same} at the same cost."
         total = reduce(SolverStatistics.then, [one.statistics for one in found])
         return best._replace(statistics=total), text if best.status.ok else ""
+
+    def lower(self, found: Outcome, w: Array, supervisor: Supervisor) -> tuple[Outcome, str]:
+        """Return `found` and "", or a better outcome and a sentence if `found` is the start `w`.
+
+        The gradient of the cost is zero not only at a minimum: a body that rests at the start also
+        satisfies the optimality conditions of the largest distance from it.
+        """
+        if not found.status.ok or np.abs(found.iterate.w - w).max(initial=0.0) > STAYED:
+            return found, ""
+        start = starts_around(self.transcription, self.transcription.unpack(w), (1,))
+        other = self.best(start, supervisor)[0]
+        total = found.statistics.then(other.statistics)
+        lower = other.status.ok and other.cost < found.cost - ALIKE * max(abs(other.cost), STAYED)
+        if not (lower or other.status is Status.UNBOUNDED):
+            return found._replace(statistics=total), ""
+        text = "The first start satisfies the optimality conditions, but another one costs less."
+        return other._replace(statistics=total), text
 
 
 def starts_around(

@@ -7,6 +7,7 @@ import numpy as np
 
 from ocp.solving.active import BoundStatus
 from ocp.solving.linearised import Linearised
+from ocp.solving.methods import Ipopt
 from ocp.solving.optimum import STATIONARY, Optimum
 from ocp.transcription.program import worst_of
 
@@ -17,6 +18,8 @@ CONVERGED, CLOSE = 1e-8, 1e-5
 """Change of scaled unknowns by the last step, and largest relative change of the cost."""
 MOST = 2
 """Number of conditions that may be given up, in multiples of the number that are too many."""
+SHARP, MOST_ITERATIONS = 1e-11, 30
+"""Tolerance and most iterations of a repeated solve if conditions are uncertain."""
 NEAREST = 1e-3
 """Least ratio of multiplier and distance of a condition that may count as active."""
 
@@ -58,7 +61,10 @@ def polished(optimum: Optimum) -> Linearised:
     Raises:
         ValueError: the point does not satisfy the optimality conditions.
     """
-    first = now = determined(optimum)
+    first = determined(optimum)
+    if first.weak or not first.regular:
+        first = determined(_sharper(optimum))
+    now = first
     for _ in range(STEPS if first.regular else 0):
         if (step := now.stepped()) is None or not step.residual <= STATIONARY:
             break
@@ -67,6 +73,14 @@ def polished(optimum: Optimum) -> Linearised:
         if same and change < CONVERGED:
             violation = worst_of(step.transcription.program, step.iterate.w, step.rows[0])
             near = abs(step.cost - optimum.cost) <= CLOSE * max(abs(optimum.cost), optimum.size)
-            return replace(later, source=optimum) if near and violation < CLOSE else first
+            return replace(later, source=first.optimum) if near and violation < CLOSE else first
         now = later
     return first
+
+
+def _sharper(optimum: Optimum) -> Optimum:
+    """Return the optimum with smaller errors, in which more conditions are certain."""
+    program = optimum.transcription.program
+    solver = Ipopt(tol=SHARP, obj_scaling_factor=1.0 / optimum.size, max_iter=MOST_ITERATIONS)
+    outcome = solver.prepared(program).run(optimum.iterate, optimum.values, warm=True)
+    return replace(optimum, iterate=outcome.iterate) if outcome.status.ok else optimum

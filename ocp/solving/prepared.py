@@ -267,8 +267,10 @@ class Prepared:
             reason += f" ended {self.solver} after {count} iterations; allow more time or continue "
             reason += "from the result, which is the best iterate."
         elif watch.halt is Status.UNBOUNDED:
-            reason = f"{status.value} Unknowns were {FAR:g} times their typical size after {count} "
-            reason += "iterations."
+            reason = (
+                f"{status.value} Unknowns were {FAR:g} times their nominal values after {count} "
+            )
+            reason += "iterations; if such values are right, give larger nominal ones."
         if watch.halt is None:
             reason += f" ({self.solver} after {count} iterations: {answer}.)"
         if status is Status.NOT_FINITE:

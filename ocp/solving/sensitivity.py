@@ -14,9 +14,10 @@ class Condition:
 
     Attributes:
         unknowns, active: numbers of unknowns, and of active conditions including equations.
-        degrees_of_freedom: number of unknowns minus number of independent active conditions.
+        degrees_of_freedom: number of unknowns minus number of active conditions; some more if the
+            conditions depend on each other.
         residual: relative residual of stationarity.
-        number: estimated 1-norm condition number of the scaled optimality conditions; inf if they
+        number: estimated condition number of the equilibrated optimality conditions; inf if they
             are singular.
         sufficient: True if the Hessian is positive definite on the active conditions, so the
             optimum is a strict local minimum.

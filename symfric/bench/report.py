@@ -16,6 +16,7 @@ import numpy as np
 
 from symfric.foundation.files import write_table
 from symfric.foundation.programs import find_compiler, needed_compiler
+from symfric.foundation.status import SolveError, Status
 from symfric.integrator.compiled.compiler import FLAGS
 
 if TYPE_CHECKING:
@@ -53,12 +54,14 @@ class Report:
         tables: title -> rows; the rows of a table may have different columns.
         notes: sentences, for example about tools that are not installed.
         interrupted: True after Ctrl-C.
+        failed: names of the tasks that failed.
     """
 
     draw: tuple[str, Draw] | None = None
     tables: dict[str, list[Row]] = field(default_factory=dict[str, list[Row]])
     notes: list[str] = field(default_factory=list[str])
     interrupted: bool = False
+    failed: tuple[str, ...] = ()
 
     def add(self, found: Iterable[Found]) -> None:
         """Append rows and notes."""
@@ -73,6 +76,8 @@ class Report:
     ) -> Self:
         """Run tasks and append their results; Ctrl-C ends the loop and keeps the rows so far.
 
+        A task that fails keeps its rows so far, and the others are run.
+
         Raises:
             KeyboardInterrupt: Ctrl-C before the first row.
         """
@@ -80,10 +85,17 @@ class Report:
             for k, (name, task) in enumerate(tasks.items()):
                 if progress is not None:
                     progress(name, k / len(tasks), "")
-                for found in task():
-                    self.add([found])
-                    if progress is not None:
-                        progress(name, (k + 1) / len(tasks), line(found))
+                try:
+                    for found in task():
+                        self.add([found])
+                        if progress is not None:
+                            progress(name, (k + 1) / len(tasks), line(found))
+                except Exception as error:  # noqa: BLE001  (any failure of a measured tool)
+                    if isinstance(error, SolveError) and error.status is Status.INTERRUPTED:
+                        raise KeyboardInterrupt from None
+                    self.failed = (*self.failed, name)
+                    first = (str(error).strip().splitlines() or [""])[0]
+                    self.notes.append(f"{name} failed: {type(error).__name__}: {first}")
         except KeyboardInterrupt:
             if not self.tables:
                 raise

@@ -58,7 +58,8 @@ def bench(
     and C of CasADi. embedded: instructions and memory of generated C on Cortex-M cores under QEMU.
 
     In files and pipes each row is also printed on standard error as it is measured. Ctrl-C keeps
-    the rows so far; the exit status is then 130.
+    the rows so far; the exit status is then 130. If a measurement fails, the others are made, and
+    the exit status is 1.
 
     Example: symfric bench multibody --plot bench.png --csv runs.csv
     """
@@ -84,6 +85,8 @@ def bench(
     output.finish(result.to_dict(), json, lambda: show(result.shown()), plot, csv)
     if result.interrupted:
         raise typer.Exit(INTERRUPTED)
+    if result.failed:
+        raise typer.Exit(1)
 
 
 def show(shown: "Iterable[Table | str]") -> None:

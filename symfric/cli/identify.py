@@ -42,12 +42,13 @@ def reader(
     resample: bool,
     step: float | None = None,
     variable: str | None = None,
+    scales: Strings = None,
 ) -> Callable[[list[str]], Dataset]:
     """Return a function that reads files according to --column, --unit, --kind and other options.
 
     --column and --unit are SIGNAL=NAME, repeated, or list all columns in order. Points are a time
     series if a column t or a step is given. With `resample`, records have equal intervals and are
-    split at gaps.
+    split at gaps. `scales` are SIGNAL=FACTOR, such as force=-1 to turn a sign.
 
     Raises:
         ValueError: a mixture of both forms, or a name without a value.
@@ -63,6 +64,8 @@ def reader(
 
     def read(paths: list[str]) -> Dataset:
         found = Dataset.read(list(paths), **how)
+        if factors := opt.numbers("--scale", scales):
+            found = found.scaled(factors)
         return found.resampled() if resample else found
 
     return read
@@ -160,6 +163,7 @@ def identify(
     variable: str | None = None,
     missing: str = "refuse",
     resample: bool = False,
+    scales: Strings = None,
     normal_force: float = 1.0,
     fixed: Strings = None,
     free: Strings = None,
@@ -184,7 +188,7 @@ def identify(
     laws, wishes = opt.laws_of(law), free_in(free)
     first = next(iter(laws.values()))
     chosen = residuals_of(kind, windows, wishes, dead_time)
-    read = reader(columns, units, kind, missing, resample, step, variable)
+    read = reader(columns, units, kind, missing, resample, step, variable, scales)
     request: dict[str, Any] = {
         "free": wishes or None,
         "fixed": opt.numbers("--fix", fixed) or None,

@@ -98,6 +98,16 @@ def test_every_example_has_its_docstring_and_code() -> None:
     assert "def problem()" in pages["out_and_back"]
 
 
+def test_publications_are_collected() -> None:
+    doc = "T.\n\nSource: A, J. X 1(2), 1999, p. 3; B,\nThesis 2001 (part); with words.\n\nMore: C."
+    assert [*lists.sources(doc)] == [
+        "A, J. X 1(2), 1999, p. 3", "B, Thesis 2001 (part); with words"
+    ]  # fmt: skip
+    assert any(where.startswith("symfric.integrator.") for _, where in lists.methods())
+    named = [name for names in lists.laws().values() for name in names]
+    assert sorted(named) == sorted(ALL_LAWS | POPULATIONS)
+
+
 # ---- measurements ----
 
 

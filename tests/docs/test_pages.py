@@ -6,15 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.machine.pages import (
-    ROOT,
-    agrees,
-    blocks,
-    commands,
-    differences,
-    main,
-    written_pages,
-)
+from docs.machine.pages import ROOT, agrees, blocks, commands, differences, main, written_pages
 from symfric.cli.app import COMMANDS
 
 

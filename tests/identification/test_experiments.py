@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from identification import Dataset, Fit, Points, cross_validate
+from identification import Dataset, Fit, InverseDynamics, Points, cross_validate
+from identification.result.page import page_of
 from symfric.foundation.status import Status
 from symfric.laws import Stribeck
 
@@ -55,3 +56,22 @@ def test_forces_that_no_speed_explains_are_refused() -> None:
     ]
     found = Fit(Points(), "coulomb", Dataset(tuple(some)), starts=1).solve(throw=False)
     assert found.status is Status.IMPLAUSIBLE
+
+
+def test_a_record_of_one_direction_is_shown_in_that_direction_only() -> None:
+    """No green heading over values that the data do not identify, no curve without data."""
+    t, w = 1e-3 * np.arange(3000), 9.0
+    v, a = 0.3 + 0.25 * np.sin(w * t), 0.25 * w * np.cos(w * t)
+    x = 0.3 * t - 0.25 / w * np.cos(w * t)
+    rng = np.random.default_rng(0)
+    force = 2 * a + np.array([float(LAW.force(s, 1.0)) for s in v])
+    force += 0.1 * rng.standard_normal(t.size)
+    data = Dataset.of(t=t, x=x, force=force)
+    found = Fit(InverseDynamics(), "stribeck", data, starts=1).solve(throw=False)
+    assert found.status is Status.SOLVED and found.curve is not None
+    assert found.parameters["m"].value == pytest.approx(2.0, rel=0.01)
+    assert {*found.undetermined[0]} == {"offset", "mu_s", "mu_d"}
+    assert found.curve.law.t.min() > 0
+    page = page_of(found)
+    assert 'class="verdict doubtful"' in page and 'class="verdict good"' not in page
+    assert "Good fit; not identifiable: mu_d, mu_s, offset" in page

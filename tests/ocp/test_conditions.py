@@ -281,6 +281,9 @@ def test_lift_off_from_the_ground_is_found() -> None:
     assert stopped.value.status is Status.TIME_LIMIT
     own = Problem(phase, problem.cost, path=path, p={"complementarity": 1e-2})
     assert "eps = 0.01" in solve(own, intervals=10, refine=False, throw=False).message
+    with pytest.raises(ValueError, match=r"expected one of t, y, v, [^;]*, got q; check") as odd:
+        solve(Problem(phase, integral(lambda s: s.q**2), path=path))
+    assert "complementarity" not in str(odd.value)
     with pytest.raises(ValueError, match=r"got complementary.*, which need collocation points"):
         solve(problem, scheme=Shooting())
     with pytest.raises(ValueError, match=r"expected friction='smooth' with complementary"):

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.checks import listed
+from symfric.foundation.numeric import evaluate_all
 from symfric.foundation.status import Status
 from symfric.integrator.equations.blocks import blocks
 from symfric.integrator.equations.initial import FLOOR, consistent
@@ -15,10 +16,13 @@ from symfric.integrator.equations.matrices import regular
 from symfric.integrator.equations.system import System
 from symfric.integrator.running.integrator import Integrator
 from symfric.model import Model
+from symfric.model.contact import APPLIED
 
 Array = NDArray[np.float64]
 NEARLY = 0.1
 """Value of det(I - dN/dN) below which a mechanism whose step shrinks to nothing has jammed."""
+STILL = 1e-9
+"""Sliding velocity per velocity of a mechanism below which a contact is in a dead centre."""
 COARSE = 1e-10
 """Resolution of time [s] above which rounding of t may be the cause of a failed step."""
 
@@ -57,12 +61,34 @@ def _causes(
         for variable in integrator.model.z:  # name joint and law
             cause = cause.replace(f"through {variable.name}:", f"through the {variable.doc}:")
         yield Status.JAMMED, cause
+        yield Status.STEP_TOO_SMALL, dead_centre(integrator, y, d)
     yield Status.STEP_TOO_SMALL, _unbounded(system, y, f, h)
     yield Status.NOT_FINITE, _not_finite(integrator, y, d, h, f)
     yield Status.NOT_FINITE, _steep(system, y, d)
     if manifold is not None:
         yield Status.JAMMED, pulls(manifold, y, d, NEARLY)
     yield Status.SINGULAR, _singular(system, y, d, h, advice)
+
+
+def dead_centre(integrator: Integrator, y: Array, d: Array) -> str:
+    """Return a message if a sticking contact cannot slide in any motion of the mechanism at y."""
+    model, system = integrator.model, integrator.system
+    mechanics, contacts = model.holonomic, [c for c in model.contacts if APPLIED in c.given]
+    if mechanics is None or not mechanics.phi.numel() or not contacts:
+        return ""
+    q, qd = system.y[: mechanics.n], system.y[mechanics.n : 2 * mechanics.n]
+    slopes = [ca.jacobian(mechanics.phi, q), *(ca.jacobian(c.slip, qd) for c in contacts)]
+    columns = integrator.of_time("slopes", ca.densify(ca.vertcat(*slopes)))
+    rows = evaluate_all(columns, np.zeros(1), y, d)[0]
+    m = mechanics.phi.numel()
+    motions = np.linalg.svd(rows[:m])[2][m:]
+    for c, row in zip(contacts, rows[m:], strict=True):
+        if np.abs(motions @ row).max(initial=0.0) < STILL * np.abs(row).max():
+            return (
+                f"contact '{c.name}' is in a dead centre, where its sliding direction, and thus "
+                "the mode of its law, is undetermined; start elsewhere, or use a smooth law"
+            )
+    return ""
 
 
 def chattering(model: Model) -> str:

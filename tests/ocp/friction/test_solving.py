@@ -6,7 +6,7 @@ Machines are judged by `rubbing.Machine.follow`: the equations again in NumPy, m
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import pairwise
+from itertools import groupby, pairwise
 from math import tanh
 from types import SimpleNamespace
 from typing import Any
@@ -36,6 +36,7 @@ from ocp.friction.mode_models import holding, mode_model
 from ocp.friction.smooth_models import Scale, own_level, speeds_at, sticking, widths_at
 from ocp.problems import out_and_back
 from ocp.solving.methods import Ipopt
+from ocp.solving.one_solve import STARTS
 from ocp.transcription.schemes import Radau
 from symfric import BrownMcPhee, Contact, ExactCoulomb, Model, SolveError, Status, Variable, drive
 from symfric.scenes import PendulumBox
@@ -262,6 +263,22 @@ def test_conveyor_has_its_closed_form_but_for_the_cost_of_its_margin(
     assert float(text[1]) == margin
     assert cost >= least * BEST
     assert -found.cost + cost == pytest.approx(BEST, rel=rel)
+
+
+def test_motion_faster_than_the_layers_ends_the_first_starts_and_a_stop_ends_all() -> None:
+    stages: list[str] = []
+
+    def report(now: Progress) -> None:
+        stages.append(now.stage)
+        if not now.stage.startswith("start"):
+            raise KeyboardInterrupt
+
+    stopped = solve(conveyor(), progress=report, throw=False)
+    assert stopped.status is Status.INTERRUPTED
+    starts = [stage for stage, _ in groupby(stages)]
+    again = starts.index("start 1", 1)
+    assert again < STARTS  # the others would have too narrow layers as well
+    assert starts[again:-1] == [f"start {number}" for number in range(1, STARTS + 2)]
 
 
 # --- failures on the way ------------------------------------------------------------------------

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from phases import unit_move
 
-from ocp import LivePlot, Phase, Problem, Progress, integral, load, solve
+from ocp import LivePlot, Phase, Problem, Progress, at_end, integral, load, solve
+from ocp.formulation.expressions import Cost
 from ocp.problems import out_and_back
 from symfric import BrownMcPhee, Model, SolveError, Status, Variable
 from symfric.scenes import drive
@@ -33,6 +34,37 @@ def test_starts_find_the_better_of_two_optima() -> None:
     assert one["y"].max() > 0.1 and many["y"].min() < -0.1
     assert many.statistics.solves >= 8
     assert "The best of 8 starts is continued: " in many.message
+
+
+REST = {"x": 0.0, "v": 0.0}
+PUSH = {"end": {}, "start": REST, "bounds": {"a": (-1.0, 1.0)}}
+"""Motions from rest with |a| <= 1, whose costs fall in both directions."""
+
+
+@pytest.mark.parametrize(
+    ("cost", "best"),
+    [
+        (at_end(lambda s: -(s.x**2)), -1.0 / 4.0),
+        (integral(lambda s: -(s.v**2)), -1.0 / 3.0),
+        (at_end(lambda s: -s.x * s.v), -1.0 / 2.0),
+    ],
+)
+def test_rest_at_the_largest_cost_is_no_solution(cost: Cost, best: float) -> None:
+    found = solve(unit_move(cost=cost, **PUSH))
+    assert found.cost == pytest.approx(best, rel=1e-4)
+    assert "another one costs less" in found.message
+
+
+def test_rest_at_the_least_cost_is_the_solution() -> None:
+    found = solve(unit_move(cost=integral(lambda s: s.x**2 + s.v**2), **PUSH))
+    assert found.cost == pytest.approx(0.0, abs=1e-9)
+    assert "another" not in found.message
+
+
+def test_start_at_a_saddle_of_an_unbounded_problem() -> None:
+    with pytest.raises(SolveError) as caught:
+        solve(unit_move(cost=integral(lambda s: s.x * s.a), end={}, start=REST))
+    assert caught.value.status is Status.UNBOUNDED
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from carts import CART, EFFORT, F, V, fastest, move, slope, there_and_back
 from phases import solve_once
+from scipy.linalg import null_space
 
 from ocp import Free, Ipopt, Phase, Problem, Radau, at_end, integral, load, soft, solve
 from ocp.solving.linearised import Linearised
@@ -131,9 +132,72 @@ def test_condition_counts_and_tests_the_second_order() -> None:
     assert "18 degrees of freedom; strict local minimum" in str(good)
     saddle = integral(lambda s: s.a**2 - 200.0 * s.x**2)
     phase = Phase(CART, 1.5, start={"x": 0.0, "v": 0.0}, end={"x": 0.0, "v": 0.0}, p={"m": 1.0})
-    bad = solve_once(Problem(phase, saddle), 20).condition
+    rest = solve_once(Problem(phase, EFFORT), 20)
+    bad = solve_once(Problem(phase, saddle), 20, guess=rest).condition
     assert not bad.sufficient
     assert "second-order conditions not met" in str(bad)
+
+
+def test_dependent_conditions_leave_a_unique_motion() -> None:
+    """The end is prescribed twice: the multipliers are not unique, the derivatives are."""
+    ends = {"start": {"x": 0.0, "v": 0.0}, "end": {"v": 0.0}, "p": {"m": 2.0}}
+    twice = {1.0: [lambda s: s.x >= 1.0, lambda s: 2.0 * s.x >= 2.0]}
+    found = solve_once(Problem(Phase(CART, 1.0, at=twice, **ends), EFFORT), 12).sensitivity("m")
+    assert "multipliers are not unique" in found.doubts[-1]
+    alone = solve_once(move(), 12).sensitivity("m")
+    np.testing.assert_allclose(found.cost, alone.cost, rtol=1e-6)
+    np.testing.assert_allclose(found.signals["a"], alone.signals["a"], atol=1e-4)
+
+
+def scaled(kind: str, L: float, T: float, C: float, nominal: bool) -> Problem:
+    """A move over L within T with costs times C, in which bounds are active or touched."""
+    sizes = {"x": L, "v": L / T, "a": L / T**2}
+    units = {"x": "m", "v": "m/s", "a": "m/s^2"}
+    x, v, a = (
+        Variable(n, units[n], **({"nominal": q} if nominal else {})) for n, q in sizes.items()
+    )
+    cart = Model("cart", x=(x, v), u=(a,), ode=ca.vertcat(v.symbol, a.symbol))
+    rest, there = {"x": 0.0, "v": 0.0}, {"x": L, "v": 0.0}
+    effort = integral(lambda s: C * (s.a / sizes["a"]) ** 2)
+    if kind == "wall":
+        phase = Phase(cart, T, start={"x": 0.0, "v": L / T}, end={"x": 0.0, "v": -L / T})
+        return Problem(phase, effort, bounds={"x": (None, L / 9)})
+    if kind == "flat":
+        phase = Phase(cart, T, start=rest, end={"x": L})
+        return Problem(phase, at_end(lambda s: C * s.x / L))
+    if kind == "fastest":
+        phase = Phase(cart, Free(0.1 * T, 5.0 * T), start=rest, end=there)
+        limits = {"a": (-5.0 * sizes["a"], 10.0 * sizes["a"])}
+        return Problem(phase, at_end(lambda s: C * s.t / T), bounds=limits)
+    bounds = {"a": (-5.0 * sizes["a"], None), "v": (None, 1.45 * sizes["v"])}
+    return Problem(Phase(cart, T, start=rest, end=there), effort, bounds=bounds)
+
+
+@pytest.mark.parametrize("kind", ["effort", "wall", "fastest", "flat"])
+def test_statements_do_not_depend_on_units(kind: str) -> None:
+    def stated(L: float, T: float, C: float, nominal: bool = True) -> list[object]:
+        found = solve(scaled(kind, L, T, C, nominal), intervals=20, refine=False, verify=False)
+        active = [(one.name, one.side, one.weak) for one in found.active()]
+        condition, by = found.condition, found.sensitivity("x at the end")
+        counts = condition.degrees_of_freedom, condition.sufficient, condition.weak
+        return [active, counts, by.doubts, str(found).count("active:")]
+
+    first = stated(1.0, 1.0, 1.0)
+    for scales in ((1, 1, 1e-6), (1, 1, 1e6), (1e-3, 1, 1), (1e3, 1, 1), (1, 1e-3, 1), (1, 1e3, 1)):
+        assert stated(*scales) == first
+    assert stated(1e3, 1e-3, 1e-6, nominal=False) == first
+
+
+def test_second_order_conditions_are_those_of_the_reduced_hessian() -> None:
+    """Dense eigenvalues on the null space of the active conditions."""
+    for kind in ("effort", "wall", "flat"):
+        found = solve(scaled(kind, 1.0, 1.0, 1.0, True), intervals=8, refine=False, verify=False)
+        own = found._linearised("condition")
+        H, A = own.equations.H.toarray(), own.equations.A.toarray()
+        Z = null_space(A, rcond=1e-9)
+        assert Z.shape[1] == own.condition.degrees_of_freedom
+        least = np.linalg.eigvalsh(Z.T @ H @ Z).min()
+        assert found.condition.sufficient == (least > 1e-6)
 
 
 def test_motion_that_is_not_unique_is_doubted() -> None:
@@ -151,7 +215,9 @@ def test_files_keep_multipliers(tmp_path: Path) -> None:
     """Scenarios share the start of a linear input; durations have a sum; a path has a penalty."""
     ends = {"start": {"x": 0.0, "v": 0.0}, "end": {"x": 0.1, "v": 0.0}}
     goals = {"light": {"m": 1.0}, "heavy": {"m": 2.0}}
-    shared = Problem(Phase(CART, 1.0, **ends), EFFORT, scenarios=goals, inputs={"a": "linear"})
+    near = EFFORT + at_end(lambda s: 100.0 * (s.x - 0.1) ** 2)
+    rest = {"x": 0.0, "v": 0.0}
+    shared = Problem(Phase(CART, 1.0, start=rest), near, scenarios=goals, inputs={"a": "linear"})
     parts = Phase(CART, Free(0.2, 1.0), name="out") >> Phase(CART, Free(0.2, 1.0), end={"x": 0.1})
     sums = Problem(parts, EFFORT, durations=[((0, 1), 1.0)], p={"m": 2.0}, periodic=["v"])
     path = [soft(lambda s: s.v <= 0.1, linear=0.5)]
@@ -167,6 +233,15 @@ def test_files_keep_multipliers(tmp_path: Path) -> None:
         name = "m" if problem is not shared else "T"
         one, other = (vars(s.sensitivity(name)) for s in (found, stored))
         np.testing.assert_equal(other, one)
+
+
+def test_failed_solves_have_no_sensitivities() -> None:
+    """x = 0 satisfies no end, but its residual is zero."""
+    twice = {1.0: [lambda s: s.x == 1.0, lambda s: s.x == 2.0]}
+    failed = solve_once(Problem(Phase(CART, 1.0, at=twice, p={"m": 2.0}), EFFORT), 6)
+    assert not failed.ok
+    with pytest.raises(ValueError, match="satisfies the optimality conditions, got a residual of"):
+        failed.sensitivity("m")
 
 
 def test_motions_without_multipliers_are_refused(tmp_path: Path) -> None:

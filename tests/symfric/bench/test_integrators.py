@@ -5,11 +5,12 @@ import sys
 import numpy as np
 import pytest
 from backends import needs_compiler
+from fake_cupy import FakeCupy
 
 from symfric import BrownMcPhee, Model, simulate
-from symfric.bench import ensemble, multibody
+from symfric.bench import calls, ensemble, integrator, multibody
 from symfric.bench.contenders import MECHANISMS, by_hand, casadi, scipy
-from symfric.bench.integrator import ERRORS
+from symfric.bench.integrator import ERRORS, RUNS
 from symfric.bench.multibody import CASES
 from symfric.bench.report import RATIOS, Report, Row, ratios, time_at
 from symfric.scenes import Rabinowicz
@@ -95,6 +96,29 @@ def test_ratios_are_over_the_reference() -> None:
     assert not [*ratios(rows, "absent", ERRORS)]
 
 
+@pytest.mark.slow
+@needs_compiler
+def test_integrators_and_derivatives_are_measured(short: None) -> None:
+    made = integrator.bench(quick=True)
+    names = dict.fromkeys(row["integrator"] for row in made.tables[RUNS])
+    assert {"symfric compiled", "symfric vm", "casadi cvodes", "C by hand"} <= names.keys()
+    for name in names:
+        coarse, fine = (r for r in made.tables[RUNS] if r["integrator"] == name)
+        assert coarse["relative error"] > 10 * fine["relative error"] > 0, name
+        assert fine["relative error"] < 1e-4, name
+        assert coarse["steps"] < fine["steps"], name
+        assert all(0.001 < row["time per run [ms]"] < 1000 for row in (coarse, fine)), name
+    (first,) = made.tables[integrator.FIRST]
+    assert all(0 <= v < 60 for c, v in first.items() if c != "case")
+    slopes = made.tables[integrator.SLOPES]
+    assert [row["parameters"] for row in slopes] == [1, 1, 2, 2]
+    for row in slopes:
+        assert row["relative error"] < 1e-3
+        assert 1 < row["ratio, forward"] < 100
+        assert 1 < row["ratio, adjoint"] < 100
+        assert 0.001 < row["time per run [ms]"] < 100
+
+
 @needs_compiler
 def test_members_in_lanes_are_those_of_single_runs() -> None:
     case = ensemble.CASES[0]._replace(t_end=2.0)
@@ -113,6 +137,36 @@ def test_without_a_graphics_processor_a_note_reports_it(monkeypatch: pytest.Monk
     monkeypatch.setitem(sys.modules, "cupy", None)
     (note,) = ensemble.cuda()
     assert str(note).startswith("Graphics processor: not run, simulate_many: backend='cuda' needs")
+
+
+@pytest.mark.slow
+def test_members_on_a_device_are_compared_with_those_on_cores(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "cupy", FakeCupy())
+    monkeypatch.setattr(ensemble, "ON_DEVICE", 3000)
+    monkeypatch.setattr(ensemble, "SAMPLE", 8)
+    (double, single) = (row for _, row in ensemble.cuda(quick=True))
+    assert (double["type"], single["type"]) == ("double", "float")
+    for row in (double, single):
+        assert row["members"] == 30
+        ratio = row["members per second"] / row["members per second, all cores"]
+        assert row["ratio to all cores"] == pytest.approx(ratio)
+    off = "relative difference at the end"
+    assert double[off] < 1e-5
+    assert double[off] < single[off] < 1e-3
+
+
+@pytest.mark.slow
+def test_short_calls_are_measured_and_right() -> None:
+    tasks: dict[str, list[Row]] = {}
+    for row in calls.bench(quick=True).tables[calls.TITLE]:
+        tasks.setdefault(str(row["task"]), []).append(row)
+    assert len(tasks) == 6
+    for rows in tasks.values():
+        assert rows[0]["ratio to the first"] == 1.0
+        assert all(0.1 < row["time [us]"] < 1e7 for row in rows)
+        assert all(row["relative error"] < 1e-2 for row in rows if row["relative error"] >= 0)
 
 
 def test_a_solver_that_fails_is_noted() -> None:

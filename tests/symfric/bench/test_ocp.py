@@ -147,9 +147,7 @@ def test_absent_and_failing_tools_are_rows() -> None:
         attempted(stopped, BLOCK, 1.0)
 
 
-def test_rows_come_one_by_one_and_stay_after_an_interrupt(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_rows_come_one_by_one_and_stay_after_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
     def still(case: Case, limit: float) -> Attempt:
         return Attempt(7.0, "Solve_Succeeded", even(case, 2), np.zeros(2))
 

@@ -23,6 +23,7 @@ from symfric.bench.report import (
     timed,
 )
 from symfric.cli import main
+from symfric.foundation.status import SolveError, Status
 
 ROWS = [
     {"case": "a", "who": "symfric", "error": 1e-4, "time [ms]": 2.0, "steps": 12345},
@@ -58,6 +59,24 @@ def test_csv_holds_all_digits(tmp_path: Path) -> None:
     rows = list(csv.DictReader((tmp_path / "t.csv").read_text("utf-8").splitlines()))
     assert [float(r["error"]) for r in rows] == [r["error"] for r in ROWS]
     assert [r["note"] for r in rows] == ["", "", "x", ""]
+
+
+def test_a_task_that_fails_keeps_its_rows_and_the_other_tasks() -> None:
+    def fails() -> Iterator[Found]:
+        yield "T", ROWS[0]
+        raise RuntimeError("no such solver\nat line 3")
+
+    made = Report().collect({"a": fails, "b": found})
+    assert [*made.tables["T"]] == [ROWS[0], *ROWS]
+    assert made.failed == ("a",)
+    assert "a failed: RuntimeError: no such solver" in made.notes
+    assert not made.interrupted
+
+    def stopped() -> Iterator[Found]:
+        yield "T", ROWS[0]
+        raise SolveError("simulate: interrupted", Status.INTERRUPTED)
+
+    assert Report().collect({"a": stopped, "b": found}).interrupted
 
 
 def test_an_interrupt_keeps_the_rows_so_far() -> None:

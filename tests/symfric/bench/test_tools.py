@@ -11,21 +11,24 @@ import numpy as np
 import pytest
 from cortex import on_target
 
-from identification import Dataset
+from identification import Dataset, synthetic_drive_data
 from ocp import solve
 from ocp.problems import READY, out_and_back
-from symfric import Coulomb, Sum, Viscous, drive
+from symfric import Coulomb, Sum, Viscous, drive, law_from_text, with_values
 from symfric.bench import codegen, embedded, identification, starts
 from symfric.bench import identification_measured as measured
+from symfric.bench.codegen import PROVEN, plants, trials
 from symfric.bench.identification import files, outcome
 from symfric.bench.identification_files import campaign
+from symfric.bench.identification_memory import ranked
 from symfric.bench.identification_repeats import coloured, far
 from symfric.bench.interop import GOAL, ROUTES, STEPS, N, T, missed, move
 from symfric.bench.ocp import controllers
 from symfric.bench.report import GOALS, Row
+from symfric.codegen import law_block
 from symfric.embedded import Absent
 from symfric.integrator import Hold, flow, simulate
-from symfric.laws import BrownMcPhee
+from symfric.laws import BrownMcPhee, Dahl
 
 # ---- optimal control ----
 
@@ -156,6 +159,23 @@ def test_no_damaged_file_is_fitted_without_a_warning() -> None:
 
 
 @pytest.mark.slow
+def test_lugre_is_flagged_on_data_of_gms_and_ranked_below_it() -> None:
+    found = ranked()
+    assert [row.law for row in found.rows] == ["gms", "lugre"]
+    assert found["lugre"].status == "DOUBTFUL"
+    assert 3 * found["gms"].validation < found["lugre"].validation
+
+
+@pytest.mark.slow
+def test_a_law_with_two_directions_is_chosen_for_data_with_two() -> None:
+    two = measured.DIRECTIONS[1]
+    sides = {"mu_d_pos": 20.0, "mu_d_neg": 24.0, "sigma_2_pos": 160.0, "sigma_2_neg": 240.0}
+    law = with_values(law_from_text(two), sides | {"v_eps_pos": 1e-3, "v_eps_neg": 1e-3})
+    data = synthetic_drive_data(law, speeds=(0.01, 0.05, 0.1), dwell=0.3)
+    assert measured.closed_loop(data).law == two
+
+
+@pytest.mark.slow
 @pytest.mark.skipif(not measured.EMPS.is_dir(), reason="needs EMPS in ../shared/data/EMPS")
 def test_the_measured_drive_reaches_the_goals_of_the_closed_loop() -> None:
     rows = goals(measured.emps(quick=True))
@@ -201,3 +221,30 @@ def test_absent_tools_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ValueError, match="sections"):
         codegen.bench(sections=("nonsense",))
     assert isnan(embedded.whole(nan)) and embedded.whole(2.7) == 3
+
+
+@pytest.mark.slow
+def test_fuzzing_has_a_row_for_every_type(
+    monkeypatch: pytest.MonkeyPatch, compiler: object
+) -> None:
+    monkeypatch.setattr(codegen, "_blocks", lambda _: [(law_block(Dahl()), 2000)])
+    made = codegen.bench(quick=True, sections=("fuzz",))
+    rows = made.tables[codegen.FUZZ]
+    assert [row["type"] for row in rows] == ["f64", "f32"]
+    assert all(row["valid steps"] + row["repaired steps"] == 2000 for row in rows)
+    assert [row["met"] for row in made.tables[GOALS]] == ["yes"]
+
+
+@pytest.mark.slow
+def test_compensators_meet_their_goals(monkeypatch: pytest.MonkeyPatch) -> None:
+    (bristles, law), *_ = plants(quick=True).items()
+    first = trials()[0]
+    cases = {case: first.cases[case] for case in (PROVEN, "levels x 0.5")}
+    monkeypatch.setattr(codegen, "plants", lambda quick: {bristles: law})
+    monkeypatch.setattr(codegen, "trials", lambda: [replace(first, cases=cases)])
+    monkeypatch.setattr(codegen, "_cost", lambda: "")
+    made = codegen.bench(quick=True, sections=("compensation",))
+    rows = made.tables[codegen.LOOPS]
+    assert [row["case"] for row in rows] == ["without", PROVEN, "levels x 0.5"]
+    assert rows[0][bristles].startswith("1 / 1")
+    assert [row["met"] for row in made.tables[GOALS]] == ["yes", "yes"]

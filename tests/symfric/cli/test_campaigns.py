@@ -104,9 +104,11 @@ def test_a_benchmark_is_printed_and_written(symfric, monkeypatch: pytest.MonkeyP
         return SimpleNamespace(
             plot=lambda path: path.write_text("p"), write_csv=lambda path: path.write_text("c"),
             to_dict=lambda: {"a": 1}, shown=lambda: [table, "A sentence."], interrupted=False,
+            failed=failed,
         )  # fmt: skip
 
     seen: list[Any] = []
+    failed: list[str] = []
     monkeypatch.setattr(campaigns, "measure", measure)
     printed = symfric(
         "bench multibody --quick --links 4,2,2 --plot b.png --csv b.csv --json b.json"
@@ -115,6 +117,8 @@ def test_a_benchmark_is_printed_and_written(symfric, monkeypatch: pytest.MonkeyP
     assert all(text in printed.out for text in ("Runs", "tool", "ours", "A sentence."))
     assert seen == [("multibody", True, {"links": (2, 4)})]
     assert (Path("b.png").read_text(), Path("b.csv").read_text()) == ("p", "c")
+    failed.append("codegen")
+    assert "Runs" in symfric("bench multibody --quick", 1).out
 
 
 @pytest.mark.slow

@@ -47,6 +47,19 @@ def test_empty_cells_and_a_pause_are_read_on_request(symfric) -> None:
     assert len(symfric(f"{LINE} --missing drop --resample --json -").json["records"]) == 2
 
 
+def test_a_wrong_sign_is_turned(symfric) -> None:
+    rows = Path("one.csv").read_text().splitlines()
+    k = next(k for k, name in enumerate(rows[0].split(",")) if name.startswith("force"))
+    cells = [row.split(",") for row in rows]
+    for row in cells[1:]:
+        row[k] = str(-float(row[k]))
+    Path("turned.csv").write_text("\n".join(map(",".join, cells)) + "\n")
+    line = LINE.replace("one.csv", "turned.csv")
+    assert "sign" in symfric(line, 1).out
+    right = symfric(f"{LINE} --json -").json["parameters"]
+    assert symfric(f"{line} --scale force=-1 --json -").json["parameters"] == right
+
+
 def test_the_true_values_are_inside_their_intervals_and_files_are_written(symfric) -> None:
     files = "--html r.html --plot r.png --json r.json"
     printed = symfric(f"{LINE} --validate two.csv --profile mu_d {files}")

@@ -111,11 +111,7 @@ def test_unit_tests_fail_if_any_line_is_wrong(compiler, tmp_path):
         what += [*changes, *wrong]
     found = tests.wrong(tmp_path, compiler)
     alive = [line.strip() for line, number in zip(what, found, strict=True) if not number]
-    assert alive == [
-        "state->z = 0.0;",
-        "out->F = t1;",
-        "out->F_end = t1;",
-    ]  # without load
+    assert alive == ["state->z = 0.0;", "out->F = t1;", "out->F_end = t1;"]  # without load
 
 
 def test_a_unit_test_prints_what_is_wrong_and_the_table_holds_its_rows(compiler, tmp_path):
@@ -273,11 +269,7 @@ def s_function(made, compiler, folder):
     (folder / "simstruc.h").write_text(simstruc)
     (folder / "cg_sfun.h").write_text(driver)
     files = [str(folder / f"{made.block.name}_sfun.c"), str(made.source(made.reals[0]))]
-    flags = [
-        *STRICT,
-        "-Wno-unused-value",
-        f"-I{folder}",
-    ]  # of its macros
+    flags = [*STRICT, "-Wno-unused-value", f"-I{folder}"]  # of its macros
     compiler.run(*flags, *files, "-o", str(folder / "sfun"), "-lm")
 
     def ran(h, parameters, inputs):

@@ -1,5 +1,7 @@
 """Figures outside pyplot, for print, and with colours for all eyes."""
 
+import subprocess
+import sys
 from functools import cache
 from io import BytesIO
 from itertools import combinations
@@ -28,6 +30,17 @@ def test_figures_are_unknown_to_pyplot_and_change_no_settings() -> None:
     grid(2, 2)
     assert plt.get_fignums() == []
     assert dict(mpl.rcParams) == before
+
+
+@pytest.mark.slow
+def test_drawing_does_not_even_import_pyplot() -> None:
+    code = (
+        "import sys; from symfric import LuGre, rabinowicz, simulate\n"
+        "from symfric.figures.pictures import plot_laws\n"
+        "plot_laws({'lugre': LuGre()}); simulate(rabinowicz(LuGre()), 0.1, samples=5).plot()\n"
+        "assert 'matplotlib' in sys.modules; assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_a_notebook_shows_a_figure_once() -> None:

@@ -3,12 +3,7 @@
 import pytest
 
 from symfric.gallery.selection.belt import peaked
-from symfric.gallery.selection.tables import (
-    PRINTED,
-    PaperComparison,
-    PaperRow,
-    compare_with_paper,
-)
+from symfric.gallery.selection.tables import PRINTED, PaperComparison, PaperRow, compare_with_paper
 
 
 def of_tables(first: bool) -> PaperComparison:

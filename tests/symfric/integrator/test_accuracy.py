@@ -3,13 +3,14 @@
 from functools import cache
 from itertools import pairwise
 
+import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from oracles import rabinowicz_brown_mcphee, rabinowicz_lugre
 from stored import stored
 
-from symfric import BrownMcPhee, Law, LuGre, Model, drive, rabinowicz, simulate
+from symfric import BrownMcPhee, Law, LuGre, Model, Variable, drive, rabinowicz, simulate
 
 Array = NDArray[np.float64]
 SPAN = 20.0
@@ -164,3 +165,26 @@ def test_stuck_block_is_still_there_after_an_hour(law: Law) -> None:
     assert abs(creep) < (1e-6 if isinstance(law, BrownMcPhee) else 1e-9)
     assert np.diff(run.step_times).max() > 100
     assert run.statistics.steps < 8000
+
+
+def test_an_hour_of_stick_slip_keeps_its_period() -> None:
+    """Six hundred slips; the last two are as far apart as the first two."""
+    model = rabinowicz(LuGre())
+    times = np.arange(0.0, 3600.0, 0.05)
+    x = simulate(model, 3600.0, t_eval=times, rtol=1e-7)["x"]
+    tops = [k for k in range(1, times.size - 1) if x[k - 1] < x[k] >= x[k + 1] and x[k] > 0.5]
+    period = (times[tops[-1]] - times[tops[0]]) / (len(tops) - 1)
+    assert len(tops) == pytest.approx(3600 / period, abs=2)
+    assert period == pytest.approx(times[tops[10]] - times[tops[9]], abs=0.06)
+
+
+def test_steps_of_one_run_span_twelve_decades() -> None:
+    """A transient of a picosecond, then seconds of slow motion."""
+    fast, slow = Variable("fast", "1", start=2.0), Variable("slow", "1", start=1.0)
+    ode = ca.vertcat(-1e12 * (fast.symbol - slow.symbol), -0.01 * slow.symbol)
+    run = simulate(Model("decades", x=(fast, slow), ode=ode), 100.0, rtol=1e-8)
+    h = np.diff(run.step_times)
+    assert h.min() < 1e-11
+    assert h.max() > 1
+    assert run.final["slow"] == pytest.approx(np.exp(-1), rel=1e-7)
+    assert run.at(1e-12)["fast"][0] == pytest.approx(1 + np.exp(-1), rel=1e-6)

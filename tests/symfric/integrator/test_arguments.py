@@ -22,6 +22,17 @@ def test_tolerance_is_that_of_the_events_at_most_and_then_no_loose_one() -> None
     assert check_span("here", MODEL, 0.0, 1.0, 1e-6)[2] == 1e-6
 
 
+def test_methods_by_name_and_by_tolerance() -> None:
+    for rtol, method in ((1e-13, RODAS5P), (1e-6, RODAS5P), (LOOSE, RODAS5P), (2e-5, RADAU5)):
+        assert chosen("here", "auto", rtol) is method
+    for name, message in (
+        ("rodas5", "here: method: expected one of auto, rodas5p.* did you mean rodas5p"),
+        ("backward_euler", "here: method: expected one with error control.* which has fixed steps"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            chosen("here", name, 1e-6)
+
+
 def test_the_method_follows_from_the_tolerance() -> None:
     for rtol, method in ((1e-13, RODAS5P), (1e-6, RODAS5P), (LOOSE, RODAS5P), (2e-5, RADAU5)):
         assert chosen("here", "auto", rtol) is method

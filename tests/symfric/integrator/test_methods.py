@@ -1,5 +1,6 @@
 """Adaptive methods through `simulate`, `simulate_many` and derivatives."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -18,6 +19,7 @@ from symfric import (
 )
 from symfric.integrator.methods.families import Explicit, Rosenbrock
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS
+from symfric.model import Event
 
 each_method = pytest.mark.parametrize("method", ADAPTIVE)
 TIMES = np.linspace(0.0, 12.0, 61)
@@ -77,6 +79,16 @@ def test_ensemble_members_are_single_runs(method: str) -> None:
     alone = [simulate(decay(), 3.0, p={"k": v}, t_eval=t, method=method)["x"] for v in k]
     assert found["x"] == pytest.approx(np.vstack(alone), rel=1e-9)
     assert not found.failed
+
+
+@each_method
+def test_event_is_found_where_it_is(method: str) -> None:
+    """4 / (1 + 5.6 t) = 1 at t = 3 / 5.6."""
+    model = decay()
+    model = replace(model, events=(Event("one", model.x[0].symbol - 1.0, terminal=True),))
+    run = simulate(model, 5.0, rtol=1e-9, method=method)
+    assert run.happened[-1][0] == pytest.approx(3 / 5.6, rel=1e-7)
+    assert run.t[-1] <= run.happened[-1][0]
 
 
 @each_method

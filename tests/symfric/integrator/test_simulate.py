@@ -211,6 +211,13 @@ def test_a_long_run_runs_on_and_one_without_progress_stops(monkeypatch: pytest.M
     assert few.statistics.steps + few.statistics.rejections == 60
 
 
+def test_algebraic_equation_without_a_solution_is_reported() -> None:
+    z = Variable("z", "1", start=1.0)
+    model = Model("none", x=(x,), z=(z,), ode=-z.symbol, alg=z.symbol**2 + 1)
+    with pytest.raises((ValueError, SolveError), match=r"consistent|stopped at t = 0 s"):
+        simulate(model, 1.0)
+
+
 def test_nominal_values_scale_the_absolute_tolerance() -> None:
     """In micrometres the same model must not be solved a million times worse."""
     slow = Variable("s", "um", start=1e6, nominal=1e6)

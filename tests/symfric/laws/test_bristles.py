@@ -145,6 +145,14 @@ def test_passive_form_fades_the_damping() -> None:
     assert [len(law.warnings()) for law in laws] == [0, 0, 0, 1]
 
 
+def test_lifting_off_while_stuck_lets_go_in_the_normalised_form_only() -> None:
+    law, stuck = LuGreNormalised(), 0.9 * LuGre().steady_state(1e-6, N)
+    z = 0.9 * law.steady_state(1e-6, N)
+    assert law.force(0.0, N, z) == pytest.approx(0.9 * STATIC, rel=1e-6)
+    assert law.force(0.0, 0.0, z) == law.force(0.1, 0.0, z) == 0.0
+    assert LuGre().force(0.0, 1e-9, stuck) == pytest.approx(0.9 * STATIC, rel=1e-6)
+
+
 def test_slow_belts_take_the_block_to_the_static_level_and_no_further() -> None:
     """A width of |v| above the creep stretches the bristle to mu_s N / tanh(creep/v_eps)."""
     for law in (LuGre(), LuGreNormalised(), LuGrePassive(), ElastoPlastic()):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import casadi as ca
 import pytest
-from law_cases import state_symbols
+from law_cases import CASES, state_symbols
 from tables import table
 
 import symfric as sf
@@ -27,6 +27,13 @@ def test_instructions_of_every_law_are_those_of_the_table(request: pytest.Fixtur
     assert not differing, "table, found; if intended: pytest --update-golden, and say why"
     # by hand: v, the constant, their product, the output; in the gradient the constant, its output
     assert found["viscous"] == {"value": 4, "gradient": 2}
+
+
+def test_gradient_costs_a_small_multiple_of_the_value() -> None:
+    """Derivatives by n inputs of m results, each at most a few times the value."""
+    for name, law in CASES.items():
+        found, directions = cost(law), 2 + len(law.states) + len(law.inputs)
+        assert found.gradient <= 2 * directions * found.value, name
 
 
 def instructions(law: sf.Law) -> int:
@@ -50,3 +57,18 @@ def test_switched_off_option_costs_less_than_in_use_and_than_its_symbol() -> Non
     assert cost(m1).value < cost(sf.BAM()).value < cost(sf.BAM(Q_e=0.01)).value
     assert cost(sf.Coulomb(v_eps=0.0)).value < cost(sf.Coulomb()).value
     assert cost(sf.QuarterCarGeneral(mu=0.0)).value < cost(sf.QuarterCarGeneral()).value - 8
+
+
+def test_arithmetic_of_laws_and_of_what_composes_them() -> None:
+    counts = {
+        "viscous": 1, "coulomb": 4, "self_tuning": 6, "dahl": 8, "stribeck": 10, "lugre": 17,
+        "brown_mcphee": 12, "asymmetric(lugre)": 17, "stribeck+viscous": 12,
+    }  # fmt: skip
+    assert {law: instructions(sf.law_from_text(law)) for law in counts} == counts
+    one = instructions(sf.Asymmetric(sf.LuGre(), sf.LuGre(sigma_0=2e5)))
+    two = instructions(sf.Asymmetric(sf.LuGre(), sf.LuGre(sigma_0=2e5, sigma_1=200.0)))
+    assert two - one == 3, "each parameter that differs costs two products and a sum"
+    full = instructions(sf.LoadDependent(sf.Stribeck(), N_0=2.0, c=0.5))
+    assert full - instructions(sf.LoadDependent(sf.Stribeck())) == 2, (
+        "the smooth maximum is always there"
+    )

@@ -130,10 +130,7 @@ def test_unsuitable_methods_of_a_user_are_refused() -> None:
     for call, text in (
         (lambda: law.rate(0.1, 1.0, 0.0), "Stiff.rate: expected .*column.*write ca.vertcat"),
         (lambda: law.rate(ca.SX.sym("v"), 1.0, 0.0), "a condition that Python evaluates"),
-        (
-            lambda: law.force(v, v[:4], np.zeros((1, 5))),
-            "an array .* write it with symfric",
-        ),
+        (lambda: law.force(v, v[:4], np.zeros((1, 5))), "an array .* write it with symfric"),
     ):
         with pytest.raises(ValueError, match=text):
             call()

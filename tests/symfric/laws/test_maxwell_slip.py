@@ -102,6 +102,15 @@ def test_force_depends_on_the_path_alone() -> None:
         assert fast == pytest.approx(slow, abs=1e-6)
 
 
+def test_loop_takes_the_closed_form_work() -> None:
+    A = 4e-5
+    points = [0.0, A, -A, A, -A, A]
+    run = moved(EXACT, points)
+    work = np.interp([3.0, 5.0], run.t, run["work"])
+    expected = 4 * sum(w * (A - w / k) for k, w in zip(STIFFNESS, LIMITS, strict=True))
+    assert work[1] - work[0] == pytest.approx(expected, rel=1e-6)
+
+
 YIELDS = [0.2e-6, 0.5e-6, 1.0e-6, 1.6e-6]
 POINTS = [0.0, 1.5e-6, 0.5e-6, 1.0e-6, 0.5e-6, -0.2e-6]
 TURN = 2 * np.pi

@@ -125,9 +125,7 @@ def test_what_is_given_besides_the_applied_force_reaches_both_sides() -> None:
     model = QuarterCar(sf.QuarterCarGeneral(mu=0.05)).model()
     (contact,) = model.contacts
     assert set(contact.further) == {"x_rel", "v_rel"}
-    slip = model.with_forces(
-        {"guide": contact.sliding(1)},
-    )
+    slip = model.with_forces({"guide": contact.sliding(1)})
     still = slip.function("ode")(0.0, [0.0, 1e-3, 0.0, 0.0], [], [], [])
     f_sd = 28900.0 * 1e-3
     pressed = 0.05 * np.hypot(f_sd, 1.0) / np.tan(np.pi / 4 - np.arcsin(

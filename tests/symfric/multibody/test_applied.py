@@ -169,6 +169,18 @@ def test_a_light_box_jams_by_name_under_dry_friction_too() -> None:
     assert caught.value.status is Status.JAMMED
 
 
+@pytest.mark.slow
+def test_absolute_coordinates_give_the_same_motion() -> None:
+    scene = PendulumBox(ExactCoulomb())
+    runs = [
+        simulate(scene.mechanism().build(formulation=f), 1.5, rtol=1e-9, samples=16)
+        for f in ("joint", "absolute")
+    ]
+    assert [n for _, n in runs[0].happened] == [n for _, n in runs[1].happened]
+    assert runs[1]["energy"] == pytest.approx(runs[0]["energy"], rel=1e-7)
+    assert np.abs(runs[1].final["x_slip"]) < 1e-8
+
+
 def driven(law: Law) -> mb.Mechanism:
     m = mb.Mechanism("driven")
     attach(m, mb.Revolute, "shaft", "wheel", rate=1.0, friction=mb.JointFriction(law, radius=0.1))

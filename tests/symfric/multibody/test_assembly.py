@@ -9,7 +9,7 @@ from chains import X, Z, attach, in_both
 
 from symfric import BrownMcPhee, LuGre, Model, Variable, Viscous, simulate
 from symfric.bench.multibody import chain
-from symfric.integrator.equations.blocks import blocks, corrected, signs
+from symfric.integrator.equations.blocks import blocks, corrected, signs, slopes
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.tableaux import METHODS
@@ -194,6 +194,8 @@ def test_steps_signs_and_refined_unknowns_of_cut_chains_are_those_of_whole_ones(
     cut, whole = both(3, law, monkeypatch)
     assert cut.inner is not None
     assert whole.inner is None
+    order = [i for group in slopes(cut).pivots for i in group]
+    assert sorted(order) == [*range(cut.n + cut.inner.l.numel())]  # each is eliminated once
     y, right, memory = (some(cut.n, seed) for seed in range(3))
     steps, every, refined = [], [], []
     for made in (cut, whole):
@@ -204,3 +206,23 @@ def test_steps_signs_and_refined_unknowns_of_cut_chains_are_those_of_whole_ones(
     assert steps[0] == pytest.approx(steps[1], abs=1e-10 * np.abs(steps[1]).max())
     assert every[0] == every[1]
     assert refined[0] == pytest.approx(refined[1], rel=1e-9, abs=1e-9)
+
+
+def instructions(links: int, law: Law | None) -> int:
+    made = unknowns(chain(links, law))
+    block = blocks(made, GAMMA)
+    stage = block.f.n_instructions() + block.solve.n_instructions()
+    return block.slopes.n_instructions() + block.pack.n_instructions() + 8 * stage
+
+
+@pytest.mark.slow
+@each_law
+def test_cuts_are_made_where_they_pay(law: Law | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the length from which they are made; beyond it the cost grows with the links alone."""
+    name = "LONG" if law is None else "LONG_WITH_FRICTION"
+    longest, found = getattr(prepare, name), list[int]()
+    for first, links in ((2, longest), (2, 2 * longest), (1000, longest)):
+        monkeypatch.setattr(prepare, name, first)
+        found.append(instructions(links, law))
+    assert found[0] < 1.05 * found[2]
+    assert np.log2(found[1] / found[0]) < 1.15

@@ -1,6 +1,7 @@
 """Friction in the joints that close loops: the same whichever joint it is, and as it must be."""
 
 from math import cos, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,8 +9,12 @@ from chains import X, Z, attach
 from mechanics import brown_mcphee, four_bar_with_friction
 from scipy.integrate import solve_ivp
 
-from symfric import BrownMcPhee, Dahl, SolveError, Trajectory, simulate
+from symfric import BrownMcPhee, Dahl, ExactCoulomb, SolveError, Trajectory, simulate
 from symfric import multibody as mb
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.diagnosis import dead_centre
+from symfric.integrator.running.integrator import Integrator
 from symfric.laws import Law, LoadNormalised, MaxwellSlip
 from symfric.scenes import FourBar
 
@@ -123,12 +128,15 @@ def test_a_guide_that_closes_is_a_guide() -> None:
     assert np.abs(other["guide_friction"]).min() > 1.0
 
 
-def yoke(law: Law, r: float, w: float, mass: float) -> mb.Mechanism:
-    """A crank whose pin rubs in the slot of a yoke; it turns at w from 0.2 rad."""
+def yoke(
+    law: Law, r: float, w: float, mass: float, start: float = 0.2, guide: Any = None
+) -> mb.Mechanism:
+    """A crank whose pin rubs in the slot of a yoke; it turns at w from `start`."""
     m = mb.Mechanism("yoke", gravity=(0.0, 0.0, 0.0))
-    at, rate = r * cos(0.2), -r * w * sin(0.2)
-    attach(m, mb.Revolute, "theta", "crank", J=1e-3, z=(0.0, -1.0, 0.0), x=X, start=0.2, rate=w)
-    attach(m, mb.Prismatic, "x", "yoke", mass=mass, J=1e-3, z=X, x=Z, start=at, rate=rate)
+    at, rate = r * cos(start), -r * w * sin(start)
+    attach(m, mb.Revolute, "theta", "crank", J=1e-3, z=(0.0, -1.0, 0.0), x=X, start=start, rate=w)
+    attach(m, mb.Prismatic, "x", "yoke", mass=mass, J=1e-3, z=X, x=Z, start=at, rate=rate,
+           friction=guide)  # fmt: skip
     m.frame("crank.pin", at=(r, 0.0, 0.0))
     m.frame("yoke.slot", z=Z, x=X)
     m.joint(mb.PinInSlot("slot", "yoke.slot", "crank.pin", friction=mb.JointFriction(law)))
@@ -149,6 +157,19 @@ def test_a_scotch_yoke_is_driven_by_the_moment_of_its_slot() -> None:
     inertia = mass * r * r * w * w * np.cos(theta) * np.sin(theta)
     moment = inertia + 0.2 * N * np.abs(slip) / w
     assert run["motor_moment"][apart] == pytest.approx(moment[apart], abs=1e-4)
+
+
+def test_a_contact_in_its_dead_centre_is_named() -> None:
+    """The guide does not slide there in any motion; a microradian away it does."""
+    guide = mb.JointFriction(ExactCoulomb(), preload=10.0)
+    for start, name in ((0.0, "x"), (1e-6, "")):
+        model = yoke(COULOMB, 0.1, 0.0, 2.0, start, guide).assembled().build()
+        integrator = Integrator(model, input_data(model, None, 0.0, 1.0), METHODS["rodas5p"])
+        y = np.zeros(integrator.system.n)
+        y[: len(model.x)] = model.initial_state()
+        found = dead_centre(integrator, y, np.zeros(0))
+        assert found.startswith(f"contact '{name}'" if name else "")
+        assert bool(found) is bool(name)
 
 
 @pytest.mark.parametrize("law", [Dahl(), MaxwellSlip()], ids=lambda law: type(law).__name__)

@@ -259,6 +259,12 @@ def test_gears_go_through_full_turns(formulation: str) -> None:
     assert run["constraint_position"].max() < 1e-12
 
 
+def test_any_ratio_couples_joints_that_count_their_turns() -> None:
+    ratio = Variable("ratio", "1", start=-pi / 5)
+    run = simulate(gearbox(ratio.symbol).build((ratio,)), 3.0, p={"ratio": -(2**0.5)})
+    assert run["r1"] == pytest.approx(-(2**0.5) * run["r0"], rel=1e-12)
+
+
 def test_other_ratios_are_refused_where_turns_are_not_counted() -> None:
     free = Variable("free", "1", start=1.0)
     path = "coupling 'gear' > ratio: expected a ratio of integers .* angles of r0 and r1 are known"

@@ -11,6 +11,7 @@ from chains import TREE, at_start, chain, in_both, rod, solve, state
 from symfric import BrownMcPhee, LuGre
 from symfric import multibody as mb
 from symfric.multibody.dynamics import kinetic_energy
+from symfric.multibody.equations import equations
 from symfric.multibody.forces import Force
 from symfric.multibody.prepare import Prepared
 from symfric.scenes import MECHANISMS, Arm, FourMass
@@ -203,6 +204,18 @@ def test_dampers_take_energy() -> None:
         power, rate = power_of(force)
         assert power < 0
         assert rate == 0.0
+
+
+def test_absent_terms_cost_nothing() -> None:
+    """A spring without damping has no velocity in it, one without length no root."""
+    made = made_in("joint", False)
+    topology, t, counts = made.eq.kin.topology, made.eq.kin.t, list[int]()
+    for more in ((), (1.0,), (1.0, 2.0)):
+        eq = equations(topology, [mb.SpringDamper("s", "ground", "b1", 3.0, *more)], [],
+                       made.eq.q, made.eq.qd, t)  # fmt: skip
+        b = ca.Function("b", [eq.q, eq.qd, eq.a, eq.lam], [eq.balance])
+        counts.append(b.n_instructions())
+    assert counts == sorted(set(counts))
 
 
 def test_mass_bias_and_inverse_dynamics_fit_each_other() -> None:

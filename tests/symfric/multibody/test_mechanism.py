@@ -15,6 +15,7 @@ from symfric import BrownMcPhee, LuGre, SolveError, Viscous, simulate
 from symfric import multibody as mb
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
+from symfric.multibody.start import following
 
 LAW = BrownMcPhee()
 
@@ -65,6 +66,16 @@ def slider_on_a_rod(start: float = 0.8, length: Scalar = 1.0) -> mb.Mechanism:
     attach(m, mb.Prismatic, "z", "block_z", z=Z, start=0.6)
     m.joint(mb.Distance("rod", "block_x", "block_z", length=length))
     return m
+
+
+def test_rates_that_cannot_stay_move_to_the_nearest() -> None:
+    J, still = np.array([[0.8, 0.6]]), np.zeros(1)
+    assert following(J, np.array([1.0, 1.0]), still) == pytest.approx([0.6 * -0.2, 0.8 * 0.2])
+    assert following(J, np.array([1.0, 0.0]), still) == pytest.approx([1.0, -4 / 3])
+    assert following(np.array([[1.0, 0.0]]), np.array([1.0, 0.0]), still) == pytest.approx([0, 0])
+    assert following(J, np.zeros(2), np.array([0.5])) == pytest.approx([-0.4, -0.3])
+    twice = np.array([[0.8, 0.6], [1.6, 1.2]])
+    assert following(twice, np.array([0.0, 3.0]), np.zeros(2)) == pytest.approx([-9 / 4, 3.0])
 
 
 def test_loops_that_cannot_be_closed_are_refused() -> None:

@@ -16,6 +16,7 @@ from symfric.integrator.equations.system import system
 from symfric.model import Model
 from symfric.model.sketch import Sketch
 from symfric.multibody.joint import COMPONENTS
+from symfric.multibody.results import constraint_units
 from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, SliderCrank
 
 pytestmark = pytest.mark.heavy
@@ -165,6 +166,12 @@ def test_multipliers_have_the_unit_of_what_they_do() -> None:
     assert every["crank_rod_norm"] == "J"
 
 
+def test_constraints_of_several_kinds_have_a_norm_without_unit() -> None:
+    assert constraint_units(["N m", "N m"]) == ("rad", "rad/s", "rad/s^2")
+    for units in (["N", "N m"], [""], []):
+        assert constraint_units(units) == ("", "", "")
+
+
 SLOW = BrownMcPhee(v_t=0.05)
 
 
@@ -210,6 +217,18 @@ def test_ends_of_springs_are_distinguished_from_frames_and_contacts_have_a_scale
     assert parts["ground"].fixed and not parts["slider_1"].fixed
     assert marks["y2"].slips == (("y2_slip", 0.05),)
     assert marks["rod_12"].slips == ()
+
+
+def test_springs_dampers_and_rods_are_distinguished() -> None:
+    m = mb.Mechanism("m")
+    m.body("bob", 1.0, (0.1, 0.1, 0.1))
+    m.frame("ground.wall", at=(1.0, 0.0, 0.0))
+    m.joint(mb.Planar("plane", "ground", "bob", start=(0.0, 0.3, 0.0)))
+    m.joint(mb.Distance("rod", "ground", "bob", length=0.3))
+    m.force(mb.SpringDamper("spring", "ground.wall", "bob", stiffness=1.0))
+    m.force(mb.SpringDamper("oil", "ground.wall", "bob", damping=1.0))
+    lines = {mark.name: mark.symbol.line for mark in sketch(m).marks}
+    assert lines == {"plane": "", "rod": "rod", "spring": "spring", "oil": "damper"}
 
 
 def test_joints_on_the_ground_are_known_whichever_way_they_are_written() -> None:

@@ -29,7 +29,7 @@ from symfric.multibody import JointSpringDamper, Mechanism, PrescribedMotion, Pr
 from symfric.results.pictures import plot_trajectories
 from symfric.results.quadrature import extremes, looks
 from symfric.results.trajectory import EnergyBalance
-from symfric.scenes import MECHANISMS, FourMass, Pendulum, Prescribed, SliderCrank
+from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, Prescribed, SliderCrank
 
 
 def circle() -> Trajectory:
@@ -228,6 +228,16 @@ def test_a_wrong_friction_power_shows() -> None:
     )
     assert wrong.relative > 1e3 * right.relative
     assert wrong.defect[-1] == pytest.approx(-1e-4 * right.work["friction"][-1], rel=1e-2)
+
+
+@pytest.mark.parametrize(("method", "order"), [("rodas3", 3), ("rodas5p", 5)])
+def test_the_defect_has_the_order_of_the_method(method: str, order: int) -> None:
+    model = FourBar(BrownMcPhee(v_t=0.1)).model()
+    runs = [simulate(model, 0.25, rtol=rtol, method=method) for rtol in (1e-6, 1e-9)]
+    steps = [run.statistics.steps for run in runs]
+    defects = [abs(run.energy_balance().defect).max() for run in runs]
+    found = np.log(defects[0] / defects[1]) / np.log(steps[1] / steps[0])
+    assert found == pytest.approx(order, abs=0.8)
 
 
 def test_energy_that_a_reset_takes_is_defect() -> None:

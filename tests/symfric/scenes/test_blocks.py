@@ -130,6 +130,12 @@ def test_stick_slip_approaches_the_closed_form_with_the_width(kind: str) -> None
     assert turning[-1] == pytest.approx(0.0, abs=6e-5)
 
 
+def test_seed_widths_of_brown_mcphee_come_as_close_as_stated() -> None:
+    """Against the plain closed form: 1e-5 hits it by chance, between its two errors."""
+    periods = [cycle(sf.BrownMcPhee(v_t=w))[0] for w in WIDTHS]
+    assert [round(p - ideal().period, 3) for p in periods] == [0.48, 0.097, 0.017, 0.0, -0.003]
+
+
 @cache
 def reference() -> tuple[np.ndarray, np.ndarray]:
     """Times and (x, v, z) of LuGre stick-slip by SciPy's Radau at 1e-12."""

@@ -182,6 +182,24 @@ def test_c_of_a_scene_takes_presets_and_places(
 TIMES = np.linspace(0.0, 1.0, 101)
 
 
+NEEDS_FORCE = {"karnopp", "awrejcewicz", "exact_coulomb"}
+
+
+@pytest.mark.slow
+def test_every_law_runs_under_given_motion_or_reports_what_is_missing() -> None:
+    refused = set[str]()
+    for name, kind in sf.ALL_LAWS.items():
+        try:
+            model = Prescribed(kind(), load="input", N_least=0.1).model()
+        except ValueError as error:
+            assert "force that rest must carry; a given motion does not say it" in str(error)
+            refused.add(name)
+            continue
+        inputs = {"v": lambda t: 0.02 * t - 0.003, "load": lambda t: 2 - t}
+        assert sf.simulate(model, 1.0, u=inputs, samples=3).status.ok, name
+    assert refused == NEEDS_FORCE
+
+
 def test_a_law_without_states_gives_its_curve() -> None:
     law = sf.BrownMcPhee()
     v = sf.Linear(TIMES, 0.01 * np.sin(7 * TIMES))

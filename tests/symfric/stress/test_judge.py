@@ -58,8 +58,7 @@ class Wrong:
         if self.harm == "nan":
             evaluate = coarse.evaluate
             coarse = replace(
-                coarse,
-                evaluate=lambda t: evaluate(t) | {"friction": np.full(np.shape(t), np.nan)},
+                coarse, evaluate=lambda t: evaluate(t) | {"friction": np.full(np.shape(t), np.nan)}
             )
         return coarse
 

@@ -21,14 +21,7 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import Tolerances, integrate
 from symfric.laws import LuGre, LuGreNormalised
 from symfric.multibody import Mechanism
-from symfric.scenes import (
-    MECHANISMS,
-    DoublePendulum,
-    FourBar,
-    Pendulum,
-    PendulumBox,
-    SliderCrank,
-)
+from symfric.scenes import MECHANISMS, DoublePendulum, FourBar, Pendulum, PendulumBox, SliderCrank
 
 Array = NDArray[np.float64]
 SMOOTH = Viscous(sigma_2=0.0)

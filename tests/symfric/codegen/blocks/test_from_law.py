@@ -10,23 +10,10 @@ from one_program import along, block_of
 from rigs import prescribed_motion
 from tables import Names, table
 
-from symfric import (
-    LoadDependent,
-    LuGre,
-    Sum,
-    Viscous,
-    parameters,
-    simulate,
-)
+from symfric import LoadDependent, LuGre, Sum, Viscous, parameters, simulate
 from symfric.codegen import law_block
 from symfric.codegen.blocks.held_step import force_of_rate, held_step
-from symfric.laws import (
-    GMS,
-    Armstrong,
-    Element,
-    MaxwellSlip,
-    Slider,
-)
+from symfric.laws import GMS, Armstrong, Element, MaxwellSlip, Slider
 
 LOAD = 8.0
 BRISTLE = ["lugre", "dahl", "lugre, delta 0.78, viscous", "lugre+dahl", "asymmetric(lugre)"]

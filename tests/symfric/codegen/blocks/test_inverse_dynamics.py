@@ -206,13 +206,7 @@ def test_joints_are_arrays_and_friction_has_the_number_of_its_joint(compiler, tm
     m.joint(Prismatic("rail", "wheel", "slide", friction=friction))
     mixed = inverse_dynamics_block(m)
     names = [v.name for v in mixed.parameters]
-    assert names == [
-        "mu_s_1",
-        "mu_d_1",
-        "v_t_1",
-        "N_1",
-        "sigma_2_2",
-    ]  # N has no effect
+    assert names == ["mu_s_1", "mu_d_1", "v_t_1", "N_1", "sigma_2_2"]  # N has no effect
     assert "Friction, numbered by joints: brown_mcphee in 1; viscous in 2." in mixed.use
     text = header(CBlock(mixed, FLOAT))
     assert "float q_2;" in text

@@ -5,14 +5,7 @@ import numpy as np
 import pytest
 from tables import Names, table
 
-from symfric import (
-    GenericAsperity,
-    LuGre,
-    RandomBristles,
-    Stribeck,
-    law_from_text,
-    parameters,
-)
+from symfric import GenericAsperity, LuGre, RandomBristles, Stribeck, law_from_text, parameters
 from symfric.codegen import contact_block, law_block
 from symfric.foundation.graph import graph
 

@@ -6,7 +6,9 @@ A module in the place of CuPy compiles the same text of the kernel for the proce
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,8 +19,8 @@ from ensembles import after, assert_same, with_functions_of_libm
 from fake_cupy import LAUNCH_ON_HOST, ON_HOST, FakeCupy
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Status, rabinowicz, simulate_many
-from symfric.emitter.c99 import REALS
-from symfric.integrator.cuda.device import BLOCK, Device, DeviceError, kernel_of
+from symfric.emitter.c99 import DOUBLE, REALS
+from symfric.integrator.cuda.device import BLOCK, Device, DeviceError, Kernel, kernel_of
 from symfric.integrator.cuda.on_device import OnDevice
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
@@ -94,6 +96,16 @@ def test_threads_launches_and_memory_change_nothing(
     assert len(cupy.todo) >= expected.attempts.sum() / 128  # four threads of 32 attempts
 
 
+def test_the_budget_of_a_launch_approaches_its_time() -> None:
+    own = integrator(oscillator())
+    device = OnDevice.of(own, np.array([0.0, 1.0]), np.array([1.0]), 100, "double")
+    budgets = [device.budget]
+    for spent in (1e-9, 0.125, 0.5, 2.5):
+        device.launched(spent)
+        budgets.append(device.budget)
+    assert budgets == [32, 128, 256, 128, 12]
+
+
 def test_chunks_change_nothing_and_progress_rises_between_launches() -> None:
     reported: list[float] = []
     whole = simulate_many(oscillator(), 1.0, **TWENTY)
@@ -120,6 +132,21 @@ def test_an_interrupt_keeps_finished_chunks_and_a_folder_continues(
     many = simulate_many(oscillator(), 1.0, progress=after(1), **TWENTY)  # between two launches
     assert many.status is Status.INTERRUPTED
     assert np.isnan(many.reached).all()
+
+
+def test_the_size_of_a_chunk_depends_on_its_work_and_its_results() -> None:
+    own = integrator(oscillator())
+    kernel = Kernel("", DOUBLE, rows=7, given=5, states=2, signals=4, operations=800)
+    for times, real, size in (
+        (1, "double", 2**30 // 800),
+        (10_000, "double", 2**30 // (8 * 40_012)),
+        (10_000, "float", 2**30 // (4 * 40_012)),
+        (10**9, "double", 1),
+    ):
+        task = OnDevice.of(own, np.array([0.0, 1.0]), np.array([1.0]), 100, real)
+        task.kernel = replace(kernel, real=REALS[real])
+        task.job = replace(task.job, times=np.broadcast_to(1.0, (times,)))
+        assert task.chunk(SimpleNamespace(own={})) == size  # type: ignore[arg-type]
 
 
 def test_the_device_of_cupy(cupy: FakeCupy, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -164,6 +191,25 @@ def test_the_kernel_is_c_and_cpp_without_a_warning(compiler: str) -> None:
             [compiler, *COMPILERS[compiler], *STRICT, "-fsyntax-only", "-"],
             input=f"{ON_HOST}{kernel.text}{LAUNCH_ON_HOST}", text=True, check=True,
         )  # fmt: skip
+
+
+def test_the_kernel_has_only_what_it_needs() -> None:
+    own = integrator(rabinowicz(BrownMcPhee()))
+    between, ends = kernel_of(own), kernel_of(own, between=False)
+    assert between is kernel_of(own)
+    assert ends.operations < between.operations
+    assert "real *D)" not in ends.text
+    for kernel in (between, ends):
+        assert "symfric_round(const" not in kernel.text
+        assert "#define FOLLOWS 0" in kernel.text
+    follows = kernel_of(integrator(switched()))
+    assert "symfric_round(const" in follows.text
+    assert "#define FOLLOWS 2" in follows.text
+    single = kernel_of(own, real=REALS["float"])
+    attempt = single.text[single.text.index("symfric_attempt(") : single.text.index("#define N ")]
+    assert "double" not in attempt
+    assert "1.1754944e-38f" in attempt
+    assert "#define SF_POWF powf" in single.text
 
 
 @pytest.mark.slow

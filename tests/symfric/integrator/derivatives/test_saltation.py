@@ -13,6 +13,12 @@ from stored import stored
 
 import symfric as sf
 from symfric import Hold, Linear, Model, Trajectory, Variable, simulate
+from symfric.integrator.derivatives import saltation as module
+from symfric.integrator.derivatives.functions import derivatives
+from symfric.integrator.derivatives.path import seeds
+from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.integrator import built
 from symfric.model import Event
 from symfric.scenes import PendulumBox
 
@@ -145,6 +151,20 @@ def test_laws_by_events_meet_differences_of_tight_runs(case: str) -> None:
     assert [*run.gradient(weights).values()] == pytest.approx(by_hand, rel=1e-9)
 
 
+def test_many_events_at_once_are_those_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [v.name for v in CASES["gms_drive"][0].p]
+    together = run_of("gms_drive", {}, sensitivities=names)
+    monkeypatch.setattr(module, "_is_single", lambda *_: False)  # pyright: ignore[reportUnknownLambdaType]
+    alone = run_of("gms_drive", {}, sensitivities=names)
+    for name in names:
+        assert together.sensitivities[name]["x"] == pytest.approx(
+            alone.sensitivities[name]["x"], rel=1e-12
+        )
+        assert together.event_sensitivities[name] == pytest.approx(
+            alone.event_sensitivities[name], rel=1e-11
+        )
+
+
 def struck() -> Model:
     """A point on a circle, whose rate an event halves; its tension follows."""
     model = pendulum()
@@ -174,6 +194,21 @@ def test_mechanism_stays_on_its_constraints_behind_an_event() -> None:
         for n in ("l", "x0.vx")
     ]
     assert [*run.gradient(weights).values()] == pytest.approx(by_hand, rel=1e-10)
+
+
+def test_sweeps_cost_what_they_are_written_for() -> None:
+    """Instructions of a step of Rabinowicz: itself, by four parameters, backwards, with jumps."""
+    model = sf.rabinowicz(sf.BrownMcPhee(), free=["mu_s", "mu_d", "k", "m"])
+    integrator, _ = built(model, input_data(model, None, 0.0, 1.0), METHODS["rodas5p"])
+    made = derivatives(integrator)
+    which = seeds(model, ["mu_s", "mu_d", "k", "m"], None, None)
+    count = [
+        made.step, made.forward(which.parameters, False).function, made.reverse(False).function,
+        made.forward(which.parameters, True).function, made.reverse(True).function,
+    ]  # fmt: skip
+    most = [580, 2900, 1400, 3320, 1540]
+    found = [f.n_instructions() for f in count]
+    assert all(f <= m for f, m in zip(found, most, strict=True)), found
 
 
 def events_of(

@@ -5,16 +5,23 @@ import numpy as np
 import pytest
 from backends import each_backend
 from closed_forms import assemble, smooth_dae
+from numpy.typing import NDArray
 
 import symfric as sf
 from symfric import Model, Variable
 from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.equations.blocks import following
 from symfric.integrator.equations.initial import (
     consistent,
     consistent_many,
+    first_guess,
     first_step,
     smallest_step,
 )
+from symfric.scenes import SliderCrank
+
+Array = NDArray[np.float64]
+
 
 NONE = np.zeros(0)
 x, z, t = Variable("x", "m", start=1.0), Variable("z", "1"), ca.SX.sym("t")
@@ -146,6 +153,26 @@ def test_smallest_step_follows_time_instead_of_its_end(backend: str) -> None:
     assert run.statistics.smallest_step < 1e-4
     assert run.final["a"] == pytest.approx(2.083340149701255e-8, rel=1e-6)
     assert many["a"][:, 0] == pytest.approx(2 * [run.final["a"]], rel=1e-12)
+
+
+def test_a_quick_way_is_taken_where_it_leads_there() -> None:
+    """The guess is put onto the constraints before; where it gives up, the search goes on."""
+    model = SliderCrank(sf.BrownMcPhee()).model()
+    system = assemble(model)
+    follow = following(system)
+    guess = first_guess(system, model, model.initial_state())
+    searched, tried = consistent(system, "here", guess, NONE), list[bool]()
+
+    def quick(y: Array, d: Array) -> Array | None:
+        assert follow is not None
+        defect = system.manifold.defect(y, d).full()  # type: ignore[union-attr]
+        tried.append(bool(np.abs(defect).max() < 1e-9))
+        return follow(y, d) if len(tried) < 2 else None
+
+    for _ in range(2):
+        found = consistent(system, "here", guess, NONE, quick)
+        assert found == pytest.approx(searched, rel=1e-9, abs=1e-9 * np.abs(searched).max())
+    assert tried == [True, True]
 
 
 def test_first_steps_of_many_spans_have_the_bits_of_each() -> None:

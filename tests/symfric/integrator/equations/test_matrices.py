@@ -66,6 +66,21 @@ def test_solution_sign_and_pivots_are_those_of_dense_elimination(n: int, density
         assert lu.pivots([lu.order[-1][0]]).numel() == 1
 
 
+def test_arrows_and_bands_have_no_fill() -> None:
+    """Whichever row and column an arrow points along; eliminating its hub first would fill all."""
+    distance = np.abs(np.subtract.outer(np.arange(15), np.arange(15)))
+    cases = [np.where(distance <= bands, 1.0, 0.0) + 3 * np.eye(15) for bands in (1, 2)]
+    for hub in (0, 4, 9):
+        arrow = 4.0 * np.eye(10)
+        arrow[hub, :], arrow[:, hub] = 1.0, 1.0
+        cases.append(arrow + np.diag(np.arange(10) == hub))
+    for values in cases:
+        lu, _ = factors(values, tuple(range(len(values))))
+        assert lu.packed.numel() == np.count_nonzero(values)
+    arrow = cases[2]
+    assert {(row, row) for row in range(1, 5)} < set(best_order(arrow != 0, arrow[None])[:9])
+
+
 def test_differential_rows_pivot_on_their_diagonal_first() -> None:
     """[M G^T; G 0] of a mechanism; an algebraic row that fills less; tiny steps of a DAE."""
     rng = np.random.default_rng(3)

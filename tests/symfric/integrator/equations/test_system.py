@@ -60,6 +60,23 @@ def test_unknowns_are_time_and_rates_only_where_equations_need_them(
     assert s.d.numel() == 0
 
 
+@pytest.mark.parametrize(
+    ("signal", "unknowns", "data"),
+    [
+        (2.0, 2, 1),
+        (sf.Hold([0.0, 1.0], [0.0, 1.0]), 2, 1),
+        (sf.Linear([0.0, 1.0], [1.0, 1.0]), 2, 1),
+        (sf.Linear([0.0, 1.0], [0.0, 1.0]), 3, 3),
+        (ca.sin, 3, 0),
+    ],
+    ids=["number", "hold", "level", "linear", "expression"],
+)
+def test_inputs_cost_only_the_data_they_need(signal: Input, unknowns: int, data: int) -> None:
+    """A linear input has value, slope and start of its interval; only it needs time."""
+    s = assembled(sf.drive(sf.BrownMcPhee()), force=signal)
+    assert (s.n, s.d.numel()) == (unknowns, data)
+
+
 def test_constant_mass_matrices_are_kept_and_algebraic_rows_and_columns_are_found() -> None:
     """Equations without rates and unknowns without rates need not stand at the same place."""
     s = assembled(dae(-Z * t, Z - X))

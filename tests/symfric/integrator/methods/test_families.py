@@ -11,7 +11,14 @@ from scipy.integrate import RK45
 import symfric as sf
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.methods.families import SMALL, eigenbasis, eliminated, exp_phi1_phi2
-from symfric.integrator.methods.tableaux import BACKWARD_EULER, DOPRI5, EXPONENTIAL, RADAU5, RODAS5P
+from symfric.integrator.methods.tableaux import (
+    BACKWARD_EULER,
+    DOPRI5,
+    EXPONENTIAL,
+    METHODS,
+    RADAU5,
+    RODAS5P,
+)
 from symfric.integrator.running.record import Dense
 from symfric.integrator.step.attempt import (
     KAPPA,
@@ -38,6 +45,15 @@ def test_backward_euler_converges_quadratically_to_the_root(h: float) -> None:
     errors = np.abs(np.array(found) - root)
     if h == 0.5:
         assert errors[1] / errors[0] ** 2 == pytest.approx(h / (1 + 2 * h * root), rel=0.2)
+
+
+def test_backward_euler_stays_bounded_where_the_step_resolves_nothing() -> None:
+    for v_t in (1e-3, 1e-5):
+        model = sf.rabinowicz(sf.BrownMcPhee(v_t=v_t))
+        step = build_fixed(assemble(model), BACKWARD_EULER).mapaccum(2000)
+        for h in (0.1, 0.01, 0.001):
+            x = step(model.initial_state(), h, []).full()[0]
+            assert np.abs(x).max() < 2.0  # the spring balances static friction at 0.57 m
 
 
 def test_explicit_step_and_its_dense_output_are_those_of_scipy() -> None:
@@ -92,6 +108,14 @@ def test_bristles_stay_within_their_travel_at_any_step() -> None:
         z = float(step([0.0, v, 0.0], 0.1, [])[2])
         assert abs(z) <= limit * (1 + 1e-12)
         assert np.sign(z) == np.sign(v - 0.1)
+
+
+def test_work_of_a_step_is_its_stages_and_factorisations() -> None:
+    system = assemble(sf.rabinowicz(sf.LuGre()))
+    for name, stages in {"rodas5p": 8, "rodas4p": 6, "rodas3": 4}.items():
+        assert METHODS[name].work(system) == (stages, 1, 1)
+    assert RADAU5.work(assemble(smooth_ode().model)) == (7, 1, 2)
+    assert RADAU5.work(assemble(smooth_dae().model)) == (10, 1, 2)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import symfric as sf
 import symfric.integrator.running.engine as loop
+import symfric.integrator.running.integrator as module
 import symfric.integrator.running.run as running
 from symfric.integrator.running import run
 from symfric.integrator.running.integrator import Integrator
@@ -93,6 +94,13 @@ def of_case(case: str, backend: str) -> str:
 @pytest.mark.parametrize("case", CASES)
 def test_both_engines_give_the_same_bits(case: str) -> None:
     assert of_case(case, "compiled") == of_case(case, "vm")
+
+
+@needs_compiler
+def test_large_steps_are_blocks_in_both_engines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """4f644ad compiled blocks and ran the step written out in the virtual machine."""
+    monkeypatch.setattr(module, "INLINE", 100)
+    assert of_case("normal force", "compiled") == of_case("normal force", "vm")
 
 
 @needs_compiler

@@ -152,6 +152,23 @@ def test_each_passage_is_one_event(backend: str, form: str, rtol: float) -> None
         assert [t for t, _ in run.happened] == pytest.approx(times, abs=30 * rtol)
 
 
+def test_events_of_coupled_variables_grow_with_their_number() -> None:
+    """Without the zeros of their equations: by a QR factorisation their length went with n^2."""
+
+    def length(n: int) -> int:
+        x, z = Variable("x", "1"), [Variable(f"z_{i}", "1") for i in range(n)]
+        own = [x.symbol, *(v.symbol for v in z), 0.0]
+        equations = [own[i] - 3 * own[i + 1] - own[i + 1] ** 3 + own[i + 2] for i in range(n)]
+        events = (Event("up", z[n // 2].symbol - 0.1),)
+        model = Model(
+            "chain", x=(x,), z=tuple(z), ode=ca.SX(1), alg=ca.vertcat(*equations), events=events
+        )
+        data = input_data(model, None, 0.0, 1.0)
+        return int(Integrator(model, data, RODAS5P).events.n_instructions())
+
+    assert length(20) < 2.5 * length(10)
+
+
 TOLERANCE = 2.0**-33
 
 

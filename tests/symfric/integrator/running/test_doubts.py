@@ -11,7 +11,7 @@ import pytest
 import symfric as sf
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import parameters
-from symfric.integrator.running import doubts
+from symfric.integrator.running import doubts, record
 from symfric.integrator.running.doubts import places
 from symfric.laws import ALL_LAWS, Asymmetric, LoadNormalised, Sum
 from symfric.scenes import ALL_SCENES, Drive, Rabinowicz
@@ -68,6 +68,13 @@ def test_it_is_seen_where_the_load_varies_and_no_drop_of_it_is_taken_for_it() ->
     assert quiet(swinging(1e-15), 4.0).doubts == ""
     with pytest.warns(sf.OverloadWarning, match="contact 'pad'"):
         sf.simulate(swinging(1e-3), 4.0)
+
+
+def test_a_long_run_whose_steps_are_not_kept_is_looked_at(monkeypatch: Any) -> None:
+    monkeypatch.setattr(record, "MOST_BYTES", 1000)
+    monkeypatch.setattr("symfric.integrator.running.run.MOST_BYTES", 1000)
+    with pytest.warns(sf.OverloadWarning, match="2.29 times"):
+        sf.simulate(block(sigma_0=1e16), 20.0, rtol=1e-7, t_eval=[0.0, 1.0])
 
 
 def test_an_ensemble_warns_once_and_names_the_members() -> None:

@@ -73,3 +73,11 @@ def test_full_record_is_continued_without_a_trace(backend: str) -> None:
     assert (stop, attempts) == (Stop.END, made)
     assert len(parts) > 2
     np.testing.assert_array_equal(np.vstack(parts), whole)
+
+
+def test_source_of_a_model_does_not_change_when_it_is_built_again() -> None:
+    """Its hash is the name in the cache."""
+    one, other = (
+        loop_source(build_step(assemble(rabinowicz(LuGre())), RODAS5P), ROWS) for _ in range(2)
+    )
+    assert one == other

@@ -152,6 +152,21 @@ def test_events_happen_at_the_times_of_closed_forms(backend: str, case: str) -> 
         assert run.t[-1] <= run.happened[-1][0]
 
 
+def test_the_step_that_an_event_cuts_keeps_its_polynomial() -> None:
+    """sin t up to an event: long steps of high order, the last one cut where the event is."""
+    velocity = replace(y, start=1.0, unit="m/s")
+    cut: list[float] = []
+    for until in (0.8, 0.9, 1.0, 1.1):
+        end = Event("end", X - np.sin(until), terminal=True)
+        swing = Model("swing", x=(x, velocity), ode=ca.vertcat(Y, -X), events=(end,))
+        run = simulate(swing, 2.0, rtol=1e-8)
+        assert run.step_times[-1] == pytest.approx(until, abs=1e-8)
+        last = np.linspace(run.step_times[-2], run.step_times[-1], 50)
+        assert run.at(last)["x"] == pytest.approx(np.sin(last), abs=1e-7)
+        cut.append(last[-1] - last[0])
+    assert max(cut) > 0.05
+
+
 def test_parabola_between_two_impacts_is_right_and_the_corner_is_sharp() -> None:
     run = simulate(ball(0.8), 1.0, rtol=1e-10)
     hit = run.happened[0][0]

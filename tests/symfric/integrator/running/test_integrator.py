@@ -6,15 +6,17 @@ import weakref
 from concurrent.futures import ThreadPoolExecutor
 
 import casadi as ca
+import numpy as np
 import pytest
 
 import symfric.integrator.running.integrator as module
 from symfric import BrownMcPhee, Model, Variable, Viscous, drive, simulate
+from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import REMEMBERED, Integrator, built
-from symfric.scenes import PendulumBox
+from symfric.scenes import PendulumBox, SliderCrank
 
 
 @pytest.fixture
@@ -41,6 +43,39 @@ def test_a_start_is_solved_for_once(solved: list[str]) -> None:
     again = simulate(model, 0.1, rtol=1e-6, backend="vm")
     assert len(solved) == 4
     assert (again["x_N"] == runs[0]["x_N"]).all()
+
+
+@pytest.fixture
+def called(monkeypatch: pytest.MonkeyPatch) -> list[Columns]:
+    """All calls of Functions of many columns."""
+    calls: list[Columns] = []
+    call = Columns.__call__
+
+    def counted(self: Columns, *arguments: object, **engine: object) -> object:
+        calls.append(self)
+        return call(self, *arguments, **engine)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Columns, "__call__", counted)
+    return calls
+
+
+def test_states_need_no_other_signals(called: list[Columns]) -> None:
+    """Those of a tree are the dense output; those of loops are projected onto them."""
+    run = simulate(PendulumBox(BrownMcPhee()).model(), 1.0)
+    phi = run["phi"]
+    assert not called
+    assert phi == pytest.approx(run.signals["phi"], abs=1e-14)
+    called.clear()
+    scene = SliderCrank(BrownMcPhee())
+    run = simulate(scene.model(), 0.02)
+    crank, slider = run["crank"], run["slider"]
+    assert len(called) == 1
+    assert crank == pytest.approx(run.signals["crank"], abs=1e-14)
+    r, length, b, c, e = (float(getattr(scene, name)) for name in "rlbce")
+    across, up = b - r * np.sin(crank), c - e + r * np.cos(crank)
+    assert np.abs(slider**2 + across**2 + up**2 - length**2).max() < 1e-13
+    states, signals = called
+    assert states.function.n_instructions() < signals.function.n_instructions() / 2
 
 
 def cart() -> Model:

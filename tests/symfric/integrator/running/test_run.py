@@ -13,6 +13,7 @@ import symfric.integrator.running.run as module
 from symfric import Hold, Model, Status, Variable, simulate
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.run import finer, own_scale
 
 x, z, u = Variable("x", "m", start=1.0), Variable("z", "1", start=1.0), Variable("u", "N")
 DECAY = Model("decay", x=(x,), ode=-x.symbol)
@@ -73,6 +74,14 @@ def test_statistics_add_up(law: sf.Law, backend: str) -> None:
     assert s.build_time > 0
     assert simulate(model, 1.0).statistics.build_time == 0
     assert simulate(DECAY, 1.0).statistics.rejections == 0
+
+
+def test_steps_end_at_the_ends_of_input_intervals() -> None:
+    ends = [0.3, 0.31, 1.1, 1.7]
+    force = Hold([0.0, *ends], [1.0, -3.0, 2.0, 0.5, 4.0])
+    run = simulate(sf.drive(sf.BrownMcPhee()), 2.0, u={"force": force})
+    assert {0.0, *ends, 2.0} <= set(run.step_times.tolist())
+    assert (np.diff(run.step_times) > 0).all()
 
 
 def test_near_jumps_take_no_search_and_jumps_without_a_solution_fail(
@@ -171,6 +180,15 @@ def test_a_swing_from_a_nanometre_follows_its_closed_form_unless_a_tolerance_is_
     assert [t for t, _ in run.happened] == pytest.approx([pi / 2, 3 * pi / 2], abs=1e-5)
     given, own = (simulate(swing(), 10.0, x0={"x": 1e-9}, atol=a) for a in (1e-7, None))
     assert given.statistics.steps < own.statistics.steps / 3
+
+
+def test_what_rests_or_is_rounding_has_no_scale_of_its_own() -> None:
+    nominal, size = np.full(4, 0.1), np.array([0.0, 1e-14, 1e-7, 0.01])
+    assert own_scale(size, nominal).tolist() == [0.1, 0.1, 1e-7, 0.1]
+    assert finer(nominal, np.array([0.0, 1e-14, 1.0, 0.01]), nominal) is None
+    own = finer(nominal, size, nominal)
+    assert own is not None
+    assert finer(own, size * 0.9, nominal) is None
 
 
 def test_a_tiny_motion_that_could_not_be_resolved_is_reported() -> None:

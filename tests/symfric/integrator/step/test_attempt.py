@@ -9,9 +9,11 @@ import pytest
 from closed_forms import ClosedForm, assemble, smooth_dae, smooth_ode, timed_ode
 from numpy.typing import NDArray
 
-from symfric import LuGre, Model, Variable, rabinowicz
+import symfric.integrator.step.attempt as module
+from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz
+from symfric.bench.multibody import chain
 from symfric.integrator.equations.system import System
-from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
+from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS, RODAS5P
 from symfric.integrator.step.attempt import (
     GROW,
     SHRINK,
@@ -19,6 +21,9 @@ from symfric.integrator.step.attempt import (
     State,
     build_fixed,
     build_step,
+    instructions,
+    least,
+    written,
 )
 from symfric.model import Monitor
 
@@ -94,6 +99,18 @@ def test_what_is_rejected_first_is_hardly_above_the_tolerance() -> None:
     errors = [(0.85 * h / less) ** 5 for h, (less, no) in zip(lengths, ends, strict=True) if no]
     assert 0 < len(errors) < lengths.size
     assert 1.0 < errors[0] < 2.0
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_step_size_settles_where_the_error_is_just_allowed(rtol: float) -> None:
+    """The error of a step goes with h^5 (estimate of order 4), so h goes with rtol^(1/5)."""
+    memory = [column(())] * 2
+    for _ in range(8):
+        memory = [
+            attempt(smooth_ode(), np.array([0.0, *m[1:MEMORY], 1.0, 1.0]), rtol=r)
+            for m, r in zip(memory, (rtol, rtol / 32), strict=True)
+        ]
+    assert memory[0][H] / memory[1][H] == pytest.approx(2.0, rel=0.25)
 
 
 def test_growth_and_shrinkage_of_a_step_are_bounded_and_forbidden_after_a_rejection() -> None:
@@ -207,3 +224,26 @@ def test_monitored_difference_is_resolved_on_its_own_scale() -> None:
     for monitors, rejected in (((), 0.0), ((Monitor(X - 1, 1e-3),), 1.0)):
         model = Model("m", x=(x, y), ode=rates, monitors=monitors)
         assert attempt(model, column((1.0, 1.0), h=0.03))[REJECTED] == rejected
+
+
+def test_small_steps_are_written_out_large_ones_never_and_others_counted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    kinds: list[object] = []
+
+    def counted(whole: System, method: Any, kind: Any = ca.SX) -> ca.Function:
+        kinds.append(kind)
+        return build_step(whole, method, kind)
+
+    monkeypatch.setattr(module, "build_step", counted)
+    belt, links = assemble(rabinowicz(BrownMcPhee())), assemble(chain(4, BrownMcPhee()))
+    step, count = written(belt, RODAS5P, 7000)
+    assert (step.class_name(), count) == ("SXFunction", step.n_instructions())
+    large, size = written(links, RODAS5P, 2000)
+    assert large.class_name() == "MXFunction"
+    assert least(links, RODAS5P) < size == instructions(large)
+    assert least(belt, METHODS["dopri5"]) == 0
+    assert least(belt, RODAS5P) < count - 1
+    assert written(belt, RODAS5P, count - 1)[0].class_name() == "MXFunction"
+    assert written(belt, RODAS5P, count)[0].class_name() == "SXFunction"
+    assert kinds == [ca.SX, ca.MX, ca.SX, ca.MX, ca.SX]

@@ -91,6 +91,15 @@ def test_order_of_a_method_is_kept_in_charts(method: str, order: int) -> None:
     assert np.log2(found[0] / found[1]) > order - 0.35
 
 
+def test_fixed_step_ends_on_the_constraints() -> None:
+    model = smooth(SCENES["slider_crank"]).build(index=0)
+    whole = assemble(model)
+    end = flow(model, steps=1)(x0=model.initial_state(), T=0.02)["xf"].full().ravel()
+    y = np.concatenate([end, np.zeros(whole.n - end.size)])
+    assert whole.manifold is not None
+    assert np.abs(whole.manifold.defect(y, []).full()).max() < 1e-12
+
+
 def test_charts_follow_full_turns() -> None:
     """Two turns of the crank in Euler parameters, whose tangent turns with it."""
     made = smooth(SliderCrank(LAW)).build(formulation="absolute")

@@ -64,6 +64,15 @@ def test_friction_peaks_without_a_coulomb_level_catch_the_block() -> None:
         assert np.abs(many["x"][:, -1] - x[::4]).max() < 1e-4, case
 
 
+def test_both_engines_catch_it() -> None:
+    """x = -1.0404 m was found, at rtol 1e-9 -0.797; SciPy's LSODA with max_step 2e-4: -0.7783."""
+    model = sf.rabinowicz(LAWS["stribeck"])
+    runs = [sf.simulate(model, 20.0, x0={"v": -0.5}, backend=b) for b in ("vm", "compiled")]
+    assert runs[0].final == runs[1].final
+    assert runs[0].statistics.steps == runs[1].statistics.steps
+    assert [r.final["x"] for r in runs] == pytest.approx([-0.77828] * 2, abs=1e-4)
+
+
 def test_a_block_that_just_touches_the_velocity_of_the_belt_is_caught() -> None:
     """Its velocity turns 3 micrometres a second short of it, on a scale of one, within a step.
 
