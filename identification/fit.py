@@ -143,7 +143,7 @@ class Fit:
             message = f"Fit: {asked.subject.name}: no start has residuals: {point}"
             raise SolveError(message, Status.NOT_FINITE)
         live = self._live(asked, made, point)
-        verdict = judge(shortened(live.minimum), asked.findings)
+        verdict = judge(shortened(live.minimum), asked.findings, live.levels)
         gain = remaining(made, point) / max(point.cost, 1e-300)
         status, message = _status(asked, end, verdict, gain)
         result = fitted(
@@ -251,7 +251,8 @@ class Fit:
         drive = asked.subject.drive
         mass = None if drive is None else float(values.get("m", drive.m))
         largest = strongest(asked.kind, self.data, asked.seen, mass)
-        levels = levels_of(asked.subject, largest, self.data.rotary)
+        v = np.zeros(1) if asked.seen is None else asked.seen.v
+        levels = levels_of(asked.subject, values, largest, v, self.data.rotary)
         return Live(asked.kind, asked.subject, self.data, made, point, levels)
 
     def _quickly(self, kind: Kind, data: Dataset) -> dict[str, float] | None:

@@ -22,6 +22,7 @@ from identification.residuals.balance import (
 )
 from identification.residuals.evaluation import Array, Blocks, Channel
 from identification.residuals.sampled import Sampled, preload
+from identification.unknowns.roles import width_of
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
@@ -245,8 +246,8 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
     gains = np.median(np.abs(slopes), axis=1).reshape(errors.size, len(model.contacts)).T
     noise = [float(np.linalg.norm(gain * errors)) for gain in gains]
     return [
-        uncertain(v[k], noise[k], motion.step, motion.filter) & (not c.states)
-        for k, c in enumerate(model.contacts)
+        uncertain(v[k], max(s, width_of(c.law)), motion.step, motion.filter) & (not c.states)
+        for k, (c, s) in enumerate(zip(model.contacts, noise, strict=True))
     ]
 
 
