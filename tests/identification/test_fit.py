@@ -61,7 +61,7 @@ def test_specs_reach_the_result() -> None:
 
 def test_progress_is_reported_after_each_start() -> None:
     reported = list[tuple[str, float]]()
-    Fit(Points(), "stribeck", points(), starts=4).solve(
+    Fit(Points(), "coulomb+viscous", points(), starts=4).solve(
         progress=lambda text, done: reported.append((text, done))
     )
     assert reported[0] == ("start 1 of 4, evaluation 2", 0.0)
