@@ -154,7 +154,12 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     low, high = _intervals(found, np.sqrt(np.diag(matrix)), inside.freedom)
     mine = tuple(names[i] for i in own)
     change = partial(_change, found, own)
-    lost = [*groups(mine, values[own], moved[own], size[own], change)]
+    nuisance = {u.name for u in found.unknowns if u.nuisance}
+    lost = [
+        (members, sentence)
+        for members, sentence in groups(mine, values[own], moved[own], size[own], change)
+        if not nuisance.issuperset(members)
+    ]
     far = {} if levels is None else dict(levels.beyond(dict(zip(names, values, strict=True))))
     gone = dict(_unlimited(found, low, high))
     labels = [found.label(c) for c in found.channels]
