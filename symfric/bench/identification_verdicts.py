@@ -111,7 +111,7 @@ def _row(count: Count) -> Row:
 
 
 def draw(rows: Sequence[Row]) -> "Figure":
-    """Draw the shares of solved fits, and the coverage of each parameter among them."""
+    """Draw the shares of solved fits, and the coverage over all parameters among them."""
     from symfric.foundation.panels import grid  # noqa: PLC0415  (slow to import)
     from symfric.foundation.style import colour  # noqa: PLC0415  (slow to import)
 
@@ -122,8 +122,9 @@ def draw(rows: Sequence[Row]) -> "Figure":
         left.barh(y, float(row["solved"]) / float(row["fits"]), color=shade)
         cells = str(row["intervals with the truth"])
         pairs = [cell.rsplit(" ", 1)[1].split("/") for cell in cells.split(", ") if cell]
-        shares = [int(i) / int(n) for i, n in pairs if int(n) >= ENOUGH]
-        right.plot(shares, [y] * len(shares), "o", ms=4, color=shade)
+        inside, n = (sum(int(pair[k]) for pair in pairs) for k in (0, 1))
+        if n >= ENOUGH:
+            right.plot(inside / n, y, "o", ms=4, color=shade)
     left.set_yticks(range(len(rows)), [str(row["scene"]) for row in rows], fontsize="x-small")
     left.invert_yaxis()
     left.set_xlabel("share of fits called solved")
