@@ -142,11 +142,46 @@ def relative(left: Sequence[Left]) -> float:
     """Return the rms error relative to the spread [%], averaged over signals; NaN if empty."""
     each = list[float]()
     for some in by_signal(left).values():
-        rows = [part.r.size for part in some]
-        mean = np.average([part.mean for part in some], weights=rows)
-        squares = [part.spread**2 + (part.mean - mean) ** 2 for part in some]
-        each.append(_rms(some) / float(np.sqrt(np.average(squares, weights=rows))))
+        each.append(_rms(some) / _spread(some))
     return 100 * float(np.sqrt(np.mean(np.square(each)))) if each else nan
+
+
+def _spread(some: Sequence[Left]) -> float:
+    """Return the standard deviation of a signal over all records."""
+    rows = [part.r.size for part in some]
+    mean = np.average([part.mean for part in some], weights=rows)
+    squares = [part.spread**2 + (part.mean - mean) ** 2 for part in some]
+    return float(np.sqrt(np.average(squares, weights=rows)))
+
+
+BLOCKS = 20
+"""Number of blocks of neighbouring residuals that determine a standard error."""
+
+
+def uncertainty(left: Sequence[Left]) -> float:
+    """Return the standard error of `relative` [%]; NaN with too few residuals."""
+    mean, error = excess(left)
+    return 100 * error / (2 * float(np.sqrt(mean))) if mean > 0 else nan
+
+
+def excess(left: Sequence[Left], best: Sequence[Left] = ()) -> tuple[float, float]:
+    """Return the mean squared error relative to the spread, minus that of `best`, and its error.
+
+    Both have residuals at the same times. Neighbouring residuals are correlated; the standard error
+    is therefore that of the means of blocks of neighbours.
+    """
+    if not left:
+        return nan, nan
+    means, errors = list[float](), list[float]()
+    others = by_signal(best)
+    for signal, some in by_signal(left).items():
+        squares = np.concatenate([part.r**2 for part in some]) / _spread(some) ** 2
+        if best:
+            squares -= np.concatenate([part.r**2 for part in others[signal]]) / _spread(some) ** 2
+        blocks = [float(b.mean()) for b in np.array_split(squares, BLOCKS) if b.size]
+        means.append(float(squares.mean()))
+        errors.append(float(np.std(blocks, ddof=1) / np.sqrt(BLOCKS)) if len(blocks) > 1 else nan)
+    return float(np.mean(means)), float(np.linalg.norm(errors)) / max(len(errors), 1)
 
 
 def percent(value: float) -> str:

@@ -26,7 +26,7 @@ from identification.from_data import (
     strongest,
 )  # fmt: skip
 from identification.residuals.evaluation import Array, Residuals
-from identification.residuals.inverse import InverseDynamics
+from identification.residuals.inverse import DEAD_TIME, InverseDynamics
 from identification.residuals.points import PointRows, Points
 from identification.result.build import fitted, levels_of, written
 from identification.result.fitted import Fitted
@@ -38,13 +38,19 @@ from identification.starts.measured import Measured
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.judge import Verdict, judge
-from identification.verdict.minimum import shortened
+from identification.verdict.minimum import minimum, shortened
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
 MOST_STARTS = 10_000
 QUICK = 40
 """Largest number of evaluations of a fit that only selects a setting."""
+LONGEST = 30
+"""Largest dead time that is looked for [samples]."""
+LATE, MATTERS = 4.0, 1.0
+"""Least dead time in its standard errors, and least shift of a value in those without it, for which
+a dead time of the force is estimated.
+"""
 OF_KIND = ("x0", "dead_time")
 """Entries of `free` that belong to the residuals."""
 
@@ -130,11 +136,14 @@ class Fit:
         if isinstance(point, Point) and getattr(made.residuals, "noises", ()):
             asked, made, end = self._again(asked, made, point)
             starts, point = (end,), made.at(end.w)
+        if isinstance(point, Point) and (later := self._delayed(asked, made, point)):
+            asked, made, end = later
+            starts, point = (end,), made.at(end.w)
         if isinstance(point, str):
             message = f"Fit: {asked.subject.name}: no start has residuals: {point}"
             raise SolveError(message, Status.NOT_FINITE)
         live = self._live(asked, made, point)
-        verdict = judge(shortened(live.minimum), asked.findings)
+        verdict = judge(shortened(live.minimum), asked.findings, live.levels)
         gain = remaining(made, point) / max(point.cost, 1e-300)
         status, message = _status(asked, end, verdict, gain)
         result = fitted(
@@ -155,6 +164,36 @@ class Fit:
         end = descend(made, point.w, 0, self.evaluations)
         kind = replace(cast(Points, asked.kind), near=near)
         return asked._replace(kind=kind), made.with_noise(end.noise), end
+
+    def _delayed(
+        self, asked: "Prepared", made: Task, point: Point
+    ) -> tuple["Prepared", Task, Start] | None:
+        """Fit again with dead times; return None unless they are significant and shift a value."""
+        kind = asked.kind
+        if not isinstance(kind, InverseDynamics) or kind.dead_time != "auto":
+            return None
+        step = max(record.median_step for record in self.data)
+        kind = replace(kind, dead_time=(0.0, LONGEST * step))
+        values = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
+        try:
+            residuals = kind.prepare(asked.subject, self.data, values)
+        except ValueError:  # no force is measured, or a law depends on it
+            return None
+        noise = _with_noise(kind, self.noise, asked.subject, self.data)[1]
+        other = self._task(residuals, asked.subject, noise)
+        end = descend(other, other.unknowns.of(values), 0, self.evaluations)
+        other = other.with_noise(end.noise)
+        there = other.at(end.w)
+        if isinstance(there, str):
+            return None
+        both = [minimum(*at) for at in ((made, point), (other, there))]
+        errors = [np.sqrt(np.diag(found.sandwich.coloured)) for found in both]
+        times = [n.startswith(DEAD_TIME) for n in residuals.names]
+        late = np.abs(there.values[times]) > LATE * errors[1][times]
+        count = len(residuals.parameters)
+        moved = np.abs(there.values[:count] - point.values[:count]) > MATTERS * errors[0][:count]
+        found = bool(late.any() and moved.any() and not both[1].held.any())
+        return (asked._replace(kind=kind), other, end) if found else None
 
     def prepared(self) -> "Prepared":
         """Check the data, choose the subject and set up the residuals, without solving."""
@@ -212,7 +251,8 @@ class Fit:
         drive = asked.subject.drive
         mass = None if drive is None else float(values.get("m", drive.m))
         largest = strongest(asked.kind, self.data, asked.seen, mass)
-        levels = levels_of(asked.subject, largest, self.data.rotary)
+        v = np.zeros(1) if asked.seen is None else asked.seen.v
+        levels = levels_of(asked.subject, values, largest, v, self.data.rotary)
         return Live(asked.kind, asked.subject, self.data, made, point, levels)
 
     def _quickly(self, kind: Kind, data: Dataset) -> dict[str, float] | None:

@@ -24,10 +24,12 @@ from identification.cross import (
     Left,
     by_signal,
     cross_validate,
+    excess,
     left_of,
     percent,
     relative,
     shared,
+    uncertainty,
 )  # fmt: skip
 from identification.data.dataset import Dataset
 from identification.fit import Fit
@@ -49,7 +51,10 @@ INTERRUPTED = "interrupted by the user"
 HEADER = ("law", "validation", "fit", "AICc", "BIC", "par.", "op.", "status", "")
 NUMBERS = (1, 2, 3, 4, 5, 6)
 """Header of the table of laws, and its numeric columns."""
-TITLES = {"validation": "validation [%]", "fitted": "fit [%]", "aicc": "AICc", "bic": "BIC"}
+TITLES = {
+    "validation": "validation [%]", "uncertainty": "validation +- [%]", "fitted": "fit [%]",
+    "aicc": "AICc", "bic": "BIC",
+}  # fmt: skip
 """Titles of fields in plain data that differ from their names."""
 LOST = "not fitted"
 OWN = ("kind", "what", "data")
@@ -66,6 +71,7 @@ class Row:
         status: status of its fit; "" if it could not be fitted.
         validation: error on data left out of the fit [%]; NaN without validation, infinite if the
             prediction diverged (`DIVERGED`); None in plain data.
+        uncertainty: standard error of the validation [%].
         fitted: error on the data of the fit [%].
         aicc, bic: difference from the best law.
         parameters: number of fitted parameters, without start values.
@@ -78,6 +84,7 @@ class Row:
     law: str
     status: str = ""
     validation: float = nan
+    uncertainty: float = nan
     fitted: float = nan
     aicc: float = nan
     bic: float = nan
@@ -90,8 +97,10 @@ class Row:
     @property
     def cells(self) -> tuple[str, ...]:
         """Cells of the row as text, in the order of `HEADER`."""
+        known = isfinite(self.validation) and isfinite(self.uncertainty)
+        error = f"{self.validation:.3g} +- {self.uncertainty:.1g} %"
         numbers = (
-            *map(percent, (self.validation, self.fitted)),
+            error if known else percent(self.validation), percent(self.fitted),
             *(f"{x:.1f}" if isfinite(x) else "-" for x in (self.aicc, self.bic)),
             str(self.parameters), "-" if self.operations is None else str(self.operations),
         )  # fmt: skip
@@ -111,6 +120,9 @@ class Row:
 @dataclass(frozen=True, eq=False)
 class Ranking:
     """Laws in order of their prediction error; laws that could not be fitted come last.
+
+    The first law is the simplest one whose squared error exceeds the smallest by at most the
+    standard error of the difference (one-standard-error rule, L. Breiman et al., 1984).
 
     Attributes:
         rows: one row for each law.
@@ -306,19 +318,42 @@ def _ranked(good: Sequence[_Tried]) -> tuple[list[Row], float]:
     over = ([x - m if isfinite(m) else nan for x in some]
             for some, m in zip((aicc, bic), least, strict=True))  # fmt: skip
     errors = ([relative(left) for left in some] for some in (outside, inside))
-    rows = [_row(t, *numbers) for t, *numbers in zip(good, *errors, *over, strict=True)]
-    rows.sort(key=lambda row: (row.validation if isfinite(row.validation) else inf, row.bic))
-    return rows, n
+    sure = map(uncertainty, outside)
+    rows = [_row(t, *numbers) for t, *numbers in zip(good, *errors, *over, sure, strict=True)]
+    order = sorted(range(len(rows)), key=lambda i: _rank(rows[i]))
+    if order and outside[order[0]]:
+        best = outside[order[0]]
+        close = [i for i in order if _close(outside[i], best)]
+        order.sort(key=lambda i: i != min(close, key=lambda i: _complexity(rows[i])))
+    return [rows[i] for i in order], n
 
 
-def _row(t: _Tried, validation: float, fitted: float, aicc: float, bic: float) -> Row:
+def _close(left: Sequence[Left], best: Sequence[Left]) -> bool:
+    """Return True if errors exceed the best ones by at most the standard error."""
+    if [(part.signal, part.r.size) for part in left] != [(p.signal, p.r.size) for p in best]:
+        return False
+    more, error = excess(left, best)
+    return more <= error or left is best
+
+
+def _rank(row: Row) -> tuple[float, float]:
+    return row.validation if isfinite(row.validation) else inf, row.bic
+
+
+def _complexity(row: Row) -> tuple[float, ...]:
+    return row.parameters, inf if row.operations is None else row.operations, *_rank(row)
+
+
+def _row(
+    t: _Tried, validation: float, fitted: float, aicc: float, bic: float, uncertainty: float
+) -> Row:
     fit, away = t.fit, validation > DIVERGED
     operations = cost(fit.law).value if isinstance(fit.law, Law) else None
     far = f"On data that were not fitted its error exceeds {DIVERGED:g} %." if away else ""
     sentence = " ".join(s for s in (*fit.verdict.sentences[:1], far, t.why) if s)
     return Row(
-        t.name, fit.status.name, inf if away else validation, fitted, aicc, bic, t.parameters,
-        operations, fit.seconds, sentence, fit,
+        t.name, fit.status.name, inf if away else validation, uncertainty, fitted, aicc, bic,
+        t.parameters, operations, fit.seconds, sentence, fit,
     )  # fmt: skip
 
 

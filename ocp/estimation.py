@@ -9,6 +9,10 @@ Gauss-Newton steps solve the problem: each one is a Kalman filter and a Rauch-Tu
 of the linearised model, so that Q may be singular. The arrival cost (m, P) is the prediction from
 the sample that left the horizon, linearised at its last estimate. For linear models, every horizon
 gives the Kalman filter.
+
+Bounds on states and loads: a value outside its bound is measured at the bound with a very small
+deviation, which leaves it slightly outside as long as the data press it there. The covariances
+ignore bounds.
 Sources: Rao, Rawlings and Mayne, IEEE Trans. Autom. Control 48, 2003, 246-258 (arrival cost); Bell,
 SIAM J. Optim. 4, 1994, 626-636 (smoother as Gauss-Newton step).
 """
@@ -18,13 +22,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, final
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eigh
 
+from ocp.formulation.phase import Ranges, as_box, is_range
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
 from symfric.foundation.parameters import Variable, check_names
@@ -37,6 +42,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 ITERATIONS, TOLERANCE = 20, 1e-6
 """Largest number of Gauss-Newton steps, and the last step in units of the spread."""
 INFORMED = 0.25
@@ -47,6 +53,8 @@ DIVERGED = (
 )
 SHOWN = 0.1
 """Smallest coefficient that is shown; the largest one is 1."""
+PINNED = 1e-4
+"""Deviation of a value that is held at its bound, in units of the spread."""
 KNOWN = 0.1
 """Deviation without measurements, in units of the spread, below which the model determines it."""
 
@@ -110,6 +118,7 @@ def estimate(
     unknown: Sequence[str] = (),
     start: Mapping[str, float] | None = None,
     spread: Mapping[str, float] | None = None,
+    bounds: Ranges | None = None,
     p: Mapping[str, float] | None = None,
     steps: int = 4,
 ) -> Estimate:
@@ -127,6 +136,8 @@ def estimate(
         unknown: inputs that are not measured (loads); they change by noise only.
         start, spread: state or unknown input -> value at t = 0 and its standard deviation; by
             default the start of the variable (0 for states of laws) and its nominal value.
+        bounds: state or unknown input -> (lower, upper), None for no bound; they hold at all
+            samples. Deviations ignore them, so they are too large near a bound.
         p: parameter -> value.
         steps: number of integration steps in each sampling interval.
 
@@ -134,8 +145,9 @@ def estimate(
         ValueError: bad input.
         SolveError: the motion becomes infinite.
 
-    Limits: no bounds on states. Gauss-Newton steps have no line search; `unconverged` counts the
-    samples without convergence.
+    Limits: Gauss-Newton steps have no line search; `unconverged` counts the samples without
+    convergence. Deviations are those of the linearised model: they hold if it is nearly linear over
+    them, which a contact that starts to slip is not.
     """
     check_model("estimate", model)
     step = checks.number("estimate: step", step, above=0.0)
@@ -151,17 +163,23 @@ def estimate(
     wrong = [f"spread of '{n}' above 0" for n, x in spread.items() if not x > 0.0]
     wrong += [f"noise of '{n}' above 0" for n in measured if not noise.get(n, 0.0) > 0.0]
     wrong += [f"noise of '{n}' of at least 0" for n in names if noise.get(n, 0.0) < 0.0]
+    boxes = checks.named("estimate: bounds", bounds, names)
+    wrong += [f"bounds of '{n}' as (lower, upper)" for n, box in boxes.items() if not is_range(box)]
     if wrong:
         raise ValueError(f"estimate: expected {'; '.join(wrong)}")
+    box = np.array([as_box(boxes.get(n, (None, None))) for n in names])
     scale = np.array([spread.get(v.name, v.nominal) for v in states], dtype=float)
     first = np.array([start.get(v.name, v.start) for v in states], dtype=float)
     first = np.nan_to_num(first) / scale  # states of laws have no start
     walk = np.array([noise.get(v.name, 0.0) for v in states]) / scale
     loads, values = states[len(model.x) :], model.values("p", p)
     machine = _Machine(
-        *_functions(model, loads, measured, scale, step, values, steps),
+        *_functions(model, loads, measured, step, steps),
+        fixed=(scale, np.asarray(values, dtype=float)),
         Q=np.diag(walk**2 * step),
         R=np.array([noise[name] ** 2 for name in measured]),
+        lower=box[:, 0] / scale,
+        upper=box[:, 1] / scale,
     )
     y = np.array([rows[name] for name in measured])
     u = np.array([rows[v.name] for v in model.u if v.name in rows]).reshape(-1, y.shape[1])
@@ -204,39 +222,50 @@ def _checked(
 
 
 def _functions(
-    model: Model, loads: Sequence[Variable], measured: Sequence[str], scale: Array, step: float,
-    p: ArrayLike, steps: int,
-) -> tuple[ca.Function, ca.Function]:  # fmt: skip
-    """Return (xi, u) -> next xi and its Jacobian, and -> measured signals and their Jacobian.
+    model: Model, loads: Sequence[Variable], measured: Sequence[str], step: float, steps: int
+) -> tuple[ca.Function, ca.Function]:
+    """Return (xi, u, scale, p) -> next xi and its Jacobian, and -> measured signals and theirs.
 
-    xi are states and loads in units of their spread, u the measured inputs.
+    xi are states and loads in units of their `scale`, u the measured inputs.
     """
+    kept: dict[Any, tuple[ca.Function, ca.Function]] = model.memory.setdefault("ocp estimate", {})
+    key = tuple(v.name for v in loads), tuple(measured), step, steps
+    if key in kept:
+        return kept[key]
     nx, given = len(model.x), [v for v in model.u if v not in loads]
     xi, u = ca.MX.sym("xi", nx + len(loads)), ca.MX.sym("u", len(given))
-    x = xi * ca.DM(scale)
+    scale, values = ca.MX.sym("scale", xi.shape[0]), ca.MX.sym("p", len(model.p))
+    x = xi * scale
     places = {v.name: u[i] for i, v in enumerate(given)}
     places |= {v.name: x[nx + i] for i, v in enumerate(loads)}
     inputs = ca.vertcat(ca.MX(0, 1), *(places[v.name] for v in model.u))
-    values = ca.DM(np.asarray(p, dtype=float))
-    after = ca.vertcat(flow(model, steps=steps)(x[:nx], inputs, values, step), x[nx:, 0]) / ca.DM(
-        scale
-    )
+    after = flow(model, steps=steps)(x[:nx], inputs, values, step)
+    after = ca.vertcat(after, x[nx:, 0]) / scale
     symbols = [model.vector("x"), model.vector("u"), model.vector("p")]
     seen = ca.vertcat(*(model.expression(name) for name in measured))
     y = ca.Function("seen", symbols, [seen])(x[:nx], inputs, values)
-    return (
-        ca.Function("next", [xi, u], [after, ca.jacobian(after, xi)]),
-        ca.Function("measured", [xi, u], [y, ca.jacobian(y, xi)]),
+    arguments = [xi, u, scale, values]
+    kept[key] = (
+        ca.Function("next", arguments, [after, ca.jacobian(after, xi)]),
+        ca.Function("measured", arguments, [y, ca.jacobian(y, xi)]),
     )
+    return kept[key]
 
 
 class _Machine(NamedTuple):
-    """Functions of `_functions`, and the covariances of changes and variances of samples."""
+    """Functions of `_functions` with their last arguments; covariances, variances, bounds."""
 
     after: ca.Function
     seen: ca.Function
+    fixed: tuple[Array, Array]
     Q: Array
     R: Array
+    lower: Array
+    upper: Array
+
+    def inside(self, xi: Array) -> Array:
+        """Return values in columns, moved to their bounds if they are outside."""
+        return np.clip(xi, self.lower[:, None], self.upper[:, None])
 
 
 class _Pass(NamedTuple):
@@ -248,26 +277,36 @@ class _Pass(NamedTuple):
     slopes: list[Array]
 
 
-def _evaluated(f: ca.Function, xi: Array, u: Array) -> tuple[Array, list[Array]]:
+def _evaluated(
+    f: ca.Function, xi: Array, u: Array, fixed: Sequence[Array]
+) -> tuple[Array, list[Array]]:
     """Return values in columns and Jacobians of a function at each sample."""
     count = xi.shape[1]
-    value, slopes = f.map(count)(xi, u)
+    value, slopes = f.map(count)(xi, u, *(np.tile(row[:, None], count) for row in fixed))
     return value.full(), np.split(slopes.full(), count, axis=1)
 
 
-def _passed(machine: _Machine, xi: Array, y: Array, u: Array, prior: tuple[Array, Array]) -> _Pass:
-    """Filter and smooth the model that is linearised at the columns of `xi`."""
-    after, A = _evaluated(machine.after, xi, u)
-    seen, C = _evaluated(machine.seen, xi, u)
+def _passed(
+    machine: _Machine, xi: Array, y: Array, u: Array, prior: tuple[Array, Array], pins: Bools
+) -> _Pass:
+    """Filter and smooth the model that is linearised at the columns of `xi`.
+
+    Values with `pins`, a mask of the shape of `xi`, are held at the nearest bound.
+    """
+    limits, every = machine.inside(xi), np.eye(xi.shape[0])
+    after, A = _evaluated(machine.after, xi, u, machine.fixed)
+    seen, C = _evaluated(machine.seen, xi, u, machine.fixed)
     if not np.isfinite([*after.flat, *seen.flat]).all():
         raise SolveError(DIVERGED, Status.NOT_FINITE)
     predicted, means, covariances = [prior], list[Array](), list[Array]()
     for k in range(xi.shape[1]):
         m, spread = predicted[-1]
-        there = np.isfinite(y[:, k])
-        H, R = C[k][there], np.diag(machine.R[there])
+        there, pinned = np.isfinite(y[:, k]), pins[:, k]
+        H = np.vstack([C[k][there], every[pinned]])
+        R = np.diag([*machine.R[there], *np.full(pinned.sum(), PINNED**2)])
         gain = np.linalg.solve(H @ spread @ H.T + R, H @ spread).T
-        m = m + gain @ (y[there, k] - seen[there, k] - H @ (m - xi[:, k]))
+        rest = [*(y[there, k] - seen[there, k]), *(limits[pinned, k] - xi[pinned, k])]
+        m = m + gain @ (rest - H @ (m - xi[:, k]))
         keep = np.eye(m.size) - gain @ H
         P = keep @ spread @ keep.T + gain @ R @ gain.T
         means.append(m)
@@ -291,7 +330,8 @@ def _moved(
     xi, prior, unconverged = first[:, None], (first, np.eye(first.size)), 0
     free = prior[1]  # covariance at the first sample of the horizon without measurements
     means, deviations = np.empty((first.size, count)), np.empty((first.size, count))
-    found = _passed(machine, xi, y[:, :1], u[:, :1], prior)
+    pins = np.zeros(xi.shape, bool)
+    found = _passed(machine, xi, y[:, :1], u[:, :1], prior, pins)
     for k in range(count):
         begin = max(0, k + 1 - horizon)
         if k:
@@ -301,17 +341,23 @@ def _moved(
             free = found.slopes[0] @ free @ found.slopes[0].T + machine.Q
         here = slice(begin, k + 1)
         for _ in range(ITERATIONS):
-            found = _passed(machine, xi, y[:, here], u[:, here], prior)
+            pins = xi != machine.inside(xi)
+            found = _passed(machine, xi, y[:, here], u[:, here], prior, pins)
             change, xi = float(np.abs(found.smooth - xi).max()), found.smooth
-            if change <= TOLERANCE:
+            if change <= TOLERANCE and np.array_equal(pins, xi != machine.inside(xi)):
                 break
         else:
             unconverged += 1
-        means[:, k] = found.smooth[:, -1]
+        if pins.any():  # covariances ignore bounds
+            free_of = _passed(machine, xi, y[:, here], u[:, here], prior, np.zeros_like(pins))
+            pairs = zip(found.predicted, free_of.predicted, strict=True)
+            predicted = [(mean, spread) for (mean, _), (_, spread) in pairs]
+            found = found._replace(filtered=free_of.filtered, predicted=predicted)
+        means[:, k] = machine.inside(found.smooth)[:, -1]
         deviations[:, k] = np.sqrt(np.diag(found.filtered[-1]))
     for slope in found.slopes[:-1]:
         free = slope @ free @ slope.T + machine.Q
-    smooth = found.smooth * scale[:, None]
+    smooth = machine.inside(found.smooth) * scale[:, None]
     return Estimate(
         t=step * np.arange(count),
         signals=dict(zip(names, means * scale[:, None], strict=True)),

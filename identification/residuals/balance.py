@@ -1,13 +1,16 @@
 """Force balance of any model with the measured motion inserted."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple, cast
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.residuals.sampled import Sampled, imposed_step
+from identification.data.differentiate import Velocity, derivatives
+from identification.data.filters import Filter, choose_filter
+from identification.data.record import Record
+from identification.residuals.sampled import Sampled, begun, imposed_step, moving_start, usual
 from symfric.foundation.numeric import is_number
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
@@ -20,6 +23,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Put = Callable[[ca.SX], ca.SX]
 
+SOME = 1000
+"""Largest number of samples that determine the usual speeds of contacts."""
 ALIKE = 1e-6
 """Share of a force direction below which other directions reproduce it."""
 
@@ -66,6 +71,7 @@ class Balance(NamedTuple):
         slopes: derivatives of the rows by rates and accelerations in steady sliding, row by row;
             None for rows with algebraic unknowns.
         loaded: True if a law depends on the applied force.
+        preloads: contacts with bristles. Their preloads (`begun`) follow p in `equations`.
     """
 
     rows: tuple[Row, ...]
@@ -73,6 +79,7 @@ class Balance(NamedTuple):
     slips: ca.Function
     slopes: Sampled | None
     loaded: bool
+    preloads: tuple[str, ...]
 
 
 def coordinates(model: Model, where: str) -> tuple[Coordinate, ...]:
@@ -106,7 +113,7 @@ def measured(model: Model, found: Sequence[Coordinate]) -> ca.SX:
 
 
 def balance(
-    model: Model, names: Sequence[str], found: Sequence[Coordinate], typical: Array, where: str
+    model: Model, names: Sequence[str], found: Sequence[Coordinate], seen: Array, where: str
 ) -> Balance:
     """Return the balance of forces of `model` with its parameters `names` as unknowns.
 
@@ -122,7 +129,8 @@ def balance(
         model: model with explicit equations, or a mechanism.
         names: free parameters; other parameters have their start values.
         found: `coordinates` of the model.
-        typical: value of w (see `measured`) at which force directions are compared.
+        seen: values of w (see `measured`) in the records, (nw, n). Force directions are compared
+            at their medians.
         where: beginning of the messages.
 
     Raises:
@@ -147,7 +155,7 @@ def balance(
         balanced = [e[i] / gains[i, k] for k, i in driven.items()]
         rows = put(stacked([*balanced, *(e[i] for i in bearing)]))
     else:
-        bearing = _bearing(model, put(gains), w, typical, where)
+        bearing = _bearing(model, put(gains), w, np.median(seen, axis=1), where)
         needed = ca.SX.sym("needed", len(model.u))
         rest = ca.SX.sym("rest", len(bearing))
         selected = ca.DM.eye(len(found))[:, bearing]
@@ -160,18 +168,125 @@ def balance(
     slips = [tuple(np.flatnonzero(on).tolist()) for on in rubs]
     known = [Row(model.u[k].name, model.u[k].unit, k, i, slips[i]) for k, i in driven.items()]
     known += [Row(f"balance of {found[i].rate.name}", units[i], None, i, slips[i]) for i in bearing]
-    start, step, later, h = _states(model.contacts, w, y, put, where)
-    g, count = put(g), len(found)
+    count = len(found)
     slip = put(stacked(c.slip for c in model.contacts))
     by_rate = ca.vec(ca.jacobian(slip, w[count : 2 * count, 0]))
     slipping = ca.Function("slips", [w, p], [ca.densify(slip), ca.densify(by_rate)])
+    values = np.array([_number(v.start, 1.0) for v in model.p if v.name in names])
+    preloads, shares = _preloads(model.contacts, seen, values, slipping)
+    start, steady, step, later, h = _states(model.contacts, preloads, w, y, put, where)
+    g = put(g)
     equations = Sampled.of(
-        w, p, rows, z=z, start=start, step=step, later=later, h=h, y=y, g=g, guess=guess
-    )
-    moved = ca.jacobian(ca.substitute(rows, z, start), w[count : 3 * count, 0])
+        w, ca.vertcat(p, shares), rows, z=z, start=start, step=step, later=later, h=h, y=y, g=g,
+        guess=guess,
+    )  # fmt: skip
+    moved = ca.jacobian(ca.substitute(rows, z, steady), w[count : 3 * count, 0])
     slopes = None if y.numel() else Sampled.of(w, p, ca.vec(ca.densify(moved).T))
     loaded = ca.depends_on(ca.vertcat(g, step), u)
-    return Balance(tuple(known), equations, slipping, slopes, loaded)
+    return Balance(tuple(known), equations, slipping, slopes, loaded, tuple(preloads))
+
+
+def _preloads(
+    contacts: Sequence[Contact], seen: Array, p: Array, slipping: ca.Function
+) -> tuple[dict[str, tuple[float, ca.SX]], ca.SX]:
+    """Return contact -> usual speed and symbol of its preload, and the symbols as a column."""
+    some = seen[:, :: 1 + seen.shape[1] // SOME]
+    speeds = slipping.map(some.shape[1])(some, np.repeat(p[:, None], some.shape[1], 1))[0].full()
+    bent = [k for k, c in enumerate(contacts) if not all(state.even for state in c.law.states)]
+    shares = ca.SX.sym("preload", len(bent))
+    return {contacts[k].name: (usual(speeds[k]), shares[i]) for i, k in enumerate(bent)}, shares
+
+
+class Motion(NamedTuple):
+    """Measured motion and inputs of one record.
+
+    Attributes:
+        name: name of the record.
+        t: times (n,) [s].
+        step: sample interval [s].
+        w: positions, rates, accelerations, inputs, time, shape (nw, n).
+        velocities: measured rates with the spectra of their noise.
+        filter: filter of the record.
+    """
+
+    name: str
+    t: Array
+    step: float
+    w: Array
+    velocities: tuple[Velocity, ...]
+    filter: Filter
+
+    @property
+    def inputs(self) -> slice:
+        """Rows of `w` that contain the inputs."""
+        return slice(3 * len(self.velocities), -1)
+
+    @property
+    def inside(self) -> slice:
+        """Samples unaffected by the end effects of the filter."""
+        return self.filter.inside(self.t.size, self.step)
+
+    @property
+    def begin(self) -> Array:
+        """First sample of `w`, with rates near rest set to zero."""
+        first, count = self.w[:, 0].copy(), len(self.velocities)
+        first[count : 2 * count] = [moving_start(v) for v in self.w[count : 2 * count]]
+        return first
+
+
+def measure(
+    model: Model,
+    found: Sequence[Coordinate],
+    record: Record,
+    called: Mapping[str, str],
+    filter: Filter | None,
+    noise: Mapping[str, float],
+) -> Motion:
+    """Differentiate a record with the channels that the model needs.
+
+    Args:
+        model: the model.
+        found: `coordinates` of the model.
+        record: equally spaced samples.
+        called: name in the model -> channel, if they differ.
+        filter: the filter; None: chosen for the fastest input, or without inputs for the fastest
+            motion.
+        noise: channel -> standard deviation of its noise, if known.
+
+    Raises:
+        ValueError: channels are missing, or intervals are unequal.
+    """
+    step = record.uniform().step
+    known = ca.vertcat(ca.SX(0, 1) if model.ode is None else model.ode, model.alg)
+    missing, raw = list[str](), list[tuple[Array | None, Array | None]]()
+    known_noise = list[tuple[float | None, ...]]()
+    for c in found:
+        names = [None if s is None else called.get(s.name, s.name) for s in (c.position, c.rate)]
+        x, v = (record[n] if n is not None and n in record else None for n in names)
+        needed, given = (c.rate, v) if c.position is None else (c.position, x)
+        if given is None and (v is None or ca.depends_on(known, needed.symbol)):
+            missing.append(called.get(needed.name, needed.name))
+        raw.append((x, v))
+        known_noise.append(tuple(None if n is None else noise.get(n) for n in names))
+    inputs = [called.get(u.name, u.name) for u in model.u]
+    missing += [n for n in inputs if n not in record]
+    if missing:
+        raise ValueError(
+            f"data '{record.name}': expected channels {', '.join(missing)} for the inverse "
+            f"dynamics of '{model.name}', got {', '.join(record.signals)}; rename columns, or use "
+            "Shooting() for motion that is not measured"
+        )
+    forces = [record[n] for n in inputs]
+    both = zip(raw, known_noise, strict=True)
+    velocities = tuple(Velocity.of(*signals, step, *sizes) for signals, sizes in both)
+    if filter is None:
+        moved = [np.gradient(cast(Array, x), step) if v is None else v for x, v in raw]
+        bands = [t.band(x, v, step) for t, (x, v) in zip(velocities, raw, strict=True)]
+        each = (choose_filter(signal, step, bands) for signal in forces or moved)
+        filter = max(each, key=lambda f: f.cutoff)
+    motion = [derivatives(x, v, step, filter, t) for t, (x, v) in zip(velocities, raw, strict=True)]
+    w = np.vstack([*(part[k] for k in range(3) for part in motion), *forces, record.time])
+    return Motion(record.name, record.time, step, w, velocities, filter)
 
 
 def _balances(model: Model, found: Sequence[Coordinate]) -> tuple[ca.SX, ca.SX, ca.SX, list[str]]:
@@ -192,11 +307,19 @@ def _balances(model: Model, found: Sequence[Coordinate]) -> tuple[ca.SX, ca.SX, 
 
 
 def _states(
-    contacts: Sequence[Contact], w: ca.SX, y: ca.SX, put: Put, where: str
-) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Return start, step, later symbols and sample interval of the states of all laws."""
+    contacts: Sequence[Contact],
+    preloads: Mapping[str, tuple[float, ca.SX]],
+    w: ca.SX,
+    y: ca.SX,
+    put: Put,
+    where: str,
+) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
+    """Return start, steady state, step, later symbols and interval of the states of all laws.
+
+    `preloads` are the usual speed and the symbol of the preload of each contact with bristles.
+    """
     later, h = ca.SX.sym("later", w.numel() + y.numel()), ca.SX.sym("h")
-    now, start, step = ca.vertcat(w, y), list[ca.SX](), list[ca.SX]()
+    now, start, steady, step = ca.vertcat(w, y), list[ca.SX](), list[ca.SX](), list[ca.SX]()
     for c in contacts:
         if not c.states:
             continue
@@ -206,9 +329,11 @@ def _states(
         here = [put(x) for x in (c.slip, c.N, *c.given.values())]
         then = [ca.substitute(x, now, later) for x in here]
         before, after = ((x[0], x[1], dict(zip(c.given, x[2:], strict=True))) for x in (here, then))
-        start.append(put(ca.SX(law.steady_state(c.slip, c.N))))
+        steady.append(put(ca.SX(law.steady_state(c.slip, c.N))))
+        speed, share = preloads.get(c.name, (0.0, ca.SX(0.0)))
+        start.append(put(begun(law, (c.slip, c.N), speed, share)))
         step.append(put(imposed_step(law, symbols_of(c.states), before, after, h, at)))
-    return stacked(start), stacked(step), later, h
+    return stacked(start), stacked(steady), stacked(step), later, h
 
 
 def _closing(model: Model, held: Sequence[Variable]) -> Put:

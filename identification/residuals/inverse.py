@@ -3,25 +3,34 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, cast, final
+from typing import Any, final
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.differentiate import Velocity, derivatives, levels, uncertain
-from identification.data.filters import Decimation, Filter, choose_filter
-from identification.data.record import Record
-from identification.residuals.balance import Balance, Coordinate, Mask, Row, balance, coordinates
+from identification.data.differentiate import levels, uncertain
+from identification.data.filters import Decimation, Filter
+from identification.residuals.balance import (
+    Balance,
+    Mask,
+    Motion,
+    Row,
+    balance,
+    coordinates,
+    measure,
+)
 from identification.residuals.evaluation import Array, Blocks, Channel
-from identification.residuals.sampled import Sampled, moving_start
+from identification.residuals.sampled import Sampled, preload
+from identification.unknowns.roles import width_of
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
 from symfric.model import Model
 
 WHERE = "InverseDynamics"
+DEAD_TIME = "dead_time"
+"""Name of the unknown, followed by the index of the record."""
 RANK = 1e-9
 """Smallest nonzero singular value of sensitivities, relative to the largest."""
 FEWEST, ENOUGH = 10, 100
@@ -37,7 +46,9 @@ class InverseDynamics:
 
     v and a result from zero-phase filtering and differences of the measured position. D is a common
     low-pass filter and decimation of all terms. For a drive: D (m a + F(v, N) + offset - force).
-    States of laws follow the measured sliding velocity, z' = rate(z, v(t), N(t)). A model with
+    States of laws follow the measured sliding velocity, z' = rate(z, v(t), N(t)). The initial
+    deflection of the bristles of a record, relative to steady sliding, is an unknown "preload[k]",
+    or "preload.contact[k]" with several contacts. A model with
     several coordinates has one row for each input and one for each coordinate without an input.
     Reactions and normal forces that depend on friction are solved for at every sample.
 
@@ -53,7 +64,8 @@ class InverseDynamics:
         filter: cut-off and decimation of all records; None: from force and motion of each record.
         dead_time: bounds of the time [s] by which the measured force leads the acting force, an
             additional unknown of each record; it is negative for a force recorded late. (0, T)
-            permits both, -T to T. None: no dead time.
+            permits both, -T to T. "auto": estimated by `Fit` if it is significant and shifts
+            another value by more than its standard error. None: no dead time.
         noise: channel of a position or velocity -> standard deviation of its white noise; others
             are those of the spectrum and of rounding. `Fit(noise=...)` passes such entries.
 
@@ -74,7 +86,7 @@ class InverseDynamics:
     x: str = "x"
     v: str | None = None
     filter: Filter | None = None
-    dead_time: tuple[float, float] | None = None
+    dead_time: tuple[float, float] | str | None = "auto"
     noise: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
@@ -85,11 +97,14 @@ class InverseDynamics:
         if self.filter is not None:
             checks.kind(f"{WHERE}: filter", self.filter, Filter, "a filter, such as Filter(100.0)")
         levels(f"{WHERE}: noise", self.noise)
-        if self.dead_time is not None:
+        if isinstance(self.dead_time, str):
+            checks.choice(f"{WHERE}: dead_time", self.dead_time, ("auto",))
+        elif self.dead_time is not None:
             pair = checks.many(f"{WHERE}: dead_time", self.dead_time, "bounds (low, high) [s]")
-            bounds = [checks.number(f"{WHERE}: dead_time", b, unit="s") for b in pair]
+            bounds = tuple(checks.number(f"{WHERE}: dead_time", b, unit="s") for b in pair)
             if len(bounds) != 2 or not bounds[0] < bounds[1]:
                 raise checks.refused(f"{WHERE}: dead_time", "bounds in order", self.dead_time)
+            object.__setattr__(self, "dead_time", bounds)
 
     def prepare(
         self, subject: Subject, data: Dataset, start: Mapping[str, float] | None = None
@@ -109,117 +124,30 @@ class InverseDynamics:
             called["v"] = self.v
         noise = self.noise or {}
         motions = [measure(model, found, record, called, self.filter, noise) for record in data]
-        typical = np.median(np.hstack([m.w for m in motions]), axis=1)
-        made = balance(model, subject.names, found, typical, where)
-        own = tuple[Unknown, ...]()
-        if self.dead_time is not None:
+        seen = np.hstack([motion.w for motion in motions])
+        made = balance(model, subject.names, found, seen, where)
+        p = np.array([float(v.start) for v in model.p if v.name in subject.names])
+        own = [
+            preload(f"preload.{n}[{k}]" if len(made.preloads) > 1 else f"preload[{k}]", v)
+            for k, motion in enumerate(motions)
+            for n, v in _slips(made, motion, model, p).items()
+            if n in made.preloads
+        ]
+        if isinstance(self.dead_time, tuple):
             if made.loaded:
                 such = "expected laws without the applied force"
                 raise ValueError(f"{where}: dead_time: {such}")
             low, high = self.dead_time
             low = low or -high
             first = min(max(0.0, low), high)
-            own = tuple(
-                Unknown(f"dead_time[{k}]", "s", first, low, high, motion.step, nuisance=True)
+            own += [
+                Unknown(f"{DEAD_TIME}[{k}]", "s", first, low, high, motion.step, nuisance=True)
                 for k, motion in enumerate(motions)
-            )
-        p = np.array([float(v.start) for v in model.p if v.name in subject.names])
+            ]
         pieces = tuple(_piece(made, motion, model, p, self.filter is None) for motion in motions)
         channels = tuple(_channels(made.rows, pieces))
-        equations = made.equations, made.rows, pieces, made.slopes
-        return InverseRows(subject.names, own, channels, *equations)
-
-
-class Motion(NamedTuple):
-    """Measured motion and inputs of one record.
-
-    Attributes:
-        name: name of the record.
-        t: times (n,) [s].
-        step: sample interval [s].
-        w: positions, rates, accelerations, inputs, time, shape (nw, n).
-        velocities: measured rates with the spectra of their noise.
-        filter: filter of the record.
-    """
-
-    name: str
-    t: Array
-    step: float
-    w: Array
-    velocities: tuple[Velocity, ...]
-    filter: Filter
-
-    @property
-    def inputs(self) -> slice:
-        """Rows of `w` that contain the inputs."""
-        return slice(3 * len(self.velocities), -1)
-
-    @property
-    def inside(self) -> slice:
-        """Samples unaffected by the end effects of the filter."""
-        return self.filter.inside(self.t.size, self.step)
-
-    @property
-    def begin(self) -> Array:
-        """First sample of `w`, with rates near rest set to zero."""
-        first, count = self.w[:, 0].copy(), len(self.velocities)
-        first[count : 2 * count] = [moving_start(v) for v in self.w[count : 2 * count]]
-        return first
-
-
-def measure(
-    model: Model,
-    found: Sequence[Coordinate],
-    record: Record,
-    called: Mapping[str, str],
-    filter: Filter | None,
-    noise: Mapping[str, float],
-) -> Motion:
-    """Differentiate a record with the channels that the model needs.
-
-    Args:
-        model: the model.
-        found: `coordinates` of the model.
-        record: equally spaced samples.
-        called: name in the model -> channel, if they differ.
-        filter: the filter; None: chosen for the fastest input, or without inputs for the fastest
-            motion.
-        noise: channel -> standard deviation of its noise, if known.
-
-    Raises:
-        ValueError: channels are missing, or intervals are unequal.
-    """
-    step = record.uniform().step
-    known = ca.vertcat(ca.SX(0, 1) if model.ode is None else model.ode, model.alg)
-    missing, raw = list[str](), list[tuple[Array | None, Array | None]]()
-    known_noise = list[tuple[float | None, ...]]()
-    for c in found:
-        names = [None if s is None else called.get(s.name, s.name) for s in (c.position, c.rate)]
-        x, v = (record[n] if n is not None and n in record else None for n in names)
-        needed, given = (c.rate, v) if c.position is None else (c.position, x)
-        if given is None and (v is None or ca.depends_on(known, needed.symbol)):
-            missing.append(called.get(needed.name, needed.name))
-        raw.append((x, v))
-        known_noise.append(tuple(None if n is None else noise.get(n) for n in names))
-    inputs = [called.get(u.name, u.name) for u in model.u]
-    missing += [n for n in inputs if n not in record]
-    if missing:
-        raise ValueError(
-            f"data '{record.name}': expected channels {', '.join(missing)} for the inverse "
-            f"dynamics of '{model.name}', got {', '.join(record.signals)}; rename columns, or use "
-            "Shooting() for motion that is not measured"
-        )
-    forces = [record[n] for n in inputs]
-    both = zip(raw, known_noise, strict=True)
-    velocities = tuple(Velocity.of(*signals, step, *sizes) for signals, sizes in both)
-    if filter is None:
-        moved = [np.gradient(cast(Array, x), step) if v is None else v for x, v in raw]
-        bands = [t.band(x, v, step) for t, (x, v) in zip(velocities, raw, strict=True)]
-        each = (choose_filter(signal, step, bands) for signal in forces or moved)
-        filter = max(each, key=lambda f: f.cutoff)
-    motion = [derivatives(x, v, step, filter, t) for t, (x, v) in zip(velocities, raw, strict=True)]
-    w = np.vstack([*(part[k] for k in range(3) for part in motion), *forces, record.time])
-    return Motion(record.name, record.time, step, w, velocities, filter)
+        parts = made.equations, made.rows, pieces, made.slopes, len(made.preloads)
+        return InverseRows(subject.names, tuple(own), channels, *parts)
 
 
 @final
@@ -300,6 +228,15 @@ def _decimated(rows: Sequence[Row], motion: Motion, slow: Sequence[Mask]) -> Pie
     return Piece(motion, decimation, tuple(kept))
 
 
+def _slips(made: Balance, motion: Motion, model: Model, p: Array) -> dict[str, Array]:
+    """Return the sliding velocity of each contact with bristles, shape (n,)."""
+    if not made.preloads:
+        return {}
+    n = motion.t.size
+    v = made.slips.map(n)(motion.w, np.repeat(p[:, None], n, 1))[0].full()
+    return dict(zip((c.name for c in model.contacts), v, strict=True))
+
+
 def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
     """Return a mask for each contact of the samples at which its static law is undetermined."""
     if not model.contacts:
@@ -310,8 +247,8 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
     gains = np.median(np.abs(slopes), axis=1).reshape(errors.size, len(model.contacts)).T
     noise = [float(np.linalg.norm(gain * errors)) for gain in gains]
     return [
-        uncertain(v[k], noise[k], motion.step, motion.filter) & (not c.states)
-        for k, c in enumerate(model.contacts)
+        uncertain(v[k], max(s, width_of(c.law)), motion.step, motion.filter) & (not c.states)
+        for k, (c, s) in enumerate(zip(model.contacts, noise, strict=True))
     ]
 
 
@@ -353,21 +290,28 @@ class InverseRows(Blocks):
     rows: tuple[Row, ...]
     pieces: tuple[Piece, ...]
     slopes: Sampled | None
+    preloads: int
 
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
-        """Yield the residuals of each balance of each record; `own` contains the dead times."""
+        """Yield the residuals of each balance of each record.
+
+        `own` contains the preloads, then the dead time, of all records.
+        """
+        count = self.preloads
+        shares, late = np.split(own, [count * len(self.pieces)])
         for number, part in enumerate(self.pieces):
-            motion = part.motion
-            w, rates = _shifted(motion, float(own[number])) if own.size else (motion.w, motion.w)
-            path = self.sampled.along(w, motion.step, p, motion.begin)
+            motion, mine = part.motion, slice(number * count, (number + 1) * count)
+            w, rates = _shifted(motion, float(late[number])) if late.size else (motion.w, motion.w)
+            path = self.sampled.along(w, motion.step, np.append(p, shares[mine]), motion.begin)
             if isinstance(path, str):
                 yield f"data '{motion.name}': {path}"
                 return
             for k, row in enumerate(self.rows):
                 J = np.zeros((motion.t.size, p.size + own.size))
-                J[:, : p.size] = path.slopes[:, k]
-                if own.size and row.input is not None:
-                    J[:, p.size + number] = rates[row.input]
+                J[:, : p.size] = path.slopes[:, k, : p.size]
+                J[:, p.size :][:, mine] = path.slopes[:, k, p.size :]
+                if late.size and row.input is not None:
+                    J[:, p.size + shares.size + number] = rates[row.input]
                 both = part.equations(k, np.column_stack([path.rows[:, k], J]))
                 yield both[:, 0] - self._bias(part, k, p, both[:, 1:]), both[:, 1:]
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from identification.data.dataset import Dataset
 from identification.data.findings import Finding
+from identification.residuals.evaluation import Array
 from identification.result.fitted import Fitted
 from identification.result.live import Asked, Live, errors_of, labels
 from identification.result.series import (
@@ -34,6 +35,7 @@ from symfric import __version__
 from symfric.foundation.parameters import Parametric, parameters
 from symfric.foundation.status import Status
 from symfric.foundation.units import turned
+from symfric.laws.composed.populations import steady_force
 from symfric.model import Model
 from symfric.scenes import Drive
 
@@ -89,6 +91,8 @@ def _rule(rule: Range | Above | Tied) -> str:
     return f"{kind}({', '.join([repr(rule.lower), repr(rule.upper), *start])})"
 
 
+SPEEDS = 20
+"""Number of measured speeds at which the law is evaluated, in each direction."""
 MOST = 40
 """Number of values above which correlations with start values of records are left out."""
 
@@ -183,19 +187,33 @@ def _estimates(live: Live) -> dict[str, Estimate]:
     return estimates
 
 
-def levels_of(subject: Subject, largest: float | None, turning: bool) -> Levels | None:
-    """Return the friction levels of a law under a known load; None if the load is not known."""
+def levels_of(
+    subject: Subject, values: Mapping[str, float], largest: float | None, v: Array, turning: bool
+) -> Levels | None:
+    """Return the friction levels of a law under a known load; None if the load is not known.
+
+    Args:
+        subject: fitted law or drive.
+        values: fitted values by name.
+        largest: largest friction force in the data [N].
+        v: measured velocities [m/s].
+        turning: True for rates and moments.
+    """
     whole, load = subject.drive or subject.law, load_of(subject)
-    if whole is None or load is None or largest is None or subject.law is None:
+    law = subject.close(values).law
+    if whole is None or load is None or largest is None or law is None:
         return None
-    if subject.law.inputs:
+    if law.inputs:
         return None  # friction alone does not determine the loads of its levels
     force = turned("N") if turning else "N"
     levels = {n: p for n, p in parameters(whole).items() if p.role == "level"}
     loads = {n: load if is_coefficient(p) else 1.0 for n, p in levels.items()}
+    speeds = np.quantile(np.abs(v), np.linspace(0.05, 1.0, SPEEDS))
+    both = np.concatenate([-speeds, speeds])
     return Levels(
-        {n: loads[n] for n, p in levels.items() if p.unit in ("1", force)}, largest, force
-    )
+        {n: loads[n] for n, p in levels.items() if p.unit in ("1", force)}, largest, force,
+        float(np.abs(steady_force(law, both, load)).max()),
+    )  # fmt: skip
 
 
 def load_of(subject: Subject) -> float | None:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -10,6 +11,7 @@ from identification.data.dataset import Dataset
 from identification.result.live import Live
 from identification.result.outcome import Outcome, sentences
 from identification.result.series import Errors
+from identification.verdict.bootstrap import Bootstrap, bootstrap
 from identification.verdict.profile import Profile, profile
 from symfric.foundation import packed
 from symfric.foundation.files import write_text
@@ -123,6 +125,22 @@ class Fitted(packed.Portable, Outcome):
         """
         live = self.alive("profile")
         return profile(live.task, live.point, live.covariance, name, points)
+
+    def bootstrap(
+        self, count: int = 200, seed: int = 0, executor: Executor | None = None
+    ) -> Bootstrap:
+        """Fit data with resampled residuals; see `verdict.bootstrap`.
+
+        Args:
+            count: number of data sets; 200 for standard errors, 1000 or more for intervals.
+            seed: random seed.
+            executor: executor of `concurrent.futures`; the result is bit-identical.
+
+        Raises:
+            ValueError: invalid arguments, or the fit is from JSON.
+        """
+        live = self.alive("bootstrap")
+        return bootstrap(live.task, live.point, self.verdict.effective, count, seed, executor)
 
     def alive(self, what: str) -> Live:
         """Return the problem and its minimum; `what` names the operation in messages.

@@ -14,7 +14,8 @@ from identification.solving.many_starts import best_of, many_starts
 from identification.solving.task import Point, Task
 from identification.unknowns.subject import Closed, Subject
 from identification.unknowns.unknowns import unknowns_of
-from identification.verdict.covariance import Covariance, Levels, covariance
+from identification.verdict.covariance import Covariance, Levels, covariance, steps_of
+from identification.verdict.identifiable import assured
 from identification.verdict.minimum import Minimum, minimum
 from symfric.foundation import checks
 
@@ -82,8 +83,10 @@ class Live:
 
     @cached_property
     def covariance(self) -> Covariance:
-        """Covariance of the values at the minimum."""
-        return covariance(self.minimum, self.levels)
+        """Covariance of the values at the minimum, with the intervals of nonlinear models."""
+        linear = covariance(self.minimum, self.levels)
+        steps = steps_of(self.task, self.point, linear)
+        return assured(self.task, self.point, linear, steps) if steps else linear
 
     @cached_property
     def closed(self) -> Closed:

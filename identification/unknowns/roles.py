@@ -88,6 +88,13 @@ def is_coefficient(parameter: Parameter) -> bool:
     return parameter.role == "level" and parameter.unit == "1"
 
 
+def width_of(law: object) -> float:
+    """Return the largest known smoothing width of a law [m/s or rad/s], 0 without one."""
+    known = parameters(law).values() if isinstance(law, Parametric) else ()
+    values = [p.value for p in known if p.role == "width" and p.unit in VELOCITIES]
+    return max((float(x) for x in values if isinstance(x, int | float)), default=0.0)
+
+
 def is_velocity(parameter: Parameter) -> bool:
     """Return True if a parameter is a position or a width on the velocity axis."""
     scale = parameter.role in ("velocity scale", "width", "")

@@ -162,6 +162,26 @@ def span(J: Array, tolerance: float = 1e-9) -> Array:
     return U[:, s > tolerance * s[0]]
 
 
+def deviance(partial: Array, r: Array, basis: Array, position: Count) -> float:
+    """Return -2 log of the likelihood up to a constant, plus the penalty of BIC.
+
+        n log(|u|^2 / n) + log |Sigma / s^2| + (k + p) log n
+
+    Args:
+        partial: partial autocorrelations, shape (p,).
+        r: residuals, shape (n,).
+        basis: orthonormal basis of the regressors, shape (n, k).
+        position: number of neighbours before each row.
+    """
+    both = whitened(np.column_stack([basis, r]), partial, position)
+    n, k = basis.shape
+    R: Array = np.asarray(np.linalg.qr(both, mode="r"))
+    left = float(R[k, k]) ** 2
+    spread = predictors(partial)[1][np.minimum(position, partial.size)]
+    unlikely = n * np.log(max(left, np.finfo(float).tiny) / n) + float(np.log(spread).sum())
+    return unlikely + (k + partial.size) * float(np.log(n))
+
+
 def _burg(r: Array, position: Count, most: int) -> Array:
     """Return the partial autocorrelations up to the order with the smallest BIC."""
     f, b = r.copy(), r.copy()

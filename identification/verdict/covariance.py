@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.residuals.evaluation import Array
+from identification.solving.task import Point, Task
 from identification.verdict.minimum import Minimum, groups
 from symfric.foundation.shown import brief
 
@@ -34,11 +35,13 @@ class Levels(NamedTuple):
             coefficient.
         largest: largest friction force in the data [N or N m].
         unit: unit of the forces.
+        curve: largest force of the law in steady sliding at the measured speeds, both ways.
     """
 
     loads: Mapping[str, float]
     largest: float
     unit: str = "N"
+    curve: float = 0.0
 
     def beyond(self, values: Mapping[str, float]) -> Iterator[tuple[str, str]]:
         """Yield the name of each level far above all forces, with a message."""
@@ -54,14 +57,15 @@ LEVEL = 0.95
 """Confidence level of the intervals."""
 TOGETHER = 0.98
 """Correlation above which two estimates are reported as strongly correlated."""
-FEW = 3.0
-"""Effective samples per unknown below which intervals are unreliable."""
 HARDLY = 0.5
 """Ratio of standard error to value above which a value is reported as poorly identified."""
 DECADES = 8.0
 """Width of the interval of a logarithmic value above which the interval is dropped [decades]."""
 WIDE = 1e4
 """Width of other intervals, relative to value and scale, above which the interval is dropped."""
+LINEAR = 0.05
+"""Relative deviation of the residuals from their linear change, at the ends of all intervals
+together, below which all intervals are linear."""
 ROUNDING = 1e-14
 """Slope of a value relative to its largest slope below which it is rounding error."""
 CLEAN = 1e-13
@@ -132,8 +136,7 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     """Compute the uncertainty of the values at a minimum.
 
     Limits: linear in the values, or in the logarithms of logarithmic unknowns; see `profile` for
-    nonlinear intervals. Channels are independent. With fewer effective samples than three times the
-    number of unknowns, the intervals are too small, and a message says so.
+    nonlinear intervals. Channels are independent.
 
     Args:
         found: the minimum.
@@ -151,14 +154,19 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     low, high = _intervals(found, np.sqrt(np.diag(matrix)), inside.freedom)
     mine = tuple(names[i] for i in own)
     change = partial(_change, found, own)
-    lost = [*groups(mine, values[own], moved[own], size[own], change)]
+    nuisance = {u.name for u in found.unknowns if u.nuisance}
+    lost = [
+        (members, sentence)
+        for members, sentence in groups(mine, values[own], moved[own], size[own], change)
+        if not nuisance.issuperset(members)
+    ]
     far = {} if levels is None else dict(levels.beyond(dict(zip(names, values, strict=True))))
     gone = dict(_unlimited(found, low, high))
     labels = [found.label(c) for c in found.channels]
     effective = {n: c.effective for n, c in zip(labels, inside.colours, strict=True)}
     weak = _weak(found, matrix, low, high, {*far, *gone})
     alone = [sentence for _, sentence in lost]
-    messages = (*alone, *far.values(), *gone.values(), *weak, *_few(found, effective))
+    messages = (*alone, *far.values(), *gone.values(), *weak)
     notes = dict.fromkeys(gone, LOST) | dict.fromkeys(far, BEYOND)
     out = np.array([name in notes for name in names], dtype=bool)
     return Covariance(
@@ -253,9 +261,33 @@ def _weak(
         )
 
 
-def _few(found: Minimum, effective: dict[str, float]) -> Iterator[str]:
-    count = sum(effective.values())
-    n = int((~found.held).sum())
-    if n and count < FEW * n:
-        text = f"The autocorrelated residuals are worth only {count:.0f} independent samples for "
-        yield f"{text}{n} unknowns: the intervals are likely too small."
+def steps_of(task: Task, point: Point, linear: Covariance) -> dict[str, Array]:
+    """Return the changes of the coordinates to the upper ends of the intervals, none if linear.
+
+    They are none if the residuals are linear up to all ends together.
+    """
+    box, names = task.unknowns, linear.names
+    out = {*box.nuisance, *linear.at_bound}
+    kept = [n for n in box.fitted if n not in out and np.isfinite(linear.low[names.index(n)])]
+    steps = {n: _direction(point, linear, n) for n in kept}
+    whole = sum(steps.values(), np.zeros(point.w.size))
+    return steps if steps and bend(task, point, whole) > LINEAR else {}
+
+
+def _direction(point: Point, linear: Covariance, name: str) -> Array:
+    """Return the change of the coordinates to the upper end of the linear interval, shape (n,)."""
+    i = linear.names.index(name)
+    change = np.nan_to_num(linear.white[:, i] / linear.white[i, i])
+    reach = (linear.high[i] - linear.low[i]) / 2
+    return np.linalg.lstsq(point.slope, change * reach, rcond=1e-9)[0]
+
+
+def bend(task: Task, point: Point, step: Array) -> float:
+    """Return the deviation of the residuals from their linear change, relative to this change."""
+    box = task.unknowns
+    step = np.clip(point.w + step, box.lower, box.upper) - point.w
+    there, change = task.at(point.w + step), point.J @ step
+    if isinstance(there, str):
+        return np.inf
+    bent = float(np.linalg.norm(there.evaluation.r / task.sigma - point.r - change))
+    return bent / max(float(np.linalg.norm(change)), 1e-300)

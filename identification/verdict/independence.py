@@ -1,4 +1,4 @@
-"""Tests for dependence of residuals on inputs and motion: added variables, autocorrelated noise.
+"""Tests for dependence of residuals on inputs, motion and time: added variables, coloured noise.
 
 Inputs and the predicted motion (the measured motion shares its noise with the residuals) define
 families of columns. The residuals of a correct model do not depend on them. Each family corresponds
@@ -10,7 +10,9 @@ to one type of model error:
 | direction of motion | sign v, v abs(v), v^3, abs(v) | Coulomb level, asymmetry, viscous terms |
 | speed | bins of abs(v), each direction | shape of the friction curve: Stribeck |
 | distance since reversal | bins, each direction | pre-sliding, hysteresis, dwell |
-| position | harmonics of the position | ripple, cogging, gravity |
+| position | a harmonic, also times sign v | ripple, cogging, gravity, an uneven track |
+| time | sensitivities times t | parameters that drift, warming up |
+| delay | rate of the predicted signal | a delay of the signal |
 
 Residuals and columns are whitened by an autoregressive model, the span of the sensitivities J is
 projected out of both, and the remaining residuals are regressed on the columns:
@@ -18,10 +20,15 @@ projected out of both, and the remaining residuals are regressed on the columns:
     F = (explained / q) / (rest / (n - k - q))  ~  F(q, n - k - q)     if there is no dependence
 
 For one column, this is a cross-correlation with the variance of Bartlett's formula. The
-autoregressive model is first fitted to the residuals, where it may absorb a missing harmonic.
-Unless F is already large, it is therefore fitted again to the residuals of the regression.
+autoregressive model is first fitted to the residuals, where it absorbs slow model errors as if they
+were coloured noise. It is therefore fitted again to the residuals of the regression. The second
+test counts if the model with the columns has the lower BIC.
+
+The harmonic of the position is the one with the largest F (the periodogram of Lomb and Scargle);
+p is multiplied by the number of harmonics (Bonferroni).
 Sources: Haugh, J. Am. Stat. Assoc. 71, 1976; Godfrey, Econometrica 46(6), 1978 (added variables);
-Ljung, System Identification, 1999, section 16.6.
+Ljung, System Identification, 1999, section 16.6; Nyblom, J. Am. Stat. Assoc. 84, 1989 (parameters
+that drift); Schwarz, Ann. Statist. 6(2), 1978 (BIC).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,18 +37,18 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from identification.residuals.evaluation import Array, Channel
-from identification.verdict.colour import Colour, Count, span, whitened
+from identification.verdict.colour import Colour, Count, deviance, span, whitened
 from identification.verdict.colour import colour as autoregressive
 from identification.verdict.minimum import Minimum, lagged, positions
 
-Kind = Literal["position", "velocity", "acceleration", ""]
+Kind = Literal["position", "velocity", "acceleration", "time", "delay", ""]
 
 DELAYS = (0, 1, 2, 4, 8, 16, 32)
 """Delays of a regressor that are tested [samples]."""
 BINS = 8
 """Number of bins of speed and of the distance since a reversal, in each direction."""
-HARMONICS = 12
-"""Largest number of harmonics of the position over its range."""
+HARMONICS = 60
+"""Largest number of half harmonics of the position over its range."""
 ROWS_EACH = 12
 """Smallest number of rows per column."""
 MOVING = 1e-3
@@ -62,7 +69,7 @@ class Family(NamedTuple):
     Attributes:
         what: name of the dependence in a message: "the residuals of x depend on ...".
         hint: likely cause of the dependence.
-        columns: columns of the regression, shape (n, q).
+        columns: columns of the regression, shape (n, q); of alternatives, shape (n, q, m).
         smoothed: True for columns from a smoothed signal, which leaves systematic errors.
     """
 
@@ -72,8 +79,14 @@ class Family(NamedTuple):
     smoothed: bool = False
 
 
-def families(regressors: Sequence[Regressor], position: Count) -> Iterator[Family]:
-    """Yield the families of all `regressors`, with fewer columns if there are few rows."""
+def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> Iterator[Family]:
+    """Yield the families of all `regressors`, with fewer columns if there are few rows.
+
+    Args:
+        regressors: signals that residuals may depend on.
+        position: number of neighbours before each row, see `positions`.
+        basis: orthonormal basis of the sensitivities, shape (n, k).
+    """
     n = position.size
     delays = DELAYS if position.max(initial=0) > 2 * DELAYS[-1] else DELAYS[:1]
     most = n // (2 * ROWS_EACH)
@@ -81,12 +94,17 @@ def families(regressors: Sequence[Regressor], position: Count) -> Iterator[Famil
     for name, signal, kind in regressors:
         if not np.ptp(signal) > 0:
             continue
+        if kind == "time":
+            yield Family("the time", "parameters drift, or a temperature", basis * signal[:, None])
+            continue
+        if kind == "delay":
+            hint = "the signals are recorded at different times: free={'dead_time': (0, 0.01)}"
+            yield Family("the rate of the signal", hint, signal[:, None])
+            continue
         if kind == "position":
-            turns = 2 * np.pi * (signal - signal.min()) / np.ptp(signal)
-            waves = np.outer(turns, np.arange(1, max(1, min(HARMONICS, most)) + 1) / 2)
+            way = next((np.sign(s) for _, s, k in regressors if k == "velocity"), None)
             hint = "an effect of the position is missing: ripple, cogging, a spring, gravity"
-            columns = np.column_stack([np.cos(waves), np.sin(waves)])
-            yield Family(f"the position {name}", hint, columns)
+            yield Family(f"the position {name}", hint, _waves(signal, way, n // 2))
             continue
         columns = np.column_stack([lagged(signal, position, d) for d in delays])
         hint = f"dynamics or a delay from {name} is missing"
@@ -104,6 +122,14 @@ def families(regressors: Sequence[Regressor], position: Count) -> Iterator[Famil
             columns = _bins(_since_reversal(signal, position), way, bins)
             hint = "hysteresis or pre-sliding is not modelled"
             yield Family(f"the distance since {name} last changed its sign", hint, columns)
+
+
+def _waves(x: Array, way: Array | None, most: int) -> Array:
+    """Return columns cos, sin, and both times `way`, for each half harmonic of x, (n, q, m)."""
+    turns = np.pi * (x - x.min()) / np.ptp(x)
+    phases = np.outer(turns, np.arange(1, max(1, min(HARMONICS, most)) + 1))
+    both = np.stack([np.cos(phases), np.sin(phases)], axis=1)
+    return both if way is None else np.concatenate([both, both * way[:, None, None]], axis=1)
 
 
 def _bins(signal: Array, way: Array, count: int) -> Array:
@@ -149,6 +175,11 @@ def inputs_of(found: Minimum, channel: Channel) -> list[Regressor]:
             rate = "v" if other.signal == "x" else f"the rate of {other.signal}"
             speed = _rate(predicted, other.t, positions(other))
             regressors.setdefault(rate, Regressor(rate, speed, "velocity"))
+    if channel.ordered:
+        predicted = channel.measured + found.raw[channel.rows]
+        rate = _rate(predicted, channel.t, positions(channel))
+        regressors["rate"] = Regressor("rate", rate, "delay")
+        regressors["time"] = Regressor("time", channel.t - channel.t.mean(), "time")
     return list(regressors.values())
 
 
@@ -162,11 +193,8 @@ def _rate(x: Array, t: Array, position: Count) -> Array:
     return slope
 
 
-SURE, UNSURE = 1e-6, 0.02
-"""p-values: below SURE, the first test is sufficient; below UNSURE, the second model is refined."""
-
-MANY = 25
-"""Rows per column above which a model of the remaining residuals is reliable."""
+STRONG = 10.0
+"""Difference of BIC that is strong evidence (Kass and Raftery, J. Am. Stat. Assoc. 90, 1995)."""
 
 
 class Dependence(NamedTuple):
@@ -176,11 +204,14 @@ class Dependence(NamedTuple):
         statistic: statistic F.
         p: probability of a larger F without dependence.
         size: root mean square of the explained part, in the unit of the residuals.
+        moved: change of the fitted values if the columns are added to the model, in standard
+            errors of the combination of values that moves most.
     """
 
     statistic: float
     p: float
     size: float
+    moved: float
 
 
 def dependences(
@@ -198,46 +229,98 @@ def dependences(
     if not np.any(r):
         return
     basis = span(J)
-    for family in families(regressors, position):
-        columns = family.columns - family.columns.mean(axis=0)
-        columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-        found = _added(r, basis, columns, colour.partial, position)
+    before = deviance(colour.partial, r, basis, position)
+    for family in families(regressors, position, basis):
+        each = np.atleast_3d(family.columns)
+        each = each - each.mean(axis=0)
+        each = each / np.maximum(np.linalg.norm(each, axis=0), 1e-300)
+        found = _best(r, basis, each, colour.partial, position)
         if found is None:
             continue
-        both = span(np.column_stack([basis, columns]), 1e-6)
-        if found.p > SURE and r.size >= MANY * both.shape[1]:
-            rest = _without(both, r)
-            other = autoregressive(rest, both, position, refine=False)
-            found = _added(r, basis, columns, other.partial, position) or found
-            if found.p < UNSURE and other.order:
-                other = autoregressive(rest, both, position)
-                found = _added(r, basis, columns, other.partial, position) or found
-        yield family, found
+        chosen, first = found
+        both = span(np.column_stack([basis, each[:, :, chosen]]), 1e-6)
+        other = autoregressive(_without(both, r), both, position, refine=False)
+        if deviance(other.partial, r, both, position) < before - STRONG:
+            second = _best(r, basis, each, other.partial, position)
+            if second is not None and second[1].p < first.p:
+                first = second[1]
+        yield family, first
 
 
-def _added(
-    r: Array, basis: Array, columns: Array, partial: Array, position: Count
-) -> Dependence | None:
-    """Return F of `columns` added to `basis` for noise with partial autocorrelations `partial`."""
+def _best(
+    r: Array, basis: Array, each: Array, partial: Array, position: Count
+) -> tuple[int, Dependence] | None:
+    """Return index and dependence of the alternative in `each`, (n, q, m), with the smallest p."""
+    known = span(whitened(basis, partial, position))
+    rest = whitened(r, partial, position)
+    clean = whitened(each, partial, position)
+    found = [(k, d) for k in range(each.shape[2])
+             if (d := _added(known, basis, rest, clean[:, :, k], each[:, :, k]))]  # fmt: skip
+    if not found:
+        return None
+    k, best = min(found, key=lambda one: one[1].p)
+    return k, best._replace(p=min(1.0, best.p * len(found)))
+
+
+def _added(known: Array, basis: Array, r: Array, columns: Array, plain: Array) -> Dependence | None:
+    """Return F of added columns.
+
+    Args:
+        known: orthonormal basis of the whitened sensitivities, shape (n, k).
+        basis: orthonormal basis of the sensitivities.
+        r: whitened residuals.
+        columns, plain: whitened columns, and the same before whitening, shape (n, q).
+    """
     from scipy.special import fdtrc  # noqa: PLC0415  (slow to import)
 
-    known = span(whitened(basis, partial, position))
-    rest = _without(known, whitened(r, partial, position))
-    clean = _without(known, whitened(columns, partial, position))
+    inside = known.T @ columns
+    rest, clean = _without(known, r), columns - known @ inside
     new = span(clean, 1e-6)
     q, free = new.shape[1], r.size - known.shape[1] - new.shape[1]
     if not q or free < 2 * q:
         return None
     weights = new.T @ rest
     explained = float(weights @ weights)
-    left = max(float(rest @ rest) - explained, np.finfo(float).tiny)
+    left = max(float(rest @ rest) - explained, 1e-15 * float(rest @ rest), np.finfo(float).tiny)
     statistic = explained / q / (left / free)
     weights, *_ = np.linalg.lstsq(clean, rest, rcond=1e-6)
-    part = _without(basis, columns @ weights)  # explained part before whitening
+    part = _without(basis, plain @ weights)  # explained part before whitening
+    moved = float(np.linalg.norm(inside @ weights)) / np.sqrt(left / free)
     size = float(np.sqrt(np.mean(part**2)))
-    return Dependence(statistic, float(fdtrc(q, free, statistic)), size)
+    return Dependence(statistic, float(fdtrc(q, free, statistic)), size, moved)
 
 
 def _without(basis: Array, x: Array) -> Array:
     """Return x without its projection on an orthonormal basis."""
     return x - basis @ (basis.T @ x)
+
+
+ROUNDING = 1e-6
+"""Error of simulation and interpolation, relative to the range of a signal."""
+BALANCE = 2e-4
+"""The same error for a force, limited by filtering and differentiation of the motion."""
+FORCES = ("N", "N m")
+
+
+def resolution(measured: Array, unit: str) -> float:
+    """Return the rms error of rounding and simulation, in the unit of the signal.
+
+    A signal is rounded if its values are multiples of the smallest step between them.
+    """
+    values = np.unique(measured)
+    reach = float(values[-1] - values[0])
+    floor = (BALANCE if unit in FORCES else ROUNDING) * max(
+        reach, 1e-3 * float(np.abs(values).max())
+    )
+    steps = np.diff(values)
+    steps = steps[steps > 1e-9 * reach]
+    if not steps.size:
+        return floor
+    count = (values - values[0]) / float(steps.min())
+    rounded = np.abs(count - np.rint(count)).max() < 0.1 and values.size < 0.9 * measured.size
+    return max(floor, float(steps.min()) / np.sqrt(12)) if rounded else floor
+
+
+def rms(r: Array) -> float:
+    """Return the root mean square."""
+    return float(np.sqrt(np.mean(r**2)))

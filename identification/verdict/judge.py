@@ -4,19 +4,20 @@ A least-squares fit reaches a minimum for any model. The residuals of a correct 
 is independent of inputs and motion, ideally white noise with the size of the sensor noise.
 Therefore
 
-* dependence on inputs, speed, direction, position or history makes a fit doubtful, because the
-  model is wrong;
+* dependence on inputs, speed, direction, position, time or history makes a fit doubtful, because
+  the model is wrong;
 * residuals larger than a given noise level make it doubtful;
+* so do autocorrelated residuals that are worth few independent samples, values at bounds of the
+  search, friction far beyond the measured forces, and a record that starts under load;
 * a signal that is almost entirely unexplained makes it doubtful, even if its residuals look like
   noise; so does a value at its bound if much is unexplained;
-* autocorrelation alone does not, because the intervals account for it, see `covariance`;
+* other autocorrelation does not, because the intervals account for it, see `covariance`;
 * errors in the data, a mass at its bound, or residuals as large as the signal make a result
   implausible.
 
 The tests have two limits. Residuals below the `resolution` of a measured signal carry no
 information. Bristles are assumed relaxed where a record starts near rest; if the machine was loaded
-before, the force is wrong until they have slid once, which biases stiffness and damping
-(`beginnings`).
+before, the force is wrong until they have slid once, which biases stiffness and damping.
 """
 
 from collections.abc import Iterator, Mapping
@@ -27,38 +28,21 @@ from typing import final
 import numpy as np
 
 from identification.data.findings import Findings
-from identification.residuals.evaluation import Array, Channel
+from identification.residuals.evaluation import Channel
 from identification.residuals.sampled import moving_start
-from identification.verdict.colour import Colour, Whiteness, whiteness
-from identification.verdict.independence import Dependence, Family, dependences, inputs_of
+from identification.verdict.colour import Colour, Whiteness, span, whiteness
+from identification.verdict.covariance import FAR, Levels
+from identification.verdict.independence import (
+    FORCES,
+    Dependence,
+    Family,
+    dependences,
+    inputs_of,
+    resolution,
+    rms,
+)
 from identification.verdict.minimum import Minimum, positions
 from symfric.foundation.status import Status
-
-ROUNDING = 1e-6
-"""Error of simulation and interpolation, relative to the range of a signal."""
-BALANCE = 1e-3
-"""The same error for a force, limited by filtering and differentiation of the motion."""
-FORCES = ("N", "N m")
-
-
-def resolution(measured: Array, unit: str) -> float:
-    """Return the rms error of rounding and simulation, in the unit of the signal.
-
-    A signal is rounded if its values are multiples of the smallest step between them.
-    """
-    values = np.unique(measured)
-    reach = float(values[-1] - values[0])
-    floor = (BALANCE if unit in FORCES else ROUNDING) * max(
-        reach, 1e-3 * float(np.abs(values).max())
-    )
-    steps = np.diff(values)
-    steps = steps[steps > 1e-9 * reach]
-    if not steps.size:
-        return floor
-    count = (values - values[0]) / float(steps.min())
-    rounded = np.abs(count - np.rint(count)).max() < 0.1 and values.size < 0.9 * measured.size
-    return max(floor, float(steps.min()) / np.sqrt(12)) if rounded else floor
-
 
 FIRST = 0.05
 """Initial share of a record that is compared with the remaining record."""
@@ -70,8 +54,8 @@ white or autocorrelated, exceed it in 1 of 10 000 cases.
 """
 
 
-def beginnings(found: Minimum) -> Iterator[str]:
-    """Yield a message for each channel whose first residuals are much larger than later ones.
+def _beginnings(found: Minimum) -> Iterator["Test"]:
+    """Test whether the first residuals of a channel are much larger than later ones.
 
     Limits: only records in order of time with a velocity among the regressors. A model that is
     wrong at the beginning for another reason, such as a decay from its largest swing, gives the
@@ -82,14 +66,13 @@ def beginnings(found: Minimum) -> Iterator[str]:
         count = int(FIRST * r.size)
         if v is None or not channel.ordered or count < FEWEST or moving_start(v) != 0.0:
             continue
-        first, later = (float(np.sqrt(np.mean(part**2))) for part in (r[:count], r[count:]))
-        ratio = first / max(later, 1e-300)
-        if ratio > LARGER:
-            yield (
-                f"The residuals of {found.label(channel)} are {ratio:.2g} times as large in its "
-                f"first {count} samples as after: the record starts under load or in another "
-                "unknown state; start it in sliding, or unloaded."
-            )
+        ratio, name = rms(r[:count]) / max(rms(r[count:]), 1e-300), found.label(channel)
+        text = (
+            f"The residuals of {name} are {ratio:.2g} times as large in its "
+            f"first {count} samples as after: the record starts under load or in another "
+            "unknown state; start it in sliding, or unloaded."
+        )
+        yield Test(name, "start", ratio, 0.0, LARGER, ratio <= LARGER, True, text)
 
 
 ALARM = 0.02
@@ -98,7 +81,9 @@ WHITE = 0.05
 """Level of the test of one channel for white noise, which does not affect the verdict."""
 SHARE = 0.05
 """Share of the variance of the residuals below which a dependence is ignored."""
-SMOOTHED = 5e-3
+MOVED = 2.0
+"""Change of the fitted values by a missing term, in standard errors, below which it is ignored."""
+SMOOTHED = 1e-3
 """Size of an ignored dependence on a smoothed acceleration, relative to the range of a signal."""
 UNEXPLAINED = 0.7
 """Ratio of residuals to the spread of the signal above which a model explains almost nothing."""
@@ -106,6 +91,10 @@ LITTLE = 0.9
 """The same ratio without a value at a bound; the fit then explains a fifth of the variance."""
 CHANCE = 10.0
 """Smallest ratio of the explained variance to that of as many regressors of pure noise."""
+FEW = 2.0
+"""Effective samples per unknown below which a fit is doubtful; intervals are honest above it."""
+SCORE = 3.84
+"""Score of a bound above which a value at the bound matters, chi2 with 5 %."""
 INERTIA = ("kg", "kg m^2")
 NEARLY = 0.1
 """Predicted gain of an unfinished search, relative to the cost, below which tests are valid."""
@@ -180,8 +169,16 @@ class Verdict:
         return Status.IMPLAUSIBLE if self.nonsense else Status.DOUBTFUL
 
 
-def judge(found: Minimum, findings: Findings | None = None) -> Verdict:
-    """Assess a minimum; errors in its data make the result implausible."""
+def judge(
+    found: Minimum, findings: Findings | None = None, levels: Levels | None = None
+) -> Verdict:
+    """Assess a minimum.
+
+    Args:
+        found: the minimum.
+        findings: findings in the data; errors make the result implausible.
+        levels: forces of the law and of the data, if known.
+    """
     white = dict[str, Whiteness]()
     tests, effective = list[Test](), dict[str, float]()
     each = list[tuple[Channel, list[tuple[Family, Dependence]]]]()
@@ -198,13 +195,15 @@ def judge(found: Minimum, findings: Findings | None = None) -> Verdict:
     count = sum(len(some) for _, some in each)
     for channel, some in each:
         tests += _independent(found, channel, some, ALARM / max(count, 1))
-    tests += _explained(found)
+    tests += [*_explained(found), *_few(found, effective), *_box(found), *_beginnings(found)]
+    tests += _extrapolated(levels) if levels is not None else []
     errors = () if findings is None else tuple(e.sentence for e in findings.errors)
     nonsense = (*errors, *_unexplained(found, effective), *_no_mass(found))
-    bounds = [f"Values at a bound: {', '.join(at)}."] if (at := _at_bound(found)) else []
+    at = [name for name in _at_bound(found) if name not in _at_box(found)]
+    bounds = [f"Values at a bound: {', '.join(at)}."] if at else []
     failed = [t for t in tests if not t.passed]
     failed.sort(key=lambda t: (not t.decides, t.p))
-    messages = (*nonsense, *beginnings(found), *(t.sentence for t in failed), *bounds)
+    messages = (*nonsense, *(t.sentence for t in failed), *bounds)
     return Verdict(tuple(tests), effective, white, nonsense, messages)
 
 
@@ -233,10 +232,10 @@ def _independent(
     name, unit, r = found.label(channel), channel.unit, found.r[channel.rows]
     fine, weighted = resolution(channel.measured, channel.unit), float(np.linalg.norm(r))
     level = float(np.linalg.norm(found.raw[channel.rows])) / weighted if weighted > 0 else 1.0
-    for family, (statistic, p, explained) in some:
+    for family, (statistic, p, explained, moved) in some:
         size, share = explained * level, explained**2 / (float(r @ r) / r.size)
         least = SMOOTHED * float(np.ptp(channel.measured)) if family.smoothed else fine
-        passed = p >= limit or size <= least or share < SHARE
+        passed = p >= limit or size <= least or (share < SHARE and moved < MOVED)
         text = (
             f"The residuals of {name} depend on {family.what}: {size:.2g} {unit} rms, "
             f"{100 * min(share, 1.0):.0f} % of their variance ({family.hint})."
@@ -260,16 +259,16 @@ def _size(found: Minimum, channel: Channel, colour: Colour) -> Iterator[Test]:
     name = found.label(channel)
     robust = bool((found.gain[channel.rows] != 1.0).any())
     left = sigma * found.r[channel.rows] if robust else found.raw[channel.rows]
-    rms = float(np.sqrt(np.mean(left**2)))
+    size = rms(left)
     free = max(colour.effective * colour.freedom / colour.rows, 1.0)
-    p = float(chdtrc(free, free * (rms / sigma) ** 2))
+    p = float(chdtrc(free, free * (size / sigma) ** 2))
     limit = ALARM / len(found.channels)
-    passed = p >= limit or rms <= resolution(channel.measured, channel.unit)
+    passed = p >= limit or size <= resolution(channel.measured, channel.unit)
     text = (
-        f"The residuals of {name} are {rms:.2g} {channel.unit}, {rms / sigma:.2g} times the given "
-        f"noise level."
+        f"The residuals of {name} are {size:.2g} {channel.unit}, {size / sigma:.2g} times the "
+        f"given noise level."
     )
-    yield Test(name, "size", rms / sigma, p, limit, passed, True, text)
+    yield Test(name, "size", size / sigma, p, limit, passed, True, text)
 
 
 def _left(found: Minimum) -> Iterator[tuple[str, float, float]]:
@@ -302,6 +301,42 @@ def _explained(found: Minimum) -> Iterator[Test]:
         yield Test(signal, "explained", share, 0.0, limit, share < limit, True, text)
 
 
+def _few(found: Minimum, effective: Mapping[str, float]) -> Iterator[Test]:
+    """Test whether the residuals are worth enough independent samples for the unknowns.
+
+    Fewer samples determine neither the intervals nor whether the residuals are noise at all: slow
+    model errors and slow noise look alike.
+    """
+    n, count = int((~found.held).sum()), sum(effective.values())
+    exact = all(rms(found.raw[c.rows]) <= resolution(c.measured, c.unit) for c in found.channels)
+    if not n or exact or count >= sum(c.t.size for c in found.channels):
+        return
+    text = (
+        f"The autocorrelated residuals are worth only {count:.0f} independent samples for {n} "
+        "unknowns: they may be a model error, and the intervals are likely too small."
+    )
+    share = count / n
+    yield Test("all", "effective samples", share, 0.0, FEW, share >= FEW, True, text)
+
+
+def _box(found: Minimum) -> Iterator[Test]:
+    """Test whether a value is at a bound of the search."""
+    if at := _at_box(found):
+        text = f"Values at a bound of the search: {', '.join(at)}; the data do not determine them."
+        yield Test("all", "bound", float(len(at)), 0.0, 0.0, False, True, text)
+
+
+def _extrapolated(levels: Levels) -> Iterator[Test]:
+    """Test whether the law stays near the measured forces at all measured speeds, both ways."""
+    ratio = levels.curve / levels.largest if levels.largest > 0 else 0.0
+    text = (
+        f"The friction of the law reaches {levels.curve:.3g} {levels.unit} within the measured "
+        f"speeds, the data only {levels.largest:.3g} {levels.unit}: a direction or a speed "
+        "is missing in the data."
+    )
+    yield Test("all", "extrapolation", ratio, 0.0, FAR, ratio <= FAR, True, text)
+
+
 def _unexplained(found: Minimum, effective: Mapping[str, float]) -> Iterator[str]:
     """Yield a message for each signal that is almost entirely unexplained.
 
@@ -329,6 +364,26 @@ def _no_mass(found: Minimum) -> Iterator[str]:
                 f"{unknown.name} is at its lower bound, {value:.3g} {unknown.unit}: the force does "
                 "not depend on the acceleration, or one of them has the wrong sign."
             )
+
+
+def _at_box(found: Minimum) -> list[str]:
+    """Return the values at a bound that is neither zero nor another value, and that matter.
+
+    A value matters if the cost would fall significantly beyond the bound: a score test (Lagrange
+    multiplier) with the effective number of samples.
+    """
+    basis = span(found.J * ~found.held)
+    worth = sum(c.effective for c in found.sandwich.colours) / found.r.size
+    names = list[str]()
+    for u, held, column in zip(found.unknowns, found.held, found.J.T, strict=True):
+        if not held or u.partner or u.nuisance or 0.0 in (u.lower, u.upper):
+            continue
+        clean = column - basis @ (basis.T @ column)
+        size = float(np.linalg.norm(clean))
+        if size > 1e-9 * float(np.linalg.norm(column)):
+            score = float(clean @ found.r) / size / max(rms(found.r), 1e-300)
+            names += [u.name] * (score**2 * worth > SCORE)
+    return names
 
 
 def _at_bound(found: Minimum) -> list[str]:

@@ -10,6 +10,7 @@ Sources: Bates and Watts, Nonlinear Regression Analysis, 1988, chapter 6; Raue e
 Bioinformatics 25(15), 2009.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from math import ceil, inf, isfinite, log10
@@ -33,6 +34,8 @@ FLAT = 0.02
 """Rise relative to the limit below which a profile is flat."""
 BLIND = 0.1
 """First step relative to the value, if there is no linear standard error."""
+REFINED, NEAR = 5, 2.0
+"""Largest number of stations inserted at the limit, and rise relative to it that needs none."""
 EVALUATIONS = 30
 """Largest number of residual evaluations at one point."""
 
@@ -130,7 +133,7 @@ def profile(
     """
     checks.choice("profile: name", name, task.unknowns.fitted)
     points = checks.count("profile: points", points, least=2)
-    walk = _Walk(task, point, covariance, name)
+    walk = Walk(task, point, covariance, name)
     (down, low, below), (up, high, above) = (walk.side(side, points) for side in (-1, 1))
     stations = [*down[::-1], (walk.best, 0.0, point.values), *up]
     values, rise, others = (np.array(column) for column in zip(*stations, strict=True))
@@ -148,7 +151,7 @@ Station = tuple[float, float, Array]
 """Value, rise, and all values at a point of a profile."""
 
 
-class _Walk:
+class Walk:
     """Computation of a profile, step by step away from the minimum."""
 
     def __init__(self, task: Task, point: Point, covariance: Covariance, name: str) -> None:
@@ -170,6 +173,18 @@ class _Walk:
         freedom = max(point.r.size - box.lower.size, 1)
         self.scale = max(point.cost / freedom, 1e-300) * colour
         self.limit = t**2
+
+    def far(self, decades: float) -> list[float]:
+        """Return values near the ends of the range, none where a linear value is unbounded.
+
+        Args:
+            decades: distance of the ends of an unbounded logarithmic value.
+        """
+        known = (self.unknown.lower, self.unknown.upper)
+        if not self.logarithmic:
+            return [0.999 * end + 0.001 * self.best for end in known if isfinite(end)]
+        far = self.best * 10.0**-decades, self.best * 10.0**decades
+        return [max(far[0], 1.001 * known[0]), min(far[1], 0.999 * known[1])]
 
     def side(self, direction: int, points: int) -> tuple[list[Station], float | None, str]:
         """Return the stations of one side, nearest first; the value at the limit; or a message."""
@@ -193,7 +208,7 @@ class _Walk:
             w, rise = found.w, (found.cost - self.point.cost) / self.scale
             stations.append((c, rise, found.values))
             if rise >= self.limit:
-                return stations, self.crossing(stations), ""
+                return stations, self.refined(stations, direction), ""
             if count >= points:  # the linear interval was too short
                 step *= 1.6
         where = "below" if direction < 0 else "above"
@@ -204,9 +219,26 @@ class _Walk:
         share = f"the rise is {100 * max(rise, 0.0) / self.limit:.0f} % of the limit"
         return stations, None, f"{self.name} is {how} {where}: at {value:.4g}, near {why}, {share}."
 
+    def refined(self, stations: list[Station], direction: int) -> float:
+        """Return the value at the limit; insert stations between the last two until they are near.
+
+        Interpolation from a rise far above the limit would be inaccurate.
+        """
+        inner, outer = [(self.best, 0.0, self.point.values), *stations][-2:]
+        for _ in range(REFINED):
+            c = self.crossing([inner, outer])
+            found = self.held_at(self.point.w, c)
+            if outer[1] < NEAR * self.limit or isinstance(found, str):
+                break
+            between = c, (found.cost - self.point.cost) / self.scale, found.values
+            stations.append(between)
+            inner, outer = (inner, between) if between[1] >= self.limit else (between, outer)
+        stations.sort(key=lambda station: direction * station[0])
+        return self.crossing([inner, outer])
+
     def crossing(self, stations: list[Station]) -> float:
         """Return the value at the limit by interpolation of the square root of the rise."""
-        (last, before, _), (value, rise, _) = [(self.best, 0.0, self.point.w), *stations][-2:]
+        (last, before, _), (value, rise, _) = stations
         a, b = (float(np.sqrt(max(x, 0.0))) for x in (before, rise))
         share = (float(np.sqrt(self.limit)) - a) / max(b - a, 1e-300)
         if self.logarithmic:
@@ -249,15 +281,19 @@ class _Walk:
             if found is None:
                 raise ArithmeticError(why)
             J, slope = found.reduced[1], found.slope[self.index]
-            return J[:, others] - J[:, [own]] * (slope[others] / slope[own])
+            reduced = J[:, others] - J[:, [own]] * (slope[others] / slope[own])
+            if not np.isfinite(reduced).all():
+                raise ArithmeticError(why)
+            return reduced
 
         low, high = box.lower[others], box.upper[others]
         start = np.clip(w[others], low, high)
         if at(start) is not None and others.any():
-            optimize.least_squares(
-                residuals, start, slopes, bounds=(low, high), x_scale="jac",
-                ftol=1e-7, xtol=1e-7, gtol=1e-12, max_nfev=EVALUATIONS,
-            )  # fmt: skip
+            with suppress(ArithmeticError, ValueError), np.errstate(all="ignore"):  # overflow
+                optimize.least_squares(
+                    residuals, start, slopes, bounds=(low, high), x_scale="jac",
+                    ftol=1e-7, xtol=1e-7, gtol=1e-12, max_nfev=EVALUATIONS,
+                )  # fmt: skip
         return best[0] if best else why
 
     def solved(self, near: Array, c: float) -> Array | None:
@@ -267,5 +303,8 @@ class _Walk:
             miss = c - float(box.values(w)[self.index])
             if abs(miss) <= 1e-10 * max(abs(c), 1e-300):
                 break
-            w[own] += max(-1e3, min(1e3, miss / float(box.slope(w)[self.index, own])))
+            slope = float(box.slope(w)[self.index, own])
+            if not abs(slope) > 0.0:
+                return None
+            w[own] += max(-1e3, min(1e3, miss / slope))
         return w if box.lower[own] <= w[own] <= box.upper[own] else None

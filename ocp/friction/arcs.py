@@ -34,7 +34,7 @@ import casadi as ca
 
 from ocp.formulation.changed_models import further_states, rebuilt
 from ocp.formulation.inputs import states_of
-from ocp.formulation.phase import Chain, Free, Phase, Range, Span, Start, limits, meet
+from ocp.formulation.phase import Chain, Free, Phase, Range, Span, Start, fixed, limits, meet
 from ocp.formulation.problem import Problem
 from ocp.formulation.statement import Duration, added_signals, forms_of, only
 from ocp.friction.mode_models import SIDES, excess, holding, mode_model
@@ -304,6 +304,8 @@ class ArcPhase:
             if state and ((mode == 0 and begins) or (was is not None and was != mode)):
                 start[state] = 0.0
                 link |= {state: None} if self.number else {}
+            if not mode and not self.number and not state and not self._at_start(contact):
+                start[f"{name}_slip"] = 0.0
             if not mode:
                 end.pop(state, None)  # implied by stick
             elif then is not None and then != mode:
@@ -336,6 +338,11 @@ class ArcPhase:
             p=only(base.p, {v.name for v in model.p}),
             name="",
         )
+
+    def _at_start(self, contact: Contact) -> bool:
+        """Return True if the prescribed start determines the slip of a contact."""
+        nodes, x = self.rules.problem.spans[0].nodes[0.0], self.base.model.x
+        return all(fixed(nodes[v.name]) for v in x if ca.depends_on(contact.slip, v.symbol))
 
     def _direction(self, name: str, mode: int, found: tuple[str, int] | None) -> Ranges:
         """Return the bound over the whole arc that fixes the direction of slip."""

@@ -15,7 +15,7 @@ from ocp.transcription.unknowns import Points
 from symfric.foundation import checks
 from symfric.foundation.numeric import tanh
 from symfric.foundation.parameters import Variable, parameters, with_values
-from symfric.foundation.variable import at_start, strays
+from symfric.foundation.variable import at_start, stacked, strays
 from symfric.laws import Exact, ExactCoulomb, Law
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Monitor
@@ -171,7 +171,9 @@ def _jumps(model: Model, contact: Contact) -> bool:
 
 def sticking(model: Model) -> tuple[Contact, ...]:
     """Return the contacts that can stick, whose friction is nonzero at v = 0."""
-    return tuple(contact for contact in model.contacts if _jumps(model, contact))
+    if "ocp sticking" not in model.memory:
+        model.memory["ocp sticking"] = tuple(c for c in model.contacts if _jumps(model, c))
+    return model.memory["ocp sticking"]
 
 
 def shortfall(model: Model) -> float:
@@ -188,8 +190,8 @@ def shortfall(model: Model) -> float:
             continue
         given = dict.fromkeys(contact.further, 0.0)
         level = at_start(law.static_level(1.0, 1, **given), model.p)
-        forces = [at_start(law.force(scale * x, 1.0, (), **given), model.p) for x in LAYER]
-        shares.append(1.0 - max(float(force) for force in forces) / float(level))
+        forces = stacked(law.force(scale * x, 1.0, (), **given) for x in LAYER)
+        shares.append(1.0 - float(ca.mmax(at_start(forces, model.p))) / float(level))
     return max(shares)
 
 

@@ -198,7 +198,8 @@ LEAN: dict[str, Option] = {
 }
 """Options of all solvers for no output and no unused derivatives."""
 QUIET: dict[str, Option] = {"print_level": 0, "sb": "yes", "mumps_mem_percent": 5}
-"""Options of Ipopt for no output."""
+"""Options of Ipopt for no output, and of MUMPS for its first estimate of the memory, which it
+doubles if necessary: by default it allocates eleven times the estimate, in each factorisation."""
 WARM: dict[str, Option] = {
     "warm_start_init_point": "yes",
     "mu_init": 1e-6,

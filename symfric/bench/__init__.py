@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from symfric.bench.report import Progress, Report
 
-PICTURES = ("integrator", "multibody", "ivp", "regularisation", "ocp")
+PICTURES = ("integrator", "multibody", "ivp", "regularisation", "ocp", "identification")
 """Subjects with a picture."""
-TABLES = ("identification", "codegen", "calls", "ensemble", "embedded", "interop", "starts")
+TABLES = ("codegen", "calls", "ensemble", "embedded", "interop", "starts")
 """Subjects without a picture."""
 SUBJECTS = (*PICTURES, *TABLES)
 """Names of modules of this package that have a function `bench`."""

@@ -12,7 +12,8 @@ from identification import Dataset, Fit, Fitted, InverseDynamics
 from symfric.bench.identification_files import File, campaign
 from symfric.bench.identification_measured import emps, franka
 from symfric.bench.identification_memory import gms, lugre
-from symfric.bench.identification_repeats import coverage, starts
+from symfric.bench.identification_repeats import starts, velocity
+from symfric.bench.identification_verdicts import TITLE, draw, verdicts
 from symfric.bench.report import Found, Progress, Report, goal, timed
 from symfric.foundation.parameters import check_names
 from symfric.foundation.status import SolveError
@@ -117,7 +118,8 @@ def files(quick: bool = False) -> Iterator[Found]:
 
 CASES: Mapping[str, Callable[[bool], Iterator[Found]]] = {
     "lugre": lugre,
-    "coverage": coverage,
+    "verdicts": verdicts,
+    "velocity": velocity,
     "emps": emps,
     "franka": franka,
     "starts": starts,
@@ -136,7 +138,7 @@ def bench(
     """
     check_names("bench identification: cases", cases, CASES)
     tasks = {case: partial(_named, case, quick) for case in cases}
-    return Report().collect(tasks, progress)
+    return Report((TITLE, draw)).collect(tasks, progress)
 
 
 def _named(case: str, quick: bool) -> Iterator[Found]:

@@ -1,123 +1,43 @@
-"""Repeated fits: with different noise, for the coverage of intervals, and from distant starts."""
+"""Repeated fits: with a noisy velocity, and from distant starts."""
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
 from functools import cache, partial
-from typing import Any, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
-from identification.data.synthetic import synthetic_drive_data
 from identification.fit import Fit
-from identification.residuals.inverse import InverseDynamics
 from identification.residuals.shooting import Shooting
 from identification.result.fitted import Fitted
 from symfric import law_from_text
 from symfric.bench.report import Found, goal, timed
-from symfric.foundation.parameters import Variable, with_values
-from symfric.foundation.status import Status
+from symfric.foundation.parameters import Variable
 from symfric.integrator import Linear, Trajectory, simulate
-from symfric.laws import QuarterCarGeneral, QuarterCarSimple, Stribeck
+from symfric.laws import QuarterCarGeneral, QuarterCarSimple
 from symfric.model import Model
 from symfric.scenes import Drive, QuarterCar
 
 Array = NDArray[np.float64]
 
-SEEDS, QUICK = 200, 20
-STAGE = {"m": 95.0, "offset": -3.0, "mu_d": 20.0, "sigma_2": 200.0}
-"""True parameters of the inverse dynamics, similar to those of EMPS."""
+SEEDS, QUICK = 100, 20
 BLOCK = {"m": 2.0, "mu_d": 1.0, "sigma_2": 0.8}
 """True parameters of the simulated motion."""
-FORCE, POSITION, VELOCITY = 0.5, 1e-4, 0.2
-"""Standard deviations of the noise [N, m, m/s], or of the innovations of coloured noise."""
-INVERSE: Any = InverseDynamics()
+POSITION, VELOCITY = 1e-4, 0.2
+"""Standard deviations of the noise [m, m/s]."""
 COULOMB = "coulomb+viscous"
 T = np.linspace(0.0, 4.0, 201)
 U = 3 * np.sin(2 * np.pi * 0.7 * T) + 2 * np.sin(2 * np.pi * 1.9 * T + 1)
 
 
-def coverage(quick: bool) -> Iterator[Found]:
-    """Measure the coverage of intervals; with `quick`, use a tenth of the seeds.
-
-    A known drive is measured repeatedly with different noise, white or AR(1) with 0.9 from sample
-    to sample, and fitted by inverse dynamics (force noise) and by simulation (position noise,
-    unknown start values). The benchmark counts the 95 % intervals that include the truth, right
-    models that are reported as doubtful, and wrong models that are not. It compares the estimate
-    from positions and a hundred times noisier velocities with that from positions alone.
+def velocity(quick: bool) -> Iterator[Found]:
+    """Compare estimates from positions and a hundred times noisier velocities with those from
+    positions alone.
     """
-    seeds = QUICK if quick else SEEDS
-    for kind, fit, truth in (("inverse dynamics", _inverse, STAGE), ("shooting", _shooting, BLOCK)):
-        for rho in (0.0, 0.9):
-            where = f"{kind}, {'AR(1) 0.9' if rho else 'white'} noise"
-            found = [_repeat(partial(fit, rho, seed), truth) for seed in range(seeds)]
-            yield from _covered(where, truth, found)
-    seconds, worst = timed(partial(_added, count := max(seeds // 2, QUICK)))
+    seconds, worst = timed(partial(_added, count := QUICK if quick else SEEDS))
     what = "a noisy velocity added: largest rms error over that without"
     yield goal(what, worst, 1.1, "<=", seconds, f"{count} seeds")
-    seconds, missed = timed(partial(_wrong, count := max(3, seeds // 20)))
-    what = "a Stribeck peak fitted without one: called solved"
-    yield goal(what, missed / count, 0.0, "<=", seconds, f"{count} seeds")
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class _Repeat:
-    """Errors, standard errors, coverage of the truth by intervals, verdict and time of a fit."""
-
-    off: Array
-    error: Array
-    inside: NDArray[np.bool_]
-    doubtful: bool
-    seconds: float
-
-
-def _repeat(fit: Callable[[], Fitted], truth: Mapping[str, float]) -> _Repeat:
-    seconds, found = timed(fit)
-    estimates = [found.parameters[name] for name in truth]
-    rows = [(e.value, e.low, e.high, e.standard_error) for e in estimates]
-    value, low, high, error = np.array(rows, dtype=float).T  # None becomes NaN
-    true = np.array(list(truth.values()))
-    inside = (low <= true) & (true <= high)
-    return _Repeat(value - true, error, inside, found.status is not Status.SOLVED, seconds)
-
-
-def _inverse(rho: float, seed: int) -> Fitted:
-    (record,) = _stage()
-    noise = np.random.default_rng(seed)
-    force = record["force"] + FORCE * coloured(noise, record.size, rho)
-    x = record["x"] + 1e-7 * noise.standard_normal(record.size)
-    noisy = replace(record, signals={**record.signals, "x": x, "force": force}, loop=None)
-    return Fit(INVERSE, COULOMB, Dataset((noisy,)), starts=1).solve(throw=False)
-
-
-@cache
-def _stage() -> Dataset:
-    """Return the record of the stage without noise."""
-    values = {"mu_d": STAGE["mu_d"], "sigma_2": STAGE["sigma_2"], "v_eps": 1e-4}
-    law = with_values(law_from_text(COULOMB), values)
-    return synthetic_drive_data(law, force_noise=0.0, position_noise=0.0)
-
-
-def _shooting(rho: float, seed: int) -> Fitted:
-    noise = np.random.default_rng(seed)
-    return _fit_block(x=_motion()["x"] + POSITION * coloured(noise, T.size, rho))
-
-
-def _covered(where: str, truth: Mapping[str, float], found: list[_Repeat]) -> Iterator[Found]:
-    """Yield coverage over the parameters, bias of the mass, and false alarms."""
-    seconds = sum(one.seconds for one in found)
-    each = np.mean([one.inside for one in found], axis=0)
-    shown = ", ".join(f"{name} {c:.3f}" for name, c in zip(truth, each, strict=True))
-    what, mean = f"{where}: 95 % intervals that hold the truth", float(each.mean())
-    yield goal(what, mean, 0.90, ">=", seconds, f"{shown}; {len(found)} seeds")
-    yield goal(what, mean, 0.99)
-    bias = abs(np.mean([one.off[0] for one in found])) / np.mean([one.error[0] for one in found])
-    yield goal(f"{where}: bias of the mass [standard errors]", float(bias), 1.0)
-    doubted = float(np.mean([one.doubtful for one in found]))
-    yield goal(f"{where}: right model not called solved", doubted, 0.05)
 
 
 def _added(seeds: int) -> float:
@@ -132,14 +52,6 @@ def _added(seeds: int) -> float:
             off[name].append(np.array([fit.values[p] for p in BLOCK]) - true)
     alone, both = (np.sqrt(np.mean(np.square(some), axis=0)) for some in off.values())
     return float(np.max(both / alone))
-
-
-def _wrong(seeds: int) -> int:
-    """Return how many fits without a Stribeck peak to data with one are reported as solved."""
-    peak = Stribeck(mu_s=28.0, mu_d=20.0, v_s=0.01, v_eps=1e-4, sigma_2=200.0)
-    fits = (Fit(INVERSE, COULOMB, synthetic_drive_data(peak, seed=k), starts=1)
-            for k in range(seeds))  # fmt: skip
-    return sum(fit.solve(throw=False).status is Status.SOLVED for fit in fits)
 
 
 def _drive() -> Model:
@@ -159,16 +71,6 @@ def _fit_block(**signals: Array) -> Fitted:
     data = Dataset.of({"t": T, **given}, units={n: units[n] for n in given})
     start = {"m": 1.7, "mu_d": 0.8, "sigma_2": 1.0}
     return Fit(Shooting(), _drive(), data, start=start).solve(throw=False)
-
-
-def coloured(noise: np.random.Generator, n: int, rho: float) -> Array:
-    """Return stationary AR(1) noise with unit innovations, shape (n,)."""
-    e = noise.standard_normal(n)
-    if rho:
-        e[0] /= np.sqrt(1 - rho**2)
-        for k in range(1, n):
-            e[k] += rho * e[k - 1]
-    return e
 
 
 # ---- distant starts ----

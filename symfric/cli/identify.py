@@ -29,6 +29,8 @@ from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
 
 KINDS = ("points", "inverse", "shooting", "loop")
+DELAYED = ("inverse", "shooting")
+"""Types of residuals with a dead time."""
 RULES: dict[str, Callable[..., Any]] = {"log": log, "linear": linear, "above": above, "tied": tied}
 
 
@@ -81,12 +83,23 @@ def _named_or_all(
     return [part.strip() for part in texts[0].split(",")]
 
 
-def residuals_of(name: str, windows: str | None, free: dict[str, Any]) -> Any:
+def residuals_of(
+    name: str, windows: str | None, free: dict[str, Any], dead_time: str | None = None
+) -> Any:
     """Return the type of residuals; `windows` is a length [s] or "choose", for shooting only.
 
-    For points, `offset` is removed from `free` and adds a constant force to friction.
+    `dead_time` is LOW:HIGH [s], for inverse dynamics and shooting. For points, `offset` is removed
+    from `free` and adds a constant force to friction.
     """
     check_names("--kind", [name], KINDS)
+    if dead_time is not None:
+        if name not in DELAYED:
+            kinds = " or ".join(DELAYED)
+            raise ValueError(f"--dead-time: expected with --kind {kinds} only, got --kind {name}")
+        ends = [checks.parsed("--dead-time", end) for end in dead_time.split(":")]
+        if len(ends) != 2:
+            raise checks.refused("--dead-time", "LOW:HIGH in seconds, such as 0:6e-3", dead_time)
+        free["dead_time"] = (ends[0], ends[1])
     if windows is not None and name != "shooting":
         raise ValueError(f"--windows: expected with --kind shooting only, got --kind {name}")
     if name == "points":
@@ -143,6 +156,7 @@ def identify(
     validate: Strings = None,
     kind: str = "inverse",
     windows: str | None = None,
+    dead_time: str | None = None,
     columns: Strings = None,
     units: Strings = None,
     step: float | None = None,
@@ -173,7 +187,7 @@ def identify(
     opt.check_outputs(html, json, picture=plot)
     laws, wishes = opt.laws_of(law), free_in(free)
     first = next(iter(laws.values()))
-    chosen = residuals_of(kind, windows, wishes)
+    chosen = residuals_of(kind, windows, wishes, dead_time)
     read = reader(columns, units, kind, missing, resample, step, variable, scales)
     request: dict[str, Any] = {
         "free": wishes or None,

@@ -27,6 +27,7 @@ from functools import partial
 from typing import Any, TypeVar, final
 
 import casadi as ca
+import numpy as np
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
@@ -58,17 +59,36 @@ def completed(model: System) -> tuple[tuple[Contact, ...], dict[str, Variable]]:
             c.name: Variable(f"{c.name}_{APPLIED}", c.unit("N"), doc=doc)
             for c in contacts if _mode(c) is not None and not _complete(c)
         }  # fmt: skip
-    for c in contacts:
-        if c.name in unknown:
-            _refuse_inputs(c, ca.vertcat(symbols_of(model.z), symbols_of(model.u)))
     contacts = tuple(_with(c, unknown[c.name].symbol) if c.name in unknown else c for c in contacts)
     pairs = enumerate(contacts)
-    done = (c if _complete(c) else _with(c, _applied(i, contacts, model)) for i, c in pairs)
+    done = [c if _complete(c) else _with(c, _applied(i, contacts, model)) for i, c in pairs]
+    own = zip(contacts, done, strict=True)
+    _refuse_shared([c for c, now in own if now is not c and _mode(c) is not None], model)
     return tuple(done), unknown
 
 
 def _with(c: Contact, F_e: ca.SX) -> Contact:
     return replace(c, given={**c.given, APPLIED: F_e})
+
+
+def _refuse_shared(held: Sequence[Contact], model: System) -> None:
+    """Raise ValueError if M is singular for contacts that all stick, at two arbitrary places."""
+    if len(held) < 2:
+        return
+    changes = stacked(_change(c, model) for c in held)
+    M = ca.densify(ca.jacobian(changes, stacked(c.force for c in held)))
+    symbols = ca.vertcat(*ca.symvar(M))
+    at = ca.Function("M", [symbols], [M])
+    for k in (1, 2):
+        values = at(1 + 0.3 * np.sin(k + np.arange(symbols.numel()))).full()
+        if not np.isfinite(values).all() or np.linalg.matrix_rank(values) == len(held):
+            return
+    names = ", ".join(c.name for c in held)
+    raise ValueError(
+        f"model '{model.name}': contacts: expected contacts whose forces in stick the equations "
+        f"determine, got {names}, which cannot slide independently of each other; use one contact "
+        "with the Sum of their laws"
+    )
 
 
 def _named(c: Contact, count: int) -> Contact:
@@ -126,10 +146,8 @@ def _applied(i: int, contacts: tuple[Contact, ...], model: System) -> ca.SX:
     slopes = ca.jacobian(chosen, unknown)
     if ca.depends_on(slopes, F):
         raise _refused(contacts[i], "accelerations and normal forces affine in the friction forces")
-    z, u = symbols_of(model.z), symbols_of(model.u)
-    if ca.depends_on(chosen, z) and ca.depends_on(model.alg, F):
+    if ca.depends_on(chosen, symbols_of(model.z)) and ca.depends_on(model.alg, F):
         raise _refused(contacts[i], "equations without algebraic variables that depend on friction")
-    _refuse_inputs(contacts[i], u)
     constant = ca.substitute(chosen, unknown, ca.SX.zeros(unknown.numel()))
     found = _last_unknown(slopes, -constant)
     if found is None:
@@ -138,8 +156,10 @@ def _applied(i: int, contacts: tuple[Contact, ...], model: System) -> ca.SX:
 
 
 def _change(c: Contact, model: System) -> ca.SX:
-    """Return the rate of the sliding velocity of a contact."""
+    """Return the rate of the sliding velocity of a contact, which must depend on states only."""
     slip, ode = ca.SX(c.slip), ca.SX(0, 1) if model.ode is None else model.ode
+    if ca.depends_on(slip, ca.vertcat(symbols_of(model.z), symbols_of(model.u))):
+        raise _refused(c, "a sliding velocity without inputs, whose rates are unknown")
     return ca.jtimes(slip, symbols_of(model.x), ode) + ca.jacobian(slip, model.t)
 
 
@@ -181,11 +201,6 @@ def _last_unknown(A: ca.SX, b: ca.SX) -> ca.SX | None:
                 rows[i, k] = 0
     pivot = ca.sparsify(rows[n - 1, n - 1])
     return rows[n - 1, n] / pivot if pivot.nnz() else None
-
-
-def _refuse_inputs(c: Contact, u: ca.SX) -> None:
-    if ca.depends_on(ca.SX(c.slip), u):
-        raise _refused(c, "a sliding velocity without inputs, whose rates are unknown")
 
 
 def _refused(c: Contact, expected: str) -> ValueError:

@@ -125,6 +125,20 @@ def test_stored_measurements_are_complete() -> None:
     assert "symfric bench ivp" in page and "Summarised by hand" in page and "; load " in page
 
 
+def test_tools_are_compared_in_columns() -> None:
+    shown = measure.tables()
+    moves = measure.stored()["interop"]["tables"][0]["rows"]
+    for row in moves:
+        if not row["status"]:
+            miss = f"{float(row['miss [m]']):.1e}".replace("e-0", "e-")
+            text = f"{miss}, {row['iterations']}, {row['processor time [s]']} s"
+            assert text in shown["interop_moves"], row
+    late = sum(m["status"] == "out of time" for m in moves)
+    assert shown["interop_moves"].count("out of time") == late
+    assert "`cvodes`" in shown["interop_integrators"] and "stops" in shown["interop_integrators"]
+    assert "symfric bench interop" in shown["interop_by"]
+
+
 def test_a_measurement_is_stored_with_machine_load_and_commit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

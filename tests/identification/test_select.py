@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.cross import Left, cross_validate, percent, relative, shared
+from identification.cross import Left, cross_validate, percent, relative, shared, uncertainty
 from identification.data.dataset import Dataset
 from identification.fit import Fit
 from identification.residuals.points import Points
@@ -41,6 +41,31 @@ def test_the_true_law_is_first_and_the_unknown_one_last(ranking: Ranking) -> Non
     assert ranking["coulomb"].bic > 100
     assert ranking.best.law is not None
     assert "stribeck" in ranking.rows[-1].sentence
+
+
+@pytest.mark.slow
+def test_the_simpler_law_is_first_within_the_standard_error() -> None:
+    """Data of Coulomb and viscous friction; the Stribeck peak may predict better by chance."""
+    first = list[str]()
+    for seed in range(8):
+        r = np.random.default_rng(seed)
+        v = r.choice([-1, 1], 120) * np.geomspace(2e-3, 0.3, 120)
+        F = 4 * np.sign(v) + 8 * v + 0.1 * r.standard_normal(v.size)
+        data = Dataset.of(v=v, F=F, units={"v": "m/s", "F": "N"}, points=True)
+        found = select(["stribeck", "coulomb+viscous"], data, Points(), starts=1)
+        first.append(found.rows[0].law)
+        assert 0 < found.rows[0].uncertainty < 0.3 * found.rows[0].validation
+    assert first.count("coulomb+viscous") >= 7
+
+
+def test_the_standard_error_is_the_spread_over_seeds() -> None:
+    def errors(seed: int) -> list[Left]:
+        r = np.random.default_rng(seed)
+        noise = np.convolve(r.standard_normal(2009), np.ones(10) / np.sqrt(10), mode="valid")
+        return [Left("a", "F", "N", np.arange(2000.0), noise, 5.0)]
+
+    found = np.array([(relative(e), uncertainty(e)) for e in map(errors, range(40))])
+    assert found[:, 1].mean() == pytest.approx(found[:, 0].std(), rel=0.3)
 
 
 def test_ranking_prints_plots_and_is_plain_data(ranking: Ranking) -> None:

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.optimize import lsq_linear
 
 from ocp import Estimate, estimate
 from symfric import (
@@ -36,8 +37,8 @@ def oscillator(loads: int = 1) -> Model:
     return Model("oscillator", x=(x, v), u=(f, *w), ode=ca.vertcat(v.symbol, force), outputs=seen)
 
 
-def dense(f: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return all states (n, 3) of the least-squares problem, and the deviations of the last one."""
+def rows_of(f: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return matrix and right side of the least-squares problem in all states."""
     n = y.size
     whole = expm(STEP * np.block([[RATES, np.array([[0.0], [1.0], [0.0]])], [np.zeros((1, 4))]]))
     A, b = whole[:3, :3], whole[:3, 3]
@@ -50,6 +51,12 @@ def dense(f: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         right[here] = weight[:, 0] * b * f[k]
     for k in np.flatnonzero(np.isfinite(y)):
         rows[3 * n + k, 3 * k], right[3 * n + k] = 1 / NOISE["x"], y[k] / NOISE["x"]
+    return rows, right
+
+
+def dense(f: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return all states (n, 3) of the least-squares problem, and the deviations of the last one."""
+    n, (rows, right) = y.size, rows_of(f, y)
     inverse = np.linalg.inv(rows.T @ rows)
     return (inverse @ rows.T @ right).reshape(n, 3), np.sqrt(np.diag(inverse)[-3:])
 
@@ -66,6 +73,29 @@ def estimated(f: np.ndarray, y: np.ndarray, horizon: int) -> Estimate:
     return estimate(
         oscillator(), data, step=STEP, horizon=horizon, noise=noise, unknown=["load"]
     )  # fmt: skip
+
+
+def test_bounds_are_those_of_bounded_least_squares() -> None:
+    """The whole horizon against a dense solver with bounds; the load is at most 0.2 N."""
+    f, y = measured(12)
+    n, loads = y.size, slice(2, None, 3)
+    A, b = rows_of(f, y)
+    low, high = np.full(3 * n, -np.inf), np.full(3 * n, np.inf)
+    high[loads] = 0.2
+    dense_states = lsq_linear(A, b, (low, high), tol=1e-12, method="bvls").x.reshape(n, 3)
+    noise = {"seen": NOISE["x"], "x": 0.03, "v": 0.2, "load": 0.5}
+    given = {"step": STEP, "horizon": n, "noise": noise, "unknown": ["load"]}
+    found = estimate(
+        oscillator(), {"f": f, "seen": y}, bounds={"load": (None, 0.2)}, **given
+    )  # fmt: skip
+    free = estimate(oscillator(), {"f": f, "seen": y}, **given)
+    assert free.smooth["load"].max() > 0.25
+    assert (found["load"] <= 0.2).all()
+    for i, name in enumerate(("x", "v", "load")):
+        np.testing.assert_allclose(found.smooth[name], dense_states[:, i], atol=1e-4)
+        np.testing.assert_allclose(found.deviations[name], free.deviations[name])
+    with pytest.raises(ValueError, match=r"expected bounds of 'load' as \(lower, upper\)"):
+        estimate(oscillator(), {"f": f, "seen": y}, bounds={"load": (2.0, 1.0)}, **given)
 
 
 def test_a_whole_horizon_is_the_least_squares_solution() -> None:

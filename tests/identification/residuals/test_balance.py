@@ -61,7 +61,7 @@ def test_forward_dynamics_leaves_nothing(model: Model, signals: list[str]) -> No
         a = [rate[places[c.rate.name]] for c in found]
         columns.append(np.array([*q, *v, *a, *force, 0.0]))
     w = np.column_stack(columns)
-    made = balance(model, names, found, w[:, 0], "test")
+    made = balance(model, names, found, w, "test")
     assert [row.signal for row in made.rows] == signals
     path = made.equations.along(w, 1.0, p)
     np.testing.assert_allclose(path.rows, 0.0, atol=1e-8)
@@ -71,7 +71,7 @@ def test_forward_dynamics_leaves_nothing(model: Model, signals: list[str]) -> No
 
 def test_only_friction_of_a_row_switches_it_off() -> None:
     model = Arm(LAW).model(["mu_d"])
-    made = balance(model, ["mu_d"], coordinates(model, "test"), np.ones(3 * 6 + 6 + 1), "test")
+    made = balance(model, ["mu_d"], coordinates(model, "test"), np.ones((3 * 6 + 6 + 1, 1)), "test")
     assert [row.slips for row in made.rows] == [(i,) for i in range(6)]
 
 

@@ -106,7 +106,8 @@ def test_states_of_a_law_follow_the_measured_velocity() -> None:
     data = Dataset.of(t=T, x=run["x"], force=force, units={"x": "m", "force": "N"})
     one = subject(drive, free=["m", "mu_s", "mu_d", "v_s", "sigma_0", "sigma_1", "sigma_2"])
     rows = plain(data, one, filter=Filter(100.0, 4))
-    values = starts(one)
+    assert rows.names == (*one.names, "preload[0]")
+    values = np.append(starts(one), [u.start for u in rows.own])
     r = evaluated(rows, values).r
     assert np.sqrt(np.mean(r**2)) < 5e-3 * np.sqrt(np.mean(force**2))
     check_slopes(rows, values * 1.05)

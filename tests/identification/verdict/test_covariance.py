@@ -123,11 +123,6 @@ def test_tied_values_follow() -> None:
     assert found.correlation[0, 2] == pytest.approx(1.0)
 
 
-def test_few_effective_samples_are_reported() -> None:
-    made = fitted(coulomb(200), 0.01 * np.cumsum(ar1(200, 0.5, 2)))
-    assert any("independent samples for 4 unknowns" in s for s in covariance(made).sentences)
-
-
 def test_intervals_are_those_of_student() -> None:
     found = of("a b", C, V, values=(2.0, 5.0))
     reach = student.ppf(0.975, found.freedom) * found.standard_errors

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from phases import solve_once
 
+from ocp import Phase, integral, solve
 from ocp.formulation.problem import Problem
 from ocp.friction import sequence
 from ocp.friction.arc_solution import ModeSolver, SolvedSequence
@@ -22,6 +23,7 @@ from ocp.solving.one_solve import starts_around
 from ocp.solving.starts import initial_points
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
+from symfric import BrownMcPhee, Contact, Model, Variable
 
 
 def there_and_back() -> Track:
@@ -219,3 +221,23 @@ def test_ends_stay_phases_join_and_resting_states_take_the_size_of_their_unit() 
     ways = [np.ptp(np.hstack([s.nodes for s in points.spans])[:2], axis=1) for points in starts]
     typical = np.median(ways, axis=0)
     assert typical[0] == pytest.approx(typical[1], rel=0.9)
+
+
+@pytest.mark.slow
+def test_stick_of_a_periodic_motion_starts_without_slip() -> None:
+    """A part on a shaken tray: without the condition, it would stick at any sliding velocity."""
+    x, v, q, w = (Variable(n, u) for n, u in (("x", "m"), ("v", "m/s"), ("q", "m"), ("w", "m/s")))
+    a = Variable("a", "m/s^2", nominal=5.0)
+    tray = Contact("tray", v - w, 9.81, BrownMcPhee(mu_s=0.4, mu_d=0.3, v_t=1e-4))
+    ode = ca.vertcat(v, -tray.force, w, a)
+    model = Model("conveyor", x=(x, v, q, w), u=(a,), ode=ode, contacts=(tray,))
+    cycle = Phase(model, 0.4, start={"x": 0.0, "q": 0.0}, end={"x": 0.05})
+    limits = {"a": (-12.0, 12.0)}
+    cost = integral(lambda s: s.a**2)
+    found = solve(Problem(cycle, cost, periodic=["v", "q", "w"], bounds=limits), starts=2)
+    assert found.verified
+    (stick, slip) = found.modes["tray"]
+    assert (stick.kind, slip.kind) == ("stick", "slip+")
+    sliding = found["v"] - found["w"]
+    assert np.abs(sliding[found.t < stick.end - 1e-6]).max() < 1e-6
+    assert sliding[(found.t > slip.begin) & (found.t < slip.end)].min() > -1e-9

@@ -96,6 +96,16 @@ def test_ratios_are_over_the_reference() -> None:
     assert not [*ratios(rows, "absent", ERRORS)]
 
 
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs of 2 s, at two tolerances."""
+    monkeypatch.setattr(integrator, "T_END", 2.0)
+    monkeypatch.setattr(integrator, "TIMES", np.linspace(0.0, 2.0, 21)[1:])
+    monkeypatch.setattr(integrator, "TOLERANCES", (0, 0, 1e-4, 1e-7))
+    monkeypatch.setattr(integrator, "CASES", {"belt": BrownMcPhee()})
+    monkeypatch.setattr(integrator, "FREE", ("mu_s", "k"))
+
+
 @pytest.mark.slow
 @needs_compiler
 def test_integrators_and_derivatives_are_measured(short: None) -> None:

@@ -21,7 +21,8 @@ from symfric.bench.codegen import PROVEN, plants, trials
 from symfric.bench.identification import files, outcome
 from symfric.bench.identification_files import campaign
 from symfric.bench.identification_memory import ranked
-from symfric.bench.identification_repeats import coloured, far
+from symfric.bench.identification_repeats import far
+from symfric.bench.identification_scenes import ar
 from symfric.bench.interop import GOAL, ROUTES, STEPS, N, T, missed, move
 from symfric.bench.ocp import controllers
 from symfric.bench.report import GOALS, Row
@@ -140,8 +141,8 @@ def test_a_free_run_of_the_true_drive_leaves_the_noise() -> None:
 
 
 def test_coloured_noise_and_distant_starts() -> None:
-    noise = coloured(np.random.default_rng(1), 20_000, 0.9)
-    assert np.var(noise) == pytest.approx(1 / (1 - 0.81), rel=0.15)
+    noise = ar(np.random.default_rng(1), 20_000, 0.9, 2.0)
+    assert np.var(noise) == pytest.approx(4.0, rel=0.15)
     assert np.corrcoef(noise[1:], noise[:-1])[0, 1] == pytest.approx(0.9, abs=0.02)
     start = far({"m": 2.0, "k": 5.0}, 4.0, 0)
     assert all(0.25 < start[n] / x < 4 for n, x in (("m", 2.0), ("k", 5.0)))

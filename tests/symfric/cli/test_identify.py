@@ -90,6 +90,11 @@ def test_records_are_fitted_together_and_parameters_can_be_held(symfric) -> None
     assert result["validation"] is None
 
 
+def test_a_dead_time_is_estimated_between_bounds(symfric) -> None:
+    result = symfric(f"{LINE} --dead-time 0:6e-3 --starts 1 --json -").json
+    assert abs(result["parameters"]["dead_time[0]"]["value"]) < 6e-3
+
+
 def test_points_of_a_curve_with_columns_and_units_of_the_call(symfric) -> None:
     line = "identify points.csv --law coulomb+viscous --kind points --free offset --json -"
     named = symfric(f"{line} --column v=speed --column F=load --unit v=mm/s --unit F=kN").json

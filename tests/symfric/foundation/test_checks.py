@@ -141,6 +141,7 @@ def test_the_first_remembered_stays_and_the_oldest_goes() -> None:
     known: dict[Hashable, str] = {}
     for key, made, kept in ((1, "a", "a"), (1, "b", "a"), (2, "c", "c"), (2, "d", "c")):
         assert remember(known, key, made, 2) == kept
+    assert known == {1: "a", 2: "c"}
     assert remember(known, 3, "e", 2) == "e"
     assert known == {2: "c", 3: "e"}
 

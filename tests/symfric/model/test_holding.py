@@ -213,3 +213,12 @@ def test_applied_forces_may_be_algebraic_variables() -> None:
     assert len(one.happened) > 5
     for name in ("x0", "x1", "v0", "v1"):
         np.testing.assert_allclose(one[name], other[name], rtol=0, atol=1e-7)
+
+
+def test_contacts_of_one_motion_are_refused() -> None:
+    """Their shares are undetermined in stick; two blocks, or one and its sum, are determined."""
+    one, two = (contact(name, COULOMB, V, 5.0) for name in ("one", "two"))
+    with pytest.raises(ValueError, match=r"in stick the equations determine, got one, two, which"):
+        Model("own", x=(X, V), u=(U,), contacts=(one, two),
+              ode=ca.vertcat(V, U - one.force - two.force))  # fmt: skip
+    assert len(blocks(False).contacts) == 2

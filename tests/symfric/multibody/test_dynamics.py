@@ -10,6 +10,7 @@ from chains import TREE, at_start, chain, in_both, rod, solve, state
 
 from symfric import BrownMcPhee, LuGre
 from symfric import multibody as mb
+from symfric.foundation.parameters import Variable
 from symfric.multibody.dynamics import kinetic_energy
 from symfric.multibody.equations import equations
 from symfric.multibody.forces import Force
@@ -253,3 +254,20 @@ def test_constraints_and_energy_are_those_of_the_model() -> None:
     kinetic, potential = (float(e) for e in f["energy"].call([x[:4], x[4:8], []]))
     assert kinetic == pytest.approx(3.0)
     assert kinetic + potential == pytest.approx(387.9365209137809)
+
+
+def test_poses_give_the_positions_of_the_bodies() -> None:
+    pose = mb.functions(rod())["poses"]([np.pi / 2], []).full()
+    assert pose[:, 3] == pytest.approx([-0.4, 0.0, 0.0])
+    assert pose[:, :3] @ pose[:, :3].T == pytest.approx(np.eye(3))
+
+
+def test_parameters_enter_by_their_symbols() -> None:
+    radius = Variable("radius", "m", start=0.1)
+    friction = mb.JointFriction(BrownMcPhee(), radius=radius.symbol)
+    f = mb.functions(rod(friction), (radius,))["inverse_dynamics"]
+    still, sliding = (
+        [float(f([0.0], [w], [0.0], [], [], [], [r])) for r in (0.1, 0.2)] for w in (0.0, 1.0)
+    )
+    assert still == pytest.approx([0.0, 0.0])
+    assert sliding[1] == pytest.approx(2 * sliding[0], rel=1e-3)

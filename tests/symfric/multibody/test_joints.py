@@ -123,6 +123,12 @@ def test_a_new_joint_is_a_class_and_nothing_else() -> None:
     assert kinds(m.build())["pin_slide"] == "position"
 
 
+def test_distance_measures_from_point_to_point() -> None:
+    made = mb.Distance("rod", "a", "b", length=5.0)
+    for z, expected in ((0.0, 0.0), (1.0, 0.5)):
+        assert float(ca.DM(made.constraints(ca.SX.eye(3), ca.SX([3.0, 4.0, z])))) == expected
+
+
 def test_a_joint_starts_at_its_given_position_or_without_displacement() -> None:
     for kind, start, expected in (
         (mb.Revolute, 0.3, (0.3,)), (mb.Revolute, None, (0,)), (mb.Cylindrical, (1.0, 2.0), (1, 2)),
@@ -155,6 +161,15 @@ def test_euler_parameters_agree_with_scipy_and_come_back() -> None:
         back = euler_parameters(ca.DM(R)).full().ravel()
         assert back * np.sign(back @ p) == pytest.approx(p)
         assert back[0] >= 0.0
+
+
+def test_identities_of_e_and_g() -> None:
+    p = unit_four(0)
+    E, G, R = (full(f(ca.SX(p))) for f in (euler_e, euler_g, rotation))
+    assert pytest.approx(R) == E @ G.T
+    assert E @ p == pytest.approx(np.zeros(3))
+    assert pytest.approx(np.eye(3)) == E @ E.T
+    assert pytest.approx(np.eye(4) - np.outer(p, p)) == E.T @ E
 
 
 def test_rates_of_euler_parameters_give_both_angular_velocities() -> None:

@@ -134,6 +134,7 @@ def test_pictures_over_what_was_varied() -> None:
     line = figure.axes[0].lines[0]
     np.testing.assert_array_equal(line.get_xdata(), MU)
     np.testing.assert_array_equal(line.get_ydata(), made["x"][:, -1])
+    assert line.get_markersize() == 3.0  # few points: each is seen on its line
     assert figure.axes[1].get_xlabel() == "mu_s"
     model = rabinowicz(LuGre(), free=["mu_s"])
     mixed = simulate_many(model, 0.1, p={"mu_s": [0.3, 0.1, 0.2]}, backend="vm")

@@ -138,6 +138,48 @@ def test_members_have_inputs_and_ends_of_their_own(case: str, backend: str) -> N
     )
 
 
+@each_engine
+def test_a_search_after_a_jump_does_not_disturb_the_others(
+    backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """z^3 + z/100 = u: after a large jump of u a damped search finds z, and the run continues."""
+    x, z = Variable("x", "m", start=0.0), Variable("z", "m/s", start=0.0)
+    u = Variable("u", "m/s", start=0.0)
+    alg = z.symbol**3 + 0.01 * z.symbol - u.symbol
+    model = Model("cubic", x=(x,), z=(z,), u=(u,), ode=z.symbol, alg=alg)
+    rows = np.array([[0.01, 0.01, 0.01], [0.01, 8.0, 1.0], [1.0, 1.1, 1.0], [1.0, 8.0, 1e-3]])
+    searched: list[int] = []
+    real = chunk_module.consistent_many
+
+    def counted(equations: Any, together: Any, where: str, y: Any, d: Any) -> Any:
+        searched.append(y.shape[0])
+        return real(equations, together, where, y, d)
+
+    monkeypatch.setattr(chunk_module, "consistent_many", counted)
+    many = simulate_many(
+        model, 0.9, u={"u": Hold([0.0, 0.3, 0.6], rows)}, t_eval=[0.1, 0.3, 0.5, 0.6, 0.9],
+        backend=backend, executor="serial",
+    )  # fmt: skip
+    assert not many.failed
+    if backend == "compiled":
+        assert searched[0] == 4
+        assert 1 <= sum(searched[1:]) <= 4
+    level = rows[:, [0, 1, 1, 2, 2]]
+    assert many["z"] ** 3 + 0.01 * many["z"] == pytest.approx(level, rel=1e-6)
+
+
+def test_mechanisms_are_assembled_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    def alone(*arguments: Any) -> Any:
+        pytest.fail(f"a member was assembled alone: {arguments[2]}")
+
+    monkeypatch.setattr(chunk_module, "consistent_many", alone)
+    given: dict[str, Any] = {"x0": {"x": [0.6, 0.7, 0.65]}, "t_eval": [0.0, 0.5]}
+    many = simulate_many(pendulum(), 0.5, backend="compiled", **given)
+    assert not many.failed
+    for m in range(3):
+        alone_as(many, m, pendulum(), 0.5, **given)
+
+
 def test_time_may_start_anywhere_and_numbers_are_one_member() -> None:
     x, t = Variable("x", "m", start=0.0), ca.SX.sym("t")
     model = Model("swing", x=(x,), ode=ca.cos(t), t=t)

@@ -20,6 +20,7 @@ import symfric.integrator.running.integrator as module
 import symfric.integrator.running.run as running
 from symfric.integrator.running import run
 from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.running.run import _March
 from symfric.laws import ALL_LAWS
 from symfric.scenes import PendulumBox, SliderCrank
 
@@ -168,6 +169,22 @@ def test_every_law_gives_the_same_bits_by_both_engines() -> None:
             assert vm == compiled, model.name
             count += 1
     assert count > 80
+
+
+@needs_compiler
+def test_only_a_far_jump_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of two jumps: the compiled loop comes back for the far one alone."""
+    searched = list[float]()
+    search = _March._make_consistent  # pyright: ignore[reportPrivateUsage]
+
+    def counted(self: _March, moved: bool = False) -> None:
+        searched.append(self.t)
+        search(self, moved)
+
+    monkeypatch.setattr(_March, "_make_consistent", counted)
+    _, t_end, arguments = CASES["held cubic"]
+    sf.simulate(cubic(), t_end, backend="compiled", **arguments)
+    assert searched == [1.0]
 
 
 Array = NDArray[np.float64]

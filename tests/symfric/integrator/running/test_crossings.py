@@ -15,7 +15,7 @@ from symfric import Event, Linear, MaxwellSlip, Model, Status, Variable, drive, 
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.crossings import Memory
-from symfric.integrator.running.engine import CompiledEngine
+from symfric.integrator.running.engine import CompiledEngine, loop_source
 from symfric.integrator.running.events import storm
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Dense, Jumps
@@ -99,6 +99,14 @@ def test_no_attempt_behind_an_event_is_made_in_vain() -> None:
     assert run.statistics.events == 499
     assert run.statistics.rejections == 0
     assert run.statistics.steps < 2.1 * 499
+
+
+def test_a_model_without_events_has_nothing_of_them_in_its_code() -> None:
+    for events, found in (((), False), ((Event("one", X - 1),), True)):
+        model = Model("clock", x=(x,), ode=ca.SX(1), events=events)
+        made = Integrator(model, input_data(model, None, 0.0, 1.0), RODAS5P)
+        source = loop_source(made.step, RODAS5P.H.shape[0], made.crossings)
+        assert ("static int symfric_search" in source) == found
 
 
 @needs_compiler

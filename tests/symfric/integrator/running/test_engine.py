@@ -1,8 +1,9 @@
 """Virtual machine and compiled loop: the same steps, the same reasons to stop."""
 
 import numpy as np
+import pytest
 from backends import each_backend, needs_compiler
-from closed_forms import assemble
+from closed_forms import assemble, smooth_ode
 from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, LuGre, Model, rabinowicz
@@ -59,6 +60,23 @@ def test_both_engines_stop_after_the_same_attempt() -> None:
             records, made, stop = run(runner, S, data(3, 5.0, 1e-6), rows, attempts, h_min)
             found.append((records.tobytes(), made, stop, S.tobytes()))
         assert found[0] == found[1], (rows, attempts, h_min)
+
+
+@each_backend
+def test_records_are_a_chain_from_start_to_end(backend: str) -> None:
+    """At the end nothing is done."""
+    runner, S = engine(backend, smooth_ode().model), start((1.0, 1.0))
+    records, _, _ = run(runner, S, data(2, 1.0), 9999, 9999, 0.0)
+    t0, t1, y0, y1 = records[:, 0], records[:, 1], records[:, 2:4], records[:, 4:6]
+    assert (t0[0], t1[-1], S[0]) == (0.0, 1.0, 1.0)
+    assert (t1[:-1] == t0[1:]).all()
+    assert (y1[:-1] == y0[1:]).all()
+    assert y0[0].tolist() == [1.0, 1.0]
+    assert y1[-1].tolist() == S[State.MEMORY :].tolist()
+    assert y1 == pytest.approx(np.array([smooth_ode().exact(t) for t in t1]), rel=1e-6)
+    before = S.copy()
+    records, made, stop = run(runner, S, data(2, 1.0), 9, 9, 0.0)
+    assert (records.shape[0], made, stop, S.tolist()) == (0, 0, Stop.END, before.tolist())
 
 
 @each_backend

@@ -1,6 +1,7 @@
 """Roots of events are isolated: no pair of crossings inside a step goes unseen."""
 
 from itertools import product
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -13,6 +14,7 @@ from symfric import Event, ExactCoulomb, Model, Variable, rabinowicz, simulate
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.integrator.running.crossings import STRAIGHT
+from symfric.integrator.running.events import Change, Search, Stop
 from symfric.integrator.running.integrator import Integrator
 
 x, c, w = Variable("x", "1"), Variable("c", "1"), Variable("w", "1")
@@ -45,6 +47,23 @@ def test_dips_of_any_width_are_seen(backend: str) -> None:
                 found = crossings(dip, at, width, backend)
                 assert found == pytest.approx([at - width, at + width], abs=2e-10)
         assert crossings(clock(sign * ((X - C) ** 2 + W)), 0.4321, 1e-12, backend) == []
+
+
+def test_the_virtual_machine_searches_only_where_an_event_is_possible(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    searched = list[bool]()
+
+    def search(of: Search, *step: Any) -> tuple[Change, Stop | None]:
+        change, requested = whole(of, *step)
+        searched.append(change is Change.CUT)
+        return change, requested
+
+    whole = Search.__call__
+    monkeypatch.setattr(Search, "__call__", search)
+    run = simulate(rabinowicz(ExactCoulomb()), 20.0, backend="vm")
+    assert sum(searched) == run.statistics.events
+    assert len(searched) < 3 * run.statistics.events < run.statistics.steps / 3
 
 
 @each_backend

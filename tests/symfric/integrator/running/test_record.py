@@ -73,6 +73,16 @@ def test_value_at_a_jump_is_that_after_it() -> None:
     assert both(np.array([2.0]))[0, 0] == pytest.approx(second.y1[0, 0])
 
 
+@pytest.mark.parametrize("method", ["rodas5p", "rodas4p", "rodas3"])
+def test_dense_output_is_as_accurate_as_the_steps(method: str) -> None:
+    model = sf.rabinowicz(sf.LuGre())
+    run = sf.simulate(model, 8.0, method=method, rtol=1e-6)
+    reference = sf.simulate(model, 8.0, rtol=1e-11)
+    at_steps = np.abs(run.at(run.step_times)["x"] - reference.at(run.step_times)["x"]).max()
+    between = np.abs(run["x"] - reference["x"]).max()
+    assert between < 3 * at_steps + 1e-6
+
+
 TIMES = [0.0, 0.1, 0.3, 0.30001, 0.4, 0.9, 1.7, 2.0]
 """Some of them at jumps of the inputs."""
 FORCE = sf.Hold([0.0, 0.3, 0.4, 0.9], [0.0, 15.0, -15.0, 20.0])

@@ -108,6 +108,14 @@ def test_near_jumps_take_no_search_and_jumps_without_a_solution_fail(
     assert run.step_times[-1] == 1.0
 
 
+def test_measured_error_is_that_of_the_run() -> None:
+    """x = exp(-t) at rtol 1e-5, compared with the closed form."""
+    run = simulate(DECAY, 3.0, rtol=1e-5, measure_error=True)
+    true = np.abs(run["x"] - np.exp(-run.t)).max()
+    assert run.statistics.error == pytest.approx(true, rel=0.05)
+    assert run.statistics.error < 1e-4
+
+
 def test_measured_error_does_not_share_the_mistakes_of_the_run() -> None:
     """Simscape's smooth peak lets go where the swinging block comes back to: all hangs on 1e-7 m.
 

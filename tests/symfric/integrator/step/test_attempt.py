@@ -74,6 +74,15 @@ def test_graph_of_blocks_computes_what_the_flat_expression_does(model: Model, me
             assert other.full() == pytest.approx(one.full(), rel=1e-6, abs=1e-12)
 
 
+def test_graph_of_blocks_is_smaller_for_a_large_system() -> None:
+    states = tuple(Variable(f"x_{i}", "1", start=1.0) for i in range(12))
+    every = ca.vertcat(*(v.symbol for v in states))
+    ode = ca.vertcat(every[1:] - every[:-1], -every[-1]) - every
+    system = assemble(Model("chain", x=states, ode=ode + ca.sin(every) * ca.sum1(every) / 12))
+    flat, blocks = (build_step(system, RODAS5P, kind) for kind in (ca.SX, ca.MX))
+    assert blocks.n_instructions() < flat.n_instructions() / 4
+
+
 @pytest.mark.parametrize("case", [smooth_ode(), smooth_dae(), timed_ode()])
 def test_accepted_attempt_is_the_bare_step(case: ClosedForm) -> None:
     h, y = 0.01, case.exact(0.0)

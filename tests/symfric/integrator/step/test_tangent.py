@@ -12,7 +12,7 @@ from symfric.foundation.parameters import symbolise
 from symfric.integrator.equations.system import System
 from symfric.integrator.step.tangent import Tangent, tangent
 from symfric.multibody import Mechanism, PrescribedMotion
-from symfric.scenes import FourBar, FourMass, MechanismScene, SliderCrank
+from symfric.scenes import FourBar, FourMass, MechanismScene, PendulumBox, SliderCrank
 
 pytestmark = pytest.mark.heavy
 
@@ -49,6 +49,17 @@ def test_charts_lead_where_all_coordinates_lead(name: str) -> None:
     assert one["constraint_position"].max() < 1e-12
     assert one["constraint_velocity"].max() < 1e-12
     assert one["constraint_acceleration"].max() < 1e-9
+
+
+def test_as_many_differential_unknowns_as_degrees_of_freedom() -> None:
+    """A tree needs no chart."""
+    for name, n, degrees in (("four_mass", 4, 2), ("slider_crank", 2, 1), ("four_bar", 3, 1)):
+        whole, chart = unknowns(smooth(SCENES[name]).build(index=0))
+        constraints = n - degrees
+        assert chart.reduced.nx == 2 * degrees
+        assert chart.reduced.n == 2 * degrees + n + constraints
+        assert whole.n == 2 * n + n + constraints + n * degrees
+    assert tangent(assemble(PendulumBox(LAW).mechanism().build(index=0))) is None
 
 
 def start_of(model: Model) -> np.ndarray:
@@ -119,6 +130,16 @@ def test_charts_follow_constraints_that_move() -> None:
     assert one["x4_rate"] == pytest.approx(-1.0 + 0.6 * one.t, abs=1e-12)
     assert one["x1"] == pytest.approx(other["x1"], abs=1e-7)
     assert one["drive_force"] == pytest.approx(other["drive_force"], abs=1e-5)
+
+
+def test_dense_output_between_steps_is_as_good_as_the_steps() -> None:
+    model = smooth(SCENES["four_mass"]).build(index=0)
+    run = simulate(model, 2.0, rtol=1e-7)
+    exact = simulate(model, 2.0, rtol=1e-12)
+    between = np.linspace(0.013, 1.987, 301)
+    coarse, fine = run.at(between), exact.at(between)
+    for name in ("x1", "x1_rate", "x4_rate"):
+        assert coarse[name] == pytest.approx(fine[name], abs=2e-5)
 
 
 @pytest.mark.slow

@@ -139,6 +139,8 @@ def test_rounding_of_an_inertia_is_zero() -> None:
         tip = urdf.links["tip"]
         assert tip is not None
         assert (tip.mass, tip.J.any(), urdf.doubts) == (1.3, False, ())
+    for least in ("0", "-1e-11"):  # of a thin rod
+        assert parse(inertia(1.3, f'ixx="{least}" iyy="1" izz="1"'), strict=True).doubts == ()
 
 
 def test_inertia_of_no_body_is_kept_and_named_or_refused() -> None:

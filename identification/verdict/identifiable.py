@@ -1,0 +1,109 @@
+"""Values that the data determine, and intervals of values on which residuals depend nonlinearly.
+
+The linear interval of a value is valid if the residuals are linear up to its ends, with the other
+values adapting. Otherwise its ends follow from the profile likelihood. A value is identifiable if
+
+    rise >= 10 at both ends of its range,   rise = min over the others [cost - least cost] / s^2
+
+An example is a Stribeck velocity far below all measured speeds, where the peak vanishes: if it fits
+as well, neither the velocity nor the static level is identifiable. Such values have no interval.
+The intervals of the other values are extended to include both fits.
+Sources: Raue et al., Bioinformatics 25(15), 2009; Davies, Biometrika 64(2), 1977 (a parameter that
+exists only under the alternative); the limit is that of Kass and Raftery, J. Am. Stat. Assoc. 90,
+1995, for -2 log of a likelihood ratio.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from identification.residuals.evaluation import Array
+from identification.solving.task import Point, Task
+from identification.verdict.covariance import LINEAR, Covariance, bend
+from identification.verdict.profile import Walk
+
+BENT = 0.1
+"""Deviation from linearity (`bend`) above which an interval follows from its profile."""
+SHOWN = 10.0
+"""Rise of the cost at the ends of the range of a value that shows the value."""
+DECADES = 3.0
+"""Distance of these ends for a logarithmic value without bounds [decades]."""
+POINTS = 3
+"""Approximate number of points of a profile to each side."""
+
+
+def assured(task: Task, point: Point, linear: Covariance, steps: Mapping[str, Array]) -> Covariance:
+    """Return the covariance with intervals for nonlinear models, without those that are not shown.
+
+    Args:
+        task, point: solved task and its minimum.
+        linear: linear covariance and intervals.
+        steps: changes of the coordinates to the ends of the linear intervals, see `steps_of`.
+    """
+    names = [*steps]
+    bent = {n: [bend(task, point, side * steps[n]) for side in (-1.0, 1.0)] for n in names}
+    walks = {n: Walk(task, point, linear, n) for n in names if max(bent[n]) > LINEAR}
+    found = linear
+    for name, walk in walks.items():
+        there = None if name in found.notes else _elsewhere(point, walk)
+        found = found if there is None else _without(found, name, there, walk.unknown.unit)
+    if found is not linear:
+        return found
+    for name, walk in walks.items():
+        found = _profiled(found, walk, name, bent[name])
+    return found
+
+
+def _elsewhere(point: Point, walk: Walk) -> Point | None:
+    """Return a fit with the value at an end of its range that is as good, None without one."""
+    for c in walk.far(DECADES):
+        there = walk.held_at(point.w, c)
+        if not isinstance(there, str) and (there.cost - point.cost) / walk.scale < SHOWN:
+            return there
+    return None
+
+
+def _profiled(found: Covariance, walk: Walk, name: str, bent: list[float]) -> Covariance:
+    """Return `found` with the ends of a profile where the residuals are not linear."""
+    low, high, i = found.low.copy(), found.high.copy(), found.names.index(name)
+    for side, curved, ends in ((-1, bent[0], low), (1, bent[1], high)):
+        if curved > BENT:
+            _, end, why = walk.side(side, POINTS)
+            if end is None:
+                return _none(found, [name], why)
+            ends[i] = end
+    return replace(found, low=low, high=high)
+
+
+def _without(found: Covariance, name: str, there: Point, unit: str) -> Covariance:
+    """Return intervals that include another fit `there`, none for `name` and values like it.
+
+    Values without influence in the other fit have no interval either.
+    """
+    names = found.names
+    value = dict(zip(names, there.values.tolist(), strict=True))[name]
+    J = there.evaluation.J / there.sigma[:, None]
+    effect = np.linalg.norm(J, axis=0) * np.abs(there.values)
+    lost = [n for n, e in zip(names, effect, strict=True) if n == name or e < 1.0]
+    half = (found.high - found.low) / 2
+    low, high = np.fmin(found.low, there.values - half), np.fmax(found.high, there.values + half)
+    verb = "is" if len(lost) == 1 else "are"
+    why = f"{name} = {value:.3g}{'' if unit == '1' else ' ' + unit} fits as well"
+    text = f"{' and '.join(lost)} {verb} not identifiable: {why}; the other intervals include both."
+    return _none(replace(found, low=low, high=high), lost, text)
+
+
+def _none(found: Covariance, lost: list[str], text: str) -> Covariance:
+    """Return `found` without intervals and errors of the values in `lost`."""
+    out = np.array([n in lost for n in found.names])
+    both = out[:, None] | out
+    return replace(
+        found,
+        matrix=np.where(both, np.nan, found.matrix),
+        white=np.where(both, np.nan, found.white),
+        low=np.where(out, np.nan, found.low),
+        high=np.where(out, np.nan, found.high),
+        sentences=(*found.sentences, text),
+        notes={**found.notes, **dict.fromkeys(lost, "not identifiable")},
+    )

@@ -1,0 +1,54 @@
+"""Bootstrap of fits: its errors are those of the linear theory for linear models."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from identification.data.dataset import Dataset
+from identification.fit import Fit
+from identification.residuals.points import Points
+from identification.result.fitted import Fitted
+
+
+def fitted(colour: float) -> Fitted:
+    """Coulomb and viscous friction with noise of a given autocorrelation."""
+    random = np.random.default_rng(0)
+    t = 1e-2 * np.arange(600)
+    v = 0.1 * np.sin(1.7 * t) + 0.07 * np.sin(0.6 * t)
+    noise = random.standard_normal(t.size)
+    for k in range(1, t.size):
+        noise[k] += colour * noise[k - 1]
+    F = 5 * np.tanh(v / 1e-4) + 20 * v + 0.2 * noise
+    data = Dataset.of(t=t, v=v, F=F, units={"v": "m/s", "F": "N"})
+    return Fit(Points(), "coulomb+viscous", data, starts=1).solve(throw=False)
+
+
+@pytest.mark.parametrize("colour", [0.0, 0.7])
+def test_errors_are_those_of_the_sandwich_also_with_coloured_residuals(colour: float) -> None:
+    fit = fitted(colour)
+    found = fit.bootstrap(60)
+    for name, error in found.standard_errors.items():
+        assert error == pytest.approx(fit.parameters[name].standard_error, rel=0.35)
+        low, high = found.interval(name)
+        assert low < fit.parameters[name].value < high
+    assert found.failed == 0
+    assert (found.blocks["F"] > 12) == (colour > 0)
+    assert "sigma_2" in str(found)
+
+
+def test_an_executor_gives_the_same_bits() -> None:
+    fit = fitted(0.0)
+    with ThreadPoolExecutor(2) as pool:
+        both = [fit.bootstrap(6, executor=executor).samples for executor in (None, pool)]
+    np.testing.assert_array_equal(*both)
+
+
+def test_bad_arguments_are_refused() -> None:
+    fit = fitted(0.0)
+    with pytest.raises(ValueError, match="bootstrap: count: expected a whole number >= 2"):
+        fit.bootstrap(1)
+    with pytest.raises(ValueError, match="interval: expected one of mu_d, sigma_2, got mu"):
+        fit.bootstrap(2).interval("mu")
+    with pytest.raises(ValueError, match="interval: level"):
+        fit.bootstrap(2).interval("mu_d", 2.0)
