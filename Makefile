@@ -50,6 +50,7 @@ stress: $(VENV)/.test
 	$(BIN)/python -m pytest --hypothesis-profile stress tests/symfric/laws
 	$(BIN)/python -m pytest --recompute tests/symfric/scenes tests/symfric/integrator/test_accuracy.py
 	$(BIN)/symfric stress --cases 10000 --json out/stress.json --out out/stress_cases
+	$(BIN)/symfric bench identification --json out/identification.json --plot out/identification.png
 
 mutants: $(VENV)/.test
 	$(BIN)/python tests/mutants.py

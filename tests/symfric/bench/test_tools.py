@@ -15,7 +15,7 @@ from identification import Dataset, synthetic_drive_data
 from ocp import solve
 from ocp.problems import READY, out_and_back
 from symfric import Coulomb, Sum, Viscous, drive, law_from_text, with_values
-from symfric.bench import codegen, embedded, identification, starts
+from symfric.bench import codegen, embedded, identification, identification_verdicts, starts
 from symfric.bench import identification_measured as measured
 from symfric.bench.codegen import PROVEN, plants, trials
 from symfric.bench.identification import files, outcome
@@ -146,6 +146,16 @@ def test_coloured_noise_and_distant_starts() -> None:
     assert np.corrcoef(noise[1:], noise[:-1])[0, 1] == pytest.approx(0.9, abs=0.02)
     start = far({"m": 2.0, "k": 5.0}, 4.0, 0)
     assert all(0.25 < start[n] / x < 4 for n, x in (("m", 2.0), ("k", 5.0)))
+
+
+def test_verdicts_and_coverage_are_counted_and_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen = [s for s in identification_verdicts.SCENES if s.name.startswith("curve, c")]
+    monkeypatch.setattr(identification_verdicts, "SCENES", chosen)
+    found = list(identification_verdicts.verdicts(quick=True))
+    rows = [row for title, row in found if title == identification_verdicts.TITLE]
+    assert [row["fits"] for row in rows] == [1.0]
+    assert [row["met"] for title, row in found if title == GOALS] == ["yes"] * 3
+    assert len(identification_verdicts.draw(rows).axes) == 2
 
 
 def test_some_files_end_as_they_should() -> None:
