@@ -54,14 +54,16 @@ def plateaus(
         Records with the channels v, F, `n` (samples per mean, for `Points(weight="n")`), `spread`
         (standard deviation of the force) and `t_mean` (mean time).
 
+    Records with one plateau each are one record of points.
+
     Raises:
-        ValueError: no record has two plateaus, intervals are unequal, or an argument is out of
+        ValueError: fewer than two plateaus, intervals are unequal, or an argument is out of
             range.
     """
     shortest = checks.number("plateaus: shortest", shortest, unit="s", above=0.0)
     change = checks.number("plateaus: change", change, above=0.0)
     settle = checks.number("plateaus: settle", settle, lower=0.0, upper=0.9)
-    found: list[Record] = []
+    found, single = list[Record](), list[Record]()
     for record in data:
         name = v or ("v" if "v" in record else x)
         step, F = record.uniform().step, record[force]
@@ -71,7 +73,7 @@ def plateaus(
         steady &= np.abs(smooth) > REST * np.abs(smooth).max()
         long = [(b, e) for b, e in runs(steady) if (e - b) * step >= shortest]
         cut = [slice(b + ceil(settle * (e - b)), e) for b, e in long]
-        if len(cut) < 2:
+        if not cut:
             continue
         unit = record.unit(force) or "N"
         columns = {
@@ -81,9 +83,16 @@ def plateaus(
             "spread": (unit, F, np.std),
             "t_mean": ("s", record.time, np.mean),
         }
-        signals = {n: np.array([of(y[s]) for s in cut], float) for n, (_, y, of) in columns.items()}
+        twice = cut if len(cut) > 1 else cut * 2  # a record has at least two rows
+        signals = {
+            n: np.array([of(y[s]) for s in twice], float) for n, (_, y, of) in columns.items()
+        }
         units = {n: unit for n, (unit, *_) in columns.items()}
-        found.append(Record(f"plateaus of {record.name}", None, signals, units))
+        one = Record(f"plateaus of {record.name}", None, signals, units)
+        (found if len(cut) > 1 else single).append(one)
+    if len(single) > 1:  # one record for each speed
+        signals = {n: np.array([one[n][0] for one in single]) for n in single[0].signals}
+        found.append(Record(f"plateaus of {len(single)} records", None, signals, single[0].units))
     if not found:
         raise ValueError(
             f"data '{data.name}': plateaus: expected at least two stretches of {shortest:g} s with "

@@ -205,15 +205,24 @@ def _numeric(row: Sequence[str], comma: bool) -> bool:
 def _first(rows: Rows, comma: bool) -> int | None:
     """Return the index of the first numeric row that is as wide as most of the last rows.
 
-    Numeric rows before a header with the names of channels are settings of the recorder.
+    Rows with text and numbers before a header with names of channels are settings of the recorder.
     """
     widths = [_width(row) for row in rows.cells[-LOOKED_AT:] if _numeric(row, comma)]
     usual = max(set(widths), key=widths.count, default=0)
     wide = [k for k, row in enumerate(rows.cells) if _width(row) >= usual]
     names = [k for k in wide if k < LOOKED_AT and sum(map(_is_name, rows.cells[k])) > 1]
     found = [k for k in wide if _numeric(rows.cells[k], comma)]
-    later = [k for k in found if k > max(names, default=-1)]
+    header = next(iter(names), -1)
+    for k in names:  # a header below rows of numbers only is an error in the file
+        if not any(_is_data(rows.cells[i], comma) for i in found if header < i < k):
+            header = k
+    later = [k for k in found if k > header]
     return next(iter(later or found), None)
+
+
+def _is_data(row: Sequence[str], comma: bool) -> bool:
+    """Return True if all cells are numbers."""
+    return all(_is_number(cell.replace(",", ".") if comma else cell) for cell in row if cell)
 
 
 def _is_name(cell: str) -> bool:

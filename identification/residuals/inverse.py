@@ -210,7 +210,8 @@ def _piece(made: Balance, motion: Motion, model: Model, p: Array, adapts: bool) 
                 f"data '{motion.name}': expected at least {FEWEST} equations of {signal} after the "
                 f"filter ({found.motion.filter}), got {count}; raise the cut-off, lower the "
                 "decimation or v_min in InverseDynamics(filter=Filter(...)), or leave out a part "
-                "with few equations by data.between(begin, end)"
+                "with few equations by data.between(begin, end); a record at one speed is a point: "
+                "Fit(Points(), ..., plateaus(data))"
             )
     return found
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification import Dataset, Fit, InverseDynamics, Points, cross_validate
+from identification import Dataset, Fit, InverseDynamics, Points, cross_validate, plateaus
 from identification.result.page import page_of
 from symfric.foundation.status import Status
 from symfric.laws import Stribeck
@@ -36,6 +36,27 @@ def test_one_record_for_each_speed_is_a_curve(jitter: float) -> None:
         assert abs(p.value - true) < 4 * (p.standard_error or 0.0), name
     left = cross_validate(fit, folds=7, start=TRUE)
     assert left.relative < 5, str(left)
+
+
+def test_records_over_time_at_one_speed_each_are_points() -> None:
+    rng, t = np.random.default_rng(0), 1e-3 * np.arange(1500)
+    some = [
+        Dataset.of(
+            t=t, x=v * t + 1e-7 * rng.standard_normal(t.size), name=f"at {v}",
+            force=float(LAW.force(v, 1.0)) + 0.1 * rng.standard_normal(t.size),
+        )[0]
+        for v in (-1.0, -0.4, -0.1, -0.03, 0.03, 0.1, 0.4, 1.0)
+    ]  # fmt: skip
+    data = Dataset(tuple(some))
+    with pytest.raises(ValueError, match=r"record at one speed is a point: .*plateaus\(data\)"):
+        Fit(InverseDynamics(), "stribeck", data).solve()
+    (points,) = plateaus(data)
+    assert points.size == len(some)
+    found = Fit(Points(), "stribeck", plateaus(data), starts=1).solve(throw=False)
+    for name, true in TRUE.items():
+        assert found.parameters[name].value == pytest.approx(true, rel=0.02), name
+    with pytest.raises(ValueError, match="at least two stretches"):
+        plateaus(Dataset((some[0],)))
 
 
 def test_speeds_of_one_direction_get_one_warning() -> None:
