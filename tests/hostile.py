@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from copy import deepcopy
 from functools import cache
 from io import BytesIO
+from threading import get_ident, main_thread
 from typing import Any
 from unittest.mock import patch
 
@@ -200,6 +201,9 @@ AUDITED: list[list[str]] = []
 
 
 def audit(event: str, _: object) -> None:
-    """To be given to `sys.addaudithook`, once in a process."""
-    if AUDITED and event in EVENTS:
+    """To be given to `sys.addaudithook`, once in a process.
+
+    Other threads load code of earlier runs that a compiler has finished meanwhile.
+    """
+    if AUDITED and event in EVENTS and get_ident() == main_thread().ident:
         AUDITED[-1].append(event)
