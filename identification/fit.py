@@ -173,7 +173,7 @@ class Fit:
         if not isinstance(kind, InverseDynamics) or kind.dead_time != "auto":
             return None
         step = max(record.median_step for record in self.data)
-        kind = replace(kind, dead_time=(0.0, LONGEST * step))
+        kind = replace(kind, dead_time=(0.0, float(f"{LONGEST * step:.3g}")))
         values = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
         try:
             residuals = kind.prepare(asked.subject, self.data, values)

@@ -169,7 +169,7 @@ REFUSED: list[tuple[Callable[[], object], str]] = [
     (lambda: chosen((-2.0, -1.0)), r"within \[.*\] kg"),
     (lambda: chosen((1.0, 3.0), heavy={"m": 2.0}), "once for all, .* in scenario heavy"),
     (lambda: scenarios(heavy={"mm": 2.0}), "scenario 'heavy': .* got mm; did you mean m"),
-    (lambda: scenarios(light={"m": -2.0}), r"scenario 'light': drive\.m: expected a number >="),
+    (lambda: scenarios(light={"m": -2.0}), r"scenario 'light': drive\.m: expected a number > 0"),
     (clash, "rates: expected new names for the rates, got u_rate"),
     (lambda: with_stop(stuck=False), "expected a model without events, got stop; deriv"),
     (lambda: with_stop(stuck=True), "expected a model without events, got stop; deriv"),

@@ -126,7 +126,7 @@ def test_widths_and_dampings_of_a_bristle_are_scaled_within_their_bounds() -> No
     dwell = parameters(smoothing(Gonthier(), friction, 10.0).at(1e-12))
     assert dwell["s_eps"].value == parameters(Gonthier())["s_eps"].lower
     with pytest.raises(ValueError, match="v_t"):  # which shapes the law: another one is refused
-        smoothing(BrownMcPhee(), friction, 10.0).at(1e-10)
+        smoothing(BrownMcPhee(), friction, 10.0).at(1e-322)
 
 
 def test_errors_that_follow_a_power_are_followed_in_strides() -> None:
