@@ -279,7 +279,9 @@ def _direction(point: Point, linear: Covariance, name: str) -> Array:
     i = linear.names.index(name)
     change = np.nan_to_num(linear.white[:, i] / linear.white[i, i])
     reach = (linear.high[i] - linear.low[i]) / 2
-    return np.linalg.lstsq(point.slope, change * reach, rcond=1e-9)[0]
+    size = np.linalg.norm(point.slope, axis=1)
+    size[size == 0] = 1.0  # the rows have different units
+    return np.linalg.lstsq(point.slope / size[:, None], change * reach / size, rcond=1e-9)[0]
 
 
 def bend(task: Task, point: Point, step: Array) -> float:
