@@ -143,6 +143,14 @@ def central_difference(signal: Array, step: float) -> Array:
     return np.gradient(signal, step)
 
 
+def fourth_order_difference(x: Array, step: float) -> Array:
+    """Return (x[-2] - 8 x[-1] + 8 x[+1] - x[+2]) / (12 h), and `central_difference` at the ends."""
+    rate = central_difference(x, step)
+    if x.size > 4:
+        rate[2:-2] = (x[:-4] - 8 * x[1:-3] + 8 * x[3:-1] - x[4:]) / (12 * step)
+    return rate
+
+
 @final
 @dataclass(frozen=True)
 class Decimation:

@@ -74,6 +74,8 @@ SAME = 1.0
 """Difference of minus twice the log-likelihood below which two minima are the same."""
 WHITE = 3.0
 """Correlation of neighbours, relative to its standard deviation, rarely exceeded by white noise."""
+LARGEST = 6.0
+"""Residual, relative to the root mean square, rarely exceeded by normal noise of 1e6 samples."""
 
 
 def many_starts(
@@ -182,10 +184,15 @@ def _enough(task: Task, done: Sequence[Start], agree: int) -> bool:
 
 
 def is_white(task: Task, point: Point) -> bool:
-    """Return True if neighbouring residuals of every channel are uncorrelated at several lags."""
+    """Return True if the residuals of every channel are uncorrelated at several lags, without peaks.
+
+    A law that misses a short part of the motion leaves few large residuals.
+    """
     for channel in task.channels:
         r = point.r[channel.rows]
         if not channel.ordered or r.size < 20:
+            return False
+        if np.abs(r).max() > LARGEST * np.sqrt(np.mean(r**2)):
             return False
         for lag in (1, 2, 4):
             pairs = float(np.sum(r[lag:] * r[:-lag])) / max(square(r), 1e-300)

@@ -12,7 +12,7 @@ to one type of model error:
 | distance since reversal | bins, each direction | pre-sliding, hysteresis, dwell |
 | position | a harmonic, also times sign v | ripple, cogging, gravity, an uneven track |
 | time | sensitivities times t | parameters that drift, warming up |
-| delay | rate of the predicted signal | a delay of the signal |
+| delay, unless a dead time is estimated | rate of the predicted signal | a delay of the signal |
 
 Residuals and columns are whitened by an autoregressive model, the span of the sensitivities J is
 projected out of both, and the remaining residuals are regressed on the columns:
@@ -177,8 +177,9 @@ def inputs_of(found: Minimum, channel: Channel) -> list[Regressor]:
             regressors.setdefault(rate, Regressor(rate, speed, "velocity"))
     if channel.ordered:
         predicted = channel.measured + found.raw[channel.rows]
-        rate = _rate(predicted, channel.t, positions(channel))
-        regressors["rate"] = Regressor("rate", rate, "delay")
+        if not any(name.startswith("dead_time") for name in found.names):
+            rate = _rate(predicted, channel.t, positions(channel))
+            regressors["rate"] = Regressor("rate", rate, "delay")
         regressors["time"] = Regressor("time", channel.t - channel.t.mean(), "time")
     return list(regressors.values())
 
