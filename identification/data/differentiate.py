@@ -14,8 +14,8 @@ from identification.data.filters import (
     averaged,
     band_above,
     central_difference,
-    fourth_order_difference,
     choose_filter,
+    fourth_order_difference,
     lowpass,
     noise_level,
     position_band,
@@ -153,9 +153,7 @@ class Velocity:
         by_x = by_x + short
         both = by_x + of_v
         best = np.divide(by_x, both, out=np.ones(both.size), where=both > 0)
-        weight = averaged(
-            best, step, WIDTH
-        )  # a narrow band would ring after the ends of the record
+        weight = averaged(best, step, WIDTH)  # narrow bands ring at ends of the record
         noise = weight**2 * of_v + (1 - weight) ** 2 * by_x
         found = Velocity(frequency, weight, noise, measured, noise, 1)
         mixed = spectrum(without_line(found.mixed(central_difference(x, step), v)))

@@ -184,7 +184,7 @@ def _enough(task: Task, done: Sequence[Start], agree: int) -> bool:
 
 
 def is_white(task: Task, point: Point) -> bool:
-    """Return True if the residuals of every channel are uncorrelated at several lags, without peaks.
+    """Return True if the residuals of each channel are uncorrelated at several lags, without peaks.
 
     A law that misses a short part of the motion leaves few large residuals.
     """
