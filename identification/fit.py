@@ -11,7 +11,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from time import perf_counter
-from typing import Any, NamedTuple, cast, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 
@@ -25,31 +25,31 @@ from identification.from_data import (
     slowest,
     strongest,
 )  # fmt: skip
-from identification.residuals.evaluation import Array, Residuals
-from identification.residuals.inverse import DEAD_TIME, InverseDynamics
+from identification.residuals.evaluation import DEAD_TIME, Array, Residuals
+from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import PointRows, Points
-from identification.result.build import fitted, levels_of, written
+from identification.result.build import fitted, levels_of, tried, written
 from identification.result.fitted import Fitted
 from identification.result.live import Asked, Kind, Live
 from identification.solving.descent import Start, descend, remaining
 from identification.solving.many_starts import Progress, best_of, many_starts, scattered
-from identification.solving.task import THRESHOLD, Point, Task, task
+from identification.solving.task import THRESHOLD, Task, task
 from identification.starts.measured import Measured
 from identification.unknowns.subject import Subject, subject
-from identification.unknowns.unknowns import unknowns_of
+from identification.unknowns.unknowns import Unknowns, unknowns_of
 from identification.verdict.judge import Verdict, judge
-from identification.verdict.minimum import minimum, shortened
+from identification.verdict.minimum import shortened
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
 MOST_STARTS = 10_000
 QUICK = 40
-"""Largest number of evaluations of a fit that only selects a setting."""
+"""Largest number of evaluations of a fit that only selects a setting or tests for a dead time."""
 LONGEST = 30
-"""Largest dead time that is looked for [samples]."""
+"""Largest dead time that is estimated [samples]."""
 LATE, MATTERS = 4.0, 1.0
-"""Least dead time in its standard errors, and least shift of a value in those without it, for which
-a dead time of the force is estimated.
+"""Smallest dead time, in its standard errors, and smallest shift of another value, in its standard
+errors without a dead time, for which a dead time of the force is estimated.
 """
 OF_KIND = ("x0", "dead_time")
 """Entries of `free` that belong to the residuals."""
@@ -130,70 +130,74 @@ class Fit:
         made = asked.task
         first = scattered(made.unknowns, asked.centre, self.starts, self.seed)
         starts = many_starts(made, first, executor, progress, self.evaluations)
-        end = best_of(starts)
-        made = made.with_noise(end.noise)
-        point = made.at(end.w)
-        if isinstance(point, Point) and getattr(made.residuals, "noises", ()):
-            asked, made, end = self._again(asked, made, point)
-            starts, point = (end,), made.at(end.w)
-        if isinstance(point, Point) and (later := self._delayed(asked, made, point)):
-            asked, made, end = later
-            starts, point = (end,), made.at(end.w)
-        if isinstance(point, str):
-            message = f"Fit: {asked.subject.name}: no start has residuals: {point}"
+        end, ends = best_of(starts), tried(made, starts)
+        live = self._live(asked, end.noise, end.w)
+        if isinstance(live, str):
+            message = f"Fit: {asked.subject.name}: no start has residuals: {live}"
             raise SolveError(message, Status.NOT_FINITE)
-        live = self._live(asked, made, point)
+        for again in (self._whitened, self._delayed):
+            if end.status is Status.INTERRUPTED or (found := again(asked, live)) is None:
+                continue
+            asked, live, end = found
+            best = replace(
+                ends[0], cost=end.cost, status=end.status, message=end.message,
+                evaluations=ends[0].evaluations + end.evaluations, values=live.values,
+            )  # fmt: skip
+            ends = (best, *ends[1:])
         verdict = judge(shortened(live.minimum), asked.findings, live.levels)
-        gain = remaining(made, point) / max(point.cost, 1e-300)
+        gain = remaining(live.task, live.point) / max(live.point.cost, 1e-300)
         status, message = _status(asked, end, verdict, gain)
         result = fitted(
-            live, starts, verdict, tuple(asked.findings),
+            live, ends, verdict, tuple(asked.findings),
             status=status, message=message, seconds=perf_counter() - begun,
             call=f"{written(self)}.solve()",
-            asked=Asked(replace(self, kind=asked.kind), dict(made.noise), point.w),
+            asked=Asked(replace(self, kind=asked.kind), dict(live.task.noise), live.point.w),
         )  # fmt: skip
         if throw and not status.ok:
             raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)
         return result
 
-    def _again(self, asked: "Prepared", made: Task, point: Point) -> tuple["Prepared", Task, Start]:
+    def _whitened(self, asked: "Prepared", live: Live) -> "Refined | None":
         """Fit again with the noise of the path linearised at the values of a first fit."""
-        rows = cast(PointRows, made.residuals)
-        near = dict(zip(rows.names, point.values.tolist(), strict=True))
-        made = replace(made, residuals=rows.whitened(point.values))
-        end = descend(made, point.w, 0, self.evaluations)
-        kind = replace(cast(Points, asked.kind), near=near)
-        return asked._replace(kind=kind), made.with_noise(end.noise), end
+        kind, rows = asked.kind, live.task.residuals
+        if not (isinstance(kind, Points) and isinstance(rows, PointRows) and rows.noises):
+            return None
+        made = replace(live.task, residuals=rows.whitened(live.point.values))
+        kind = replace(kind, near=live.values)
+        return self._refined(asked._replace(kind=kind, task=made), live.point.w, self.evaluations)
 
-    def _delayed(
-        self, asked: "Prepared", made: Task, point: Point
-    ) -> tuple["Prepared", Task, Start] | None:
+    def _delayed(self, asked: "Prepared", live: Live) -> "Refined | None":
         """Fit again with dead times; return None unless they are significant and shift a value."""
         kind = asked.kind
         if not isinstance(kind, InverseDynamics) or kind.dead_time != "auto":
             return None
         step = max(record.median_step for record in self.data)
         kind = replace(kind, dead_time=(0.0, float(f"{LONGEST * step:.3g}")))
-        values = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
         try:
-            residuals = kind.prepare(asked.subject, self.data, values)
-        except ValueError:  # no force is measured, or a law depends on it
+            residuals = kind.prepare(asked.subject, self.data, live.values)
+            unknowns = _unknowns(residuals, asked.subject)
+        except ValueError:  # no force is measured, a law depends on it, or few residuals
             return None
-        noise = _with_noise(kind, self.noise, asked.subject, self.data)[1]
-        other = self._task(residuals, asked.subject, noise)
-        end = descend(other, other.unknowns.of(values), 0, self.evaluations)
-        other = other.with_noise(end.noise)
-        there = other.at(end.w)
-        if isinstance(there, str):
+        made = replace(live.task, residuals=residuals, unknowns=unknowns)
+        changed = asked._replace(kind=kind, task=made)
+        found = self._refined(changed, unknowns.of(live.values), min(self.evaluations, QUICK))
+        if found is None or not found.end.status.ok or found.live.minimum.held.any():
             return None
-        both = [minimum(*at) for at in ((made, point), (other, there))]
-        errors = [np.sqrt(np.diag(found.sandwich.coloured)) for found in both]
-        times = [n.startswith(DEAD_TIME) for n in residuals.names]
-        late = np.abs(there.values[times]) > LATE * errors[1][times]
+        first, last = live.point.values, found.live.point.values
+        before, after = (
+            np.sqrt(np.diag(one.minimum.sandwich.coloured)) for one in (live, found.live)
+        )
         count = len(residuals.parameters)
-        moved = np.abs(there.values[:count] - point.values[:count]) > MATTERS * errors[0][:count]
-        found = bool(late.any() and moved.any() and not both[1].held.any())
-        return (asked._replace(kind=kind), other, end) if found else None
+        times = [n.startswith(DEAD_TIME) for n in residuals.names]
+        late = np.abs(last[times]) > LATE * after[times]
+        moved = np.abs(last[:count] - first[:count]) > MATTERS * before[:count]
+        return found if late.any() and moved.any() else None
+
+    def _refined(self, asked: "Prepared", w: Array, evaluations: int) -> "Refined | None":
+        """Solve a changed problem from the coordinates `w`; return None without residuals."""
+        end = descend(asked.task, w, 0, evaluations)
+        live = self._live(asked, end.noise, end.w)
+        return None if isinstance(live, str) else Refined(asked, live, end)
 
     def prepared(self) -> "Prepared":
         """Check the data, choose the subject and set up the residuals, without solving."""
@@ -216,9 +220,9 @@ class Fit:
             natural=None if seen is None or self.start == "law" else seen.natural,
         )
         checks.check_names("Fit: start", given, found.names)
-        kind, noise = _with_noise(kind, self.noise, found, self.data)
         values = centre(found, None if self.start == "law" else seen, given)
         try:
+            kind, noise = _with_noise(kind, self.noise, found, self.data)
             if getattr(kind, "windows", None) == "choose":
                 from identification.residuals.shooting import choose  # noqa: PLC0415 (slow to import)
 
@@ -239,14 +243,17 @@ class Fit:
             ValueError: the residuals cannot be evaluated again.
         """
         asked = self.prepared()
+        found = self._live(asked, noise, w)
+        if isinstance(found, str):
+            raise ValueError(f"Fit: {asked.subject.name}: no residuals: {found}")
+        return found
+
+    def _live(self, asked: "Prepared", noise: dict[str, float], w: Array) -> Live | str:
+        """Return the problem at the coordinates `w` of its solution, or a message on failure."""
         made = asked.task.with_noise(noise)
         point = made.at(w)
         if isinstance(point, str):
-            raise ValueError(f"Fit: {asked.subject.name}: no residuals: {point}")
-        return self._live(asked, made, point)
-
-    def _live(self, asked: "Prepared", made: Task, point: Point) -> Live:
-        """Return the problem with its minimum and the friction levels of the law."""
+            return point
         values = dict(zip(made.residuals.names, point.values.tolist(), strict=True))
         drive = asked.subject.drive
         mass = None if drive is None else float(values.get("m", drive.m))
@@ -267,16 +274,24 @@ class Fit:
         Raises:
             ValueError: fewer residuals than unknowns.
         """
-        unknowns = unknowns_of(
-            (*found.unknowns, *residuals.own), found.ties, residuals.names, found.held
+        return task(residuals, _unknowns(residuals, found), noise, self.loss, found.guard)
+
+
+def _unknowns(residuals: Residuals, found: Subject) -> Unknowns:
+    """Return the coordinates of the fitted values.
+
+    Raises:
+        ValueError: fewer residuals than unknowns.
+    """
+    own = (*found.unknowns, *residuals.own)
+    unknowns = unknowns_of(own, found.ties, residuals.names, found.held)
+    rows = sum(c.t.size for c in residuals.channels)
+    if rows < len(unknowns.unknowns):
+        raise ValueError(
+            f"Fit: expected at least {len(unknowns.unknowns)} residuals for as many unknowns, "
+            f"got {rows}; hold some, or add data"
         )
-        rows = sum(c.t.size for c in residuals.channels)
-        if rows < len(unknowns.unknowns):
-            raise ValueError(
-                f"Fit: expected at least {len(unknowns.unknowns)} residuals for as many unknowns, "
-                f"got {rows}; hold some, or add data"
-            )
-        return task(residuals, unknowns, noise, self.loss, found.guard)
+    return unknowns
 
 
 class Prepared(NamedTuple):
@@ -297,6 +312,14 @@ class Prepared(NamedTuple):
     task: Task
     centre: Any
     seen: Measured | None
+
+
+class Refined(NamedTuple):
+    """Fit that started from the values of a first fit."""
+
+    asked: Prepared
+    live: Live
+    end: Start
 
 
 def _status(asked: Prepared, end: Start, verdict: Verdict, gain: float) -> tuple[Status, str]:
@@ -333,13 +356,13 @@ def _to_kind(kind: Kind, free: Any) -> tuple[Kind, Any]:
 
 
 def _with_noise(kind: Kind, noise: Any, found: Subject, data: Dataset) -> tuple[Kind, Any]:
-    """Pass the noise of channels that are not compared to the residuals; return both."""
+    """Pass the noise of channels of the motion to the residuals; return both."""
     if not isinstance(noise, Mapping) or not isinstance(kind, Points | InverseDynamics):
         return kind, noise
-    compared = {"F"} if isinstance(kind, Points) else {u.name for u in found.model.u}
     given = checks.named("Fit: noise", noise)
-    mine = {n: given[n] for n in given if n not in compared and any(n in r for r in data)}
-    return replace(kind, noise=mine or kind.noise), {n: given[n] for n in given if n not in mine}
+    motion = [n for n in kind.motion_channels(found) if any(n in r for r in data)]
+    mine = {n: given.pop(n) for n in motion if n in given}
+    return replace(kind, noise=mine or kind.noise), given
 
 
 def _check_kind(where: str, kind: object) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.data.findings import Finding
 from identification.residuals.evaluation import Channel, Evaluation, Residuals
-from identification.result.build import fitted
+from identification.result.build import fitted, tried
 from identification.result.fitted import Fitted
 from identification.result.live import Live
 from identification.solving.many_starts import best_of, many_starts
@@ -103,10 +103,10 @@ def make(
     problem = task(residuals, unknowns)
     rng = np.random.default_rng(0)
     w0 = unknowns.of({"mu_s": 25.0, "mu_d": 18.0, "v_s": 0.02, "sigma_2": 100.0})
-    tried = many_starts(
+    ends = many_starts(
         problem, [w0 + k * rng.standard_normal(w0.size) for k in range(starts)], agree=0
     )
-    best = best_of(tried)
+    best = best_of(ends)
     problem = problem.with_noise(best.noise)
     point = problem.at(best.w)
     if isinstance(point, str):
@@ -114,7 +114,8 @@ def make(
     live = Live(kind, what, data, problem, point, None)
     verdict = judge(live.minimum)
     status = verdict.status(best.status)
-    return fitted(live, tried, verdict, findings, status=status, seconds=0.1, call=call)
+    some = tried(problem, ends)
+    return fitted(live, some, verdict, findings, status=status, seconds=0.1, call=call)
 
 
 def evaluated(rows: Residuals, values: NDArray[np.float64]) -> Evaluation:

@@ -12,6 +12,9 @@ from identification.unknowns.spec import Unknown
 
 Array = NDArray[np.float64]
 
+DEAD_TIME = "dead_time"
+"""Name of the unknown dead time, in inverse dynamics followed by the index of the record."""
+
 
 @final
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from identification.residuals.balance import (
     coordinates,
     measure,
 )
-from identification.residuals.evaluation import Array, Blocks, Channel
+from identification.residuals.evaluation import DEAD_TIME, Array, Blocks, Channel
 from identification.residuals.sampled import Sampled, preload
 from identification.unknowns.roles import width_of
 from identification.unknowns.spec import Unknown
@@ -29,8 +29,6 @@ from symfric.foundation import checks
 from symfric.model import Model
 
 WHERE = "InverseDynamics"
-DEAD_TIME = "dead_time"
-"""Name of the unknown, followed by the index of the record."""
 RANK = 1e-9
 """Smallest nonzero singular value of sensitivities, relative to the largest."""
 FEWEST, ENOUGH = 10, 100
@@ -105,6 +103,13 @@ class InverseDynamics:
             if len(bounds) != 2 or not bounds[0] < bounds[1]:
                 raise checks.refused(f"{WHERE}: dead_time", "bounds in order", self.dead_time)
             object.__setattr__(self, "dead_time", bounds)
+
+    def motion_channels(self, subject: Subject) -> tuple[str, ...]:
+        """Return the names of the channels of positions and rates."""
+        if subject.drive is not None:
+            return self.x, self.v or "v"
+        found = coordinates(subject.model, f"{WHERE}: model '{subject.model.name}'")
+        return tuple(s.name for c in found for s in (c.position, c.rate) if s is not None)
 
     def prepare(
         self, subject: Subject, data: Dataset, start: Mapping[str, float] | None = None

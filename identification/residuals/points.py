@@ -86,6 +86,11 @@ class Points:
         levels("Points: noise", self.noise)
         checks.flag("Points: offset", self.offset)
 
+    def motion_channels(self, subject: Subject) -> tuple[str, ...]:
+        """Return the names of the channels of position and velocity."""
+        del subject
+        return self.x, self.v
+
     def imposed(self, law: Law, data: Dataset) -> bool:
         """Return True if the states of `law` follow the velocity over time.
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.record import Record
-from identification.residuals.evaluation import Channel
+from identification.residuals.evaluation import DEAD_TIME, Channel
 from identification.residuals.initial import Begin, Sensed, cut, hidden, noise_of, turnaround
-from identification.residuals.shots import DEAD_TIME, Drives, Shot, Shots, delayed, plain
+from identification.residuals.shots import Drives, Shot, Shots, delayed, plain
 from identification.residuals.stepper import why_not_sampled
 from identification.unknowns.spec import Unknown
 from symfric.foundation import checks

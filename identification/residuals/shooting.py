@@ -24,9 +24,10 @@ import numpy as np
 
 from identification.data.dataset import Dataset
 from identification.data.record import Record
+from identification.residuals.evaluation import DEAD_TIME
 from identification.residuals.initial import FEWEST
 from identification.residuals.preparation import Preparation
-from identification.residuals.shots import DEAD_TIME, Shots
+from identification.residuals.shots import Shots
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
 

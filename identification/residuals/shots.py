@@ -20,7 +20,7 @@ from typing import Any, Literal, NamedTuple, cast, final
 import casadi as ca
 import numpy as np
 
-from identification.residuals.evaluation import Array, Blocks, Evaluation
+from identification.residuals.evaluation import DEAD_TIME, Array, Blocks, Evaluation
 from identification.residuals.stepper import Chain, Mass, Motion, given_inputs, why_no_motion
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
@@ -28,8 +28,6 @@ from symfric.foundation.variable import stacked
 from symfric.integrator import Hold, Input, Linear, simulate
 from symfric.model import Model, Output
 
-DEAD_TIME = "dead_time"
-"""Name of the unknown, and of the parameter of a delayed model."""
 RATE = "_rate"
 """Suffix that turns the name of an input into the name of its rate."""
 

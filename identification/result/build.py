@@ -99,7 +99,7 @@ MOST = 40
 
 def fitted(
     live: Live,
-    starts: Sequence[Start],
+    starts: Sequence[Tried],
     verdict: Verdict,
     findings: Sequence[Finding] = (),
     *,
@@ -113,7 +113,7 @@ def fitted(
 
     Args:
         live: problem with the final noise levels, and the end of the best start.
-        starts: all starts.
+        starts: ends of all starts, best first.
         verdict: assessment of the residuals at the best end.
         findings: warnings on the data.
         status: status of the fit, including the verdict.
@@ -141,7 +141,7 @@ def fitted(
         errors=errors_of(task.residuals, records, live.point.evaluation.r, verdict.effective),
         validation=None,
         noise=dict(task.noise),
-        starts=_tried(task, starts),
+        starts=tuple(starts),
         findings=tuple(findings),
         series=_series(live, records, verdict),
         curve=_curve(live),
@@ -224,7 +224,7 @@ def load_of(subject: Subject) -> float | None:
     return float(loads[0]) if loads and subject.law is not None else None
 
 
-def _tried(task: Task, starts: Sequence[Start]) -> tuple[Tried, ...]:
+def tried(task: Task, starts: Sequence[Start]) -> tuple[Tried, ...]:
     """Return the ends of the starts, best first."""
     best = min([s.objective for s in starts if isfinite(s.objective)], default=0.0)
     return tuple(

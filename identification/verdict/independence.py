@@ -36,7 +36,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from identification.residuals.evaluation import Array, Channel
+from identification.residuals.evaluation import DEAD_TIME, Array, Channel
 from identification.verdict.colour import Colour, Count, deviance, span, whitened
 from identification.verdict.colour import colour as autoregressive
 from identification.verdict.minimum import Minimum, lagged, positions
@@ -177,7 +177,7 @@ def inputs_of(found: Minimum, channel: Channel) -> list[Regressor]:
             regressors.setdefault(rate, Regressor(rate, speed, "velocity"))
     if channel.ordered:
         predicted = channel.measured + found.raw[channel.rows]
-        if not any(name.startswith("dead_time") for name in found.names):
+        if not any(name.startswith(DEAD_TIME) for name in found.names):
             rate = _rate(predicted, channel.t, positions(channel))
             regressors["rate"] = Regressor("rate", rate, "delay")
         regressors["time"] = Regressor("time", channel.t - channel.t.mean(), "time")

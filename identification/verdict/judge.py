@@ -7,17 +7,15 @@ Therefore
 * dependence on inputs, speed, direction, position, time or history makes a fit doubtful, because
   the model is wrong;
 * residuals larger than a given noise level make it doubtful;
-* so do autocorrelated residuals that are worth few independent samples, values at bounds of the
-  search, friction far beyond the measured forces, and a record that starts under load;
+* autocorrelated residuals that are worth few independent samples, values at bounds of the search,
+  and friction far beyond the measured forces make it doubtful;
 * a signal that is almost entirely unexplained makes it doubtful, even if its residuals look like
   noise; so does a value at its bound if much is unexplained;
 * other autocorrelation does not, because the intervals account for it, see `covariance`;
 * errors in the data, a mass at its bound, or residuals as large as the signal make a result
   implausible.
 
-The tests have two limits. Residuals below the `resolution` of a measured signal carry no
-information. Bristles are assumed relaxed where a record starts near rest; if the machine was loaded
-before, the force is wrong until they have slid once, which biases stiffness and damping.
+Limits: residuals below the `resolution` of a measured signal carry no information.
 """
 
 from collections.abc import Iterator, Mapping
@@ -29,7 +27,6 @@ import numpy as np
 
 from identification.data.findings import Findings
 from identification.residuals.evaluation import Channel
-from identification.residuals.sampled import moving_start
 from identification.verdict.colour import Colour, Whiteness, span, whiteness
 from identification.verdict.covariance import FAR, Levels
 from identification.verdict.independence import (
@@ -43,37 +40,6 @@ from identification.verdict.independence import (
 )
 from identification.verdict.minimum import Minimum, positions
 from symfric.foundation.status import Status
-
-FIRST = 0.05
-"""Initial share of a record that is compared with the remaining record."""
-FEWEST = 8
-"""Smallest number of initial samples for the comparison."""
-LARGER = 4.0
-"""Ratio of initial residuals to later ones above which a message is given; Gaussian residuals,
-white or autocorrelated, exceed it in 1 of 10 000 cases.
-"""
-
-
-def _beginnings(found: Minimum) -> Iterator["Test"]:
-    """Test whether the first residuals of a channel are much larger than later ones.
-
-    Limits: only records in order of time with a velocity among the regressors. A model that is
-    wrong at the beginning for another reason, such as a decay from its largest swing, gives the
-    same message.
-    """
-    for channel in found.channels:
-        v, r = channel.regressors.get("v"), found.r[channel.rows]
-        count = int(FIRST * r.size)
-        if v is None or not channel.ordered or count < FEWEST or moving_start(v) != 0.0:
-            continue
-        ratio, name = rms(r[:count]) / max(rms(r[count:]), 1e-300), found.label(channel)
-        text = (
-            f"The residuals of {name} are {ratio:.2g} times as large in its "
-            f"first {count} samples as after: the record starts under load or in another "
-            "unknown state; start it in sliding, or unloaded."
-        )
-        yield Test(name, "start", ratio, 0.0, LARGER, ratio <= LARGER, True, text)
-
 
 ALARM = 0.02
 """Probability of a false alarm over all tests of a fit."""
@@ -107,7 +73,8 @@ class Test:
 
     Attributes:
         channel: signal, with the index of its record if there are several: "force[2]".
-        name: "whiteness", "independence of ...", "size", "explained", "bound".
+        name: "whiteness", "independence of ...", "size", "explained", "effective samples",
+            "bound", "extrapolation".
         statistic, p: statistic, and the probability of a larger one if the model is correct.
         limit: p below which the test fails; for `size` and `explained` the limit of the statistic.
         passed: True unless the test failed.
@@ -195,7 +162,7 @@ def judge(
     count = sum(len(some) for _, some in each)
     for channel, some in each:
         tests += _independent(found, channel, some, ALARM / max(count, 1))
-    tests += [*_explained(found), *_few(found, effective), *_box(found), *_beginnings(found)]
+    tests += [*_explained(found), *_few(found, effective), *_box(found)]
     tests += _extrapolated(levels) if levels is not None else []
     errors = () if findings is None else tuple(e.sentence for e in findings.errors)
     nonsense = (*errors, *_unexplained(found, effective), *_no_mass(found))
