@@ -144,6 +144,10 @@ def test_functions_of_casadi_may_be_used_for_numbers_and_arrays() -> None:
     rate = SLIDING.rate(v, 2.0, np.zeros((1, 3)))
     assert rate.shape == (1, 3)
     assert rate[0] == pytest.approx(v)
+    several = np.array([[-1.0, 0.0, 2e-3], [1.0, 1e-4, -2e-3]])
+    assert law.force(several, 2.0) == pytest.approx(0.6 * np.tanh(several / 1e-3))
+    with pytest.raises(ValueError, match=r"force: expected a force, .* got the expression"):
+        with_force(lambda s, v, N: ca.SX(0.3) * N * v).force(0.1, 2.0)
     assert SLIDING.rate(0.1, 2.0, [1e-5]) == pytest.approx([0.1 - 1e4 * 0.1 / 0.6 * 1e-5])
 
 

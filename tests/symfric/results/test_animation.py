@@ -105,6 +105,9 @@ def test_a_block_on_a_belt_is_seen_from_aside_with_its_spring_and_its_stick() ->
         show(k)
         at.append([line.get_xdata()[0] for line in ticks])
     assert np.mod(np.subtract(at[1], at[0]), length) == pytest.approx(np.full(9, 0.3))
+    for marks in map(np.sort, at):
+        assert np.diff(marks) == pytest.approx(np.full(8, length / 9))
+        assert -1e-12 <= marks[0] + length / 3 < length / 9
     small = simulate(Prescribed(BrownMcPhee()).model(), 1.0, u={"v": 1e-3})
     assert picture(small, np.array([0.0, 1.0]))[0].axes[0].get_xlabel() == "x [mm]"
 
