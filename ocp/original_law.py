@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from ocp.checking.interval_errors import cut_meshes, local_errors
 from ocp.checking.resimulate import arcs_of
-from ocp.checking.verify import verified
+from ocp.checking.verify import confirmed, verified
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Ipopt
@@ -79,7 +79,7 @@ class OriginalLaw:
         except FAILURES as error:  # shooting does not support all models
             return with_sentence(exact, f"With the law itself: {reason_of(error)}.")
         own = replace(own, statistics=exact.statistics.then(own.statistics))
-        if own.verified:
+        if confirmed(own):
             return replace(own, modes=exact.modes)
         kept = with_sentence(exact, f"By {self.scheme} with the law itself: {own.message}")
         kept = replace(kept, statistics=own.statistics)
@@ -108,7 +108,7 @@ class OriginalLaw:
             best = self._cheaper(made, near)
             if best.status is Status.SOLVED or best.status.stopped:
                 checked = verified(best, self.tolerance)
-                if checked.verified:
+                if confirmed(checked):
                     end = "the optimality conditions hold" if checked.ok else "stopped"
                     return replace(checked, message=f"{text} {end}.")
             near = replace(near, statistics=best.statistics)

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, final
 from numpy.typing import ArrayLike
 
 from ocp.checking.mesh_refinement import Goals, refined_solve
-from ocp.checking.verify import verified, verify
+from ocp.checking.verify import confirmed, verified, verify
 from ocp.complementarity import solve_relaxed, with_products
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
@@ -235,8 +235,8 @@ class Search:
             exact = self.checked(_after(sharp.solution, exact))
             if exact.status in MISSED and last and not direct.supervisor.over:
                 exact = self.by_original_law(exact) if bristles(problem) else exact
-                own = exact if narrow or exact.verified else self._by_own_law(exact)
-                if own.verified:
+                own = exact if narrow or confirmed(exact) else self._by_own_law(exact)
+                if confirmed(own):
                     return Judged(own, True)
                 exact = _after(own, exact) if own is not exact else exact
             if exact.ok or last:

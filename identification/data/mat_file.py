@@ -199,7 +199,7 @@ def read_variables(file: Path, variable: str | None) -> Record | list[Raw]:
     except NotImplementedError:
         raise ValueError(
             f"{where}: expected a MATLAB file of version 7 or older, got version 7.3 "
-            "(HDF5); save it with save(name, '-v7')"
+            "(HDF5); save it with save(name, '-v7'), or rename it to .h5"
         ) from None
     except Exception as error:  # noqa: BLE001 (damaged bytes raise various errors)
         raise ValueError(

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from re import DOTALL, fullmatch
-from typing import Literal, TypeVar, final
+from typing import Any, Literal, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,6 +115,41 @@ def label(cell: str) -> tuple[str, str]:
     if match and is_common(match[2]) and any(_matches(match[1], n) for n in MOTION):
         return match[1], match[2]
     return cell, ""
+
+
+def column_of(where: str, key: str, values: object) -> Column:
+    """Return a column of values held in Python; dates are converted to seconds from the first one.
+
+    Raises:
+        ValueError: not a vector.
+    """
+    name, said = label(key)
+    if isinstance(values, np.ma.MaskedArray):  # masked values are missing
+        masked: Any = values  # pyright: ignore[reportUnknownVariableType]
+        values = masked.astype(float).filled(np.nan) if masked.dtype.kind in "iuf" else masked
+    wrong = checks.refused(f"{where}: {key}", "a vector of numbers", values)
+    try:
+        found = np.asarray(values)
+    except (ValueError, TypeError):
+        raise wrong from None
+    if found.ndim == 2 and min(found.shape) == 1:  # a row or column vector as in MATLAB
+        found = found.ravel()
+    if found.ndim != 1:
+        raise wrong
+    if found.dtype.kind in "mM" and found.size:
+        spent = found - found[np.argmin(np.isnat(found))]
+        seconds = spent.astype("timedelta64[ns]") / np.timedelta64(1, "s")  # NaN if not a time
+        return Column.of(name, "s", seconds)
+    if found.dtype.kind in "iufb":
+        return Column.of(name, said, found.astype(float))
+    numbers = np.full(found.size, np.nan)
+    for k, item in enumerate(found):
+        number = checks.as_number(item) if found.dtype.kind == "O" else None
+        if number is None:
+            problem = f"sample {k}: expected a number, got {checks.shown(item)}"
+            return Column(name, said, numbers, problem)
+        numbers[k] = number
+    return Column.of(name, said, numbers)
 
 
 def is_channel(name: str) -> bool:

@@ -10,14 +10,7 @@ from typing import Any
 import numpy as np
 
 from identification.data.mat_file import read_variables
-from identification.data.raw import (
-    Column,
-    Raw,
-    Wanted,
-    gathered,
-    label,
-    record,
-)
+from identification.data.raw import Raw, Wanted, column_of, gathered, record
 from identification.data.record import Record
 from identification.data.units import CHANNELS
 from symfric.foundation import checks
@@ -50,7 +43,7 @@ def columns_of(name: str, frame: object, arrays: Mapping[str, object]) -> tuple[
     elif frame is not None:
         such = "arrays by name or a frame"
         raise checks.refused(where, such, frame, "write Dataset.of(t=t, x=x, force=force)")
-    columns = [_held(where, key, v) for key, v in [*given.items(), *arrays.items()]]
+    columns = [column_of(where, key, v) for key, v in [*given.items(), *arrays.items()]]
     if not columns:
         raise ValueError(f"{where}: expected columns such as t=..., x=..., force=..., got none")
     names = [*given, *arrays]
@@ -61,35 +54,6 @@ def columns_of(name: str, frame: object, arrays: Mapping[str, object]) -> tuple[
         got = ", ".join(f"{c.label}: {c.values.size}" for c in columns)
         raise ValueError(f"{where}: expected columns of one length, got {got}")
     return Raw(name, tuple(columns), verb="data"), framed
-
-
-def _held(where: str, key: str, values: object) -> Column:
-    name, said = label(key)
-    if isinstance(values, np.ma.MaskedArray):  # masked values are missing
-        masked: Any = values  # pyright: ignore[reportUnknownVariableType]
-        values = masked.astype(float).filled(np.nan) if masked.dtype.kind in "iuf" else masked
-    wrong = checks.refused(f"{where}: {key}", "a vector of numbers", values)
-    try:
-        found = np.asarray(values)
-    except (ValueError, TypeError):
-        raise wrong from None
-    if found.ndim == 2 and min(found.shape) == 1:  # a row or column vector as in MATLAB
-        found = found.ravel()
-    if found.ndim != 1:
-        raise wrong
-    if found.dtype.kind in "mM" and found.size:
-        seconds = (found - found[0]).astype("timedelta64[ns]").astype(np.int64) * 1e-9
-        return Column.of(name, "s", seconds)
-    if found.dtype.kind in "iufb":
-        return Column.of(name, said, found.astype(float))
-    numbers = np.full(found.size, np.nan)
-    for k, item in enumerate(found):
-        number = checks.as_number(item) if found.dtype.kind == "O" else None
-        if number is None:
-            problem = f"sample {k}: expected a number, got {checks.shown(item)}"
-            return Column(name, said, numbers, problem)
-        numbers[k] = number
-    return Column.of(name, said, numbers)
 
 
 def to_csv(record: Record, path: Path) -> Path:
@@ -103,26 +67,37 @@ def to_csv(record: Record, path: Path) -> Path:
 
 def _text(file: Path, variable: str | None) -> list[Raw]:
     """Return the columns of a text file."""
-    if variable is not None:
-        raise ValueError(
-            f"read '{file.name}': expected variable= only of .mat, .npz and .npy files"
-        )
     from identification.data.text import read_text  # noqa: PLC0415 (slow to import)
 
+    _refuse(file, variable)
     return [read_text(file)]
 
 
-def _archive(file: Path, variable: str | None) -> Record | list[Raw]:
-    """Return the columns of an HDF5 or Parquet file."""
-    from identification.data.archives import read_archive  # noqa: PLC0415 (optional packages)
+def _hdf5(file: Path, variable: str | None) -> Record | list[Raw]:
+    """Return the columns of an HDF5 file."""
+    from identification.data.archives import read_hdf5  # noqa: PLC0415 (slow to import)
 
-    return read_archive(file, variable)
+    return read_hdf5(file, variable)
+
+
+def _parquet(file: Path, variable: str | None) -> list[Raw]:
+    """Return the columns of a Parquet file."""
+    from identification.data.archives import read_parquet  # noqa: PLC0415 (slow to import)
+
+    _refuse(file, variable)
+    return [read_parquet(file)]
+
+
+def _refuse(file: Path, variable: str | None) -> None:
+    if variable is not None:
+        such = "variable= only of .mat, .npz, .npy and .h5 files"
+        raise ValueError(f"read '{file.name}': expected {such}")
 
 
 TEXT = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log", ".prn", ".data", "")
 READERS: dict[str, Callable[[Path, str | None], Record | list[Raw]]] = {
     **dict.fromkeys(TEXT, _text), **dict.fromkeys((".mat", ".npz", ".npy"), read_variables),
-    **dict.fromkeys((".h5", ".hdf5", ".parquet", ".pq"), _archive),
+    **dict.fromkeys((".h5", ".hdf5"), _hdf5), **dict.fromkeys((".parquet", ".pq"), _parquet),
 }  # fmt: skip
 """Functions that read a file, by its suffix."""
 Paths = str | PathLike[str] | Sequence[str | PathLike[str]]

@@ -42,6 +42,22 @@ class Rows(NamedTuple):
     comments: list[str]
 
 
+class Layout(NamedTuple):
+    """Layout of the columns of a text file.
+
+    Attributes:
+        comma: True if decimal points are commas.
+        first: index of the first row of numbers.
+        labels: name and unit of each column; "" for those that the file does not contain.
+        named: True if there is a header.
+    """
+
+    comma: bool
+    first: int
+    labels: list[tuple[str, str]]
+    named: bool
+
+
 def read_text(file: Path) -> Raw:
     """Return the columns of a text file.
 
@@ -58,43 +74,54 @@ def read_text(file: Path) -> Raw:
     return found or _by_cells(file)
 
 
-def _layout(rows: Rows) -> tuple[bool, int | None, list[str] | None, list[str] | None]:
-    """Return whether commas are decimal, the first row of numbers, names and units."""
+def _layout(rows: Rows, where: str) -> Layout:
+    """Return the layout of the columns.
+
+    Raises:
+        ValueError: no row of numbers.
+    """
     last = [cell for row in rows.cells[-LOOKED_AT:] for cell in row]
     with_comma, with_point = (sum(p.fullmatch(c) is not None for c in last)
                               for p in (WITH_COMMA, WITH_POINT))  # fmt: skip
     comma = rows.delimiter != "," and with_comma > with_point
     first = _first(rows, comma)
-    return comma, first, *_header(rows, first)
+    if first is None:
+        count = len(rows.cells)
+        got = "an empty file" if not count else "a header alone"
+        if count > 2:  # names and units
+            got = f"{count} rows of text, the last one '{' '.join(rows.cells[-1])[:40]}'"
+        raise ValueError(f"{where}: expected rows of numbers, got {got}")
+    names, units = _header(rows, first)
+    labels = [label(name) for name in names or [""] * len(rows.cells[first])]
+    labels = [(name, said or (units[k] if units else "")) for k, (name, said) in enumerate(labels)]
+    return Layout(comma, first, labels, names is not None)
 
 
 def _plain(file: Path) -> Raw | None:
     """Return the columns of a large file of numbers; None if it contains other cells."""
+    where = f"read '{file.name}'"
     with file.open("rb") as stream:
         head = stream.read(LARGE // 16)
         stream.seek(-LARGE // 16, SEEK_END)
         tail = stream.read()
     parts = head[: head.rfind(b"\n")], tail[tail.find(b"\n") + 1 :]
     try:
-        rows = _rows(b"\n".join(parts), f"read '{file.name}'")
-        comma, first, names, units = _layout(rows)
-        if comma or first is None:
-            return None
+        rows = _rows(b"\n".join(parts), where)
+        layout = _layout(rows, where)
         delimiter = None if rows.delimiter == " " else rows.delimiter
-        skipped = rows.numbers[first] - 1
-        values = np.loadtxt(
-            file, delimiter=delimiter, skiprows=skipped, comments=None, encoding="latin-1", ndmin=2
-        )
+        skipped = rows.numbers[layout.first] - 1
+        with file.open(encoding="latin-1") as lines:
+            points = (line.replace(",", ".") for line in lines) if layout.comma else file
+            values = np.loadtxt(
+                points, delimiter=delimiter, skiprows=skipped, comments=None, encoding="latin-1",
+                ndmin=2,
+            )  # fmt: skip
     except ValueError:
         return None
-    width = len(names or rows.cells[first])
-    if values.shape[1] != width or not np.isfinite(values).all():
+    if values.shape[1] != len(layout.labels) or not np.isfinite(values).all():
         return None
-    said = [label(name) for name in names] if names else [("", "")] * width
-    columns = (
-        Column(name, unit or (units[k] if units else ""), np.ascontiguousarray(values[:, k]))
-        for k, (name, unit) in enumerate(said)
-    )
+    pairs = zip(layout.labels, values.T, strict=True)
+    columns = (Column(name, unit, np.ascontiguousarray(y)) for (name, unit), y in pairs)
     return Raw(file.name, tuple(columns), skipped + 1)
 
 
@@ -102,28 +129,22 @@ def _by_cells(file: Path) -> Raw:
     """Return the columns of a text file cell by cell, with a message on the first bad one."""
     where = f"read '{file.name}'"
     rows = _rows(file.read_bytes(), where)
-    comma, first, names, units = _layout(rows)
-    if first is None:
-        got = f"{len(rows.cells)} rows of text only" if rows.cells else "an empty file"
-        got = "a header alone" if names else got
-        raise ValueError(f"{where}: expected rows of numbers, got {got}")
-    width = len(names or rows.cells[first])
+    comma, first, labels, named = _layout(rows, where)
+    width = len(labels)
     body, numbers = rows.cells[first:], rows.numbers[first:]
     for number, row in zip(numbers, body, strict=True):
         if any(row[width:]):
             hint = "; write numbers with a decimal point" if rows.delimiter == "," else ""
             raise ValueError(
                 f"{where}: row {number}: expected {width} cells as in the "
-                f"{'header' if names else 'first row'}, got {len(row)}{hint}"
+                f"{'header' if named else 'first row'}, got {len(row)}{hint}"
             )
     columns: list[Column] = []
-    for k in range(width):
+    for k, (name, said) in enumerate(labels):
         cells = [row[k] if k < len(row) else "" for row in body]
         if comma:
             cells = [cell.replace(",", ".") if cell.count(",") == 1 else cell for cell in cells]
-        name, said = label(names[k]) if names else ("", "")
-        values, problem, gaps = _numbers(cells, numbers)
-        columns.append(Column(name, said or (units[k] if units else ""), values, problem, gaps))
+        columns.append(Column(name, said, *_numbers(cells, numbers)))
     return Raw(file.name, tuple(columns), numbers[0])
 
 
@@ -195,11 +216,11 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _numeric(row: Sequence[str], comma: bool) -> bool:
-    """Return True if at least half of the cells are numbers; the row is then not a header."""
+def _numeric(row: Sequence[str], comma: bool, share: float = 0.5) -> bool:
+    """Return True if at least `share` of the cells are numbers; the row is then not a header."""
     cells = [cell.replace(",", ".") if comma else cell for cell in row if cell]
     numbers = sum(map(_is_number, cells))
-    return numbers > 0 and numbers >= len(cells) / 2
+    return numbers > 0 and numbers >= share * len(cells)
 
 
 def _first(rows: Rows, comma: bool) -> int | None:
@@ -211,18 +232,12 @@ def _first(rows: Rows, comma: bool) -> int | None:
     usual = max(set(widths), key=widths.count, default=0)
     wide = [k for k, row in enumerate(rows.cells) if _width(row) >= usual]
     names = [k for k in wide if k < LOOKED_AT and sum(map(_is_name, rows.cells[k])) > 1]
-    found = [k for k in wide if _numeric(rows.cells[k], comma)]
     header = next(iter(names), -1)
     for k in names:  # a header below rows of numbers only is an error in the file
-        if not any(_is_data(rows.cells[i], comma) for i in found if header < i < k):
+        if not any(header < i < k and _numeric(rows.cells[i], comma, 1.0) for i in wide[:k]):
             header = k
-    later = [k for k in found if k > header]
-    return next(iter(later or found), None)
-
-
-def _is_data(row: Sequence[str], comma: bool) -> bool:
-    """Return True if all cells are numbers."""
-    return all(_is_number(cell.replace(",", ".") if comma else cell) for cell in row if cell)
+    later = [k for k in wide if k > header]
+    return next((k for k in [*later, *wide] if _numeric(rows.cells[k], comma)), None)
 
 
 def _is_name(cell: str) -> bool:
@@ -231,13 +246,13 @@ def _is_name(cell: str) -> bool:
     return bool(name) and not _is_number(cell) and (bool(said) or is_channel(name))
 
 
-def _header(rows: Rows, first: int | None) -> tuple[list[str] | None, list[str] | None]:
+def _header(rows: Rows, first: int) -> tuple[list[str] | None, list[str] | None]:
     """Return names and units of the columns; None for those that the file does not contain."""
-    width = 0 if first is None else _width(rows.cells[first])
-    above = [row for row in rows.cells[:first] if first is None or len(row) >= width]
+    width = _width(rows.cells[first])
+    above = [row for row in rows.cells[:first] if len(row) >= width]
     if not above:
         spoken = [s for c in rows.comments[-1:] for s in (_cells(c, rows.delimiter), c.split())]
-        return next((s for s in spoken if len(s) == width and width), None), None
+        return next((s for s in spoken if len(s) == width), None), None
     cells = above[-1]
     if len(above) > 1 and all(unit(c.strip("[]()")) is not None for c in cells):
         names = above[-2]

@@ -89,8 +89,10 @@ def moving_start(v: Array) -> float:
     return float(v[0]) if abs(v[0]) > NEAR_REST * usual(v) else 0.0
 
 
-PRELOAD = 2.0
-"""Largest initial deflection of a bristle relative to that of steady sliding."""
+PRELOAD = 10.0
+"""Largest initial deflection of a bristle relative to that of steady sliding at the usual speed.
+
+In slow sliding it is larger by the ratio of static and kinetic level."""
 
 
 def begun(law: Law, start: tuple[Scalar, Scalar], usual: float, share: ca.SX) -> ca.SX:
@@ -103,7 +105,7 @@ def begun(law: Law, start: tuple[Scalar, Scalar], usual: float, share: ca.SX) ->
         law: law with states.
         start: initial velocity and normal force.
         usual: speed at which the share is one.
-        share: symbol of the share, from -1 (slid backwards before) to 1, 0 relaxed.
+        share: symbol of the share; 1 after sliding forwards, -1 after sliding backwards, 0 relaxed.
     """
     steady, bent = (ca.SX(law.steady_state(v, start[1])) for v in (start[0], usual))
     even = [state.even for state in law.states]

@@ -25,7 +25,7 @@ from identification.result.outcome import (
     unit_of,
     with_unit,
 )
-from identification.result.series import FEW, Curve, Errors, Estimate, Series, limits
+from identification.result.series import Curve, Errors, Estimate, Series, limits
 from identification.result.stored import source_of
 from identification.verdict.judge import Test
 from symfric.foundation.status import Status
@@ -83,9 +83,7 @@ def lags(one: Series) -> str:
 
 def friction(curve: Curve, name: str) -> str:
     """Return the chart of friction over velocity, with dots for the data and a line for the law."""
-    few = sum(line.t.size for line in curve.measured.values()) < FEW
-    kind = "measured sample" if few else "measured"
-    dots = [Dots(kind, line.t, line.y) for line in curve.measured.values()]
+    dots = [Dots("measured sample", line.t, line.y) for line in curve.measured.values()]
     low, high = limits(curve)
     x = around("v", curve.v_unit, [curve.law.t, *(line.t for line in curve.measured.values())])
     marks: list[Mark] = [

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from identification.result.outcome import Outcome
-from identification.result.series import FEW, Curve, Series, limits
+from identification.result.series import Curve, Series, limits
 from symfric.foundation import checks
 from symfric.foundation.panels import grid, panels, save
 from symfric.foundation.style import colour
@@ -59,12 +59,10 @@ def _legend(axis: Axes, columns: int = 3) -> None:
 
 
 def _curve(axis: Axes, curve: Curve, name: str) -> None:
-    few = sum(line.t.size for line in curve.measured.values()) < FEW
-    size = 8.0 if few else 1.8
     for line in curve.measured.values():
-        axis.plot(line.t, line.y, ".", color="0.6", ms=size, mew=0, alpha=0.6, rasterized=True)
+        axis.plot(line.t, line.y, ".", color="0.6", ms=8.0, mew=0, alpha=0.6, rasterized=True)
     axis.plot([], [], ".", color="0.6", label=curve.says)
-    axis.plot(curve.law.t, curve.law.y, color=colour(1), lw=1.5, label=name)
+    axis.plot(curve.law.t, curve.law.y, color=colour(1), lw=1.2, label=name)
     low, high = limits(curve)
     axis.set_ylim(low, high)
     axis.set_xlabel(f"v [{curve.v_unit}]")

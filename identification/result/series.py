@@ -286,8 +286,6 @@ def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
 
 REST = 1e-3
 """Share of the largest speed above which a point has a direction."""
-FEW = 500
-"""Number of points below which each is drawn larger than the line."""
 
 
 def _curve(law: Law, N: float, lines: dict[str, Line], turning: bool, says: str) -> Curve:

@@ -220,6 +220,11 @@ def verified(solution: Solution, tolerance: float = TOLERANCE) -> Solution:
     return replace(checked, status=verification.status, message=message)
 
 
+def confirmed(solution: Solution) -> bool:
+    """Return True if the simulation confirms the motion, even if its solve was stopped."""
+    return solution.verification is not None and solution.verification.ok
+
+
 def verified_arcs(
     problem: Problem, arcs: Sequence[Arc], cost: float, tolerance: float = TOLERANCE,
     rtol: float = RTOL,

@@ -185,10 +185,11 @@ def _sizes_by_equations(model: Model, T: float, known: Mapping[str, float]) -> d
 
 
 def _with_nominals(model: Model, sizes: Mapping[str, float]) -> Model:
-    x, u = (
-        tuple(replace(v, nominal=sizes[v.name]) if _far(v, sizes) else v for v in group)
-        for group in (model.x, model.u)
-    )
+    def fitted(v: Variable) -> Variable:
+        kept = v.nominal != DEFAULT and not _far(v, sizes)
+        return v if kept else replace(v, nominal=sizes.get(v.name, v.nominal))
+
+    x, u = tuple(map(fitted, model.x)), tuple(map(fitted, model.u))
     return rebuilt(model, partial(_with_nominals, sizes=sizes), x=x, u=u)
 
 

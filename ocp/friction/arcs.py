@@ -336,7 +336,7 @@ class ArcPhase:
             joins=base.joins if self.opens else (),
             cost=base.cost if self.closes or base.cost is None else replace(base.cost, end=()),
             p=only(base.p, {v.name for v in model.p}),
-            name="",
+            name=base.name if self.opens and self.closes else "",
         )
 
     def _at_start(self, contact: Contact) -> bool:

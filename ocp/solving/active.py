@@ -265,7 +265,7 @@ def _active(optimum: Optimum, status: BoundStatus, run: Sequence[Entry]) -> Acti
     first_span = place.span - span.phase
     start, length = sum(s.T for s in points[first_span : place.span]), points[place.span].T
     whole = not np.isfinite(place.fraction)
-    if name.startswith("the duration of"):  # of several phases
+    if name.startswith("the duration"):  # of several phases
         start, whole = 0.0, True
         length = sum(s.T for s in points[: len(problem.chain)])
     return Active(

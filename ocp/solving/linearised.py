@@ -189,7 +189,8 @@ class Linearised:
         found: dict[str, list[tuple[Entry, bool]]] = {}
         for entry in self.entries:
             if lower[entry.number] == upper[entry.number]:
-                found.setdefault(entry.name, []).append((entry, True))
+                name = "T" if entry.name == "the duration" else entry.name
+                found.setdefault(name, []).append((entry, True))
                 continue
             short = entry.name.removeprefix("the ")
             for side, bounds in (("lower", lower), ("upper", upper)):

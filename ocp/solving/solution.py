@@ -142,8 +142,8 @@ class Solution(packed.Portable):
 
     @property
     def verified(self) -> bool:
-        """True if the re-simulated motion satisfies all conditions within the tolerance."""
-        return self.verification is not None and self.verification.ok
+        """True if solved, and the re-simulated motion satisfies all conditions within tolerance."""
+        return self.ok and self.verification is not None and self.verification.ok
 
     @property
     def miss(self) -> float:

@@ -1,6 +1,6 @@
 """Initial guesses of the optimiser from prescribed values, the user's guess or a solution."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import isfinite
@@ -109,12 +109,11 @@ def initial_points(into: Transcription, given: Mapping[str, Guess] | Run | None 
     problem = into.problem
     models = [span.model for span in problem.spans]
     known = dict.fromkeys(v.name for m in models for group in (m.x, m.z, m.u) for v in group)
-    run = given if isinstance(given, Run) else None
-    durations = _durations(problem, None if run is None else float(run.t[-1] - run.t[0]))
+    t, rows = _signals(given, known) if isinstance(given, Run) else (None, dict[str, Array]())
+    durations = _durations(problem, None if t is None else float(t[-1]))
     total = float(sum(durations[: len(problem.chain)]))
-    if run is not None:
-        at, rows = total * (run.t - run.t[0]) / (run.t[-1] - run.t[0]), run.signals
-        given = {n: partial(np.interp, xp=at, fp=rows[n][: at.size]) for n in known if n in rows}
+    if t is not None:
+        given = {n: partial(np.interp, xp=total / t[-1] * t, fp=row) for n, row in rows.items()}
     guesses = checks.named("guess", given, list(known))
 
     def value(number: int, name: str, fractions: Array) -> Array | None:
@@ -124,6 +123,19 @@ def initial_points(into: Transcription, given: Mapping[str, Guess] | Run | None 
         return _evaluate(name, guesses[name], begin + fractions * durations[number], total)
 
     return into.consistent(points_from(into, durations, value))
+
+
+def _signals(run: Run, known: Collection[str]) -> tuple[Array, dict[str, Array]]:
+    """Return the times of a run since its start [s], and its signals among `known`."""
+    t = checks.array("guess: times of the run", run.t)
+    if t.size < 2 or np.diff(t).min() < 0.0 or t[0] == t[-1]:
+        raise checks.refused("guess: times of the run", "increasing times [s]", t)
+    shared = [name for name in known if name in run.signals]
+    rows = {n: checks.array(f"guess of {n}", run.signals[n])[: t.size] for n in shared}
+    if not rows or any(row.size < t.size for row in rows.values()):
+        what = f"one of {', '.join(known)}, with a value for each time"
+        raise checks.refused("guess: signals of the run", what, [*run.signals])
+    return t - t[0], rows
 
 
 def resample(

@@ -195,7 +195,8 @@ def whole(problem: Problem, grid: Grid) -> Iterator[Piece]:
         fixed = sum(limits(spans[i].T)[0] for i in numbers if i not in free)
         low, high = limits(total)
         size = np.array([high])
-        name = "the duration of phases " + ", ".join(str(i + 1) for i in numbers)
+        some = "the duration of phases " + ", ".join(str(i + 1) for i in numbers)
+        name = some if len(numbers) < phases else "the duration"
         rows = Rows((name,), size, np.array([low - fixed]), np.array([high - fixed]))
         columns = np.array([[layout.spans[i].T for i in free]])
         weights = np.array([[time_scale(spans[i]) for i in free]]) / size

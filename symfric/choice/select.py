@@ -243,9 +243,10 @@ def laws_of(where: str, laws: Candidates | None) -> Forms:
     else:
         listed = laws if isinstance(laws, list | tuple) else ()
         own = {law_name(law): (law,) for law in listed if isinstance(law, Law)}
-        names = [x for x in listed if not isinstance(x, Law)] if listed else laws
-        known = ALL_LAWS if names is None else checks.names(f"{where}: laws", names, ALL_LAWS)
-        found = {name: forms(ALL_LAWS[name]()) for name in known} | own
+        asked = [law_name(x) if isinstance(x, Law) else x for x in listed] if own else laws
+        known = ALL_LAWS | own
+        names = ALL_LAWS if asked is None else checks.names(f"{where}: laws", asked, known)
+        found = {name: own.get(name) or forms(ALL_LAWS[name]()) for name in names}
     if not found:
         raise ValueError(f"{where}: laws: expected at least one, got none")
     return found

@@ -299,9 +299,9 @@ def within_load(law: Law, z: ca.SX, N: ca.SX) -> ca.SX:
 
         |z_i| <= 1.001 most_held(N) / |dF/dz_i|   at v = 0
 
-    The margin leaves rounding errors of states at the limit unchanged. A memory error or a fallen
-    load then causes no force above that of stiction. A state is not limited if its slope depends on
-    the states or is zero, or if the law has no known level.
+    The margin leaves rounding errors of states at the limit unchanged. After a memory error or a
+    fall of the load, each state then causes at most the force of stiction. A state is not limited
+    if its slope depends on the states or is zero, or if the law has no known level.
     """
     v = ca.SX(0)
     slopes = ca.densify(ca.jacobian(law.force(v, N, z), z))

@@ -304,7 +304,8 @@ def contact(
         name: name of the contact.
         law: any law for a scalar sliding velocity.
         v: sliding velocity [m/s], a variable or an expression; `force` opposes it.
-        N: normal force [N], a number, a variable or an expression.
+        N: normal force >= 0 [N], a number, a variable or an expression. Simulations do not check
+            its sign; `Event("lift", N - least, -1, terminal=True)` ends them when bodies separate.
         rest: maps a state of the model to its value at which `v` is exactly zero, for laws that
             stick; by default a state of the model in which `v` is linear.
         least: smallest value of a varying `N`, at which the law must be defined.

@@ -77,7 +77,7 @@ class ContactModes:
         contacts = switching(model.contacts, model.x, model.events)
         rows, nominal, x = list[ca.SX](), model.nominal("x"), model.vector("x")
         still: list[float] = []
-        for c, *_ in contacts:
+        for c in (one.contact for one in contacts):
             force, further = ca.SX(c.given[APPLIED]), c.further
             up, down = (
                 ca.SX(c.law.static_level(c.N, side, **further)) - side * force for side in (1, -1)

@@ -142,13 +142,14 @@ def with_states(method: Callable[..., Any]) -> Callable[..., Any]:
             if not isinstance(slip, np.ndarray) and "truth value" not in str(error):
                 raise
             raise _unsuitable(where, slip, error) from error
-        if isinstance(value, ca.DM) and not is_casadi(slip, load, states, *inputs.values()):
-            shape = np.shape(slip) if method.__name__ == "force" else np.shape(states)
-            fits = value.numel() == np.prod(shape, dtype=int)
-            value = value.full().ravel("F").reshape(shape)[()] if fits else None
         if value is None or isinstance(value, list | tuple):
             raise _unsuitable(where, slip, value)
-        return value
+        if not is_casadi(value) or is_casadi(slip, load, states, *inputs.values()):
+            return value
+        shape = np.shape(slip) if method.__name__ == "force" else np.shape(states)
+        if not isinstance(value, ca.DM) or value.numel() != np.prod(shape, dtype=int):
+            raise _unsuitable(where, slip, value)
+        return value.full().reshape(shape)[()]
 
     return checked
 

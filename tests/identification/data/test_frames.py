@@ -28,6 +28,10 @@ def test_frames_are_taken_by_their_columns() -> None:
     stamps = np.datetime64("2026-05-01T12:00:00") + (1000 * T).astype("timedelta64[ms]")
     record = Dataset.of(Frame({"time": stamps, "q": T, "tau": T}), units="rad, N m")[0]
     np.testing.assert_allclose(record.time, T, atol=1e-9)
+    for absent in (0, 7):
+        stamps[absent] = "NaT"
+        record = Dataset.of(time=stamps, x=T, force=T, missing="drop")[0]
+        np.testing.assert_allclose(record.time, record["x"] - record["x"][0], atol=1e-9)
 
 
 def test_masked_samples_were_not_measured() -> None:

@@ -61,6 +61,9 @@ def test_large_files_have_the_bits_of_small_ones(tmp_path: Path) -> None:
     for name in small.signals:
         assert np.array_equal(large[name][: small.size], small[name])
     assert np.array_equal(large["force"], 1e3 * numbers[:, 2])
+    commas = "\n".join(lines).replace(".", ",")
+    (same,) = Dataset.read(written(tmp_path / "commas.csv", commas))
+    assert all(np.array_equal(same[name], large[name]) for name in large.signals)
     lines[20_000] = "1;2;three"
     with pytest.raises(ValueError, match=r"row 20001: expected a number, got 'three'"):
         Dataset.read(written(tmp_path / "bad.csv", "\n".join(lines)))
@@ -110,10 +113,11 @@ def test_hdf5_files_are_read_like_mat_files(tmp_path: Path) -> None:
     with h5py.File(path, "w") as file:
         run = file.create_group("run")
         run["t [s]"], run["x [mm]"], run["force [N]"] = T, np.sin(T), np.cos(T).reshape(1, -1)
+        run["nothing"] = h5py.SoftLink("/absent")
     (record,) = Dataset.read(path, variable="run")
     np.testing.assert_allclose(record["x"], 1e-3 * np.sin(T))
     assert np.array_equal(record["force"], np.cos(T))
-    with pytest.raises(ValueError, match=r"expected a file of h5py, got another one"):
+    with pytest.raises(ValueError, match=r"expected an HDF5 file, got a damaged"):
         Dataset.read(written(tmp_path / "bad.h5", "data"))
 
 
@@ -125,5 +129,7 @@ def test_parquet_tables_are_read(tmp_path: Path) -> None:
     (record,) = Dataset.read(path)
     assert np.array_equal(record["force"], np.cos(T))
     assert "note" in record.left_out
-    with pytest.raises(ValueError, match=r"expected a file of pyarrow, got another one"):
+    with pytest.raises(ValueError, match=r"expected variable= only of \.mat, .* and \.h5 files"):
+        Dataset.read(path, variable="run")
+    with pytest.raises(ValueError, match=r"expected a Parquet file, got a damaged"):
         Dataset.read(written(tmp_path / "bad.parquet", "data"))

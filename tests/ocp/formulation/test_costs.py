@@ -116,6 +116,7 @@ def test_sizes_follow_from_ends_bounds_and_equations_unless_near() -> None:
     assert nominals(sized(move(1e-6))) == pytest.approx({"x": 1e-6, "v": 1e-6, "u": 2e-6})
     assert cost_size(sized(move(1e-6))) == pytest.approx(4e-12)
     assert nominals(sized(move(1.0, bounds={"u": (-5e3, 2e3)})))["u"] == 5e3
+    assert nominals(sized(move(1e-6, bounds={"u": (-0.02, 0.02)})))["u"] == 0.02
     for problem in (move(1.0), move(0.02), move(50.0), move(1e4, nominal=10.0)):
         assert sized(problem) is problem
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
@@ -115,6 +116,10 @@ def test_runs_are_guesses() -> None:
     np.testing.assert_allclose(again.nodes, found.points.spans[0].nodes, atol=1e-2)
 
 
+def run_of(t: list[float], **signals: list[float]) -> Any:
+    return SimpleNamespace(t=t, signals=signals)
+
+
 @pytest.mark.parametrize(
     ("guess", "message"),
     [
@@ -125,6 +130,10 @@ def test_runs_are_guesses() -> None:
         ({"a": lambda t: t[:3]}, r"guess: expected for a a number.* shape \(3,\)"),
         (initial_points(on(unit_move(), 7)), r"expected points of 1 phases, .* shape \(2, 7\)"),
         (initial_points(on(there_and_back(), 6)), "guess: .* got points of other meshes or models"),
+        (run_of([0.0, 1.0, 0.5]), "guess: times of the run: expected increasing times"),
+        (run_of([0.0]), "guess: times of the run: expected increasing times"),
+        (run_of([0.0, 1.0], w=[0.0, 1.0]), "signals of the run: expected one of x, v, a, .*'w'"),
+        (run_of([0.0, 1.0], x=[0.0]), "signals of the run: .* with a value for each time"),
         (5, WHAT),
         ("move.npz", rf"{WHAT}, got 'move\.npz'; a file is read by ocp\.load\(path\)"),
     ],

@@ -196,13 +196,15 @@ def test_multipliers_of_phases_links_and_sums_of_durations() -> None:
 
     found = solve_once(two(), 10)
     conditions = {one.name: one for one in found.active()}
-    total = conditions["the duration of phases 1, 2"]
+    total = conditions["the duration"]
     assert (total.unit, total.begin, total.end) == ("cost/s", 0.0, 2.0)
     for name, condition, value in (("total", total, 2.0),
                                    ("jump", conditions["the start of x"], 0.1)):  # fmt: skip
         wanted = slope(two, name, value, 10, Radau(3))[0]
         np.testing.assert_allclose(condition.multiplier, wanted, rtol=1e-5)
     np.testing.assert_allclose(found.hamiltonian, total.multiplier, rtol=1e-6)
+    by = found.sensitivity("T")
+    np.testing.assert_allclose([by.cost, by.T], [total.multiplier, 1.0], rtol=1e-6)
     assert found.costates["x"].shape == found.t.shape
 
 

@@ -65,6 +65,7 @@ def test_start_at_a_saddle_of_an_unbounded_problem() -> None:
     with pytest.raises(SolveError) as caught:
         solve(unit_move(cost=integral(lambda s: s.x * s.a), end={}, start=REST))
     assert caught.value.status is Status.UNBOUNDED
+    assert not caught.value.partial.verified
 
 
 @pytest.mark.slow

@@ -118,6 +118,8 @@ def test_sensitivities_pass_through_stick() -> None:
         (cost, T), by = np.subtract(*results) / 2e-4, found.sensitivity(name)
         np.testing.assert_allclose(by.cost, cost, rtol=1e-6, atol=1e-8)
         np.testing.assert_allclose(by.t[np.argmin(abs(found.t - stops))], T, rtol=1e-6, atol=1e-8)
+    whole = found.sensitivity("T")  # a longer rest costs nothing
+    np.testing.assert_allclose([whole.cost, whole.T], [0.0, 1.0], atol=1e-6)
 
 
 # --- condition, and what cannot be known --------------------------------------------------------

@@ -19,6 +19,7 @@ from symfric.choice import Choice, Friction, Row, select
 from symfric.choice.continuation import RUN
 from symfric.choice.nature import forms
 from symfric.choice.ranking import lines
+from symfric.choice.select import laws_of
 from symfric.laws import ALL_LAWS, GMS, BrownMcPhee, ExactCoulomb, Law, LuGre, steady_force
 from symfric.scenes import Drive, Rabinowicz
 from symfric.scenes.base import contact
@@ -311,3 +312,12 @@ def test_no_law_of_the_catalogue_breaks_it() -> None:
     found = select(Rabinowicz, accuracy=1e-2, t_end=SHORT, workers=2)
     assert {row.law for row in found} == set(ALL_LAWS)
     assert len(found.ranked) > 15
+
+
+def test_candidates_are_names_and_laws_in_their_order() -> None:
+    own = BrownMcPhee(v_t=1e-4)
+    found = laws_of("select", [own, "stribeck", LuGre()])
+    assert [*found] == ["brown_mcphee", "stribeck", "lugre"]
+    assert found["brown_mcphee"] == (own,)
+    with pytest.raises(ValueError, match="laws: expected every name once"):
+        laws_of("select", [own, "brown_mcphee"])

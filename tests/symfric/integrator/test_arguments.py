@@ -33,11 +33,6 @@ def test_methods_by_name_and_by_tolerance() -> None:
             chosen("here", name, 1e-6)
 
 
-def test_the_method_follows_from_the_tolerance() -> None:
-    for rtol, method in ((1e-13, RODAS5P), (1e-6, RODAS5P), (LOOSE, RODAS5P), (2e-5, RADAU5)):
-        assert chosen("here", "auto", rtol) is method
-
-
 def test_settings_are_checked_once_and_true_is_no_time() -> None:
     """Equal numbers of another type are other settings."""
     model = drive(Viscous())

@@ -136,6 +136,17 @@ def test_correct_laws_pass() -> None:
     assert str(sf.check_law(RIGHT)).startswith("Falling: no errors, no warnings")
 
 
+def test_parameters_off_by_decades_cause_no_false_verdict() -> None:
+    for law, values in (
+        (sf.LuGrePassive(), {"sigma_0": 1e14}), (sf.GMS(), {"mu_d": 1e-10}),
+        (sf.Stribeck(), {"v_s": 1e-12}), (sf.Dahl(), {"n": 1e-9}),
+        (sf.ElastoPlastic(), {"sigma_1": 1e9}), (sf.BrownMcPhee(), {"mu_s": 1e8, "mu_d": 1e8}),
+    ):  # fmt: skip
+        report = sf.check_law(sf.with_values(law, values))
+        topics = {one.topic for one in report.remarks if one.result in ("error", "warning")}
+        assert topics <= {"states"} | ({"passivity"} if law.warnings() else set()), report
+
+
 def test_functions_of_casadi_may_be_used_for_numbers_and_arrays() -> None:
     law = with_force(lambda s, v, N: 0.3 * N * ca.tanh(v / 1e-3))
     v = np.array([-1.0, 0.0, 2e-3])
@@ -144,6 +155,10 @@ def test_functions_of_casadi_may_be_used_for_numbers_and_arrays() -> None:
     rate = SLIDING.rate(v, 2.0, np.zeros((1, 3)))
     assert rate.shape == (1, 3)
     assert rate[0] == pytest.approx(v)
+    several = np.array([[-1.0, 0.0, 2e-3], [1.0, 1e-4, -2e-3]])
+    assert law.force(several, 2.0) == pytest.approx(0.6 * np.tanh(several / 1e-3))
+    with pytest.raises(ValueError, match=r"force: expected a force, .* got the expression"):
+        with_force(lambda s, v, N: ca.SX(0.3) * N * v).force(0.1, 2.0)
     assert SLIDING.rate(0.1, 2.0, [1e-5]) == pytest.approx([0.1 - 1e4 * 0.1 / 0.6 * 1e-5])
 
 

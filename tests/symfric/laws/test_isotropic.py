@@ -209,6 +209,15 @@ def test_slip_in_a_plane_of_space_is_slip_in_the_plane() -> None:
         assert rate == pytest.approx(whole, rel=1e-9, abs=1e-12)
 
 
+def test_steady_sliding_has_the_force_of_the_law_along_the_motion() -> None:
+    e = np.array([0.6, -0.8])
+    for name in DYNAMIC:
+        one, law = LAWS[name], sf.PlanarSlip(LAWS[name])
+        expected = one.force(0.1, N, one.steady_state(0.1, N)) * e
+        force = law.force(0.1 * e, N, law.steady_state(0.1 * e, N))
+        assert force == pytest.approx(expected, rel=1e-9), name
+
+
 def test_lugre_on_a_circle_lags_by_the_angle_of_its_linear_equation() -> None:
     """dz/dt = v - lambda z with turning v: z = v/(lambda + i omega)."""
     speed, omega = 4e-3, 2 * pi * 100

@@ -19,7 +19,16 @@ from symfric.multibody import Distance, Mechanism, PinInSlot, Prismatic, Revolut
 from symfric.multibody.results import SPRING
 from symfric.results.animation import SLIDES, STICKS, frame_times, picture
 from symfric.results.strokes import Poses, Stroke, View, look, strokes
-from symfric.scenes import MECHANISMS, DrillString, Pendulum, Prescribed
+from symfric.scenes import (
+    MECHANISMS,
+    CoupledBlocks,
+    DrillString,
+    Pendulum,
+    Prescribed,
+    Rabinowicz,
+)
+
+Array = NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")
@@ -98,15 +107,22 @@ def test_a_block_on_a_belt_is_seen_from_aside_with_its_spring_and_its_stick() ->
         fills.append(to_hex(joint.get_markerfacecolor()))
         assert joint.get_xdata()[0] == pytest.approx(run.at(t)["x"][0])
     assert fills == [to_hex(fill) for fill in (SLIDES, STICKS, SLIDES)]
-    # marks of the belt move with it
-    ticks = [line for line in axis.lines if line.get_marker() == "|"]
-    length, at = 3 * 0.15 * 0.8 * 9.81 / 2.1, list[list[float]]()
-    for k in range(2):
-        show(k)
-        at.append([line.get_xdata()[0] for line in ticks])
-    assert np.mod(np.subtract(at[1], at[0]), length) == pytest.approx(np.full(9, 0.3))
     small = simulate(Prescribed(BrownMcPhee()).model(), 1.0, u={"v": 1e-3})
     assert picture(small, np.array([0.0, 1.0]))[0].axes[0].get_xlabel() == "x [mm]"
+
+
+def test_marks_of_a_belt_are_evenly_spaced_and_move_with_it() -> None:
+    way = 0.15 * 0.8 * 9.81 / 2.1
+    for kind, count in ((Rabinowicz, 9), (CoupledBlocks, 15)):
+        figure, show = picture(simulate(kind(BrownMcPhee()).model(), 3.0), np.array([0.0, 3.0]))
+        ticks = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
+        at = list[Array]()
+        for k in range(2):
+            show(k)
+            at.append(np.array([line.get_xdata()[0] for line in ticks]))
+            assert np.diff(np.sort(at[k])) == pytest.approx(np.full(count - 1, way / 3))
+            assert -1e-9 < at[k].min() + way < way / 3
+        assert np.mod(at[1] - at[0], count * way / 3) == pytest.approx(np.full(count, 0.3))
 
 
 @pytest.mark.parametrize("along", ["x", "z"])
@@ -166,7 +182,6 @@ def test_the_hands_of_a_drill_string_turn_and_its_bit_sticks_at_first() -> None:
     assert np.abs(tips - np.sin(angle)).min() < 1e-9  # the hand of the top drive
 
 
-Array = NDArray[np.float64]
 FRAMES = 7
 
 

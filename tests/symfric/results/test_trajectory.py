@@ -43,6 +43,7 @@ def test_a_detail_is_a_signal_by_name(run: Trajectory) -> None:
         run.details.items()
     )
     assert not run.details.keys() & run.units.keys()
+    assert "\nfurther: " in repr(run)
     assert run["phi_Fx"] == pytest.approx(-2.0 * (9.81 * np.cos(angle) + 0.5 * rate**2))
 
 
@@ -185,6 +186,7 @@ def test_a_run_prints_how_it_ended_and_the_ranges_of_its_signals(sticking: Traje
     assert text.startswith(
         "run of 'rabinowicz' from 0 to 6 s\nfriction: belt by ExactCoulomb\nSUCC"
     )
+    assert "further" not in text, "details are not evaluated for it"
     assert f"{run.statistics.steps} steps of Rodas5P, {len(run.happened)} event" in text
     row = next(line.split() for line in text.splitlines() if line.startswith("  friction"))
     low, high = run.extremes["friction"]

@@ -198,6 +198,12 @@ def test_blocks_stick_and_slip_as_the_matrix_exponential(v_belt: float) -> None:
     assert [t for t, _, _ in found] == pytest.approx([t for t, _, _ in happened], abs=1e-7)
     final = [run[name][-1] for name in ("x_1", "x_2", "v_1", "v_2")]
     assert final == pytest.approx(last, abs=1e-7)
+    x, v = (np.array([run[f"{name}_{i}"][[0, -1]] for i in (1, 2)]) for name in "xv")
+    stored_energy = (np.sum(v * v, axis=0) + np.sum(x * (K @ x), axis=0)) / 2
+    force, heat = (
+        sum(run.integral(f"{name}_{i}")[-1] for i in (1, 2)) for name in ("friction", "power")
+    )
+    assert np.diff(stored_energy) == pytest.approx(-v_belt * force - heat, abs=1e-6)
 
 
 J_1, J_2, T_1, T_2, W = 0.2, 0.64, 100.0, 20.0, 150.0

@@ -21,8 +21,6 @@ from symfric.integrator.equations.initial import (
 from symfric.scenes import SliderCrank
 
 Array = NDArray[np.float64]
-
-
 NONE = np.zeros(0)
 x, z, t = Variable("x", "m", start=1.0), Variable("z", "1"), ca.SX.sym("t")
 X, Z = x.symbol, z.symbol

@@ -10,7 +10,7 @@ from closed_forms import ClosedForm, assemble, smooth_dae, smooth_ode, timed_ode
 from numpy.typing import NDArray
 
 import symfric.integrator.step.attempt as module
-from symfric import BrownMcPhee, LuGre, Model, Variable, rabinowicz
+from symfric import BrownMcPhee, ExactCoulomb, LuGre, Model, Variable, Viscous, rabinowicz
 from symfric.bench.multibody import chain
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS, RODAS5P
@@ -23,9 +23,11 @@ from symfric.integrator.step.attempt import (
     build_step,
     instructions,
     least,
+    obstacles,
     written,
 )
 from symfric.model import Monitor
+from symfric.scenes import Pendulum
 
 Array = NDArray[np.float64]
 x, y, z = (Variable(name, "1", start=float(name != "z")) for name in "xyz")
@@ -256,3 +258,9 @@ def test_small_steps_are_written_out_large_ones_never_and_others_counted(
     assert written(belt, RODAS5P, count - 1)[0].class_name() == "MXFunction"
     assert written(belt, RODAS5P, count)[0].class_name() == "SXFunction"
     assert kinds == [ca.SX, ca.MX, ca.SX, ca.MX, ca.SX]
+
+
+def test_only_mechanisms_with_dry_friction_are_tested_for_missed_breakaway() -> None:
+    for law, tested in ((BrownMcPhee(), True), (ExactCoulomb(), True), (Viscous(), False)):
+        made = obstacles(assemble(Pendulum(law).model()), RODAS5P)
+        assert (made is not None) is tested, law
