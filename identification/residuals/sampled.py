@@ -89,7 +89,7 @@ def moving_start(v: Array) -> float:
     return float(v[0]) if abs(v[0]) > NEAR_REST * usual(v) else 0.0
 
 
-PRELOAD = 10.0
+PRELOAD = 4.0
 """Largest initial deflection of a bristle relative to that of steady sliding at the usual speed.
 
 In slow sliding it is larger by the ratio of static and kinetic level."""
