@@ -25,7 +25,7 @@ from identification.from_data import (
     slowest,
     strongest,
 )  # fmt: skip
-from identification.residuals.evaluation import DEAD_TIME, Array, Residuals
+from identification.residuals.evaluation import Array, Residuals
 from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import PointRows, Points
 from identification.result.build import fitted, levels_of, tried, written
@@ -47,10 +47,8 @@ QUICK = 40
 """Largest number of evaluations of a fit that only selects a setting or tests for a dead time."""
 LONGEST = 30
 """Largest dead time that is estimated [samples]."""
-LATE, MATTERS = 4.0, 1.0
-"""Smallest dead time, in its standard errors, and smallest shift of another value, in its standard
-errors without a dead time, for which a dead time of the force is estimated.
-"""
+MATTERS = 0.5
+"""Shift of a value by a dead time of the force, in its standard errors, that is not neglected."""
 OF_KIND = ("x0", "dead_time")
 """Entries of `free` that belong to the residuals."""
 
@@ -167,7 +165,7 @@ class Fit:
         return self._refined(asked._replace(kind=kind, task=made), live.point.w, self.evaluations)
 
     def _delayed(self, asked: "Prepared", live: Live) -> "Refined | None":
-        """Fit again with dead times; return None unless they are significant and shift a value."""
+        """Fit again with dead times; return None if they hardly shift the other values."""
         kind = asked.kind
         if not isinstance(kind, InverseDynamics) or kind.dead_time != "auto":
             return None
@@ -184,14 +182,10 @@ class Fit:
         if found is None or not found.end.status.ok or found.live.minimum.held.any():
             return None
         first, last = live.point.values, found.live.point.values
-        before, after = (
-            np.sqrt(np.diag(one.minimum.sandwich.coloured)) for one in (live, found.live)
-        )
         count = len(residuals.parameters)
-        times = [n.startswith(DEAD_TIME) for n in residuals.names]
-        late = np.abs(last[times]) > LATE * after[times]
-        moved = np.abs(last[:count] - first[:count]) > MATTERS * before[:count]
-        return found if late.any() and moved.any() else None
+        errors = np.sqrt(np.diag(live.minimum.sandwich.coloured))[:count]
+        moved = np.abs(last[:count] - first[:count])
+        return found if (moved > MATTERS * errors).any() else None
 
     def _refined(self, asked: "Prepared", w: Array, evaluations: int) -> "Refined | None":
         """Solve a changed problem from the coordinates `w`; return None without residuals."""

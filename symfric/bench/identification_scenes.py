@@ -253,10 +253,31 @@ def jitter(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
     return np.interp(m.t + 3e-4 * rng.standard_normal(m.t.size), m.t, m.x), F
 
 
-def delay(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return forces 2 ms late."""
+def delay(rng: Generator, m: Motion, F: Array, late: float = 2e-3) -> tuple[Array, Array]:
+    """Return forces that are `late` [s]."""
     del rng
-    return m.x, np.interp(m.t - 2e-3, m.t, F)
+    return m.x, np.interp(m.t - late, m.t, F)
+
+
+def backlash(rng: Generator, m: Motion, F: Array, play: float = 2e-5) -> tuple[Array, Array]:
+    """Return positions of an encoder that follows the stage with a play [m]."""
+    del rng
+    path = [m.x[0]]
+    for x in m.x[1:].tolist():
+        path.append(min(max(path[-1], x - play / 2), x + play / 2))
+    return np.array(path), F
+
+
+def saturated(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+    """Return forces of a sensor that loses 10 % of the gain at the largest force."""
+    del rng
+    return m.x, F * (1 - 0.1 * (F / np.abs(F).max()) ** 2)
+
+
+def loaded(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
+    """Return forces of a guide that rubs with 5 % of the force of inertia."""
+    del rng
+    return m.x, F + 0.05 * M * np.abs(m.a) * np.sign(m.v)
 
 
 def drift(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
@@ -379,15 +400,26 @@ SCENES = (
     Scene("kept: stage, heavy tails", "right", partial(simple, change=heavy_tails), COULOMB, True),
     Scene("kept: stage, asymmetric law", "right",
           partial(simple, law="asymmetric(coulomb+viscous)", friction=asymmetric, rho=0.5),
-          STAGE | {"mu_d_pos": 22.0, "mu_d_neg": 20.0, "sigma_2_pos": 220.0, "sigma_2_neg": 200.0},
+          {"m": M, "mu_d_pos": 22.0 + OFFSET, "mu_d_neg": 20.0 - OFFSET, "sigma_2_pos": 220.0,
+           "sigma_2_neg": 200.0},
           True),
     Scene("kept: curve of few points", "right", partial(points, count=30), CURVE, True),
-    Scene("kept: stage, held force", "record", partial(fine, change=held), STRIBECK, True),
+    Scene("stage, held force", "record", partial(fine, change=held), STRIBECK),
     Scene("kept: stage, encoder 1 um, AR(1) 0.7", "record",
           partial(stage, position=0.0, change=encoder(1e-6), rho=0.7), STRIBECK, True),
-    Scene("kept: stage, one-sided gain", "wrong", partial(simple, change=gained), COULOMB, True),
+    Scene("stage, one-sided gain", "wrong", partial(simple, change=gained), COULOMB),
     Scene("kept: stage, root of the speed", "wrong", partial(simple, friction=root), COULOMB, True),
     Scene("kept: stage, warming up, coulomb+viscous", "wrong", partial(simple, change=warm_up),
           COULOMB, True),
     Scene("kept: shooting, missing spring", "wrong", partial(shooting, spring=0.5), BLOCK, True),
+    Scene("kept: stage, delay 1 ms, AR(1) 0.7", "record",
+          partial(stage, change=partial(delay, late=1e-3), rho=0.7), STRIBECK, True),
+    Scene("kept: bristles, position noise 1 um", "record", partial(memory, position=1e-6), BRISTLE,
+          True),
+    Scene("kept: stage, backlash of the encoder", "record", partial(stage, change=backlash),
+          STRIBECK, True),
+    Scene("kept: stage, saturating sensor", "wrong", partial(simple, change=saturated), COULOMB,
+          True),
+    Scene("kept: stage, friction of the guide under load", "wrong", partial(simple, change=loaded),
+          COULOMB, True),
 )  # fmt: skip
