@@ -47,8 +47,6 @@ QUICK = 40
 """Largest number of evaluations of a fit that only selects a setting or tests for a dead time."""
 LONGEST = 30
 """Largest dead time that is estimated [samples]."""
-MATTERS = 0.5
-"""Shift of a value by a dead time of the force, in its standard errors, that is not neglected."""
 OF_KIND = ("x0", "dead_time")
 """Entries of `free` that belong to the residuals."""
 
@@ -165,7 +163,7 @@ class Fit:
         return self._refined(asked._replace(kind=kind, task=made), live.point.w, self.evaluations)
 
     def _delayed(self, asked: "Prepared", live: Live) -> "Refined | None":
-        """Fit again with dead times; return None if they hardly shift the other values."""
+        """Fit again with dead times; return None if the data do not determine them."""
         kind = asked.kind
         if not isinstance(kind, InverseDynamics) or kind.dead_time != "auto":
             return None
@@ -181,11 +179,8 @@ class Fit:
         found = self._refined(changed, unknowns.of(live.values), min(self.evaluations, QUICK))
         if found is None or not found.end.status.ok or found.live.minimum.held.any():
             return None
-        first, last = live.point.values, found.live.point.values
-        count = len(residuals.parameters)
-        errors = np.sqrt(np.diag(live.minimum.sandwich.coloured))[:count]
-        moved = np.abs(last[:count] - first[:count])
-        return found if (moved > MATTERS * errors).any() else None
+        lost, before = (one.minimum.sandwich.null.shape[1] for one in (found.live, live))
+        return None if lost > before else found
 
     def _refined(self, asked: "Prepared", w: Array, evaluations: int) -> "Refined | None":
         """Solve a changed problem from the coordinates `w`; return None without residuals."""
