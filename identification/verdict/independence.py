@@ -13,7 +13,7 @@ to one type of model error:
 | position | a harmonic, also times sign v | ripple, cogging, gravity, an uneven track |
 | time | sensitivities times t | parameters that drift, warming up |
 | delay, unless a dead time is estimated | rate of the predicted signal | a delay of the signal |
-| predicted force | its size, square and cube | gain of a direction, saturation, effect of the load |
+| predicted force | its size, square and cube | gain of a direction, saturation, load |
 
 Residuals and columns are whitened by an autoregressive model, the span of the sensitivities J is
 projected out of both, and the remaining residuals are regressed on the columns:
