@@ -83,10 +83,30 @@ def constant_runs(y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return first, np.diff(np.concatenate([first, [y.size]]))
 
 
+LONG, BLOCKS = 100_000, 20
+"""Number of samples above which statistics use evenly spaced blocks, and number of the blocks."""
+
+
+def blocks(n: int, most: int = LONG) -> list[slice]:
+    """Return slices of n samples: all of them, or evenly spaced blocks of `most` samples in all."""
+    if n <= most:
+        return [slice(0, n)]
+    size = most // BLOCKS
+    return [slice(k, k + size) for k in np.linspace(0, n - size, BLOCKS).astype(int).tolist()]
+
+
+def some(y: Array) -> Array:
+    """Return a signal, of a long one only evenly spaced samples, for its quantiles."""
+    return y[:: 1 + y.size // LONG]
+
+
 def count_of(y: Array) -> float:
-    """Return the smallest step between values of a signal; 0 if they are not on a coarse grid."""
-    levels = np.unique(y)
-    if levels.size < 2 or levels.size > 0.5 * y.size:
+    """Return the smallest step between values of a signal; 0 if they are not on a coarse grid.
+
+    Of a long signal, only blocks are evaluated.
+    """
+    levels = np.unique(np.concatenate([y[part] for part in blocks(y.size)]))
+    if levels.size < 2 or levels.size > 0.5 * min(y.size, LONG):
         return 0.0
     steps = np.diff(levels)
     smallest = float(np.quantile(steps, 0.05))
