@@ -1,6 +1,7 @@
 """Checks of a long record, of which statistics use blocks: faults anywhere are found."""
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -91,6 +92,6 @@ def test_blocks_are_even_and_disjoint() -> None:
     parts = blocks(N)
     assert len(parts) == BLOCKS and {p.stop - p.start for p in parts} == {LONG // BLOCKS}
     assert (parts[0].start, parts[-1].stop) == (0, N)
-    assert all(a.stop <= b.start for a, b in zip(parts, parts[1:], strict=False))
+    assert all(a.stop <= b.start for a, b in pairwise(parts))
     assert not any(p.start <= INSIDE < p.stop for p in parts)
     assert blocks(LONG) == [slice(0, LONG)]
