@@ -130,12 +130,13 @@ def weighted(signal: Array, gain: Callable[[Array], Array], reach: float, *, odd
     block = max(LEAST, 1 << ceil(log2(8 * reach)))
     if n <= max(LONG, block):
         periodic = np.concatenate([signal, side * signal[-2:0:-1]])
-        here = gain(np.fft.rfftfreq(periodic.size))
+        here = gain(np.asarray(np.fft.rfftfreq(periodic.size), np.float64))
         return np.fft.irfft(np.fft.rfft(periodic) * here, periodic.size)[:n]
     edge = ceil(reach)
     before, after = side * signal[edge:0:-1], side * signal[-2 : -edge - 2 : -1]
     whole = np.concatenate([before, signal, after])
-    here, step, found = gain(np.fft.rfftfreq(block)), block - 2 * edge, np.empty(n)
+    here = gain(np.asarray(np.fft.rfftfreq(block), np.float64))
+    step, found = block - 2 * edge, np.empty(n)
     for k in range(0, n, step):
         part = np.fft.irfft(np.fft.rfft(whole[k : k + block], block) * here, block)
         found[k : k + step] = part[edge : edge + min(step, n - k)]

@@ -72,7 +72,8 @@ class Rough:
     @cached_property
     def inverse(self) -> Array:
         """Pseudo-inverse of the weighted columns."""
-        return np.linalg.pinv(self.columns[:: self.every] * self.root[:, None], rcond=1e-10)
+        weighted: Array = self.columns[:: self.every] * self.root[:, None]
+        return np.asarray(np.linalg.pinv(weighted, rcond=1e-10), np.float64)
 
     def with_column(self, column: Array) -> tuple[float, float]:
         """Return value and standard error of an additional regressor, shape (rows,)."""
