@@ -14,9 +14,8 @@ from identification.data.check_signals import (
     of_spikes,
     of_velocity,
 )
-from identification.data.findings import Finding, Findings, View
+from identification.data.findings import Finding, Findings, Rough, View, rough_model
 from identification.data.record import GAP, JITTER, Array, Record
-from identification.data.rough import Rough, rough_model
 
 FEWEST, FEW = 20, 50
 """Numbers of samples below which a record gives an error, and a warning."""

@@ -5,9 +5,17 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.findings import Array, Finding, View
+from identification.data.findings import (
+    Array,
+    Finding,
+    Rough,
+    View,
+    joined,
+    rough_model,
+    smoothed,
+    white_part,
+)
 from identification.data.record import constant_runs, count_of, some
-from identification.data.rough import Rough, joined, rough_model, smoothed, white_part
 
 FAR = 12.0
 """Least distance of a spike from the running median, relative to its 95 % quantile."""

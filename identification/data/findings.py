@@ -1,4 +1,11 @@
-"""Findings of the checks of data, and the checked view of a record."""
+"""Findings of the checks of data, the checked view of a record, and its rough model.
+
+    force = m a + level sgn(v) + viscous v + stiffness x + offset
+
+For a rotary drive, sin x and cos x are added. The model is a robust linear regression on signals
+smoothed by a Gaussian window, whose width depends on the noise of the position. Its signs and its
+explained variance reveal wrong signs, exchanged columns, delay and drift; it is not an estimate.
+"""
 
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -8,8 +15,9 @@ from pathlib import Path
 from typing import Any, Literal, final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from identification.data.record import Array, Record, blocks, first_of
+from identification.data.record import Array, Record, count_of, even_blocks, first_of
 from symfric.foundation import checks
 
 Severity = Literal["error", "warning"]
@@ -159,19 +167,8 @@ class View:
 
     @cached_property
     def steady(self) -> tuple[Record, ...]:
-        """Longest piece of the record without gaps, at equal intervals; () if it is too short.
-
-        A long piece is represented by evenly spaced blocks.
-        """
-        record = self.record
-        if record.t is None or record.size < 20:
-            return ()
-        longest = max(record.pieces, key=lambda part: part.stop - part.start)
-        size, first = longest.stop - longest.start, longest.start
-        if size < 20:
-            return ()
-        each = (slice(first + part.start, first + part.stop) for part in blocks(size))
-        return tuple(_even(record.at(part)) for part in each)
+        """Even blocks of the record."""
+        return even_blocks(self.record)
 
     def finding(
         self, serious: bool, kind: str, signal: str, case: str = "",
@@ -205,11 +202,218 @@ class View:
         return place if t is None else f"t = {t[sample]:.6g} s ({place})"
 
 
-def _even(piece: Record) -> Record:
-    """Return a record at equal intervals, interpolated if its intervals differ by more than 5 %."""
-    step = (piece.time[-1] - piece.time[0]) / (piece.size - 1)
-    grid = piece.time[0] + step * np.arange(piece.size)
-    if np.abs(grid - piece.time).max() < 0.05 * step:
-        return piece
-    signals = {key: np.interp(grid, piece.time, y) for key, y in piece.signals.items()}
-    return Record(piece.name, grid, signals, piece.units, first_row=piece.first_row)
+WIDTHS = (2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 35.0, 60.0, 100.0)
+"""Standard deviations of the smoothing window, in samples."""
+CLEAN = 0.1
+"""Largest acceptable ratio of the noise of the acceleration to the acceleration."""
+TURNED = 0.3
+"""Range of an angle [rad] above which gravity may be visible."""
+KNOTS = np.array([0.0, 0.05, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0])
+"""Quantiles of the speed at the knots of a free friction curve."""
+HUBER = 2.5
+ROUNDS = 5
+ENOUGH = 10_000
+"""Number of rows of a regression, which are evenly spaced."""
+MOVING = 0.02
+"""Share of the largest speed above which the drive is moving."""
+
+
+@final
+class Rough:
+    """Rough model of one record.
+
+    Attributes:
+        t, v, a, force: times [s] and smoothed signals of the rows.
+        step: sample interval [s].
+        blocks: number of blocks of equal length that contain the rows.
+        columns: regressors of the values.
+        clean: True if the acceleration exceeds its noise.
+        values, errors: m, level, viscous, stiffness, offset (and coefficients of sin x, cos x),
+            and their standard errors.
+        root: roots of the weights of every `every`-th row in the regression.
+        explained: share of the variance of the force explained by the model, robust to outliers.
+    """
+
+    def __init__(
+        self, t: Array, v: Array, a: Array, force: Array, columns: Array, width: float,
+        step: float, clean: bool, blocks: int,
+    ) -> None:  # fmt: skip
+        self.t, self.v, self.a, self.force, self.columns = t, v, a, force, columns
+        self.step, self.clean, self.blocks = step, clean, blocks
+        self.every = max(1, int(2 * width), force.size // ENOUGH)
+        A, b = columns[:: self.every], force[:: self.every]
+        self.values, self.errors, self.root = _robust(A, b)
+        self.explained = _explained(A, b, self.values)
+
+    def unexplained_when_late(self, late: float) -> float:
+        """Return the unexplained share of the force after correcting a delay of `late` [s].
+
+        The rows keep their weights.
+        """
+        A = self.columns[:: self.every]
+        b = np.interp(self.t[:: self.every] + late, self.t, self.force)
+        return 1 - _explained(A, b, self.inverse @ (self.root * b))
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Pseudo-inverse of the weighted columns."""
+        weighted: Array = self.columns[:: self.every] * self.root[:, None]
+        return np.asarray(np.linalg.pinv(weighted, rcond=1e-10), np.float64)
+
+    def with_column(self, column: Array) -> tuple[float, float]:
+        """Return value and standard error of an additional regressor, shape (rows,)."""
+        A = np.column_stack([self.columns[:: self.every], column[:: self.every]])
+        values, errors, _ = _robust(A, self.force[:: self.every])
+        return float(values[-1]), float(errors[-1])
+
+    @cached_property
+    def residual(self) -> Array:
+        """Difference of the force and its prediction by the model."""
+        return self.force - self.columns @ self.values
+
+    @property
+    def moving(self) -> NDArray[np.bool_]:
+        """Mask of the rows in which the drive moves."""
+        return np.abs(self.v) > MOVING * np.abs(self.v).max()
+
+    @property
+    def spread(self) -> float:
+        """Range of the middle half of the forces."""
+        return float(np.ptp(np.quantile(self.force, (0.25, 0.75))))
+
+    def sure(self, k: int) -> float:
+        """Return the ratio of value k to its standard error."""
+        return float(self.values[k] / self.errors[k]) if self.errors[k] > 0 else 0.0
+
+    def one_way(self, share: float = 0.1) -> bool:
+        """Return True if motion in one direction is at most `share` of that in the other."""
+        path = [float(np.sum(np.maximum(side * self.v, 0.0))) for side in (1, -1)]
+        return min(path) <= share * max(path)
+
+
+def smoothed(y: Array, width: float, order: int = 0) -> Array:
+    """Return a signal smoothed by a Gaussian window, or its central differences per sample.
+
+    Rows are smoothed separately.
+    """
+    from scipy.ndimage import gaussian_filter1d  # noqa: PLC0415  (slow to import)
+
+    found = np.asarray(gaussian_filter1d(y, width, mode="nearest"), dtype=np.float64)
+    for _ in range(order):  # unlike SciPy's derivatives, differences remove a constant exactly
+        found = np.gradient(found, axis=-1)
+    return found
+
+
+def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> Rough | None:
+    """Return the rough model of a record; None without position and force, or if it is too short.
+
+    Args:
+        view: record to model.
+        exchanged: exchange force and position.
+        curve: replace level and viscous part by any friction curve that is piecewise linear in
+            each direction, and add a drift in time as the last column.
+    """
+    steady = view.steady
+    if not {"x", "force"} <= view.roles.keys() or not steady or steady[0].size < 50:
+        return None
+    both = ("x", "force")[:: -1 if exchanged else 1]
+    position, push = (joined(steady, view.roles[r]) for r in both)
+    if np.ptp(position) == 0 or np.ptp(push) == 0:
+        return None
+    step, size = steady[0].step, steady[0].size
+    width, clean = _width(position)
+    edge = int(3 * width)
+    rows = (slice(None), slice(edge, size - edge))
+    if size - 2 * edge < 30:
+        return None
+    xs = smoothed(position, width)
+    v, a = smoothed(position, width, 1) / step, smoothed(position, width, 2) / step**2
+    still = MOVING * float(np.abs(v[rows]).max())
+    sign = smoothed(np.sign(v) * (np.abs(v) > still), width)
+    columns = [a, sign, v, xs - xs.mean(), np.ones_like(v)]
+    if view.unit("x") == "rad" and np.ptp(position) > TURNED:
+        columns += [np.sin(xs), np.cos(xs)]
+    if curve:
+        columns[1:3] = _curve(v, still, rows)
+        columns.append(np.linspace(-0.5, 0.5, v.size).reshape(v.shape))
+    t, v, a, b, *columns = (
+        y[rows].ravel() for y in (joined(steady, "t"), v, a, smoothed(push, width), *columns)
+    )
+    return Rough(t, v, a, b, np.column_stack(columns), width, step, clean, len(steady))
+
+
+def _explained(A: Array, b: Array, values: Array) -> float:
+    """Return the share of the variance of `b` explained by a regression, robust to outliers."""
+
+    def mean(squares: Array) -> float:
+        return float(np.mean(np.minimum(squares, 25 * np.quantile(squares, 0.9))))
+
+    whole = mean((b - np.median(b)) ** 2)
+    return 1 - mean((b - A @ values) ** 2) / whole if whole > 0 else 0.0
+
+
+def _curve(v: Array, still: float, rows: tuple[slice, slice]) -> list[Array]:
+    """Return hat functions of the speed in each direction, with knots at quantiles of the speed.
+
+    Quantiles are those of the entries `rows` of v, shape (blocks, n).
+    """
+    found: list[Array] = []
+    for side in (1.0, -1.0):
+        speed = np.maximum(side * v, 0.0)
+        there = speed[rows][speed[rows] > still]
+        if there.size >= KNOTS.size * 10:
+            knots = np.concatenate([[0.0], np.unique(np.quantile(there, KNOTS))])
+            found += [np.interp(speed, knots, hat) * (speed > 0) for hat in np.eye(knots.size)[1:]]
+    return found or [np.sign(v), v]
+
+
+def _width(x: Array) -> tuple[float, bool]:
+    """Return the narrowest sufficient window, and whether the acceleration exceeds its noise."""
+    noise = max(white_part(x), count_of(x.ravel()) / np.sqrt(12))
+    best = WIDTHS[0]
+    for width in WIDTHS:
+        if width > max(x.shape[1] / 40, WIDTHS[0]):
+            break
+        best = width
+        of_noise = noise * np.sqrt(3 / (8 * np.sqrt(np.pi))) * width**-2.5
+        if of_noise < CLEAN * float(np.std(smoothed(x, width, 2))):
+            return width, True
+    return best, False
+
+
+def white_part(x: Array) -> float:
+    """Return the standard deviation of the white noise of a position."""
+    return float(np.std(np.diff(x, 3))) / np.sqrt(20)
+
+
+def _robust(A: Array, b: Array) -> tuple[Array, Array, Array]:
+    """Return values, standard errors and roots of the weights of Huber's regression.
+
+    It is computed by iterative reweighting.
+    """
+    scale = np.linalg.norm(A, axis=0)
+    scale[scale == 0] = 1.0
+    B = A / scale
+    weight = np.ones(b.size)
+    values = np.zeros(A.shape[1])
+    for _ in range(ROUNDS):
+        root = np.sqrt(weight)
+        R = np.asarray(np.linalg.qr(np.column_stack([B, b]) * root[:, None], mode="r"))
+        values, *_ = np.linalg.lstsq(R[:, :-1], R[:, -1], rcond=1e-10)  # SVD of few rows
+        residual = b - B @ values
+        least = 1e-12 * float(np.abs(b).max()) + 1e-200
+        sigma = max(1.4826 * float(np.median(np.abs(residual))), least)
+        weight = 1 / np.maximum(1.0, np.abs(residual) / (HUBER * sigma))
+    root = np.sqrt(weight)
+    X = B * root[:, None]
+    inverse = np.linalg.pinv(X.T @ X, rcond=1e-10)
+    rest = b - B @ values
+    lag = float(np.corrcoef(rest[1:], rest[:-1])[0, 1]) if rest.size > 3 and rest.std() > 0 else 0.0
+    lag = min(max(lag, 0.0), 0.98)
+    variance = (1 + lag) / (1 - lag) * float(weight @ rest**2) / max(b.size - A.shape[1], 1)
+    return values / scale, np.sqrt(np.maximum(variance * np.diag(inverse), 0.0)) / scale, root
+
+
+def joined(steady: Sequence[Record], signal: str) -> Array:
+    """Return a signal, a row for each block, shape (blocks, n)."""
+    return np.stack([block[signal] for block in steady])

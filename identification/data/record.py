@@ -71,6 +71,10 @@ JITTER = 0.01
 """Largest relative deviation of a sample interval from the mean in uniform samples."""
 
 
+FEWEST = 20
+"""Smallest number of samples of a piece that is checked."""
+
+
 def runs(there: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first and end (exclusive) of each run of True values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
@@ -358,3 +362,28 @@ class Record:
             units=dict(zip(keys, self.units.values(), strict=True)),
             columns={given.get(key, key): column for key, column in self.columns.items()},
         )
+
+
+def even_blocks(record: Record) -> tuple[Record, ...]:
+    """Return the longest piece of a record without gaps, at equal intervals; () if it is too short.
+
+    Evenly spaced `blocks` represent a long piece.
+    """
+    if record.t is None or record.size < FEWEST:
+        return ()
+    longest = max(record.pieces, key=lambda part: part.stop - part.start)
+    size, first = longest.stop - longest.start, longest.start
+    if size < FEWEST:
+        return ()
+    each = (slice(first + part.start, first + part.stop) for part in blocks(size))
+    return tuple(_even(record.at(part)) for part in each)
+
+
+def _even(piece: Record) -> Record:
+    """Return a record at equal intervals, interpolated if its intervals differ by more than 5 %."""
+    step = (piece.time[-1] - piece.time[0]) / (piece.size - 1)
+    grid = piece.time[0] + step * np.arange(piece.size)
+    if np.abs(grid - piece.time).max() < 0.05 * step:
+        return piece
+    signals = {key: np.interp(grid, piece.time, y) for key, y in piece.signals.items()}
+    return Record(piece.name, grid, signals, piece.units, first_row=piece.first_row)
