@@ -5,16 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.findings import (
-    Array,
-    Finding,
-    Rough,
-    View,
-    joined,
-    rough_model,
-    smoothed,
-    white_part,
-)
+from identification.data.filters import gaussian, white_part
+from identification.data.findings import Array, Finding, Rough, View, joined, rough_model
 from identification.data.record import constant_runs, count_of, some
 
 FAR = 12.0
@@ -285,8 +277,8 @@ def of_velocity(view: View) -> Iterator[Finding]:
         known, signal = joined(steady, other), joined(steady, name)
         if np.ptp(signal) == 0 or np.ptp(known) == 0:
             continue
-        derived = (smoothed(known, WIDTH, 1) / steady[0].step)[:, inner].ravel()
-        given = smoothed(signal, WIDTH)[:, inner].ravel()
+        derived = (gaussian(known, WIDTH, 1) / steady[0].step)[:, inner].ravel()
+        given = gaussian(signal, WIDTH)[:, inner].ravel()
         if derived.std() == 0 or given.std() == 0:
             continue
         alike = float(np.corrcoef(derived, given)[0, 1])

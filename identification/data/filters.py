@@ -173,6 +173,19 @@ def smoothed(signal: Array, cutoff: float) -> Array:
     return np.asarray(solveh_banded(bands, signal))
 
 
+def gaussian(y: Array, width: float, order: int = 0) -> Array:
+    """Return a signal smoothed by a Gaussian window, or its central differences per sample.
+
+    Rows are smoothed separately.
+    """
+    from scipy.ndimage import gaussian_filter1d  # noqa: PLC0415  (slow to import)
+
+    found = np.asarray(gaussian_filter1d(y, width, mode="nearest"), dtype=np.float64)
+    for _ in range(order):  # unlike SciPy's derivatives, differences remove a constant exactly
+        found = np.gradient(found, axis=-1)
+    return found
+
+
 def central_difference(signal: Array, step: float) -> Array:
     """Return the first derivative, of second order inside and one-sided at both ends."""
     return np.gradient(signal, step)
@@ -290,6 +303,11 @@ def noise_level(power: Array) -> float:
     The level is the median divided by ln 2; spectral lines do not affect the median.
     """
     return float(np.median(power[power.size // 2 :])) / float(np.log(2))
+
+
+def white_part(x: Array) -> float:
+    """Return the standard deviation of the white noise of a position."""
+    return float(np.std(np.diff(x, 3))) / np.sqrt(20)
 
 
 def rounded_level(signal: Array, power: Array) -> float:

@@ -17,6 +17,7 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.data.filters import gaussian, white_part
 from identification.data.record import Array, Record, count_of, even_blocks, first_of
 from symfric.foundation import checks
 
@@ -291,19 +292,6 @@ class Rough:
         return min(path) <= share * max(path)
 
 
-def smoothed(y: Array, width: float, order: int = 0) -> Array:
-    """Return a signal smoothed by a Gaussian window, or its central differences per sample.
-
-    Rows are smoothed separately.
-    """
-    from scipy.ndimage import gaussian_filter1d  # noqa: PLC0415  (slow to import)
-
-    found = np.asarray(gaussian_filter1d(y, width, mode="nearest"), dtype=np.float64)
-    for _ in range(order):  # unlike SciPy's derivatives, differences remove a constant exactly
-        found = np.gradient(found, axis=-1)
-    return found
-
-
 def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> Rough | None:
     """Return the rough model of a record; None without position and force, or if it is too short.
 
@@ -326,10 +314,10 @@ def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> 
     rows = (slice(None), slice(edge, size - edge))
     if size - 2 * edge < 30:
         return None
-    xs = smoothed(position, width)
-    v, a = smoothed(position, width, 1) / step, smoothed(position, width, 2) / step**2
+    xs = gaussian(position, width)
+    v, a = gaussian(position, width, 1) / step, gaussian(position, width, 2) / step**2
     still = MOVING * float(np.abs(v[rows]).max())
-    sign = smoothed(np.sign(v) * (np.abs(v) > still), width)
+    sign = gaussian(np.sign(v) * (np.abs(v) > still), width)
     columns = [a, sign, v, xs - xs.mean(), np.ones_like(v)]
     if view.unit("x") == "rad" and np.ptp(position) > TURNED:
         columns += [np.sin(xs), np.cos(xs)]
@@ -337,7 +325,7 @@ def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> 
         columns[1:3] = _curve(v, still, rows)
         columns.append(np.linspace(-0.5, 0.5, v.size).reshape(v.shape))
     t, v, a, b, *columns = (
-        y[rows].ravel() for y in (joined(steady, "t"), v, a, smoothed(push, width), *columns)
+        y[rows].ravel() for y in (joined(steady, "t"), v, a, gaussian(push, width), *columns)
     )
     return Rough(t, v, a, b, np.column_stack(columns), width, step, clean, len(steady))
 
@@ -376,14 +364,9 @@ def _width(x: Array) -> tuple[float, bool]:
             break
         best = width
         of_noise = noise * np.sqrt(3 / (8 * np.sqrt(np.pi))) * width**-2.5
-        if of_noise < CLEAN * float(np.std(smoothed(x, width, 2))):
+        if of_noise < CLEAN * float(np.std(gaussian(x, width, 2))):
             return width, True
     return best, False
-
-
-def white_part(x: Array) -> float:
-    """Return the standard deviation of the white noise of a position."""
-    return float(np.std(np.diff(x, 3))) / np.sqrt(20)
 
 
 def _robust(A: Array, b: Array) -> tuple[Array, Array, Array]:
