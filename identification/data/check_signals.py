@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.filters import gaussian, white_part
-from identification.data.findings import Array, Finding, Rough, View, joined, rough_model
-from identification.data.record import constant_runs, count_of, some
+from identification.data.findings import Array, Finding, Rough, View, rough_model
+from identification.data.record import constant_runs, count_of, joined, some
 
 FAR = 12.0
 """Least distance of a spike from the running median, relative to its 95 % quantile."""

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.filters import gaussian, white_part
-from identification.data.record import Array, Record, count_of, even_blocks, first_of
+from identification.data.record import Array, Record, count_of, even_blocks, first_of, joined
 from symfric.foundation import checks
 
 Severity = Literal["error", "warning"]
@@ -395,8 +395,3 @@ def _robust(A: Array, b: Array) -> tuple[Array, Array, Array]:
     lag = min(max(lag, 0.0), 0.98)
     variance = (1 + lag) / (1 - lag) * float(weight @ rest**2) / max(b.size - A.shape[1], 1)
     return values / scale, np.sqrt(np.maximum(variance * np.diag(inverse), 0.0)) / scale, root
-
-
-def joined(steady: Sequence[Record], signal: str) -> Array:
-    """Return a signal, a row for each block, shape (blocks, n)."""
-    return np.stack([block[signal] for block in steady])

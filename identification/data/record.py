@@ -387,3 +387,8 @@ def _even(piece: Record) -> Record:
         return piece
     signals = {key: np.interp(grid, piece.time, y) for key, y in piece.signals.items()}
     return Record(piece.name, grid, signals, piece.units, first_row=piece.first_row)
+
+
+def joined(steady: Sequence[Record], signal: str) -> Array:
+    """Return a signal, a row for each block, shape (blocks, n)."""
+    return np.stack([block[signal] for block in steady])
