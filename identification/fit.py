@@ -26,11 +26,11 @@ from identification.from_data import (
     strongest,
 )  # fmt: skip
 from identification.residuals.evaluation import DEAD_TIME, Array, Residuals
-from identification.residuals.inverse import InverseDynamics
+from identification.residuals.inverse import InverseDynamics, InverseRows
 from identification.residuals.points import PointRows, Points
 from identification.result.build import fitted, levels_of, tried, written
 from identification.result.fitted import Fitted
-from identification.result.live import Asked, Kind, Live
+from identification.result.live import Asked, Kind, Live, may_be_late
 from identification.solving.descent import Start, descend, remaining
 from identification.solving.many_starts import Progress, best_of, many_starts, scattered
 from identification.solving.task import THRESHOLD, Task, task
@@ -171,12 +171,15 @@ class Fit:
         kind = asked.kind
         if not isinstance(kind, InverseDynamics) or kind.dead_time != "auto":
             return None
+        rows = live.task.residuals
+        if not isinstance(rows, InverseRows) or not may_be_late(live, rows, LATE / 2, MATTERS / 2):
+            return None  # half the limits allow for the linearisation
         step = max(record.median_step for record in self.data)
         kind = replace(kind, dead_time=(0.0, float(f"{LONGEST * step:.3g}")))
         try:
-            residuals = kind.prepare(asked.subject, self.data, live.values)
+            residuals = rows.delayed(*kind.dead_time)
             unknowns = _unknowns(residuals, asked.subject)
-        except ValueError:  # no force is measured, a law depends on it, or few residuals
+        except ValueError:  # a law depends on the force, or few residuals
             return None
         made = replace(live.task, residuals=residuals, unknowns=unknowns)
         changed = asked._replace(kind=kind, task=made)

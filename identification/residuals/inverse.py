@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.differentiate import levels, uncertain
-from identification.data.filters import Decimation, Filter
+from identification.data.filters import Decimation, Filter, fourth_order_difference
 from identification.residuals.balance import (
     Balance,
     Mask,
@@ -139,21 +139,11 @@ class InverseDynamics:
             for n, v in _slips(made, motion, model, p).items()
             if n in made.preloads
         ]
-        if isinstance(self.dead_time, tuple):
-            if made.loaded:
-                such = "expected laws without the applied force"
-                raise ValueError(f"{where}: dead_time: {such}")
-            low, high = self.dead_time
-            low = low or -high
-            first = min(max(0.0, low), high)
-            own += [
-                Unknown(f"{DEAD_TIME}[{k}]", "s", first, low, high, motion.step, nuisance=True)
-                for k, motion in enumerate(motions)
-            ]
         pieces = tuple(_piece(made, motion, model, p, self.filter is None) for motion in motions)
         channels = tuple(_channels(made.rows, pieces))
-        parts = made.equations, made.rows, pieces, made.slopes, len(made.preloads)
-        return InverseRows(subject.names, tuple(own), channels, *parts)
+        parts = made.equations, made.rows, pieces, made.slopes, len(made.preloads), made.loaded
+        rows = InverseRows(subject.names, tuple(own), channels, *parts)
+        return rows.delayed(*self.dead_time) if isinstance(self.dead_time, tuple) else rows
 
 
 @final
@@ -295,6 +285,39 @@ class InverseRows(Blocks):
     pieces: tuple[Piece, ...]
     slopes: Sampled | None
     preloads: int
+    loaded: bool
+
+    def delayed(self, low: float, high: float) -> "InverseRows":
+        """Return the residuals with a dead time of each record within bounds.
+
+        Raises:
+            ValueError: a law depends on the applied force.
+        """
+        if self.loaded:
+            raise ValueError(f"{WHERE}: dead_time: expected laws without the applied force")
+        low = low or -high
+        first = min(max(0.0, low), high)
+        late = (
+            Unknown(f"{DEAD_TIME}[{k}]", "s", first, low, high, part.motion.step, nuisance=True)
+            for k, part in enumerate(self.pieces)
+        )
+        return replace(self, own=(*self.own, *late))
+
+    def rates(self) -> Array:
+        """Return the derivatives of the residuals by dead times of the records, (rows, records)."""
+        found = np.zeros((self.channels[-1].rows.stop, len(self.pieces)))
+        for channel in self.channels:
+            part, motion = self.pieces[channel.record], self.pieces[channel.record].motion
+            k = [row.signal for row in self.rows].index(channel.signal)
+            if (i := self.rows[k].input) is not None:
+                rate = fourth_order_difference(motion.w[motion.inputs][i], motion.step)
+                found[channel.rows, channel.record] = part.equations(k, rate[:, None])[:, 0]
+        return found
+
+    @property
+    def linear(self) -> bool:
+        """True if the force is linear in the parameters, and there is no dead time."""
+        return self.sampled.linear and not self.own
 
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
         """Yield the residuals of each balance of each record.

@@ -97,6 +97,13 @@ class Sandwich(NamedTuple):
     null: Array
     colours: tuple[Colour, ...]
 
+    @property
+    def widening(self) -> float:
+        """Largest ratio of the standard errors with and without autocorrelation."""
+        white = np.diag(self.white)
+        ratio = np.divide(np.diag(self.coloured), white, out=np.ones(white.size), where=white > 0)
+        return float(np.sqrt(ratio.max(initial=1.0)))
+
 
 def _meat(found: Colour, bread: Array, place: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return B' Sigma B of one channel, and the variances of its estimated diagonal.
