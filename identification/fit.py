@@ -38,7 +38,6 @@ from identification.starts.measured import Measured
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import Unknowns, unknowns_of
 from identification.verdict.judge import Verdict, judge
-from identification.verdict.minimum import shortened
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
@@ -144,7 +143,7 @@ class Fit:
                 evaluations=ends[0].evaluations + end.evaluations, values=live.values,
             )  # fmt: skip
             ends = (best, *ends[1:])
-        verdict = judge(shortened(live.minimum), asked.findings, live.levels)
+        verdict = judge(live.minimum.short, asked.findings, live.levels)
         gain = remaining(live.task, live.point) / max(live.point.cost, 1e-300)
         status, message = _status(asked, end, verdict, gain)
         result = fitted(

@@ -130,12 +130,17 @@ def whitened(x: Array, partial: Array, position: Count) -> Array:
     The first rows of a run are predicted from the available rows.
     """
     table, spread = predictors(partial)
-    order = np.minimum(position, partial.size)
+    first = np.flatnonzero(position < partial.size)
     out = x.copy()
+    for j in range(1, partial.size + 1):
+        out[j:] -= table[-1, j - 1] * x[:-j]
+    out[first] = x[first]
     wide = (-1,) + (1,) * (x.ndim - 1)
     for j in range(1, partial.size + 1):
-        out[j:] -= table[order[j:], j - 1].reshape(wide) * x[:-j]
-    return out / np.sqrt(spread[order]).reshape(wide)
+        here = first[position[first] >= j]
+        out[here] -= table[position[here], j - 1].reshape(wide) * x[here - j]
+    out[first] /= np.sqrt(spread[position[first]]).reshape(wide)
+    return out
 
 
 def predictors(partial: Array) -> tuple[Array, Array]:
