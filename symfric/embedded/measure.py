@@ -8,7 +8,6 @@ from tempfile import TemporaryDirectory
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.generated import Generated
@@ -31,10 +30,9 @@ from symfric.embedded.target import (
 )
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import CompileError, find_compiler
-
-Array = NDArray[np.float64]
 
 STEPS = 400
 

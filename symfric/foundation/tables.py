@@ -6,11 +6,10 @@ from pathlib import Path
 from re import fullmatch
 
 import numpy as np
-from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.foundation.units import parsed
 
-Array = NDArray[np.float64]
 Rows = list[tuple[int, list[str]]]
 """Row number in the file and cells of each row."""
 

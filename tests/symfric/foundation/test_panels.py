@@ -14,9 +14,9 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from matplotlib.text import Text
-from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, LuGre, Trajectory, for_print, rabinowicz, simulate
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import Picture, blank, grid, panels, save
 from symfric.foundation.style import COLOURS, CYCLE, DASHES, line
 from symfric.results.pictures import plot_trajectories
@@ -146,8 +146,6 @@ def test_bad_sizes_and_endings_are_refused(figure: Figure) -> None:
     with pytest.raises(ValueError, match="a figure, such as run"):
         for_print(None)  # type: ignore[arg-type]
 
-
-Array = NDArray[np.float64]
 
 EYES = {
     "normal": np.eye(3),

@@ -6,13 +6,12 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from oracles import rabinowicz_brown_mcphee, rabinowicz_lugre
 from stored import stored
 
 from symfric import BrownMcPhee, Law, LuGre, Model, Variable, drive, rabinowicz, simulate
+from symfric.foundation.numeric import Array
 
-Array = NDArray[np.float64]
 SPAN = 20.0
 """Three stick-slip cycles of the Rabinowicz block [s]."""
 LAWS: dict[str, Law] = {"brown_mcphee": BrownMcPhee(), "lugre": LuGre()}

@@ -9,12 +9,11 @@ from math import log10, pi, sqrt
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, Law, LuGre, Model, simulate
+from symfric.foundation.numeric import Array
 from symfric.scenes import Rabinowicz
 
-Array = NDArray[np.float64]
 SCENES, SEED = 500, 10
 CYCLES = 6
 

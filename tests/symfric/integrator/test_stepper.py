@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from backends import BACKENDS, each_backend, needs_compiler
 from differentiable import followed
-from numpy.typing import NDArray
 
 from symfric import (
     BrownMcPhee,
@@ -24,11 +23,11 @@ from symfric import (
     simulate,
     stepper,
 )
+from symfric.foundation.numeric import Array
 from symfric.integrator.running import plants
 from symfric.integrator.running.plants import SAMPLES
 from symfric.scenes import SliderCrank
 
-Array = NDArray[np.float64]
 LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 x, z, u = Variable("x", "m"), Variable("z", "1"), Variable("u", "N")
 

@@ -8,7 +8,6 @@ import casadi as ca
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from pages import on_a_screen, shown
 
 from symfric import (
@@ -21,6 +20,7 @@ from symfric import (
     simulate,
     simulate_many,
 )
+from symfric.foundation.numeric import Array
 from symfric.integrator import simulate_by_peer
 from symfric.model.kinds import MODE
 from symfric.multibody import Mechanism
@@ -170,9 +170,6 @@ def test_modes_of_an_ensemble_are_whole_numbers(times: np.ndarray | None) -> Non
     study = simulate_many(MODEL["exact"], 8.0, t_eval=times, x0=starts, **how)
     assert whole(study.signals["mode"])
     assert whole(study.extremes["mode"])
-
-
-Array = NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")

@@ -9,17 +9,16 @@ import numpy as np
 import pytest
 from backends import each_backend
 from differentiable import oscillator, pendulum, root, switched
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 import symfric as sf
 from symfric import Hold, Linear, Model, Variable, simulate
+from symfric.foundation.numeric import Array
 from symfric.integrator.by_peer import peer
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.running.run import Tolerances
 
-Array = NDArray[np.float64]
 LAWS: dict[str, sf.Law] = {"brown_mcphee": sf.BrownMcPhee(), "lugre": sf.LuGre()}
 FREE = ("mu_s", "mu_d", "k")
 each_law = pytest.mark.parametrize("law", LAWS)

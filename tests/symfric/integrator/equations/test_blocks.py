@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from backends import needs_compiler
 from closed_forms import assemble, smooth_dae
-from numpy.typing import NDArray
 
 import symfric.integrator.equations.blocks as module
 from symfric import BrownMcPhee, LuGre, Model, Variable, Viscous, rabinowicz
+from symfric.foundation.numeric import Array
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import (
     Following,
@@ -26,7 +26,6 @@ from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.system import System
 from symfric.scenes import FourBar, Pendulum, PendulumBox, SliderCrank
 
-Array = NDArray[np.float64]
 NONE = np.zeros(0)
 LAW = BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
 x, z = Variable("x", "m", start=1.0), Variable("z", "1")

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from backends import each_backend
 from closed_forms import assemble, smooth_dae
-from numpy.typing import NDArray
 
 import symfric as sf
 from symfric import Model, Variable
+from symfric.foundation.numeric import Array
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.blocks import following
 from symfric.integrator.equations.initial import (
@@ -20,7 +20,6 @@ from symfric.integrator.equations.initial import (
 )
 from symfric.scenes import SliderCrank
 
-Array = NDArray[np.float64]
 NONE = np.zeros(0)
 x, z, t = Variable("x", "m", start=1.0), Variable("z", "1"), ca.SX.sym("t")
 X, Z = x.symbol, z.symbol

@@ -3,8 +3,8 @@
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.integrator.equations.matrices import (
     SOUND,
     SymbolicLU,
@@ -16,7 +16,6 @@ from symfric.integrator.equations.matrices import (
     regular,
 )
 
-Array = NDArray[np.float64]
 DIAGONAL, SWAPPED = ((0, 0), (1, 1)), ((1, 0), (0, 1))
 
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from backends import needs_compiler
 from hybrid import ball
-from numpy.typing import NDArray
 
 import symfric as sf
 import symfric.integrator.running.engine as loop
@@ -187,7 +186,6 @@ def test_only_a_far_jump_is_searched_for(monkeypatch: pytest.MonkeyPatch) -> Non
     assert searched == [1.0]
 
 
-Array = NDArray[np.float64]
 RUNS = 150
 
 

@@ -7,14 +7,13 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 from symfric import Contact, Event, Hold, Model, Trajectory, Variable, simulate, simulate_many
 from symfric.bench.ocp_cases import Case
 from symfric.bench.ocp_referee import judged
+from symfric.foundation.numeric import Array
 from symfric.laws import ExactCoulomb
 
-Array = NDArray[np.float64]
 SEEDS = [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 20))]
 
 

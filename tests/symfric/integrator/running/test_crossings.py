@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from backends import each_backend, needs_compiler
 from hybrid import ball
-from numpy.typing import NDArray
 
 from symfric import Event, Linear, MaxwellSlip, Model, Status, Variable, drive, simulate
+from symfric.foundation.numeric import Array
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.crossings import Memory
@@ -21,7 +21,6 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Dense, Jumps
 from symfric.integrator.running.run import Tolerances, integrate
 
-Array = NDArray[np.float64]
 ATOL = np.full(2, 1e-7)
 x, y = Variable("x", "m"), Variable("y", "m", start=2.0)
 X, Y = x.symbol, y.symbol

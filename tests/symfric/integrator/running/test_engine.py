@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from backends import each_backend, needs_compiler
 from closed_forms import assemble, smooth_ode
-from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, LuGre, Model, rabinowicz
+from symfric.foundation.numeric import Array
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
 from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, Work, loop_source
 from symfric.integrator.running.events import Stop
 from symfric.integrator.step.attempt import Given, State, build_step
 
-Array = NDArray[np.float64]
 ROWS = RODAS5P.H.shape[0]
 
 KINDS = ("vm", "compiled")

@@ -9,15 +9,14 @@ import casadi as ca
 import numpy as np
 import pytest
 from backends import each_backend
-from numpy.typing import NDArray
 
 import symfric as sf
 import symfric.integrator.running.run as module
+from symfric.foundation.numeric import Array
 from symfric.integrator.running.crossings import cutting
 from symfric.integrator.running.record import Dense, Record, Run, hermite
 from symfric.scenes import PendulumBox
 
-Array = NDArray[np.float64]
 RNG = np.random.default_rng(7)
 
 

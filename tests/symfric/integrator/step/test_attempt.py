@@ -7,11 +7,11 @@ import casadi as ca
 import numpy as np
 import pytest
 from closed_forms import ClosedForm, assemble, smooth_dae, smooth_ode, timed_ode
-from numpy.typing import NDArray
 
 import symfric.integrator.step.attempt as module
 from symfric import BrownMcPhee, ExactCoulomb, LuGre, Model, Variable, Viscous, rabinowicz
 from symfric.bench.multibody import chain
+from symfric.foundation.numeric import Array
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.tableaux import ADAPTIVE, METHODS, RODAS5P
 from symfric.integrator.step.attempt import (
@@ -29,7 +29,6 @@ from symfric.integrator.step.attempt import (
 from symfric.model import Monitor
 from symfric.scenes import Pendulum
 
-Array = NDArray[np.float64]
 x, y, z = (Variable(name, "1", start=float(name != "z")) for name in "xyz")
 X, Y, Z = x.symbol, y.symbol, z.symbol
 T_AT, H, H_OLD, REJECTED, MEMORY = State.T, State.H, State.H_OLD, State.REJECTED, State.MEMORY

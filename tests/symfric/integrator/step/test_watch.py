@@ -7,14 +7,13 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from printed_laws import PRINTED
 from scipy.integrate import odeint
 
 import symfric as sf
+from symfric.foundation.numeric import Array
 from symfric.integrator.step.attempt import REACH, Watch
 
-Array = NDArray[np.float64]
 CAPTURED = json.loads((Path(__file__).parents[3] / "golden" / "captured.json").read_text())
 STARTS = np.array(CAPTURED["v"])
 NAMES = ("stribeck", "tustin", "benson", "andersson", "simscape_breakaway", "bengisu_akay")
