@@ -1,15 +1,7 @@
-"""`symfric identify` on records made here: a mass on a known force with known friction.
+"""`symfric identify` on records made here: a mass on a known force with known friction."""
 
-`symfric select`: laws ranked on a scene or a function of the user.
-
-`symfric ocp`: ready problems and those of a user's file.
-"""
-
-import csv
 import json
-from importlib import import_module
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,14 +11,8 @@ from identification.data.dataset import Dataset
 from identification.data.synthetic import synthetic_drive_data
 from identification.result.fitted import Fitted
 from identification.unknowns.spec import above, linear, log, tied
-from ocp import Legendre, Radau, Shooting, load
-from ocp.problems import READY
 from symfric import Coulomb, SolveError, Sum, Viscous
-from symfric.cli import ocp as ocp_command
-from symfric.cli import select as command
 from symfric.cli.identify import free_in, refuse
-from symfric.cli.ocp import scheme_of
-from symfric.laws import Law, LuGre
 
 TRUTH = {"m": 40.0, "offset": 2.0, "mu_d": 15.0, "sigma_2": 80.0}
 LINE = "identify one.csv --law coulomb+viscous --starts 1"
@@ -167,174 +153,3 @@ def test_free_parameters_have_the_specifications_of_python() -> None:
         "g": linear(0, 2, 1), "h": above("a"), "i": tied("a", 1.2), "x0": "rest",
         "dead_time": (0, 1e-3),
     }  # fmt: skip
-
-
-FAST = "--no-fixed-steps --workers 1 --accuracy 0.02"
-
-
-def test_a_scene_with_parameters_gives_table_and_files(symfric) -> None:
-    laws = "--law stribeck --law coulomb --set mu_s=0.2 --set m=1 --set stribeck.delta=1"
-    files = "--json c.json --html c.html --csv c.csv"
-    out = symfric(f"select rabinowicz {laws} --t-end 5 {FAST} {files}").out
-    assert "mu_s = 0.2, mu_d = 0.1" in out
-    assert "Simulation: take stribeck" in out
-    assert json.loads(Path("c.json").read_text(encoding="utf-8"))["best"] == "stribeck"
-    assert Path("c.html").stat().st_size > 10_000
-    assert Path("c.csv").read_text(encoding="utf-8").startswith("law,")
-    line = f"select rabinowicz --law coulomb --need '' --t-end 5 {FAST}"
-    assert "coulomb comes nearest" in symfric(line, 1).err
-
-
-def seen(symfric, monkeypatch: pytest.MonkeyPatch, line: str) -> Any:
-    """The arguments of the ranking that a line asks for."""
-    found: list[Any] = []
-
-    def stop(machine: Any, laws: Any, **how: Any) -> None:
-        found.append((machine, laws, how))
-        raise ValueError("enough")
-
-    monkeypatch.setattr(command, "select_law", stop)
-    assert symfric(f"select {line}", 2).err == "symfric: enough\n"
-    return found[0]
-
-
-def test_structure_and_parameters_of_a_scene_are_set(symfric, monkeypatch) -> None:
-    line = "drive --law stribeck --set m=2 --set turning=true --of x,v --t-end 1 --set v_s=0.3"
-    machine, laws, how = seen(symfric, monkeypatch, line)
-    made = machine(LuGre())
-    assert (made.m, made.turning, machine.__name__) == (2.0, True, "drive")
-    assert list(laws) == ["stribeck"]
-    assert (how["of"], how["t_end"], how["friction"].v_s) == (["x", "v"], 1.0, 0.3)
-    assert how["needs"] == ("stiction", "stribeck")
-
-
-def test_a_function_in_a_file_is_a_machine(symfric, mine, monkeypatch) -> None:
-    machine, _, _ = seen(symfric, monkeypatch, "mine.py --law stribeck --set m=3")
-    assert machine.keywords == {"m": 3.0}
-    assert machine(LuGre()).name == "press"
-
-
-def test_forms_are_set_for_one_law_or_all(symfric, monkeypatch) -> None:
-    def form(line: str) -> list[str]:
-        _, laws, _ = seen(symfric, monkeypatch, f"rabinowicz --law karnopp --need '' {line}")
-        return [law.form for law in laws["karnopp"]]
-
-    assert form("") == ["event", "smooth"] or len(form("")) > 1
-    assert form("--set karnopp.form=event") == ["event"]
-    assert form("--law stribeck --set form=original") == ["original"]
-
-
-def test_laws_without_the_required_phenomena_are_not_fitted(symfric, monkeypatch) -> None:
-    requested = list[str]()
-
-    def stop(laws: list[str], *_: object) -> None:
-        requested.extend(laws)
-        raise ValueError("enough")
-
-    monkeypatch.setattr(command, "fitted", stop)
-    monkeypatch.setattr(command, "reader", lambda *_: lambda _: None)
-    symfric("select drive --law dahl,lugre,coulomb --need presliding,stribeck --data d", 2)
-    assert requested == ["lugre"]
-
-
-def test_fits_are_passed_on_with_their_relative_errors(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    law: Law = LuGre(mu_s=0.2)
-    rows = [
-        SimpleNamespace(law="lugre", fit=SimpleNamespace(law=law), fitted=2.5, sentence=""),
-        SimpleNamespace(law="dahl", fit=None, fitted=1.0, sentence="no motion"),
-    ]
-    fits = import_module("identification.select")  # the module, not the function of its name
-    monkeypatch.setattr(fits, "select", lambda *_, **__: SimpleNamespace(rows=rows))
-    assert command.fitted(["lugre", "dahl"], None, None, 1.0) == ({"lugre": law}, {"lugre": 0.025})
-    assert "dahl: no motion" in capsys.readouterr().err
-    rows.pop(0)
-    with pytest.raises(ValueError, match="--data: expected data that some law fits"):
-        command.fitted(["dahl"], None, None, 1.0)
-
-
-def test_progress_is_reported_in_lines_without_a_terminal(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    clock = iter([0.0, 5.0, 20.0, 20.0, 25.0])
-    monkeypatch.setattr(command, "perf_counter", lambda: next(clock))
-    with command.reported("select x") as say:
-        for share in (0.1, 0.5, 0.7):
-            say("lugre", share)
-    assert capsys.readouterr().err == "select x: 50 % after 20 s, lugre last\n"
-
-
-def test_a_problem_of_a_file_is_solved_and_written(symfric, mine) -> None:
-    """A mass of 1 kg over 1 m from rest to rest in T: J = 12 / T^3."""
-    line = "ocp mine.py --set T=2 --intervals 5"
-    printed = symfric(f"{line} --csv a.csv --save a.npz --plot a.png --json a.json")
-    assert printed.err == "wrote a.csv, a.npz, a.png, a.json\n"
-    assert "verified" in printed.out
-    assert "yes" in printed.out
-    assert "difference" not in printed.out
-    found = json.loads(Path("a.json").read_text())
-    assert found["cost"] == pytest.approx(12 / 8, rel=1e-3)
-    assert found["verification"]["ok"]
-    rows = list(csv.reader(Path("a.csv").read_text().splitlines()))
-    assert rows[0][:3] == ["t [s]", "x [m]", "v [m/s]"]
-    assert load("a.npz").cost == found["cost"]
-    assert Path("a.png").stat().st_size > 1000
-    by = symfric("ocp mine.py --intervals 5 --sensitivity 'x at the end,T' --json -").json
-    assert by["sensitivities"]["x at the end"]["dJ"] == pytest.approx(2 * by["cost"])
-    assert by["sensitivities"]["T"]["dJ"] == pytest.approx(-3 * by["cost"])
-    again = symfric("ocp mine.py:problem --set T=2 --guess a.npz --scheme legendre2 --json -").json
-    assert again["cost"] == pytest.approx(12 / 8, rel=1e-3)
-
-
-def test_a_soft_end_of_a_file_is_shown(symfric, tmp_path, monkeypatch) -> None:
-    """J = 12 x^2 + 3 (1 - x) has its least value at x = 1/8."""
-    monkeypatch.chdir(tmp_path)
-    Path("wall.py").write_text(
-        "from ocp import Phase, Problem, integral, soft\n"
-        "import casadi as ca\nfrom symfric import Model, Variable\n"
-        "wall = soft(lambda s: s.x == 1.0, linear=3.0)\n"
-        "x, v, force = (Variable(name, '') for name in ('x', 'v', 'force'))\n"
-        "model = Model('mass', x=(x, v), u=(force,), ode=ca.vertcat(v, force))\n"
-        "phase = Phase(model, 1.0, end={'v': 0.0}, at={1: [wall]})\n"
-        "problem = Problem(phase, integral(lambda s: s.force**2))\n"
-    )
-    shown = symfric("ocp wall.py --intervals 10").out
-    assert "condition 1 at the end" in shown
-    assert "2.625" in shown
-    assert "0.875" in shown
-    found = symfric("ocp wall.py --intervals 10 --json -").json
-    assert found["soft"]["condition 1 at the end"]["violation"] == pytest.approx(0.875, rel=1e-3)
-
-
-def test_options_are_the_arguments_of_solve(symfric, monkeypatch: pytest.MonkeyPatch) -> None:
-    def solve(problem: object, **given: object) -> None:
-        seen.update(given)
-        raise ValueError("enough")
-
-    seen: dict[str, object] = {}
-    monkeypatch.setattr(ocp_command, "solve", solve)
-    options = "--intervals 7 --tolerance 0.1 --resting-margin 0.002 --max-time 3 --solver sqp"
-    options += " --starts 4 --no-refine --no-verify"
-    symfric(f"ocp out_and_back --scheme radau5 --friction smooth {options}", 2)
-    del seen["progress"]
-    assert str(seen.pop("solver")).startswith("Sqp")
-    assert seen == {
-        "scheme": Radau(5), "friction": "smooth", "tolerance": 0.1, "resting_margin": 0.002,
-        "intervals": 7, "max_time": 3.0, "guess": None, "throw": False,
-        "starts": 4, "executor": None, "refine": False, "verify": False,
-    }  # fmt: skip
-
-
-def test_a_ready_problem_is_compared_with_its_best_known_cost(symfric) -> None:
-    assert "difference" in symfric("ocp bryson_denham --intervals 8").out
-    out = symfric("ocp").out
-    assert all(name in out for name in READY)
-
-
-def test_names_of_schemes() -> None:
-    assert scheme_of("radau") == Radau(3)
-    assert scheme_of("radau5") == Radau(5)
-    assert scheme_of("legendre2") == Legendre(2)
-    assert scheme_of("shooting") == Shooting("rodas5p")
-    assert scheme_of("shooting:exponential:4") == Shooting("exponential", 4)

@@ -304,7 +304,6 @@ def test_the_controller_stops_its_integration_at_the_limit_and_on_hold() -> None
     assert go.x[2] < 0.0
 
 
-pytestmark = pytest.mark.heavy
 FULL = Compensation(
     N="input", dead_zone=1e-3, inertia=1.0, delay=1e-3, error_gain=20.0, hold=(1e-5, 1e-3),
     stick=(1.0, 0.1, 1e-3), dither=(0.1, 100.0), limit=5.0, slew=100.0, offset=0.1,
@@ -323,6 +322,7 @@ BLOCKS = [
 ]
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("real", ["double", "float"])
 def test_c_agrees_with_casadi_and_stays_finite(real, compiler, tmp_path):
     program = OneProgram(BLOCKS, tmp_path, compiler, real=real)
