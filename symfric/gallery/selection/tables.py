@@ -31,6 +31,7 @@ from symfric.choice.measured import Task, measured
 from symfric.choice.ranking import WIDTH, Row
 from symfric.figures.regularisation import Machine, machine_of
 from symfric.foundation import checks
+from symfric.foundation.files import json_data
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError
 from symfric.integrator.simulate import simulate
@@ -170,10 +171,7 @@ class PaperComparison:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; numbers that are not finite are null."""
-        rows = [
-            {n: None if isinstance(v, float) and not isfinite(v) else v for n, v in row.items()}
-            for row in map(asdict, self.rows)
-        ]
+        rows = json_data([asdict(row) for row in self.rows])
         return {"scene": self.scene, "tables": [self.times, self.ranks], "rows": rows,
                 "orders": self.orders()}  # fmt: skip
 
