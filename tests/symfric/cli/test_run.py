@@ -154,6 +154,10 @@ HEADERS = {
         ("force", "N"): ([0, 0.5, 2], [1, 2, -4]),
         ("force [N]", "N"): ([0, 0.5, 2], [1, 2, -4]),
     },
+    "# both forces\ntime F[kN] F[N]\n0 1 2\n1 3 4\n": {
+        ("F [N]", "N"): ([0, 1], [2, 4]),
+        ("F [kN]", "N"): ([0, 1], [1000, 3000]),
+    },
 }
 
 
@@ -167,6 +171,35 @@ def test_columns_of_a_file_are_inputs_in_si_units(tmp_path: Path) -> None:
             np.testing.assert_allclose(samples.t, times)
             np.testing.assert_allclose(samples.values, values)
     assert input_from_text("force", "-2.5", "N") == -2.5
+
+
+@pytest.mark.parametrize(
+    ("text", "messages"),
+    [
+        ("", ["expected rows of numbers, got an empty file"]),
+        ("1,2\n3,4\n", ["'t [s]', got no header; check", "'F [N]', got no header; check"]),
+        ("F,t [J]\n1,2\n", ["column 't [J]': expected a unit of s, ms, us, min in br"]),
+        ("F [m],t\n1,2\n", ["column 'F [m]': expected a unit of N, mN, kN, N m"]),
+        ("F,F,t\n1,2,3\n", ["expected one column 'F [N]', got F, F; check the header"]),
+        ("x,s\n1,2\n", ["'t [s]', got x, s; check", "'F [N]', got x, s; check the header"]),
+        ("F,t [s]\n1,2\n1,2,5,3\n", ["row 3: expected 2 cells as in the header, got 4; write n"]),
+        ("F,t [s]\n1,\n", ["column 't [s]', row 2: expected a number, got ''"]),
+        ("F,t\n1,2\n3,1\n", ["t: expected increasing"]),
+    ],
+)
+def test_what_is_no_input_is_refused_with_its_place(
+    tmp_path: Path, text: str, messages: list[str]
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError) as caught:
+        input_from_text("force", f"{path}:F", "N")
+    for message, line in zip(messages, str(caught.value).splitlines(), strict=True):
+        assert line.startswith("read 'a.csv': ")
+        assert message in line
+    for place, got in ((tmp_path, "a folder"), (tmp_path / "none.csv", "nothing there")):
+        with pytest.raises(ValueError, match=f"expected a file, got {got}"):
+            input_from_text("force", f"{place}:F", "N")
 
 
 def test_all_scenes_are_listed(symfric, monkeypatch: pytest.MonkeyPatch) -> None:
