@@ -21,11 +21,12 @@ from identification.residuals.balance import (
     measure,
 )
 from identification.residuals.evaluation import DEAD_TIME, Array, Blocks, Channel
-from identification.residuals.sampled import Sampled, preload
+from identification.residuals.sampled import Sampled, preload, same
 from identification.unknowns.roles import width_of
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
+from symfric.integrator.compiled.columns import Columns
 from symfric.model import Model
 
 WHERE = "InverseDynamics"
@@ -237,8 +238,7 @@ def _slips(made: Balance, motion: Motion, model: Model, p: Array) -> dict[str, A
     """Return the sliding velocity of each contact with bristles, shape (n,)."""
     if not made.preloads:
         return {}
-    n = motion.t.size
-    v = made.slips.map(n)(motion.w, np.repeat(p[:, None], n, 1))[0].full()
+    v = Columns(made.slips)([motion.w.T, same(p, motion.t.size)])[0].T
     return dict(zip((c.name for c in model.contacts), v, strict=True))
 
 
@@ -246,8 +246,7 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
     """Return a mask for each contact of the samples at which its static law is undetermined."""
     if not model.contacts:
         return []
-    n = motion.t.size
-    v, slopes = (part.full() for part in made.slips.map(n)(motion.w, np.repeat(p[:, None], n, 1)))
+    v, slopes = (part.T for part in Columns(made.slips)([motion.w.T, same(p, motion.t.size)]))
     errors = np.array([u.errors(motion.filter, motion.step)[0] for u in motion.velocities])
     gains = np.median(np.abs(slopes), axis=1).reshape(errors.size, len(model.contacts)).T
     noise = [float(np.linalg.norm(gain * errors)) for gain in gains]

@@ -297,7 +297,7 @@ class _Along:
     def evaluated(self, name: str, here: Array, z: Array) -> tuple[Array, Array]:
         """Return values and derivatives of a Function at some samples."""
         n = here.shape[0]
-        value, slopes = self.of.run(name, [here, z, _same(self.p, n)])
+        value, slopes = self.of.run(name, [here, z, same(self.p, n)])
         return value, slopes.reshape(n, -1, value.shape[1]).transpose(0, 2, 1)
 
     def solve(self) -> str:
@@ -319,7 +319,7 @@ class _Along:
     def chained(self, name: str, first: Array, *given: Array) -> Array:
         """Return all results of a Function applied from sample to sample, starting at `first`."""
         here = np.hstack([self.w, self.y])
-        rows = [here[:-1], here[1:], self.h, *given, _same(self.p, self.n - 1)]
+        rows = [here[:-1], here[1:], self.h, *given, same(self.p, self.n - 1)]
         return np.vstack([first[None, :], self.of.run(name, rows, first)[0]])
 
     def tangents(self) -> tuple[Array, Array]:
@@ -351,7 +351,7 @@ class _Along:
         return both[:, nz:].reshape(self.n, self.count, nz).transpose(0, 2, 1)
 
 
-def _same(p: Array, n: int) -> tuple[Array, NDArray[np.intp]]:
+def same(p: Array, n: int) -> tuple[Array, NDArray[np.intp]]:
     """Return the parameters as one row shared by n samples."""
     return p[None, :], np.zeros(n, np.intp)
 
