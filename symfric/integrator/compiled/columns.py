@@ -16,12 +16,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import bound
+from symfric.foundation.numeric import Array, bound
 from symfric.foundation.programs import CompileError
 from symfric.integrator.compiled.background import Prospect
 from symfric.integrator.compiled.compiler import load
 
-Array = NDArray[np.float64]
 Row = Array | tuple[Array, NDArray[np.intp]]
 """Arguments, one per row; or a table and the row number in it for each argument."""
 NAME = "symfric_rows"
