@@ -174,9 +174,10 @@ class Fit:
         if not isinstance(rows, InverseRows) or not may_be_late(live, rows, LATE / 2, MATTERS / 2):
             return None  # half the limits allow for the linearisation
         step = max(record.median_step for record in self.data)
-        kind = replace(kind, dead_time=(0.0, float(f"{LONGEST * step:.3g}")))
+        bounds = (0.0, float(f"{LONGEST * step:.3g}"))
+        kind = replace(kind, dead_time=bounds)
         try:
-            residuals = rows.delayed(*kind.dead_time)
+            residuals = rows.delayed(*bounds)
             unknowns = _unknowns(residuals, asked.subject)
         except ValueError:  # a law depends on the force, or few residuals
             return None

@@ -303,8 +303,8 @@ def _moments(Q: Array, pair: Count, lag: int) -> tuple[float, float]:
     """
     n, k = Q.shape
     SQ = np.zeros_like(Q)
-    np.add.at(SQ, pair, Q[pair - lag] / 2)
-    np.add.at(SQ, pair - lag, Q[pair] / 2)
+    SQ[pair] += Q[pair - lag] / 2
+    SQ[pair - lag] += Q[pair] / 2
     QSQ = Q.T @ SQ
     first = -float(np.trace(QSQ))
     second = pair.size / 2 - 2 * float((SQ**2).sum()) + float((QSQ**2).sum())

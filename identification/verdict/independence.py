@@ -126,17 +126,17 @@ def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> 
 
 
 class Waves(NamedTuple):
-    """Half harmonics of a position, from 1 to `count`.
+    """Half harmonics of a position, from 1 to `most`.
 
     Attributes:
         turns: phases of the first one, shape (n,).
         way: direction of motion, shape (n,), if known.
-        count: number of harmonics.
+        most: number of harmonics.
     """
 
     turns: Array
     way: Array | None
-    count: int
+    most: int
 
     def columns(self, k: int, rows: Count | slice = slice(None)) -> Array:
         """Return the columns cos, sin, and both times `way`, of harmonic k, shape (n, q)."""
@@ -253,7 +253,7 @@ def dependences(
     for family in families(regressors, position, basis):
         columns, count = family.columns, 1
         if isinstance(columns, Waves):
-            count, columns = columns.count, _largest(columns, r, basis, colour.partial, position)
+            count, columns = columns.most, _largest(columns, r, basis, colour.partial, position)
         columns = _scaled(columns)
         first = test(columns)
         if first is None:
@@ -277,7 +277,7 @@ def _largest(waves: Waves, r: Array, basis: Array, partial: Array, position: Cou
     rows = np.concatenate(parts)
     there = np.minimum(position[rows], np.concatenate([part - part[0] for part in parts]))
     test = _Added.of(r[rows], basis[rows], partial, there)
-    each = ((k, test(_scaled(waves.columns(k, rows)))) for k in range(1, waves.count + 1))
+    each = ((k, test(_scaled(waves.columns(k, rows)))) for k in range(1, waves.most + 1))
     found = [(k, d.statistic) for k, d in each if d is not None]
     return waves.columns(max(found, key=lambda one: one[1], default=(1, 0.0))[0])
 
@@ -317,17 +317,17 @@ class _Added(NamedTuple):
         columns = whitened(plain, self.partial, self.position)
         inside = self.known.T @ columns
         clean = columns - self.known @ inside
-        squares, V = np.linalg.eigh(clean.T @ clean)
+        squares, axes = np.linalg.eigh(clean.T @ clean)
         kept = squares > 1e-12 * squares[-1]
-        V, squares = V[:, kept], squares[kept]
+        axes, squares = axes[:, kept], squares[kept]
         q, free = squares.size, self.rest.size - self.known.shape[1] - squares.size
         if not q or free < 2 * q:
             return None
-        along, whole = V.T @ (clean.T @ self.rest), float(self.rest @ self.rest)
+        along, whole = axes.T @ (clean.T @ self.rest), float(self.rest @ self.rest)
         explained = float(along @ (along / squares))
         left = max(whole - explained, 1e-15 * whole, np.finfo(float).tiny)
         statistic = explained / q / (left / free)
-        weights = V @ (along / squares)
+        weights = axes @ (along / squares)
         part = _without(self.basis, plain @ weights)  # explained part before whitening
         moved = float(np.linalg.norm(inside @ weights)) / np.sqrt(left / free)
         size = float(np.sqrt(np.mean(part**2)))

@@ -124,13 +124,13 @@ def _meat(found: Colour, bread: Array, place: NDArray[np.int64]) -> tuple[Array,
     both = np.full(points // 2 + 1, 2.0 / points)  # of the frequencies w and -w
     both[[0, -1]] /= 2
     S, slopes = (part[..., : both.size] * both for part in found.spectrum(points))
-    C, slope = np.zeros((k, k)), np.zeros((found.order, k))
+    sums, slope = np.zeros((k, k)), np.zeros((found.order, k))
     for first in range(0, rows, PART):
         waves = np.fft.rfft(on_grid[first : first + PART], points, axis=0)
-        C += np.real(waves.conj().T @ (S[:, None] * waves))
+        sums += np.real(waves.conj().T @ (S[:, None] * waves))
         slope += slopes @ np.abs(waves) ** 2
     spread = np.einsum("pi,pq,qi->i", slope, found.doubt, slope)
-    return C, 2 * np.diag(C) ** 2 / found.freedom + spread
+    return sums, 2 * np.diag(sums) ** 2 / found.freedom + spread
 
 
 @final
