@@ -26,11 +26,11 @@ from identification.from_data import (
     strongest,
 )  # fmt: skip
 from identification.residuals.evaluation import Array, Residuals
-from identification.residuals.inverse import InverseDynamics
+from identification.residuals.inverse import InverseDynamics, InverseRows
 from identification.residuals.points import PointRows, Points
 from identification.result.build import fitted, levels_of, tried, written
 from identification.result.fitted import Fitted
-from identification.result.live import Asked, Kind, Live
+from identification.result.live import Asked, Kind, Live, matters
 from identification.solving.descent import Start, descend, remaining
 from identification.solving.many_starts import Progress, best_of, many_starts, scattered
 from identification.solving.task import THRESHOLD, Task, task
@@ -38,7 +38,6 @@ from identification.starts.measured import Measured
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import Unknowns, unknowns_of
 from identification.verdict.judge import Verdict, judge
-from identification.verdict.minimum import shortened
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
@@ -140,7 +139,7 @@ class Fit:
                 evaluations=ends[0].evaluations + end.evaluations, values=live.values,
             )  # fmt: skip
             ends = (best, *ends[1:])
-        verdict = judge(shortened(live.minimum), asked.findings, live.levels)
+        verdict = judge(live.minimum.short, asked.findings, live.levels)
         gain = remaining(live.task, live.point) / max(live.point.cost, 1e-300)
         status, message = _status(asked, end, verdict, gain)
         result = fitted(
@@ -167,12 +166,16 @@ class Fit:
         kind = asked.kind
         if not isinstance(kind, InverseDynamics) or kind.dead_time != "auto":
             return None
+        rows = live.task.residuals
+        if not isinstance(rows, InverseRows) or not matters(live, rows):
+            return None
         step = max(record.median_step for record in self.data)
-        kind = replace(kind, dead_time=(0.0, float(f"{LONGEST * step:.3g}")))
+        bounds = (0.0, float(f"{LONGEST * step:.3g}"))
+        kind = replace(kind, dead_time=bounds)
         try:
-            residuals = kind.prepare(asked.subject, self.data, live.values)
+            residuals = rows.delayed(*bounds)
             unknowns = _unknowns(residuals, asked.subject)
-        except ValueError:  # no force is measured, a law depends on it, or few residuals
+        except ValueError:  # a law depends on the force, or few residuals
             return None
         made = replace(live.task, residuals=residuals, unknowns=unknowns)
         changed = asked._replace(kind=kind, task=made)

@@ -152,7 +152,7 @@ def judge(
     white = dict[str, Whiteness]()
     tests, effective = list[Test](), dict[str, float]()
     each = list[tuple[Channel, list[tuple[Family, Dependence]]]]()
-    for channel, colour in zip(found.channels, found.sandwich.colours, strict=True):
+    for channel, colour in zip(found.channels, found.colours, strict=True):
         name = found.label(channel)
         effective[name] = colour.effective
         position = positions(channel)
@@ -343,7 +343,7 @@ def _at_box(found: Minimum) -> list[str]:
     multiplier) with the effective number of samples.
     """
     basis = span(found.J * ~found.held)
-    worth = sum(c.effective for c in found.sandwich.colours) / found.r.size
+    worth = sum(c.effective for c in found.colours) / found.r.size
     names = list[str]()
     for u, held, column in zip(found.unknowns, found.held, found.J.T, strict=True):
         if not held or u.partner or u.nuisance or 0.0 in (u.lower, u.upper):

@@ -14,17 +14,15 @@ from typing import Any, NamedTuple, final
 import casadi as ca
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from identification import Dataset, Fit, InverseDynamics, Points, Shooting
 from symfric import law_from_text
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import with_values
 from symfric.integrator import Linear, Trajectory, simulate
 from symfric.laws import Law, LuGre, SteadyStateLuGre, Stribeck
 from symfric.model import Model
 from symfric.scenes import Drive
-
-Array = NDArray[np.float64]
 
 M, OFFSET = 95.0, -3.0
 """Mass [kg] and constant force [N] of the stage."""
