@@ -6,7 +6,7 @@ from contextlib import suppress
 import numpy as np
 
 from identification.data.dataset import Dataset
-from identification.data.differentiate import differentiate
+from identification.data.differentiate import differentiated
 from identification.data.findings import Findings
 from identification.residuals.points import Points
 from identification.starts.measured import Measured
@@ -42,7 +42,10 @@ def _roles(kind: object) -> dict[str, str]:
 
 
 def measured(kind: object, data: Dataset, load: float) -> Measured | None:
-    """Return velocity and force of all points or of a drive; None if unavailable."""
+    """Return velocity and force of all points or of a drive; None if unavailable.
+
+    Blocks represent a long record of a drive.
+    """
     try:
         if isinstance(kind, Points):
             timed = all(r.t is not None for r in data)
@@ -50,7 +53,7 @@ def measured(kind: object, data: Dataset, load: float) -> Measured | None:
             each = [{p: r[n] if n in r else kind.path(r).v for p, n in names.items()} for r in data]
         else:
             called, chosen = _roles(kind), getattr(kind, "filter", None)
-            motions = [differentiate(r, chosen, **called) for r in data]
+            motions = [m for r in data for m in differentiated(r, chosen, **called)]
             each = [{"v": m.v, "F": m.force, "x": m.x, "t": m.t, "a": m.a} for m in motions]
         signals = {part: np.concatenate([one[part] for one in each]) for part in each[0]}
         breaks = tuple(np.cumsum([one["v"].size for one in each])[:-1].tolist())

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.multibody import (
     Cylindrical,
     Fixed,
@@ -23,7 +23,6 @@ from symfric.multibody import (
 from symfric.multibody.equations import Equations
 from symfric.multibody.prepare import Prepared
 
-Array = NDArray[np.float64]
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 in_both = pytest.mark.parametrize("formulation", ["joint", "absolute"])
 in_joint_coordinates_first = pytest.mark.parametrize(

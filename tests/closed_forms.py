@@ -7,7 +7,6 @@ from math import exp, sin
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric import Model, Variable
 from symfric.integrator.equations.inputs import input_data
@@ -16,7 +15,6 @@ from symfric.integrator.methods.method import Method
 from symfric.integrator.running.record import Dense
 from symfric.integrator.step.attempt import build_dense_step, build_fixed
 
-Array = NDArray[np.float64]
 T = 1.0
 """End time of every measurement [s]."""
 

@@ -13,12 +13,12 @@ from math import cos, sin
 
 import numpy as np
 from mechanics import newton, size
-from numpy.typing import NDArray
 from scipy.integrate import OdeSolution, solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-Array = NDArray[np.float64]
+from symfric.foundation.numeric import Array
+
 Modes = tuple[int, ...]
 Solve = Callable[[Array, Modes], tuple[Array, Array, Array]]
 """State and modes -> accelerations, friction forces and normal forces of all contacts."""

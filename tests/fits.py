@@ -20,9 +20,8 @@ from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.judge import judge
+from symfric.foundation.numeric import Array
 from symfric.laws import Law, Stribeck
-
-Array = NDArray[np.float64]
 
 TRUTH = Stribeck(mu_s=28.0, mu_d=20.0, v_s=0.01, delta=2.0, sigma_2=200.0, v_eps=1e-4)
 

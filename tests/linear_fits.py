@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.residuals.evaluation import Channel, Evaluation
 from identification.solving.descent import descend
@@ -13,8 +12,8 @@ from identification.solving.task import Point, Task, task
 from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.minimum import Minimum
+from symfric.foundation.numeric import Array
 
-Array = NDArray[np.float64]
 STEP = 0.02
 
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from math import cos, pi, sin, sqrt, tanh
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symfric.foundation.numeric import Array
+
 Rates = Callable[[float, Array], list[float]]
 EPS = 1e-4
 """Smoothing of |f| in the reference data [N]."""

@@ -12,14 +12,13 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from ocp import Phase, Problem, Solution, integral
 from symfric import BrownMcPhee, Contact, Model, Variable
+from symfric.foundation.numeric import Array
 from symfric.multibody import JointFriction, JointSpringDamper, Mechanism, Revolute
 
-Array = NDArray[np.float64]
 WIDTH = 1e-5
 """Smoothing velocity of the laws [m/s]."""
 

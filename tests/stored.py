@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symfric.foundation.numeric import Array
+
 FOLDER = Path(__file__).parent / "golden" / "references"
 chosen = {"update": False, "recompute": False}
 """The option of the command line; set by `conftest.pytest_configure`."""

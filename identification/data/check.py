@@ -15,7 +15,7 @@ from identification.data.check_signals import (
     of_velocity,
 )
 from identification.data.findings import Finding, Findings, Rough, View, rough_model
-from identification.data.record import GAP, JITTER, Record
+from identification.data.record import GAP, JITTER, Array, Record
 
 FEWEST, FEW = 20, 50
 """Numbers of samples below which a record gives an error, and a warning."""
@@ -235,27 +235,34 @@ def _dead_time(view: View, model: Rough, free: Rough) -> Iterator[Finding]:
 def _hum(view: View, free: Rough) -> Iterator[Finding]:
     """Find a periodic force that the drive does not cause."""
     limit = 5 * float(np.median(np.abs(free.residual)))
-    left, window = np.clip(free.residual, -limit, limit), np.hanning(free.residual.size)
-    power = np.abs(np.fft.rfft(left * window)) ** 2
+    power, window = _power(free, np.clip(free.residual, -limit, limit))
     k = int(np.argmax(power[2:])) + 2
     share = float(power[max(k - 2, 0) : k + 3].sum() / (power.sum() + 1e-300))
     size = 2 * float(np.sqrt(power[k])) / float(window.sum())
     if share <= LINE or size <= LOUD * free.spread:
         return
     if not any(_answered(free, round(k / n)) for n in HARMONICS):
-        values = {"size": size, "frequency": k / left.size / free.step, "share": share}
+        values = {"size": size, "frequency": k / window.size / free.step, "share": share}
         yield view.warning("hum", view.name("force"), **values)
+
+
+def _power(free: Rough, signal: Array) -> tuple[Array, Array]:
+    """Return the mean power of the blocks of a signal under a Hann window, and the window."""
+    parts = signal.reshape(free.blocks, -1)
+    window = np.hanning(parts.shape[1])
+    return np.mean(np.abs(np.fft.rfft(parts * window)) ** 2, axis=0), window
 
 
 def _answered(free: Rough, k: int) -> bool:
     """Return True if the velocity has a spectral line at bin k, which indicates an excitation.
 
     Below `PERIODS` periods a line and a single move are indistinguishable, and the result is False;
-    a slow excitation that only bends bristles can therefore be reported as a hum.
+    a slow excitation that only bends bristles can therefore be reported as a hum. In the blocks of
+    a long record, such lines are ignored.
     """
     if k < PERIODS:
-        return False
-    power = np.abs(np.fft.rfft((free.v - free.v.mean()) * np.hanning(free.v.size))) ** 2
+        return free.blocks > 1
+    power, _ = _power(free, free.v - free.v.mean())
     line = power[k - 2 : k + 3]
     background = np.median(np.concatenate([power[k // 2 : k - 3], power[k + 4 : 2 * k]]))
     return bool(line.max() > CLEAR * background and line.sum() > ANSWER * power.sum())

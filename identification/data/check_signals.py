@@ -5,16 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.findings import (
-    Array,
-    Finding,
-    Rough,
-    View,
-    rough_model,
-    smoothed,
-    white_part,
-)
-from identification.data.record import constant_runs, count_of
+from identification.data.filters import gaussian, white_part
+from identification.data.findings import Array, Finding, Rough, View, rough_model
+from identification.data.record import constant_runs, count_of, joined, some
 
 FAR = 12.0
 """Least distance of a spike from the running median, relative to its 95 % quantile."""
@@ -49,20 +42,26 @@ def spike_samples(y: Array, *, position: bool) -> tuple[NDArray[np.intp], Array]
     if y.size < 50 or np.ptp(y) == 0:
         return none, np.zeros(y.size)
     off = np.abs(y - median_of_five(y))
-    usual = max(float(np.quantile(off, 0.95)), count_of(y))
-    limit = max(FAR * usual, RANGE * float(np.ptp(np.quantile(y, (0.01, 0.99)))))
+    usual = max(float(np.quantile(some(off), 0.95)), count_of(y))
+    limit = max(FAR * usual, RANGE * float(np.ptp(np.quantile(some(y), (0.01, 0.99)))))
     if position:  # positions are smooth, hence a lower limit
-        limit = max(FAR * usual, 3 * float(np.quantile(np.abs(np.diff(y)), 0.9)))
-    through = np.abs(np.roll(y, -3) - np.roll(y, 3))  # small at a spike, because y returns
-    through[:3] = through[-3:] = 0.0
-    far = np.flatnonzero((off > limit) & (off > BACK * through))
+        limit = max(FAR * usual, 3 * float(np.quantile(some(np.abs(np.diff(y))), 0.9)))
+    far = np.flatnonzero(off > limit)
+    inner = (far >= 3) & (far < y.size - 3)
+    through = np.zeros(far.size)  # small at a spike, because y returns
+    through[inner] = np.abs(y[far[inner] + 3] - y[far[inner] - 3])
+    far = far[off[far] > BACK * through]
     return (far if limit > 0 and far.size <= MANY * y.size else none), off
 
 
 def median_of_five(y: Array) -> Array:
     """Return the running median of five samples, which ignores single outliers and pairs."""
     padded = np.pad(y, 2, mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
+    a, b, c, d, e = (padded[k : k + y.size] for k in range(5))
+    low = np.maximum(np.minimum(a, b), np.minimum(c, d))  # second and third of a, b, c, d
+    high = np.minimum(np.maximum(a, b), np.maximum(c, d))
+    low, high = np.minimum(low, high), np.maximum(low, high)
+    return np.maximum(low, np.minimum(high, e))
 
 
 RUN, SHARE = 5, 0.002
@@ -105,9 +104,9 @@ def of_clipping(view: View) -> Iterator[Finding]:
 def _limited_sensor(view: View, signal: str, tops: list[float]) -> str:
     """Return the reason why only the measurement was limited; "" if this is not certain."""
     model = rough_model(view, curve=True) if signal == view.name("force") else None
-    if model is None or view.steady is None:
+    if model is None:
         return ""
-    force = np.interp(model.t, view.steady.time, view.steady[signal])
+    force = np.interp(model.t, view.record.time, view.record[signal])
     clipped = np.isin(force, tops)
     if clipped.sum() < 5 or (~clipped).sum() < 50:
         return ""
@@ -133,15 +132,16 @@ JUMP = 8.0
 def of_frozen(view: View) -> Iterator[Finding]:
     """Find intervals of equal values in signals that otherwise never repeat, or jump afterwards."""
     for signal, y, unit in view.known():
-        steps, position = np.abs(np.diff(y)), signal == view.name("x")
+        position = signal == view.name("x")
         first, length = constant_runs(y)
         long = (length >= FROZEN) & ((y[first] < y.max()) & (y[first] > y.min()) | position)
         if not long.any():
             continue
+        steps = np.abs(np.diff(y))
         inside = np.repeat(long, length)[1:]
         repeats = float(np.mean(steps[~inside] == 0)) if not inside.all() else 1.0
         noisy = repeats < REPEATED and count_of(y) == 0
-        usual = max(float(np.quantile(steps, 0.995)), count_of(y))
+        usual = max(float(np.quantile(some(steps), 0.995)), count_of(y))
         after = np.append(steps, 0.0)[first + length - 1]
         jumps = long & (after > JUMP * usual)
         jumped = bool(jumps.any())
@@ -181,9 +181,10 @@ def of_jumps(view: View) -> Iterator[Finding]:
     if np.corrcoef(x[1:], x[:-1])[0, 1] < WHITE:  # noise jumps at every sample
         return
     name, size = view.name("x"), np.abs(np.diff(median_of_five(x)))
-    usual = max(float(np.quantile(size, 0.995)), count_of(x))
-    nearby = np.maximum(np.roll(size, 2), np.roll(size, -2))
-    far = np.flatnonzero((size > JUMPED * usual) & (size > NEAR * np.maximum(nearby, usual)))
+    usual = max(float(np.quantile(some(size), 0.995)), count_of(x))
+    far = np.flatnonzero(size > JUMPED * usual)
+    nearby = np.maximum(size[far - 2], size[(far + 2) % size.size])
+    far = far[size[far] > NEAR * np.maximum(nearby, usual)]
     if not far.size:
         size = np.abs(np.diff(x))  # many wraps of a fast drive raise the usual step
         far = np.flatnonzero(size > 0.5 * np.ptp(x))
@@ -265,18 +266,19 @@ SCALES = {
 
 def of_velocity(view: View) -> Iterator[Finding]:
     """Find a velocity or acceleration that differs from the derivative of position or velocity."""
-    record = view.steady
-    if record is None or record.size < 100:
+    steady = view.steady
+    if not steady or view.record.size < 100:
         return
-    edge = int(3 * WIDTH)
+    inner = slice(int(3 * WIDTH), -int(3 * WIDTH))
     for pair in (("x", "v"), ("v", "a")):
         if not {*pair} <= view.roles.keys():
             continue
         other, name = (view.roles[r] for r in pair)
-        if np.ptp(record[name]) == 0 or np.ptp(record[other]) == 0:
+        known, signal = joined(steady, other), joined(steady, name)
+        if np.ptp(signal) == 0 or np.ptp(known) == 0:
             continue
-        derived = (smoothed(record[other], WIDTH, 1) / record.step)[edge:-edge]
-        given = smoothed(record[name], WIDTH)[edge:-edge]
+        derived = (gaussian(known, WIDTH, 1) / steady[0].step)[:, inner].ravel()
+        given = gaussian(signal, WIDTH)[:, inner].ravel()
         if derived.std() == 0 or given.std() == 0:
             continue
         alike = float(np.corrcoef(derived, given)[0, 1])

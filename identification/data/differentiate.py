@@ -9,21 +9,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.data.filters import (
+    SEGMENT,
     Decimation,
     Filter,
+    any_within,
     averaged,
     band_above,
     central_difference,
     choose_filter,
     fourth_order_difference,
+    frequencies,
     lowpass,
     noise_level,
     position_band,
     rounded_level,
     spectrum,
-    without_line,
-)  # fmt: skip
-from identification.data.record import Array, Record
+    weighted,
+)
+from identification.data.record import Array, Record, blocks
 from symfric.foundation import checks
 from symfric.foundation.shown import brief
 
@@ -133,14 +136,14 @@ class Velocity:
         known = v if x is None else x
         if known is None:
             raise ValueError("velocity: expected a position or a velocity, got neither")
-        frequency: Array = np.asarray(np.fft.rfftfreq(known.size), np.float64)
-        power = spectrum(without_line(known))
+        frequency = frequencies(known.size)
+        power = spectrum(known, line=True)
         ones = np.ones(power.size)
         of_x = ones * (rounded_level(known, power) if x_noise is None else x_noise**2)
         by_x = of_x * (np.sin(2 * np.pi * frequency) / step) ** 2
         if v is None:
             return Velocity(frequency, 0 * ones, by_x, power, of_x, 2)
-        measured = power if x is None else spectrum(without_line(v))
+        measured = power if x is None else spectrum(v, line=True)
         of_v = velocity_noise(measured) if v_noise is None else ones * v_noise**2
         if x is None:
             return Velocity(frequency, ones, of_v, power, of_v, 1)
@@ -156,15 +159,16 @@ class Velocity:
         weight = averaged(best, step, WIDTH)  # narrow bands ring at ends of the record
         noise = weight**2 * of_v + (1 - weight) ** 2 * by_x
         found = Velocity(frequency, weight, noise, measured, noise, 1)
-        mixed = spectrum(without_line(found.mixed(central_difference(x, step), v)))
+        mixed = spectrum(found.mixed(central_difference(x, step), v), line=True)
         return replace(found, power=mixed)
 
     def mixed(self, of_x: Array, of_v: Array) -> Array:
         """Combine a signal derived from the position with one from the velocity, shape (n,)."""
-        apart = of_v - of_x
-        periodic = np.concatenate([apart, apart[-2:0:-1]])
-        weight = np.interp(np.fft.rfftfreq(periodic.size), self.frequency, self.weight)
-        return of_x + np.fft.irfft(np.fft.rfft(periodic) * weight, periodic.size)[: apart.size]
+
+        def weight(f: Array) -> Array:
+            return np.interp(f, self.frequency, self.weight)
+
+        return of_x + weighted(of_v - of_x, weight, SEGMENT / 4, odd=False)
 
     def errors(self, filter: Filter, step: float, taps: Array | None = None) -> Array:
         """Return standard deviations of the noise of velocity and acceleration, shape (2,).
@@ -285,7 +289,26 @@ def uncertain(v: Array, noise: float, step: float, filter: Filter) -> Mask:
     slow[1:] |= turns
     slow[:-1] |= turns
     around = ceil(0.5 / (filter.cutoff * step))
-    return np.convolve(slow, np.ones(2 * around + 1), mode="same") > 0.5
+    return any_within(np.pad(slow, around), 2 * around + 1)
+
+
+def differentiated(record: Record, filter: Filter | None, **called: str) -> list[MotionSignals]:
+    """Return `differentiate` of a record; of a long record only of those evenly spaced blocks
+    that move.
+
+    Raises:
+        ValueError: see `differentiate`.
+    """
+    parts, found = blocks(record.size), list[MotionSignals]()
+    for part in parts:
+        try:
+            found.append(
+                differentiate(record.at(part) if len(parts) > 1 else record, filter, **called)
+            )
+        except ValueError:
+            if part is parts[-1] and not found:
+                raise
+    return found
 
 
 def differentiate(

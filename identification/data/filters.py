@@ -5,16 +5,16 @@ the position, and the same low-pass filter for the measured and the predicted fo
 Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 2013 (IDIM-LS).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, floor, log10
+from math import ceil, floor, log2, log10
 from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import count_of
+from identification.data.record import LONG, count_of
 from symfric.foundation import checks
 
 Array = NDArray[np.float64]
@@ -99,31 +99,69 @@ def lowpass(signal: Array, cutoff: float, step: float, order: int = 4) -> Array:
     if not 0 < cutoff * step < 0.5:
         such = f"below the Nyquist frequency {0.5 / step:g} Hz"
         raise ValueError(f"lowpass: cutoff: expected {such}, got {cutoff:g} Hz")
-    n = signal.size
-    line = np.linspace(signal[0], signal[-1], n)
-    rest = signal - line
-    periodic = np.concatenate([rest, -rest[-2:0:-1]])
-    ratio = np.tan(np.pi * np.fft.rfftfreq(periodic.size)) / np.tan(np.pi * cutoff * step)
-    gain = 1 / (1 + ratio ** (2 * order))
-    return line + np.fft.irfft(np.fft.rfft(periodic) * gain, periodic.size)[:n]
+    line = np.linspace(signal[0], signal[-1], signal.size)
+
+    def gain(f: Array) -> Array:
+        ratio = np.tan(np.pi * f) / np.tan(np.pi * cutoff * step)
+        return 1 / (1 + ratio ** (2 * order))
+
+    return line + weighted(signal - line, gain, DECAY / (cutoff * step), odd=True)
+
+
+DECAY = 12.0
+"""Time in periods of the cut-off after which the response of `lowpass` is rounding error."""
+LEAST = 2**15
+"""Smallest number of samples of a block that is transformed at once."""
+
+
+def weighted(signal: Array, gain: Callable[[Array], Array], reach: float, *, odd: bool) -> Array:
+    """Return a signal multiplied by a gain in the frequency domain, shape (n,).
+
+    It is continued at both ends by reflection. Long signals are divided into overlapping blocks
+    (overlap-save).
+
+    Args:
+        signal: samples, shape (n,).
+        gain: function of frequencies in cycles per sample.
+        reach: samples after which the response to a pulse is negligible.
+        odd: odd or even reflection.
+    """
+    n, side = signal.size, -1.0 if odd else 1.0
+    block = max(LEAST, 1 << ceil(log2(8 * reach)))
+    if n <= max(LONG, block):
+        periodic = np.concatenate([signal, side * signal[-2:0:-1]])
+        here = gain(np.asarray(np.fft.rfftfreq(periodic.size), np.float64))
+        return np.fft.irfft(np.fft.rfft(periodic) * here, periodic.size)[:n]
+    edge = ceil(reach)
+    before, after = side * signal[edge:0:-1], side * signal[-2 : -edge - 2 : -1]
+    whole = np.concatenate([before, signal, after])
+    here = gain(np.asarray(np.fft.rfftfreq(block), np.float64))
+    step, found = block - 2 * edge, np.empty(n)
+    for k in range(0, n, step):
+        part = np.fft.irfft(np.fft.rfft(whole[k : k + block], block) * here, block)
+        found[k : k + step] = part[edge : edge + min(step, n - k)]
+    return found
 
 
 def smoother_gain(frequency: Array, cutoff: float) -> Array:
     """Return the gain of `smoothed` at frequencies in cycles per sample."""
-    return 1 / (1 + (np.sin(np.pi * frequency) / np.sin(np.pi * cutoff)) ** 4)
+    g = (np.sin(np.pi * frequency) / np.sin(np.pi * cutoff)) ** 4
+    return 1 - (g / (1 + g)) ** 2
 
 
 def smoothed(signal: Array, cutoff: float) -> Array:
-    """Return the discrete smoothing spline y of a signal u, without reflection at the ends.
+    """Return a signal smoothed twice by the spline S, S u + S (u - S u), without end reflections.
 
-        min |u - y|^2 + |D y|^2 / (2 sin(pi f_c))^4,   gain 1 / (1 + (sin(pi f) / sin(pi f_c))^4)
+        S u = argmin |u - y|^2 + |D y|^2 / (2 sin(pi f_c))^4,   gain of S 1 / (1 + g),
+        gain of both 1 - (g / (1 + g))^2,   g = (sin(pi f) / sin(pi f_c))^4
 
-    D are second differences.
-    Source: E. T. Whittaker, Proc. Edinb. Math. Soc. 41, 1923; P. Eilers, Anal. Chem. 75, 2003.
+    D are second differences. The second step (twicing) returns most of the motion that S removes.
+    Source: E. T. Whittaker, Proc. Edinb. Math. Soc. 41, 1923; P. Eilers, Anal. Chem. 75, 2003;
+    J. W. Tukey, Exploratory Data Analysis, 1977, section 16 (twicing).
 
     Args:
         signal: samples, shape (n,).
-        cutoff: f_c in cycles per sample, where the gain is 1/2.
+        cutoff: f_c in cycles per sample, where the gain is 3/4.
     """
     from scipy.linalg import solveh_banded  # noqa: PLC0415 (slow to import)
 
@@ -135,7 +173,21 @@ def smoothed(signal: Array, cutoff: float) -> Array:
             bands[2 - shift, here] += DIFFERENCE[i] * DIFFERENCE[i + shift]
     bands *= (2 * np.sin(np.pi * cutoff)) ** -4
     bands[2] += 1.0
-    return np.asarray(solveh_banded(bands, signal))
+    once = np.asarray(solveh_banded(bands, signal))
+    return once + np.asarray(solveh_banded(bands, signal - once))
+
+
+def gaussian(y: Array, width: float, order: int = 0) -> Array:
+    """Return a signal smoothed by a Gaussian window, or its central differences per sample.
+
+    Rows are smoothed separately.
+    """
+    from scipy.ndimage import gaussian_filter1d  # noqa: PLC0415  (slow to import)
+
+    found = np.asarray(gaussian_filter1d(y, width, mode="nearest"), dtype=np.float64)
+    for _ in range(order):  # unlike SciPy's derivatives, differences remove a constant exactly
+        found = np.gradient(found, axis=-1)
+    return found
 
 
 def central_difference(signal: Array, step: float) -> Array:
@@ -197,7 +249,13 @@ class Decimation:
 
     def touched(self, samples: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return a mask of the rows whose windows contain any of `samples`, shape (rows,)."""
-        return np.convolve(samples, np.ones(self.taps.size), mode="valid")[:: self.factor] > 0.5
+        return any_within(samples, self.taps.size)[:: self.factor]
+
+
+def any_within(samples: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:
+    """Return a mask of the windows of `size` that contain any of `samples`, (n - size + 1,)."""
+    count = np.concatenate([[0], np.cumsum(samples)])
+    return count[size:] > count[:-size]
 
 
 def bandwidth(force: Array, step: float, share: float = 0.999) -> float:
@@ -206,24 +264,41 @@ def bandwidth(force: Array, step: float, share: float = 0.999) -> float:
     The level of the white noise is the median of the upper half of the spectrum divided by ln 2,
     the ratio of median and mean for white noise; spectral lines do not affect the median.
     """
-    power = np.abs(np.fft.rfft(force - force.mean())) ** 2
-    frequency = np.fft.rfftfreq(force.size, step)
+    centred = force - force.mean()
+    short = force.size <= LONG
+    power = np.abs(np.fft.rfft(centred)) ** 2 if short else spectrum(centred)
+    frequency = frequencies(force.size) / step
     noise = np.median(power[frequency > 0.25 / step]) / np.log(2)
     total = np.cumsum(power - noise)
     return float(frequency[np.argmax(total >= share * total.max())])
 
 
-def spectrum(signal: Array) -> Array:
-    """Return the power under a Hann window, shape (n//2+1,); for white noise, its variance.
+SEGMENT = 2**14
+"""Number of samples of the segments over which the spectrum of a long signal is averaged."""
 
-    If the end values of a signal differ, subtract the line between them by `without_line` first.
+
+def frequencies(n: int) -> Array:
+    """Return the frequencies of `spectrum` for n samples, in cycles per sample."""
+    return np.asarray(np.fft.rfftfreq(n if n <= LONG else SEGMENT), np.float64)
+
+
+def spectrum(signal: Array, *, line: bool = False) -> Array:
+    """Return the power under a Hann window at `frequencies`; for white noise, its variance.
+
+    Signals longer than `LONG` are divided into segments, over which the power is averaged (Bartlett
+    and Welch).
+
+    Args:
+        signal: samples, shape (n,).
+        line: subtract the straight line from the first to the last sample, of each segment.
     """
-    return np.abs(np.fft.rfft(signal * np.hanning(signal.size))) ** 2 / (0.375 * signal.size)
-
-
-def without_line(signal: Array) -> Array:
-    """Return a signal minus the straight line from its first to its last sample."""
-    return signal - np.linspace(signal[0], signal[-1], signal.size)
+    n = signal.size
+    size, count = (n, 1) if n <= LONG else (SEGMENT, n // SEGMENT)
+    window, total = np.hanning(size), np.zeros(size // 2 + 1)
+    for part in signal[: size * count].reshape(count, size):
+        rest = part - np.linspace(part[0], part[-1], size) if line else part
+        total += np.abs(np.fft.rfft(rest * window)) ** 2
+    return total / (0.375 * size * count)
 
 
 def noise_level(power: Array) -> float:
@@ -232,6 +307,11 @@ def noise_level(power: Array) -> float:
     The level is the median divided by ln 2; spectral lines do not affect the median.
     """
     return float(np.median(power[power.size // 2 :])) / float(np.log(2))
+
+
+def white_part(x: Array) -> float:
+    """Return the standard deviation of the white noise of a position."""
+    return float(np.std(np.diff(x, 3))) / np.sqrt(20)
 
 
 def rounded_level(signal: Array, power: Array) -> float:
@@ -257,7 +337,7 @@ def position_band(x: Array, step: float) -> float:
     The noise level is that of the upper half of the spectrum. Accelerations above this frequency
     are noise.
     """
-    power = spectrum(without_line(x))
+    power = spectrum(x, line=True)
     return band_above(power, np.full(power.size, rounded_level(x, power)), step, 2)
 
 

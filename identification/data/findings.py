@@ -17,7 +17,8 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.record import Array, Record, count_of, first_of
+from identification.data.filters import gaussian, white_part
+from identification.data.record import Array, Record, count_of, even_blocks, first_of, joined
 from symfric.foundation import checks
 
 Severity = Literal["error", "warning"]
@@ -166,20 +167,9 @@ class View:
         return self.record.units[self.name(role)]
 
     @cached_property
-    def steady(self) -> Record | None:
-        """Longest piece of the record without gaps, at equal intervals; None if too short."""
-        record = self.record
-        if record.t is None or record.size < 20:
-            return None
-        piece = record.at(max(record.pieces, key=lambda part: part.stop - part.start))
-        if piece.size < 20:
-            return None
-        step = (piece.time[-1] - piece.time[0]) / (piece.size - 1)
-        grid = piece.time[0] + step * np.arange(piece.size)
-        if np.abs(grid - piece.time).max() < 0.05 * step:
-            return piece
-        signals = {key: np.interp(grid, piece.time, y) for key, y in piece.signals.items()}
-        return Record(piece.name, grid, signals, piece.units, first_row=piece.first_row)
+    def steady(self) -> tuple[Record, ...]:
+        """Even blocks of the record."""
+        return even_blocks(self.record)
 
     def finding(
         self, serious: bool, kind: str, signal: str, case: str = "",
@@ -236,34 +226,45 @@ class Rough:
     Attributes:
         t, v, a, force: times [s] and smoothed signals of the rows.
         step: sample interval [s].
+        blocks: number of blocks of equal length that contain the rows.
         columns: regressors of the values.
         clean: True if the acceleration exceeds its noise.
         values, errors: m, level, viscous, stiffness, offset (and coefficients of sin x, cos x),
             and their standard errors.
+        root: roots of the weights of every `every`-th row in the regression.
         explained: share of the variance of the force explained by the model, robust to outliers.
     """
 
     def __init__(
         self, t: Array, v: Array, a: Array, force: Array, columns: Array, width: float,
-        step: float, clean: bool,
+        step: float, clean: bool, blocks: int,
     ) -> None:  # fmt: skip
         self.t, self.v, self.a, self.force, self.columns = t, v, a, force, columns
-        self.step, self.clean = step, clean
+        self.step, self.clean, self.blocks = step, clean, blocks
         self.every = max(1, int(2 * width), force.size // ENOUGH)
         A, b = columns[:: self.every], force[:: self.every]
-        self.values, self.errors = _robust(A, b)
+        self.values, self.errors, self.root = _robust(A, b)
         self.explained = _explained(A, b, self.values)
 
     def unexplained_when_late(self, late: float) -> float:
-        """Return the unexplained share of the force after correcting a delay of `late` [s]."""
+        """Return the unexplained share of the force after correcting a delay of `late` [s].
+
+        The rows keep their weights.
+        """
         A = self.columns[:: self.every]
         b = np.interp(self.t[:: self.every] + late, self.t, self.force)
-        return 1 - _explained(A, b, _robust(A, b)[0])
+        return 1 - _explained(A, b, self.inverse @ (self.root * b))
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Pseudo-inverse of the weighted columns."""
+        weighted: Array = self.columns[:: self.every] * self.root[:, None]
+        return np.asarray(np.linalg.pinv(weighted, rcond=1e-10), np.float64)
 
     def with_column(self, column: Array) -> tuple[float, float]:
         """Return value and standard error of an additional regressor, shape (rows,)."""
         A = np.column_stack([self.columns[:: self.every], column[:: self.every]])
-        values, errors = _robust(A, self.force[:: self.every])
+        values, errors, _ = _robust(A, self.force[:: self.every])
         return float(values[-1]), float(errors[-1])
 
     @cached_property
@@ -291,16 +292,6 @@ class Rough:
         return min(path) <= share * max(path)
 
 
-def smoothed(y: Array, width: float, order: int = 0) -> Array:
-    """Return a signal smoothed by a Gaussian window, or its central differences per sample."""
-    from scipy.ndimage import gaussian_filter1d  # noqa: PLC0415  (slow to import)
-
-    found = np.asarray(gaussian_filter1d(y, width, mode="nearest"), dtype=np.float64)
-    for _ in range(order):  # unlike SciPy's derivatives, differences remove a constant exactly
-        found = np.gradient(found)
-    return found
-
-
 def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> Rough | None:
     """Return the rough model of a record; None without position and force, or if it is too short.
 
@@ -310,30 +301,33 @@ def rough_model(view: View, *, exchanged: bool = False, curve: bool = False) -> 
         curve: replace level and viscous part by any friction curve that is piecewise linear in
             each direction, and add a drift in time as the last column.
     """
-    record = view.steady
-    if record is None or not {"x", "force"} <= view.roles.keys() or record.size < 50:
+    steady = view.steady
+    if not {"x", "force"} <= view.roles.keys() or not steady or steady[0].size < 50:
         return None
-    position, push = (record[view.roles[r]] for r in ("x", "force")[:: -1 if exchanged else 1])
+    both = ("x", "force")[:: -1 if exchanged else 1]
+    position, push = (joined(steady, view.roles[r]) for r in both)
     if np.ptp(position) == 0 or np.ptp(push) == 0:
         return None
-    step = record.step
+    step, size = steady[0].step, steady[0].size
     width, clean = _width(position)
     edge = int(3 * width)
-    rows = slice(edge, record.size - edge)
-    if record.size - 2 * edge < 30:
+    rows = (slice(None), slice(edge, size - edge))
+    if size - 2 * edge < 30:
         return None
-    xs = smoothed(position, width)
-    v, a = smoothed(position, width, 1) / step, smoothed(position, width, 2) / step**2
+    xs = gaussian(position, width)
+    v, a = gaussian(position, width, 1) / step, gaussian(position, width, 2) / step**2
     still = MOVING * float(np.abs(v[rows]).max())
-    sign = smoothed(np.sign(v) * (np.abs(v) > still), width)
+    sign = gaussian(np.sign(v) * (np.abs(v) > still), width)
     columns = [a, sign, v, xs - xs.mean(), np.ones_like(v)]
     if view.unit("x") == "rad" and np.ptp(position) > TURNED:
         columns += [np.sin(xs), np.cos(xs)]
     if curve:
         columns[1:3] = _curve(v, still, rows)
-        columns.append(np.linspace(-0.5, 0.5, v.size))
-    A, b = np.column_stack(columns)[rows], smoothed(push, width)[rows]
-    return Rough(record.time[rows], v[rows], a[rows], b, A, width, step, clean)
+        columns.append(np.linspace(-0.5, 0.5, v.size).reshape(v.shape))
+    t, v, a, b, *columns = (
+        y[rows].ravel() for y in (joined(steady, "t"), v, a, gaussian(push, width), *columns)
+    )
+    return Rough(t, v, a, b, np.column_stack(columns), width, step, clean, len(steady))
 
 
 def _explained(A: Array, b: Array, values: Array) -> float:
@@ -346,8 +340,11 @@ def _explained(A: Array, b: Array, values: Array) -> float:
     return 1 - mean((b - A @ values) ** 2) / whole if whole > 0 else 0.0
 
 
-def _curve(v: Array, still: float, rows: slice) -> list[Array]:
-    """Return hat functions of the speed in each direction, with knots at quantiles of the speed."""
+def _curve(v: Array, still: float, rows: tuple[slice, slice]) -> list[Array]:
+    """Return hat functions of the speed in each direction, with knots at quantiles of the speed.
+
+    Quantiles are those of the entries `rows` of v, shape (blocks, n).
+    """
     found: list[Array] = []
     for side in (1.0, -1.0):
         speed = np.maximum(side * v, 0.0)
@@ -360,25 +357,23 @@ def _curve(v: Array, still: float, rows: slice) -> list[Array]:
 
 def _width(x: Array) -> tuple[float, bool]:
     """Return the narrowest sufficient window, and whether the acceleration exceeds its noise."""
-    noise = max(white_part(x), count_of(x) / np.sqrt(12))
+    noise = max(white_part(x), count_of(x.ravel()) / np.sqrt(12))
     best = WIDTHS[0]
     for width in WIDTHS:
-        if width > max(x.size / 40, WIDTHS[0]):
+        if width > max(x.shape[1] / 40, WIDTHS[0]):
             break
         best = width
         of_noise = noise * np.sqrt(3 / (8 * np.sqrt(np.pi))) * width**-2.5
-        if of_noise < CLEAN * float(np.std(smoothed(x, width, 2))):
+        if of_noise < CLEAN * float(np.std(gaussian(x, width, 2))):
             return width, True
     return best, False
 
 
-def white_part(x: Array) -> float:
-    """Return the standard deviation of the white noise of a position."""
-    return float(np.std(np.diff(x, 3))) / np.sqrt(20)
+def _robust(A: Array, b: Array) -> tuple[Array, Array, Array]:
+    """Return values, standard errors and roots of the weights of Huber's regression.
 
-
-def _robust(A: Array, b: Array) -> tuple[Array, Array]:
-    """Return values and standard errors of Huber's regression by iterative reweighting."""
+    It is computed by iterative reweighting.
+    """
     scale = np.linalg.norm(A, axis=0)
     scale[scale == 0] = 1.0
     B = A / scale
@@ -386,15 +381,17 @@ def _robust(A: Array, b: Array) -> tuple[Array, Array]:
     values = np.zeros(A.shape[1])
     for _ in range(ROUNDS):
         root = np.sqrt(weight)
-        values, *_ = np.linalg.lstsq(B * root[:, None], b * root, rcond=1e-10)
+        R = np.asarray(np.linalg.qr(np.column_stack([B, b]) * root[:, None], mode="r"))
+        values, *_ = np.linalg.lstsq(R[:, :-1], R[:, -1], rcond=1e-10)  # SVD of few rows
         residual = b - B @ values
         least = 1e-12 * float(np.abs(b).max()) + 1e-200
         sigma = max(1.4826 * float(np.median(np.abs(residual))), least)
         weight = 1 / np.maximum(1.0, np.abs(residual) / (HUBER * sigma))
-    X = B * np.sqrt(weight)[:, None]
+    root = np.sqrt(weight)
+    X = B * root[:, None]
     inverse = np.linalg.pinv(X.T @ X, rcond=1e-10)
     rest = b - B @ values
     lag = float(np.corrcoef(rest[1:], rest[:-1])[0, 1]) if rest.size > 3 and rest.std() > 0 else 0.0
     lag = min(max(lag, 0.0), 0.98)
     variance = (1 + lag) / (1 - lag) * float(weight @ rest**2) / max(b.size - A.shape[1], 1)
-    return values / scale, np.sqrt(np.maximum(variance * np.diag(inverse), 0.0)) / scale
+    return values / scale, np.sqrt(np.maximum(variance * np.diag(inverse), 0.0)) / scale, root

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.data.differentiate import Velocity, position_noise
-from identification.data.filters import smoothed, smoother_gain, spectrum, without_line
+from identification.data.filters import smoothed, smoother_gain, spectrum
 from identification.data.record import JITTER, Array, Record
 
 SMOOTHER = 2.0
@@ -49,7 +49,7 @@ def smooth_path(
     given, t, n, step = dict(noise or {}), record.time, record.size, record.step
     name = v if v in record else x
     signal = record[name]
-    of = None if name == x or v in given else position_noise(spectrum(without_line(signal)))
+    of = None if name == x or v in given else position_noise(spectrum(signal, line=True))
     if of is not None:
         name, given[x] = x, float(np.sqrt(of[0])) * step
         signal = np.append(0.0, np.cumsum((signal[1:] + signal[:-1]) / 2 * np.diff(t)))

@@ -71,6 +71,10 @@ JITTER = 0.01
 """Largest relative deviation of a sample interval from the mean in uniform samples."""
 
 
+FEWEST = 20
+"""Smallest number of samples of a piece that is checked."""
+
+
 def runs(there: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first and end (exclusive) of each run of True values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
@@ -83,10 +87,30 @@ def constant_runs(y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return first, np.diff(np.concatenate([first, [y.size]]))
 
 
+LONG, BLOCKS = 100_000, 20
+"""Number of samples above which statistics use evenly spaced blocks, and number of the blocks."""
+
+
+def blocks(n: int, most: int = LONG) -> list[slice]:
+    """Return slices of n samples: all of them, or evenly spaced blocks of `most` samples in all."""
+    if n <= most:
+        return [slice(0, n)]
+    size = most // BLOCKS
+    return [slice(k, k + size) for k in np.linspace(0, n - size, BLOCKS).astype(int).tolist()]
+
+
+def some(y: Array) -> Array:
+    """Return a signal, of a long one only evenly spaced samples, for its quantiles."""
+    return y[:: 1 + y.size // LONG]
+
+
 def count_of(y: Array) -> float:
-    """Return the smallest step between values of a signal; 0 if they are not on a coarse grid."""
-    levels = np.unique(y)
-    if levels.size < 2 or levels.size > 0.5 * y.size:
+    """Return the smallest step between values of a signal; 0 if they are not on a coarse grid.
+
+    Of a long signal, only blocks are evaluated.
+    """
+    levels = np.unique(np.concatenate([y[part] for part in blocks(y.size)]))
+    if levels.size < 2 or levels.size > 0.5 * min(y.size, LONG):
         return 0.0
     steps = np.diff(levels)
     smallest = float(np.quantile(steps, 0.05))
@@ -338,3 +362,33 @@ class Record:
             units=dict(zip(keys, self.units.values(), strict=True)),
             columns={given.get(key, key): column for key, column in self.columns.items()},
         )
+
+
+def even_blocks(record: Record) -> tuple[Record, ...]:
+    """Return the longest piece of a record without gaps, at equal intervals; () if it is too short.
+
+    Evenly spaced `blocks` represent a long piece.
+    """
+    if record.t is None or record.size < FEWEST:
+        return ()
+    longest = max(record.pieces, key=lambda part: part.stop - part.start)
+    size, first = longest.stop - longest.start, longest.start
+    if size < FEWEST:
+        return ()
+    each = (slice(first + part.start, first + part.stop) for part in blocks(size))
+    return tuple(_even(record.at(part)) for part in each)
+
+
+def _even(piece: Record) -> Record:
+    """Return a record at equal intervals, interpolated if its intervals differ by more than 5 %."""
+    step = (piece.time[-1] - piece.time[0]) / (piece.size - 1)
+    grid = piece.time[0] + step * np.arange(piece.size)
+    if np.abs(grid - piece.time).max() < 0.05 * step:
+        return piece
+    signals = {key: np.interp(grid, piece.time, y) for key, y in piece.signals.items()}
+    return Record(piece.name, grid, signals, piece.units, first_row=piece.first_row)
+
+
+def joined(steady: Sequence[Record], signal: str) -> Array:
+    """Return a signal, a row for each block, shape (blocks, n)."""
+    return np.stack([block[signal] for block in steady])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.differentiate import levels, uncertain
-from identification.data.filters import Decimation, Filter
+from identification.data.filters import Decimation, Filter, fourth_order_difference
 from identification.residuals.balance import (
     Balance,
     Mask,
@@ -21,11 +21,12 @@ from identification.residuals.balance import (
     measure,
 )
 from identification.residuals.evaluation import DEAD_TIME, Array, Blocks, Channel
-from identification.residuals.sampled import Sampled, preload
+from identification.residuals.sampled import Sampled, preload, same
 from identification.unknowns.roles import width_of
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
 from symfric.foundation import checks
+from symfric.integrator.compiled.columns import Columns
 from symfric.model import Model
 
 WHERE = "InverseDynamics"
@@ -62,13 +63,13 @@ class InverseDynamics:
         filter: cut-off and decimation of all records; None: from force and motion of each record.
         dead_time: bounds of the time [s] by which the measured force leads the acting force, an
             additional unknown of each record; it is negative for a force recorded late. (0, T)
-            permits both, -T to T. "auto": estimated by `Fit` if it is significant and shifts
-            another value by more than its standard error. None: no dead time.
+            permits both, -T to T. "auto": estimated by `Fit` if the data determine it. None: no
+            dead time.
         noise: channel of a position or velocity -> standard deviation of its white noise; others
             are those of the spectrum and of rounding. `Fit(noise=...)` passes such entries.
 
     Limits: a force that is held for a sample leads by half a sample, which lowers the viscous
-    coefficient by about m w^2 h / 2 for motion at w [rad/s]; dead_time=(0, h) estimates this lead.
+    coefficient by about m w^2 h / 2 for motion at w [rad/s], unless the dead time is estimated.
     The automatic decimation is limited to the band in which the motion exceeds its noise
     (`choose_filter`). The remaining bias by white noise is corrected to second order, except in
     rows with algebraic unknowns; with a filter of the user, the noise of the acceleration must be
@@ -138,21 +139,11 @@ class InverseDynamics:
             for n, v in _slips(made, motion, model, p).items()
             if n in made.preloads
         ]
-        if isinstance(self.dead_time, tuple):
-            if made.loaded:
-                such = "expected laws without the applied force"
-                raise ValueError(f"{where}: dead_time: {such}")
-            low, high = self.dead_time
-            low = low or -high
-            first = min(max(0.0, low), high)
-            own += [
-                Unknown(f"{DEAD_TIME}[{k}]", "s", first, low, high, motion.step, nuisance=True)
-                for k, motion in enumerate(motions)
-            ]
         pieces = tuple(_piece(made, motion, model, p, self.filter is None) for motion in motions)
         channels = tuple(_channels(made.rows, pieces))
-        parts = made.equations, made.rows, pieces, made.slopes, len(made.preloads)
-        return InverseRows(subject.names, tuple(own), channels, *parts)
+        parts = made.equations, made.rows, pieces, made.slopes, len(made.preloads), made.loaded
+        rows = InverseRows(subject.names, tuple(own), channels, *parts)
+        return rows.delayed(*self.dead_time) if isinstance(self.dead_time, tuple) else rows
 
 
 @final
@@ -237,8 +228,7 @@ def _slips(made: Balance, motion: Motion, model: Model, p: Array) -> dict[str, A
     """Return the sliding velocity of each contact with bristles, shape (n,)."""
     if not made.preloads:
         return {}
-    n = motion.t.size
-    v = made.slips.map(n)(motion.w, np.repeat(p[:, None], n, 1))[0].full()
+    v = Columns(made.slips)([motion.w.T, same(p, motion.t.size)])[0].T
     return dict(zip((c.name for c in model.contacts), v, strict=True))
 
 
@@ -246,8 +236,7 @@ def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
     """Return a mask for each contact of the samples at which its static law is undetermined."""
     if not model.contacts:
         return []
-    n = motion.t.size
-    v, slopes = (part.full() for part in made.slips.map(n)(motion.w, np.repeat(p[:, None], n, 1)))
+    v, slopes = (part.T for part in Columns(made.slips)([motion.w.T, same(p, motion.t.size)]))
     errors = np.array([u.errors(motion.filter, motion.step)[0] for u in motion.velocities])
     gains = np.median(np.abs(slopes), axis=1).reshape(errors.size, len(model.contacts)).T
     noise = [float(np.linalg.norm(gain * errors)) for gain in gains]
@@ -296,6 +285,39 @@ class InverseRows(Blocks):
     pieces: tuple[Piece, ...]
     slopes: Sampled | None
     preloads: int
+    loaded: bool
+
+    def delayed(self, low: float, high: float) -> "InverseRows":
+        """Return the residuals with a dead time of each record within bounds.
+
+        Raises:
+            ValueError: a law depends on the applied force.
+        """
+        if self.loaded:
+            raise ValueError(f"{WHERE}: dead_time: expected laws without the applied force")
+        low = low or -high
+        first = min(max(0.0, low), high)
+        late = (
+            Unknown(f"{DEAD_TIME}[{k}]", "s", first, low, high, part.motion.step, nuisance=True)
+            for k, part in enumerate(self.pieces)
+        )
+        return replace(self, own=(*self.own, *late))
+
+    def rates(self) -> Array:
+        """Return the derivatives of the residuals by dead times of the records, (rows, records)."""
+        found = np.zeros((self.channels[-1].rows.stop, len(self.pieces)))
+        for channel in self.channels:
+            part, motion = self.pieces[channel.record], self.pieces[channel.record].motion
+            k = [row.signal for row in self.rows].index(channel.signal)
+            if (i := self.rows[k].input) is not None:
+                rate = fourth_order_difference(motion.w[motion.inputs][i], motion.step)
+                found[channel.rows, channel.record] = part.equations(k, rate[:, None])[:, 0]
+        return found
+
+    @property
+    def linear(self) -> bool:
+        """True if the force is linear in the parameters, and there is no dead time."""
+        return self.sampled.linear and not self.own
 
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
         """Yield the residuals of each balance of each record.

@@ -15,7 +15,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from identification.data.filters import noise_level, spectrum, without_line
+from identification.data.filters import noise_level, spectrum
 from identification.residuals.evaluation import Array
 
 STEP = 1e-2
@@ -41,7 +41,7 @@ class PathNoise(NamedTuple):
             errors: columns of the error of v for unit amplitudes, (n, m).
             F: measured force (n,), whose white noise is that of its spectrum.
         """
-        level = np.sqrt(noise_level(spectrum(without_line(F))))
+        level = np.sqrt(noise_level(spectrum(F, line=True)))
         sigma = max(float(level), EXACT * float(np.ptp(F)), 1e-300)
         base = force(v)
         G = np.column_stack([force(v + STEP * e) - base for e in errors.T]) / (STEP * sigma)

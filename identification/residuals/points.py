@@ -204,6 +204,11 @@ class PointRows(Blocks):
     preloads: bool
     noises: tuple[PathNoise, ...] = ()
 
+    @property
+    def linear(self) -> bool:
+        """True if the law is linear in its parameters."""
+        return self.slides.linear and (self.breaks is None or self.breaks.linear)
+
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
         """Yield the residuals of each record, and their derivatives."""
         count = len(self.tables) if self.preloads else 0

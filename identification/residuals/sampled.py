@@ -160,6 +160,7 @@ class Sampled:
         rows, g, start: Functions of (w, y), z, p with derivatives by (z, y, p).
         step, tangent: the step of z, and the same with derivatives by p.
         sizes: numbers of w, z, y and p.
+        linear: True if the rows are linear in p.
         guess: start values of y, shape (ny,).
     """
 
@@ -169,6 +170,7 @@ class Sampled:
     step: ca.Function
     tangent: ca.Function
     sizes: tuple[int, int, int, int]
+    linear: bool
     guess: Array
 
     @classmethod
@@ -216,6 +218,7 @@ class Sampled:
             ca.Function("sampled_step", [z, *given, p], [ca.densify(step)]),
             ca.Function("sampled_tangent", [both, *given, *moved, p], [ca.densify(new)]),
             sizes,
+            not (nz or ny) and not ca.depends_on(ca.jacobian(rows, p), p),
             np.array(guess, float),
         )
 
@@ -297,7 +300,7 @@ class _Along:
     def evaluated(self, name: str, here: Array, z: Array) -> tuple[Array, Array]:
         """Return values and derivatives of a Function at some samples."""
         n = here.shape[0]
-        value, slopes = self.of.run(name, [here, z, _same(self.p, n)])
+        value, slopes = self.of.run(name, [here, z, same(self.p, n)])
         return value, slopes.reshape(n, -1, value.shape[1]).transpose(0, 2, 1)
 
     def solve(self) -> str:
@@ -319,7 +322,7 @@ class _Along:
     def chained(self, name: str, first: Array, *given: Array) -> Array:
         """Return all results of a Function applied from sample to sample, starting at `first`."""
         here = np.hstack([self.w, self.y])
-        rows = [here[:-1], here[1:], self.h, *given, _same(self.p, self.n - 1)]
+        rows = [here[:-1], here[1:], self.h, *given, same(self.p, self.n - 1)]
         return np.vstack([first[None, :], self.of.run(name, rows, first)[0]])
 
     def tangents(self) -> tuple[Array, Array]:
@@ -351,7 +354,7 @@ class _Along:
         return both[:, nz:].reshape(self.n, self.count, nz).transpose(0, 2, 1)
 
 
-def _same(p: Array, n: int) -> tuple[Array, NDArray[np.intp]]:
+def same(p: Array, n: int) -> tuple[Array, NDArray[np.intp]]:
     """Return the parameters as one row shared by n samples."""
     return p[None, :], np.zeros(n, np.intp)
 

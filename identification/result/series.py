@@ -8,7 +8,7 @@ from typing import final
 
 import numpy as np
 
-from identification.data.differentiate import differentiate
+from identification.data.differentiate import differentiated
 from identification.data.record import Record
 from identification.residuals.evaluation import Array, Channel
 from identification.verdict.colour import Whiteness
@@ -275,11 +275,12 @@ def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:
         if record.t is None or "force" not in record or "x" not in record:
             continue
         try:
-            signals = differentiate(record)
+            found = differentiated(record, None)
         except ValueError:  # no acceleration: unequal intervals, or too short
             continue
-        friction = signals.force - float(drive.m) * signals.a - float(drive.offset)
-        lines[record.name] = Line(signals.equations(signals.v), signals.equations(friction))
+        m, offset = float(drive.m), float(drive.offset)
+        parts = [(s.equations(s.v), s.equations(s.force - m * s.a - offset)) for s in found]
+        lines[record.name] = Line(*map(np.concatenate, zip(*parts, strict=True)))
     says = "measured: force - m a - offset" if lines else "no record has force and position"
     return _curve(drive.law, float(drive.N), lines, drive.turning, says)
 

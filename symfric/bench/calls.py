@@ -12,10 +12,10 @@ from subprocess import run
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.bench.contenders import buffered, compiled, tolerances
 from symfric.bench.report import Found, Progress, Report, backend, interleaved, unwarned
+from symfric.foundation.numeric import Array
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.by_peer import peer
 from symfric.integrator.equations.inputs import Hold, input_data
@@ -27,7 +27,6 @@ from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.model import Model
 from symfric.scenes import Arm, Drive, Rabinowicz
 
-Array = NDArray[np.float64]
 Calls = dict[str, Callable[[], object]]
 SEED, RTOL = 10, 1e-6
 TORQUES = (30.0, 30.0, 15.0, 2.0, 1.0, 0.2)

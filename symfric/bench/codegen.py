@@ -12,7 +12,6 @@ from time import perf_counter
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, ExactCoulomb, Hold, Law, LuGre, SolveError, simulate
 from symfric.bench.embedded import CASES, whole
@@ -33,6 +32,7 @@ from symfric.embedded import BY, Absent, find_tools, measure
 from symfric.emitter.c99 import REALS
 from symfric.fmu import Exported, export_fmu
 from symfric.fmu.export import running
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.integrator import Input
@@ -121,7 +121,6 @@ def _blocks(quick: bool) -> Iterator[tuple[Block, int]]:
 
 # ---- units and compensators at run time ----
 
-Array = NDArray[np.float64]
 RTOL, STEP, TINY = 1e-9, 0.1, 1e-4
 MOST = 10.0
 """Goal for the largest difference of a state [rtol]."""

@@ -16,10 +16,9 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.bench.report import FASTEST, compile_time
-from symfric.foundation.numeric import bound
+from symfric.foundation.numeric import Array, bound
 from symfric.integrator.arguments import chosen
 from symfric.integrator.by_peer import peer
 from symfric.integrator.compiled.compiler import library
@@ -36,7 +35,6 @@ from symfric.laws import BrownMcPhee
 from symfric.model import Model
 from symfric.scenes import Rabinowicz
 
-Array = NDArray[np.float64]
 Watched = tuple[str, ...]
 """Names of states."""
 Solve = Callable[..., tuple[Array, Callable[[], int]]]

@@ -5,9 +5,9 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.bench.report import Found, Progress, Report, best_time, interleaved, unwarned
+from symfric.foundation.numeric import Array
 from symfric.integrator import Ensemble, simulate_many
 from symfric.integrator.cuda.device import Device, DeviceError
 from symfric.integrator.equations.initial import first_guess, first_step, smallest_step
@@ -21,7 +21,6 @@ from symfric.laws import BrownMcPhee, LuGre
 from symfric.model import Model
 from symfric.scenes import FourBar, Pendulum, SliderCrank, rabinowicz
 
-Array = NDArray[np.float64]
 RTOL, MOST = 1e-6, 10_000_000
 MEMBERS = 400
 LANES = "Processor time of an ensemble and of the same runs one by one, on one core"

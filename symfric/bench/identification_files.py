@@ -16,11 +16,10 @@ from io import BytesIO
 from typing import Any, Literal, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification import synthetic_drive_data
+from symfric.foundation.numeric import Array
 
-Array = NDArray[np.float64]
 Truth = Literal["good", "bad", "hidden"]
 
 HEADER = "t [s],x [m],force [N]"

@@ -10,7 +10,6 @@ from time import process_time
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.record import Record
@@ -26,8 +25,6 @@ from symfric.bench.report import Found, Row, best_time, goal, timed
 from symfric.foundation.status import SolveError
 from symfric.laws import Law
 from symfric.model import Model
-
-Array = NDArray[np.float64]
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 EMPS = DATA / "EMPS"

@@ -5,7 +5,6 @@ from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.fit import Fit
@@ -17,12 +16,11 @@ from identification.starts.maxwell_slip import fit_elements
 from identification.starts.measured import Measured
 from symfric import GMS, Element, MaxwellSlip, Slider
 from symfric.bench.report import Found, goal, timed
+from symfric.foundation.numeric import Array
 from symfric.foundation.status import Status
 from symfric.integrator import Hold, simulate
 from symfric.laws import Law, LuGre
 from symfric.scenes import Drive
-
-Array = NDArray[np.float64]
 
 TRUTH = {
     "mu_s": 1.5, "mu_d": 1.0, "v_s": 1e-3,

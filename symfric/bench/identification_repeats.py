@@ -5,7 +5,6 @@ from functools import cache, partial
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.fit import Fit
@@ -13,13 +12,12 @@ from identification.residuals.shooting import Shooting
 from identification.result.fitted import Fitted
 from symfric import law_from_text
 from symfric.bench.report import Found, goal, timed
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
 from symfric.integrator import Linear, Trajectory, simulate
 from symfric.laws import QuarterCarGeneral, QuarterCarSimple
 from symfric.model import Model
 from symfric.scenes import Drive, QuarterCar
-
-Array = NDArray[np.float64]
 
 SEEDS, QUICK = 100, 20
 BLOCK = {"m": 2.0, "mu_d": 1.0, "sigma_2": 0.8}

@@ -6,7 +6,6 @@ from importlib.util import find_spec
 from time import process_time
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.bench import contenders
 from symfric.bench.contenders import Contender
@@ -20,6 +19,7 @@ from symfric.bench.report import (
     ratios,
     unwarned,
 )
+from symfric.foundation.numeric import Array
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.simulate import simulate
 from symfric.laws import BrownMcPhee, Law, LuGre
@@ -27,7 +27,6 @@ from symfric.model import Model
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import rabinowicz
 
-Array = NDArray[np.float64]
 T_END = 20.0
 TIMES = np.linspace(0.0, T_END, 401)[1:]
 STARTS = (-0.05, -0.01, 0.03, 0.06, 0.09)

@@ -20,15 +20,14 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.bench.report import Found, Progress, Report, Row, timed
+from symfric.foundation.numeric import Array
 from symfric.integrator import Hold, flow, simulate
 from symfric.laws import GMS, BrownMcPhee, ElastoPlastic, Law, LuGre
 from symfric.model import Model
 from symfric.scenes import drive, rabinowicz
 
-Array = NDArray[np.float64]
 GOAL, T, N, LIMIT, LOAD = 0.1, 1.0, 50, 20.0, 10.0
 STEPS = 10
 """Number of steps of `flow` in each interval; steps of 2 ms resolve the bristles."""

@@ -11,7 +11,6 @@ from functools import partial
 from math import nan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.formulation.expressions import at_end, effort, track
 from ocp.formulation.phase import Phase
@@ -22,13 +21,13 @@ from symfric.bench.ocp_contenders import Attempt, Contender
 from symfric.bench.ocp_others import attempted, contenders
 from symfric.bench.ocp_referee import Verdict, judged
 from symfric.bench.report import Found, Progress, Report, Row, curves
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.foundation.programs import find_compiler
 from symfric.laws import BrownMcPhee, ExactCoulomb, Law, LuGre
 from symfric.model import Model
 from symfric.scenes.blocks import drive
 
-Array = NDArray[np.float64]
 LIMIT, QUICK_LIMIT = 20.0, 3.0
 """Time limits of one solve [s]."""
 TITLE = (

@@ -14,15 +14,13 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.formulation.problem import Problem
 from ocp.solve import solve
 from ocp.solving.solution import Solution
 from symfric.bench.ocp_cases import UNBOUNDED, Case
+from symfric.foundation.numeric import Array
 from symfric.foundation.status import Status
-
-Array = NDArray[np.float64]
 
 
 @final

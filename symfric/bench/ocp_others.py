@@ -15,7 +15,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.bench.ocp_cases import Case
 from symfric.bench.ocp_contenders import (
@@ -29,8 +28,7 @@ from symfric.bench.ocp_contenders import (
     rockit,
     symfric,
 )
-
-Array = NDArray[np.float64]
+from symfric.foundation.numeric import Array
 
 
 def opty(case: Case, limit: float, width: float) -> Attempt:

@@ -13,12 +13,11 @@ from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from symfric.bench.ocp_cases import UNBOUNDED, Case
+from symfric.foundation.numeric import Array
 
-Array = NDArray[np.float64]
 RTOL = 1e-9
 MARGIN = 1e-9
 """Relative excess over the static level at which sticking ends."""

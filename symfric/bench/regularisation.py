@@ -23,7 +23,6 @@ from math import log, nan
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.bench.report import Found, Progress, Report, backend, curves
 from symfric.figures.regularisation import (
@@ -34,6 +33,7 @@ from symfric.figures.regularisation import (
     regularisation,
     sample,
 )
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import (
     BrownMcPhee,
@@ -47,7 +47,6 @@ from symfric.laws import (
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import FourMass, PendulumBox, Rabinowicz, Scene, SliderCrank
 
-Array = NDArray[np.float64]
 RTOLS = (1e-5, 1e-6, 1e-8)
 """Relative tolerances of the runs."""
 FINE = 1e-10

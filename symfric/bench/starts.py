@@ -10,7 +10,6 @@ from math import inf, isfinite, nan, pi
 from statistics import median
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.formulation.phase import Span, clipped, limits
 from ocp.formulation.problem import Problem
@@ -23,9 +22,9 @@ from symfric.bench.ocp_cases import CASES
 from symfric.bench.ocp_contenders import held, solved
 from symfric.bench.ocp_referee import judged
 from symfric.bench.report import Found, Progress, Report, timed
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
 
-Array = NDArray[np.float64]
 STARTS, RANDOM = 12, 50
 QUICK = ("out_and_back", "pendulum", "brachistochrone")
 NEAR, FAR = 0.1, 0.5

@@ -6,10 +6,10 @@ from math import asin, exp, pi
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from symfric.foundation import checks
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import (
     Armstrong,
@@ -32,8 +32,6 @@ from symfric.laws import (
     VelocityBased,
     steady_force,
 )
-
-Array = NDArray[np.float64]
 
 
 @final

@@ -9,20 +9,17 @@ from math import inf, log
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.choice.friction import Friction, alike, friction_of
 from symfric.choice.smoothing import OF_BRISTLES, Smoothing, smoothing
 from symfric.figures.regularisation import Machine, Sample, apart, positions, sample
 from symfric.foundation import checks
-from symfric.foundation.numeric import is_number
+from symfric.foundation.numeric import Array, is_number
 from symfric.foundation.status import OverloadWarning, SolveError, Status
 from symfric.laws import BrownMcPhee, Law, Stribeck
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import Scene
-
-Array = NDArray[np.float64]
 
 OVERLOAD = "drier bristles creep too slowly for their v_eps or for the rounding of velocities"
 """Reason given for runs whose friction exceeds its static level."""

@@ -9,7 +9,6 @@ from typing import final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.choice import nature
 from symfric.choice.continuation import (
@@ -36,12 +35,12 @@ from symfric.codegen.blocks.from_model import plant_block
 from symfric.figures.data import phenomena
 from symfric.figures.motion import sampled
 from symfric.figures.regularisation import Machine, positions
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import parameters
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law
 from symfric.model import Model
 
-Array = NDArray[np.float64]
 WORK = 100_000_000
 """Largest number of CasADi instructions for one step size."""
 FEWEST = 100

@@ -9,6 +9,7 @@ from typing import Any, final
 
 from symfric.choice.nature import EVENT
 from symfric.foundation.checks import check_names
+from symfric.foundation.files import json_data
 
 RANKED, INACCURATE, LACKING, REFUSED, FAILED = (
     "ranked", "inaccurate", "lacks", "cannot run", "failed",
@@ -109,8 +110,7 @@ class Row:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; NaN and infinity are None."""
-        data = asdict(self) | {"work": self.work, "curve": [list(pair) for pair in self.curve]}
-        return {n: None if isinstance(v, float) and not isfinite(v) else v for n, v in data.items()}
+        return json_data(asdict(self) | {"work": self.work})
 
 
 def ordered(rows: Iterable[Row]) -> list[Row]:

@@ -21,16 +21,15 @@ from math import inf, log
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from symfric.choice.friction import Friction, fall_of, peaked
 from symfric.figures.regularisation import Regularisation, apart
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Parameter, parameters, with_values
 from symfric.laws import Law, LeineSwitch, RateAndState
 from symfric.laws.base.families import WithModes
 
-Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-7
 """Limit below which a width of a static law only rounds an absolute value."""
 RELATIVE = ("u_eps",)

@@ -4,19 +4,23 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from symfric import Law, Linear, parameters, rate_of, with_values
 from symfric.cli.options import assignments, named_law, numbers
 from symfric.foundation import checks
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names, options
-from symfric.foundation.tables import read_columns
+from symfric.foundation.units import parsed
 from symfric.integrator import Input
 from symfric.integrator.equations.inputs import Sampled
 from symfric.model import Model
 from symfric.scenes import ALL_SCENES, Scene
+
+if TYPE_CHECKING:
+    from identification.data.raw import Column, Raw
 
 
 def kind_of(
@@ -205,10 +209,52 @@ def input_from_text(name: str, text: str, unit: str) -> Linear | float:
             ) from None
     else:
         return checks.number(f"--input {name}", value)
-    names = (column, column.partition("[")[0].strip())
-    wanted = {"t": (("t", "time", "Time"), "s"), column: (names, unit)}
-    table = read_columns(Path(file), wanted)
+    from identification.data.raw import gathered, label  # noqa: PLC0415 (slow to import)
+    from identification.data.text import read_text  # noqa: PLC0415 (slow to import)
+
+    place = Path(file)
+    if not place.is_file():
+        got = "a folder" if place.is_dir() else "nothing there; check the path"
+        raise ValueError(f"read '{file}': expected a file, got {got}")
+    raw = read_text(place)
+    times = [c for c in raw.columns if c.label in ("t", "time", "Time")]
+    meant = label(column)
+    hits = [c for c in raw.columns if (c.label, c.unit) == meant]
+    hits = hits or [c for c in raw.columns if c.label == meant[0]]
+    wanted = (("t", times, "s"), (meant[0], hits, unit))
+    columns = gathered([partial(_in_si, raw, *given) for given in wanted])
     try:
-        return Linear(table["t"], table[column])
+        return Linear(*columns)
     except ValueError as error:
-        raise ValueError(f"read '{Path(file).name}': {error}") from None
+        raise ValueError(f"read '{place.name}': {error}") from None
+
+
+def _in_si(raw: "Raw", name: str, hits: Sequence["Column"], unit: str) -> Array:
+    """Return the numbers of the only column in `hits` in the SI unit `unit`.
+
+    Raises:
+        ValueError: not one column, another dimension, or a bad cell.
+    """
+    from identification.data.units import CHANNELS  # noqa: PLC0415 (slow to import)
+    from identification.data.units import unit as of_signal  # noqa: PLC0415 (slow to import)
+
+    where = f"read '{raw.name}'"
+    if len(hits) != 1:
+        got = ", ".join(str(c) for c in hits or raw.columns if c.label) or "no header"
+        raise ValueError(
+            f"{where}: expected one column '{name} [{unit}]', got {got}; check the header"
+        )
+    (column,) = hits
+    if column.problem:
+        raise ValueError(f"{where}: column '{column}', {column.problem}")
+    if column.unit in ("", unit):
+        return column.values
+    si = parsed(unit)
+    for meant in (parsed(column.unit), of_signal(column.unit)):
+        if meant and si and meant.powers == si.powers:
+            return meant.factor / si.factor * column.values
+    usual = (channel.examples for channel in CHANNELS.values() if unit in channel.units)
+    raise ValueError(
+        f"{where}: column '{column}': expected a unit of {next(usual, unit)} in brackets, "
+        f"got {column.unit}"
+    )

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from symfric.foundation.files import write_text
+from symfric.foundation.files import json_data, write_text
 
 EXACT = 12
 """Significant digits of numbers that a user may enter again."""
@@ -127,7 +127,7 @@ def emit_json(content: Mapping[str, Any], destination: str | Path | None) -> Non
     """Write `content` as one JSON object to a file, or to standard output for "-"."""
     if destination is None:
         return
-    text = json.dumps(plain(content), indent=2, allow_nan=False, ensure_ascii=False)
+    text = json.dumps(json_data(content), indent=2, allow_nan=False, ensure_ascii=False)
     if destination == "-":
         typer.echo(text)
     else:
@@ -152,12 +152,3 @@ def say_written(*paths: str | Path | None) -> None:
     names = [str(path) for path in paths if path is not None and str(path) != "-"]
     if names:
         note(f"wrote {', '.join(names)}")
-
-
-def plain(value: Any) -> Any:
-    """Return `value` as JSON data; infinity and NaN become None."""
-    if isinstance(value, Mapping):
-        return {str(name): plain(item) for name, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -23,9 +23,8 @@ from symfric.codegen.guards import Status
 from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import GuardModel, in_type
 from symfric.foundation.graph import SELECT, Graph, graph, rebuild
+from symfric.foundation.numeric import Array
 from symfric.model.kinds import CONSTRAINTS
-
-Array = NDArray[np.float64]
 
 OVERFLOWS = 1e18
 """Numbers above this have no square in float."""

@@ -18,9 +18,9 @@ from symfric.codegen.blocks.block import Block
 from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import in_type, run_vm
 from symfric.foundation.graph import Graph, graph, rebuild
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 STEPS = 800

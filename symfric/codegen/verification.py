@@ -7,7 +7,6 @@ from tempfile import TemporaryDirectory
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.compared import TOLERANCE, Run, ulp
@@ -18,10 +17,9 @@ from symfric.codegen.runner import compile_object, compiled, needed_symbols, run
 from symfric.codegen.source import routines
 from symfric.emitter.c99 import DOUBLE
 from symfric.foundation.checks import kind
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import CompileError, Compiler, find_compiler, missing_compiler
-
-Array = NDArray[np.float64]
 
 STEPS = 20_000
 FEWER = 4000

@@ -10,7 +10,6 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.codegen import Block, generate
 from symfric.codegen.layout import TEMPLATES, CBlock, filled
@@ -19,7 +18,7 @@ from symfric.compensation.result import WITHOUT, Comparison, Loop, Reference
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
-from symfric.foundation.numeric import bound
+from symfric.foundation.numeric import Array, bound
 from symfric.foundation.parameters import Parametric, Variable, param
 from symfric.foundation.programs import CompileError, Compiler, find_compiler, needed_compiler
 from symfric.foundation.status import SolveError
@@ -27,8 +26,6 @@ from symfric.integrator import stepper
 from symfric.integrator.plant import Plant
 from symfric.laws.base import smooth
 from symfric.model import Model, Output, check_model
-
-Array = NDArray[np.float64]
 
 
 @final

@@ -6,18 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
+from symfric.foundation.numeric import Array
 from symfric.foundation.shown import brief
 from symfric.foundation.style import line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-Array = NDArray[np.float64]
 
 
 @final

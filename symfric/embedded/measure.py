@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from math import inf, isfinite, nan
+from math import inf, nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.generated import Generated
@@ -31,10 +30,10 @@ from symfric.embedded.target import (
 )
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
+from symfric.foundation.files import json_data
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import CompileError, find_compiler
-
-Array = NDArray[np.float64]
 
 STEPS = 400
 
@@ -85,10 +84,7 @@ class Measured:
 
     def to_dict(self) -> dict[str, Any]:
         """Return all values by name; None for values that were not measured."""
-        return {
-            name: None if isinstance(value, float) and not isfinite(value) else value
-            for name, value in asdict(self).items()
-        }
+        return json_data(asdict(self))
 
 
 def measure(

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing, Shown, Table
 from symfric.foundation.style import DASHES, colour, dash
@@ -28,9 +28,6 @@ from symfric.laws.base.law import require_law
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-Array = NDArray[np.float64]
 
 
 @final

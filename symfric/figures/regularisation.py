@@ -28,10 +28,9 @@ from time import process_time
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import is_number
+from symfric.foundation.numeric import Array, is_number
 from symfric.foundation.parameters import parameters, with_values
 from symfric.foundation.status import Status
 from symfric.integrator.equations.inputs import Input
@@ -44,7 +43,6 @@ from symfric.model.kinds import FRICTION_STATE, MODE, POSITION
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import Scene
 
-Array = NDArray[np.float64]
 Measure = Sequence[str] | Callable[[Trajectory], Array]
 """Names of signals, or a function trajectory -> numbers, such as periods."""
 SAMPLES = 2001

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.emitter.c99 import DOUBLE
 from symfric.fmu.variables import LEAST_RTOL
+from symfric.foundation.numeric import Array
 from symfric.integrator.arguments import chosen
 from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import (
@@ -35,7 +35,6 @@ from symfric.integrator.step.pieces import all_macros, routine
 from symfric.model import Model
 from symfric.model.start import start_function
 
-Array = NDArray[np.float64]
 MOST_ATTEMPTS = 10**6
 """Largest number of attempts in one communication step."""
 EVENT_TOLERANCE = 1e-10

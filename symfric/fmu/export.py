@@ -15,7 +15,6 @@ from xml.etree import ElementTree as Xml
 from zipfile import ZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.codegen.blocks.from_model import fixed_method
 from symfric.codegen.layout import filled
@@ -32,6 +31,7 @@ from symfric.fmu.package import (
 )
 from symfric.fmu.variables import LARGEST_RTOL, LEAST_RTOL, Entry, entries
 from symfric.foundation import checks
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import parameters
 from symfric.integrator.methods.tableaux import ADAPTIVE
 from symfric.model import Model, check_model
@@ -214,7 +214,6 @@ def _model(
     return given, (0.0, until)
 
 
-Array = NDArray[np.float64]
 LOG = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)
 
 

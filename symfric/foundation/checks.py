@@ -24,12 +24,11 @@ from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.foundation.shown import Showing
 from symfric.foundation.symbolic import Symbolic, plain
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 LONGEST = 60

@@ -3,9 +3,10 @@
 import csv
 import json
 import os
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager, suppress
 from errno import EDQUOT, EFBIG, EIO, ENOSPC
+from math import isfinite
 from pathlib import Path
 from secrets import token_hex
 from typing import Any, cast
@@ -142,6 +143,15 @@ def read_json(where: str, path: str | Path, what: str) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise ValueError(f"{where} '{path}': expected {what}, got something else")
     return cast(dict[str, Any], data)
+
+
+def json_data(value: Any) -> Any:
+    """Return `value` as JSON data; infinity and NaN become None."""
+    if isinstance(value, Mapping):
+        return {str(name): json_data(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [json_data(item) for item in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def write_table(path: str | Path, header: Iterable[str], rows: Iterable[Iterable[object]]) -> None:

@@ -12,13 +12,12 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symfric import Trajectory
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.foundation.style import QUIET, Line, line
-
-Array = NDArray[np.float64]
 
 
 def acceleration(run: Trajectory, rate: str, times: ArrayLike | None = None) -> Array:

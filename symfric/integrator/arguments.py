@@ -3,9 +3,10 @@
 import warnings
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symfric.foundation import checks
+from symfric.foundation.numeric import Array
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.methods.families import Radau
 from symfric.integrator.methods.method import Method
@@ -14,7 +15,6 @@ from symfric.integrator.running.run import MANY_STEPS, Tolerances
 from symfric.model import Model
 from symfric.model import check_model as check_model
 
-Array = NDArray[np.float64]
 LOOSE = 1e-5
 """Relative tolerance above which whole stick phases may be missed without notice."""
 BACKENDS = ("auto", "vm", "compiled")

@@ -29,9 +29,10 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symfric.foundation import checks
+from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator import arguments
 from symfric.integrator.equations.initial import consistent, first_guess, first_step
@@ -76,7 +77,6 @@ def stabilised(system: System) -> System:
     )
 
 
-Array = NDArray[np.float64]
 PEERS = ("sundials", "rosenbrock", "ggl")
 CHUNKS = 32
 COUNTS = {

@@ -22,9 +22,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symfric.foundation import checks
+from symfric.foundation.numeric import Array
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import OverloadWarning, SolveError, Status
 from symfric.integrator import arguments
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
     Task = Job | SingleJob | OnDevice
     """Part of the work that all chunks of an ensemble share."""
 
-Array = NDArray[np.float64]
 CUDA, REALS = "cuda", ("double", "float")
 EXECUTORS = ("serial", "threads", "processes")
 RESULTS = 4

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symfric.foundation import checks
+from symfric.foundation.numeric import Array
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess
@@ -33,7 +34,6 @@ from symfric.integrator.running.plants import (
 from symfric.integrator.running.run import MOST_ORDERS
 from symfric.integrator.step.attempt import Given, State
 
-Array = NDArray[np.float64]
 Numbers = Mapping[str, ArrayLike]
 
 

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.memory import remember
+from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator import arguments
 from symfric.integrator.derivatives.path import Path, seeds
@@ -34,7 +35,6 @@ from symfric.model import Model
 from symfric.results.stored import Statistics
 from symfric.results.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 PLAIN: frozenset[type] = frozenset((float, int, bool, str, type(None)))
 REMEMBERED, MOST_TIMES = 16, 10_000
 """Number of settings cached per model (the oldest is removed first), and largest cached grid."""

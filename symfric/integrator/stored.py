@@ -8,8 +8,8 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.foundation.status import Status
 from symfric.foundation.storable import agree
 from symfric.integrator.arguments import BACKENDS
@@ -24,7 +24,6 @@ from symfric.model import Model
 from symfric.results.stored import Format, Statistics
 from symfric.results.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 Slopes = dict[str, dict[str, Array]]
 
 

@@ -17,10 +17,9 @@ from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import is_number, is_symbolic
+from symfric.foundation.numeric import Array, is_number, is_symbolic
 from symfric.foundation.parameters import parameters, symbolise, with_values
 from symfric.foundation.shown import Showing, Shown, Table, counted, spaced
 from symfric.foundation.units import exponents
@@ -29,7 +28,6 @@ from symfric.laws.base.law import FORCE, Law, require_law
 from symfric.laws.composed.populations import cost
 from symfric.laws.static.smooth_peak import BrownMcPhee
 
-Array = NDArray[np.float64]
 TEXTS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 LOADS = (0.5, 1.0, 20.0)
 """Normal forces [N]."""

@@ -39,9 +39,9 @@ from typing import final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation.graph import coupled
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
 from symfric.laws import Law
 from symfric.laws.base import smooth
@@ -115,7 +115,6 @@ def null_direction(J: ca.SX) -> ca.SX:
     return Z / ca.sqrt(ca.sumsqr(Z))
 
 
-Array = NDArray[np.float64]
 IMMOVABLE = 1e-10
 """Fraction of the unconstrained W below which the constraints hold a contact."""
 MINORS = 8

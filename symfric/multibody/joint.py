@@ -268,8 +268,6 @@ class Joint(Keywords, ABC):
     """Joint coordinate of each direction of forces and motions: "slide", "turn", ..."""
     quaternion: ClassVar[int | None] = None
     """Index of the first of four Euler parameters among the coordinates."""
-    plane: ClassVar[int | None] = None
-    """Axis of both frames that is normal to the plane of a planar joint."""
     transmits: ClassVar[tuple[str, ...]] = COMPONENTS
     """Components of force and moment that the joint can transmit, in axes of the child's frame."""
     symbol: ClassVar[Symbol] = Symbol()

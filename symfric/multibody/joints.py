@@ -102,7 +102,6 @@ class PlanarRevolute(Closing):
 
     rubs = ("turn",)
     directions: ClassVar[Mapping[str, int]] = {"turn": 0}
-    plane = 2
     transmits = ("Fx", "Fy")
     symbol = Symbol("o", axes=(("b", 2),), hinge=True, anchored=True)
 
@@ -121,7 +120,6 @@ class PlanarPrismatic(Closing):
 
     rubs = ("slide",)
     directions: ClassVar[Mapping[str, int]] = {"slide": 0}
-    plane = 1
     transmits = ("Fx", "Fz", "My")
     symbol = Symbol("s", guide=True)
 
@@ -140,7 +138,6 @@ class PinInSlot(Closing):
 
     rubs = ("slide",)
     directions: ClassVar[Mapping[str, int]] = {"slide": 0}
-    plane = 1
     transmits = ("Fx", "Fz")
     symbol = Symbol("o", slot=True)
 

@@ -133,7 +133,7 @@ class Relative(NamedTuple):
     Attributes:
         R, p: pose.
         w, v: relative angular velocity, and velocity of the origin of the child frame.
-        R_WP, p_WP: pose of the parent frame in the world.
+        R_WP: orientation of the parent frame in the world.
         p_WC: position of the origin of the child frame in the world.
     """
 
@@ -142,7 +142,6 @@ class Relative(NamedTuple):
     w: ca.SX
     v: ca.SX
     R_WP: ca.SX
-    p_WP: ca.SX
     p_WC: ca.SX
 
 
@@ -184,7 +183,7 @@ class Kinematics:
         R, arm = R_WP.T @ child.R @ C.R, p_WC - p_WP
         w = R_WP.T @ (child.w - parent.w)
         v = R_WP.T @ (v_WC - v_WP - ca.cross(parent.w, arm))
-        return Relative(R, R_WP.T @ arm, w, v, R_WP, p_WP, p_WC)
+        return Relative(R, R_WP.T @ arm, w, v, R_WP, p_WC)
 
     def rotation(self, joint: Joint) -> ca.SX:
         """Return R_PC of a joint."""

@@ -6,9 +6,9 @@ from typing import final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation.checks import shown
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import at_start, stacked, starts_of, strays, symbols_of, undeclared
 from symfric.model import Variables, kinds
@@ -20,7 +20,6 @@ from symfric.multibody.kinematics import Cuts
 from symfric.multibody.spatial import GROUND, euler_e, euler_parameters
 from symfric.multibody.topology import Topology, absolute
 
-Array = NDArray[np.float64]
 LONG, LONG_WITH_FRICTION = 16, 12
 """Number of links of a chain from which cuts save operations.
 

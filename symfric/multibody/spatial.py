@@ -15,10 +15,9 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation.checks import shown
-from symfric.foundation.numeric import Scalar, is_number, is_symbolic
+from symfric.foundation.numeric import Array, Scalar, is_number, is_symbolic
 from symfric.foundation.variable import Variable, at_start
 
 Vector = Sequence[Any] | ca.SX | ca.DM
@@ -145,7 +144,6 @@ def _unit(name: str, a: Any) -> ca.DM:
     return ca.DM(vector(a)) / length
 
 
-Array = NDArray[np.float64]
 GROUND = "ground"
 """Name of the fixed body."""
 TRIANGLE = 1e-9

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symfric.foundation.numeric import Array
+
 Position = Callable[[Array], tuple[Array, Array, Array]]
 """Function q -> (phi, phi_q, phi_t) at time 0, shapes (m,), (m, n), (m,)."""
 FITS = 1e-8

@@ -10,12 +10,11 @@ from typing import NamedTuple, final
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation import checks
+from symfric.foundation.numeric import Array
 from symfric.multibody.spatial import unphysical
 
-Array = NDArray[np.float64]
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 SINGLE = KINDS[:3]
 """Kinds of joints with one coordinate."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.files import write_text, written
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import blank, grid
 from symfric.foundation.shown import data_uri
 from symfric.foundation.style import EDGE, colour
@@ -23,7 +24,6 @@ from symfric.model.sketch import Sketch
 from symfric.results.signals import Signals
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes
 
-Array = NDArray[np.float64]
 ENDINGS = (".gif", ".html", ".mp4")
 Flags = NDArray[np.bool_]
 BRIEF, LONG, SHOWN = 2.0, 12.0, 6.0

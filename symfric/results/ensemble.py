@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
+from symfric.foundation.numeric import Array
 from symfric.foundation.shown import Showing, Shown, Table, among, counted, spaced, valued
 from symfric.foundation.status import Status
 from symfric.foundation.storable import agree
@@ -19,7 +20,6 @@ from symfric.results.stored import Format, module
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 PLACES = ("end", "least", "greatest")
 MOST = 5_000_000
 """Largest number of values that `shown` reads; all count in a memory-mapped file, because the last

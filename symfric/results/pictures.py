@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import panels, save
 from symfric.foundation.panels import panels as empty_panels
 from symfric.foundation.shown import spaced
@@ -20,7 +21,6 @@ from symfric.model.kinds import CONSTRAINTS, ENERGY, FRICTION
 from symfric.results.kinds import Group, every, friction_laws, kinds, main
 from symfric.results.signals import Signals
 
-Array = NDArray[np.float64]
 APART = 8
 """Largest number of signals for which each signal has a panel if all are shown."""
 BLACK = COLOURS.index(EDGE)

@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from symfric.foundation.numeric import Array
+
 Evaluate = Callable[[Array], Mapping[str, Array]]
 Of = Callable[[ca.SX, Array], Array]
 """Function that returns the values of an expression at times."""

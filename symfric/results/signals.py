@@ -6,18 +6,16 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar
+from symfric.foundation.numeric import Array, Scalar
 from symfric.foundation.shown import Showing
 from symfric.foundation.status import Status
 from symfric.foundation.variable import strays
 from symfric.model import Model
 from symfric.results.quadrature import extremes, integral_between, integrals, looks
 from symfric.results.stored import Statistics
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.model.sketch import Mark, Part, Sketch
 
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 FLAT = 1e-6
 """Fraction of the motion in a plane below which motion out of the plane counts as zero."""

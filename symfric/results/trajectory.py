@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation import packed
 from symfric.foundation.files import write_table, write_text
+from symfric.foundation.numeric import Array
 from symfric.foundation.shown import Showing, Shown, Table, among, counted
 from symfric.foundation.variable import stacked
 from symfric.model.kinds import WORK
@@ -23,9 +23,6 @@ from symfric.results.stored import module
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-
-Array = NDArray[np.float64]
 
 
 @final

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import parameters, with_values
 from symfric.foundation.status import SolveError
 from symfric.integrator import Hold, Input, Linear, simulate
@@ -21,7 +22,6 @@ from symfric.scenes import ALL_SCENES
 from symfric.stress.cases import Case
 from symfric.stress.referee.solve import NO_FORCE, SINE, Question, Signal, knows, solve
 
-Array = NDArray[np.float64]
 WORK = 120_000
 TIMES = 101
 """Number of times at which runs are compared."""

@@ -15,7 +15,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from symfric import (
     GMS,
@@ -29,6 +28,7 @@ from symfric import (
     Slider,
 )
 from symfric.figures import Scales
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import WIDE, grid
 from symfric.foundation.style import DASHES, EDGE, QUIET
 from symfric.gallery.shared import look
@@ -77,7 +77,6 @@ def laws(count: int = 2000) -> dict[str, AnyLaw]:
     }
 
 
-Array = NDArray[np.float64]
 Loops = Mapping[str, tuple[Array, Array]]
 """Case -> abscissa and ordinate."""
 

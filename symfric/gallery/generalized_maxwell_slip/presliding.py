@@ -6,10 +6,10 @@ from functools import partial
 import casadi as ca
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from identification import Measured, fit_elements
 from symfric.figures import Curve, break_away, hysteresis, push
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import NARROW, WIDE, grid, panels
 from symfric.gallery.generalized_maxwell_slip import laws as paper
 from symfric.gallery.generalized_maxwell_slip.laws import F_C, SIGMA_0, SIGNALS, stribeck
@@ -183,8 +183,6 @@ def along_path(name: str, curve: Curve, steps: int) -> float:
     v = legs[np.minimum(phase.astype(int), legs.size - 1)] * np.sin(np.pi * (phase % 1))
     return paper.difference(name, curve.columns, t, v * np.pi / 2 * legs.size / end)
 
-
-Array = NDArray[np.float64]
 
 PEAK, RISE, FALL = 1.1, 0.5, 0.05  # N, s, s
 BASE, SWING, FREQUENCY, SINCE = 0.1, 0.05, 2.0, 4.0  # N, N, Hz, s

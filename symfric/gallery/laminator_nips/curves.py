@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import root_scalar
 
 from symfric import LuGre, simulate
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import line
 from symfric.gallery.laminator_nips.studies import PRINTED, curve
@@ -14,7 +14,6 @@ from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.shared import legend_below
 from symfric.scenes import Prescribed
 
-Array = NDArray[np.float64]
 EXPONENTS = (2 / 3, 8 / 9, 26 / 27)
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(40)
 

@@ -11,17 +11,16 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from symfric import LuGre, SteadyStateLuGre, simulate
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import panels
 from symfric.foundation.style import colour, line
 from symfric.gallery.laminator_nips.studies import PRINTED, curve
 from symfric.gallery.plate import Drawn, plate
 from symfric.scenes import Rabinowicz
 
-Array = NDArray[np.float64]
 WIRES = [(Z, ratio) for Z in (10.0, 30.0, 100.0, 300.0) for ratio in (0.0, 0.05, 0.2, 0.5)]
 """Z [N s/m], for example from 0.2 kg on 500 N/m to 1 kg on 90 kN/m, and damping ratio."""
 SPAN = 400.0

@@ -5,18 +5,16 @@ from functools import cache
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from identification import Dataset, Fit, Points, six_steps
 from identification.starts.six_steps import standard_errors
 from identification.starts.stribeck import StribeckCurve
 from symfric import SteadyStateLuGre
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import QUIET, Line
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.shared import look, rms
-
-Array = NDArray[np.float64]
 
 PRINTED = {"pilot": SteadyStateLuGre.pilot(), "main": SteadyStateLuGre.main()}
 """Laws with the parameters of tables 5.1 and 5.2."""

@@ -4,9 +4,9 @@ from itertools import pairwise
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric import QuarterCarSimple, Trajectory
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import NARROW, panels
 from symfric.foundation.style import QUIET, line
 from symfric.gallery.plate import Drawn, plate
@@ -15,7 +15,6 @@ from symfric.gallery.quarter_car_friction.rig import as_printed, driven
 from symfric.gallery.shared import look
 from symfric.results.quadrature import integral_between
 
-Array = NDArray[np.float64]
 END, VISCOUS = 10.0, 0.02
 """End of the curve [Stribeck velocities], and its viscous slope [F_C per Stribeck velocity]."""
 

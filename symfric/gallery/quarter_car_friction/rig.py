@@ -12,10 +12,10 @@ from itertools import pairwise
 from math import asin, copysign, cos, exp, pi, sin, tan
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from symfric import QuarterCarGeneral, Trajectory, simulate, with_values
+from symfric.foundation.numeric import Array
 from symfric.laws import Law
 from symfric.scenes import QuarterCar
 
@@ -69,8 +69,6 @@ def ride(law: Law, millimetres: int = 50, samples: int = 6001) -> Trajectory:
     car = QuarterCar.preset(name, law, t_ramp=RAMP, t_hold=HOLD)
     return simulate(car.model(), T_END, rtol=1e-8, samples=samples)
 
-
-Array = NDArray[np.float64]
 
 M_B, M_W, K_S, B_D, K_T, B_T = 240.0, 40.0, 28900.0, 260.0, 920000.0, 3886.0
 THETA, L_D, BREAK_AWAY = pi / 4, 0.4, 193.8

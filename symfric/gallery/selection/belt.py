@@ -5,15 +5,14 @@ from functools import cache
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from symfric import Trajectory, simulate
+from symfric.foundation.numeric import Array
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.selection import laws
 from symfric.gallery.shared import Belt, largest, rms, spread
 from symfric.scenes import Rabinowicz
 
-Array = NDArray[np.float64]
 T_END = 20.0
 M, K, V_BELT, F_S, F_C = 0.8, 2.1, 0.1, 0.15 * 0.8 * 9.81, 0.1 * 0.8 * 9.81
 

@@ -14,15 +14,14 @@ from functools import cache
 import casadi as ca
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from symfric import ExactCoulomb, SolveError, Trajectory, simulate
+from symfric.foundation.numeric import Array
 from symfric.gallery.selection.laws import FORMS, forms, small_multiples
 from symfric.gallery.self_tuning.machines import Machine, size, solve
 from symfric.gallery.shared import acceleration, largest, rms, spread
 from symfric.scenes import PendulumBox
 
-Array = NDArray[np.float64]
 M_BOX, M, L, J, R, G = 6.0, 20.0, 0.3, 1.8, 0.01, 9.81
 """Numbers of table 6; the radius of the hinge, which it does not state, is that of the preset."""
 FLOOR, HINGE, WIDTH = 0.02, 0.002, 1e-3
@@ -65,7 +64,6 @@ def at_start() -> tuple[float, float]:
     return float(a), float(alpha)
 
 
-Array = NDArray[np.float64]
 Variant = tuple[float, float]
 """Inertia about the mass [kg m^2] and radius of the hinge [m]."""
 DRAWN: Variant = (J, R)

@@ -9,17 +9,14 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy import float64
-from numpy.typing import NDArray
 
 from symfric import Awrejcewicz, BengisuAkay, Karnopp, Law, Threlfall, VelocityBased
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import grid
 from symfric.foundation.style import colour
 from symfric.gallery.selection.tables import PRINTED
 from symfric.gallery.shared import REFERENCE, rms
 from symfric.scenes import PendulumBox, Rabinowicz
-
-Array = NDArray[float64]
 
 LAWS: dict[str, Law] = {name: row.law() for name, row in PRINTED.items()}
 LAWS["Karnopp"] = Karnopp(form="event")

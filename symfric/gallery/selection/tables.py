@@ -23,7 +23,6 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from symfric.choice.friction import Friction
@@ -32,13 +31,14 @@ from symfric.choice.measured import Task, measured
 from symfric.choice.ranking import WIDTH, Row
 from symfric.figures.regularisation import Machine, machine_of
 from symfric.foundation import checks
+from symfric.foundation.files import json_data
+from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError
 from symfric.integrator.simulate import simulate
 from symfric.laws import ALL_LAWS, BrownMcPhee, Law
 from symfric.model import Model
 from symfric.scenes import PendulumBox, Rabinowicz, Scene
 
-Array = NDArray[np.float64]
 EQUAL = 1e-4
 """Error of the integrator at which our times are measured, relative to the motion of the law."""
 SAMPLES = 20001
@@ -171,10 +171,7 @@ class PaperComparison:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; numbers that are not finite are null."""
-        rows = [
-            {n: None if isinstance(v, float) and not isfinite(v) else v for n, v in row.items()}
-            for row in map(asdict, self.rows)
-        ]
+        rows = json_data([asdict(row) for row in self.rows])
         return {"scene": self.scene, "tables": [self.times, self.ranks], "rows": rows,
                 "orders": self.orders()}  # fmt: skip
 

@@ -9,10 +9,10 @@ from functools import cache, partial
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import root_scalar
 
 from symfric import BrownMcPhee, Law, SelfTuning, Trajectory, simulate, symbolise
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import grid, panels
 from symfric.foundation.style import line
 from symfric.gallery.plate import Drawn, plate
@@ -191,7 +191,6 @@ def sensitivity(law: Law, name: str, v: np.ndarray) -> tuple[np.ndarray, np.ndar
     return dF(v[None], value).full()[0] * value / MU["mu_s"], differences * value / MU["mu_s"]
 
 
-Array = NDArray[np.float64]
 LAWS = ("self-tuning, equal peak", "Brown-McPhee")
 BLOCK = {"m": 1.0, "k": 2.0, "v_belt": 0.1, "g": 10.0}
 

@@ -6,15 +6,14 @@ from functools import cache
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric import BrittleSelfTuning, BrownMcPhee, Law, SelfTuning, simulate
+from symfric.foundation.numeric import Array
 from symfric.gallery.self_tuning import machines
 from symfric.gallery.self_tuning.machines import Coefficient, Machine, solve
 from symfric.gallery.shared import acceleration, largest
 from symfric.scenes import Scene
 
-Array = NDArray[np.float64]
 Signals = dict[str, Array]
 LAWS = ("self-tuning", "Brown-McPhee")
 TUNED = "self-tuning, own B"

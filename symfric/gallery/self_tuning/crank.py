@@ -6,9 +6,9 @@ both laws with their peak at 10 mm/s.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric import BrownMcPhee
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import panels
 from symfric.foundation.style import line
 from symfric.gallery.plate import Drawn, plate
@@ -17,7 +17,6 @@ from symfric.gallery.self_tuning.both_laws import LAWS, Both
 from symfric.gallery.shared import REFERENCE, largest, legend_below
 from symfric.scenes import SliderCrank
 
-Array = NDArray[np.float64]
 MU = {"mu_s": 0.1, "mu_d": 0.08}
 V_T = 0.01  # m/s
 MORE = ("energy", "constraint_position")

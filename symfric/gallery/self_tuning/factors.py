@@ -4,15 +4,14 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from symfric import BrittleSelfTuning, SelfTuning
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import grid, panels
 from symfric.gallery.plate import Drawn, plate
 from symfric.gallery.shared import largest, shade
 from symfric.laws.static.self_tuning import brittleness
 
-Array = NDArray[np.float64]
 C = 2 - 2 / np.pi * np.arcsin(0.8)
 """Shape factor of figures 8 and 9."""
 

@@ -8,8 +8,8 @@ from functools import cache, partial
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.foundation.panels import grid, panels
 from symfric.foundation.style import QUIET, colour, line
 from symfric.gallery.plate import Drawn, plate
@@ -19,7 +19,6 @@ from symfric.gallery.self_tuning.machines import fastest, fixed_steps
 from symfric.gallery.shared import REFERENCE, largest, legend_below
 from symfric.scenes import FourMass
 
-Array = NDArray[np.float64]
 MU = {"mu_s": 0.12, "mu_d": 0.1}
 V_T = 0.01
 """Velocity of the peak [m/s], of Haug's example."""

@@ -12,7 +12,8 @@ from typing import final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
+
+from symfric.foundation.numeric import Array
 
 Coefficient = Callable[[ca.SX, ca.SX | float], ca.SX]
 """Function of sliding velocity [m/s] and normal force [N] that returns F/N."""
@@ -116,9 +117,6 @@ def slider_crank(mu: Coefficient) -> Machine:
 def size(f: ca.SX | float) -> ca.SX:
     """Return the magnitude of a force, smoothed at zero as in the reference data."""
     return ca.sqrt(ca.sumsqr(f) + 1e-8) - 1e-4
-
-
-Array = NDArray[np.float64]
 
 
 def solve(machine: Machine, times: Array) -> dict[str, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from symfric.emitter.c99 import REALS
+from symfric.foundation.numeric import Array
 from symfric.integrator.cuda.device import Device, Kernel, Loaded, kernel_of
 from symfric.integrator.many.chunk import Chunk, Job, Solved
 from symfric.integrator.many.member_data import MemberData
@@ -18,7 +19,6 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import State
 from symfric.model import Model
 
-Array = NDArray[np.float64]
 WHERE = "simulate_many: backend='cuda'"
 FRESH = 8
 """Reason of a member that was not started (`members.h`)."""

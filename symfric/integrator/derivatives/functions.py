@@ -13,8 +13,8 @@ from typing import final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.integrator.compiled.columns import NAME, Columns, filled
 from symfric.integrator.derivatives.path import Parameters, of_data
 from symfric.integrator.equations.expressions import branchless, divided_once
@@ -22,7 +22,6 @@ from symfric.integrator.many.vectors import lanes_header, vector_source
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import build_dense_step
 
-Array = NDArray[np.float64]
 FEW, MANY = 4, 8
 """Numbers of lanes: for up to four names, and for more."""
 

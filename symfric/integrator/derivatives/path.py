@@ -8,13 +8,13 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Dense, Jumps
 from symfric.model import Model
 
-Array = NDArray[np.float64]
 Parameters = tuple[int, ...]
 """Row in p of each parameter, -1 for a start value."""
 

@@ -35,11 +35,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.checks import listed
+from symfric.foundation.numeric import Array
 from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.path import Jump, Path
 from symfric.integrator.equations.initial import ASSEMBLED, ITERATIONS, consistent
 
-Array = NDArray[np.float64]
 Which = Sequence[int] | NDArray[np.intp]
 GRAZING = 1e-6
 """Relative rate of an event expression below which it touches zero without crossing it.

@@ -16,12 +16,11 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.path import Jump, Path, Seeds, of_data
 from symfric.integrator.derivatives.saltation import Links, at_start, event_times, links
 from symfric.integrator.running.record import Dense
-
-Array = NDArray[np.float64]
 
 
 class Slopes(NamedTuple):

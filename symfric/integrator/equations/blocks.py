@@ -32,15 +32,13 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from symfric.foundation.numeric import bound, reciprocal
+from symfric.foundation.numeric import Array, bound, reciprocal
 from symfric.integrator.compiled.columns import filled
 from symfric.integrator.equations.manifold import PULLING, SHOCK
 from symfric.integrator.equations.matrices import Factors, SymbolicLU, factorise
 from symfric.integrator.equations.system import System
 
-Array = NDArray[np.float64]
 NONE = ca.SX(0, 1)
 
 

@@ -29,7 +29,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import applied, reciprocal, walk
+from symfric.foundation.numeric import Array, applied, reciprocal, walk
 from symfric.integrator.compiled.columns import Columns
 
 Rule = Callable[[int, list[ca.SX]], ca.SX | None]
@@ -135,7 +135,6 @@ def divided_once(expression: ca.SX) -> ca.SX:
     return rewritten(function, arguments, rule)[0]
 
 
-Array = NDArray[np.float64]
 MOST_NUMBERS = 1000
 """Count of numbers above which an expression is treated as a table, and stays unchanged."""
 

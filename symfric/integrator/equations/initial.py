@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.checks import listed, number
-from symfric.foundation.numeric import evaluate, evaluate_all
+from symfric.foundation.numeric import Array, evaluate, evaluate_all
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.manifold import Manifold, jammed
 from symfric.integrator.equations.system import System
 from symfric.model import Model
 
-Array = NDArray[np.float64]
 ITERATIONS = 50
 ASSEMBLED = 1e-12
 """Largest constraint error, relative to the largest state."""

@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import is_number
+from symfric.foundation.numeric import Array, is_number
 from symfric.foundation.parameters import Variable
 from symfric.foundation.shown import brief
 from symfric.foundation.variable import stacked, strays
 from symfric.integrator.equations.expressions import Pieces, lifted, pieces
 from symfric.model import Model
 
-Array = NDArray[np.float64]
 RAMP = "linear"
 """Structure of an input that is linear in time on each interval."""
 NO_ROWS = ca.SX(0, 1)

@@ -22,14 +22,12 @@ from typing import final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from symfric.foundation.numeric import evaluate
+from symfric.foundation.numeric import Array, evaluate
 from symfric.integrator.equations.matrices import factorise
 from symfric.model import Model
 from symfric.model.holonomic import Holonomic
 
-Array = NDArray[np.float64]
 DEPENDENT = 1e-4
 """Ratio of singular values of phi_q below which a stopped mechanism is called singular.
 

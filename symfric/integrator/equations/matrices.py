@@ -22,9 +22,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import reciprocal
+from symfric.foundation.numeric import Array, reciprocal
 
-Array = NDArray[np.float64]
 Order = tuple[tuple[int, int], ...]
 """(row, column) of each pivot, in the order of elimination."""
 

@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.checks import listed
+from symfric.foundation.numeric import Array
 from symfric.foundation.variable import stacked
 from symfric.integrator.equations.expressions import branchless, divided_once
 from symfric.integrator.equations.inputs import InputData
@@ -39,7 +40,6 @@ from symfric.integrator.equations.matrices import Order, echelon, null_space
 from symfric.model import Model
 from symfric.model.holonomic import Inner
 
-Array = NDArray[np.float64]
 Columns = tuple[ca.SX, ca.SX, ca.SX, list[str]]
 """Unknowns without time, right-hand side, mass matrix and names."""
 SAMPLES = 4

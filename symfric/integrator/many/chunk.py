@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_step
 from symfric.integrator.equations.inputs import InputData
@@ -22,7 +23,6 @@ from symfric.integrator.running.run import ROUNDS, Tolerances, integrate, own_sc
 from symfric.integrator.step.attempt import Given, State
 from symfric.model import Model
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Points = Sequence[tuple[Array, Array]]
 BEFORE = -1

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symfric.foundation import checks
+from symfric.foundation.numeric import Array
 from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import Hold, Input, InputData, Sampled, input_data, paced
 from symfric.integrator.equations.system import System
 from symfric.model import Model
 
-Array = NDArray[np.float64]
 Values = dict[str, Array]
 MemberInput = Input | ArrayLike
 """Input as in `simulate`, or an array of numbers or samples (members, n), one row per member."""

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.integrator.compiled.columns import Columns, densified
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import Following
@@ -33,7 +34,6 @@ from symfric.integrator.running.plants import (
 )
 from symfric.integrator.step.attempt import Given, State
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 _LOCK = Lock()
 PAIRED = 2500

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from symfric.foundation import storable
 from symfric.foundation.files import written
+from symfric.foundation.numeric import Array
 from symfric.integrator.many.chunk import Solved
 
-Array = NDArray[np.float64]
 BLOCK = 2**20
 """Bytes written at once when a file is created."""
 

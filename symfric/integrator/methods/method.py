@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.matrices import (
     SOUND,
@@ -20,8 +20,6 @@ from symfric.integrator.equations.matrices import (
 )
 from symfric.integrator.equations.system import System
 from symfric.model import Model
-
-Array = NDArray[np.float64]
 
 
 class Trial(NamedTuple):

@@ -29,12 +29,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import evaluate
+from symfric.foundation.numeric import Array, evaluate
 from symfric.foundation.variable import stacked
 from symfric.model import Contact, Model
 from symfric.model.contact import APPLIED, Switching, switching
 
-Array = NDArray[np.float64]
 Solve = Callable[[Array], Array]
 """Unknowns y with new modes -> y with consistent algebraic unknowns; may raise ValueError."""
 STILL = 1e-11

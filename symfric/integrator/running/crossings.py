@@ -21,12 +21,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.integrator.equations.expressions import divided_once
 from symfric.integrator.running.record import Record
 from symfric.model import Model
 from symfric.model.contact import mode_changes, switching
 
-Array = NDArray[np.float64]
 LOOKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Relative places at which each step, and each doubtful piece of a step, is evaluated."""
 FINER = 64

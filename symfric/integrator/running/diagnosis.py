@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.checks import listed
-from symfric.foundation.numeric import evaluate_all
+from symfric.foundation.numeric import Array, evaluate_all
 from symfric.foundation.status import Status
 from symfric.integrator.equations.blocks import blocks
 from symfric.integrator.equations.initial import FLOOR, consistent
@@ -18,7 +18,6 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.model import Model
 from symfric.model.contact import APPLIED
 
-Array = NDArray[np.float64]
 NEARLY = 0.1
 """Value of det(I - dN/dN) below which a mechanism whose step shrinks to nothing has jammed."""
 STILL = 1e-9

@@ -35,6 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.memory import remember
+from symfric.foundation.numeric import Array
 from symfric.foundation.status import EnergyWarning, OverloadWarning
 from symfric.foundation.variable import strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
@@ -45,7 +46,6 @@ from symfric.model import Model
 from symfric.model.contact import APPLIED, Contact
 from symfric.model.forces import by_laws
 
-Array = NDArray[np.float64]
 SPEEDS = np.array([1e-6, 1e-3, 1.0, 1e3])
 """Slips [m/s] of the first check, in both directions."""
 LOADS = (1.0, 1e3)

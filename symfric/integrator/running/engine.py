@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import address, bound
+from symfric.foundation.numeric import Array, address, bound
 from symfric.integrator.compiled.columns import filled
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import Following
@@ -28,7 +28,6 @@ from symfric.integrator.running.events import Change, Eventful, Search, Stop
 from symfric.integrator.running.record import Dense, Outputs, Record
 from symfric.integrator.step.attempt import GROWTH_MEMORY, Given, State
 
-Array = NDArray[np.float64]
 STOPS = tuple(Stop)
 """Reasons to stop, by number."""
 MOST_ROWS, LEAST_ROWS, BYTES = 2048, 64, 2**20

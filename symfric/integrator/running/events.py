@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import bound
+from symfric.foundation.numeric import Array, bound
 from symfric.integrator.equations.initial import SURE
 from symfric.integrator.running import crossings as limits
 from symfric.integrator.running.crossings import (
@@ -28,7 +28,6 @@ from symfric.integrator.running.record import Jumps, Record
 from symfric.integrator.step.attempt import Given, State
 from symfric.model.parts import Event
 
-Array = NDArray[np.float64]
 JUMPS = 512
 """Number of jumps recorded between two returns of an engine."""
 

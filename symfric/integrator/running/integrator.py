@@ -8,10 +8,9 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from symfric.foundation.memory import remember
-from symfric.foundation.numeric import Scalar, is_casadi
+from symfric.foundation.numeric import Array, Scalar, is_casadi
 from symfric.foundation.programs import CompileError
 from symfric.foundation.variable import stacked
 from symfric.integrator.compiled.background import Prospect
@@ -35,7 +34,6 @@ from symfric.integrator.step.attempt import written
 from symfric.model import Model
 from symfric.model.kinds import MODE
 
-Array = NDArray[np.float64]
 JUDGED = 4
 """Number of argument sets of `Integrator.suited` whose results are cached."""
 INLINE = 7000

@@ -13,7 +13,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import bound, evaluate
+from symfric.foundation.numeric import Array, bound, evaluate
 from symfric.integrator.compiled.columns import densified, filled
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
@@ -23,7 +23,6 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Outputs
 from symfric.integrator.step.attempt import Given, State
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 END, ATTEMPTS, STEP_TOO_SMALL, SEARCH, AGAIN, STORM, OVER = 0, 2, 3, 4, 5, 6, -1
 """States of a plant.

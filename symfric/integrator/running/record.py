@@ -8,9 +8,8 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.foundation.numeric import Array
 from symfric.foundation.status import Status
-
-Array = NDArray[np.float64]
 
 
 class Record(NamedTuple):

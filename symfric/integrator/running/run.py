@@ -12,9 +12,8 @@ from time import perf_counter
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from symfric.foundation.numeric import evaluate
+from symfric.foundation.numeric import Array, evaluate
 from symfric.foundation.status import Status
 from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
@@ -25,7 +24,6 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import MOST_BYTES, Outputs, Run
 from symfric.integrator.step.attempt import Given, State
 
-Array = NDArray[np.float64]
 SMALL, REST = 1e-3, 1e-12
 """Sizes, in nominal values, below which a motion gets its own scale, or counts as zero.
 

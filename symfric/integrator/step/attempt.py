@@ -31,16 +31,15 @@ from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from symfric.foundation.numeric import reciprocal
+from symfric.foundation.numeric import Array, reciprocal
 from symfric.integrator.equations.blocks import blocks, signs
 from symfric.integrator.equations.manifold import PULLING, SHOCK
 from symfric.integrator.equations.system import System
 from symfric.integrator.methods.method import Method, Trial, Trials
 from symfric.integrator.step.tangent import tangent
 
-Array = NDArray[np.float64]
 GROWTH_MEMORY = 2.5
 """Largest growth of the step size that the controller stores."""
 

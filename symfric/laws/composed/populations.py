@@ -14,15 +14,14 @@ from typing import ClassVar, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, column, expm1, sin
+from symfric.foundation.numeric import Array, Scalar, column, expm1, sin
 from symfric.foundation.parameters import Parametric, parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Input, Law, State
 
-Array = NDArray[np.float64]
 SPEEDS = 20
 """Number of speeds per decade at which the mean force is computed."""
 

@@ -8,7 +8,6 @@ from typing import Any, cast
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from symfric import Model, SolveError, Status, Variable, rabinowicz, simulate
 from symfric.choice import continuation
@@ -32,6 +31,7 @@ from symfric.choice.measured import (
 )
 from symfric.choice.smoothing import Smoothed, SmoothingStudy
 from symfric.figures.regularisation import Machine, Sample
+from symfric.foundation.numeric import Array
 from symfric.integrator import Input, Linear
 from symfric.laws import LuGre, Stribeck, Viscous
 from symfric.model import Event
@@ -176,7 +176,6 @@ def test_bristles_keep_the_accuracy_in_a_far_tighter_run_or_are_not_ranked(
     assert _holds(task, at, budget(held))
 
 
-Array = NDArray[np.float64]
 C, W, END = 20.0, 4 * pi, 2.0
 
 

@@ -1,19 +1,35 @@
-"""Files, manifest, and the text of header and source."""
+"""Files, manifest, and the text of header and source.
+
+Invalid arguments of generated C, compensators and embedded runs: one table of calls.
+
+All laws in C: the bits of CasADi, no warnings, no undefined behaviour, valid C++.
+"""
 
 import json
+import shutil
+import subprocess
+from pathlib import Path
 
 import casadi as ca
+import numpy as np
 import pytest
-from tables import table
+from law_cases import CASES, NO_STEP
+from one_program import LIMITED, STRICT, OneProgram, block_of, has_bits, is_near
+from tables import Names, table
 
-from symfric import BrownMcPhee, LuGre, Output, Variable, Viscous, law_from_text
-from symfric.codegen import Block, generate, law_block
+from symfric import BrownMcPhee, LuGre, Model, Output, Variable, Viscous, drive, law_from_text
+from symfric.codegen import Block, generate, law_block, plant_block
 from symfric.codegen.blocks.block import Elements
 from symfric.codegen.layout import CBlock
+from symfric.codegen.runner import run_vm
 from symfric.codegen.source import header, interval, routines, source
+from symfric.codegen.verification import excitation
+from symfric.compensation import sine
 from symfric.emitter.c99 import DOUBLE, FLOAT, REALS
 from symfric.foundation.programs import Compiler, find_compiler
 from symfric.laws import GMS
+from symfric.model import Event
+from symfric.scenes import ALL_SCENES, Drive
 
 LUGRE = law_block(LuGre())
 
@@ -165,3 +181,90 @@ def test_states_are_read_before_any_is_written_and_texts_cannot_end_their_commen
     for real in REALS.values():
         lines = source(CBlock(law_block(law_from_text("lugre+dahl")), real)).splitlines()
         assert max(map(len, lines)) <= 100
+
+
+TABLE = table(__file__, "refusals")
+x, z, u, h = (Variable(n, unit) for n, unit in (("x", "m"), ("z", "1"), ("u", "m/s"), ("h", "s")))
+
+
+def lag(**changes) -> Block:
+    parts = {"name": "lag", "states": (x,), "inputs": (u,), "parameters": (h,),
+             "next": x.symbol + h.symbol * u.symbol,
+             "outputs": {"y": Output(2 * x.symbol, "m")}}  # fmt: skip
+    return Block(**parts | changes)
+
+
+t = ca.SX.sym("t")
+NAMES = {
+    "ca": ca, "u": u, "h": h, "lag": lag, "plant": drive(LuGre()),
+    "wave": sine(0.01, 1.0, 1.0),
+    "ball": Model("ball", x=(x,), ode=-x.symbol, events=(Event("hit", x.symbol - 0.5),)),
+    "clock": Model("clock", x=(x,), ode=-x.symbol, outputs={"now": Output(t, "s")}, t=t),
+    "leak": Model("leak", x=(x,), z=(z,), ode=-z.symbol, alg=z.symbol + z.symbol**3 - x.symbol),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("group", TABLE)
+def test_bad_arguments_are_refused_in_a_sentence_and_write_nothing(group, tmp_path):
+    names = Names(NAMES, OUT=tmp_path / "c", FILE=tmp_path / "file")
+    names["FILE"].write_text("")
+    for call, words in TABLE[group].items():
+        with pytest.raises(ValueError) as caught:
+            eval(call, {}, names)
+        assert words in str(caught.value), call
+        assert not names["OUT"].exists()
+
+
+LAWS = [name for name in CASES if name not in NO_STEP]
+STEEP = "lagged(stribeck)"
+"""A filtered velocity of 2 m/s in float is known to 1e-7 m/s, 1/1000 of the width of the law."""
+FEW = (
+    *("stribeck", "brown_mcphee", "self_tuning", "lugre", "dahl, n 0.5", "maxwell_slip"),
+    *("bouc_wen", "lagged(stribeck)", "asymmetric(lugre)", "haessig_friedland, event"),
+)
+
+
+@pytest.fixture(scope="module")
+def laws(compiler: Compiler, tmp_path_factory) -> OneProgram:
+    blocks = [block_of(CASES[name]) for name in LAWS]
+    return OneProgram(blocks, tmp_path_factory.mktemp("laws"), compiler, flags=("-O0",))
+
+
+def test_double_has_the_bits_of_casadi_and_guards_report_every_repair(laws: OneProgram) -> None:
+    has_bits(laws, frozenset(map(LAWS.index, LIMITED)))
+
+
+def test_headers_and_sources_are_valid_cpp(laws: OneProgram) -> None:
+    if shutil.which("g++") is None:
+        pytest.skip("no g++ on this machine")
+    folder = laws.executable.parent
+    (folder / "all.cpp").write_text("".join(f'#include "{c.name}.c"\n' for c in laws.several))
+    strict = [flag for flag in STRICT if flag not in ("-std=c99", "-Wmissing-prototypes")]
+    command = ["g++", "-std=c++11", *strict, "-fsyntax-only", "all.cpp"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("names", [FEW, pytest.param(LAWS, marks=pytest.mark.slow)], ids=len)
+def test_float_is_near_from_the_same_states(names, compiler: Compiler, tmp_path: Path) -> None:
+    program = OneProgram([block_of(CASES[n]) for n in names], tmp_path, compiler, real="float")
+    is_near(program, 4e-6, [k for k, name in enumerate(names) if name == STEEP])
+
+
+@pytest.mark.slow
+def test_every_scene_with_two_laws_has_the_bits_of_casadi(compiler: Compiler, tmp_path) -> None:
+    scenes = [scene for name, scene in ALL_SCENES.items() if name != "arm"]
+    blocks = [plant_block(scene(law)) for scene in scenes for law in (BrownMcPhee(), LuGre())]
+    program = OneProgram(blocks, tmp_path, compiler, flags=("-O0",))
+    for k, c in enumerate(program.several):
+        u = excitation(c.block, 60)
+        (rows,) = program.run([(k, u)])
+        assert np.array_equal(rows, run_vm(c, u), equal_nan=True)
+
+
+@pytest.mark.slow
+def test_clang_agrees(tmp_path: Path) -> None:
+    if shutil.which("clang") is None:
+        pytest.skip("no clang on this machine")
+    blocks = [*(block_of(CASES[name]) for name in FEW), plant_block(Drive(LuGre()))]
+    has_bits(OneProgram(blocks, tmp_path, Compiler(("clang",)), flags=("-O2",)))

@@ -8,19 +8,7 @@ import pytest
 from law_cases import CASES
 from one_program import Stepper, block_of
 
-from symfric import (
-    GMS,
-    Asymmetric,
-    BrownMcPhee,
-    Coulomb,
-    Dahl,
-    Law,
-    LuGre,
-    SelfTuning,
-    Stribeck,
-    Table,
-    Viscous,
-)
+import symfric as sf
 from symfric.codegen import law_block
 from symfric.compensation import compensator, settings_from_text
 from symfric.foundation.graph import graph
@@ -29,7 +17,7 @@ from symfric.scenes import Drive
 H = 1e-3
 BARE = {"velocity": "reference", "scales": (), "ramp": None}
 CURVE = {"mu_s": 6.0, "mu_d": 4.0, "v_s": 5e-3, "sigma_2": 20.0}
-STEP = Stribeck(v_eps=1e-9, **CURVE)
+STEP = sf.Stribeck(v_eps=1e-9, **CURVE)
 """With N = 1 N the coefficients are newtons, and sign(v) is one at any speed."""
 
 
@@ -41,22 +29,24 @@ class Machine(Stepper):
         return self.found["F"]
 
 
-def machine(law: Law | Drive, **settings: object) -> Machine:
+def machine(law: sf.Law | Drive, **settings: object) -> Machine:
     return Machine(compensator(law, **(BARE | settings)))
 
 
-def force(law: Law, inputs: dict[str, float], steps: int = 1, **settings: object) -> float:
+def force(law: sf.Law, inputs: dict[str, float], steps: int = 1, **settings: object) -> float:
     """Force after some steps with held inputs."""
     go = machine(law, **settings)
     return [go(**inputs) for _ in range(steps)][-1]
 
 
-VISCOUS = Stribeck(mu_s=0.0, mu_d=0.0, sigma_2=1.0, v_eps=1e-3)
+VISCOUS = sf.Stribeck(mu_s=0.0, mu_d=0.0, sigma_2=1.0, v_eps=1e-3)
 """Law whose force equals its velocity."""
 
 
-@pytest.mark.parametrize("law", [STEP, LuGre(), GMS(form="event"), Dahl(), BrownMcPhee()])
-def test_without_features_a_compensator_is_the_block_of_its_law(law: Law) -> None:
+@pytest.mark.parametrize(
+    "law", [STEP, sf.LuGre(), sf.GMS(form="event"), sf.Dahl(), sf.BrownMcPhee()]
+)
+def test_without_features_a_compensator_is_the_block_of_its_law(law: sf.Law) -> None:
     """It has the same bits, and no further operation except the limit of its states."""
     alone, bare = law_block(law), compensator(law, **BARE)
     wanted = ca.vertcat(ca.SX(0, 1), alone.next, alone.outputs["F"].expression)
@@ -70,18 +60,19 @@ def test_without_features_a_compensator_is_the_block_of_its_law(law: Law) -> Non
 
 def test_the_scales_are_those_of_the_terms_of_the_law() -> None:
     for law, names in (
-        (STEP, {"coulomb", "stribeck", "viscous"}), (Coulomb(), {"coulomb"}),
-        (Viscous(2.0), {"viscous"}), (SelfTuning(), {"force"}),
-        (Table((0.0, 1.0), (0.1, 0.2)), {"force"}),
+        (STEP, {"coulomb", "stribeck", "viscous"}), (sf.Coulomb(), {"coulomb"}),
+        (sf.Viscous(2.0), {"viscous"}), (sf.SelfTuning(), {"force"}),
+        (sf.Table((0.0, 1.0), (0.1, 0.2)), {"force"}),
     ):  # fmt: skip
         found = {p.name for p in compensator(law).parameters if p.name.startswith("scale")}
         assert found == {f"scale_{name}" for name in names}
 
 
 @pytest.mark.parametrize(
-    "law", [STEP, LuGre(**CURVE), Asymmetric(STEP, STEP), GMS(C=400.0, **CURVE, form="event")]
+    "law",
+    [STEP, sf.LuGre(**CURVE), sf.Asymmetric(STEP, STEP), sf.GMS(C=400.0, **CURVE, form="event")],
 )
-def test_scaled_terms_add_up_to_the_closed_form(law: Law) -> None:
+def test_scaled_terms_add_up_to_the_closed_form(law: sf.Law) -> None:
     """Long sliding at 3 mm/s: s_c 4 + s_s 2 exp(-0.36) + s_v 20 v."""
     v, block = 3e-3, compensator(law, **(BARE | {"scales": ("coulomb", "stribeck", "viscous")}))
     parts = {"coulomb": 4.0, "stribeck": 2.0 * exp(-((v / 5e-3) ** 2)), "viscous": 20.0 * v}
@@ -99,9 +90,9 @@ def test_scaled_terms_add_up_to_the_closed_form(law: Law) -> None:
     assert force(law, {"v_ref": v}, 400, without=["viscous"]) == pytest.approx(wanted, rel=1e-6)
 
 
-@pytest.mark.parametrize("law", [LuGre(**CURVE), GMS(**CURVE, form="event")])
+@pytest.mark.parametrize("law", [sf.LuGre(**CURVE), sf.GMS(**CURVE, form="event")])
 @pytest.mark.parametrize("terms", [None, ["bristle"]])
-def test_without_a_load_there_is_no_force_until_it_returns(law: Law, terms) -> None:
+def test_without_a_load_there_is_no_force_until_it_returns(law: sf.Law, terms) -> None:
     go = Machine(compensator(law, ramp=None, N="input", without=["viscous"], scales=terms))
     for load, steps, low, high in (
         (1.0, 900, 3.0, inf),
@@ -136,7 +127,7 @@ def test_the_terms_of_every_law_add_up_to_its_force(name: str) -> None:
 
 
 def test_scales_act_at_once_and_do_not_change_the_states() -> None:
-    block = compensator(LuGre(**CURVE), **(BARE | {"scales": {"coulomb": 1.0, "stribeck": 1.0}}))
+    block = compensator(sf.LuGre(**CURVE), **(BARE | {"scales": {"coulomb": 1.0, "stribeck": 1.0}}))
     whole, half = Machine(block), Machine(block, scale_coulomb=0.5, scale_stribeck=0.5)
     for _ in range(5):
         whole(v_ref=2e-3)
@@ -147,7 +138,7 @@ def test_scales_act_at_once_and_do_not_change_the_states() -> None:
 
 
 def test_without_bristles_the_force_is_the_steady_curve() -> None:
-    law, v = LuGre(**CURVE), 3e-3
+    law, v = sf.LuGre(**CURVE), 3e-3
     steady = 4.0 + 2.0 * exp(-((v / 5e-3) ** 2)) + 20.0 * v
     none, all_of_them, plain = (
         force(law, {"v_ref": v}, **s)
@@ -173,7 +164,7 @@ def test_the_velocity_of_the_law_is_desired_near_rest_and_measured_beyond() -> N
 
 def test_friction_builds_up_over_a_travel_and_remembers_short_reversals() -> None:
     """From -4 N to 4 N over 0.1 mm in steps of 1 um, as in a Maxwell element."""
-    go = machine(Coulomb(mu_d=4.0), build_up=1e-4)
+    go = machine(sf.Coulomb(mu_d=4.0), build_up=1e-4)
     forth = [go(v_ref=1e-3) for _ in range(200)]
     assert forth[0] == pytest.approx(0.5 * 8.0 / 100)  # the mean of the first step
     assert np.allclose(np.diff(forth[:49]), 8.0 / 100)
@@ -181,16 +172,16 @@ def test_friction_builds_up_over_a_travel_and_remembers_short_reversals() -> Non
     assert [go(v_ref=-1e-3) for _ in range(20)][-1] == pytest.approx(4.0 - 19.5 * 8.0 / 100)
     assert [go(v_ref=1e-3) for _ in range(20)][-1] == pytest.approx(4.0 - 0.5 * 8.0 / 100)
     assert go() == pytest.approx(4.0)  # held at rest
-    viscous = Stribeck(mu_s=4.0, mu_d=4.0, sigma_2=20.0, v_eps=1e-9)
+    viscous = sf.Stribeck(mu_s=4.0, mu_d=4.0, sigma_2=20.0, v_eps=1e-9)
     assert force(viscous, {"v_ref": 0.01}, 200, build_up=1e-4) == pytest.approx(4.2)
     table = ((0.0, 0.0), (0.25, 0.75), (1.0, 1.0))
-    go = machine(Coulomb(mu_d=4.0), build_up=1e-4, build_up_table=table)
+    go = machine(sf.Coulomb(mu_d=4.0), build_up=1e-4, build_up_table=table)
     for _ in range(200):
         go(v_ref=-1e-3)
     forth = np.array([go(v_ref=1e-3) for _ in range(100)])
     shares = np.interp((np.arange(100) + 0.5) / 100, *np.array(table).T)
     assert np.allclose(forth, 4.0 * (2 * shares - 1))
-    sides = Asymmetric(Coulomb(mu_d=4.0, v_eps=1e-9), Coulomb(mu_d=2.0, v_eps=1e-9))
+    sides = sf.Asymmetric(sf.Coulomb(mu_d=4.0, v_eps=1e-9), sf.Coulomb(mu_d=2.0, v_eps=1e-9))
     go = machine(sides, build_up=1e-4)
     for v, wanted in ((1e-3, 4.0), (-1e-3, -2.0)):
         assert [go(v_ref=v) for _ in range(300)][-1] == pytest.approx(wanted)
@@ -254,8 +245,10 @@ def test_the_limit_is_the_last_operation() -> None:
     assert go(v_ref=0.1) == 0.5
 
 
-@pytest.mark.parametrize("law", [LuGre(**CURVE), GMS(C=400.0, **CURVE, form="event"), Dahl()])
-def test_a_wrong_state_causes_no_force_above_stiction(law: Law) -> None:
+@pytest.mark.parametrize(
+    "law", [sf.LuGre(**CURVE), sf.GMS(C=400.0, **CURVE, form="event"), sf.Dahl()]
+)
+def test_a_wrong_state_causes_no_force_above_stiction(law: sf.Law) -> None:
     go = machine(law, N=2.0)
     go.x[:] = 1e3
     most = float(law.most_held(2.0)) * len(law.states)

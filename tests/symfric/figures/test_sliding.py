@@ -6,16 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from symfric import (
-    Dahl,
-    ExactCoulomb,
-    GenericAsperity,
-    LuGre,
-    RateAndState,
-    SelfTuning,
-    Viscous,
-    law_from_text,
-)
+import symfric as sf
 from symfric.figures import (
     Curve,
     FigureData,
@@ -39,17 +30,17 @@ from symfric.laws import GMS, ElastoPlastic, MaxwellSlip, SteadyStateLuGre
 
 
 def test_sweeps_change_stiffness_shape_and_curvature_alone() -> None:
-    slow, fast = sweep_b(SelfTuning(), values=(0.5, 1.0)).curves
+    slow, fast = sweep_b(sf.SelfTuning(), values=(0.5, 1.0)).curves
     assert slow["F"].max() == pytest.approx(fast["F"].max(), rel=1e-3)
     peaks = [curve["v"][curve["F"].argmax()] for curve in (slow, fast)]
     assert peaks[0] == pytest.approx(2 * peaks[1], rel=0.02)
-    data = sweep_c(SelfTuning())
+    data = sweep_c(sf.SelfTuning())
     assert data.title.startswith("profiles for values of the shape factor C")
     assert data.note.startswith("C up to 1 gives a plateau")
     assert not data["C = 0"]["F"].any()
     for c in ("0.5", "1", "1.2", "1.4", "1.6", "1.8", "2"):
         assert bool(np.diff(data[f"C = {c}"]["F"]).min() > 0) is (float(c) <= 1), c
-    middle = [curve["F"][599:602] for curve in sweep_e(SelfTuning()).curves]
+    middle = [curve["F"][599:602] for curve in sweep_e(sf.SelfTuning()).curves]
     slopes = [F[2] - F[0] for F in middle]
     assert slopes == pytest.approx(np.full(len(slopes), slopes[0]), rel=1e-3)
 
@@ -64,7 +55,7 @@ def test_steady_state_of_seed_4_has_the_minimum_of_the_table() -> None:
 
 
 def test_viscous_friction_adds_a_linear_tail_to_the_dry_curve() -> None:
-    data = steady_state(LuGre(), shares=(0.0, 1.0))
+    data = steady_state(sf.LuGre(), shares=(0.0, 1.0))
     _, dry, wet = data.curves
     assert wet["F"] - dry["F"] == pytest.approx(0.7848 * wet["v"] / 1e-2)
 
@@ -90,7 +81,7 @@ def test_non_local_memory_returns_to_the_force_of_each_turning_point() -> None:
 
 
 def test_lugre_has_no_such_memory() -> None:
-    F = hysteresis(LuGre(), speeds=(1.0,))["1x"]["F"][::200]
+    F = hysteresis(sf.LuGre(), speeds=(1.0,))["1x"]["F"][::200]
     assert abs(F[5] - F[3]) > 0.05
 
 
@@ -117,7 +108,7 @@ def test_a_route_is_gone_through() -> None:
 def test_force_lags_so_it_is_higher_while_the_velocity_rises() -> None:
     at = np.linspace(1e-3, 3e-3, 21)
     for name, case in product(("lugre", "leuven", "armstrong"), ("2 Hz", "10 Hz")):
-        curve = lag(law_from_text(name), frequencies=(float(case[:-3]),))[case]
+        curve = lag(sf.law_from_text(name), frequencies=(float(case[:-3]),))[case]
         v, F = curve["v"], curve["F"]
         up = np.diff(v, append=v[-1]) > 0
         rising, falling = (
@@ -128,7 +119,7 @@ def test_force_lags_so_it_is_higher_while_the_velocity_rises() -> None:
 
 
 def test_lag_of_lugre_lies_around_the_steady_curve_and_grows_with_the_frequency() -> None:
-    data = lag(LuGre())
+    data = lag(sf.LuGre())
     areas = [abs(np.trapezoid(data[f]["F"], data[f]["v"])) for f in ("2 Hz", "5 Hz", "10 Hz")]
     assert areas == sorted(areas)
     assert data["steady"]["F"][[0, -1]] == pytest.approx(
@@ -137,13 +128,13 @@ def test_lag_of_lugre_lies_around_the_steady_curve_and_grows_with_the_frequency(
 
 
 def test_transition_settles_on_the_dynamic_level_on_both_sides() -> None:
-    curve = transition(LuGre())["2 Hz"]
+    curve = transition(sf.LuGre())["2 Hz"]
     assert curve["F"][curve["v"].argmax()] == pytest.approx(0.7848, rel=1e-2)
     assert curve["F"][curve["v"].argmin()] == pytest.approx(-0.7848, rel=1e-2)
 
 
 def test_rate_and_state_jumps_by_a_and_falls_by_b() -> None:
-    law, N = RateAndState(), 2.0
+    law, N = sf.RateAndState(), 2.0
     curve = velocity_step(law, N, factor=10.0).curves[0]
     F, x, fast = curve["F"], curve["x"], curve["v"] > 2 * curve["v"][0]
     before, peak, settled = F[~fast][0], F[fast].max(), F[fast][-1]
@@ -157,7 +148,7 @@ def test_rate_and_state_jumps_by_a_and_falls_by_b() -> None:
 
 def test_friction_heals_with_the_logarithm_of_the_dwell_time() -> None:
     """At rest the age grows with time: the peak rises by b ln(10) N a decade."""
-    law = RateAndState()
+    law = sf.RateAndState()
     data = dwell(law, 2.0, holds=(1e3, 1e4, 1e5))
     rise = np.diff(data.curves[0]["F"])
     expected = 2.0 * float(law.b) * np.log(10.0)
@@ -165,13 +156,13 @@ def test_friction_heals_with_the_logarithm_of_the_dwell_time() -> None:
 
 
 def test_viscous_block_approaches_its_speed() -> None:
-    curve = push(Viscous(sigma_2=4.0), force=2.0, t_end=1.0, mass=0.5, samples=11).curves[0]
+    curve = push(sf.Viscous(sigma_2=4.0), force=2.0, t_end=1.0, mass=0.5, samples=11).curves[0]
     assert np.allclose(curve["v"], 0.5 * (1 - np.exp(-8 * curve["t"])), atol=2e-5)
     assert np.allclose(curve["F"], 4 * curve["v"], atol=1e-9)
 
 
 def test_random_contacts_take_the_momentum_that_is_missing() -> None:
-    law = GenericAsperity(k=1e5, count=50)
+    law = sf.GenericAsperity(k=1e5, count=50)
     curve = push(law, 1.0, force=0.5, t_end=0.1, mass=0.5, samples=4001).curves[0]
     left = np.trapezoid(curve["F_e"] - curve["F"], curve["t"])
     assert abs(0.5 * curve["v"][-1] / left - 1) < 1e-3
@@ -179,7 +170,7 @@ def test_random_contacts_take_the_momentum_that_is_missing() -> None:
 
 
 def test_at_rest_friction_is_the_force_that_pulls() -> None:
-    data = stiction(ExactCoulomb(), 10.0)
+    data = stiction(sf.ExactCoulomb(), 10.0)
     curve = data.curves[0]
     still = (np.abs(curve["v"]) < 1e-9) & (np.abs(curve["F_e"]) < 1.49)
     assert still.sum() > 50
@@ -190,7 +181,7 @@ def test_at_rest_friction_is_the_force_that_pulls() -> None:
 
 @cache
 def of_lugre() -> Curve:
-    return drift(LuGre())["lugre"]
+    return drift(sf.LuGre())["lugre"]
 
 
 def test_lugre_drifts_and_the_elasto_plastic_law_does_not() -> None:
@@ -213,7 +204,7 @@ SETTLING = ("maxwell_slip", *(pytest.param(n, marks=pytest.mark.slow) for n in (
 
 @pytest.mark.parametrize("name", SETTLING)
 def test_laws_with_hysteresis_settle_instead_of_drifting(name: str) -> None:
-    curve = drift(law_from_text(name))[name]
+    curve = drift(sf.law_from_text(name))[name]
     t, x = curve["t"], curve["x"]
     early, late = (np.mean(x[(t >= a) & (t < a + 1)]) for a in (3.0, 7.0))
     assert abs(late - early) < 2e-6  # LuGre: 1.6e-4
@@ -228,7 +219,7 @@ def test_a_mean_over_a_period_forgets_its_sine_and_keeps_a_line() -> None:
 
 
 def test_break_away_of_lugre_falls_with_the_rate_as_computed_independently() -> None:
-    curve = break_away(LuGre(), rates=(0.1, 1.0, 10.0))["lugre"]
+    curve = break_away(sf.LuGre(), rates=(0.1, 1.0, 10.0))["lugre"]
     # SciPy's Radau on plain Python, seed 2's parameters
     assert curve["F"] == pytest.approx([1.166, 1.125, 0.961], abs=5e-4)
 
@@ -236,20 +227,20 @@ def test_break_away_of_lugre_falls_with_the_rate_as_computed_independently() -> 
 def test_break_away_ends_at_the_kinetic_level_whatever_the_stiffness() -> None:
     """By LSODA on plain Python for sigma_0 = 1e4 and no damping: 0.9322, then F_C."""
     F_C = 0.1 * 7.848
-    soft = break_away(LuGre(sigma_0=1e4, sigma_1=0.0), rates=(1.0, 30.0))
+    soft = break_away(sf.LuGre(sigma_0=1e4, sigma_1=0.0), rates=(1.0, 30.0))
     assert soft.curves[0]["F"] == pytest.approx([0.9322, F_C], abs=5e-4)
     rates = (3.0, 100.0)
-    for law in (LuGre(sigma_0=1e3), LuGre(sigma_0=1e6, sigma_1=0.0), Dahl(sigma_0=1e3)):
+    for law in (sf.LuGre(sigma_0=1e3), sf.LuGre(sigma_0=1e6, sigma_1=0.0), sf.Dahl(sigma_0=1e3)):
         assert (break_away(law, rates=rates).curves[0]["F"] > 0.9999 * F_C).all()
 
 
 def test_scales_of_another_law_do_not_end_the_elastic_motion() -> None:
     """The scales of a contact ten times as stiff are given, as those of a whole comparison are."""
-    stiff = scales(LuGre(sigma_0=1e6))
-    given = break_away(LuGre(sigma_0=1e4, sigma_1=0.0), given=stiff, rates=(30.0,))
+    stiff = scales(sf.LuGre(sigma_0=1e6))
+    given = break_away(sf.LuGre(sigma_0=1e4, sigma_1=0.0), given=stiff, rates=(30.0,))
     assert given.curves[0]["F"][0] == pytest.approx(0.7848, abs=5e-4)
 
 
 def test_break_away_of_a_static_law_does_not_know_the_rate() -> None:
-    peak = break_away(law_from_text("brown_mcphee"), rates=(0.1, 10.0))["brown_mcphee"]["F"]
+    peak = break_away(sf.law_from_text("brown_mcphee"), rates=(0.1, 10.0))["brown_mcphee"]["F"]
     assert peak == pytest.approx(np.full(2, 0.9996 * 0.15 * 7.848), rel=1e-4)

@@ -7,7 +7,6 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from symfric.foundation import packed
 from symfric.foundation.parameters import Variable
@@ -18,8 +17,6 @@ from symfric.laws import BrownMcPhee, ExactCoulomb, LuGre
 from symfric.model import Event, Model, Output
 from symfric.results.trajectory import Trajectory
 from symfric.scenes import Pendulum, drive, rabinowicz
-
-Array = NDArray[np.float64]
 
 
 def through_file(run: Trajectory, folder: Path) -> Trajectory:

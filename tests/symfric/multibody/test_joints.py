@@ -24,6 +24,12 @@ from symfric.multibody.topology import absolute, spanning_tree
 from symfric.results.kinds import kinds
 
 MOVING = [kind for kind in mb.ALL_JOINTS if not kind.closes]
+IN_PLANE = {
+    mb.PlanarRevolute: rotation_z,
+    mb.PlanarPrismatic: rotation_y,
+    mb.PinInSlot: rotation_y,
+}
+"""Rotation in the plane of a joint that closes planar loops."""
 each_joint = pytest.mark.parametrize("kind", mb.ALL_JOINTS, ids=lambda kind: kind.__name__)
 each_moving = pytest.mark.parametrize("kind", MOVING, ids=lambda kind: kind.__name__)
 
@@ -80,8 +86,8 @@ def test_constraints_are_independent_and_hold_what_joints_transmit(kind: type[mb
     q = ca.SX.sym("q", len(kind.coordinates))
     if kind.closes:
         R, p = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0], np.ones(3)
-        if kind.plane is not None:
-            R = ca.DM({1: rotation_y, 2: rotation_z}[kind.plane](ca.SX(0.3))).full()
+        if turned := IN_PLANE.get(kind):
+            R = ca.DM(turned(ca.SX(0.3))).full()
     else:
         pose = ca.Function("pose", [q], [ca.densify(x) for x in joint(kind).pose(q)])
         R, p = (m.full() for m in pose.call([coordinates(kind)]))

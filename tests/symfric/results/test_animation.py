@@ -10,10 +10,10 @@ import pytest
 from chains import attach
 from matplotlib.animation import FFMpegWriter
 from matplotlib.colors import to_hex
-from numpy.typing import NDArray
 from PIL import Image
 
 from symfric import BrownMcPhee, ExactCoulomb, Model, Trajectory, Variable, rabinowicz, simulate
+from symfric.foundation.numeric import Array
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
 from symfric.multibody import Distance, Mechanism, PinInSlot, Prismatic, Revolute
 from symfric.multibody.results import SPRING
@@ -27,8 +27,6 @@ from symfric.scenes import (
     Prescribed,
     Rabinowicz,
 )
-
-Array = NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")

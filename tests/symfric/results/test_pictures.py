@@ -1,5 +1,9 @@
-"""Pictures of runs: what they show by default, with which names, units and line styles."""
+"""Pictures of runs: what they show by default, with which names, units and line styles.
 
+Runs as one page.
+"""
+
+import re
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -12,23 +16,28 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.image import imread
+from pages import Balanced
+from robots import SMALL
 
-from symfric import BrownMcPhee, LuGre, Model, Trajectory, Variable, rabinowicz, simulate
+import symfric as sf
+from symfric.cli import main
 from symfric.foundation.style import line
+from symfric.multibody.urdf import read_urdf
+from symfric.page.html import STYLE
 from symfric.results.kinds import friction_laws, is_mechanism, kinds, norms, shortened
 from symfric.results.pictures import level, plot_trajectories
-from symfric.scenes import CoupledBlocks, Drive, FourMass, Pendulum, QuarterCar
+from symfric.scenes import CoupledBlocks, Drive, FourMass, Pendulum, QuarterCar, Rabinowicz
 
 
 @pytest.fixture(scope="module")
-def runs() -> dict[str, Trajectory]:
-    laws = {"lugre": LuGre(), "brown_mcphee": BrownMcPhee()}
-    return {name: simulate(rabinowicz(law), 0.5, samples=51) for name, law in laws.items()}
+def runs() -> dict[str, sf.Trajectory]:
+    laws = {"lugre": sf.LuGre(), "brown_mcphee": sf.BrownMcPhee()}
+    return {name: sf.simulate(sf.rabinowicz(law), 0.5, samples=51) for name, law in laws.items()}
 
 
 @pytest.fixture(scope="module")
-def four_mass() -> Trajectory:
-    return simulate(FourMass(BrownMcPhee()).model(), 0.1, samples=11)
+def four_mass() -> sf.Trajectory:
+    return sf.simulate(FourMass(sf.BrownMcPhee()).model(), 0.1, samples=11)
 
 
 def labels(figure: Figure) -> list[str]:
@@ -40,7 +49,7 @@ def names(axis: Axes) -> list[str]:
 
 
 def test_a_run_shows_positions_friction_and_power_and_names_its_law(
-    runs: dict[str, Trajectory],
+    runs: dict[str, sf.Trajectory],
 ) -> None:
     figure = runs["lugre"].plot()
     assert labels(figure) == ["x [mm]", "friction [N]", "power [mW]"]
@@ -52,7 +61,7 @@ def test_a_run_shows_positions_friction_and_power_and_names_its_law(
 
 
 def test_chosen_signals_in_the_chosen_order_all_of_them_or_none(
-    runs: dict[str, Trajectory], tmp_path: Path
+    runs: dict[str, sf.Trajectory], tmp_path: Path
 ) -> None:
     run, path = runs["lugre"], tmp_path / "new" / "x.png"
     figure = run.plot("friction", "x", label="LuGre", path=path)
@@ -72,7 +81,7 @@ def test_chosen_signals_in_the_chosen_order_all_of_them_or_none(
 
 
 def test_runs_differ_by_colour_and_line_style_and_stand_in_a_legend_below(
-    runs: dict[str, Trajectory],
+    runs: dict[str, sf.Trajectory],
 ) -> None:
     figure = plot_trajectories(runs)
     assert [len(axis.lines) for axis in figure.axes] == [2, 2, 2]
@@ -87,7 +96,7 @@ def test_runs_differ_by_colour_and_line_style_and_stand_in_a_legend_below(
 
 
 def test_mechanisms_share_panels_by_kind_and_constraints_are_left_to_all(
-    four_mass: Trajectory,
+    four_mass: sf.Trajectory,
 ) -> None:
     figure = four_mass.plot()
     assert labels(figure) == ["position [m]", "friction [N]", "energy [J]"]
@@ -103,8 +112,8 @@ def test_mechanisms_share_panels_by_kind_and_constraints_are_left_to_all(
     assert [axis.get_yscale() for axis in everything.axes] == 6 * ["linear"] + ["log"]
 
 
-def test_of_compared_mechanisms_energy_is_the_sum(four_mass: Trajectory) -> None:
-    run = simulate(QuarterCar(LuGre()).model(), 0.1, samples=5)
+def test_of_compared_mechanisms_energy_is_the_sum(four_mass: sf.Trajectory) -> None:
+    run = sf.simulate(QuarterCar(sf.LuGre()).model(), 0.1, samples=5)
     assert labels(plot_trajectories({"a": run, "b": run})) == [
         "X_b [m]", "X_w [m]", "friction [N]", "power [W]",
     ]  # fmt: skip
@@ -116,9 +125,9 @@ def test_of_compared_mechanisms_energy_is_the_sum(four_mass: Trajectory) -> None
 
 
 def test_a_constant_is_a_level_line_and_no_offset_is_written() -> None:
-    x, c = Variable("x", "m", start=1.0), Variable("c", "m", start=7.8e-6)
-    still = Model("still", x=(x, c), ode=ca.SX([1.0, 0.0]))
-    axis = simulate(still, 1.0, samples=5).plot("c").axes[0]
+    x, c = sf.Variable("x", "m", start=1.0), sf.Variable("c", "m", start=7.8e-6)
+    still = sf.Model("still", x=(x, c), ode=ca.SX([1.0, 0.0]))
+    axis = sf.simulate(still, 1.0, samples=5).plot("c").axes[0]
     assert axis.get_ylabel() == "c [µm]"
     assert axis.get_ylim() == pytest.approx((0.8 * 7.8, 1.2 * 7.8))
     axis.figure.draw_without_rendering()
@@ -142,24 +151,24 @@ def test_names_lose_the_ending_that_all_share_and_stay_short() -> None:
 
 
 def test_scenes_without_joints_show_the_same_kinds_and_others_all_they_have() -> None:
-    a = Variable("concentration", "mol/m^3", start=1.0)
-    decay = Model("decay", x=(a,), ode=-a.symbol)
-    blocks, drive = (scene(BrownMcPhee()) for scene in (CoupledBlocks, Drive))
+    a = sf.Variable("concentration", "mol/m^3", start=1.0)
+    decay = sf.Model("decay", x=(a,), ode=-a.symbol)
+    blocks, drive = (scene(sf.BrownMcPhee()) for scene in (CoupledBlocks, Drive))
     for model, scene, expected in (
         (blocks.model(), blocks, ["position [m]", "friction [N]", "power of friction [W]"]),
         (drive.model(), drive, ["x [m]", "friction [N]", "power [W]"]),
         (decay, None, ["concentration [mol/m^3]"]),
     ):
         inputs = {name: given.function for name, given in scene.inputs.items()} if scene else {}
-        run = simulate(model, 1.0, u=inputs, samples=11)
+        run = sf.simulate(model, 1.0, u=inputs, samples=11)
         assert labels(run.plot()) == expected
 
 
 def test_a_signal_over_decades_has_a_logarithmic_axis_and_years_below_it() -> None:
-    x = Variable("x", "m", start=1e-9, nominal=1e-9)
+    x = sf.Variable("x", "m", start=1e-9, nominal=1e-9)
     year = 365.25 * 86400.0
-    growing = Model("growing", x=(x,), ode=x.symbol / year)
-    run = simulate(growing, 20 * year)
+    growing = sf.Model("growing", x=(x,), ode=x.symbol / year)
+    run = sf.simulate(growing, 20 * year)
     figure = run.plot("x", log=["x"])
     (axis,) = figure.axes
     drawn = axis.get_yscale(), axis.get_ylabel(), axis.get_xlabel()
@@ -170,13 +179,13 @@ def test_a_signal_over_decades_has_a_logarithmic_axis_and_years_below_it() -> No
     assert run.plot("x").axes[0].get_yscale() == "linear"
     with pytest.raises(ValueError, match="expected one of x, got y"):
         run.plot("x", log=["y"])
-    sunk = simulate(growing, 3.0, x0={"x": -1.0})
+    sunk = sf.simulate(growing, 3.0, x0={"x": -1.0})
     with pytest.raises(ValueError, match="log: expected signals above zero somewhere, got x"):
         sunk.plot("x", log="x")
 
 
 def test_every_kind_of_a_mechanism_with_loops_and_bristles() -> None:
-    model = FourMass(LuGre()).model()
+    model = FourMass(sf.LuGre()).model()
     found = kinds(model)
     assert Counter(found.values()) == {
         "position": 4, "rate": 4, "state of friction": 4, "normal force": 4, "friction": 8,
@@ -187,8 +196,80 @@ def test_every_kind_of_a_mechanism_with_loops_and_bristles() -> None:
 
 
 def test_mechanisms_without_loops_have_no_norms_of_constraints() -> None:
-    model = Pendulum(BrownMcPhee()).model()
+    model = Pendulum(sf.BrownMcPhee()).model()
     assert norms(model) == ()
     assert friction_laws(model) == "BrownMcPhee"
     assert is_mechanism(model)
-    assert not is_mechanism(rabinowicz(BrownMcPhee()))
+    assert not is_mechanism(sf.rabinowicz(sf.BrownMcPhee()))
+
+
+def _places(cells: list[str], name: str) -> list[int]:
+    found = [k for k, cell in enumerate(cells) if cell == name]
+    assert len(found) >= 2
+    return found
+
+
+def test_a_page_holds_the_numbers_of_the_runs_and_needs_nothing(tmp_path: Path) -> None:
+    scenes = {"LuGre": Rabinowicz(sf.LuGre()), "<b>": Rabinowicz(sf.BrownMcPhee(mu_s=0.17))}
+    runs = {n: sf.simulate(s.model(), 2.0, measure_error=True) for n, s in scenes.items()}
+    text = sf.report(
+        runs, tmp_path / "p.html", settings={n: sf.parameters(s) for n, s in scenes.items()}
+    )
+    assert (tmp_path / "p.html").read_text("utf-8") == text
+    page = Balanced(text)
+    assert all(s.startswith(("#", "data:")) for s in page.sources)
+    assert "<b>" not in text.replace("&lt;b&gt;", "")
+    for run in runs.values():
+        assert f"{run.extremes['x'][1]:.6g}" in page.cells
+        assert f"{run.final['friction']:.6g}" in page.cells
+        assert f"{run.statistics.error:.1e}" in page.cells
+    for run, at in zip(runs.values(), _places(page.cells, "x"), strict=False):
+        ends = (run.final["x"], *run.extremes["x"])
+        assert page.cells[at + 1 : at + 5] == [*(f"{value:.6g}" for value in ends), "m"]
+    assert "0.17" in page.cells
+    assert text.count("Source:") == len(runs)
+
+
+def test_a_law_has_one_colour_on_its_page() -> None:
+    """That of the picture of the motion, also in the second chart of friction."""
+    run = sf.simulate(Rabinowicz(sf.BrownMcPhee()).model(), 0.1)
+    runs = {f"law {k}": run for k in range(5)}
+    page = sf.report(runs)
+    drawn = re.findall(r'<polyline class="(run\d)"', page)
+    assert drawn == [f"run{k}" for k in range(5)]
+    positions = plot_trajectories(runs, ["x"]).axes[0].lines
+    for kind, curve in zip(drawn, positions, strict=True):
+        assert f"svg .{kind} {{ stroke: {curve.get_color()};" in STYLE
+    robot = sf.simulate(read_urdf(SMALL).build(), 0.1, x0={"hinge": 1.0})
+    for text, unit in ((page, "m/s"), (sf.report(robot), "rad/s")):
+        assert f"sliding velocity [{unit}]" in text
+
+
+def test_what_is_no_run_is_refused() -> None:
+    for bad in ({}, {"x": 1.0}, 3):
+        with pytest.raises(ValueError, match="report"):
+            sf.report(bad)  # pyright: ignore[reportArgumentType]
+
+
+def test_the_command_writes_one_page_of_several_laws(tmp_path: Path) -> None:
+    out = tmp_path / "r.html"
+    words = "report rabinowicz --law dahl --law coulomb --t-end 2 --set m=0.5 --html"
+    assert main([*words.split(), str(out)]) == 0
+    cells = Balanced(out.read_text("utf-8")).cells
+    assert {"dahl", "coulomb", "0.5", "sigma_0"} <= set(cells)
+    assert main([*words.split()[:-3], "--set", "mm=1", "--out", str(tmp_path / "n.html")]) == 2
+    assert not (tmp_path / "n.html").exists()
+
+
+def test_the_page_of_a_run_that_jams_is_written_and_is_no_success(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "jams.html"
+    line = "report four_bar --law lugre --law-of pin=brown_mcphee --t-end 0.3 --out"
+    words = [*line.split(), str(out)]
+    monkeypatch.setattr("sys.argv", ["symfric", *words])
+    assert main(words) == 1
+    text = out.read_text("utf-8")
+    assert "Not finished" in text
+    assert f"symfric {line} {out}" in text
+    assert f"wrote {out}" in capsys.readouterr().err

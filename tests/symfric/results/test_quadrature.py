@@ -11,19 +11,7 @@ from chains import X, attach, in_joint_coordinates_first
 from hybrid import ball
 from matplotlib.lines import Line2D
 
-from symfric import (
-    BrownMcPhee,
-    Coulomb,
-    Hold,
-    Model,
-    SolveError,
-    Trajectory,
-    Variable,
-    Viscous,
-    drive,
-    rabinowicz,
-    simulate,
-)
+import symfric as sf
 from symfric.model import Event, Output
 from symfric.multibody import JointSpringDamper, Mechanism, PrescribedMotion, Prismatic, Revolute
 from symfric.results.pictures import plot_trajectories
@@ -32,13 +20,13 @@ from symfric.results.trajectory import EnergyBalance
 from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, Prescribed, SliderCrank
 
 
-def circle() -> Trajectory:
+def circle() -> sf.Trajectory:
     """x = cos t, v = -sin t over two turns, with signals of them and of time."""
-    x, v, t = Variable("x", "m", start=1.0), Variable("v", "m/s"), ca.SX.sym("t")
+    x, v, t = sf.Variable("x", "m", start=1.0), sf.Variable("v", "m/s"), ca.SX.sym("t")
     outputs = {"size": Output(ca.fabs(v.symbol), "m/s"), "late": Output(t * x.symbol, "m s")}
     ode = ca.vertcat(v.symbol, -x.symbol)
-    model = Model("circle", x=(x, v), t=t, ode=ode, outputs=outputs)
-    return simulate(model, 4 * np.pi, rtol=1e-10, t_eval=[0.0, 4 * np.pi])
+    model = sf.Model("circle", x=(x, v), t=t, ode=ode, outputs=outputs)
+    return sf.simulate(model, 4 * np.pi, rtol=1e-10, t_eval=[0.0, 4 * np.pi])
 
 
 def test_the_area_of_a_loop_is_that_of_the_circle() -> None:
@@ -67,7 +55,7 @@ def test_kinks_inside_a_step_are_found() -> None:
 
 
 def test_the_work_of_friction_is_its_power_integrated() -> None:
-    run = simulate(rabinowicz(Coulomb()), 5.0, rtol=1e-8, t_eval=[0.0, 5.0])
+    run = sf.simulate(sf.rabinowicz(sf.Coulomb()), 5.0, rtol=1e-8, t_eval=[0.0, 5.0])
     assert run.work("friction", "v_rel") == pytest.approx(run.integral("power")[-1], rel=1e-7)
     halves = run.work("friction", "v_rel", (0.0, 2.0)) + run.work("friction", "v_rel", (2.0, 5.0))
     assert halves == pytest.approx(run.work("friction", "v_rel"), rel=1e-10)
@@ -75,7 +63,9 @@ def test_the_work_of_friction_is_its_power_integrated() -> None:
 
 
 def test_what_has_no_area_and_times_that_are_none_are_refused() -> None:
-    run = simulate(Prescribed(Viscous()).model(), 1.0, u={"v": Hold([0.0], [0.5])}, t_eval=[1.0])
+    run = sf.simulate(
+        Prescribed(sf.Viscous()).model(), 1.0, u={"v": sf.Hold([0.0], [0.5])}, t_eval=[1.0]
+    )
     for call, message in (
         (lambda: run.area("friction", "v"), "area: expected an x of the states and time"),
         (lambda: run.work("friction", "v", (1.0, 0.5)), "between: expected a first and a later"),
@@ -89,10 +79,10 @@ def test_what_has_no_area_and_times_that_are_none_are_refused() -> None:
 AT, WIDTH = 5.1234, 1e-3
 
 
-def hit() -> Trajectory:
+def hit() -> sf.Trajectory:
     """A pulse of 564 N for a thousandth of a second, looked at in tenths of a second."""
     force = {"force": lambda t: ca.exp(-(((t - AT) / WIDTH) ** 2)) / (WIDTH * sqrt(pi))}
-    return simulate(drive(BrownMcPhee()), 10.0, u=force, samples=101, backend="vm")
+    return sf.simulate(sf.drive(sf.BrownMcPhee()), 10.0, u=force, samples=101, backend="vm")
 
 
 def test_a_pulse_between_the_samples_is_the_greatest_value_and_in_the_picture() -> None:
@@ -105,9 +95,9 @@ def test_a_pulse_between_the_samples_is_the_greatest_value_and_in_the_picture() 
 
 
 def test_extremes_between_steps_are_refined() -> None:
-    x, v = Variable("x", "m", start=1.0), Variable("v", "m/s")
-    swing = Model("swing", x=(x, v), ode=ca.vertcat(v.symbol, -x.symbol))
-    run = simulate(swing, 10.0, samples=2, rtol=1e-9, backend="vm")
+    x, v = sf.Variable("x", "m", start=1.0), sf.Variable("v", "m/s")
+    swing = sf.Model("swing", x=(x, v), ode=ca.vertcat(v.symbol, -x.symbol))
+    run = sf.simulate(swing, 10.0, samples=2, rtol=1e-9, backend="vm")
     for name in ("x", "v"):
         assert run.extremes[name] == pytest.approx((-1.0, 1.0), abs=1e-6)
     times = np.linspace(0.0, 10.0, 30)
@@ -117,7 +107,7 @@ def test_extremes_between_steps_are_refined() -> None:
 
 def test_the_value_just_before_a_jump_counts() -> None:
     """A ball is fastest when it hits the ground, where its velocity turns over."""
-    run = simulate(ball(0.8), 0.6, samples=2, backend="vm")
+    run = sf.simulate(ball(0.8), 0.6, samples=2, backend="vm")
     (hit, _), *_ = run.happened
     least = run.extremes["v"][0]
     assert least == pytest.approx(-9.81 * hit, rel=1e-9)
@@ -130,9 +120,9 @@ def test_looks_show_samples_steps_their_middles_and_both_sides_of_jumps() -> Non
 
 
 def test_what_was_reached_has_extremes_too() -> None:
-    x = Variable("x", "m", start=1.0)
-    with pytest.raises(SolveError) as failed:
-        simulate(Model("blow up", x=(x,), ode=x.symbol**2), 2.0)
+    x = sf.Variable("x", "m", start=1.0)
+    with pytest.raises(sf.SolveError) as failed:
+        sf.simulate(sf.Model("blow up", x=(x,), ode=x.symbol**2), 2.0)
     least, greatest = failed.value.partial.extremes["x"]
     assert least == 1.0
     assert greatest > 1e3
@@ -140,7 +130,7 @@ def test_what_was_reached_has_extremes_too() -> None:
 
 pytestmark = pytest.mark.heavy
 
-LAW = BrownMcPhee(v_t=0.05)
+LAW = sf.BrownMcPhee(v_t=0.05)
 
 
 def slider(*forces: JointSpringDamper) -> Mechanism:
@@ -155,15 +145,15 @@ def slider(*forces: JointSpringDamper) -> Mechanism:
 def test_integral_sees_the_jumps_of_an_input() -> None:
     block = slider(JointSpringDamper("motor", "x", "slide"))
     block.forces[0] = replace(block.forces[0], actuator=block.input("F", "N"))
-    u = {"F": Hold([0.0, 0.7, 1.1], [5.0, -2.0, 1.0])}
-    run = simulate(block.build(), 2.0, u=u, rtol=1e-9, t_eval=[2.0])
+    u = {"F": sf.Hold([0.0, 0.7, 1.1], [5.0, -2.0, 1.0])}
+    run = sf.simulate(block.build(), 2.0, u=u, rtol=1e-9, t_eval=[2.0])
     assert run.integral("F") == pytest.approx([5 * 0.7 - 2 * 0.4 + 0.9])
     assert run.energy_balance().defect == pytest.approx([0.0], abs=1e-9)
 
 
 def test_damper_dissipates_the_energy_of_the_closed_form() -> None:
     """m v' = -d v: the energy falls with exp(-2 d t / m), all of it into the damper."""
-    run = simulate(slider(JointSpringDamper("oil", "x", "slide", damping=0.8)).build(), 3.0,
+    run = sf.simulate(slider(JointSpringDamper("oil", "x", "slide", damping=0.8)).build(), 3.0,
                    rtol=1e-9)  # fmt: skip
     balance = run.energy_balance()
     assert balance.work["oil"] == pytest.approx(9 * (np.exp(-0.8 * run.t) - 1), abs=1e-7)
@@ -180,7 +170,7 @@ def test_motor_that_moves_its_spring_counts_with_its_whole_power() -> None:
     m = slider()
     rest = m.input("rest", "m")
     m.force(JointSpringDamper("wound", "x", "slide", stiffness=50.0, rest=rest))
-    run = simulate(m.build(), 2.0, u={"rest": lambda t: 0.2 * ca.sin(3 * t)}, rtol=1e-10)
+    run = sf.simulate(m.build(), 2.0, u={"rest": lambda t: 0.2 * ca.sin(3 * t)}, rtol=1e-10)
     balance = run.energy_balance()
     assert balance.energy == pytest.approx(run["kinetic"])
     assert np.ptp(balance.work["wound"]) > 1.0
@@ -193,7 +183,7 @@ def test_drive_lifts_and_pays_for_friction(formulation: str) -> None:
     m = Pendulum(LAW).mechanism()
     m.joints[0] = replace(m.joints[0], start=0.0, rate=1.6)
     m.constraint(PrescribedMotion("motor", "phi", lambda t: 0.8 * ca.sin(2 * t)))
-    balance = simulate(m.build(formulation=formulation), 2.0, rtol=1e-9).energy_balance()
+    balance = sf.simulate(m.build(formulation=formulation), 2.0, rtol=1e-9).energy_balance()
     angle, rate = 0.8 * np.sin(2 * balance.t), 1.6 * np.cos(2 * balance.t)
     assert balance.energy == pytest.approx(rate**2 / 6 - 9.81 * 0.5 * np.cos(angle), abs=1e-8)
     assert balance.work["friction"][-1] < -0.05
@@ -207,7 +197,7 @@ SCENES = {"four_mass": (FourMass(LAW), 4.0), "slider_crank": (SliderCrank(LAW), 
 @pytest.mark.parametrize("name", SCENES)
 def test_friction_explains_the_loss_of_energy(name: str) -> None:
     scene, until = SCENES[name]
-    run = simulate(scene.model(), until, rtol=1e-8)
+    run = sf.simulate(scene.model(), until, rtol=1e-8)
     balance = run.energy_balance()
     lost = balance.energy[0] - balance.energy[-1]
     assert lost > 0.1 * balance.scale
@@ -223,7 +213,7 @@ def test_a_wrong_friction_power_shows() -> None:
     off = dict(model.further)
     off[name] = replace(off[name], expression=(1 + 1e-4) * off[name].expression)
     right, wrong = (
-        simulate(m, 1.5, rtol=1e-8).energy_balance()
+        sf.simulate(m, 1.5, rtol=1e-8).energy_balance()
         for m in (model, replace(model, details=lambda: off))
     )
     assert wrong.relative > 1e3 * right.relative
@@ -232,8 +222,8 @@ def test_a_wrong_friction_power_shows() -> None:
 
 @pytest.mark.parametrize(("method", "order"), [("rodas3", 3), ("rodas5p", 5)])
 def test_the_defect_has_the_order_of_the_method(method: str, order: int) -> None:
-    model = FourBar(BrownMcPhee(v_t=0.1)).model()
-    runs = [simulate(model, 0.25, rtol=rtol, method=method) for rtol in (1e-6, 1e-9)]
+    model = FourBar(sf.BrownMcPhee(v_t=0.1)).model()
+    runs = [sf.simulate(model, 0.25, rtol=rtol, method=method) for rtol in (1e-6, 1e-9)]
     steps = [run.statistics.steps for run in runs]
     defects = [abs(run.energy_balance().defect).max() for run in runs]
     found = np.log(defects[0] / defects[1]) / np.log(steps[1] / steps[0])
@@ -245,27 +235,27 @@ def test_energy_that_a_reset_takes_is_defect() -> None:
     model = slider().build()
     x, v = (model.x[i].symbol for i in range(2))
     bump = Event("bump", x - 1.0, 1, reset={"x_rate": v / 2})
-    run = simulate(replace(model, events=(bump,)), 1.0, rtol=1e-8)
+    run = sf.simulate(replace(model, events=(bump,)), 1.0, rtol=1e-8)
     assert run.energy_balance().defect[-1] == pytest.approx(-6.75)
 
 
 def test_nothing_moves_and_nothing_is_missing() -> None:
     m = Mechanism("rest", gravity=(0.0, 0.0, 0.0))
     attach(m, Revolute, "turn", "bob")
-    balance = simulate(m.build(), 1.0).energy_balance()
+    balance = sf.simulate(m.build(), 1.0).energy_balance()
     assert (balance.scale, balance.relative, balance.work) == (0.0, 0.0, {})
     zero = np.zeros(3)
     books = EnergyBalance(np.arange(3.0), zero - 4.9, {}, zero + 1e-48, 1e-48)
     assert books.relative == 0.0  # it rests but for rounding
     assert replace(books, defect=zero + 1e-9, scale=1e-3).relative == 1e-6
     with pytest.raises(ValueError, match="'rabinowicz': expected a mechanism, got a model w"):
-        simulate(rabinowicz(LAW), 0.1).energy_balance()
+        sf.simulate(sf.rabinowicz(LAW), 0.1).energy_balance()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_mass", "slider_crank", "double_pendulum", "pendulum_box"])
 def test_frictionless_drift_over_100_s(name: str) -> None:
     """Far below the requested 1e-6: 3e-9 at most."""
-    smooth = BrownMcPhee(mu_s=0.0, mu_d=0.0)
-    run = simulate(MECHANISMS[name](smooth).model(), 100.0, rtol=1e-10)
+    smooth = sf.BrownMcPhee(mu_s=0.0, mu_d=0.0)
+    run = sf.simulate(MECHANISMS[name](smooth).model(), 100.0, rtol=1e-10)
     assert run.energy_balance().relative < 1e-7

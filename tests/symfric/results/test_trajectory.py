@@ -8,19 +8,10 @@ import casadi as ca
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from pages import on_a_screen, shown
 
-from symfric import (
-    BrownMcPhee,
-    ExactCoulomb,
-    LuGre,
-    Model,
-    Trajectory,
-    rabinowicz,
-    simulate,
-    simulate_many,
-)
+import symfric as sf
+from symfric.foundation.numeric import Array
 from symfric.integrator import simulate_by_peer
 from symfric.model.kinds import MODE
 from symfric.multibody import Mechanism
@@ -29,11 +20,13 @@ from symfric.scenes import MECHANISMS, Arm, FourMass, Pendulum
 
 
 @pytest.fixture(scope="module")
-def run() -> Trajectory:
-    return simulate(Pendulum(BrownMcPhee()).model(["m"]), 1.0, samples=21, p={"m": 2.0}, rtol=1e-8)
+def run() -> sf.Trajectory:
+    return sf.simulate(
+        Pendulum(sf.BrownMcPhee()).model(["m"]), 1.0, samples=21, p={"m": 2.0}, rtol=1e-8
+    )
 
 
-def test_a_detail_is_a_signal_by_name(run: Trajectory) -> None:
+def test_a_detail_is_a_signal_by_name(run: sf.Trajectory) -> None:
     """Half a metre, and the mass that was given to the run."""
     assert "rod_x" not in run.units
     assert run.unit("rod_x") == "m"
@@ -47,7 +40,7 @@ def test_a_detail_is_a_signal_by_name(run: Trajectory) -> None:
     assert run["phi_Fx"] == pytest.approx(-2.0 * (9.81 * np.cos(angle) + 0.5 * rate**2))
 
 
-def test_any_expression_of_the_model_at_any_time(run: Trajectory) -> None:
+def test_any_expression_of_the_model_at_any_time(run: sf.Trajectory) -> None:
     model = run.model
     phi, w = (v.symbol for v in model.x)
     column = run.of(ca.vertcat(model.p[0].symbol * w, model.t), [0.25, 0.5])
@@ -57,7 +50,7 @@ def test_any_expression_of_the_model_at_any_time(run: Trajectory) -> None:
     assert run.of(ca.sin(phi)) == pytest.approx(np.sin(run["phi"]))
 
 
-def test_foreign_symbols_times_and_names_are_refused(run: Trajectory) -> None:
+def test_foreign_symbols_times_and_names_are_refused(run: sf.Trajectory) -> None:
     times, name = r"expected times in \[0, 1\] s", "got phi_Fq; did you mean phi_F"
     for call, message in (
         (lambda: run.of(ca.SX.sym("alien")), r"symbols of its model, got alien"),
@@ -71,7 +64,7 @@ def test_foreign_symbols_times_and_names_are_refused(run: Trajectory) -> None:
             call()
 
 
-def test_columns_of_choice_are_written(run: Trajectory, tmp_path: Path) -> None:
+def test_columns_of_choice_are_written(run: sf.Trajectory, tmp_path: Path) -> None:
     run.to_csv(tmp_path / "x.csv", "phi", "phi_Fx")
     with (tmp_path / "x.csv").open(newline="") as file:
         header, *rows = csv.reader(file)
@@ -80,7 +73,7 @@ def test_columns_of_choice_are_written(run: Trajectory, tmp_path: Path) -> None:
 
 
 def test_a_model_without_details_has_accelerations_alone() -> None:
-    run = simulate(rabinowicz(LuGre()), 0.1, samples=3)
+    run = sf.simulate(sf.rabinowicz(sf.LuGre()), 0.1, samples=3)
     assert run.details == {"x_acc": "m/s^2"}
     with pytest.raises(ValueError, match="got wok_rate"):
         run["wok_rate"]
@@ -88,7 +81,7 @@ def test_a_model_without_details_has_accelerations_alone() -> None:
 
 def test_details_of_a_peer_show_its_drift() -> None:
     """Nothing is refined behind CasADi's integrators, neither signals nor expressions."""
-    model = MECHANISMS["four_mass"](BrownMcPhee(v_t=0.1)).model()
+    model = MECHANISMS["four_mass"](sf.BrownMcPhee(v_t=0.1)).model()
     run = simulate_by_peer(model, 0.5, "rosenbrock", samples=5)
     assert run["constraint_position"].max() > 1e-10
     assert run.of(model.expression("constraint_position")) == pytest.approx(
@@ -96,7 +89,7 @@ def test_details_of_a_peer_show_its_drift() -> None:
     )
 
 
-def test_tables_of_pandas_and_xarray(run: Trajectory) -> None:
+def test_tables_of_pandas_and_xarray(run: sf.Trajectory) -> None:
     pytest.importorskip("pandas", reason="needs the package pandas")
     pytest.importorskip("xarray", reason="needs the package xarray")
     frame, data, some = run.to_dataframe(), run.to_xarray(), run.to_dataframe("phi", "phi_Fx")
@@ -112,7 +105,7 @@ def test_tables_of_pandas_and_xarray(run: Trajectory) -> None:
 
 
 def test_without_their_packages_there_is_a_sentence(
-    run: Trajectory, monkeypatch: pytest.MonkeyPatch
+    run: sf.Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def none(name: str) -> None:
         raise ImportError(name)
@@ -124,13 +117,13 @@ def test_without_their_packages_there_is_a_sentence(
             call()
 
 
-MODEL: dict[str, Model] = {
-    "exact": rabinowicz(ExactCoulomb()),
-    "loops": FourMass(ExactCoulomb()).model(),
+MODEL: dict[str, sf.Model] = {
+    "exact": sf.rabinowicz(sf.ExactCoulomb()),
+    "loops": FourMass(sf.ExactCoulomb()).model(),
 }
 
 
-def modes(model: Model) -> list[str]:
+def modes(model: sf.Model) -> list[str]:
     return [v.name for v in model.x if v.kind == MODE]
 
 
@@ -141,7 +134,7 @@ def whole(values: object) -> bool:
 @pytest.mark.parametrize("name", MODEL)
 def test_modes_of_a_run_are_whole_numbers_everywhere(name: str, tmp_path: Path) -> None:
     model = MODEL[name]
-    run = simulate(model, 3.0 if name == "loops" else 8.0, rtol=1e-6)
+    run = sf.simulate(model, 3.0 if name == "loops" else 8.0, rtol=1e-6)
     direction = name == "loops" and "x1_loop_direction" not in modes(model)
     assert modes(model) and not direction, "the law has modes"
     between = run.at(np.linspace(*run.span, 3001))
@@ -167,20 +160,17 @@ def test_modes_of_a_run_are_whole_numbers_everywhere(name: str, tmp_path: Path) 
 @pytest.mark.parametrize("times", [None, np.linspace(0.0, 8.0, 41)])
 def test_modes_of_an_ensemble_are_whole_numbers(times: np.ndarray | None) -> None:
     starts, how = {"x": np.linspace(0.0, 0.3, 3)}, {"method": "dopri5", "backend": "vm"}
-    study = simulate_many(MODEL["exact"], 8.0, t_eval=times, x0=starts, **how)
+    study = sf.simulate_many(MODEL["exact"], 8.0, t_eval=times, x0=starts, **how)
     assert whole(study.signals["mode"])
     assert whole(study.extremes["mode"])
 
 
-Array = NDArray[np.float64]
-
-
 @pytest.fixture(scope="module")
-def sticking() -> Trajectory:
-    return simulate(rabinowicz(ExactCoulomb()), 6.0, samples=301)
+def sticking() -> sf.Trajectory:
+    return sf.simulate(sf.rabinowicz(sf.ExactCoulomb()), 6.0, samples=301)
 
 
-def test_a_run_prints_how_it_ended_and_the_ranges_of_its_signals(sticking: Trajectory) -> None:
+def test_a_run_prints_how_it_ended_and_the_ranges_of_its_signals(sticking: sf.Trajectory) -> None:
     run, text = sticking, repr(sticking)
     assert on_a_screen(text)
     assert text.startswith(
@@ -194,7 +184,7 @@ def test_a_run_prints_how_it_ended_and_the_ranges_of_its_signals(sticking: Traje
     assert row == ["friction", "N", *(f"{x:.6g}" for x in numbers)]
 
 
-def test_a_run_as_html_has_a_picture_and_leaves_no_figure_open(sticking: Trajectory) -> None:
+def test_a_run_as_html_has_a_picture_and_leaves_no_figure_open(sticking: sf.Trajectory) -> None:
     before = plt.get_fignums()
     page = shown(sticking)
     assert len(page.pictures) == 1
@@ -204,7 +194,7 @@ def test_a_run_as_html_has_a_picture_and_leaves_no_figure_open(sticking: Traject
 
 def test_showing_a_long_run_looks_at_its_times_only() -> None:
     looked = list[int]()
-    short = simulate(rabinowicz(LuGre()), 1.0, samples=51)
+    short = sf.simulate(sf.rabinowicz(sf.LuGre()), 1.0, samples=51)
     counts = replace(short.statistics, steps=10**6)
 
     def evaluate(at: Array) -> dict[str, Array]:
@@ -219,32 +209,32 @@ def test_showing_a_long_run_looks_at_its_times_only() -> None:
 
 
 def test_an_ensemble_names_the_failed_members() -> None:
-    model = rabinowicz(BrownMcPhee(), free=["m"])
-    runs = simulate_many(model, 1.0, p={"m": [0.5, 1.0]}, t_eval=[0.5, 1.0], max_steps=5)
+    model = sf.rabinowicz(sf.BrownMcPhee(), free=["m"])
+    runs = sf.simulate_many(model, 1.0, p={"m": [0.5, 1.0]}, t_eval=[0.5, 1.0], max_steps=5)
     assert "ensemble of 'rabinowicz': 2 members at 2 times from 0.5 to 1 s" in repr(runs)
     assert "member 0 failed: " in repr(runs)
-    fine = simulate_many(model, 1.0, p={"m": [0.5, 1.0]}, t_eval=np.linspace(0.1, 1, 9))
+    fine = sf.simulate_many(model, 1.0, p={"m": [0.5, 1.0]}, t_eval=np.linspace(0.1, 1, 9))
     x = fine["x"][:, -1]
     row = next(line.split() for line in repr(fine).splitlines() if line.startswith("  x"))
     assert row == ["x", "m", f"{x.min():.6g}", f"{np.median(x):.6g}", f"{x.max():.6g}"]
     assert len(shown(fine).pictures) == 1
-    nowhere = simulate(model, 6.0, max_steps=3, throw=False)
+    nowhere = sf.simulate(model, 6.0, max_steps=3, throw=False)
     assert "MAX_STEPS" in repr(nowhere) and on_a_screen(repr(nowhere))
 
 
 def test_mechanisms_show_bodies_joints_and_what_rubs() -> None:
     for scene in MECHANISMS.values():
-        machine = scene(BrownMcPhee()).mechanism()
+        machine = scene(sf.BrownMcPhee()).mechanism()
         assert on_a_screen(repr(machine))
         assert "BrownMcPhee" in repr(machine)
-    arm = Arm(BrownMcPhee()).mechanism()
+    arm = Arm(sf.BrownMcPhee()).mechanism()
     assert "6 bodies, 6 joints, no closed loops" in repr(arm)
     assert len(shown(arm).pictures) == 1
     assert not shown(Mechanism("empty")).pictures
 
 
 def test_completion_offers_what_users_ask_for() -> None:
-    run = simulate(rabinowicz(BrownMcPhee()), 0.1, samples=11)
+    run = sf.simulate(sf.rabinowicz(sf.BrownMcPhee()), 0.1, samples=11)
     offered = {name for name in dir(run) if not name.startswith("_")}
     assert {"at", "plot", "save", "extremes", "t", "final", "sensitivities"} <= offered
     assert offered.isdisjoint({"evaluate", "express", "keep", "packed_as", "shown", "hidden"})

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from dry import blocks_on_belt
 from mechanics import brown_mcphee
-from numpy.typing import NDArray
 from oracles import StickSlip, rabinowicz_coulomb, rabinowicz_lugre
 from scipy.integrate import solve_ivp
 from stored import stored
 
 import symfric as sf
 from symfric import BrownMcPhee, Coulomb, ExactCoulomb, Linear, LuGre, Stribeck, Viscous, simulate
+from symfric.foundation.numeric import Array
 from symfric.integrator import Input
 from symfric.scenes import Clutch, CoupledBlocks, DrillString, Drive, Nip
 
@@ -270,7 +270,6 @@ def test_an_open_clutch_has_its_drag_alone_also_below_zero() -> None:
     assert simulate(Clutch(Viscous(), N_0=0.0).model(), 0.01).status.ok
 
 
-Array = NDArray[np.float64]
 J_BIT, J_STRING, STIFFNESS, C, C_B, R = 471.9698, 100.0, 861.5336, 172.3067, 50.0, 0.155575
 
 

@@ -8,16 +8,15 @@ import casadi as ca
 import numpy as np
 import pytest
 from mechanics import brown_mcphee
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from stored import stored
 
 import symfric as sf
+from symfric.foundation.numeric import Array
 from symfric.multibody import JointFriction, JointSpringDamper, Prismatic, UserForce
 from symfric.multibody.kinematics import Kinematics
 from symfric.scenes import QuarterCar
 
-Array = NDArray[np.float64]
 M_B, M_W, K_S, B_D, K_T, B_T = 240.0, 40.0, 28900.0, 260.0, 920000.0, 3886.0
 KINKS = (0.0, 0.5, 1.5, 3.5, 4.5, 6.5, 7.5, 10.0)
 Friction = Callable[[float, float, float], float]

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from mechanics import brown_mcphee, four_mass, pendulum_box, pendulum_period, slider_crank
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from symfric import BrownMcPhee, Law, Model, SolveError, Status, Trajectory, Viscous, simulate
+from symfric.foundation.numeric import Array
 from symfric.integrator.equations.blocks import signs
 from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import input_data
@@ -23,7 +23,6 @@ from symfric.laws import LuGre, LuGreNormalised
 from symfric.multibody import Mechanism
 from symfric.scenes import MECHANISMS, DoublePendulum, FourBar, Pendulum, PendulumBox, SliderCrank
 
-Array = NDArray[np.float64]
 SMOOTH = Viscous(sigma_2=0.0)
 G = 9.81
 slow = pytest.mark.slow

@@ -10,9 +10,9 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import symfric.stress.referee
+from symfric.foundation.numeric import Array
 from symfric.laws import ALL_LAWS
 from symfric.stress.cases import Case, Signal
 from symfric.stress.problem import problem, question
@@ -20,7 +20,6 @@ from symfric.stress.referee.laws import LAWS, SIGNS
 from symfric.stress.referee.scenes import SCENES
 from symfric.stress.referee.solve import Motion, knows, solve
 
-Array = NDArray[np.float64]
 PAIRS = [(law, scene) for scene in SCENES for law in LAWS if knows(law, scene)]
 FORMS = {"coulomb": [{"shape": s} for s in SIGNS], "exact_coulomb": [{"form": "stribeck"}]}
 LEVELS = {"mu_s": 0.31, "mu_d": 0.17, "v_s": 3e-3, "sigma_2": 0.7, "delta": 1.3, "n": 1.7}

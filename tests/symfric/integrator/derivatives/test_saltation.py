@@ -8,11 +8,11 @@ import casadi as ca
 import numpy as np
 import pytest
 from differentiable import pendulum
-from numpy.typing import NDArray
 from stored import stored
 
 import symfric as sf
 from symfric import Hold, Linear, Model, Trajectory, Variable, simulate
+from symfric.foundation.numeric import Array
 from symfric.integrator.derivatives import saltation as module
 from symfric.integrator.derivatives.functions import derivatives
 from symfric.integrator.derivatives.path import seeds
@@ -21,8 +21,6 @@ from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import built
 from symfric.model import Event
 from symfric.scenes import PendulumBox
-
-Array = NDArray[np.float64]
 
 
 def ball() -> Model:

@@ -6,9 +6,9 @@ from math import pi, sqrt
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import symfric as sf
+from symfric.foundation.numeric import Array
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.compiled import compiler
 from symfric.integrator.equations import expressions
@@ -31,7 +31,6 @@ from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.step.attempt import build_fixed, build_step
 from symfric.laws import Karnopp
 
-Array = NDArray[np.float64]
 Signal = Callable[[ca.SX], ca.SX]
 t, X = ca.SX.sym("t"), ca.SX.sym("x")
 x, force = sf.Variable("x", "m"), sf.Variable("force", "N")

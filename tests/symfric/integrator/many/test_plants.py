@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from backends import needs_compiler
 from differentiable import followed
-from numpy.typing import NDArray
 
 from symfric import LuGre, Model, Plant, SolveError, Variable, drive, stepper
 from symfric.integrator.many.members import LEAST_PLANTS
 
-Array = NDArray[np.float64]
 pytestmark = needs_compiler
 x, z, u = Variable("x", "m"), Variable("z", "1"), Variable("u", "N")
 MEMBERS = 11

@@ -1,30 +1,39 @@
-"""Results of an ensemble in memory or in a folder: resumed, distinguished, bounded in memory."""
+"""Results of an ensemble in memory or in a folder: resumed, distinguished, bounded in memory.
 
+Tasks of an ensemble: plain data, written once, known by every digit, solved by any process.
+"""
+
+import gc
+import pickle
 import signal
+import weakref
 from collections.abc import Callable
 from concurrent.futures import Executor
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
-from differentiable import oscillator
+from differentiable import oscillator, switched
 from ensembles import Inline, after, assert_same, explosive
 
-from symfric import (
-    Ensemble,
-    Hold,
-    LuGre,
-    Model,
-    Output,
-    Status,
-    Variable,
-    rabinowicz,
-    simulate_many,
-)
-from symfric.integrator.many.chunk import Solved
+import symfric as sf
+import symfric.integrator.compiled.compiler as compiler
+import symfric.integrator.many.members as module
+import symfric.integrator.running.integrator as built
+from symfric.foundation.programs import Compiler
+from symfric.integrator.equations.initial import first_guess
+from symfric.integrator.equations.inputs import Input, input_data
+from symfric.integrator.equations.system import system
+from symfric.integrator.many.chunk import Chunk, Job, Solved, digest
+from symfric.integrator.many.members import Assembly, program
 from symfric.integrator.many.store import Store
+from symfric.integrator.methods.tableaux import RODAS5P
+from symfric.integrator.running.integrator import Integrator
+from symfric.integrator.step.attempt import Given, State
+from symfric.scenes import Pendulum
 
 
 def solved(first: int, size: int = 2, fails: bool = True) -> Solved:
@@ -89,50 +98,50 @@ def test_an_interrupted_run_is_resumed(tmp_path: Path) -> None:
     p = np.linspace(0.0, 0.9, 20)
     p[1] = 2.0
 
-    def run(executor: Executor, progress: Callable[[float], None] | None = None) -> Ensemble:
-        return simulate_many(
+    def run(executor: Executor, progress: Callable[[float], None] | None = None) -> sf.Ensemble:
+        return sf.simulate_many(
             explosive(), 1.0, p={"p": p}, chunk=3, executor=executor, workers=1, out=tmp_path,
             progress=progress,
         )  # fmt: skip
 
     first, second, third = Inline(), Inline(), Inline()
     interrupted = run(first, after(3))
-    assert interrupted.status is Status.INTERRUPTED
+    assert interrupted.status is sf.Status.INTERRUPTED
     assert np.isfinite(interrupted["x"][:, 0]).sum() == 3 * 3 - 1
     reported: list[float] = []
     resumed = run(second, reported.append)
-    assert resumed.status is Status.SUCCESS
+    assert resumed.status is sf.Status.SUCCESS
     assert second.tasks == 7 - 3
     assert len(reported) == 4
     assert reported[0] >= 11 / 20
     assert reported[-1] == 1.0
-    assert_same(resumed, simulate_many(explosive(), 1.0, p={"p": p}, executor="serial"))
+    assert_same(resumed, sf.simulate_many(explosive(), 1.0, p={"p": p}, executor="serial"))
     assert list(resumed.failed) == [1]
     assert_same(run(third), resumed)
     assert third.tasks == 0
 
 
 def test_a_folder_holds_the_results_as_plain_arrays(tmp_path: Path) -> None:
-    model, x0 = rabinowicz(LuGre()), {"v": np.linspace(-0.1, 0.1, 7)}
+    model, x0 = sf.rabinowicz(sf.LuGre()), {"v": np.linspace(-0.1, 0.1, 7)}
     given: dict[str, Any] = {"x0": x0, "t_eval": [0.5, 1.0], "chunk": 3}
-    in_memory = simulate_many(model, 1.0, **given)
-    assert_same(in_memory, simulate_many(model, 1.0, out=tmp_path, **given))
+    in_memory = sf.simulate_many(model, 1.0, **given)
+    assert_same(in_memory, sf.simulate_many(model, 1.0, out=tmp_path, **given))
     (folder,) = tmp_path.iterdir()
     np.testing.assert_array_equal(np.load(folder / "x.npy"), in_memory["x"])
     (folder / "x.npy").unlink()
     with pytest.warns(UserWarning, match="out: 3 of 3 chunks in .* have been deleted"):
-        assert_same(simulate_many(model, 1.0, out=tmp_path, **given), in_memory)
-    assert_same(simulate_many(model, 1.0, out=tmp_path, **given), in_memory)
+        assert_same(sf.simulate_many(model, 1.0, out=tmp_path, **given), in_memory)
+    assert_same(sf.simulate_many(model, 1.0, out=tmp_path, **given), in_memory)
 
 
-def constant(value: float, output: float = 1.0, bound: float = 0.0) -> Model:
+def constant(value: float, output: float = 1.0, bound: float = 0.0) -> sf.Model:
     """x' = value + p + u, an output, a start value that is an expression."""
-    p, u = Variable("p", "m/s", start=0.0), Variable("u", "m/s", start=0.0)
-    x = Variable("x", "m", start=0.0)
-    y = Variable("y", "m", start=x.symbol + bound)
-    return Model(
+    p, u = sf.Variable("p", "m/s", start=0.0), sf.Variable("u", "m/s", start=0.0)
+    x = sf.Variable("x", "m", start=0.0)
+    y = sf.Variable("y", "m", start=x.symbol + bound)
+    return sf.Model(
         "constant", x=(x, y), p=(p,), u=(u,), ode=ca.vertcat(value + p.symbol + u.symbol, 0),
-        outputs={"out": Output(output * x.symbol, "m")},
+        outputs={"out": sf.Output(output * x.symbol, "m")},
     )  # fmt: skip
 
 
@@ -148,7 +157,7 @@ def changed(row: int) -> Any:
 
 CHANGES: list[dict[str, Any]] = [
     {"x0": {"x": changed(500)}}, {"x0": {"y": changed(500)}}, {"p": {"p": changed(500)}},
-    {"p": {"p": 1e-12}}, {"u": {"u": 1e-12}}, {"u": {"u": Hold([0.0], [2e-12])}},
+    {"p": {"p": 1e-12}}, {"u": {"u": 1e-12}}, {"u": {"u": sf.Hold([0.0], [2e-12])}},
     {"u": {"u": lambda t: 1e-12 * t}}, {"rtol": 2e-6}, {"method": "rodas4p"},
     {"max_steps": 9_999_999}, {"t_eval": [1.0 - 1e-12]}, {"t_end": 1.0 + 1e-12, "t_eval": [1.0]},
     {"t_start": 1e-12}, {"max_step": 0.01}, {"times": [0.5]}, {"backend": "vm"},
@@ -163,7 +172,7 @@ def test_results_of_other_arguments_are_never_used(tmp_path: Path) -> None:
     def tasks(change: dict[str, Any]) -> int:
         executor = Inline()
         arguments = {"model": constant(1.0)} | given | change
-        simulate_many(**arguments, executor=executor, out=tmp_path)
+        sf.simulate_many(**arguments, executor=executor, out=tmp_path)
         return executor.tasks
 
     assert [tasks({}), tasks({})] == [1, 0]
@@ -174,7 +183,7 @@ def test_results_of_other_arguments_are_never_used(tmp_path: Path) -> None:
 def test_only_a_few_chunks_exist_at_once(tmp_path: Path) -> None:
     executor = Inline()
     given: dict[str, Any] = {"x0": {"x": np.ones(200)}, "chunk": 2, "workers": 2, "out": tmp_path}
-    simulate_many(oscillator(), 0.1, executor=executor, **given)
+    sf.simulate_many(oscillator(), 0.1, executor=executor, **given)
     assert executor.tasks == 100
     assert executor.most <= 2 * 2 + 1
 
@@ -248,3 +257,114 @@ def test_disk_space_is_allocated_with_the_files(tmp_path: Path) -> None:
     Store(tmp_path, ["a"], 3000, 100, 1)
     assert (tmp_path / "a.npy").stat().st_blocks * 512 >= 3000 * 100 * 8
     assert np.isnan(np.load(tmp_path / "a.npy")).all()
+
+
+def task(
+    model: sf.Model, start: list[float], u: dict[str, Input] | None = None
+) -> tuple[Job, Chunk]:
+    """Two equal members over a second, results at three times."""
+    inputs = input_data(model, u, 0.0, 1.0)
+    integrator = Integrator(model, inputs, RODAS5P)
+    p, atol = model.values("p"), 1e-7 * integrator.system.nominal
+    S = State.at(0.0, 1e-8, start)
+    R = Given.of(1.0, 1e-6, 1.0, atol, [*p, *inputs.values[:, 0]])
+    times = np.array([0.0, 0.5, 1.0])
+    job = Job(program(integrator), inputs.breaks, times, 10_000)
+    return job, Chunk(np.tile(S, (2, 1)), np.tile(R, (2, 1)), inputs.values[None], np.full(2, 1.0))
+
+
+def test_solving_does_not_change_a_chunk() -> None:
+    u: dict[str, Input] = {"u": sf.Hold([0.0, 0.5], [1.0, -1.0])}
+    for model, start in ((oscillator(), [1.0, 0.0]), (switched(), [1.0, 0.0])):
+        job, chunk = task(model, start, u)
+        S, R = chunk.S.copy(), chunk.R.copy()
+        first, second = job.solve(chunk), job.solve(chunk)
+        np.testing.assert_array_equal(chunk.S, S)
+        np.testing.assert_array_equal(chunk.R, R)
+        np.testing.assert_array_equal(first.signals, second.signals)
+
+
+def test_equal_jobs_have_one_digest_and_every_field_counts() -> None:
+    job, _ = task(switched(), [1.0, 0.0])
+    same, _ = task(switched(), [1.0, 0.0])
+    assert digest(job) == digest(same) == digest(pickle.loads(pickle.dumps(job)))
+    x = ca.SX.sym("x")
+    changes: dict[type, Any] = {
+        str: lambda v: v + " ", bool: lambda v: not v, int: lambda v: v + 1,
+        tuple: lambda v: (*v, "more"), np.ndarray: lambda v: v + 1e-15, type(None): lambda v: 1,
+        ca.Function: lambda v: ca.Function("other", [x], [2 * x]),
+    }  # fmt: skip
+
+    def changed(whole: object) -> list[Any]:
+        """Copies of `whole`, each with one field changed at any depth."""
+        if not is_dataclass(whole):
+            return [None]
+        found = []
+        for item in fields(whole):
+            value = getattr(whole, item.name)
+            new = changes.get(type(value), changed)(value)
+            found += [
+                replace(whole, **{item.name: n}) for n in (new if type(new) is list else [new])
+            ]
+        return found
+
+    every = changed(job)
+    assert len(every) > 12
+    assert len({digest(one) for one in every} - {digest(job)}) == len(every)
+    zeros, tiny = np.zeros(5000), np.zeros(5000)
+    tiny[2500] = 1e-300
+    assert repr(zeros) == repr(tiny)
+    assert digest(zeros) != digest(tiny)
+    assert digest(zeros) != digest(zeros.reshape(50, 100))
+    assert digest("ab", "c") != digest("a", "bc")
+
+
+@pytest.mark.parametrize("make", [oscillator, switched])
+def test_another_call_builds_writes_and_compiles_nothing(
+    make: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+
+    def counted(place: Any, name: str) -> None:
+        real = getattr(place, name)
+
+        def call(*arguments: Any, **options: Any) -> Any:
+            made.append(name)
+            return real(*arguments, **options)
+
+        monkeypatch.setattr(place, name, call)
+
+    for place, name in (
+        (built, "Integrator"), (module, "with_code"), (compiler, "opened"), (Compiler, "run"),
+    ):  # fmt: skip
+        counted(place, name)
+    model = make()
+    first = sf.simulate_many(model, 1.0, x0={"x": [0.5, 1.0]}, backend="compiled")
+    assert made[:2] == ["Integrator", "with_code"]
+    made.clear()
+    again = sf.simulate_many(model, 1.0, x0={"x": [1.0, 0.5]}, u={"u": 0.0}, backend="compiled")
+    sf.simulate(model, 1.0, backend="vm")
+    assert made == []
+    np.testing.assert_array_equal(again["x"], first["x"][::-1])
+    sf.simulate_many(model, 1.0, method="rodas4p", backend="compiled")
+    assert made[:2] == ["Integrator", "with_code"]
+    gone = weakref.ref(model)
+    del model
+    gc.collect()
+    assert gone() is None  # programs die with their model
+
+
+def test_each_member_has_the_charts_of_its_own_start() -> None:
+    """Bases of the tangent space of a pendulum in absolute coordinates."""
+    model = Pendulum(sf.BrownMcPhee()).mechanism().build(formulation="absolute")
+    whole = system(model, input_data(model, None, 0.0, 1.0))
+    manifold, d = whole.manifold, np.tile(model.values("p"), (3, 1))
+    assert manifold is not None and manifold.charted
+    guess = first_guess(whole, model, model.initial_state(None, None, 0.0), 0.0)
+    y, closed = Assembly(manifold, whole.nx)(np.outer([1.0, 1.01, 0.99], guess), d)
+    assert closed.all()
+    n, m = manifold.n, manifold.m
+    for row in y:
+        slope, V = manifold.slope(row, d[0]).full(), row[manifold.basis].reshape(n - m, n)
+        assert pytest.approx(np.eye(n - m), abs=1e-12) == V @ V.T
+        assert slope[n : n + m, :n] @ V.T == pytest.approx(np.zeros((m, n - m)), abs=1e-12)

@@ -1,21 +1,33 @@
-"""Caches of integrators: nothing is computed twice, and all die with their model."""
+"""Caches of integrators: nothing is computed twice, and all die with their model.
+
+Dense output, values at the times of the result, and the steps that a run keeps.
+"""
 
 import copy
 import gc
 import weakref
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
+from backends import each_backend
 
+import symfric as sf
 import symfric.integrator.running.integrator as module
+import symfric.integrator.running.run as of_run
 from symfric import BrownMcPhee, Model, Variable, Viscous, drive, simulate
+from symfric.foundation.numeric import Array
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.running.crossings import cutting
 from symfric.integrator.running.integrator import REMEMBERED, Integrator, built
+from symfric.integrator.running.record import Dense, Record, Run, hermite
 from symfric.scenes import PendulumBox, SliderCrank
 
 
@@ -133,3 +145,152 @@ def test_a_copy_of_a_model_remembers_nothing() -> None:
     simulate(model, 0.1, backend="vm")
     assert "integrators" not in copy.copy(model).memory
     assert simulate(copy.copy(model), 0.1, backend="vm").final == simulate(model, 0.1).final
+
+
+RNG = np.random.default_rng(7)
+
+
+def pieces(rows: int, count: int = 3, n: int = 2) -> Dense:
+    """A continuous chain with random coefficients on [0, count] s."""
+    t, y = np.arange(count + 1.0), RNG.normal(size=(count + 1, n))
+    return Dense(t[:-1], t[1:], y[:-1], y[1:], RNG.normal(size=(count, rows, n)))
+
+
+def cubic(t: Array) -> Array:
+    return np.stack([1 + t - 2 * t**2 + t**3, 4 - t**3])
+
+
+def cubic_slope(t: Array) -> Array:
+    return np.stack([1 - 4 * t + 3 * t**2, -3 * t**2])
+
+
+def test_hermite_interpolation_reproduces_cubics() -> None:
+    t = np.array([0.0, 0.3, 1.0, 1.1, 2.5])
+    fine = np.linspace(0, 2.5, 77)
+    assert hermite(t, cubic(t), cubic_slope(t))(fine) == pytest.approx(cubic(fine), abs=1e-13)
+
+
+@pytest.mark.parametrize(("rows", "degree"), [(0, 1), (1, 2), (2, 3), (3, 4)])
+def test_piece_is_a_polynomial_one_degree_above_its_rows(rows: int, degree: int) -> None:
+    """Through the accepted values at its ends; a step cut at an event keeps it."""
+    dense, every = pieces(rows), np.arange(3)
+    np.testing.assert_array_equal(dense.piece(every, np.zeros(3)), dense.y0)
+    np.testing.assert_array_equal(dense.piece(every, np.ones(3)), dense.y1)
+    ends = np.vstack([dense.y0, dense.y1[-1:]])
+    assert pytest.approx(ends, abs=1e-14) == dense(np.arange(4.0)).T
+    s = np.linspace(0, 1, 9)
+    values = dense.piece(np.zeros(9, int), s)
+    for power in (degree, degree - 1):
+        fitted = np.polynomial.polynomial.polyfit(s, values, power)
+        off = np.abs(np.polynomial.polynomial.polyval(s, fitted).T - values).max()
+        assert (off < 1e-10) == (power == degree)
+    whole = pieces(rows, 1)
+    for theta in (0.001, 0.37, 0.999, 1.0):
+        cut = Dense.of(cutting(Record(2, rows))(theta, whole.rows[0]).full().T, 2)
+        assert (cut.t0.tolist(), cut.t1.tolist()) == ([0.0], [theta])
+        times = np.linspace(0, theta, 101)
+        assert cut(times) == pytest.approx(whole(times), abs=1e-12)
+
+
+def test_value_at_a_jump_is_that_after_it() -> None:
+    first, second = pieces(1, 1, 1), pieces(1, 1, 1)
+    both = Dense.of(
+        np.vstack([first.rows, replace(second, t0=second.t0 + 1, t1=second.t1 + 1).rows]), 1
+    )
+    assert both(np.array([1.0]))[0, 0] == second.y0[0, 0]
+    assert both(np.array([np.nextafter(1.0, 0)]))[0, 0] == pytest.approx(first.y1[0, 0])
+    assert both(np.array([2.0]))[0, 0] == pytest.approx(second.y1[0, 0])
+
+
+@pytest.mark.parametrize("method", ["rodas5p", "rodas4p", "rodas3"])
+def test_dense_output_is_as_accurate_as_the_steps(method: str) -> None:
+    model = sf.rabinowicz(sf.LuGre())
+    run = sf.simulate(model, 8.0, method=method, rtol=1e-6)
+    reference = sf.simulate(model, 8.0, rtol=1e-11)
+    at_steps = np.abs(run.at(run.step_times)["x"] - reference.at(run.step_times)["x"]).max()
+    between = np.abs(run["x"] - reference["x"]).max()
+    assert between < 3 * at_steps + 1e-6
+
+
+TIMES = [0.0, 0.1, 0.3, 0.30001, 0.4, 0.9, 1.7, 2.0]
+"""Some of them at jumps of the inputs."""
+FORCE = sf.Hold([0.0, 0.3, 0.4, 0.9], [0.0, 15.0, -15.0, 20.0])
+RAMP = sf.Linear([0.0, 0.3, 0.9], [0.0, 15.0, -25.0])
+LAW = sf.BrownMcPhee(mu_s=0.12, mu_d=0.1, v_t=0.01)
+
+Case = tuple[Callable[[], sf.Model], dict[str, Any]]
+CASES: dict[str, Case] = {
+    "one interval": (lambda: sf.rabinowicz(sf.BrownMcPhee()), {}),
+    "held": (lambda: sf.drive(sf.LuGre()), {"u": {"force": FORCE}}),
+    "sampled": (lambda: sf.drive(sf.BrownMcPhee()), {"u": {"force": RAMP}, "times": [0.1, 1.5]}),
+    "events": (lambda: sf.drive(sf.ExactCoulomb()), {"u": {"force": lambda t: 12 * ca.sin(9 * t)}}),
+    "held events": (lambda: sf.drive(sf.ExactCoulomb()), {"u": {"force": FORCE}}),
+    "algebraic": (lambda: PendulumBox(LAW).model(), {}),
+    "few steps": (lambda: sf.rabinowicz(sf.LuGre()), {"max_steps": 70, "throw": False}),
+}
+
+
+def run_of(case: str, backend: str, **further: Any) -> sf.Trajectory:
+    make, arguments = CASES[case]
+    return sf.simulate(make(), 2.0, t_eval=TIMES, backend=backend, **(arguments | further))
+
+
+@each_backend
+@pytest.mark.parametrize("case", CASES)
+def test_outputs_are_the_dense_output_whether_or_not_steps_are_kept(
+    case: str, backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`at` evaluates the records of accepted steps in NumPy; a long run is run again for it."""
+    whole, kept, keep = run_of(case, backend), list[int](), Run.keep
+    assert whole.t.tolist() == [time for time in TIMES if time <= whole.step_times[-1]]
+    assert whole.t.size > 1
+
+    def counted(self: Run, piece: Any) -> None:
+        keep(self, piece)
+        kept.append(sum(map(len, self.kept)))
+
+    monkeypatch.setattr(Run, "keep", counted)
+    monkeypatch.setattr(of_run, "MOST_BYTES", 200)
+    bounded = run_of(case, backend)
+    assert bounded.statistics.smallest_step == whole.statistics.smallest_step
+    assert bounded.final == whole.final
+    once, again = len(kept), whole.at(whole.t)
+    for name in whole.units:
+        assert bounded[name].tobytes() == whole[name].tobytes() == again[name].tobytes(), name
+    assert len(kept) == once
+    at = np.linspace(0.0, whole.step_times[-1], 57)
+    for name, values in whole.at(at).items():
+        assert bounded.at(at)[name].tobytes() == values.tobytes(), name
+    assert len(kept) > once  # run again for what lies between, and no steps kept for that either
+    assert max(kept) == 1
+    assert bounded.step_times.tobytes() == whole.step_times.tobytes()
+
+
+def test_tiny_motions_are_found_without_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The size of a motion is known when its steps are not kept."""
+    model, start = sf.drive(sf.LuGre()), {"v": 1e-7}
+    whole = sf.simulate(model, 0.1, x0=start, samples=11)
+    monkeypatch.setattr(of_run, "MOST_BYTES", 2000)
+    bounded = sf.simulate(model, 0.1, x0=start, samples=11)
+    assert bounded["v"].tobytes() == whole["v"].tobytes()
+    assert bounded.statistics.steps == whole.statistics.steps
+
+
+@each_backend
+def test_a_callback_may_run_another_simulation(backend: str) -> None:
+    """Buffers belong to one run at a time."""
+    model = sf.rabinowicz(sf.LuGre())
+
+    def positions(x: float, progress: Callable[[float], None] | None = None) -> Array:
+        return sf.simulate(
+            model, 20.0, x0={"x": x}, samples=21, backend=backend, progress=progress
+        )["x"]  # fmt: skip
+
+    inner, alone = list[Array](), [positions(x) for x in (0.0, 0.3)]
+    outer = positions(0.0, lambda _: inner.append(positions(0.3)))
+    assert outer.tobytes() == alone[0].tobytes()
+    assert all(found.tobytes() == alone[1].tobytes() for found in inner)
+    assert inner
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(positions, [0.0, 0.3] * 6))
+    assert [a.tobytes() for a in found] == [a.tobytes() for a in alone] * 6

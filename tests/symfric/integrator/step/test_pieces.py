@@ -6,18 +6,16 @@ import casadi as ca
 import numpy as np
 import pytest
 from backends import needs_compiler
-from numpy.typing import NDArray
 
 from symfric import BrownMcPhee, rabinowicz
 from symfric.emitter.c99 import DOUBLE, FLOAT
+from symfric.foundation.numeric import Array
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.step.attempt import Given, State, build_step
 from symfric.integrator.step.pieces import Written, all_macros, in_c, macros, routine
-
-Array = NDArray[np.float64]
 
 
 def library(*written: Written) -> ctypes.CDLL:

@@ -10,17 +10,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from robots import MOVING, random_robot, rod
 
 from symfric import Coulomb, Law, simulate
+from symfric.foundation.numeric import Array
 from symfric.multibody import Mechanism, functions
 from symfric.multibody.spatial import euler_g, rotation
 from symfric.multibody.urdf import read_urdf
 from symfric.multibody.urdf_file import parse
 
 pin: Any = pytest.importorskip("pinocchio", reason="needs Pinocchio (extra pinocchio)")
-Array = NDArray[np.float64]
 LIMIT = '<limit lower="-9" upper="9" effort="9" velocity="9"/></joint>'
 EASY = Coulomb(mu_d=1.0, v_eps=0.1)
 each_robot = pytest.mark.parametrize("seed", range(6))
