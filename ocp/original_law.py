@@ -38,7 +38,7 @@ from symfric.foundation.status import SolveError, Status
 
 STEPS = 20
 """Default number of steps of an interval."""
-PASSES = 6
+PASSES = 8
 """Largest number of meshes."""
 MOST_PARTS = 8
 """Largest number of parts into which one pass divides an interval."""

@@ -173,7 +173,7 @@ def load_through_spring(v_t: float = V_T) -> Problem:
     return _there_and_back(_coupled("load_through_spring", v_t, 0.0))
 
 
-@frictional(59.18, 1e-2, BEST)
+@frictional(58.744, 1e-2, BEST)
 def two_blocks(v_t: float = V_T) -> Problem:
     """Two coupled blocks with a contact each.
 

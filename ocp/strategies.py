@@ -1,4 +1,15 @@
-"""Strategies of `solve`: direct, by homotopy, by modes, and the order in which they are tried."""
+"""Strategies of `solve`: direct, by homotopy, by modes, and the order in which they are tried.
+
+1. Models without contacts that stick, and `friction="smooth"`: direct solves on refined meshes.
+2. Otherwise coarse solves with wide layers from several starts (`friction.homotopy`).
+3. With one contact and a narrow law, their layers are narrowed on the coarse mesh, and the modes of
+   each motion are optimised (`friction.mode_optimisation`). A valid motion ends the search, so the
+   fine homotopy is skipped.
+4. Otherwise the layers of the best motion are narrowed on refined meshes. Modes are sought when a
+   step fails or the last width is reached, and the first valid motion ends the search.
+5. The law itself follows by a direct solve or by shooting, only if the motion by modes misses under
+   it. A guess with modes skips steps 2 to 4 if modes near it are valid.
+"""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress

@@ -18,6 +18,9 @@ from ocp.solving.solution import Mode
 SAME_INSTANT = 1e-9
 """Time difference, relative to the duration, below which two times coincide."""
 
+SLOWEST = 1e-3
+"""Smallest change of a velocity between two times, in multiples of the creep."""
+
 KINDS = {1: "slip+", 0: "stick", -1: "slip-"}
 """Name of each mode."""
 
@@ -84,6 +87,9 @@ Legs = tuple[Leg, ...]
 def read(contact: str, t: Array, slip: Array, creep: float, shortest: float) -> Track:
     """Deduce the track of one contact from its sliding velocities.
 
+    A contact sticks for the time below `creep` minus the time in which it reverses, or starts or
+    stops, with the acceleration at both ends of this interval.
+
     Args:
         contact: name of the contact.
         t, slip: times [s] and sliding velocities [m/s], shape (n,).
@@ -94,7 +100,10 @@ def read(contact: str, t: Array, slip: Array, creep: float, shortest: float) -> 
     first = np.flatnonzero(np.append(True, np.diff(modes) != 0))
     last = np.append(first[1:] - 1, t.size - 1)
     runs = [Run(int(modes[a]), float(t[a]), float(t[b])) for a, b in zip(first, last, strict=True)]
-    long = [run for run in runs if run.end - run.begin >= shortest]
+    crossing = creep * np.diff(t) / np.maximum(np.abs(np.diff(slip)), SLOWEST * creep)
+    crossing = np.concatenate([[0.0], crossing, [0.0]])
+    spent = np.where([run.mode == 0 for run in runs], crossing[first] + crossing[last + 1], 0.0)
+    long = [run for run, s in zip(runs, spent, strict=True) if run.end - run.begin - s >= shortest]
     kept = list(_merged(long or [max(runs, key=lambda run: run.end - run.begin)]))
     middles = [(a.end + b.begin) / 2 for a, b in pairwise(kept)]
     bounds = pairwise([float(t[0]), *middles, float(t[-1])])

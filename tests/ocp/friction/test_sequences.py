@@ -158,6 +158,17 @@ def found_for(legs: tuple[Leg, ...]) -> SolvedSequence:
     return settled(modes_solver(), first)
 
 
+def test_crossing_of_zero_is_a_reversal_and_a_dwell_is_stick() -> None:
+    """With constant acceleration a the speed is below the creep for 2 creep / a at a reversal."""
+    t = np.linspace(0.0, 1.0, 91)
+    crossing = sequence.read("guide", t, t - 0.5, creep=0.1, shortest=0.01)
+    assert [run.mode for run in crossing.runs] == [-1, 1]
+    assert crossing.runs[0].end == pytest.approx(0.5, abs=0.02)
+    slip = np.sign(t - 0.5) * np.maximum(np.abs(t - 0.5) - 0.1, 0.0)
+    dwell = sequence.read("guide", t, slip, creep=0.1, shortest=0.01)
+    assert [run.mode for run in dwell.runs] == [-1, 0, 1]
+
+
 @pytest.mark.parametrize(
     "runs",
     [
