@@ -126,15 +126,16 @@ class Fit:
         if progress is not None:
             checks.function("Fit: progress", progress, "a function of a text and a fraction")
         asked = self.prepared()
-        made = asked.task
+        made = asked.task.part
         first = scattered(made.unknowns, asked.centre, self.starts, self.seed)
         starts = many_starts(made, first, executor, progress, self.evaluations)
         end, ends = best_of(starts), tried(made, starts)
+        whole, asked = asked, asked._replace(task=made)
         live = self._live(asked, end.noise, end.w)
         if isinstance(live, str):
             message = f"Fit: {asked.subject.name}: no start has residuals: {live}"
             raise SolveError(message, Status.NOT_FINITE)
-        for again in (self._whitened, self._delayed):
+        for again in (partial(self._completed, whole), self._whitened, self._delayed):
             if end.status is Status.INTERRUPTED or (found := again(asked, live)) is None:
                 continue
             asked, live, end = found
@@ -155,6 +156,12 @@ class Fit:
         if throw and not status.ok:
             raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)
         return result
+
+    def _completed(self, whole: "Prepared", asked: "Prepared", live: Live) -> "Refined | None":
+        """Fit all rows, starting at the values fitted to part of them."""
+        if asked.task is whole.task:
+            return None
+        return self._refined(whole, live.point.w, self.evaluations)
 
     def _whitened(self, asked: "Prepared", live: Live) -> "Refined | None":
         """Fit again with the noise of the path linearised at the values of a first fit."""

@@ -104,6 +104,14 @@ class Blocks:
         """True if the residuals are linear in the values; they are then evaluated once."""
         return False
 
+    @property
+    def part(self) -> "Blocks | None":
+        """Residuals of evenly spaced blocks of long records; None for short ones and with states.
+
+        A fit searches there first.
+        """
+        return None
+
     @abstractmethod
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
         """Yield residuals and their derivatives by all values for each block, or a message.

@@ -9,9 +9,8 @@ from typing import Protocol, final
 import numpy as np
 
 from identification.data.dataset import Dataset
-from identification.data.record import LONG
 from identification.residuals.evaluation import Array, Residuals
-from identification.residuals.inverse import InverseDynamics, InverseRows
+from identification.residuals.inverse import PART, InverseDynamics, InverseRows
 from identification.result.series import Errors, error
 from identification.solving.many_starts import best_of, many_starts
 from identification.solving.task import Point, Task, triangle
@@ -88,8 +87,12 @@ class Live:
     def covariance(self) -> Covariance:
         """Covariance of the values at the minimum, with the intervals of nonlinear models."""
         linear = covariance(self.minimum, self.levels)
-        steps = steps_of(self.task, self.point, linear)
-        return assured(self.task, self.point, linear, steps) if steps else linear
+        whole = part = (self.task, self.point)
+        if (some := self.task.part) is not self.task:
+            there = some.at(self.point.w)
+            part = whole if isinstance(there, str) else (some, there)
+        steps = steps_of(*part, linear)
+        return assured(whole, part, linear, steps) if steps else linear
 
     @cached_property
     def closed(self) -> Closed:
@@ -143,7 +146,7 @@ def may_be_late(live: Live, rows: InverseRows, late: float, moved: float) -> boo
             standard errors.
     """
     point, count = live.point, live.point.w.size
-    if live.task.rows <= LONG or len(rows.pieces) > FEW:
+    if live.task.rows <= PART or len(rows.pieces) > FEW:
         return True
     R = triangle(np.column_stack([point.J, rows.rates() / point.sigma[:, None], point.r]))
     inverse = np.linalg.pinv(R[:-1, :-1])
