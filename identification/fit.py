@@ -25,12 +25,12 @@ from identification.from_data import (
     slowest,
     strongest,
 )  # fmt: skip
-from identification.residuals.evaluation import DEAD_TIME, Array, Residuals
+from identification.residuals.evaluation import Array, Residuals
 from identification.residuals.inverse import InverseDynamics, InverseRows
 from identification.residuals.points import PointRows, Points
 from identification.result.build import fitted, levels_of, tried, written
 from identification.result.fitted import Fitted
-from identification.result.live import Asked, Kind, Live, may_be_late
+from identification.result.live import Asked, Kind, Live, matters
 from identification.solving.descent import Start, descend, remaining
 from identification.solving.many_starts import Progress, best_of, many_starts, scattered
 from identification.solving.task import THRESHOLD, Task, task
@@ -46,10 +46,6 @@ QUICK = 40
 """Largest number of evaluations of a fit that only selects a setting or tests for a dead time."""
 LONGEST = 30
 """Largest dead time that is estimated [samples]."""
-LATE, MATTERS = 4.0, 1.0
-"""Smallest dead time, in its standard errors, and smallest shift of another value, in its standard
-errors without a dead time, for which a dead time of the force is estimated.
-"""
 OF_KIND = ("x0", "dead_time")
 """Entries of `free` that belong to the residuals."""
 
@@ -173,13 +169,13 @@ class Fit:
         return self._refined(asked._replace(kind=kind, task=made), live.point.w, self.evaluations)
 
     def _delayed(self, asked: "Prepared", live: Live) -> "Refined | None":
-        """Fit again with dead times; return None unless they are significant and shift a value."""
+        """Fit again with dead times; return None if the data do not determine them."""
         kind = asked.kind
         if not isinstance(kind, InverseDynamics) or kind.dead_time != "auto":
             return None
         rows = live.task.residuals
-        if not isinstance(rows, InverseRows) or not may_be_late(live, rows, LATE / 2, MATTERS / 2):
-            return None  # half the limits allow for the linearisation
+        if not isinstance(rows, InverseRows) or not matters(live, rows):
+            return None
         step = max(record.median_step for record in self.data)
         bounds = (0.0, float(f"{LONGEST * step:.3g}"))
         kind = replace(kind, dead_time=bounds)
@@ -193,15 +189,8 @@ class Fit:
         found = self._refined(changed, unknowns.of(live.values), min(self.evaluations, QUICK))
         if found is None or not found.end.status.ok or found.live.minimum.held.any():
             return None
-        first, last = live.point.values, found.live.point.values
-        before, after = (
-            np.sqrt(np.diag(one.minimum.sandwich.coloured)) for one in (live, found.live)
-        )
-        count = len(residuals.parameters)
-        times = [n.startswith(DEAD_TIME) for n in residuals.names]
-        late = np.abs(last[times]) > LATE * after[times]
-        moved = np.abs(last[:count] - first[:count]) > MATTERS * before[:count]
-        return found if late.any() and moved.any() else None
+        lost, before = (one.minimum.sandwich.null.shape[1] for one in (found.live, live))
+        return None if lost > before else found
 
     def _refined(self, asked: "Prepared", w: Array, evaluations: int) -> "Refined | None":
         """Solve a changed problem from the coordinates `w`; return None without residuals."""

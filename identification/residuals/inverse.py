@@ -66,13 +66,13 @@ class InverseDynamics:
         filter: cut-off and decimation of all records; None: from force and motion of each record.
         dead_time: bounds of the time [s] by which the measured force leads the acting force, an
             additional unknown of each record; it is negative for a force recorded late. (0, T)
-            permits both, -T to T. "auto": estimated by `Fit` if it is significant and shifts
-            another value by more than its standard error. None: no dead time.
+            permits both, -T to T. "auto": estimated by `Fit` if the data determine it. None: no
+            dead time.
         noise: channel of a position or velocity -> standard deviation of its white noise; others
             are those of the spectrum and of rounding. `Fit(noise=...)` passes such entries.
 
     Limits: a force that is held for a sample leads by half a sample, which lowers the viscous
-    coefficient by about m w^2 h / 2 for motion at w [rad/s]; dead_time=(0, h) estimates this lead.
+    coefficient by about m w^2 h / 2 for motion at w [rad/s], unless the dead time is estimated.
     The automatic decimation is limited to the band in which the motion exceeds its noise
     (`choose_filter`). The remaining bias by white noise is corrected to second order, except in
     rows with algebraic unknowns; with a filter of the user, the noise of the acceleration must be

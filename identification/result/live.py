@@ -135,15 +135,15 @@ class Live:
 
 FEW = 20
 """Largest number of records for which dead times are tested before they are estimated."""
+SHIFTED = 0.1
+"""Shift of a value, in its standard errors, above which dead times of long records matter."""
 
 
-def may_be_late(live: Live, rows: InverseRows, late: float, moved: float) -> bool:
-    """Return False if a Gauss-Newton step shows that no dead time of long records is significant.
+def matters(live: Live, rows: InverseRows) -> bool:
+    """Return False if a Gauss-Newton step shows that dead times of long records shift no value.
 
     Args:
         live, rows: fit without dead times, and its residuals.
-        late, moved: smallest dead time, and smallest change of another coordinate, in their
-            standard errors.
     """
     point, count = live.point, live.point.w.size
     if live.task.rows <= PART or len(rows.pieces) > FEW:
@@ -152,7 +152,7 @@ def may_be_late(live: Live, rows: InverseRows, late: float, moved: float) -> boo
     inverse = np.linalg.pinv(R[:-1, :-1])
     wide = live.minimum.sandwich.widening * R[-1, -1] / np.sqrt(live.task.rows)
     sure = np.abs(inverse @ R[:-1, -1]) / (wide * np.linalg.norm(inverse, axis=1))
-    return bool((sure[count:] > late).any() and (sure[:count] > moved).any())
+    return bool((sure[:count] > SHIFTED).any())
 
 
 def _settled(kind: Kind, residuals: Residuals, data: Dataset) -> Kind:

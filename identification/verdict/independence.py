@@ -13,6 +13,7 @@ to one type of model error:
 | position | a harmonic, also times sign v | ripple, cogging, gravity, an uneven track |
 | time | sensitivities times t | parameters that drift, warming up |
 | delay, unless a dead time is estimated | rate of the predicted signal | a delay of the signal |
+| predicted force | its size, square and cube | gain of a direction, saturation, load |
 
 Residuals and columns are whitened by an autoregressive model, the span of the sensitivities J is
 projected out of both, and the remaining residuals are regressed on the columns:
@@ -28,7 +29,8 @@ The harmonic of the position is the one with the largest F (the periodogram of L
 p is multiplied by the number of harmonics (Bonferroni).
 Sources: Haugh, J. Am. Stat. Assoc. 71, 1976; Godfrey, Econometrica 46(6), 1978 (added variables);
 Ljung, System Identification, 1999, section 16.6; Nyblom, J. Am. Stat. Assoc. 84, 1989 (parameters
-that drift); Schwarz, Ann. Statist. 6(2), 1978 (BIC).
+that drift); Schwarz, Ann. Statist. 6(2), 1978 (BIC); Ramsey, J. R. Stat. Soc. B 31(2), 1969 (powers
+of predicted values).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -42,7 +44,7 @@ from identification.verdict.colour import Colour, Count, deviance, span, whitene
 from identification.verdict.colour import colour as autoregressive
 from identification.verdict.minimum import Minimum, lagged, positions
 
-Kind = Literal["position", "velocity", "acceleration", "time", "delay", ""]
+Kind = Literal["position", "velocity", "acceleration", "time", "delay", "force", ""]
 
 DELAYS = (0, 1, 2, 4, 8, 16, 32)
 """Delays of a regressor that are tested [samples]."""
@@ -101,6 +103,11 @@ def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> 
         if kind == "delay":
             hint = "the signals are recorded at different times: free={'dead_time': (0, 0.01)}"
             yield Family("the rate of the signal", hint, signal[:, None])
+            continue
+        if kind == "force":
+            y = signal / np.abs(signal).max()
+            hint = "the gain of the sensor depends on direction or size, or friction on the load"
+            yield Family("the predicted force", hint, np.column_stack([np.abs(y), y**2, y**3]))
             continue
         if kind == "position":
             way = next((np.sign(s) for _, s, k in regressors if k == "velocity"), None)
@@ -199,6 +206,8 @@ def inputs_of(found: Minimum, channel: Channel) -> list[Regressor]:
             rate = _rate(predicted, channel.t, positions(channel))
             regressors["rate"] = Regressor("rate", rate, "delay")
         regressors["time"] = Regressor("time", channel.t - channel.t.mean(), "time")
+        if channel.unit in FORCES:
+            regressors["predicted"] = Regressor("predicted", predicted, "force")
     return list(regressors.values())
 
 

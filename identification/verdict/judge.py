@@ -57,8 +57,11 @@ LITTLE = 0.9
 """The same ratio without a value at a bound; the fit then explains a fifth of the variance."""
 CHANCE = 10.0
 """Smallest ratio of the explained variance to that of as many regressors of pure noise."""
-FEW = 2.0
-"""Effective samples per unknown below which a fit is doubtful; intervals are honest above it."""
+FEW = 6.0
+"""Effective samples per unknown below which a fit is doubtful.
+
+With fewer, an autocorrelation that happens to be estimated too small halves the intervals.
+"""
 SCORE = 3.84
 """Score of a bound above which a value at the bound matters, chi2 with 5 %."""
 INERTIA = ("kg", "kg m^2")
@@ -280,7 +283,7 @@ def _few(found: Minimum, effective: Mapping[str, float]) -> Iterator[Test]:
         return
     text = (
         f"The autocorrelated residuals are worth only {count:.0f} independent samples for {n} "
-        "unknowns: they may be a model error, and the intervals are likely too small."
+        "unknowns: they may be a model error, and the intervals may be too small; record longer."
     )
     share = count / n
     yield Test("all", "effective samples", share, 0.0, FEW, share >= FEW, True, text)
