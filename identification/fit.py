@@ -25,12 +25,12 @@ from identification.from_data import (
     slowest,
     strongest,
 )  # fmt: skip
-from identification.residuals.evaluation import DEAD_TIME, Array, Residuals
-from identification.residuals.inverse import InverseDynamics
+from identification.residuals.evaluation import Array, Residuals
+from identification.residuals.inverse import InverseDynamics, InverseRows
 from identification.residuals.points import PointRows, Points
 from identification.result.build import fitted, levels_of, tried, written
 from identification.result.fitted import Fitted
-from identification.result.live import Asked, Kind, Live
+from identification.result.live import Asked, Kind, Live, matters
 from identification.solving.descent import Start, descend, remaining
 from identification.solving.many_starts import Progress, best_of, many_starts, scattered
 from identification.solving.task import THRESHOLD, Task, task
@@ -38,7 +38,6 @@ from identification.starts.measured import Measured
 from identification.unknowns.subject import Subject, subject
 from identification.unknowns.unknowns import Unknowns, unknowns_of
 from identification.verdict.judge import Verdict, judge
-from identification.verdict.minimum import shortened
 from symfric.foundation import checks
 from symfric.foundation.status import SolveError, Status
 
@@ -47,10 +46,6 @@ QUICK = 40
 """Largest number of evaluations of a fit that only selects a setting or tests for a dead time."""
 LONGEST = 30
 """Largest dead time that is estimated [samples]."""
-LATE, MATTERS = 4.0, 1.0
-"""Smallest dead time, in its standard errors, and smallest shift of another value, in its standard
-errors without a dead time, for which a dead time of the force is estimated.
-"""
 OF_KIND = ("x0", "dead_time")
 """Entries of `free` that belong to the residuals."""
 
@@ -127,15 +122,16 @@ class Fit:
         if progress is not None:
             checks.function("Fit: progress", progress, "a function of a text and a fraction")
         asked = self.prepared()
-        made = asked.task
+        made = asked.task.part
         first = scattered(made.unknowns, asked.centre, self.starts, self.seed)
         starts = many_starts(made, first, executor, progress, self.evaluations)
         end, ends = best_of(starts), tried(made, starts)
+        whole, asked = asked, asked._replace(task=made)
         live = self._live(asked, end.noise, end.w)
         if isinstance(live, str):
             message = f"Fit: {asked.subject.name}: no start has residuals: {live}"
             raise SolveError(message, Status.NOT_FINITE)
-        for again in (self._whitened, self._delayed):
+        for again in (partial(self._completed, whole), self._whitened, self._delayed):
             if end.status is Status.INTERRUPTED or (found := again(asked, live)) is None:
                 continue
             asked, live, end = found
@@ -144,7 +140,7 @@ class Fit:
                 evaluations=ends[0].evaluations + end.evaluations, values=live.values,
             )  # fmt: skip
             ends = (best, *ends[1:])
-        verdict = judge(shortened(live.minimum), asked.findings, live.levels)
+        verdict = judge(live.minimum.short, asked.findings, live.levels)
         gain = remaining(live.task, live.point) / max(live.point.cost, 1e-300)
         status, message = _status(asked, end, verdict, gain)
         result = fitted(
@@ -157,6 +153,12 @@ class Fit:
             raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)
         return result
 
+    def _completed(self, whole: "Prepared", asked: "Prepared", live: Live) -> "Refined | None":
+        """Fit all rows, starting at the values fitted to part of them."""
+        if asked.task is whole.task:
+            return None
+        return self._refined(whole, live.point.w, self.evaluations)
+
     def _whitened(self, asked: "Prepared", live: Live) -> "Refined | None":
         """Fit again with the noise of the path linearised at the values of a first fit."""
         kind, rows = asked.kind, live.task.residuals
@@ -167,31 +169,28 @@ class Fit:
         return self._refined(asked._replace(kind=kind, task=made), live.point.w, self.evaluations)
 
     def _delayed(self, asked: "Prepared", live: Live) -> "Refined | None":
-        """Fit again with dead times; return None unless they are significant and shift a value."""
+        """Fit again with dead times; return None if the data do not determine them."""
         kind = asked.kind
         if not isinstance(kind, InverseDynamics) or kind.dead_time != "auto":
             return None
+        rows = live.task.residuals
+        if not isinstance(rows, InverseRows) or not matters(live, rows):
+            return None
         step = max(record.median_step for record in self.data)
-        kind = replace(kind, dead_time=(0.0, float(f"{LONGEST * step:.3g}")))
+        bounds = (0.0, float(f"{LONGEST * step:.3g}"))
+        kind = replace(kind, dead_time=bounds)
         try:
-            residuals = kind.prepare(asked.subject, self.data, live.values)
+            residuals = rows.delayed(*bounds)
             unknowns = _unknowns(residuals, asked.subject)
-        except ValueError:  # no force is measured, a law depends on it, or few residuals
+        except ValueError:  # a law depends on the force, or few residuals
             return None
         made = replace(live.task, residuals=residuals, unknowns=unknowns)
         changed = asked._replace(kind=kind, task=made)
         found = self._refined(changed, unknowns.of(live.values), min(self.evaluations, QUICK))
         if found is None or not found.end.status.ok or found.live.minimum.held.any():
             return None
-        first, last = live.point.values, found.live.point.values
-        before, after = (
-            np.sqrt(np.diag(one.minimum.sandwich.coloured)) for one in (live, found.live)
-        )
-        count = len(residuals.parameters)
-        times = [n.startswith(DEAD_TIME) for n in residuals.names]
-        late = np.abs(last[times]) > LATE * after[times]
-        moved = np.abs(last[:count] - first[:count]) > MATTERS * before[:count]
-        return found if late.any() and moved.any() else None
+        lost, before = (one.minimum.sandwich.null.shape[1] for one in (found.live, live))
+        return None if lost > before else found
 
     def _refined(self, asked: "Prepared", w: Array, evaluations: int) -> "Refined | None":
         """Solve a changed problem from the coordinates `w`; return None without residuals."""

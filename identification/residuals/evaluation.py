@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple, Protocol, final
 
 import numpy as np
@@ -98,6 +99,19 @@ class Blocks:
         """Names of the values: parameters first, then own unknowns."""
         return (*self.parameters, *(unknown.name for unknown in self.own))
 
+    @property
+    def linear(self) -> bool:
+        """True if the residuals are linear in the values; they are then evaluated once."""
+        return False
+
+    @property
+    def part(self) -> "Blocks | None":
+        """Residuals of evenly spaced blocks of long records; None for short ones and with states.
+
+        A fit searches there first.
+        """
+        return None
+
     @abstractmethod
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
         """Yield residuals and their derivatives by all values for each block, or a message.
@@ -111,6 +125,22 @@ class Blocks:
     def at(self, values: Array) -> Evaluation | str:
         """Return residuals and derivatives, or a message if they cannot be evaluated."""
         values = np.asarray(values, float)
+        if not self.linear:
+            return self._whole(values)
+        if not self._known:
+            found = self._whole(values)
+            if isinstance(found, str):
+                return found
+            self._known.append((values, found))
+        there, (r, J) = self._known[0]
+        return Evaluation(r + np.einsum("ij,j->i", J, values - there), J)
+
+    @cached_property
+    def _known(self) -> list[tuple[Array, Evaluation]]:
+        """First values, and residuals and derivatives there."""
+        return []
+
+    def _whole(self, values: Array) -> Evaluation | str:
         count, found = len(self.parameters), list[tuple[Array, Array]]()
         for block in self.blocks(values[:count], values[count:]):
             if isinstance(block, str):

@@ -160,6 +160,7 @@ class Sampled:
         rows, g, start: Functions of (w, y), z, p with derivatives by (z, y, p).
         step, tangent: the step of z, and the same with derivatives by p.
         sizes: numbers of w, z, y and p.
+        linear: True if the rows are linear in p.
         guess: start values of y, shape (ny,).
     """
 
@@ -169,6 +170,7 @@ class Sampled:
     step: ca.Function
     tangent: ca.Function
     sizes: tuple[int, int, int, int]
+    linear: bool
     guess: Array
 
     @classmethod
@@ -216,6 +218,7 @@ class Sampled:
             ca.Function("sampled_step", [z, *given, p], [ca.densify(step)]),
             ca.Function("sampled_tangent", [both, *given, *moved, p], [ca.densify(new)]),
             sizes,
+            not (nz or ny) and not ca.depends_on(ca.jacobian(rows, p), p),
             np.array(guess, float),
         )
 

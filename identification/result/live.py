@@ -6,12 +6,14 @@ from functools import cached_property
 from math import nan
 from typing import Protocol, final
 
+import numpy as np
+
 from identification.data.dataset import Dataset
 from identification.residuals.evaluation import Array, Residuals
-from identification.residuals.inverse import InverseDynamics, InverseRows
+from identification.residuals.inverse import PART, InverseDynamics, InverseRows
 from identification.result.series import Errors, error
 from identification.solving.many_starts import best_of, many_starts
-from identification.solving.task import Point, Task
+from identification.solving.task import Point, Task, triangle
 from identification.unknowns.subject import Closed, Subject
 from identification.unknowns.unknowns import unknowns_of
 from identification.verdict.covariance import Covariance, Levels, covariance, steps_of
@@ -85,8 +87,12 @@ class Live:
     def covariance(self) -> Covariance:
         """Covariance of the values at the minimum, with the intervals of nonlinear models."""
         linear = covariance(self.minimum, self.levels)
-        steps = steps_of(self.task, self.point, linear)
-        return assured(self.task, self.point, linear, steps) if steps else linear
+        whole = part = (self.task, self.point)
+        if (some := self.task.part) is not self.task:
+            there = some.at(self.point.w)
+            part = whole if isinstance(there, str) else (some, there)
+        steps = steps_of(*part, linear)
+        return assured(whole, part, linear, steps) if steps else linear
 
     @cached_property
     def closed(self) -> Closed:
@@ -125,6 +131,28 @@ class Live:
         if isinstance(point, str):
             raise ValueError(f"validate: expected data '{data.name}' that can be compared: {point}")
         return residuals, point.evaluation.r
+
+
+FEW = 20
+"""Largest number of records for which dead times are tested before they are estimated."""
+SHIFTED = 0.1
+"""Shift of a value, in its standard errors, above which dead times of long records matter."""
+
+
+def matters(live: Live, rows: InverseRows) -> bool:
+    """Return False if a Gauss-Newton step shows that dead times of long records shift no value.
+
+    Args:
+        live, rows: fit without dead times, and its residuals.
+    """
+    point, count = live.point, live.point.w.size
+    if live.task.rows <= PART or len(rows.pieces) > FEW:
+        return True
+    R = triangle(np.column_stack([point.J, rows.rates() / point.sigma[:, None], point.r]))
+    inverse = np.linalg.pinv(R[:-1, :-1])
+    wide = live.minimum.sandwich.widening * R[-1, -1] / np.sqrt(live.task.rows)
+    sure = np.abs(inverse @ R[:-1, -1]) / (wide * np.linalg.norm(inverse, axis=1))
+    return bool((sure[:count] > SHIFTED).any())
 
 
 def _settled(kind: Kind, residuals: Residuals, data: Dataset) -> Kind:

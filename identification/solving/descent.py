@@ -207,7 +207,7 @@ def _renew(search: _Search) -> float:
 
 def variance(task: Task, point: Point) -> float:
     """Return the variance of the weighted residuals; at least 1 if a noise level is given."""
-    freedom = max(1, point.sigma.size - point.w.size)
+    freedom = max(1, task.rows - point.w.size)
     least = 1.0
     if set(task.noise) == set(task.estimated):
         least = max((NOISELESS * task.spread(s) / task.noise[s]) ** 2 for s in task.noise)

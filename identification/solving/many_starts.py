@@ -105,6 +105,7 @@ def many_starts(
     done: list[Start] = []
     if len(starts) > 1 and task.is_linear(starts[0]):
         starts = starts[:1]
+    task = task.reduced(starts[0])
     found = _in_turn(task, starts, executor, progress, evaluations)
     try:
         for start in found:

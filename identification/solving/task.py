@@ -28,6 +28,7 @@ from typing import Any, final
 import numpy as np
 
 from identification.residuals.evaluation import Array, Channel, Evaluation, Residuals
+from identification.unknowns.spec import Unknown
 from identification.unknowns.unknowns import Unknowns
 from symfric.foundation import checks
 
@@ -91,6 +92,41 @@ def triangle(columns: Array) -> Array:
 def square(x: Array) -> float:
     """Return the sum of squares without BLAS, which uses several threads for long sums."""
     return float(np.sum(x * x))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """Residuals linear in their values, with the rows of each channel reduced to a triangle.
+
+        |r_s(p)|^2 = |R_s [p; 1]|^2,   R_s = triangle of [J_s, r_s(0)]
+
+    The channels keep their times and measured values.
+    """
+
+    names: tuple[str, ...]
+    own: tuple[Unknown, ...]
+    channels: tuple[Channel, ...]
+    R: Array
+
+    @classmethod
+    def of(cls, residuals: Residuals, values: Array) -> "Triangles | str":
+        """Return the triangles of linear residuals evaluated at `values`, or a message."""
+        found, k = residuals.at(values), values.size
+        if isinstance(found, str):
+            return found
+        whole = np.column_stack([found.J, found.r - np.einsum("ij,j->i", found.J, values)])
+        R = [triangle(whole[c.rows]) for c in residuals.channels]
+        channels = tuple(
+            replace(c, rows=slice(i * (k + 1), (i + 1) * (k + 1)), ordered=False)
+            for i, c in enumerate(residuals.channels)
+        )
+        return cls(residuals.names, residuals.own, channels, np.vstack(R))
+
+    def at(self, values: Array) -> Evaluation:
+        """Return residuals and derivatives."""
+        J = self.R[:, :-1]
+        return Evaluation(np.einsum("ij,j->i", J, values) + self.R[:, -1], J)
 
 
 Guard = Callable[[Mapping[str, float]], object]
@@ -180,11 +216,29 @@ class Task:
     @cached_property
     def sigma(self) -> Array:
         """Noise level of every row [SI], shape (rows,)."""
-        rows = sum(c.t.size for c in self.channels)
-        found = np.ones(rows)
+        found = np.ones(max(c.rows.stop for c in self.channels))
         for channel in self.channels:
             found[channel.rows] = self.noise[channel.signal]
         return found
+
+    @property
+    def rows(self) -> int:
+        """Number of compared values."""
+        return sum(c.t.size for c in self.channels)
+
+    def reduced(self, w: Array) -> "Task":
+        """Return the same problem with few rows if it is linear, evaluated at the coordinates w."""
+        if self.loss != "squares" or not getattr(self.residuals, "linear", False):
+            return self
+        found = Triangles.of(self.residuals, self.unknowns.values(self.unknowns.inside(w)))
+        return self if isinstance(found, str) else replace(self, residuals=found)
+
+    @property
+    def part(self) -> "Task":
+        """The same problem on part of the rows of long records, if it is not linear."""
+        linear = getattr(self.residuals, "linear", False)
+        found = None if linear else getattr(self.residuals, "part", None)
+        return self if found is None else replace(self, residuals=found)
 
     def with_noise(self, noise: Mapping[str, float]) -> "Task":
         """Return the problem with other noise levels."""
@@ -212,9 +266,14 @@ class Task:
         return Point(w, values, found, self.sigma, self.unknowns.slope(w), self.loss)
 
     def is_linear(self, w: Array) -> bool:
-        """Return True if the residuals are linear in the coordinates: there is one minimum."""
+        """Return True if the residuals are linear in the values or coordinates: one minimum.
+
+        Bounds and orders of values are convex. Tied values need not be linear in the others.
+        """
         if self.loss != "squares" or len(self.estimated) > 1:
             return False
+        if getattr(self.residuals, "linear", False):
+            return len(self.unknowns.names) == len(self.unknowns.fitted)
         wide = np.minimum(1.0, self.unknowns.upper - self.unknowns.lower)
         here, there = (self.at(self.unknowns.inside(w + share * wide)) for share in (0.0, 0.4))
         if isinstance(here, str) or isinstance(there, str):
@@ -280,7 +339,8 @@ def levels(task: Task, point: Point) -> dict[str, float]:
     for signal in task.estimated:
         r = np.concatenate([point.evaluation.r[c.rows] for c in _of(task, signal)])
         if task.loss == "squares":
-            level = float(np.sqrt(square(r) / max(r.size - shares[signal], 1.0)))
+            rows = sum(c.t.size for c in _of(task, signal))
+            level = float(np.sqrt(square(r) / max(rows - shares[signal], 1.0)))
         else:
             level = NORMAL * float(np.median(np.abs(r)))
         found[signal] = max(level, NOISELESS * task.spread(signal))

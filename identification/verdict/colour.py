@@ -130,12 +130,17 @@ def whitened(x: Array, partial: Array, position: Count) -> Array:
     The first rows of a run are predicted from the available rows.
     """
     table, spread = predictors(partial)
-    order = np.minimum(position, partial.size)
+    first = np.flatnonzero(position < partial.size)
     out = x.copy()
+    for j in range(1, partial.size + 1):
+        out[j:] -= table[-1, j - 1] * x[:-j]
+    out[first] = x[first]
     wide = (-1,) + (1,) * (x.ndim - 1)
     for j in range(1, partial.size + 1):
-        out[j:] -= table[order[j:], j - 1].reshape(wide) * x[:-j]
-    return out / np.sqrt(spread[order]).reshape(wide)
+        here = first[position[first] >= j]
+        out[here] -= table[position[here], j - 1].reshape(wide) * x[here - j]
+    out[first] /= np.sqrt(spread[position[first]]).reshape(wide)
+    return out
 
 
 def predictors(partial: Array) -> tuple[Array, Array]:
@@ -298,8 +303,8 @@ def _moments(Q: Array, pair: Count, lag: int) -> tuple[float, float]:
     """
     n, k = Q.shape
     SQ = np.zeros_like(Q)
-    np.add.at(SQ, pair, Q[pair - lag] / 2)
-    np.add.at(SQ, pair - lag, Q[pair] / 2)
+    SQ[pair] += Q[pair - lag] / 2
+    SQ[pair - lag] += Q[pair] / 2
     QSQ = Q.T @ SQ
     first = -float(np.trace(QSQ))
     second = pair.size / 2 - 2 * float((SQ**2).sum()) + float((QSQ**2).sum())

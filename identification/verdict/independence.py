@@ -13,6 +13,7 @@ to one type of model error:
 | position | a harmonic, also times sign v | ripple, cogging, gravity, an uneven track |
 | time | sensitivities times t | parameters that drift, warming up |
 | delay, unless a dead time is estimated | rate of the predicted signal | a delay of the signal |
+| predicted force | its size, square and cube | gain of a direction, saturation, load |
 
 Residuals and columns are whitened by an autoregressive model, the span of the sensitivities J is
 projected out of both, and the remaining residuals are regressed on the columns:
@@ -28,7 +29,8 @@ The harmonic of the position is the one with the largest F (the periodogram of L
 p is multiplied by the number of harmonics (Bonferroni).
 Sources: Haugh, J. Am. Stat. Assoc. 71, 1976; Godfrey, Econometrica 46(6), 1978 (added variables);
 Ljung, System Identification, 1999, section 16.6; Nyblom, J. Am. Stat. Assoc. 84, 1989 (parameters
-that drift); Schwarz, Ann. Statist. 6(2), 1978 (BIC).
+that drift); Schwarz, Ann. Statist. 6(2), 1978 (BIC); Ramsey, J. R. Stat. Soc. B 31(2), 1969 (powers
+of predicted values).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -36,12 +38,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from identification.data.record import blocks
 from identification.residuals.evaluation import DEAD_TIME, Array, Channel
 from identification.verdict.colour import Colour, Count, deviance, span, whitened
 from identification.verdict.colour import colour as autoregressive
 from identification.verdict.minimum import Minimum, lagged, positions
 
-Kind = Literal["position", "velocity", "acceleration", "time", "delay", ""]
+Kind = Literal["position", "velocity", "acceleration", "time", "delay", "force", ""]
 
 DELAYS = (0, 1, 2, 4, 8, 16, 32)
 """Delays of a regressor that are tested [samples]."""
@@ -69,13 +72,13 @@ class Family(NamedTuple):
     Attributes:
         what: name of the dependence in a message: "the residuals of x depend on ...".
         hint: likely cause of the dependence.
-        columns: columns of the regression, shape (n, q); of alternatives, shape (n, q, m).
+        columns: columns of the regression, shape (n, q), or alternatives of them.
         smoothed: True for columns from a smoothed signal, which leaves systematic errors.
     """
 
     what: str
     hint: str
-    columns: Array
+    columns: "Array | Waves"
     smoothed: bool = False
 
 
@@ -101,6 +104,11 @@ def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> 
             hint = "the signals are recorded at different times: free={'dead_time': (0, 0.01)}"
             yield Family("the rate of the signal", hint, signal[:, None])
             continue
+        if kind == "force":
+            y = signal / np.abs(signal).max()
+            hint = "the gain of the sensor depends on direction or size, or friction on the load"
+            yield Family("the predicted force", hint, np.column_stack([np.abs(y), y**2, y**3]))
+            continue
         if kind == "position":
             way = next((np.sign(s) for _, s, k in regressors if k == "velocity"), None)
             hint = "an effect of the position is missing: ripple, cogging, a spring, gravity"
@@ -124,12 +132,29 @@ def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> 
             yield Family(f"the distance since {name} last changed its sign", hint, columns)
 
 
-def _waves(x: Array, way: Array | None, most: int) -> Array:
-    """Return columns cos, sin, and both times `way`, for each half harmonic of x, (n, q, m)."""
+class Waves(NamedTuple):
+    """Half harmonics of a position, from 1 to `most`.
+
+    Attributes:
+        turns: phases of the first one, shape (n,).
+        way: direction of motion, shape (n,), if known.
+        most: number of harmonics.
+    """
+
+    turns: Array
+    way: Array | None
+    most: int
+
+    def columns(self, k: int, rows: Count | slice = slice(None)) -> Array:
+        """Return the columns cos, sin, and both times `way`, of harmonic k, shape (n, q)."""
+        phases = k * self.turns[rows]
+        both = np.column_stack([np.cos(phases), np.sin(phases)])
+        return both if self.way is None else np.hstack([both, both * self.way[rows, None]])
+
+
+def _waves(x: Array, way: Array | None, most: int) -> Waves:
     turns = np.pi * (x - x.min()) / np.ptp(x)
-    phases = np.outer(turns, np.arange(1, max(1, min(HARMONICS, most)) + 1))
-    both = np.stack([np.cos(phases), np.sin(phases)], axis=1)
-    return both if way is None else np.concatenate([both, both * way[:, None, None]], axis=1)
+    return Waves(turns, way, max(1, min(HARMONICS, most)))
 
 
 def _bins(signal: Array, way: Array, count: int) -> Array:
@@ -181,6 +206,8 @@ def inputs_of(found: Minimum, channel: Channel) -> list[Regressor]:
             rate = _rate(predicted, channel.t, positions(channel))
             regressors["rate"] = Regressor("rate", rate, "delay")
         regressors["time"] = Regressor("time", channel.t - channel.t.mean(), "time")
+        if channel.unit in FORCES:
+            regressors["predicted"] = Regressor("predicted", predicted, "force")
     return list(regressors.values())
 
 
@@ -231,64 +258,89 @@ def dependences(
         return
     basis = span(J)
     before = deviance(colour.partial, r, basis, position)
+    test = _Added.of(r, basis, colour.partial, position)
     for family in families(regressors, position, basis):
-        each = np.atleast_3d(family.columns)
-        each = each - each.mean(axis=0)
-        each = each / np.maximum(np.linalg.norm(each, axis=0), 1e-300)
-        found = _best(r, basis, each, colour.partial, position)
-        if found is None:
+        columns, count = family.columns, 1
+        if isinstance(columns, Waves):
+            count, columns = columns.most, _largest(columns, r, basis, colour.partial, position)
+        columns = _scaled(columns)
+        first = test(columns)
+        if first is None:
             continue
-        chosen, first = found
-        both = span(np.column_stack([basis, each[:, :, chosen]]), 1e-6)
+        both = span(np.column_stack([basis, columns]), 1e-6)
         other = autoregressive(_without(both, r), both, position, refine=False)
         if deviance(other.partial, r, both, position) < before - STRONG:
-            second = _best(r, basis, each, other.partial, position)
-            if second is not None and second[1].p < first.p:
-                first = second[1]
-        yield family, first
+            second = _Added.of(r, basis, other.partial, position)(columns)
+            if second is not None and second.p < first.p:
+                first = second
+        yield family, first._replace(p=min(1.0, first.p * count))
 
 
-def _best(
-    r: Array, basis: Array, each: Array, partial: Array, position: Count
-) -> tuple[int, Dependence] | None:
-    """Return index and dependence of the alternative in `each`, (n, q, m), with the smallest p."""
-    known = span(whitened(basis, partial, position))
-    rest = whitened(r, partial, position)
-    clean = whitened(each, partial, position)
-    found = [(k, d) for k in range(each.shape[2])
-             if (d := _added(known, basis, rest, clean[:, :, k], each[:, :, k]))]  # fmt: skip
-    if not found:
-        return None
-    k, best = min(found, key=lambda one: one[1].p)
-    return k, best._replace(p=min(1.0, best.p * len(found)))
+CHOICE = 10_000
+"""Largest number of rows from which a harmonic is chosen."""
 
 
-def _added(known: Array, basis: Array, r: Array, columns: Array, plain: Array) -> Dependence | None:
-    """Return F of added columns.
+def _largest(waves: Waves, r: Array, basis: Array, partial: Array, position: Count) -> Array:
+    """Return the columns of the harmonic with the largest F, on blocks of a long channel."""
+    parts = [np.arange(part.start, part.stop) for part in blocks(r.size, CHOICE)]
+    rows = np.concatenate(parts)
+    there = np.minimum(position[rows], np.concatenate([part - part[0] for part in parts]))
+    test = _Added.of(r[rows], basis[rows], partial, there)
+    each = ((k, test(_scaled(waves.columns(k, rows)))) for k in range(1, waves.most + 1))
+    found = [(k, d.statistic) for k, d in each if d is not None]
+    return waves.columns(max(found, key=lambda one: one[1], default=(1, 0.0))[0])
 
-    Args:
+
+def _scaled(columns: Array) -> Array:
+    """Return columns of mean zero and length one."""
+    centred = columns - columns.mean(axis=0)
+    return centred / np.maximum(np.linalg.norm(centred, axis=0), 1e-300)
+
+
+class _Added(NamedTuple):
+    """Test for added columns under an autoregressive model.
+
+    Attributes:
+        partial, position: see `whitened`.
+        basis: orthonormal basis of the sensitivities, shape (n, k).
         known: orthonormal basis of the whitened sensitivities, shape (n, k).
-        basis: orthonormal basis of the sensitivities.
-        r: whitened residuals.
-        columns, plain: whitened columns, and the same before whitening, shape (n, q).
+        rest: whitened residuals without their part in `known`, shape (n,).
     """
-    from scipy.special import fdtrc  # noqa: PLC0415  (slow to import)
 
-    inside = known.T @ columns
-    rest, clean = _without(known, r), columns - known @ inside
-    new = span(clean, 1e-6)
-    q, free = new.shape[1], r.size - known.shape[1] - new.shape[1]
-    if not q or free < 2 * q:
-        return None
-    weights = new.T @ rest
-    explained = float(weights @ weights)
-    left = max(float(rest @ rest) - explained, 1e-15 * float(rest @ rest), np.finfo(float).tiny)
-    statistic = explained / q / (left / free)
-    weights, *_ = np.linalg.lstsq(clean, rest, rcond=1e-6)
-    part = _without(basis, plain @ weights)  # explained part before whitening
-    moved = float(np.linalg.norm(inside @ weights)) / np.sqrt(left / free)
-    size = float(np.sqrt(np.mean(part**2)))
-    return Dependence(statistic, float(fdtrc(q, free, statistic)), size, moved)
+    partial: Array
+    position: Count
+    basis: Array
+    known: Array
+    rest: Array
+
+    @classmethod
+    def of(cls, r: Array, basis: Array, partial: Array, position: Count) -> "_Added":
+        known = span(whitened(basis, partial, position))
+        rest = _without(known, whitened(r, partial, position))
+        return cls(partial, position, basis, known, rest)
+
+    def __call__(self, plain: Array) -> Dependence | None:
+        """Return F of the columns `plain`, shape (n, q); None if they are in the model."""
+        from scipy.special import fdtrc  # noqa: PLC0415  (slow to import)
+
+        columns = whitened(plain, self.partial, self.position)
+        inside = self.known.T @ columns
+        clean = columns - self.known @ inside
+        squares, axes = np.linalg.eigh(clean.T @ clean)
+        kept = squares > 1e-12 * squares[-1]
+        axes, squares = axes[:, kept], squares[kept]
+        q, free = squares.size, self.rest.size - self.known.shape[1] - squares.size
+        if not q or free < 2 * q:
+            return None
+        along, whole = axes.T @ (clean.T @ self.rest), float(self.rest @ self.rest)
+        explained = float(along @ (along / squares))
+        left = max(whole - explained, 1e-15 * whole, np.finfo(float).tiny)
+        statistic = explained / q / (left / free)
+        weights = axes @ (along / squares)
+        part = _without(self.basis, plain @ weights)  # explained part before whitening
+        moved = float(np.linalg.norm(inside @ weights)) / np.sqrt(left / free)
+        size = float(np.sqrt(np.mean(part**2)))
+        return Dependence(statistic, float(fdtrc(q, free, statistic)), size, moved)
 
 
 def _without(basis: Array, x: Array) -> Array:

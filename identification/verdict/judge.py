@@ -57,8 +57,11 @@ LITTLE = 0.9
 """The same ratio without a value at a bound; the fit then explains a fifth of the variance."""
 CHANCE = 10.0
 """Smallest ratio of the explained variance to that of as many regressors of pure noise."""
-FEW = 2.0
-"""Effective samples per unknown below which a fit is doubtful; intervals are honest above it."""
+FEW = 6.0
+"""Effective samples per unknown below which a fit is doubtful.
+
+With fewer, an autocorrelation that happens to be estimated too small halves the intervals.
+"""
 SCORE = 3.84
 """Score of a bound above which a value at the bound matters, chi2 with 5 %."""
 INERTIA = ("kg", "kg m^2")
@@ -149,7 +152,7 @@ def judge(
     white = dict[str, Whiteness]()
     tests, effective = list[Test](), dict[str, float]()
     each = list[tuple[Channel, list[tuple[Family, Dependence]]]]()
-    for channel, colour in zip(found.channels, found.sandwich.colours, strict=True):
+    for channel, colour in zip(found.channels, found.colours, strict=True):
         name = found.label(channel)
         effective[name] = colour.effective
         position = positions(channel)
@@ -280,7 +283,7 @@ def _few(found: Minimum, effective: Mapping[str, float]) -> Iterator[Test]:
         return
     text = (
         f"The autocorrelated residuals are worth only {count:.0f} independent samples for {n} "
-        "unknowns: they may be a model error, and the intervals are likely too small."
+        "unknowns: they may be a model error, and the intervals may be too small; record longer."
     )
     share = count / n
     yield Test("all", "effective samples", share, 0.0, FEW, share >= FEW, True, text)
@@ -340,7 +343,7 @@ def _at_box(found: Minimum) -> list[str]:
     multiplier) with the effective number of samples.
     """
     basis = span(found.J * ~found.held)
-    worth = sum(c.effective for c in found.sandwich.colours) / found.r.size
+    worth = sum(c.effective for c in found.colours) / found.r.size
     names = list[str]()
     for u, held, column in zip(found.unknowns, found.held, found.J.T, strict=True):
         if not held or u.partner or u.nuisance or 0.0 in (u.lower, u.upper):

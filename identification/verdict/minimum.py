@@ -97,6 +97,17 @@ class Sandwich(NamedTuple):
     null: Array
     colours: tuple[Colour, ...]
 
+    @property
+    def widening(self) -> float:
+        """Largest ratio of the standard errors with and without autocorrelation."""
+        white = np.diag(self.white)
+        ratio = np.divide(np.diag(self.coloured), white, out=np.ones(white.size), where=white > 0)
+        return float(np.sqrt(ratio.max(initial=1.0)))
+
+
+PART = 2**15
+"""Number of grid points that are transformed at once; correlations between parts are neglected."""
+
 
 def _meat(found: Colour, bread: Array, place: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return B' Sigma B of one channel, and the variances of its estimated diagonal.
@@ -106,15 +117,20 @@ def _meat(found: Colour, bread: Array, place: NDArray[np.int64]) -> tuple[Array,
     if not found.order:
         flat = found.variance * bread.T @ bread
         return flat, 2 * np.diag(flat) ** 2 / found.freedom
-    on_grid = np.zeros((int(place.max()) + 1, bread.shape[1]))
+    rows, k = int(place.max()) + 1, bread.shape[1]
+    on_grid = np.zeros((rows, k))
     np.add.at(on_grid, place, bread)
-    points = 1 << (2 * on_grid.shape[0]).bit_length()
-    waves = np.fft.fft(on_grid, points, axis=0)
-    S, slopes = found.spectrum(points)
-    C = np.real(waves.conj().T @ (S[:, None] * waves)) / points
-    slope = slopes @ np.abs(waves) ** 2 / points  # (p, k)
+    points = 1 << (2 * min(rows, PART)).bit_length()
+    both = np.full(points // 2 + 1, 2.0 / points)  # of the frequencies w and -w
+    both[[0, -1]] /= 2
+    S, slopes = (part[..., : both.size] * both for part in found.spectrum(points))
+    sums, slope = np.zeros((k, k)), np.zeros((found.order, k))
+    for first in range(0, rows, PART):
+        waves = np.fft.rfft(on_grid[first : first + PART], points, axis=0)
+        sums += np.real(waves.conj().T @ (S[:, None] * waves))
+        slope += slopes @ np.abs(waves) ** 2
     spread = np.einsum("pi,pq,qi->i", slope, found.doubt, slope)
-    return C, 2 * np.diag(C) ** 2 / found.freedom + spread
+    return sums, 2 * np.diag(sums) ** 2 / found.freedom + spread
 
 
 @final
@@ -155,6 +171,24 @@ class Minimum:
         return channel.signal if len(records) == 1 else f"{channel.signal}[{channel.record}]"
 
     @cached_property
+    def short(self) -> "Minimum":
+        """Minimum with part of the rows of long channels, see `shortened`."""
+        return shortened(self)
+
+    @cached_property
+    def colours(self) -> tuple[Colour, ...]:
+        """Autoregressive models of the channels, of long ones from the rows of `short`."""
+        if self.short is not self:
+            both = zip(self.channels, self.short.colours, strict=True)
+            sizes = ((c, channel.t.size) for channel, c in both)
+            return tuple(c._replace(rows=n, freedom=c.freedom + n - c.rows) for c, n in sizes)
+        J = self.J * ~self.held * self.gain[:, None]
+        return tuple(
+            colour(self.r[c.rows], J[c.rows], positions(c, across_windows=True))
+            for c in self.channels
+        )
+
+    @cached_property
     def sandwich(self) -> Sandwich:
         """Linearised uncertainty of the values, with independent noise in the channels."""
         free = ~self.held
@@ -168,19 +202,12 @@ class Minimum:
         reach = np.abs(bread).max(axis=0, initial=0.0)
         reach = np.where(reach > 0, reach, 1.0)  # scaling; variances of variances would overflow
         bread = bread / reach
-        sensitivity = scaled * self.gain[:, None]
         k = len(self.names)
         coloured, white, spread = np.zeros((k, k)), np.zeros((k, k)), np.zeros(k)
-        colours = list[Colour]()
-        short = shortened(replace(self, J=sensitivity))
-        for channel, part in zip(self.channels, short.channels, strict=True):
-            B, n = bread[channel.rows], channel.t.size
-            there = positions(part, across_windows=True)
-            seen = colour(short.r[part.rows], short.J[part.rows], there)
-            seen = seen._replace(rows=n, freedom=seen.freedom + n - seen.rows)
+        for channel, seen in zip(self.channels, self.colours, strict=True):
+            B = bread[channel.rows]
             C, wide = _meat(seen, B, places(channel))
             coloured, white, spread = coloured + C, white + seen.white * B.T @ B, spread + wide
-            colours.append(seen)
         total = np.diag(coloured) ** 2
         freedom = 2 * np.divide(total, spread, where=spread > 0, out=np.ones(k))
         inside = Vt[kept][:, free]  # free directions orthogonal to `inside` are null
@@ -189,7 +216,7 @@ class Minimum:
         back = np.outer(reach, reach)
         coloured, white = back * coloured, back * white
         freedom = np.maximum(freedom, 1.0)
-        return Sandwich(coloured, white, freedom, null / size[:, None], tuple(colours))
+        return Sandwich(coloured, white, freedom, null / size[:, None], self.colours)
 
 
 LONG, BLOCKS = 50_000, 20

@@ -71,6 +71,7 @@ def refined(
     order: int = 5,
     most: int = 1000,
     for_loss: float = inf,
+    growth: float = GROWTH,
 ) -> tuple[Array, ...]:
     """Return new meshes with local errors below `local` and a total loss below `loss`.
 
@@ -92,17 +93,18 @@ def refined(
         order: order of the scheme.
         most: largest total number of intervals.
         for_loss: largest total number of intervals for the sake of losses.
+        growth: largest growth of the number of intervals.
     """
     roots = [np.cbrt(e.losses) for e in errors]
     total = sum(float(root.sum()) for root in roots)
     share = sqrt(total / loss) if loss > 0 else 0.0
     intervals = sum(mesh.size - 1 for mesh in meshes)
-    lost = min(1.0, min(GROWTH * intervals, for_loss) / max(share * total, 1.0))
+    lost = min(1.0, min(growth * intervals, for_loss) / max(share * total, 1.0))
     parts: list[Array] = []
     for mesh, own, root in zip(meshes, errors, roots, strict=True):
         excess = 2.0 * np.where(np.isfinite(own.local), own.local, 1e30 * local) / local
         n = np.where(excess > 1.0, excess ** (2.0 / (order + 1)), excess ** (1.0 / (order + 1)))
-        n = np.maximum(np.minimum(n, GROWTH), lost * share * root)
+        n = np.maximum(np.minimum(n, growth), lost * share * root)
         if own.outside is not None:
             n = np.where(own.outside, np.maximum(n, 2.0), n)
         parts.append(_graded(np.clip(n, LEAST_PARTS, MOST_PARTS), np.diff(mesh)))

@@ -5,7 +5,8 @@ mode sequence deduced from this motion, friction is a known force while a contac
 reaction while it sticks. The problem of these arcs is smooth and the switching times are unknowns,
 so a solver finds them with full precision on few intervals:
 
-1. Deduce the sequence, and insert stick at each reversal and at the ends (`ocp.friction.sequence`).
+1. Deduce the sequence (`ocp.friction.sequence`). If it leads to no solution, insert stick at each
+   reversal and at the ends.
 2. Solve the problem of mode models with free durations (`ocp.friction.arcs`).
 3. Remove arcs whose duration is almost zero, change the sequence where the motion is at the bounds
    of its modes (`ocp.friction.sequence`), and solve again from there.
@@ -80,6 +81,8 @@ SURE = 1.5
 """Factor by which a margin exceeds the share of the static level that a law does not reach."""
 LEAST_INTERVALS = 40
 MOST = 800
+GROWTH = 5.0
+"""Largest growth of the number of intervals in one pass."""
 
 
 def rests_inside(solved: SolvedSequence) -> Legs | None:
@@ -286,10 +289,11 @@ def _attempts(
 ) -> Iterator[tuple[int, Legs]]:
     """Yield iteration limits and possible sequences, the most likely one first.
 
-    All sequences with the first limit precede those with the second one.
+    All sequences with the first limit precede those with the second one. Those without inserted
+    stick come first: it takes many iterations to shrink, and the motion shows longer stick.
     """
     sequences: dict[str, Legs] = {}
-    for rests, factor in product((True, False), CREEP):
+    for rests, factor in product((False, True), CREEP):
         creep = {name: factor * width for name, width in widths.items()}
         legs = reader.sequence(creep, rests)
         if shown(legs) not in sequences:
@@ -341,33 +345,46 @@ def _fine(modes_solver: ModeSolver, solved: SolvedSequence) -> SolvedSequence:
 
     The estimate of this loss is reliable if two meshes agree on the cost without the loss. Until
     they agree, all intervals are halved. If stiction follows its level, the estimate is too large,
-    and the gain by the last refinement is the criterion.
+    and the error of J by two meshes applies.
     """
-    before = inf, inf
+    before: SolvedSequence | None = None
     for _ in range(ROUNDS):
         t, allowed = solved.transcription, FINE * abs(solved.outcome.cost) + ZERO
         arcs = arcs_of(t.problem, t.meshes, solved.points)
         local = estimated_errors(t, solved.outcome.iterate.w, t.program.values, arcs)
-        agree = abs(solved.ideal_cost - before[0]) <= allowed
-        enough = solved.loss <= allowed or 0.0 <= before[1] - solved.outcome.cost <= allowed
+        ideal, left = _remaining(before, solved)
+        loss = min(solved.loss, left)
         exact = max(float(own.max()) for own in local) <= LOCAL
         outside = solved.overloaded
-        if agree and exact and enough and not any(own.any() for own in outside):
+        agree = min(ideal, left) <= allowed
+        if agree and exact and loss <= allowed and not any(own.any() for own in outside):
             break
-        least = 0.0 if agree else HALVED * LOCAL
+        least, trust = 0.0 if agree else HALVED * LOCAL, loss / max(solved.loss, ZERO)
         errors = [
-            MeshErrors(np.maximum(own, least), loss, over)
-            for own, loss, over in zip(local, solved.losses, outside, strict=True)
+            MeshErrors(np.maximum(own, least), trust * lost, over)
+            for own, lost, over in zip(local, solved.losses, outside, strict=True)
         ]
         meshes = refined(
-            t.meshes, errors, [()] * len(errors), local=LOCAL, loss=allowed / 2, most=MOST
-        )
+            t.meshes, errors, [()] * len(errors), local=LOCAL, loss=allowed / 2, most=MOST,
+            growth=GROWTH,
+        )  # fmt: skip
         parts = solved.legs, solved.discretisation, meshes
         finer = modes_solver.on(*parts, solved.known, 1e-4)
         if not finer.ok:  # in a flat minimum the solution may be far from the start
             finer = modes_solver.on(*parts, finer.known, 1e-2)
         if not finer.ok:
             break
-        before = solved.ideal_cost, solved.outcome.cost
-        solved = settled(modes_solver, finer)
+        before, solved = solved, settled(modes_solver, finer)
     return solved
+
+
+def _remaining(before: SolvedSequence | None, now: SolvedSequence) -> tuple[float, float]:
+    """Return the errors of the cost without loss and of J, which fall as N^-2, by two meshes.
+
+    Meshes of similar size differ by their errors.
+    """
+    if before is None:
+        return inf, inf
+    square = max(1.0, (now.intervals / before.intervals) ** 2 - 1.0)
+    changes = now.ideal_cost - before.ideal_cost, now.outcome.cost - before.outcome.cost
+    return abs(changes[0]) / square, abs(changes[1]) / square

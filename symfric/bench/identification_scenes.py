@@ -1,15 +1,13 @@
 """Bank of scenes for the calibration of verdicts: right models, imperfect records, wrong models.
 
-A scene draws a motion and noise from a seed and returns the fit of a user. Forces follow from the
-imposed motion in closed form, F_e = m v' + F(v) + offset; bristles take exact steps on a grid ten
-times finer than the record. `kept` scenes were written before the limits of the verdict and never
-used to set them.
+A scene draws a motion and noise from a seed and returns the fit of a user. `kept` scenes were never
+used to set a limit of the verdict.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 import casadi as ca
 import numpy as np
@@ -17,24 +15,49 @@ from numpy.random import Generator
 
 from identification import Dataset, Fit, InverseDynamics, Points, Shooting
 from symfric import law_from_text
+from symfric.bench.identification_records import (
+    BRISTLE,
+    CURVE,
+    FINE,
+    FINEST,
+    HIDDEN,
+    NOISE,
+    OFFSET,
+    PLAIN,
+    SPEED,
+    STAGE,
+    Change,
+    M,
+    ar,
+    asymmetric,
+    backlash,
+    bristle,
+    clipped,
+    cogging,
+    curve,
+    delay,
+    drift,
+    encoder,
+    exact,
+    gained,
+    heavy_tails,
+    held,
+    jitter,
+    loaded,
+    motion,
+    plain,
+    quadratic,
+    root,
+    saturated,
+    uneven,
+    warm_up,
+)
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import with_values
 from symfric.integrator import Linear, Trajectory, simulate
 from symfric.laws import Law, LuGre, SteadyStateLuGre, Stribeck
 from symfric.model import Model
 from symfric.scenes import Drive
-
-M, OFFSET = 95.0, -3.0
-"""Mass [kg] and constant force [N] of the stage."""
-CURVE = {"mu_s": 28.0, "mu_d": 20.0, "v_s": 0.01, "sigma_2": 200.0}
-HIDDEN = CURVE | {"v_s": 1e-3}
-PLAIN = {"mu_d": 20.0, "sigma_2": 200.0}
-STAGE = {"m": M, "offset": OFFSET}
-BRISTLE = {"sigma_0": 1e5, "sigma_1": 300.0}
-SPEED, SECONDS, RATE, FINE = 0.08, 12.0, 500.0, 10
-"""Largest speed [m/s], length [s] and sampling rate [1/s] of a record; fine steps per sample."""
-NOISE, FINEST = 0.5, 1e-9
-"""Standard deviations of the noise of a force [N] and of a nearly exact position [m]."""
 
 
 @final
@@ -57,86 +80,6 @@ class Scene:
     fit: Callable[[Generator], Fit]
     truth: Mapping[str, float]
     kept: bool = False
-
-
-class Motion(NamedTuple):
-    """Times, positions, velocities and accelerations, each of shape (n,)."""
-
-    t: Array
-    x: Array
-    v: Array
-    a: Array
-
-    def sampled(self) -> "Motion":
-        """Return every sample of the record, without the fine steps between them."""
-        return Motion(*(part[::FINE] for part in self))
-
-
-def motion(
-    rng: Generator, top: float = SPEED, least: float = 0.05, one_way: bool = False,
-    fast: float = 1.0,
-) -> Motion:  # fmt: skip
-    """Return strokes of three frequencies with random phases, slow at first and at the end.
-
-    Args:
-        rng: generator of the phases.
-        top: largest speed [m/s].
-        least: share of the speed at first and at the end.
-        one_way: motion in one direction.
-        fast: factor of the frequencies.
-    """
-    t = np.arange(round(SECONDS * RATE) * FINE + 1) / (RATE * FINE)
-    waves = zip((0.2, 0.45, 0.8), (1.0, 0.6, 0.3), rng.uniform(0, 2 * np.pi, 3), strict=True)
-    v = sum((a * np.sin(2 * np.pi * fast * f * t + p) for f, a, p in waves), np.zeros(t.size))
-    v = v * (least + (1 - least) * np.sin(np.pi * t / t[-1]) ** 2)
-    v = np.abs(v) + 0.02 if one_way else v
-    v *= top / np.abs(v).max()
-    h = t[1]
-    x = np.concatenate([[0.0], np.cumsum(h * (v[1:] + v[:-1]) / 2)])
-    return Motion(t, x, v, np.gradient(v, t))
-
-
-def curve(v: Array, mu_s: float, mu_d: float, v_s: float, sigma_2: float) -> Array:
-    """Return friction with a Stribeck peak."""
-    return np.sign(v) * (mu_d + (mu_s - mu_d) * np.exp(-((v / v_s) ** 2))) + sigma_2 * v
-
-
-def plain(v: Array, mu_d: float, sigma_2: float) -> Array:
-    """Return Coulomb and viscous friction."""
-    return mu_d * np.sign(v) + sigma_2 * v
-
-
-def bristle(t: Array, v: Array, z: float = 0.0, sigma_0: float = 1e5, sigma_1: float = 300.0,
-            mu_s: float = 28.0, mu_d: float = 20.0, v_s: float = 0.01, sigma_2: float = 200.0
-            ) -> Array:  # fmt: skip
-    """Return the friction of LuGre from the bristle deflection z [m], by exact steps."""
-    h, mean = np.diff(t), (v[1:] + v[:-1]) / 2
-    level = (mu_d + (mu_s - mu_d) * np.exp(-((mean / v_s) ** 2))) / sigma_0
-    decay = np.exp(-np.abs(mean) / level * h)
-    path = [z]
-    for keep, end in zip(decay.tolist(), (np.sign(mean) * level).tolist(), strict=True):
-        path.append(end + (path[-1] - end) * keep)
-    bent = np.array(path)
-    level = (mu_d + (mu_s - mu_d) * np.exp(-((v / v_s) ** 2))) / sigma_0
-    return sigma_0 * bent + sigma_1 * (v - np.abs(v) / level * bent) + sigma_2 * v
-
-
-def ar(rng: Generator, n: int, rho: float, size: float) -> Array:
-    """Return stationary AR(1) noise of standard deviation `size`."""
-    e = rng.standard_normal(n)
-    for k in range(1, n):
-        e[k] = rho * e[k - 1] + np.sqrt(1 - rho**2) * e[k]
-    return size * e
-
-
-Change = Callable[[Generator, Motion, Array], tuple[Array, Array]]
-"""Function of generator, motion and exact force that returns recorded positions and forces."""
-
-
-def exact(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return the record without further errors."""
-    del rng
-    return m.x, F
 
 
 def stage(
@@ -234,93 +177,6 @@ def shooting(rng: Generator, law: Law = COULOMB_LAW, rho: float = 0.0, spring: f
     return Fit(Shooting(), block(COULOMB_LAW), data, start=start, starts=1)
 
 
-# ---- errors of records and of models ----
-
-
-def encoder(step: float) -> Change:
-    """Return the rounding of positions to multiples of `step` [m]."""
-
-    def change(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-        return step * np.round((m.x + step * rng.uniform()) / step), F
-
-    return change
-
-
-def jitter(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return positions at times that scatter by 0.3 ms."""
-    return np.interp(m.t + 3e-4 * rng.standard_normal(m.t.size), m.t, m.x), F
-
-
-def delay(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return forces 2 ms late."""
-    del rng
-    return m.x, np.interp(m.t - 2e-3, m.t, F)
-
-
-def drift(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return forces whose viscous part falls by 30 % over time, and the Coulomb level by 10 %."""
-    del rng
-    share = m.t / m.t[-1]
-    return m.x, F - share * (0.3 * CURVE["sigma_2"] * m.v + 0.1 * CURVE["mu_d"] * np.sign(m.v))
-
-
-def warm_up(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return forces whose viscous part falls by 30 % with the dissipated energy."""
-    del rng
-    heat = np.cumsum(np.abs(m.v))
-    return m.x, F - 0.3 * (1 - np.exp(-3 * heat / heat[-1])) * CURVE["sigma_2"] * m.v
-
-
-def uneven(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return forces with a Coulomb level that varies by 6 % over the position."""
-    way = 2 * np.pi * (m.x / 0.05 + rng.uniform())
-    return m.x, F + 0.06 * CURVE["mu_d"] * np.sign(m.v) * np.sin(way)
-
-
-def cogging(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return forces with a ripple of 2 N over the position."""
-    return m.x, F + 2.0 * np.sin(2 * np.pi * (m.x / 0.01 + rng.uniform()))
-
-
-def clipped(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return forces limited to 80 % of the largest one."""
-    del rng
-    most = 0.8 * np.abs(F).max()
-    return m.x, np.clip(F, -most, most)
-
-
-def held(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return forces of which the logger stores every fourth one four times."""
-    del rng
-    return m.x, F[4 * (np.arange(F.size) // 4)]
-
-
-def gained(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return forces of a sensor with a gain of 1.05 in one direction."""
-    del rng
-    return m.x, np.where(F > 0, 1.05, 1.0) * F
-
-
-def heavy_tails(rng: Generator, m: Motion, F: Array) -> tuple[Array, Array]:
-    """Return forces with noise of Student's t distribution with four degrees of freedom."""
-    return m.x, F + 0.3 * rng.standard_t(4, F.size)
-
-
-def asymmetric(v: Array) -> Array:
-    """Return Coulomb and viscous friction, a tenth larger in one direction."""
-    return plain(v, **PLAIN) * np.where(v > 0, 1.1, 1.0)
-
-
-def quadratic(v: Array) -> Array:
-    """Return Coulomb and viscous friction with a drag of 10 N at the largest speed."""
-    return plain(v, **PLAIN) + 10.0 * v * np.abs(v) / SPEED**2
-
-
-def root(v: Array) -> Array:
-    """Return Coulomb friction and a drag that grows with the square root of the speed."""
-    return np.sign(v) * (20.0 + 16.0 * np.sqrt(np.abs(v) / SPEED))
-
-
 STRIBECK = STAGE | CURVE
 COULOMB = STAGE | PLAIN
 flat = partial(plain, **PLAIN)
@@ -377,15 +233,26 @@ SCENES = (
     Scene("kept: stage, heavy tails", "right", partial(simple, change=heavy_tails), COULOMB, True),
     Scene("kept: stage, asymmetric law", "right",
           partial(simple, law="asymmetric(coulomb+viscous)", friction=asymmetric, rho=0.5),
-          STAGE | {"mu_d_pos": 22.0, "mu_d_neg": 20.0, "sigma_2_pos": 220.0, "sigma_2_neg": 200.0},
+          {"m": M, "mu_d_pos": 22.0 + OFFSET, "mu_d_neg": 20.0 - OFFSET, "sigma_2_pos": 220.0,
+           "sigma_2_neg": 200.0},
           True),
     Scene("kept: curve of few points", "right", partial(points, count=30), CURVE, True),
-    Scene("kept: stage, held force", "record", partial(fine, change=held), STRIBECK, True),
+    Scene("stage, held force", "record", partial(fine, change=held), STRIBECK),
     Scene("kept: stage, encoder 1 um, AR(1) 0.7", "record",
           partial(stage, position=0.0, change=encoder(1e-6), rho=0.7), STRIBECK, True),
-    Scene("kept: stage, one-sided gain", "wrong", partial(simple, change=gained), COULOMB, True),
+    Scene("stage, one-sided gain", "wrong", partial(simple, change=gained), COULOMB),
     Scene("kept: stage, root of the speed", "wrong", partial(simple, friction=root), COULOMB, True),
     Scene("kept: stage, warming up, coulomb+viscous", "wrong", partial(simple, change=warm_up),
           COULOMB, True),
     Scene("kept: shooting, missing spring", "wrong", partial(shooting, spring=0.5), BLOCK, True),
+    Scene("kept: stage, delay 1 ms, AR(1) 0.7", "record",
+          partial(stage, change=partial(delay, late=1e-3), rho=0.7), STRIBECK, True),
+    Scene("kept: bristles, position noise 1 um", "record", partial(memory, position=1e-6), BRISTLE,
+          True),
+    Scene("kept: stage, backlash of the encoder", "record", partial(stage, change=backlash),
+          STRIBECK, True),
+    Scene("kept: stage, saturating sensor", "wrong", partial(simple, change=saturated), COULOMB,
+          True),
+    Scene("kept: stage, friction of the guide under load", "wrong", partial(simple, change=loaded),
+          COULOMB, True),
 )  # fmt: skip

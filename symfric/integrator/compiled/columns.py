@@ -24,8 +24,10 @@ from symfric.integrator.compiled.compiler import load
 Row = Array | tuple[Array, NDArray[np.intp]]
 """Arguments, one per row; or a table and the row number in it for each argument."""
 NAME = "symfric_rows"
-CHAINED, SIDE_BY_SIDE = 16, 32
-"""Columns per call of the virtual machine; the last call repeats its last column."""
+CHAINED, SIDE_BY_SIDE, MANY = 16, 32, 1024
+"""Columns per call of the virtual machine; the last call repeats its last column. `MANY` are for at
+least as many rows that are not chained.
+"""
 PER_INSTRUCTION = 3e-9
 """Time per instruction of the virtual machine [s]."""
 
@@ -50,20 +52,20 @@ class Columns:
     spent: float = 0.0
     source: Callable[[], str] | None = None
 
-    @property
-    def size(self) -> int:
-        """Number of columns per call."""
-        return CHAINED if self.chained else SIDE_BY_SIDE
-
     @cached_property
     def _dense(self) -> ca.Function:
         return densified(self.function)
 
     @cached_property
-    def _batch(self) -> ca.Function:
-        if self.chained:
-            return self._dense.mapaccum(f"{self._dense.name()}_{self.size}", self.size)
-        return self._dense.map(self.size)
+    def _batches(self) -> dict[int, ca.Function]:
+        return {}
+
+    def _batch(self, size: int) -> ca.Function:
+        """Return the Function of `size` columns."""
+        if size not in self._batches:
+            whole, name = self._dense, f"{self._dense.name()}_{size}"
+            self._batches[size] = whole.mapaccum(name, size) if self.chained else whole.map(size)
+        return self._batches[size]
 
     @cached_property
     def _prospect(self) -> Prospect:
@@ -109,7 +111,8 @@ class Columns:
         return results
 
     def _in_vm(self, rows: Sequence[Row], first: Array | None, count: int) -> list[Array]:
-        batch, most = self._batch, self.size
+        most = CHAINED if self.chained else MANY if count >= MANY else SIDE_BY_SIDE
+        batch = self._batch(most)
         arguments = [np.zeros(batch.numel_in(i)) for i in range(batch.n_in())]
         results = [np.zeros((most, batch.numel_out(i) // most)) for i in range(batch.n_out())]
         found = [np.empty((count, result.shape[1])) for result in results]

@@ -21,8 +21,8 @@ from symfric.bench.codegen import PROVEN, plants, trials
 from symfric.bench.identification import files, outcome
 from symfric.bench.identification_files import campaign
 from symfric.bench.identification_memory import ranked
+from symfric.bench.identification_records import ar
 from symfric.bench.identification_repeats import far
-from symfric.bench.identification_scenes import ar
 from symfric.bench.interop import GOAL, ROUTES, STEPS, N, T, missed, move
 from symfric.bench.ocp import controllers
 from symfric.bench.report import GOALS, Row
