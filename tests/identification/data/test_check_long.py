@@ -36,7 +36,7 @@ def spike(t: Array, x: Array, force: Array) -> None:
 
 def frozen(t: Array, x: Array, force: Array) -> None:
     del t, force
-    x[INSIDE : INSIDE + 40] = x[INSIDE]
+    x[INSIDE : INSIDE + 12] = x[INSIDE]
 
 
 def late(t: Array, x: Array, force: Array) -> None:
