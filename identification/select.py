@@ -36,11 +36,10 @@ from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
 from identification.result.fitted import Fitted
 from identification.result.live import Kind
-from identification.result.outcome import columns
 from identification.solving.many_starts import Progress
 from symfric.foundation import checks
 from symfric.foundation.files import json_data
-from symfric.foundation.shown import Shown, Table
+from symfric.foundation.shown import Shown, Table, columns
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law
 from symfric.laws.composed.populations import cost
