@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,10 +92,8 @@ class InverseDynamics:
     noise: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("force", "x"):
+        for name in ("force", "x") if self.v is None else ("force", "x", "v"):
             checks.text(f"{WHERE}: {name}", getattr(self, name), "the name of a channel")
-        if self.v is not None:
-            checks.text(f"{WHERE}: v", self.v, "the name of a channel")
         if self.filter is not None:
             checks.kind(f"{WHERE}: filter", self.filter, Filter, "a filter, such as Filter(100.0)")
         levels(f"{WHERE}: noise", self.noise)
@@ -174,6 +172,17 @@ class Piece:
         motion, taps = self.motion, self.decimation.taps
         each = [u.errors(motion.filter, motion.step, taps) for u in motion.velocities]
         return np.ravel(np.array(each).T)
+
+    @property
+    def halved(self) -> "Piece":
+        """Equations of at least two samples, without frequencies that interpolation attenuates."""
+        n, two = self.decimation.samples, Decimation(self.decimation.samples, 2)
+        if self.decimation.factor > 1 or not two.rows:
+            return self
+        touched = (two.touched(~np.isin(np.arange(n), k)) for k in self.kept)
+        motion = self.motion._replace(filter=replace(self.motion.filter, decimation=2))
+        found = Piece(motion, two, tuple(np.flatnonzero(~some) for some in touched))
+        return self if found.fewest < FEWEST else found
 
     @property
     def part(self) -> "Piece":
@@ -319,7 +328,9 @@ class InverseRows(Blocks):
             Unknown(f"{DEAD_TIME}[{k}]", "s", first, low, high, part.motion.step, nuisance=True)
             for k, part in enumerate(self.pieces)
         )
-        return replace(self, own=(*self.own, *late))
+        pieces = tuple(part.halved for part in self.pieces)
+        channels = tuple(_channels(self.rows, pieces))
+        return replace(self, own=(*self.own, *late), pieces=pieces, channels=channels)
 
     def rates(self) -> Array:
         """Return the derivatives of the residuals by dead times of the records, (rows, records)."""
@@ -355,7 +366,7 @@ class InverseRows(Blocks):
         shares, late = np.split(own, [count * len(self.pieces)])
         for number, part in enumerate(self.pieces):
             motion, mine = part.motion, slice(number * count, (number + 1) * count)
-            w, rates = _shifted(motion, float(late[number])) if late.size else (motion.w, motion.w)
+            w, rates = motion.shifted(float(late[number])) if late.size else (motion.w, motion.w)
             path = self.sampled.along(w, motion.step, np.append(p, shares[mine]), motion.begin)
             if isinstance(path, str):
                 yield f"data '{motion.name}': {path}"
@@ -387,14 +398,3 @@ class InverseRows(Blocks):
         _, s, Vt = np.linalg.svd(np.linalg.qr(J, mode="r"))
         axes = Vt[s > RANK * s.max(initial=1e-300)]
         return J @ (axes.T @ (axes @ c / s[: len(axes)] ** 2))
-
-
-def _shifted(motion: Motion, delay: float) -> tuple[Array, Array]:
-    """Return `w` with the acting force u(t - delay), and du/dt at t - delay, shape (inputs, n)."""
-    from scipy.interpolate import CubicSpline  # noqa: PLC0415 (slow to import)
-
-    spline: Any = CubicSpline(motion.t, motion.w[motion.inputs], axis=1)
-    at = np.clip(motion.t - delay, motion.t[0], motion.t[-1])
-    w = motion.w.copy()
-    w[motion.inputs] = spline(at)
-    return w, np.asarray(spline(at, 1))
