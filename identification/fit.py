@@ -26,11 +26,11 @@ from identification.from_data import (
     strongest,
 )  # fmt: skip
 from identification.residuals.evaluation import Array, Residuals
-from identification.residuals.inverse import InverseDynamics, InverseRows
+from identification.residuals.inverse import PART, InverseDynamics, InverseRows
 from identification.residuals.points import PointRows, Points
 from identification.result.build import fitted, levels_of, tried, written
 from identification.result.fitted import Fitted
-from identification.result.live import Asked, Kind, Live, matters
+from identification.result.live import Asked, Kind, Live, expanded, matters
 from identification.solving.descent import Start, descend, remaining
 from identification.solving.many_starts import Progress, best_of, many_starts, scattered
 from identification.solving.task import THRESHOLD, Task, task
@@ -44,6 +44,8 @@ from symfric.foundation.status import SolveError, Status
 MOST_STARTS = 10_000
 QUICK = 40
 """Largest number of evaluations of a fit that only selects a setting or tests for a dead time."""
+SMALL = 0.1
+"""Largest dead time [samples] in which residuals of long records are taken as linear."""
 LONGEST = 30
 """Largest dead time that is estimated [samples]."""
 OF_KIND = ("x0", "dead_time")
@@ -186,7 +188,12 @@ class Fit:
             return None
         made = replace(live.task, residuals=residuals, unknowns=unknowns)
         changed = asked._replace(kind=kind, task=made)
-        found = self._refined(changed, unknowns.of(live.values), min(self.evaluations, QUICK))
+        start, most, found = unknowns.of(live.values), min(self.evaluations, QUICK), None
+        if live.task.rows > PART:  # small dead times do not need an interpolated force
+            small = replace(made, residuals=expanded(residuals))
+            found = self._refined(changed._replace(task=small), start, most)
+        if found is None or found.live.dead_time > SMALL * step:
+            found = self._refined(changed, start, most)
         if found is None or not found.end.status.ok or found.live.minimum.held.any():
             return None
         lost, before = (one.minimum.sandwich.null.shape[1] for one in (found.live, live))
@@ -194,7 +201,7 @@ class Fit:
 
     def _refined(self, asked: "Prepared", w: Array, evaluations: int) -> "Refined | None":
         """Solve a changed problem from the coordinates `w`; return None without residuals."""
-        end = descend(asked.task, w, 0, evaluations)
+        end = descend(asked.task.reduced(w), w, 0, evaluations)
         live = self._live(asked, end.noise, end.w)
         return None if isinstance(live, str) else Refined(asked, live, end)
 

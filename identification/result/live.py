@@ -9,7 +9,7 @@ from typing import Protocol, final
 import numpy as np
 
 from identification.data.dataset import Dataset
-from identification.residuals.evaluation import Array, Residuals
+from identification.residuals.evaluation import DEAD_TIME, Array, Extended, Residuals
 from identification.residuals.inverse import PART, InverseDynamics, InverseRows
 from identification.result.series import Errors, error
 from identification.solving.many_starts import best_of, many_starts
@@ -105,6 +105,12 @@ class Live:
         names = self.task.residuals.names
         return dict(zip(names, self.point.values.tolist(), strict=True))
 
+    @property
+    def dead_time(self) -> float:
+        """Largest fitted dead time [s], of either sign."""
+        late = [abs(x) for n, x in self.values.items() if n.startswith(DEAD_TIME)]
+        return max(late, default=0.0)
+
     def errors_on(self, data: Dataset) -> Errors:
         """Return the errors of the parameters on other data; see `left_on`."""
         residuals, r = self.left_on(data)
@@ -155,8 +161,16 @@ def matters(live: Live, rows: InverseRows) -> bool:
     return bool((sure[:count] > SHIFTED).any())
 
 
+def expanded(rows: InverseRows) -> Extended:
+    """Return the residuals `InverseRows.delayed`, linear in dead times far below a sample."""
+    count = len(rows.own) - len(rows.pieces)
+    plain = replace(rows, own=rows.own[:count])
+    return Extended(plain, rows.own[count:], plain.rates())
+
+
 def _settled(kind: Kind, residuals: Residuals, data: Dataset) -> Kind:
     """Return `kind` with the filter chosen for the data of the fit, for equal filtering."""
+    residuals = residuals.residuals if isinstance(residuals, Extended) else residuals
     if not isinstance(kind, InverseDynamics) or not isinstance(residuals, InverseRows):
         return kind
     if kind.filter is not None:

@@ -14,6 +14,7 @@ from identification.data.record import LONG
 from identification.residuals import inverse
 from identification.residuals.inverse import InverseRows
 from identification.residuals.points import PointRows
+from identification.result.live import expanded
 from symfric.foundation.status import Status
 
 Array = NDArray[np.float64]
@@ -140,3 +141,18 @@ def test_verdicts_of_long_records(seed: int) -> None:
     late = Fit(kind, "coulomb+viscous", stage(n, seed, late=2)).solve(throw=False)
     assert late.values["dead_time[0]"] == pytest.approx(-2e-3, abs=2e-4)
     assert late.values["sigma_2"] == pytest.approx(TRUTH["sigma_2"], rel=0.01)
+
+
+def test_small_dead_times_enter_linearly() -> None:
+    """The residuals linear in the dead time against those of the interpolated force."""
+    asked = Fit(InverseDynamics(), "coulomb+viscous", stage(20_000)).prepared()
+    rows = asked.task.residuals
+    assert isinstance(rows, InverseRows)
+    exact, late = rows.delayed(0.0, 5e-3), 2e-5
+    small = expanded(exact)
+    assert small.names == exact.names and small.linear and not exact.linear
+    values = np.append(asked.task.unknowns.values(asked.centre), late)
+    one, two = exact.at(values), small.at(values)
+    assert not isinstance(one, str) and not isinstance(two, str)
+    change = np.sqrt(np.mean((late * one.J[:, -1]) ** 2))
+    assert np.sqrt(np.mean((one.r - two.r) ** 2)) < 0.05 * change
