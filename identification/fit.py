@@ -26,11 +26,11 @@ from identification.from_data import (
     strongest,
 )  # fmt: skip
 from identification.residuals.evaluation import Array, Residuals
-from identification.residuals.inverse import InverseDynamics, InverseRows
+from identification.residuals.inverse import PART, InverseDynamics, InverseRows
 from identification.residuals.points import PointRows, Points
 from identification.result.build import fitted, levels_of, tried, written
 from identification.result.fitted import Fitted
-from identification.result.live import Asked, Kind, Live, matters
+from identification.result.live import Asked, Kind, Live, expanded, matters
 from identification.solving.descent import Start, descend, remaining
 from identification.solving.many_starts import Progress, best_of, many_starts, scattered
 from identification.solving.task import THRESHOLD, Task, task
@@ -44,6 +44,8 @@ from symfric.foundation.status import SolveError, Status
 MOST_STARTS = 10_000
 QUICK = 40
 """Largest number of evaluations of a fit that only selects a setting or tests for a dead time."""
+SMALL = 0.1
+"""Largest dead time [samples] in which residuals of long records are taken as linear."""
 LONGEST = 30
 """Largest dead time that is estimated [samples]."""
 OF_KIND = ("x0", "dead_time")
@@ -109,7 +111,7 @@ class Fit:
 
         Args:
             executor: executor of `concurrent.futures` for the starts; the result is bit-identical.
-            progress: called with a text and the completed fraction.
+            progress: called with a text and the completed fraction, 1.0 after all starts.
             throw: raise `SolveError` if the result is unusable; its `partial` is the result.
 
         Raises:
@@ -122,15 +124,18 @@ class Fit:
         if progress is not None:
             checks.function("Fit: progress", progress, "a function of a text and a fraction")
         asked = self.prepared()
-        made = asked.task
+        made = asked.task.part
         first = scattered(made.unknowns, asked.centre, self.starts, self.seed)
         starts = many_starts(made, first, executor, progress, self.evaluations)
         end, ends = best_of(starts), tried(made, starts)
+        whole, asked = asked, asked._replace(task=made)
         live = self._live(asked, end.noise, end.w)
         if isinstance(live, str):
             message = f"Fit: {asked.subject.name}: no start has residuals: {live}"
             raise SolveError(message, Status.NOT_FINITE)
-        for again in (self._whitened, self._delayed):
+        tell: Progress = progress or (lambda text, share: None)
+        for again in (partial(self._completed, whole), self._whitened, self._delayed):
+            tell("all rows, noise of the path, dead times", 1.0)
             if end.status is Status.INTERRUPTED or (found := again(asked, live)) is None:
                 continue
             asked, live, end = found
@@ -139,6 +144,7 @@ class Fit:
                 evaluations=ends[0].evaluations + end.evaluations, values=live.values,
             )  # fmt: skip
             ends = (best, *ends[1:])
+        tell("verdict and intervals", 1.0)
         verdict = judge(live.minimum.short, asked.findings, live.levels)
         gain = remaining(live.task, live.point) / max(live.point.cost, 1e-300)
         status, message = _status(asked, end, verdict, gain)
@@ -151,6 +157,12 @@ class Fit:
         if throw and not status.ok:
             raise SolveError(f"Fit: {asked.subject.name}: {result.message}", status, result)
         return result
+
+    def _completed(self, whole: "Prepared", asked: "Prepared", live: Live) -> "Refined | None":
+        """Fit all rows, starting at the values fitted to part of them."""
+        if asked.task is whole.task:
+            return None
+        return self._refined(whole, live.point.w, self.evaluations)
 
     def _whitened(self, asked: "Prepared", live: Live) -> "Refined | None":
         """Fit again with the noise of the path linearised at the values of a first fit."""
@@ -179,7 +191,12 @@ class Fit:
             return None
         made = replace(live.task, residuals=residuals, unknowns=unknowns)
         changed = asked._replace(kind=kind, task=made)
-        found = self._refined(changed, unknowns.of(live.values), min(self.evaluations, QUICK))
+        start, most, found = unknowns.of(live.values), min(self.evaluations, QUICK), None
+        if live.task.rows > PART:  # small dead times do not need an interpolated force
+            small = replace(made, residuals=expanded(residuals))
+            found = self._refined(changed._replace(task=small), start, most)
+        if found is None or found.live.dead_time > SMALL * step:
+            found = self._refined(changed, start, most)
         if found is None or not found.end.status.ok or found.live.minimum.held.any():
             return None
         lost, before = (one.minimum.sandwich.null.shape[1] for one in (found.live, live))
@@ -187,7 +204,7 @@ class Fit:
 
     def _refined(self, asked: "Prepared", w: Array, evaluations: int) -> "Refined | None":
         """Solve a changed problem from the coordinates `w`; return None without residuals."""
-        end = descend(asked.task, w, 0, evaluations)
+        end = descend(asked.task.reduced(w), w, 0, evaluations)
         live = self._live(asked, end.noise, end.w)
         return None if isinstance(live, str) else Refined(asked, live, end)
 

@@ -36,10 +36,10 @@ from identification.fit import Fit
 from identification.residuals.inverse import InverseDynamics
 from identification.result.fitted import Fitted
 from identification.result.live import Kind
-from identification.result.outcome import columns
 from identification.solving.many_starts import Progress
 from symfric.foundation import checks
-from symfric.foundation.shown import Shown, Table
+from symfric.foundation.files import json_data
+from symfric.foundation.shown import Shown, Table, columns
 from symfric.foundation.status import SolveError, Status
 from symfric.laws import Law
 from symfric.laws.composed.populations import cost
@@ -111,9 +111,7 @@ class Row:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, with None for non-finite numbers."""
         named = {TITLES.get(f.name, f.name): getattr(self, f.name) for f in fields(self)[:-1]}
-        return {
-            n: None if isinstance(v, float) and not isfinite(v) else v for n, v in named.items()
-        }
+        return json_data(named)
 
 
 @final

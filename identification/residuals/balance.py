@@ -1,7 +1,7 @@
 """Force balance of any model with the measured motion inserted."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import casadi as ca
 import numpy as np
@@ -232,6 +232,16 @@ class Motion(NamedTuple):
         first, count = self.w[:, 0].copy(), len(self.velocities)
         first[count : 2 * count] = [moving_start(v) for v in self.w[count : 2 * count]]
         return first
+
+    def shifted(self, delay: float) -> tuple[Array, Array]:
+        """Return `w` with the inputs u(t - delay), and du/dt at t - delay, shape (inputs, n)."""
+        from scipy.interpolate import CubicSpline  # noqa: PLC0415 (slow to import)
+
+        spline: Any = CubicSpline(self.t, self.w[self.inputs], axis=1)
+        at = np.clip(self.t - delay, self.t[0], self.t[-1])
+        w = self.w.copy()
+        w[self.inputs] = spline(at)
+        return w, np.asarray(spline(at, 1))
 
 
 def measure(

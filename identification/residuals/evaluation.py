@@ -104,6 +104,14 @@ class Blocks:
         """True if the residuals are linear in the values; they are then evaluated once."""
         return False
 
+    @property
+    def part(self) -> "Blocks | None":
+        """Residuals of evenly spaced blocks of long records; None for short ones and with states.
+
+        A fit searches there first.
+        """
+        return None
+
     @abstractmethod
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
         """Yield residuals and their derivatives by all values for each block, or a message.
@@ -140,3 +148,48 @@ class Blocks:
             found.append(block)
         r, J = zip(*found, strict=True)
         return Evaluation(np.concatenate(r), np.vstack(J))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Extended:
+    """Residuals with further unknowns in which they are linear, r(p) + C q.
+
+    Attributes:
+        residuals: r.
+        more: the unknowns q.
+        columns: C, shape (rows, unknowns).
+    """
+
+    residuals: Blocks
+    more: tuple[Unknown, ...]
+    columns: Array
+
+    @property
+    def own(self) -> tuple[Unknown, ...]:
+        """Unknowns of the data set."""
+        return (*self.residuals.own, *self.more)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the values."""
+        return (*self.residuals.names, *(unknown.name for unknown in self.more))
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """Channels of all rows."""
+        return self.residuals.channels
+
+    @property
+    def linear(self) -> bool:
+        """True if the residuals are linear in all values."""
+        return self.residuals.linear
+
+    def at(self, values: Array) -> Evaluation | str:
+        """Return residuals and derivatives, or a message."""
+        count = len(self.residuals.names)
+        found = self.residuals.at(values[:count])
+        if isinstance(found, str):
+            return found
+        r = found.r + np.einsum("ij,j->i", self.columns, values[count:])
+        return Evaluation(r, np.hstack([found.J, self.columns]))

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.data.differentiate import levels, uncertain
 from identification.data.filters import Decimation, Filter, fourth_order_difference
+from identification.data.record import LONG, blocks
 from identification.residuals.balance import (
     Balance,
     Mask,
@@ -32,8 +33,10 @@ from symfric.model import Model
 WHERE = "InverseDynamics"
 RANK = 1e-9
 """Smallest nonzero singular value of sensitivities, relative to the largest."""
+PART = 20_000
+"""Number of equations of a long record in which a fit searches first."""
 FEWEST, ENOUGH = 10, 100
-"""Smallest number of equations of a signal, and target number if the filter is adapted."""
+"""Least number of equations of a signal, and target number if the filter is adapted."""
 
 
 @final
@@ -89,10 +92,8 @@ class InverseDynamics:
     noise: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("force", "x"):
+        for name in ("force", "x") if self.v is None else ("force", "x", "v"):
             checks.text(f"{WHERE}: {name}", getattr(self, name), "the name of a channel")
-        if self.v is not None:
-            checks.text(f"{WHERE}: v", self.v, "the name of a channel")
         if self.filter is not None:
             checks.kind(f"{WHERE}: filter", self.filter, Filter, "a filter, such as Filter(100.0)")
         levels(f"{WHERE}: noise", self.noise)
@@ -130,8 +131,8 @@ class InverseDynamics:
             called["v"] = self.v
         noise = self.noise or {}
         motions = [measure(model, found, record, called, self.filter, noise) for record in data]
-        seen = np.hstack([motion.w for motion in motions])
-        made = balance(model, subject.names, found, seen, where)
+        seen = [motion.w[:, :: 1 + motion.t.size // LONG] for motion in motions]
+        made = balance(model, subject.names, found, np.hstack(seen), where)
         p = np.array([float(v.start) for v in model.p if v.name in subject.names])
         own = [
             preload(f"preload.{n}[{k}]" if len(made.preloads) > 1 else f"preload[{k}]", v)
@@ -140,9 +141,9 @@ class InverseDynamics:
             if n in made.preloads
         ]
         pieces = tuple(_piece(made, motion, model, p, self.filter is None) for motion in motions)
-        channels = tuple(_channels(made.rows, pieces))
-        parts = made.equations, made.rows, pieces, made.slopes, len(made.preloads), made.loaded
-        rows = InverseRows(subject.names, tuple(own), channels, *parts)
+        first = subject.names, tuple(own), tuple(_channels(made.rows, pieces))
+        more = made.equations, made.rows, pieces, made.slopes, len(made.preloads), made.loaded
+        rows = InverseRows(*first, *more)
         return rows.delayed(*self.dead_time) if isinstance(self.dead_time, tuple) else rows
 
 
@@ -171,6 +172,35 @@ class Piece:
         motion, taps = self.motion, self.decimation.taps
         each = [u.errors(motion.filter, motion.step, taps) for u in motion.velocities]
         return np.ravel(np.array(each).T)
+
+    @property
+    def halved(self) -> "Piece":
+        """Equations of at least two samples, without frequencies that interpolation attenuates."""
+        n, two = self.decimation.samples, Decimation(self.decimation.samples, 2)
+        if self.decimation.factor > 1 or not two.rows:
+            return self
+        touched = (two.touched(~np.isin(np.arange(n), k)) for k in self.kept)
+        motion = self.motion._replace(filter=replace(self.motion.filter, decimation=2))
+        found = Piece(motion, two, tuple(np.flatnonzero(~some) for some in touched))
+        return self if found.fewest < FEWEST else found
+
+    @property
+    def part(self) -> "Piece":
+        """Evenly spaced blocks of the equations of a long record of static laws, as one piece."""
+        motion, factor, cut = self.motion, self.decimation.factor, self.motion.inside.start
+        more = -(-self.decimation.taps.size // factor)  # rows whose windows leave a block
+        each = blocks(self.decimation.rows - more, PART)
+        if len(each) == 1:
+            return self
+        size = each[0].stop - each[0].start + more
+        samples = [cut + b.start * factor + np.arange(size * factor) for b in each]
+        rows = np.concatenate([np.arange(cut), *samples, np.arange(cut)])
+        new = np.full(self.decimation.rows, -1)
+        for i, b in enumerate(each):
+            new[b] = i * size + np.arange(b.stop - b.start)
+        kept = tuple(found[found >= 0] for found in (new[k] for k in self.kept))
+        motion = motion._replace(t=motion.t[rows], w=motion.w[:, rows])
+        return Piece(motion, Decimation(rows.size - 2 * cut, factor), kept)
 
     @property
     def fewest(self) -> int:
@@ -217,8 +247,7 @@ def _decimated(rows: Sequence[Row], motion: Motion, slow: Sequence[Mask]) -> Pie
     decimation = Decimation(n, motion.filter.decimation)
     kept: list[NDArray[np.int64]] = []
     for row in rows:
-        masks = [slow[k][motion.inside] for k in row.slips]
-        unsure = np.any([np.zeros(n, bool), *masks], axis=0)
+        unsure = np.any([np.zeros(n, bool), *(slow[k][motion.inside] for k in row.slips)], axis=0)
         touched = decimation.touched(unsure) if decimation.rows else np.ones(0, bool)
         kept.append(np.flatnonzero(~touched))
     return Piece(motion, decimation, tuple(kept))
@@ -226,10 +255,8 @@ def _decimated(rows: Sequence[Row], motion: Motion, slow: Sequence[Mask]) -> Pie
 
 def _slips(made: Balance, motion: Motion, model: Model, p: Array) -> dict[str, Array]:
     """Return the sliding velocity of each contact with bristles, shape (n,)."""
-    if not made.preloads:
-        return {}
-    v = Columns(made.slips)([motion.w.T, same(p, motion.t.size)])[0].T
-    return dict(zip((c.name for c in model.contacts), v, strict=True))
+    found = Columns(made.slips)([motion.w.T, same(p, motion.t.size)]) if made.preloads else [[]]
+    return {c.name: v for c, v in zip(model.contacts, np.transpose(found[0]), strict=False)}
 
 
 def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:
@@ -301,16 +328,19 @@ class InverseRows(Blocks):
             Unknown(f"{DEAD_TIME}[{k}]", "s", first, low, high, part.motion.step, nuisance=True)
             for k, part in enumerate(self.pieces)
         )
-        return replace(self, own=(*self.own, *late))
+        pieces = tuple(part.halved for part in self.pieces)
+        channels = tuple(_channels(self.rows, pieces))
+        return replace(self, own=(*self.own, *late), pieces=pieces, channels=channels)
 
     def rates(self) -> Array:
         """Return the derivatives of the residuals by dead times of the records, (rows, records)."""
         found = np.zeros((self.channels[-1].rows.stop, len(self.pieces)))
+        signals = [row.signal for row in self.rows]
         for channel in self.channels:
-            part, motion = self.pieces[channel.record], self.pieces[channel.record].motion
-            k = [row.signal for row in self.rows].index(channel.signal)
+            part, k = self.pieces[channel.record], signals.index(channel.signal)
             if (i := self.rows[k].input) is not None:
-                rate = fourth_order_difference(motion.w[motion.inputs][i], motion.step)
+                force = part.motion.w[part.motion.inputs][i]
+                rate = fourth_order_difference(force, part.motion.step)
                 found[channel.rows, channel.record] = part.equations(k, rate[:, None])[:, 0]
         return found
 
@@ -318,6 +348,14 @@ class InverseRows(Blocks):
     def linear(self) -> bool:
         """True if the force is linear in the parameters, and there is no dead time."""
         return self.sampled.linear and not self.own
+
+    @property
+    def part(self) -> "InverseRows | None":
+        """Residuals of blocks of long records; None for short ones and with states."""
+        if self.own or self.sampled.sizes[1] or self.channels[-1].rows.stop <= LONG:
+            return None
+        pieces = tuple(piece.part for piece in self.pieces)
+        return replace(self, pieces=pieces, channels=tuple(_channels(self.rows, pieces)))
 
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
         """Yield the residuals of each balance of each record.
@@ -328,7 +366,7 @@ class InverseRows(Blocks):
         shares, late = np.split(own, [count * len(self.pieces)])
         for number, part in enumerate(self.pieces):
             motion, mine = part.motion, slice(number * count, (number + 1) * count)
-            w, rates = _shifted(motion, float(late[number])) if late.size else (motion.w, motion.w)
+            w, rates = motion.shifted(float(late[number])) if late.size else (motion.w, motion.w)
             path = self.sampled.along(w, motion.step, np.append(p, shares[mine]), motion.begin)
             if isinstance(path, str):
                 yield f"data '{motion.name}': {path}"
@@ -347,25 +385,16 @@ class InverseRows(Blocks):
         if self.slopes is None or not p.size:
             return np.zeros(len(J))
         motion = part.motion
-        at = part.decimation.centres(np.arange(motion.t.size)[motion.inside])[part.kept[k]]
+        kept = part.kept[k]
+        at = part.decimation.centres(np.arange(motion.t.size)[motion.inside])[kept]
+        at = at[:: 1 + at.size // LONG]
         found = self.slopes.along(motion.w[:, at], motion.step, p)
         if isinstance(found, str):
             return np.zeros(len(J))
         count = part.errors.size
         place = slice(k * count, (k + 1) * count)
         c = np.einsum("ij,j,ijp->p", found.rows[:, place], part.errors**2, found.slopes[:, place])
-        c = np.append(c, np.zeros(J.shape[1] - p.size))
-        U, s, Vt = np.linalg.svd(J, full_matrices=False)
-        kept = s > RANK * s.max(initial=1e-300)
-        return U[:, kept] @ ((Vt[kept] @ c) / s[kept])
-
-
-def _shifted(motion: Motion, delay: float) -> tuple[Array, Array]:
-    """Return `w` with the acting force u(t - delay), and du/dt at t - delay, shape (inputs, n)."""
-    from scipy.interpolate import CubicSpline  # noqa: PLC0415 (slow to import)
-
-    spline: Any = CubicSpline(motion.t, motion.w[motion.inputs], axis=1)
-    at = np.clip(motion.t - delay, motion.t[0], motion.t[-1])
-    w = motion.w.copy()
-    w[motion.inputs] = spline(at)
-    return w, np.asarray(spline(at, 1))
+        c = np.append(c * (kept.size / at.size), np.zeros(J.shape[1] - p.size))
+        _, s, Vt = np.linalg.svd(np.linalg.qr(J, mode="r"))
+        axes = Vt[s > RANK * s.max(initial=1e-300)]
+        return J @ (axes.T @ (axes @ c / s[: len(axes)] ** 2))

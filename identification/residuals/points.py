@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.data.differentiate import levels
 from identification.data.path import SmoothPath, smooth_path
-from identification.data.record import Record
+from identification.data.record import LONG, Record
 from identification.residuals.evaluation import Array, Blocks, Channel
 from identification.residuals.path_noise import PathNoise
 from identification.residuals.sampled import (
@@ -208,6 +208,22 @@ class PointRows(Blocks):
     def linear(self) -> bool:
         """True if the law is linear in its parameters."""
         return self.slides.linear and (self.breaks is None or self.breaks.linear)
+
+    @property
+    def part(self) -> "PointRows | None":
+        """Residuals of part of the points of long records; None for short ones and over time."""
+        if self.imposed or self.channels[-1].rows.stop <= LONG:
+            return None
+        tables, channels, first = list[Table](), list[Channel](), 0
+        for table, channel in zip(self.tables, self.channels, strict=True):
+            every = slice(None, None, 1 + table.F.size // LONG)
+            F, weights, rest = table.F[every], table.weights[every], table.rest[every]
+            thin = Table(None, table.w[:, every], F, weights, rest, table.errors[every])
+            rows = slice(first, first := first + thin.F.size)
+            t, measured = channel.t[every], channel.measured[every]
+            tables.append(thin)
+            channels.append(replace(channel, rows=rows, t=t, measured=measured, ordered=False))
+        return replace(self, tables=tuple(tables), channels=tuple(channels))
 
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
         """Yield the residuals of each record, and their derivatives."""

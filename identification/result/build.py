@@ -2,7 +2,7 @@
 
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass, replace
 from math import inf, isfinite
 from typing import Any
 
@@ -37,7 +37,7 @@ from symfric.foundation.status import Status
 from symfric.foundation.units import turned
 from symfric.laws.composed.populations import steady_force
 from symfric.model import Model
-from symfric.scenes import Drive
+from symfric.scenes import Drive, Scene
 
 SHOWN = 6
 """Size of the longest array that is written out."""
@@ -93,6 +93,8 @@ def _rule(rule: Range | Above | Tied) -> str:
 
 SPEEDS = 20
 """Number of measured speeds at which the law is evaluated, in each direction."""
+STEP = 1e-2
+"""Step of the differences for the band of a curve, in standard errors."""
 MOST = 40
 """Number of values above which correlations with start values of records are left out."""
 
@@ -249,7 +251,7 @@ def _curve(live: Live) -> Curve | None:
     """Return friction over velocity of a law in a drive or fitted to points; None for others."""
     law, machine, data = live.closed.law, live.closed.scene, live.data
     if isinstance(machine, Drive):
-        return of_drive(machine, data.records)
+        return _banded(live, of_drive(machine, data.records), float(machine.N))
     load = load_of(live.subject)
     if law is None or load is None:
         return None
@@ -257,7 +259,41 @@ def _curve(live: Live) -> Curve | None:
         data[c.record].name: (c.regressors.get("v", c.t), c.measured)
         for c in live.task.residuals.channels
     }
-    return of_points(law, load, points, data.rotary)
+    return _banded(live, of_points(law, load, points, data.rotary), load)
+
+
+def _banded(live: Live, curve: Curve, N: float) -> Curve:
+    """Return a curve with its 95 % band, without it if a value of the law has no interval.
+
+    half width t sqrt(g' C g),   g = dF/dp by central differences of part of a standard error
+    """
+    from scipy.special import stdtrit  # noqa: PLC0415  (slow to import)
+
+    found = live.covariance
+    errors = dict(zip(found.names, found.standard_errors, strict=True))
+    values = {name: live.values[name] for name in live.subject.names}
+    moving = [n for n in found.names if n in values and n not in found.at_bound]
+
+    def force(name: str, step: float) -> Array:
+        law = live.subject.guard(values | {name: values[name] + step})
+        law = law.law if isinstance(law, Scene) else law
+        return curve.law.y if law is None else steady_force(law, curve.law.t, N)
+
+    slopes = dict[str, Array]()
+    try:
+        for name in moving:
+            step = STEP * (errors[name] if errors[name] > 0 else abs(values[name]) or 1.0)
+            slope = (force(name, step) - force(name, -step)) / (2 * step)
+            if slope.any():
+                slopes[name] = slope
+    except ValueError:  # a limit of the law is nearer than a step
+        return curve
+    if not slopes:
+        return curve
+    at = [found.names.index(name) for name in slopes]
+    G, C = np.column_stack([*slopes.values()]), found.matrix[np.ix_(at, at)]
+    half = stdtrit(found.freedom[at].min(), 0.975) * np.sqrt(np.einsum("ij,jk,ik->i", G, C, G))
+    return replace(curve, half=half) if np.isfinite(half).all() else curve
 
 
 def _made(call: str, kind: str) -> dict[str, str]:

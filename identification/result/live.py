@@ -9,9 +9,8 @@ from typing import Protocol, final
 import numpy as np
 
 from identification.data.dataset import Dataset
-from identification.data.record import LONG
-from identification.residuals.evaluation import Array, Residuals
-from identification.residuals.inverse import InverseDynamics, InverseRows
+from identification.residuals.evaluation import DEAD_TIME, Array, Extended, Residuals
+from identification.residuals.inverse import PART, InverseDynamics, InverseRows
 from identification.result.series import Errors, error
 from identification.solving.many_starts import best_of, many_starts
 from identification.solving.task import Point, Task, triangle
@@ -88,8 +87,12 @@ class Live:
     def covariance(self) -> Covariance:
         """Covariance of the values at the minimum, with the intervals of nonlinear models."""
         linear = covariance(self.minimum, self.levels)
-        steps = steps_of(self.task, self.point, linear)
-        return assured(self.task, self.point, linear, steps) if steps else linear
+        whole = part = (self.task, self.point)
+        if (some := self.task.part) is not self.task:
+            there = some.at(self.point.w)
+            part = whole if isinstance(there, str) else (some, there)
+        steps = steps_of(*part, linear)
+        return assured(whole, part, linear, steps) if steps else linear
 
     @cached_property
     def closed(self) -> Closed:
@@ -101,6 +104,12 @@ class Live:
         """Free parameters, start values and dead times by name."""
         names = self.task.residuals.names
         return dict(zip(names, self.point.values.tolist(), strict=True))
+
+    @property
+    def dead_time(self) -> float:
+        """Largest fitted dead time [s], of either sign."""
+        late = [abs(x) for n, x in self.values.items() if n.startswith(DEAD_TIME)]
+        return max(late, default=0.0)
 
     def errors_on(self, data: Dataset) -> Errors:
         """Return the errors of the parameters on other data; see `left_on`."""
@@ -143,7 +152,7 @@ def matters(live: Live, rows: InverseRows) -> bool:
         live, rows: fit without dead times, and its residuals.
     """
     point, count = live.point, live.point.w.size
-    if live.task.rows <= LONG or len(rows.pieces) > FEW:
+    if live.task.rows <= PART or len(rows.pieces) > FEW:
         return True
     R = triangle(np.column_stack([point.J, rows.rates() / point.sigma[:, None], point.r]))
     inverse = np.linalg.pinv(R[:-1, :-1])
@@ -152,8 +161,16 @@ def matters(live: Live, rows: InverseRows) -> bool:
     return bool((sure[:count] > SHIFTED).any())
 
 
+def expanded(rows: InverseRows) -> Extended:
+    """Return the residuals `InverseRows.delayed`, linear in dead times far below a sample."""
+    count = len(rows.own) - len(rows.pieces)
+    plain = replace(rows, own=rows.own[:count])
+    return Extended(plain, rows.own[count:], plain.rates())
+
+
 def _settled(kind: Kind, residuals: Residuals, data: Dataset) -> Kind:
     """Return `kind` with the filter chosen for the data of the fit, for equal filtering."""
+    residuals = residuals.residuals if isinstance(residuals, Extended) else residuals
     if not isinstance(kind, InverseDynamics) or not isinstance(residuals, InverseRows):
         return kind
     if kind.filter is not None:

@@ -1,8 +1,7 @@
 """Fields of a fit and their report as text: verdict first, then estimates with uncertainty."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import zip_longest
 from math import floor, isfinite, log10
 from textwrap import wrap
 
@@ -12,6 +11,7 @@ from identification.result.live import Asked, Live
 from identification.result.series import Curve, Errors, Estimate, Series, Tried
 from identification.verdict.judge import Verdict
 from symfric.foundation.parameters import Parametric
+from symfric.foundation.shown import columns
 from symfric.foundation.status import Status
 from symfric.foundation.storable import agree
 from symfric.laws import Law
@@ -172,18 +172,6 @@ def correlated(fit: Outcome) -> list[tuple[str, str, float]]:
         if isfinite(fit.correlation[i, j]) and abs(fit.correlation[i, j]) > CLOSE
     ]
     return sorted(pairs, key=lambda pair: -abs(pair[2]))
-
-
-def columns(rows: Iterable[Sequence[str]], right: Sequence[int] = ()) -> Iterator[str]:
-    """Yield lines of padded columns; the columns in `right` are right-aligned."""
-    lines = [list(row) for row in rows]
-    widths = [max(map(len, column)) for column in zip_longest(*lines, fillvalue="")]
-    for line in lines:
-        cells = [
-            cell.rjust(w) if j in right else cell.ljust(w)
-            for j, (cell, w) in enumerate(zip(line, widths, strict=False))
-        ]
-        yield "  ".join(cells).rstrip()
 
 
 def _indented(texts: Iterable[str]) -> Iterator[str]:

@@ -86,9 +86,11 @@ def friction(curve: Curve, name: str) -> str:
     dots = [Dots("measured sample", line.t, line.y) for line in curve.measured.values()]
     low, high = limits(curve)
     x = around("v", curve.v_unit, [curve.law.t, *(line.t for line in curve.measured.values())])
+    sides = (-1.0, 1.0) if curve.half.size else ()
     marks: list[Mark] = [
         *dots,
         Path("law", curve.law.t, curve.law.y, name),
+        *(Path("limit", curve.law.t, curve.law.y + side * curve.half, "95 %") for side in sides),
         Dots("measured", np.zeros(0), np.zeros(0), curve.says),
     ]
     says = f"friction of {name} over velocity, {float(curve.law.y.min()):.4g} to "

@@ -63,6 +63,9 @@ def _curve(axis: Axes, curve: Curve, name: str) -> None:
         axis.plot(line.t, line.y, ".", color="0.6", ms=8.0, mew=0, alpha=0.6, rasterized=True)
     axis.plot([], [], ".", color="0.6", label=curve.says)
     axis.plot(curve.law.t, curve.law.y, color=colour(1), lw=1.2, label=name)
+    if curve.half.size:
+        ends = curve.law.y - curve.half, curve.law.y + curve.half
+        axis.fill_between(curve.law.t, *ends, color=colour(1), alpha=0.25, lw=0, label="95 %")
     low, high = limits(curve)
     axis.set_ylim(low, high)
     axis.set_xlabel(f"v [{curve.v_unit}]")

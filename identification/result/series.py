@@ -1,7 +1,7 @@
 """Parts of a result: estimates, errors, signals for plots, and friction over velocity."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from math import inf, nan
 from typing import final
@@ -250,6 +250,8 @@ class Curve:
         law: force of the fitted law in steady sliding over velocity.
         measured: record -> points (velocity, friction).
         says: origin of the points.
+        half: half width of the pointwise 95 % band of the law, shape of its force; empty if a
+            parameter of the law has no interval.
     """
 
     v_unit: str
@@ -257,6 +259,7 @@ class Curve:
     law: Line
     measured: dict[str, Line]
     says: str
+    half: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def of_points(law: Law, N: float, points: dict[str, tuple[Array, Array]], turning: bool) -> Curve:

@@ -233,6 +233,13 @@ class Task:
         found = Triangles.of(self.residuals, self.unknowns.values(self.unknowns.inside(w)))
         return self if isinstance(found, str) else replace(self, residuals=found)
 
+    @property
+    def part(self) -> "Task":
+        """The same problem on part of the rows of long records, if it is not linear."""
+        linear = getattr(self.residuals, "linear", False)
+        found = None if linear else getattr(self.residuals, "part", None)
+        return self if found is None else replace(self, residuals=found)
+
     def with_noise(self, noise: Mapping[str, float]) -> "Task":
         """Return the problem with other noise levels."""
         return replace(self, noise=dict(noise))

@@ -13,8 +13,8 @@ from identification.unknowns.roles import is_scale, parts, velocity
 from symfric.foundation import checks
 from symfric.foundation.parameters import parameters, symbolise
 from symfric.foundation.variable import symbols_of
-from symfric.laws.base import smooth
 from symfric.laws.base.law import Law
+from symfric.laws.composed.populations import in_steady_sliding
 
 Array = NDArray[np.float64]
 
@@ -221,7 +221,8 @@ def fit_law(
     if names:  # keep those on which the steady force depends
         model, variables = symbolise(law, *names)
         p = symbols_of(variables)
-        found = ca.which_depends(_steady(model, ca.SX.sym("v"), N), p, 1, False)
+        F = ca.SX(in_steady_sliding(model, ca.SX.sym("v"), N))
+        found = ca.which_depends(F, p, 1, False)
         names = [name for name, depends in zip(names, found, strict=True) if depends]
     if not names:
         return {}
@@ -235,12 +236,6 @@ def fit_law(
         if cost < best and at.apart(at.p(w)[0]):
             best, end = cost, w
     return dict(zip(names, at.p(end)[0].tolist(), strict=True))
-
-
-def _steady(law: Law, v: ca.SX, N: float) -> ca.SX:
-    ahead = smooth.sign(v, 0.0) if law.facts.odd else 1.0
-    given = {i.name: i.steady * ahead for i in law.inputs}
-    return ca.SX(law.force(v, N, law.steady_state(v, N), **given))
 
 
 class _LawFit:
@@ -374,7 +369,7 @@ class _LawFit:
 def _forces(law: Law, p: ca.SX, v: Array, N: float) -> ca.Function:
     """Return a function of the parameters to forces at velocities `v` and their derivatives."""
     speed, at = ca.SX.sym("v"), ca.MX.sym("p", p.numel())
-    F = _steady(law, speed, N)
+    F = ca.SX(in_steady_sliding(law, speed, N))
     one = ca.Function("curve", [speed, p], [F, ca.jacobian(F, p)])
     forces, slopes = one.map(v.size)(ca.DM(v).T, at)
     return ca.Function("curves", [at], [forces.T, ca.reshape(slopes, p.numel(), v.size).T])

@@ -33,20 +33,30 @@ POINTS = 3
 """Approximate number of points of a profile to each side."""
 
 
-def assured(task: Task, point: Point, linear: Covariance, steps: Mapping[str, Array]) -> Covariance:
+Solved = tuple[Task, Point]
+"""A solved problem and its minimum."""
+
+
+def assured(
+    whole: Solved, part: Solved, linear: Covariance, steps: Mapping[str, Array]
+) -> Covariance:
     """Return the covariance with intervals for nonlinear models, without those that are not shown.
 
     Args:
-        task, point: solved task and its minimum.
+        whole: solved task and its minimum.
+        part: the same on part of the rows of long records, which suffices for the linearity and to
+            show a value.
         linear: linear covariance and intervals.
         steps: changes of the coordinates to the ends of the linear intervals, see `steps_of`.
     """
     names = [*steps]
-    bent = {n: [bend(task, point, side * steps[n]) for side in (-1.0, 1.0)] for n in names}
-    walks = {n: Walk(task, point, linear, n) for n in names if max(bent[n]) > LINEAR}
+    bent = {n: [bend(*part, side * steps[n]) for side in (-1.0, 1.0)] for n in names}
+    walks = {n: Walk(*whole, linear, n) for n in names if max(bent[n]) > LINEAR}
     found = linear
     for name, walk in walks.items():
-        there = None if name in found.notes else _elsewhere(point, walk)
+        there = None
+        if name not in found.notes:
+            there = _elsewhere(walk, walk if part is whole else Walk(*part, linear, name))
         found = found if there is None else _without(found, name, there, walk.unknown.unit)
     if found is not linear:
         return found
@@ -55,13 +65,26 @@ def assured(task: Task, point: Point, linear: Covariance, steps: Mapping[str, Ar
     return found
 
 
-def _elsewhere(point: Point, walk: Walk) -> Point | None:
-    """Return a fit with the value at an end of its range that is as good, None without one."""
-    for c in walk.far(DECADES):
-        there = walk.held_at(point.w, c)
-        if not isinstance(there, str) and (there.cost - point.cost) / walk.scale < SHOWN:
+def _elsewhere(whole: Walk, part: Walk) -> Point | None:
+    """Return a fit with the value at an end of its range that is as good, None without one.
+
+    A value that part of the rows show is not tested on all of them.
+    """
+    for c in whole.far(DECADES):
+        there = _as_good(part, whole.point.w, c)
+        if there is not None and part is not whole:
+            there = _as_good(whole, there.w, c)
+        if there is not None:
             return there
     return None
+
+
+def _as_good(walk: Walk, w: Array, c: float) -> Point | None:
+    """Return the fit with the value c, searched from w, if the data do not exclude it."""
+    there = walk.held_at(w, c)
+    if isinstance(there, str) or (there.cost - walk.point.cost) / walk.scale >= SHOWN:
+        return None
+    return there
 
 
 def _profiled(found: Covariance, walk: Walk, name: str, bent: list[float]) -> Covariance:

@@ -42,6 +42,7 @@ from symfric.foundation.graph import coupled
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import at_start, stacked
 from symfric.model import Contact, Model, Output
+from symfric.model.start import rate_of
 from symfric.multibody.applied import MINORS, forward, null_direction
 
 RANK = 1e-11
@@ -212,16 +213,12 @@ def slip_change(model: Model, contact: Contact) -> ca.SX:
         ValueError: the sliding velocity depends on an input or an algebraic variable.
     """
     bare, slip = model.open, contact.slip
-    x, mechanics = bare.vector("x"), bare.holonomic
     if ca.depends_on(slip, ca.vertcat(bare.vector("u"), bare.vector("z"))):
         raise checks.refused(
             f"contact '{contact.name}': slip", "one of states, time and parameters", slip,
             "an input may jump, so the contact cannot stick",
         )  # fmt: skip
-    rate = ca.SX(0, 1) if bare.ode is None else bare.ode
-    if mechanics is not None:
-        rate = ca.vertcat(x[mechanics.n : 2 * mechanics.n], mechanics.a, mechanics.rates)
-    return ca.jtimes(slip, x, rate) + ca.jacobian(slip, bare.t)
+    return rate_of(slip, bare)
 
 
 def nominal_load(model: Model, contact: Contact) -> float:

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any, NamedTuple, final
 
 import casadi as ca
@@ -14,6 +13,7 @@ from ocp.formulation.phase import Array, Span
 from ocp.formulation.problem import Posed, Problem
 from ocp.transcription.schemes import Coefficients, Scheme
 from ocp.transcription.unknowns import Points, SpanPoints
+from symfric.foundation.files import json_data
 from symfric.foundation.parameters import check_names
 from symfric.foundation.storable import agree
 
@@ -97,11 +97,8 @@ class Motion:
 
     def to_dict(self) -> dict[str, Any]:
         """Return times and signals as plain data, with None for numbers that are not finite."""
-        signals = {
-            name: [v if isfinite(v) else None for v in row.tolist()]
-            for name, row in self.signals.items()
-        }
-        return {"scenario": self.name, "t": self.t.tolist(), "signals": signals}
+        signals = {name: row.tolist() for name, row in self.signals.items()}
+        return json_data({"scenario": self.name, "t": self.t.tolist(), "signals": signals})
 
     def __getitem__(self, name: str) -> Array:
         if name == "t":

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
@@ -20,7 +19,7 @@ from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.unknowns import Points
 from symfric.foundation import packed
-from symfric.foundation.files import write_table, write_text
+from symfric.foundation.files import json_data, write_table, write_text
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Shown
 from symfric.foundation.status import Status
@@ -355,12 +354,12 @@ class Solution(packed.Portable):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the solution as plain data, with None for numbers that are not finite."""
-        return {
+        return json_data({
             "scene": self.problem.name,
             "status": self.status.name,
             "message": self.message,
             "T": self.T,
-            "cost": self.cost if isfinite(self.cost) else None,
+            "cost": self.cost,
             "chosen": dict(self.chosen),
             "soft": {name: asdict(penalty) for name, penalty in self.soft.items()},
             "phases": [asdict(phase) for phase in self.phases],
@@ -370,7 +369,7 @@ class Solution(packed.Portable):
             "statistics": asdict(self.statistics),
             "units": {"t": "s", **self.units},
             "motions": [motion.to_dict() for motion in self.motions],
-        }
+        })  # fmt: skip
 
     def to_json(self, path: str | Path) -> None:
         """Write the data of `to_dict` as JSON."""

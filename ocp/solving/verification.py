@@ -5,6 +5,7 @@ from math import isfinite
 from typing import Any, final
 
 from ocp.formulation.phase import Array
+from symfric.foundation.files import json_data
 from symfric.foundation.shown import brief, spaced
 from symfric.foundation.status import Status
 from symfric.foundation.storable import agree
@@ -178,23 +179,19 @@ class Verification:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the verification as plain data, with None for numbers that are not finite."""
-        return {
+        return json_data({
             "ok": self.ok,
             "tolerance": self.tolerance,
             "rtol": self.rtol,
             "sentence": self.sentence,
-            "cost": _plain(self.cost),
-            "growth": _plain(self.growth),
-            "restarts": list(self.restarts),
+            "cost": self.cost,
+            "growth": self.growth,
+            "restarts": self.restarts,
             "checked": [
                 {"what": m.what, "name": m.name}
-                | {n: _plain(getattr(m, n)) for n in ("time", "value", "wanted", "relative")}
+                | {n: getattr(m, n) for n in ("time", "value", "wanted", "relative")}
                 for m in self.checked
             ],
-            "local_errors": [[_plain(e) for e in errors.tolist()] for errors in self.local_errors],
+            "local_errors": [errors.tolist() for errors in self.local_errors],
             "restarted": None if self.restarted is None else self.restarted.to_dict(),
-        }
-
-
-def _plain(value: float) -> float | None:
-    return float(value) if isfinite(value) else None
+        })  # fmt: skip

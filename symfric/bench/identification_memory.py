@@ -127,7 +127,7 @@ Path = tuple[Array, Array]
 
 def gms(quick: bool) -> Iterator[Found]:
     """Fit laws to a slow and a fast path, and predict another path."""
-    count, thin = (4, 2) if quick else (10, 1)
+    count, thin = (2, 2) if quick else (10, 1)
     law, rng = _true(count), np.random.default_rng(1)
     slow, fast = _slow("hysteresis", 0.02 * thin), _fast(2e-3 * thin)
     seconds, error = timed(partial(_elements, law, slow, rng))

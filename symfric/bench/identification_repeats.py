@@ -19,7 +19,7 @@ from symfric.laws import QuarterCarGeneral, QuarterCarSimple
 from symfric.model import Model
 from symfric.scenes import Drive, QuarterCar
 
-SEEDS, QUICK = 100, 20
+SEEDS, QUICK = 100, 2
 BLOCK = {"m": 2.0, "mu_d": 1.0, "sigma_2": 0.8}
 """True parameters of the simulated motion."""
 POSITION, VELOCITY = 1e-4, 0.2
@@ -73,7 +73,7 @@ def _fit_block(**signals: Array) -> Fitted:
 
 # ---- distant starts ----
 
-FAR_SEEDS, FAR_QUICK = 20, 4
+FAR_SEEDS, FAR_QUICK = 20, 1
 NEAR, ERRORS = 0.05, 5.0
 """Largest relative error, and largest error in standard errors, of a parameter that was found."""
 HYSTERESIS = {"m": 2.0, "c": 10.0, "k": 5e4, "alpha": 5e4, "beta": 800.0, "gamma": 1100.0}

@@ -20,6 +20,7 @@ from symfric.foundation.checks import kind
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import CompileError, Compiler, find_compiler, missing_compiler
+from symfric.foundation.shown import columns
 
 STEPS = 20_000
 FEWER = 4000
@@ -139,9 +140,7 @@ class Verification:
             return head
         rows = [("real", "steps", "warnings", "bits", "error", "of", "ties", "foreign symbols")]
         rows += [check.row for check in self.checks]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
-        return "\n".join([head, *lines])
+        return "\n".join([head, *columns(rows)])
 
 
 VERIFIED = "verified"

@@ -5,10 +5,11 @@ In HTML, text from users is escaped, images are embedded, and there are no scrip
 
 from abc import ABC, abstractmethod
 from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from html import escape
 from io import BytesIO
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, ClassVar, cast, final
 
 import numpy as np
@@ -148,18 +149,24 @@ def among(names: Iterable[str], most: int = 8) -> str:
     return ", ".join(every[:most]) + more
 
 
+def columns(rows: Iterable[Sequence[str]], right: Sequence[int] = ()) -> Iterator[str]:
+    """Yield lines of padded columns; the columns in `right` are right-aligned."""
+    lines = [list(row) for row in rows]
+    widths = [max(map(len, column)) for column in zip_longest(*lines, fillvalue="")]
+    for line in lines:
+        cells = [
+            cell.rjust(w) if j in right else cell.ljust(w)
+            for j, (cell, w) in enumerate(zip(line, widths, strict=False))
+        ]
+        yield "  ".join(cells).rstrip()
+
+
 def _rows(table: Table, most: int) -> list[str]:
     """Return the table as at most `most` aligned lines."""
     rows, lines = list(table.rows), [table.header] if any(table.header) else []
     room = most - len(lines)
     shown = rows if len(rows) <= room else rows[: max(0, room - 1)]
-    lines += shown
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)] if lines else []
-    found: list[str] = []
-    for line in lines:
-        cells = enumerate(zip(line, widths, strict=True))
-        justified = (s.rjust(w) if j in table.numbers else s.ljust(w) for j, (s, w) in cells)
-        found.append("  ".join(justified))
+    found = list(columns([*lines, *shown], table.numbers))
     left = [row[0] for row in rows[len(shown) :]]
     if left:
         found.append(table.rest.format(n=len(left), names=", ".join(left)))

@@ -35,7 +35,7 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model.contact import APPLIED, Contact, Variables
 from symfric.model.parts import Event, Monitor, Output
-from symfric.model.start import System
+from symfric.model.start import System, rate_of
 
 STICKS = 0.5
 """Absolute value of a mode below which a contact sticks. Modes are -1, 0 or 1, except for
@@ -157,10 +157,10 @@ def _applied(i: int, contacts: tuple[Contact, ...], model: System) -> ca.SX:
 
 def _change(c: Contact, model: System) -> ca.SX:
     """Return the rate of the sliding velocity of a contact, which must depend on states only."""
-    slip, ode = ca.SX(c.slip), ca.SX(0, 1) if model.ode is None else model.ode
+    slip = ca.SX(c.slip)
     if ca.depends_on(slip, ca.vertcat(symbols_of(model.z), symbols_of(model.u))):
         raise _refused(c, "a sliding velocity without inputs, whose rates are unknown")
-    return ca.jtimes(slip, symbols_of(model.x), ode) + ca.jacobian(slip, model.t)
+    return rate_of(slip, model)
 
 
 def _row(c: Contact, model: System) -> ca.SX:

@@ -207,3 +207,15 @@ def accelerations(model: System) -> dict[str, Output]:
         unit = model.x[r].unit and per_second(model.x[r].unit)
         found[f"{v.name}_acc"] = Output(model.ode[r], unit, f"acceleration of {v.name}")
     return found
+
+
+def rate_of(expression: ca.SX, model: System) -> ca.SX:
+    """Return the time derivative of an expression of states, parameters and time.
+
+    For a mechanism it depends on the accelerations `holonomic.a`.
+    """
+    x, mechanics = symbols_of(model.x), model.holonomic
+    rates = ca.SX(0, 1) if model.ode is None else model.ode
+    if mechanics is not None:
+        rates = ca.vertcat(x[mechanics.n : 2 * mechanics.n], mechanics.a, mechanics.rates)
+    return ca.jtimes(expression, x, rates) + ca.jacobian(expression, model.t)

@@ -31,8 +31,9 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array, evaluate
 from symfric.foundation.variable import stacked
-from symfric.model import Contact, Model
+from symfric.model import Model
 from symfric.model.contact import APPLIED, Switching, switching
+from symfric.model.start import rate_of
 
 Solve = Callable[[Array], Array]
 """Unknowns y with new modes -> y with consistent algebraic unknowns; may raise ValueError."""
@@ -44,15 +45,6 @@ MANY = 8
 """Largest number of contacts without velocity whose modes are tried in all combinations."""
 UP, DOWN, CHANGE, SLIP = range(4)
 """Columns of a row of a contact: margins to both levels, rate of the slip, and the slip."""
-
-
-def slip_rate(model: Model, contact: Contact) -> ca.SX:
-    """Return the rate of a sliding velocity, which depends on `holonomic.a` for a mechanism."""
-    x, mechanics, slip = model.vector("x"), model.holonomic, ca.SX(contact.slip)
-    rate = ca.SX(0, 1) if model.ode is None else model.ode
-    if mechanics is not None:
-        rate = ca.vertcat(x[mechanics.n : 2 * mechanics.n], mechanics.a, mechanics.rates)
-    return ca.jtimes(slip, x, rate) + ca.jacobian(slip, model.t)
 
 
 @final
@@ -81,7 +73,7 @@ class ContactModes:
             up, down = (
                 ca.SX(c.law.static_level(c.N, side, **further)) - side * force for side in (1, -1)
             )
-            rows.append(ca.vertcat(up, down, slip_rate(model, c), ca.SX(c.slip)))
+            rows.append(ca.vertcat(up, down, rate_of(ca.SX(c.slip), model), ca.SX(c.slip)))
             slope = ca.DM(ca.jacobian(ca.SX(c.slip), x).sparsity(), 1).full()[0] != 0
             still.append(STILL * max(nominal[slope], default=1.0))
         look = of_time("contacts", ca.densify(stacked(rows)))

@@ -328,10 +328,14 @@ def steady_force(law: AnyLaw, v: Array, N: float) -> Array:
     """
     if isinstance(law, Population):
         return law.steady_force(v, N)
+    return np.array(np.broadcast_to(in_steady_sliding(law, v, N), v.shape), dtype=float)
+
+
+def in_steady_sliding(law: Law, v: Scalar, N: Scalar) -> Scalar:
+    """Return the `steady_force` [N] of a law as numbers or as an expression."""
     ahead: Scalar = smooth.sign(v, 0.0) if law.facts.odd else 1.0
     given = {i.name: i.steady * ahead for i in law.inputs}
-    force = law.force(v, N, law.steady_state(v, N), **given)
-    return np.array(np.broadcast_to(force, v.shape), dtype=float)
+    return law.force(v, N, law.steady_state(v, N), **given)
 
 
 def steady_inputs(law: AnyLaw) -> str:
