@@ -1,4 +1,4 @@
-"""Strategies of `solve`: direct, by homotopy, by modes, and the order in which they are tried.
+"""Strategies of `solve`: direct, by homotopy, by modes, and their order.
 
 1. Models without contacts that stick, and `friction="smooth"`: direct solves on refined meshes.
 2. Otherwise coarse solves with wide layers from several starts (`friction.homotopy`).
@@ -23,7 +23,7 @@ from ocp.checking.verify import confirmed, verified, verify
 from ocp.complementarity import solve_relaxed, with_products
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
-from ocp.friction.event_check import verify_exactly
+from ocp.friction.event_check import verify_exactly, without_law_states
 from ocp.friction.homotopy import FINE, LAST, Sharp, resumed, sharpened
 from ocp.friction.mode_optimisation import optimise_modes, refusal
 from ocp.friction.smooth_models import (
@@ -41,7 +41,6 @@ from ocp.solving.one_solve import STARTS, Solver
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start
-from ocp.solving.verification import Verification
 from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes
 from symfric.foundation import checks
 from symfric.foundation.status import Status
@@ -171,7 +170,7 @@ class Search:
         try:
             if not (solution.modes and laws):
                 return verified(solution, self.tolerance)
-            found = _without_law_states(solution, verify(solution, self.tolerance))
+            found = without_law_states(solution, verify(solution, self.tolerance))
             if is_exact(solution.problem) and (found.ok or not solution.ok):
                 return replace(solution, verification=found)
         except FAILURES as error:
@@ -193,7 +192,7 @@ class Search:
             return Judged(with_sentence(solution, text), right=True)
         try:
             exact = verify_exactly(solution, self.tolerance, EXACT_RTOL)
-            exact = _without_law_states(solution, exact)
+            exact = without_law_states(solution, exact)
         except FAILURES as error:
             text = f"With exact Coulomb friction it was not simulated: {reason_of(error)}."
             return Judged(with_sentence(solution, text), solution.ok)
@@ -399,11 +398,3 @@ def _refused(problem: Problem) -> str:
 def _after(first: Solution, later: Solution) -> Solution:
     """Return `later` with the statistics of both solves."""
     return replace(later, statistics=first.statistics.then(later.statistics))
-
-
-def _without_law_states(solution: Solution, found: Verification) -> Verification:
-    """Return `found` without checks of law states and local errors."""
-    if not (hidden := law_states(solution.problem)):
-        return found
-    kept = [m for m in found.checked if m.name not in hidden and m.what != "local error"]
-    return replace(found, checked=tuple(kept), restarted=None)

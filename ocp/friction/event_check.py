@@ -13,7 +13,7 @@ as of a loop with several degrees of freedom. Contacts in ball joints keep their
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import final
@@ -27,7 +27,7 @@ from ocp.checking.verify import cost_of, misses_of
 from ocp.formulation.phase import Array
 from ocp.friction import sequence
 from ocp.friction.exact_models import LIFTS, exact_model, start_modes
-from ocp.friction.smooth_models import sticking
+from ocp.friction.smooth_models import law_states, sticking
 from ocp.solving.solution import Mode, Solution
 from ocp.solving.verification import Miss, Verification
 from symfric import Hold, Trajectory, simulate
@@ -238,3 +238,11 @@ def verify_exactly(solution: Solution, tolerance: float = 1e-4, rtol: float = 1e
     worst_first = tuple(sorted(checked, key=lambda miss: -miss.relative))
     trajectories = tuple(run.trajectory for run in runs)
     return Verification(tolerance, rtol, worst_first, (), trajectories, value, *failed)
+
+
+def without_law_states(solution: Solution, found: Verification) -> Verification:
+    """Return `found` without checks of law states and local errors."""
+    if not (hidden := law_states(solution.problem)):
+        return found
+    kept = [m for m in found.checked if m.name not in hidden and m.what != "local error"]
+    return replace(found, checked=tuple(kept), restarted=None)
