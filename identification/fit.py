@@ -148,7 +148,7 @@ class Fit:
         result = fitted(
             live, ends, verdict, tuple(asked.findings),
             status=status, message=message, seconds=perf_counter() - begun,
-            call=f"{written(self)}.solve()",
+            call=f"{written(self)}.solve()", kind=kind,
             asked=Asked(replace(self, kind=asked.kind), dict(live.task.noise), live.point.w),
         )  # fmt: skip
         if throw and not status.ok:
