@@ -111,7 +111,7 @@ class Fit:
 
         Args:
             executor: executor of `concurrent.futures` for the starts; the result is bit-identical.
-            progress: called with a text and the completed fraction.
+            progress: called with a text and the completed fraction, 1.0 after all starts.
             throw: raise `SolveError` if the result is unusable; its `partial` is the result.
 
         Raises:
@@ -133,7 +133,9 @@ class Fit:
         if isinstance(live, str):
             message = f"Fit: {asked.subject.name}: no start has residuals: {live}"
             raise SolveError(message, Status.NOT_FINITE)
+        tell: Progress = progress or (lambda text, share: None)
         for again in (partial(self._completed, whole), self._whitened, self._delayed):
+            tell("all rows, noise of the path, dead times", 1.0)
             if end.status is Status.INTERRUPTED or (found := again(asked, live)) is None:
                 continue
             asked, live, end = found
@@ -142,6 +144,7 @@ class Fit:
                 evaluations=ends[0].evaluations + end.evaluations, values=live.values,
             )  # fmt: skip
             ends = (best, *ends[1:])
+        tell("verdict and intervals", 1.0)
         verdict = judge(live.minimum.short, asked.findings, live.levels)
         gain = remaining(live.task, live.point) / max(live.point.cost, 1e-300)
         status, message = _status(asked, end, verdict, gain)

@@ -92,10 +92,10 @@ LONG, BLOCKS = 100_000, 20
 
 
 def blocks(n: int, most: int = LONG) -> list[slice]:
-    """Return slices of n samples: all of them, or evenly spaced blocks of `most` samples in all."""
+    """Return slices of n samples: all of them, or evenly spaced blocks of about `most` in all."""
     if n <= most:
         return [slice(0, n)]
-    size = most // BLOCKS
+    size = most // BLOCKS + 1  # a reflected block then has a length with small prime factors
     return [slice(k, k + size) for k in np.linspace(0, n - size, BLOCKS).astype(int).tolist()]
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from identification import Dataset, Fit, Fitted, InverseDynamics
 from symfric.bench.identification_files import File, campaign
+from symfric.bench.identification_length import length
 from symfric.bench.identification_measured import emps, franka
 from symfric.bench.identification_memory import gms, lugre
 from symfric.bench.identification_repeats import starts, velocity
@@ -125,6 +126,7 @@ CASES: Mapping[str, Callable[[bool], Iterator[Found]]] = {
     "starts": starts,
     "gms": gms,
     "files": files,
+    "length": length,
 }
 
 

@@ -88,7 +88,8 @@ def test_progress_is_reported_after_each_start() -> None:
     assert {("start 1 of 4", 0.25), ("start 2 of 4, evaluation 2", 0.25)} <= {*found}
     assert [done for _, done in found] == sorted(done for _, done in found)
     found = reported("coulomb+viscous")
-    assert (found[0], found[-1]) == (("start 1 of 1, evaluation 2", 0.0), ("start 1 of 1", 1.0))
+    assert found[0] == ("start 1 of 1, evaluation 2", 0.0)
+    assert ("start 1 of 1", 1.0) in found and found[-1] == ("verdict and intervals", 1.0)
 
 
 def motion(law: Any, m: float = 2.0) -> Dataset:
