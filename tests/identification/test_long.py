@@ -79,7 +79,7 @@ def test_a_nonlinear_law_is_searched_on_part_of_the_rows(monkeypatch: pytest.Mon
     fit = Fit(InverseDynamics(), "stribeck", stage(3 * LONG, peak=2.0)).solve(throw=False)
     whole = [rows for rows in calls if rows == max(calls)]
     assert max(calls) > LONG and max(r for r in calls if r != whole[0]) <= inverse.PART
-    assert len(whole) < 0.3 * len(calls)
+    assert len(whole) <= 8
     assert gauss_newton(fit) < 1e-2
 
 
@@ -130,10 +130,10 @@ def test_memory_of_a_fit_is_bounded_for_each_row() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(3))
 def test_verdicts_of_long_records(seed: int) -> None:
     """Right laws are solved; a missing Stribeck peak of 10 % and a late force are found."""
-    kind, n = InverseDynamics(), 3 * LONG
+    kind, n = InverseDynamics(), 3 * LONG // 2
     assert Fit(kind, "coulomb+viscous", stage(n, seed)).solve().status is Status.SOLVED
     assert Fit(kind, "stribeck", stage(n, seed, peak=2.0)).solve().status is Status.SOLVED
     wrong = Fit(kind, "coulomb+viscous", stage(n, seed, peak=0.5)).solve(throw=False)
