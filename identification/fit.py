@@ -124,7 +124,7 @@ class Fit:
         if progress is not None:
             checks.function("Fit: progress", progress, "a function of a text and a fraction")
         asked = self.prepared()
-        made = asked.task.part
+        made, kind = asked.task.part, asked.kind
         first = scattered(made.unknowns, asked.centre, self.starts, self.seed)
         starts = many_starts(made, first, executor, progress, self.evaluations)
         end, ends = best_of(starts), tried(made, starts)
@@ -151,7 +151,7 @@ class Fit:
         result = fitted(
             live, ends, verdict, tuple(asked.findings),
             status=status, message=message, seconds=perf_counter() - begun,
-            call=f"{written(self)}.solve()",
+            call=f"{written(self)}.solve()", kind=kind,
             asked=Asked(replace(self, kind=asked.kind), dict(live.task.noise), live.point.w),
         )  # fmt: skip
         if throw and not status.ok:

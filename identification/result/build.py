@@ -13,7 +13,7 @@ from identification.data.dataset import Dataset
 from identification.data.findings import Finding
 from identification.residuals.evaluation import Array
 from identification.result.fitted import Fitted
-from identification.result.live import Asked, Live, errors_of, labels
+from identification.result.live import Asked, Kind, Live, errors_of, labels
 from identification.result.series import (
     Curve,
     Estimate,
@@ -109,6 +109,7 @@ def fitted(
     message: str = "",
     seconds: float = 0.0,
     call: str = "",
+    kind: Kind | None = None,
     asked: Asked | None = None,
 ) -> Fitted:
     """Return the result of a fit.
@@ -122,15 +123,16 @@ def fitted(
         message: details of the end; the sentence of `status` precedes it.
         seconds: duration of all starts.
         call: Python code of the call.
+        kind: residuals of the first fit; None: those of `live`.
         asked: arguments that restore the problem, also from a file.
     """
-    task, certain, kind = live.task, live.covariance, written(live.kind)
+    task, certain, by = live.task, live.covariance, written(kind or live.kind)
     records = tuple(r.name for r in live.data)
     left_out = set(task.unknowns.nuisance) if len(certain.names) > MOST else set[str]()
     shown = [i for i, name in enumerate(certain.names) if name not in left_out]
     return Fitted(
         name=live.subject.name,
-        kind=kind,
+        kind=by,
         records=records,
         parameters=_estimates(live),
         names=tuple(certain.names[i] for i in shown),
@@ -151,7 +153,7 @@ def fitted(
         machine=live.closed.scene,
         seconds=seconds,
         evaluations=sum(s.evaluations for s in starts),
-        made=_made(call, kind),
+        made=_made(call, by),
         live=live,
         asked=asked,
     )
