@@ -379,12 +379,13 @@ def _fine(modes_solver: ModeSolver, solved: SolvedSequence) -> SolvedSequence:
 
 
 def _remaining(before: SolvedSequence | None, now: SolvedSequence) -> tuple[float, float]:
-    """Return the errors of the cost without loss and of J, which fall as N^-2, by two meshes.
+    """Return bounds of the errors of the cost without loss and of J, by two meshes.
 
-    Meshes of similar size differ by their errors.
+    The errors fall at least as 1/N (stiction at its level), usually as N^-2. Meshes of similar size
+    differ by their errors.
     """
     if before is None:
         return inf, inf
-    square = max(1.0, (now.intervals / before.intervals) ** 2 - 1.0)
+    share = max(1.0, now.intervals / before.intervals - 1.0)
     changes = now.ideal_cost - before.ideal_cost, now.outcome.cost - before.outcome.cost
-    return abs(changes[0]) / square, abs(changes[1]) / square
+    return abs(changes[0]) / share, abs(changes[1]) / share
