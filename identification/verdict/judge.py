@@ -189,7 +189,7 @@ def _white(name: str, found: Whiteness, colour: Colour) -> Test:
         text = f"The residuals of {name} are not white ({most})"
         text += (
             f": {colour.rows} count as {colour.effective:.0f} independent ones in the intervals."
-            if colour.order
+            if round(colour.effective) < colour.rows
             else ", too little to matter for the intervals."
         )
     return Test(name, "whiteness", found.statistic, found.p, WHITE, passed, False, text)
