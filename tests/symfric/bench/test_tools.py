@@ -193,9 +193,6 @@ def test_the_measured_drive_reaches_the_goals_of_the_closed_loop() -> None:
     rows = goals(measured.emps(quick=True))
     assert rows["closed loop x [%]"]["met"] == "yes"
     assert rows["closed loop force [%]"]["met"] == "yes"
-    assert rows["open loop, round windows [mm]"]["measured"] < 6.5
-    assert rows["open loop [mm]"]["measured"] < 9.0
-    assert "asymmetric" in rows["open loop [mm]"]["note"]
 
 
 # ---- generated code ----
