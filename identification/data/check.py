@@ -159,10 +159,11 @@ def of_excitation(view: View, model: Rough) -> Iterator[Finding]:
     if not model.clean:
         yield view.warning("excitation", name, "no_acceleration")
         return
-    if abs(model.sure(0)) < UNSURE:
-        values = {"mass": model.values[0], "error": model.errors[0]}
+    mass, error = model.inertia if abs(model.sure(0)) < UNSURE else (1.0, 0.0)
+    if abs(mass) < UNSURE * error:
         of_mass = "kg m^2" if view.unit("x") == "rad" else "kg"
-        yield view.warning("excitation", name, "no_mass", of_mass=of_mass, **values)
+        values = {"mass": mass, "error": error, "of_mass": of_mass}
+        yield view.warning("excitation", name, "no_mass", **values)
     if (share := model.moving.mean()) < 1 - MOST:
         yield view.warning("excitation", name, "rest", share=share)
     speed = np.abs(model.v[model.moving])

@@ -261,6 +261,13 @@ class Rough:
         weighted: Array = self.columns[:: self.every] * self.root[:, None]
         return np.asarray(np.linalg.pinv(weighted, rcond=1e-10), np.float64)
 
+    @cached_property
+    def inertia(self) -> tuple[float, float]:
+        """Mass and standard error without the stiffness, which equals a mass at one frequency."""
+        A = np.delete(self.columns[:: self.every], 3, axis=1)
+        values, errors, _ = _robust(A, self.force[:: self.every])
+        return float(values[0]), float(errors[0])
+
     def with_column(self, column: Array) -> tuple[float, float]:
         """Return value and standard error of an additional regressor, shape (rows,)."""
         A = np.column_stack([self.columns[:: self.every], column[:: self.every]])

@@ -131,3 +131,13 @@ def test_an_excitation_is_no_hum_and_an_additional_hum_is_reported() -> None:
         assert "hum" not in shaken(frequency, slow).check().kinds
     (hum,) = (f for f in shaken(20.0, hum=5.0).check() if f.kind == "hum")
     assert "49.9 Hz" in hum.sentence
+
+
+def test_the_mass_in_a_motion_of_one_frequency() -> None:
+    """A mass and a spring have the same effect there, but few drives have a spring."""
+    t = 0.002 * np.arange(2000)
+    x, w = 0.02 * np.sin(5 * t), 0.1 * np.cos(5 * t)
+    noise = 0.5 * np.random.default_rng(0).standard_normal(t.size)
+    heavy, light = (-m * 25 * x + 20 * np.sign(w) + 200 * w + noise for m in (50.0, 0.0))
+    kinds = [Dataset.of(t=t, x=x, force=F).check().kinds for F in (heavy, light)]
+    assert ["excitation" in some for some in kinds] == [False, True]
