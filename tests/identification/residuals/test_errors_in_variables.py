@@ -75,10 +75,11 @@ def test_the_correction_removes_the_bias_of_a_wide_filter() -> None:
     assert abs(exact - corrected) < 0.25 * (exact - plain)
 
 
-@pytest.mark.parametrize("late", [0.002, -0.002])
-def test_bounds_from_zero_find_a_force_recorded_late_or_early(late: float) -> None:
+@pytest.mark.parametrize("given", [(0, 0.006), "auto"])
+@pytest.mark.parametrize("late", [0.002, -0.002, 0.0])
+def test_a_force_recorded_late_or_early(late: float, given: tuple[float, float] | str) -> None:
     data = drive(stage()[1], 0, late)
-    fit = Fit(InverseDynamics(dead_time=(0, 0.006)), "stribeck", data, starts=1).solve()
+    fit = Fit(InverseDynamics(dead_time=given), "stribeck", data, starts=1).solve()
     assert fit.parameters["dead_time[0]"].value == pytest.approx(-late, abs=2.5e-4)
     assert fit.parameters["m"].value == pytest.approx(95.0, rel=5e-3)
 

@@ -34,6 +34,7 @@ def test_right_models_are_seldom_doubted(n: int, rho: float) -> None:
         (lambda m: np.sign(m["v"]) * np.exp(-np.abs(m["v"] / 0.1)), "speed"),  # Stribeck
         (lambda m: np.cos(2 * np.pi * m["x"] / np.ptp(m["x"]) * 2), "position"),  # ripple
         (lambda m: np.roll(m["force"], 8), "force"),  # a delay
+        (lambda m: np.abs(coulomb(m["v"].size) @ TRUTH) / 4, "predicted force"),  # a gain
     ],
 )
 def test_what_is_missing_is_named(
