@@ -43,7 +43,7 @@ from symfric.foundation.status import SolveError, Status
 
 MOST_STARTS = 10_000
 QUICK = 40
-"""Largest number of evaluations of a fit that only selects a setting or tests for a dead time."""
+"""Largest number of evaluations of a fit that selects a setting or adds dead times."""
 SMALL = 0.1
 """Largest dead time [samples] in which residuals of long records are taken as linear."""
 LONGEST = 30
@@ -135,7 +135,7 @@ class Fit:
             raise SolveError(message, Status.NOT_FINITE)
         tell: Progress = progress or (lambda text, share: None)
         for again in (partial(self._completed, whole), self._whitened, self._delayed):
-            tell("all rows, noise of the path, dead times", 1.0)
+            tell("further fits from there", 1.0)
             if end.status is Status.INTERRUPTED or (found := again(asked, live)) is None:
                 continue
             asked, live, end = found

@@ -36,7 +36,7 @@ RANK = 1e-9
 PART = 20_000
 """Number of equations of a long record in which a fit searches first."""
 FEWEST, ENOUGH = 10, 100
-"""Least number of equations of a signal, and target number if the filter is adapted."""
+"""Smallest number of equations of a signal, and target number if the filter is adapted."""
 
 
 @final
@@ -255,8 +255,10 @@ def _decimated(rows: Sequence[Row], motion: Motion, slow: Sequence[Mask]) -> Pie
 
 def _slips(made: Balance, motion: Motion, model: Model, p: Array) -> dict[str, Array]:
     """Return the sliding velocity of each contact with bristles, shape (n,)."""
-    found = Columns(made.slips)([motion.w.T, same(p, motion.t.size)]) if made.preloads else [[]]
-    return {c.name: v for c, v in zip(model.contacts, np.transpose(found[0]), strict=False)}
+    if not made.preloads:
+        return {}
+    v, _ = Columns(made.slips)([motion.w.T, same(p, motion.t.size)])
+    return dict(zip((c.name for c in model.contacts), v.T, strict=True))
 
 
 def _slow(made: Balance, motion: Motion, model: Model, p: Array) -> list[Mask]:

@@ -1,6 +1,5 @@
 """Processor time and memory of identification by the number of samples."""
 
-import resource
 import tempfile
 from collections.abc import Iterator
 from functools import partial
@@ -47,6 +46,8 @@ def length(quick: bool) -> Iterator[Found]:
 
 def measured(n: int) -> dict[str, float]:
     """Return processor times [s], and the largest memory of the process until the first fit."""
+    import resource  # noqa: PLC0415  (absent on Windows)
+
     kind, found = InverseDynamics(), dict[str, float]()
     with tempfile.TemporaryDirectory() as folder:
         (path,) = stage(n).to_csv(Path(folder) / "run.csv")
