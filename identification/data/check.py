@@ -14,7 +14,7 @@ from identification.data.check_signals import (
     of_spikes,
     of_velocity,
 )
-from identification.data.findings import Finding, Findings, Rough, View, rough_model
+from identification.data.findings import Finding, Findings, Rough, View, robust, rough_model
 from identification.data.record import GAP, JITTER, Array, Record
 
 FEWEST, FEW = 20, 50
@@ -147,6 +147,8 @@ def _against(view: View, model: Rough, force: str) -> Iterator[Finding]:
 
 UNSURE = 3.0
 """Ratio of the rough mass to its standard error below which the accelerations are too small."""
+STIFFNESS = 3
+"""Column of the stiffness in the rough model."""
 SPREAD = 1.7
 """Ratio of the 90 % and 10 % quantiles of the speed below which there is only one speed."""
 MOST = 0.97
@@ -159,11 +161,13 @@ def of_excitation(view: View, model: Rough) -> Iterator[Finding]:
     if not model.clean:
         yield view.warning("excitation", name, "no_acceleration")
         return
-    mass, error = model.inertia if abs(model.sure(0)) < UNSURE else (1.0, 0.0)
-    if abs(mass) < UNSURE * error:
-        of_mass = "kg m^2" if view.unit("x") == "rad" else "kg"
-        values = {"mass": mass, "error": error, "of_mass": of_mass}
-        yield view.warning("excitation", name, "no_mass", **values)
+    if abs(model.sure(0)) < UNSURE:  # at one frequency, a stiffness has the effect of a mass
+        plain = np.delete(model.columns, STIFFNESS, axis=1)[:: model.every]
+        values, errors, _ = robust(plain, model.force[:: model.every])
+        if abs(values[0]) < UNSURE * errors[0]:
+            of_mass = "kg m^2" if view.unit("x") == "rad" else "kg"
+            given = {"mass": values[0], "error": errors[0], "of_mass": of_mass}
+            yield view.warning("excitation", name, "no_mass", **given)
     if (share := model.moving.mean()) < 1 - MOST:
         yield view.warning("excitation", name, "rest", share=share)
     speed = np.abs(model.v[model.moving])

@@ -243,7 +243,7 @@ class Rough:
         self.step, self.clean, self.blocks = step, clean, blocks
         self.every = max(1, int(2 * width), force.size // ENOUGH)
         A, b = columns[:: self.every], force[:: self.every]
-        self.values, self.errors, self.root = _robust(A, b)
+        self.values, self.errors, self.root = robust(A, b)
         self.explained = _explained(A, b, self.values)
 
     def unexplained_when_late(self, late: float) -> float:
@@ -261,17 +261,10 @@ class Rough:
         weighted: Array = self.columns[:: self.every] * self.root[:, None]
         return np.asarray(np.linalg.pinv(weighted, rcond=1e-10), np.float64)
 
-    @cached_property
-    def inertia(self) -> tuple[float, float]:
-        """Mass and standard error without the stiffness, which equals a mass at one frequency."""
-        A = np.delete(self.columns[:: self.every], 3, axis=1)
-        values, errors, _ = _robust(A, self.force[:: self.every])
-        return float(values[0]), float(errors[0])
-
     def with_column(self, column: Array) -> tuple[float, float]:
         """Return value and standard error of an additional regressor, shape (rows,)."""
         A = np.column_stack([self.columns[:: self.every], column[:: self.every]])
-        values, errors, _ = _robust(A, self.force[:: self.every])
+        values, errors, _ = robust(A, self.force[:: self.every])
         return float(values[-1]), float(errors[-1])
 
     @cached_property
@@ -376,7 +369,7 @@ def _width(x: Array) -> tuple[float, bool]:
     return best, False
 
 
-def _robust(A: Array, b: Array) -> tuple[Array, Array, Array]:
+def robust(A: Array, b: Array) -> tuple[Array, Array, Array]:
     """Return values, standard errors and roots of the weights of Huber's regression.
 
     It is computed by iterative reweighting.

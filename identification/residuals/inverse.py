@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from identification.data.dataset import Dataset
 from identification.data.differentiate import levels, uncertain
 from identification.data.filters import Decimation, Filter, fourth_order_difference
-from identification.data.record import LONG, blocks
+from identification.data.record import LONG, blocks, some
 from identification.residuals.balance import (
     Balance,
     Mask,
@@ -388,13 +388,11 @@ class InverseRows(Blocks):
             return np.zeros(len(J))
         motion = part.motion
         kept = part.kept[k]
-        at = part.decimation.centres(np.arange(motion.t.size)[motion.inside])[kept]
-        at = at[:: 1 + at.size // LONG]
+        at = some(part.decimation.centres(np.arange(motion.t.size)[motion.inside])[kept])
         found = self.slopes.along(motion.w[:, at], motion.step, p)
         if isinstance(found, str):
             return np.zeros(len(J))
-        count = part.errors.size
-        place = slice(k * count, (k + 1) * count)
+        place = slice(k * part.errors.size, (k + 1) * part.errors.size)
         c = np.einsum("ij,j,ijp->p", found.rows[:, place], part.errors**2, found.slopes[:, place])
         c = np.append(c * (kept.size / at.size), np.zeros(J.shape[1] - p.size))
         _, s, Vt = np.linalg.svd(np.linalg.qr(J, mode="r"))
