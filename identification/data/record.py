@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import final
+from typing import TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +99,10 @@ def blocks(n: int, most: int = LONG) -> list[slice]:
     return [slice(k, k + size) for k in np.linspace(0, n - size, BLOCKS).astype(int).tolist()]
 
 
-def some(y: Array) -> Array:
+Entry = TypeVar("Entry", bound=np.generic)
+
+
+def some(y: NDArray[Entry]) -> NDArray[Entry]:
     """Return a signal, of a long one only evenly spaced samples, for its quantiles."""
     return y[:: 1 + y.size // LONG]
 
