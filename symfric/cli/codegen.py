@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
-from textwrap import fill
 from typing import Any, NamedTuple
 
 import typer
@@ -12,22 +11,21 @@ import typer
 from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
+from symfric.cli.codegen_report import report
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
     Block,
-    Generated,
-    Verification,
     generate,
     inverse_dynamics_block,
     plant_block,
     verify,
 )
+from symfric.codegen import prove as prove_block
 from symfric.codegen.generated import with_cores
-from symfric.codegen.verification import Check
 from symfric.compensation import Compensation, settings_from_text
 from symfric.compensation import compensator as compensator_block
-from symfric.embedded import CORES, Measured, measure
+from symfric.embedded import CORES, measure
 from symfric.foundation import checks
 from symfric.foundation.files import check_folder
 from symfric.foundation.parameters import check_names, parameters
@@ -104,6 +102,7 @@ def codegen(
     compensator: bool = False,
     compensation: Strings = None,
     accept: Strings = None,
+    prove: bool = False,
     compiler: str | None = None,
     json: str | None = None,
 ) -> None:
@@ -124,6 +123,8 @@ def codegen(
     check_names("--core", core or (), CORES)
     check_folder(out)
     opt.check_outputs(json)
+    if prove and not guards:
+        raise ValueError("--prove: expected guards, whose effect is proved, got --no-guards")
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
     if fit and not law and fit.suffix.lower() not in (".json", ".urdf") and not fit.is_file():
@@ -173,35 +174,10 @@ def codegen(
     ]
     generated = with_cores(generated, [m.to_dict() for m in measured])
     law = chosen.text if chosen else law or generated.block.name
-    report(law, generated, verification, measured, json)
-    if not verification.ok:
+    proofs = [prove_block(generated.block, one) for one in generated.reals if prove]
+    report(law, generated, verification, measured, proofs, json)
+    if not verification.ok or not all(found.ok for found in proofs):
         raise typer.Exit(1)
-
-
-def report(
-    law: str,
-    generated: Generated,
-    verification: Verification,
-    measured: Sequence[Measured],
-    json: str | None,
-) -> None:
-    """Print or write the verification and the sizes, and print the file names."""
-    content = {
-        "law": law,
-        "files": [str(path) for path in generated.files],
-        "manifest": dict(generated.manifest),
-        "verification": verification.to_dict(),
-        "cores": [m.to_dict() for m in measured],
-    }
-    output.emit_json(content, json)
-    if json != "-":
-        show_verification(verification)
-        show_sizes(generated, measured)
-    names = "  ".join(str(path.relative_to(generated.folder)) for path in generated.files)
-    output.note(f"wrote {len(generated.files)} files into {generated.folder}:")
-    indent: Any = dict.fromkeys(("initial_indent", "subsequent_indent"), "  ")
-    output.note(fill(names, 78, break_long_words=False, break_on_hyphens=False, **indent))
-    output.say_written(json)
 
 
 def subject_of(chosen: Chosen | None, scene: str | None, compensator: bool) -> str:
@@ -348,51 +324,3 @@ def robot(
     if not isinstance(machine, MechanismScene):
         raise ValueError(f"{INVERSE}: expected a scene of bodies and joints, got {where}")
     return with_values(machine, values).mechanism()
-
-
-def show_verification(verification: Verification) -> None:
-    """Print the comparison of the C with CasADi, one row per floating point type."""
-    compiler = f" ({verification.compiler})" if verification.compiler else ""
-    output.show(f"{verification.name}: {verification.status}{compiler}")
-    rows = [
-        (check.real, check.steps, len(check.warnings), compared(check), f"{check.error:.2g}",
-         check.worst or "-", ", ".join(check.foreign or ()) or "none")
-        for check in verification.checks
-    ]  # fmt: skip
-    if rows:
-        output.show_table(
-            ["type", "steps", "warnings", "against CasADi", "error", "output", "foreign"], rows
-        )
-    for check in verification.checks:
-        if check.ties:
-            output.show(
-                f"{check.real}: in {check.ties} of {check.steps} steps rounding decides a mode, "
-                "in CasADi as in C"
-            )
-
-
-def compared(check: Check) -> str:
-    """Return a description of the comparison: distance in double precision, or within rounding."""
-    if check.ulp is None:
-        return "within rounding" if check.near else "differs"
-    return "bit for bit equal" if check.ulp == 0 else f"{check.ulp} ulp apart"
-
-
-def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
-    """Print memory on this machine (from `size`, -fstack-usage) and cost on other cores (QEMU)."""
-    rows: list[tuple[str | float, ...]] = []
-    for real in generated.reals:
-        found = generated.manifest["real"][real].get("measured")
-        if found is not None:
-            stack = max(found["stack"].values(), default="-")
-            rows.append((real, found["compiler"], found["text"] or "-", stack, "-", "-"))
-    for m in measured:
-        cells = (m.text, m.stack, m.average, m.maximum) if m.ok else ("-", "-", "-", "-")
-        numbers = (f"{x:.0f}" if isinstance(x, float) else x for x in cells)
-        rows.append((m.real, m.core, *numbers))
-    if rows:
-        head = ["type", "compiler or core", "code [B]", "stack [B]", "average instructions",
-                "most instructions"]  # fmt: skip
-        output.show_table(head, rows)
-    for core, status in dict.fromkeys((m.core, m.status) for m in measured if not m.ok):
-        output.show(f"{core}: {status}")

@@ -25,7 +25,7 @@ static @real @{name}_mended(
     @real x, @real low, @real high, @real safe,
     unsigned int clamped, unsigned int not_finite, unsigned int *status)
 {
-    if ((@{name}_bits(x) & @magnitude) >= @infinite) {
+    if (@{name}_beyond(x, @largest)) {
         *status |= not_finite;
         return safe;
     }
