@@ -9,6 +9,7 @@ from symfric.cli import output
 from symfric.codegen import Check, Generated, Proof, Verification
 from symfric.codegen.guards import TOP
 from symfric.embedded import Measured
+from symfric.embedded.measure import REGIMES
 
 
 def report(
@@ -88,14 +89,17 @@ def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
         found = generated.manifest["real"][real].get("measured")
         if found is not None:
             stack = max(found["stack"].values(), default="-")
-            rows.append((real, found["compiler"], found["text"] or "-", stack, "-", "-"))
-    for m in measured:
-        cells = (m.text, m.stack, m.average, m.maximum) if m.ok else ("-", "-", "-", "-")
-        numbers = (f"{x:.0f}" if isinstance(x, float) else x for x in cells)
-        rows.append((m.real, m.core, *numbers))
+            rows.append((real, found["compiler"], found["text"] or "-", stack))
+    rows += [(m.real, m.core, f"{m.text:.0f}", f"{m.stack:.0f}") for m in measured if m.ok]
     if rows:
-        head = ["type", "compiler or core", "code [B]", "stack [B]", "average instructions",
-                "most instructions"]  # fmt: skip
-        output.show_table(head, rows)
+        output.show_table(["type", "compiler or core", "code [B]", "stack [B]"], rows)
     for core, status in dict.fromkeys((m.core, m.status) for m in measured if not m.ok):
         output.show(f"{core}: {status}")
+    if counted := [m for m in measured if m.ok]:
+        output.show("instructions per step (mean in mixed motion and by regime; maximum):")
+        names = [name for name in REGIMES if name in counted[0].regimes]
+        head = ["type", "core", "mixed", *names, "maximum"]
+        output.show_table(head, [
+            (m.real, m.core, *(f"{x:.0f}" for x in (m.average, *m.regimes.values(), m.maximum)))
+            for m in counted
+        ])  # fmt: skip
