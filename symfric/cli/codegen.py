@@ -22,15 +22,16 @@ from symfric.codegen import (
     verify,
 )
 from symfric.codegen import prove as prove_block
+from symfric.codegen.blocks.variables import STEP_SIZE
 from symfric.codegen.generated import with_cores
 from symfric.compensation import Compensation, settings_from_text
 from symfric.compensation import compensator as compensator_block
-from symfric.embedded import CORES, measure
+from symfric.embedded import CORES, StepError, measure, step_errors
 from symfric.foundation import checks
 from symfric.foundation.files import check_folder
 from symfric.foundation.parameters import check_names, parameters
 from symfric.foundation.programs import find_compiler
-from symfric.foundation.status import Status
+from symfric.foundation.status import SolveError, Status
 from symfric.laws import AnyLaw
 from symfric.multibody import Mechanism, read_urdf
 from symfric.scenes import Drive, Scene
@@ -143,6 +144,7 @@ def codegen(
     own: dict[str, Any] = {"fold": fold or None, "free": free, "name": name, "h": step_size}
     own = {option: value for option, value in own.items() if value is not None}
     options, adjustable = dict[str, Any](), None
+    errors: tuple[StepError, ...] = ()
     if chosen is None:
         made: Block | AnyLaw = inverse_dynamics_block(
             robot(fit, scene, law, opt.numbers("--set", texts)), **own, payload=payload,
@@ -152,7 +154,9 @@ def codegen(
         machine = machine_of(scene, kind_of(scene, "--scene", preset, law_of), chosen, texts)
         own["method"] = method or "auto"
         made = plant_block(machine, **own)
-        own.pop("h", None)
+        size = own.pop("h", STEP_SIZE)
+        errors = fixed_steps(machine, size, own["method"])
+        made = replace(made, limits=(*made.limits, *(str(e) for e in errors if e.h == size)))
         adjustable = partial(plant_block, machine, **own)
     else:
         made = opt.with_settings(chosen.law, chosen.text, texts)
@@ -175,7 +179,7 @@ def codegen(
     generated = with_cores(generated, [m.to_dict() for m in measured])
     law = chosen.text if chosen else law or generated.block.name
     proofs = [prove_block(generated.block, one) for one in generated.reals if prove]
-    report(law, generated, verification, measured, proofs, json)
+    report(law, generated, verification, measured, proofs, errors, json)
     if not verification.ok or not all(found.ok for found in proofs):
         raise typer.Exit(1)
 
@@ -284,6 +288,18 @@ def machine_of(
             f"fitted under a load of 1 N; {hint}"
         )
     return machine
+
+
+def fixed_steps(machine: Scene, h: float, method: str) -> tuple[StepError, ...]:
+    """Return the errors of steps around h with the inputs of the scene; none if it stops."""
+    if h >= machine.t_end:
+        return ()
+    inputs = {name: own.function for name, own in machine.inputs.items()}
+    try:
+        return step_errors(machine, h, machine.t_end, u=inputs, method=method)
+    except SolveError as error:
+        output.note(f"errors of fixed steps were not measured: {error}")
+        return ()
 
 
 def compensated(law: AnyLaw, drive: Drive | None, texts: Sequence[str], **how: Any) -> Block:

@@ -8,7 +8,7 @@ from typing import Any
 from symfric.cli import output
 from symfric.codegen import Check, Generated, Proof, Verification
 from symfric.codegen.guards import TOP
-from symfric.embedded import Measured
+from symfric.embedded import Measured, StepError
 from symfric.embedded.measure import REGIMES
 
 
@@ -18,9 +18,10 @@ def report(
     verification: Verification,
     measured: Sequence[Measured],
     proofs: Sequence[Proof],
+    errors: Sequence[StepError],
     json: str | None,
 ) -> None:
-    """Print or write the verification, the sizes and the proofs, and print the file names."""
+    """Print or write all results, and print the file names."""
     content = {
         "law": law,
         "files": [str(path) for path in generated.files],
@@ -28,10 +29,12 @@ def report(
         "verification": verification.to_dict(),
         "cores": [m.to_dict() for m in measured],
         "proofs": [asdict(found) for found in proofs],
+        "step_errors": [asdict(found) for found in errors],
     }
     output.emit_json(content, json)
     if json != "-":
         show_verification(verification)
+        show_step_errors(errors)
         show_sizes(generated, measured)
         for found in proofs:
             output.show(f"{found.real}: {contract(found)}")
@@ -40,6 +43,16 @@ def report(
     indent: Any = dict.fromkeys(("initial_indent", "subsequent_indent"), "  ")
     output.note(fill(names, 78, break_long_words=False, break_on_hyphens=False, **indent))
     output.say_written(json)
+
+
+def show_step_errors(errors: Sequence[StepError]) -> None:
+    """Print the errors of fixed steps, one row per step size."""
+    if errors:
+        output.show(f"errors of fixed steps over {errors[0].duration:g} s of the scene:")
+        output.show_table(
+            ["step [s]", "largest error / peak", "state"],
+            [(f"{e.h:g}", f"{e.error:.2g}", e.state) for e in errors],
+        )
 
 
 def contract(proof: Proof) -> str:

@@ -93,8 +93,13 @@ def test_a_scene_becomes_a_plant(symfric) -> None:
     (check,) = result["verification"]["checks"]
     assert (check["real"], check["ulp"]) == ("double", 0)
     assert "backward Euler" in Path("c/rabinowicz_f64.h").read_text()
+    steps = {one["h"]: one["error"] for one in result["step_errors"]}
+    assert [*steps] == [4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4]
+    assert f"error of steps of 0.001 s is {steps[1e-3]:.1g}" in " ".join(
+        Path("c/rabinowicz_f64.h").read_text().split()
+    )
     line = "codegen --scene drive --law stribeck --set turning=true --set m=2 --no-kit --out c"
-    symfric(line)
+    assert "errors of fixed steps over 4 s of the scene:" in symfric(line).out
     assert "moving mass [kg m^2]" in Path("c/drive_f64.h").read_text()
     assert names(described("drive")["parameters"])[:3] == ["m", "N", "offset"]
     symfric(f"{line} --fold --step-size 1e-3")
