@@ -152,12 +152,7 @@ def codegen(
         )  # fmt: skip
     elif scene is not None:
         machine = machine_of(scene, kind_of(scene, "--scene", preset, law_of), chosen, texts)
-        own["method"] = method or "auto"
-        made = plant_block(machine, **own)
-        size = own.pop("h", STEP_SIZE)
-        errors = fixed_steps(machine, size, own["method"])
-        made = replace(made, limits=(*made.limits, *(str(e) for e in errors if e.h == size)))
-        adjustable = partial(plant_block, machine, **own)
+        made, errors, adjustable = plant(machine, method=method or "auto", **own)
     else:
         made = opt.with_settings(chosen.law, chosen.text, texts)
         if compensator:
@@ -288,6 +283,16 @@ def machine_of(
             f"fitted under a load of 1 N; {hint}"
         )
     return machine
+
+
+def plant(
+    machine: Scene, h: float | None = None, **how: Any
+) -> tuple[Block, tuple[StepError, ...], Callable[[], Block]]:
+    """Return the block of a plant, its errors, and a function for the block with h variable."""
+    block, size = plant_block(machine, h=h, **how), STEP_SIZE if h is None else h
+    errors = fixed_steps(machine, size, how["method"])
+    limits = (*block.limits, *(str(one) for one in errors if one.h == size))
+    return replace(block, limits=limits), errors, partial(plant_block, machine, **how)
 
 
 def fixed_steps(machine: Scene, h: float, method: str) -> tuple[StepError, ...]:
