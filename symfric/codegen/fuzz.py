@@ -30,7 +30,7 @@ from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.graph import graph
-from symfric.foundation.programs import Compiler, finished
+from symfric.foundation.programs import PATIENCE, Compiler, finished
 
 SANITIZED = ("-std=c99", "-O1", "-g", "-ffp-contract=off", "-fsanitize=undefined,address",
              "-fno-sanitize-recover=all")  # fmt: skip
@@ -39,6 +39,8 @@ FAST = ("-std=c99", "-O2", "-ffast-math")
 """Flags with which compilers assume that no number is infinite or NaN."""
 
 STEPS = 1_000_000
+SLOWEST = 1e-4
+"""Time of a step on a loaded machine [s]."""
 COUNTS = ("valid", "repaired", "altered", "unflagged", "unfinished", "last_resort", "beyond")
 
 
@@ -113,7 +115,7 @@ def fuzz(
                 compiler.run(*FAST, "-c", made, "-o", parts[-1])
         flags = ("-std=c99", "-O1") if fast else SANITIZED
         compiler.run(*flags, f"-I{folder}", *parts, "-o", target, "-lm")
-        done = finished([target, str(steps)])
+        done = finished([target, str(steps)], limit=PATIENCE + SLOWEST * steps)
     numbers = done.output.split()
     if done.status != 0 or len(numbers) != len(COUNTS):
         said = (done.messages or f"it ended with {done.status}").strip()
