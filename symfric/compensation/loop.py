@@ -176,7 +176,7 @@ def close_loop(
     run = partial(
         _run, reference=reference, controller=controller, delay=delay, noise=noise, seed=seed,
         real=real, compiler=compiler, measured=(position, velocity), load=load,
-        varied=np.array([*varied.values()]).reshape(len(varied), -1),
+        varied=np.column_stack([np.zeros((reference.x.size, 0)), *varied.values()]),
     )  # fmt: skip
 
     def going(count: int) -> Plant:
@@ -303,7 +303,7 @@ def _run(
             rows[3, k] = forces[k + 1 + delay].sum(axis=0)
             queue.append(np.clip(command, -controller.limit, controller.limit))
             rows[2, k] = queue.pop(0)
-            acting = np.column_stack([rows[2, k], np.tile(varied[:, k : k + 1].T, (count, 1))])
+            acting = np.column_stack([rows[2, k], np.tile(varied[k], (count, 1))])
             rows[:2, k + 1] = plant.step(acting)[:, places].T
         k = steps
     except KeyboardInterrupt:

@@ -8,7 +8,7 @@ import pytest
 from one_program import Stepper, along
 
 import symfric as sf
-from symfric.codegen import Block, generate, verify
+from symfric.codegen import Block, fuzz, generate, verify
 from symfric.compensation import (
     Cascade,
     Comparison,
@@ -266,6 +266,15 @@ def test_the_c_has_the_bits_of_casadi(make, law: sf.Law, tmp_path, compiler) -> 
     del compiler
     found = verify(generate(make(law, mass=1.0, noise=NOISE), tmp_path))
     assert found.ok, found.status
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", MAKE)
+@pytest.mark.parametrize("real", ["float", "double"])
+def test_random_bits_are_repaired_and_flagged(make, real: str, compiler) -> None:
+    found = fuzz.fuzz(make(BRISTLES, mass=1.0, noise=NOISE), real, compiler, steps=100_000)
+    assert found.ok, found
+    assert found.last_resort == 0
 
 
 def test_names_and_units_are_those_of_the_compensator() -> None:
