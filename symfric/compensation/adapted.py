@@ -87,9 +87,9 @@ class Adapted:
             end: True for the force at the end of the step, False for its mean.
         """
         self._s = s = chosen_adaptation(where, settings, chosen)
-        N, mass, offset = 1.0, s.mass, 0.0
+        normal, mass, offset = 1.0, s.mass, 0.0
         if isinstance(law, Drive):
-            N, offset, turning = float(law.N), float(law.offset), turning or law.turning
+            normal, offset, turning = float(law.N), float(law.offset), turning or law.turning
             law, mass = law.law, float(law.m) if mass is None else mass
         require_law(where, law)
         self.where, self._turning = f"{where} '{law_name(law)}'", turning
@@ -104,7 +104,7 @@ class Adapted:
         self._inner, size, self._parts = inner, step_size(where, h, inner), Parts(inner)
         self.h, self._sizes, found = size.h, size.parameters, terms(law, inner)
         own = {p.name: p for p in self._parts.parameters}
-        self.level = _level(law, N)
+        self.level = _level(law, normal)
         scales = scale_parameters([n for n in found.names if n != "bristle"], offset, mass)
         self.theta = estimated(self.where, s, scales | own, self.level, _idle(law, inner))
         self.names = [p.name for p in self.theta]
@@ -115,7 +115,7 @@ class Adapted:
             used["stribeck"] = used["coulomb"]
         self._parts.parameters = [p for p in self._parts.parameters if p.name not in symbols]
         self.v, self.z = found.v, symbols_of(inner.states)
-        load = self._parts.parameter("N", N)
+        load = self._parts.parameter("N", normal)
         self._held = within_load(found.law, self.z, load) if inner.states else self.z
         given = [n for n in own if n in symbols]
         old = ca.vertcat(found.N, *(own[n].symbol for n in given))
@@ -197,7 +197,7 @@ class Adapted:
         """Add parameters, and return noise_v [m/s], noise_F [N] and t_window [s]."""
         s, noise = self._s, self._s.noise or 0.0
         accuracy = SHARES["accuracy"] * self.level if s.accuracy is None else s.accuracy
-        step = float(self._sizes[0].start) if self._sizes else float(self.h)
+        step = float(next((v.start for v in self._sizes), self.h))
         usual = max(SAMPLES * step, 2 * self._mass * noise / accuracy)
         window = self.parameter("t_window", usual if s.window is None else s.window)
         return self.parameter("noise_v", noise), self.parameter("noise_F", accuracy), window
@@ -249,7 +249,7 @@ class Adapted:
             doc=f"{texts['doc']} {inner.doc}",
             equations=f"{texts['equations']}\n\n{inner.equations}",
             sources=(*texts["sources"], *inner.sources), use=USE, limits=(*LIMITS, *inner.limits),
-            constants=inner.constants | ({} if self._sizes else {"h": float(self.h)}),
+            constants=dict(inner.constants) | ({} if self._sizes else {"h": float(self.h)}),
             about=inner.about, outputs=found, **parts.variables(self._sizes),
         )  # fmt: skip
         return in_turning(arranged(block)) if self._turning else arranged(block)

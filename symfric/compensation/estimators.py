@@ -187,8 +187,8 @@ def kalman_estimator(
     ahead, slopes, M = prediction(f, seen, now)
     scale = ca.vertcat(noise_v, ca.DM(f.reach), spread)
     fading = (1 - lost) * ca.SX.eye(n)
-    A = slopes / scale[:known] * ca.repmat(scale.T, known, 1)
-    A = ca.vertcat(A, ca.horzcat(ca.SX(n, known), fading))
+    moving = slopes / scale[:known] * ca.repmat(scale.T, known, 1)
+    A = ca.vertcat(moving, ca.horzcat(ca.SX(n, known), fading))
     walk = ca.repmat(ca.sqrt(1 - (1 - lost) ** 2), n)
     jump = noise_F * ca.sqrt(ca.fmax(t_window, f.h) * f.h) / (M * noise_v)
     drift = ca.repmat(noise_F / f.level * ca.sqrt(f.h / t_window), nz)
@@ -225,14 +225,14 @@ def prediction(f: Adapted, seen: ca.SX, now: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX
     """
     theta = symbols_of(f.theta)
     mass = theta[f.names.index("inertia")] if "inertia" in f.names else f.mass
-    M, stiff = ca.SX.sym("M"), mass + f.h * ca.fmax(ca.jacobian(f.force, f.v), 0.0)
-    v = f.v + f.h * (f.given("force") - f.force) / M
+    m, M = ca.SX.sym("M"), mass + f.h * ca.fmax(ca.jacobian(f.force, f.v), 0.0)
+    v = f.v + f.h * (f.given("force") - f.force) / m
     ahead = ca.vertcat(v, ca.substitute(f.after, f.v, v))
     slopes = ca.jacobian(ahead, ca.vertcat(f.v, f.z, theta))
-    ahead, slopes = ca.substitute([ahead, slopes], [M], [stiff])
+    ahead, slopes = ca.substitute([ahead, slopes], [m], [M])
     old, new = ca.vertcat(f.v, theta), ca.vertcat(seen, now)
-    ahead, slopes, M = ca.substitute([ahead, slopes, stiff], [old], [new])
-    return ahead, slopes, M
+    found = ca.substitute([ahead, slopes, M], [old], [new])
+    return found[0], found[1], found[2]
 
 
 def _last(f: Adapted) -> tuple[ca.SX, ca.SX]:

@@ -191,7 +191,9 @@ def close_loop(
         _split(case, reference.x.size)
     runs = run(going(1), (), {WITHOUT: {}})
     if cases:
-        runs |= run(going(len(cases)), given, cases, estimator=estimator)
+        runs |= run(
+            going(len(cases)), given, cases, estimators=() if estimator is None else (estimator,)
+        )
     engine = "CasADi's VM" if compiler is None else f"C in {real}, {compiler}"
     units = plant.signals[position], unit
     return Comparison(plant.name, reference, runs, controller.count, engine, units)
@@ -273,14 +275,15 @@ def _run(
     measured: tuple[str, str],
     load: float,
     varied: Array,
-    estimator: Block | None = None,
+    estimators: Sequence[Block] = (),
 ) -> dict[str, Loop]:
     """Return the loops of all cases for one set of blocks, simulated together."""
     count, steps = len(cases), reference.x.size
     control = Members(controller.block(), [{}] * count, compiler=compiler)
     added = [Members(block, [*cases.values()], real, compiler) for block in blocks]
-    learner = Members(estimator, [*cases.values()], real, compiler) if estimator else None
-    learnt = np.zeros((steps, len(estimator.outputs) if estimator else 0, count))
+    learners = [Members(b, [*cases.values()], real, compiler) for b in estimators]
+    names = [name for block in estimators for name in block.outputs]
+    learnt = np.zeros((steps, len(names), count))
     random = np.random.default_rng(seed)
     places = [[v.name for v in plant.model.x].index(name) for name in measured]
     rows = np.zeros((4, steps + 1, count))  # position, velocity, acting and added force
@@ -297,8 +300,8 @@ def _run(
                 "u": rows[2, k - 1], "force": rows[2, k - 1], "N": load, "enable": 1.0,
                 "learn": 1.0,
             }  # fmt: skip
-            command = _commanded(control, added, learner, k, now, forces[k], forces[k + 1 + delay])
-            if learner is not None:
+            command = _commanded(control, added, learners, k, now, forces[k], forces[k + 1 + delay])
+            for learner in learners:
                 learnt[k] = learner.output.T
             rows[3, k] = forces[k + 1 + delay].sum(axis=0)
             queue.append(np.clip(command, -controller.limit, controller.limit))
@@ -310,9 +313,9 @@ def _run(
         ended = f"interrupted at {k * controller.h:g} s"
     except SolveError as error:
         ended = f"stopped at {k * controller.h:g} s: {error}"
-    every = [*added, *[learner] * (learner is not None)]
-    status = np.bitwise_or.reduce([np.zeros(count, np.uint32), *(b.status for b in every)])
-    names = [*estimator.outputs] if estimator else []
+    status = np.bitwise_or.reduce(
+        [np.zeros(count, np.uint32), *(b.status for b in (*added, *learners))]
+    )
     return {
         name: Loop(name, reference, *(rows[i, : k + (i < 2), m] for i in range(4)),
                    limit=controller.limit, ended=ended, status=int(status[m]),
@@ -324,7 +327,7 @@ def _run(
 def _commanded(
     control: Members,
     added: Sequence[Members],
-    learner: Members | None,
+    learners: Sequence[Members],
     k: int,
     now: Mapping[str, float | Array],
     acted: Array,
@@ -338,15 +341,16 @@ def _commanded(
         control.inputs[name][:] = now[name]
     control.step()
     seen = {**now, "v": control.outputs["v_m"], "e": control.outputs["e"]}
-    if learner is not None:
+    for learner in learners:
         learner.change(k)
         for name, place in learner.inputs.items():
             place[:] = seen[name]
         learner.step()
     for i, block in enumerate(added):
         block.change(k)
-        for name in block.params.keys() & (learner.outputs.keys() if learner else ()):
-            block.params[name][:] = learner.outputs[name]
+        for learner in learners:
+            for name in block.params.keys() & learner.outputs.keys():
+                block.params[name][:] = learner.outputs[name]
         for name, place in block.inputs.items():
             place[:] = seen[name]
             if name == "u":
