@@ -131,7 +131,8 @@ class Adapted:
         memory = SHARES["memory"] * s.change if s.memory is None else s.memory
         self.memory = self._parts.parameter("t_memory", memory)
         self._next = dict[str, ca.SX]()
-        self._parts.inputs = [replace(inner.inputs[0], nominal=0.1, doc="measured velocity")]
+        seen: dict[str, Any] = {"nominal": 0.1, "doc": "measured velocity"}
+        self._parts.inputs = [replace(v, **seen) for v in inner.inputs[:1]]
         self.follow(self.z, self.after)
 
     def parameter(self, name: str, start: float) -> ca.SX:
