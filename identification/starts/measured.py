@@ -299,7 +299,9 @@ def turning_points(x: Array, dead: float) -> list[int]:
     """Return the samples at which a position turns back by more than `dead`, in order."""
     found = list[int]()
     side, extreme = 0, 0
-    for i in range(1, x.size):
+    moving = np.flatnonzero(np.diff(x))  # local extremes and the end suffice
+    turns = moving[:-1][np.diff(np.sign(x[moving + 1] - x[moving])) != 0] + 1
+    for i in [*turns.tolist(), *(moving[-1:] + 1).tolist()]:
         moved = x[i] - x[extreme]
         if side * moved >= 0 and moved:
             if side == 0 and abs(moved) <= dead:
@@ -354,7 +356,8 @@ def hysteresis(measured: Measured, *, offset: float = 0.0, dead: float = DEAD) -
 
 def _branches(x: Array, F: Array, v: Array, dead: float, shift: int) -> Iterator[Branch]:
     typical = float(np.quantile(np.abs(F), 0.75))
-    middle = np.median([F[:-2], F[1:-1], F[2:]], axis=0)  # median of three, against single spikes
+    low, high = np.minimum(F[:-1], F[1:]), np.maximum(F[:-1], F[1:])
+    middle = np.maximum(low[:-1], np.minimum(high[:-1], F[2:]))  # median of three, against spikes
     smooth = np.concatenate([F[:1], middle, F[-1:]])
     for first, last in pairwise([*turning_points(x, dead * float(np.ptp(x))), x.size - 1]):
         side = 1 if x[last] > x[first] else -1
