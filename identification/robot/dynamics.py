@@ -178,7 +178,7 @@ def _regressor(
         variables += own
         bodies.append(replace(body, mass=m, com=others[:3], inertia=others[3:], ideal=True))
     mechanism.bodies = bodies
-    eq = mechanism.prepare(variables).eq
+    eq = mechanism.prepare(tuple(variables)).eq
     T, offset, leads = couplings(eq)
     motion = [ca.SX.sym(name, len(leads)) for name in ("q", "qd", "qdd")]
     y, yd, ydd = motion

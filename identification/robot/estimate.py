@@ -8,8 +8,8 @@ covariance includes the autocorrelation of the residuals of each joint, see `San
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import final
+from itertools import pairwise
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,30 +20,31 @@ from identification.robot.base import Base, regressor
 from identification.robot.dynamics import RobotModel
 from identification.robot.friction import JointLaw, coordinates
 from identification.robot.motion import RobotMotion
-from identification.verdict.minimum import Minimum
-from symfric.foundation.shown import brief
+from identification.verdict.minimum import Minimum, Sandwich
 
 METHODS = ("ordinary", "weighted", "robust")
-ROUNDS = 40
+ROUNDS = 20
 """Largest number of iterations."""
 CLOSE = 1e-6
-"""Relative change of the weighted residuals below which the iteration ends."""
+"""Change of the logarithms of all sigma below which the iteration ends."""
 HUBER = 1.345
 """Residual in standard deviations above which Huber's weight decreases."""
-HALVINGS = 8
+HALVINGS = 4
 """Largest number of halvings of a step of a nonlinear law."""
+NEAR = np.array([0.5, 3.0])
+"""Bounds of a velocity of a law, relative to the slowest and the fastest speeds."""
+LEAP = 2.0
+"""Largest change of the logarithm of a parameter in one step."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Equations:
+class Equations(NamedTuple):
     """Rows of the joints that move, in order of record, joint and time.
 
     Attributes:
         Z: columns of base parameters and offsets, shape (rows, b + n).
         v, tau: velocity of the joint, measured torque, shape (rows,).
-        joint: index of the joint, shape (rows,).
-        channels: rows of each record and joint.
+        joint, record: indices, shape (rows,).
+        t: times [s], shape (rows,).
         noise: standard deviation of the noise of the torque by its spectrum, shape (rows,).
     """
 
@@ -51,61 +52,46 @@ class Equations:
     v: Array
     tau: Array
     joint: NDArray[np.int64]
-    channels: tuple[Channel, ...]
+    record: NDArray[np.int64]
+    t: Array
     noise: Array
-
-    __repr__ = brief
 
     @classmethod
     def of(
-        cls, model: RobotModel, motions: Sequence[RobotMotion], base: Base, rotors: bool
-    ) -> "Equations":
-        """Evaluate the regressor over all records."""
-        blocks, v, tau, joint = list[Array](), list[Array](), list[Array](), list[int]()
-        channels, noise, n = list[Channel](), list[Array](), len(model.joints)
+        cls, model: RobotModel, motions: Sequence[RobotMotion], base: Base, rotors: bool,
+        every: bool = False,
+    ) -> "Equations":  # fmt: skip
+        """Return the rows of all records without reversals, or `every` row."""
+        blocks = list[tuple[Any, ...]]()
         for record, one in enumerate(motions):
-            Y = regressor(model, one.q, one.v, one.a, rotors)[..., base.chosen]
-            for k in np.flatnonzero(one.kept.any(axis=0)).tolist():
-                kept, count = one.kept[:, k], int(one.kept[:, k].sum())
-                rows = slice(len(joint), len(joint) + count)
-                blocks.append(np.hstack([Y[kept, k], np.tile(np.eye(n)[k], (count, 1))]))
-                v.append(one.v[kept, k])
-                tau.append(one.tau[kept, k])
-                noise.append(np.full(count, one.noise[k]))
-                joint += [k] * count
-                name, unit = model.names[k], model.forces[k]
-                channels.append(Channel(record, name, unit, rows, one.t[kept], tau[-1], {}))
-        return cls(
-            np.vstack(blocks), np.concatenate(v), np.concatenate(tau), np.array(joint),
-            tuple(channels), np.concatenate(noise),
-        )  # fmt: skip
+            columns = regressor(model, one.q, one.v, one.a, rotors)[..., base.chosen]
+            for k, offset in enumerate(np.eye(len(model.joints))):
+                on = np.ones_like(one.kept[:, k]) if every else one.kept[:, k]
+                n = int(on.sum())
+                blocks.append((
+                    np.hstack([columns[on, k], np.tile(offset, (n, 1))]), one.v[on, k],
+                    one.tau[on, k], np.full(n, k), np.full(n, record), one.t[on],
+                    np.full(n, one.noise[k]),
+                ))  # fmt: skip
+        joined = cast(Any, [np.concatenate(part) for part in zip(*blocks, strict=True)])
+        return cls(*joined)
 
     def at(self, rows: NDArray[np.bool_]) -> "Equations":
         """Return some of the rows."""
-        channels, first = list[Channel](), 0
-        for c in self.channels:
-            here = rows[c.rows]
-            last = first + int(here.sum())
-            if last > first:
-                t, tau = c.t[here], c.measured[here]
-                channels.append(Channel(c.record, c.signal, c.unit, slice(first, last), t, tau, {}))
-            first = last
-        one = (y[rows] for y in (self.Z, self.v, self.tau, self.joint))
-        return Equations(*one, tuple(channels), self.noise[rows])
+        return Equations(*(column[rows] for column in self))
 
     def linearised(self, laws: Sequence[JointLaw], x: Array) -> tuple[Array, Array]:
         """Return all columns (rows, p) at the values x, and the predicted torques (rows,)."""
-        sizes = [len(law.names) for law in laws]
-        friction = np.zeros((self.tau.size, sum(sizes)))
-        first, theta = self.Z.shape[1], self.Z.shape[1]
-        predicted = self.Z @ x[:first]
-        for k, (law, size) in enumerate(zip(laws, sizes, strict=True)):
-            on, part = self.joint == k, slice(theta - first, theta - first + size)
-            F, J = law.at(self.v[on], x[theta : theta + size])
-            friction[on, part] = J
-            predicted[on] += F
-            theta += size
-        return np.hstack([self.Z, friction]), predicted
+        first = self.Z.shape[1]
+        predicted, blocks = self.Z @ x[:first], [self.Z]
+        for k, law in enumerate(laws):
+            on, last = self.joint == k, first + len(law.names)
+            columns = np.zeros((self.tau.size, last - first))
+            force, columns[on] = law.at(self.v[on], x[first:last])
+            predicted[on] += force
+            blocks.append(columns)
+            first = last
+        return np.hstack(blocks), predicted
 
     def by_joint(self, values: Array, n: int) -> Array:
         """Return the root mean square of values by joint; NaN for joints without rows, (n,)."""
@@ -113,9 +99,7 @@ class Equations:
         return np.sqrt(np.divide(sums, counts, out=np.full(n, np.nan), where=counts > 0))
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Estimated:
+class Estimated(NamedTuple):
     """Estimate of p values: base parameters, offsets and coordinates of the laws.
 
     Attributes:
@@ -124,7 +108,7 @@ class Estimated:
         A: columns at x, shape (rows, p).
         residuals: predicted - measured, shape (rows,).
         sigma: standard deviation of the residuals of each joint, shape (n,).
-        weights: weights of the rows, shape (rows,).
+        weights: weights of the rows relative to 1 / sigma^2, shape (rows,).
     """
 
     equations: Equations
@@ -134,68 +118,103 @@ class Estimated:
     sigma: Array
     weights: Array
 
-    __repr__ = brief
+    @property
+    def unlikely(self) -> float:
+        """Negative logarithm of the likelihood up to a constant."""
+        return float(np.sum(np.log(self.sigma[self.equations.joint])))
 
-    def minimum(self, names: Sequence[str]) -> Minimum:
-        """Return the weighted problem, whose `sandwich` is the covariance of the values."""
-        p, size = self.x.size, 1 / self.sigma[self.equations.joint]
+    def covariance(self) -> Sandwich:
+        """Return the covariance of the values."""
+        e, p, size = self.equations, self.x.size, 1 / self.sigma[self.equations.joint]
+        same = (np.diff(e.joint) == 0) & (np.diff(e.record) == 0)
+        ends = [0, *(np.flatnonzero(~same) + 1).tolist(), e.tau.size]
+        channels = [
+            Channel(0, "", "", slice(i, j), e.t[i:j], e.tau[i:j], {}) for i, j in pairwise(ends)
+        ]
         return Minimum(
-            channels=self.equations.channels, unknowns=(), names=tuple(names), values=self.x,
-            slope=np.eye(p), held=np.zeros(p, dtype=bool), r=self.residuals * size * self.weights,
+            channels=channels, unknowns=(), names=("",) * p, values=self.x, slope=np.eye(p),
+            held=np.zeros(p, dtype=bool), r=self.residuals * size * self.weights,
             J=self.A * size[:, None], gain=np.where(self.weights < 1.0, 0.0, 1.0),
             raw=self.residuals, noise={}, change=lambda values: 0.0,
-        )  # fmt: skip
+        ).sandwich  # fmt: skip
+
+    def refitted(self, x: Array, count: int) -> Array:
+        """Return `x` with all values after the first `count` adapted to these, to first order."""
+        weight = np.sqrt(self.weights) / self.sigma[self.equations.joint]
+        change = (self.A[:, :count] @ (x - self.x)[:count]) * weight
+        rest = self.x[count:] - _least_squares(self.A[:, count:] * weight[:, None], change)
+        return np.append(x[:count], rest)
 
 
-def estimate(equations: Equations, laws: Sequence[JointLaw], base: Base, method: str) -> Estimated:
+def estimate(
+    equations: Equations, laws: Sequence[JointLaw], base: Base, method: str
+) -> Estimated:  # fmt: skip
     """Return the estimate by one of `METHODS`."""
-    n, start = len(laws), coordinates(laws)
-    x = np.concatenate([base.values, np.zeros(n), start])
-    scales = np.concatenate([base.scales, np.ones(n), np.ones(start.size)])
+    n, tau = len(laws), equations.tau
+    x = np.concatenate([base.values, np.zeros(n), coordinates(laws)])
     linear = all(law.linear for law in laws)
-    sigma = weights = np.ones(equations.tau.size)
-    A, predicted = equations.linearised(laws, x)
-    cost, spread = np.inf, np.ones(n)
+    low, high, leap = _ends(equations, laws, x.size)
+    x = np.clip(x, low, high)
+    least = 1e-9 * np.nan_to_num(equations.by_joint(tau, n), nan=1.0) + 1e-300
+    sigma, weights = np.ones(n), np.ones(tau.size)
+    columns, predicted = equations.linearised(laws, x)
     for _ in range(ROUNDS):
-        w = np.sqrt(weights) / sigma
-        goal = equations.tau - predicted + A @ x
-        there = _least_squares(A * w[:, None], goal * w, scales)
-        step, before = there - x, float(np.sum(((equations.tau - predicted) * w) ** 2))
-        for _ in range(1 if linear else HALVINGS):
-            there = x + step
-            A, predicted = equations.linearised(laws, there)
-            if float(np.sum(((equations.tau - predicted) * w) ** 2)) <= before:
+        w = np.sqrt(weights) / sigma[equations.joint]
+        ends = np.maximum(low - x, -leap), np.minimum(high - x, leap)
+        step = _bounded(columns * w[:, None], (tau - predicted) * w, *ends)
+        before = np.linalg.norm((tau - predicted) * w)
+        for _ in range(HALVINGS):
+            columns, predicted = equations.linearised(laws, x + step)
+            if linear or np.linalg.norm((tau - predicted) * w) <= before:
                 break
             step = step / 2
-        x, left = there, predicted - equations.tau
-        spread = _spreads(equations, left, x.size, n)
-        if method == "ordinary" and linear:
-            break
-        if method != "ordinary":
-            sigma = spread[equations.joint]
+        x, left = x + step, predicted - tau
+        spread = equations.by_joint(left, n) / np.sqrt(max(0.1, 1 - x.size / tau.size))
+        spread = np.maximum(np.nan_to_num(spread, nan=1.0), least)
+        if method == "ordinary":
+            spread = np.full(n, np.linalg.norm(left) / np.sqrt(tau.size))
         if method == "robust":
-            large = np.abs(left) / sigma
-            weights = np.minimum(1.0, HUBER / np.maximum(large, 1e-300))
-        now = float(np.sum(np.log(spread[np.isfinite(spread)]))) + float(np.sum(1 - weights))
-        if abs(now - cost) < CLOSE:
+            size = np.maximum(np.abs(left) / spread[equations.joint], HUBER)
+            weights = HUBER / size
+        change = np.abs(np.log(spread / sigma)).max()
+        sigma = spread
+        if change < CLOSE:
             break
-        cost = now
-    spread = np.where(np.isfinite(spread), spread, 1.0)
-    if method == "ordinary":
-        sigma_j = np.full(n, float(np.sqrt(np.mean((predicted - equations.tau) ** 2))))
-        return Estimated(equations, x, A, predicted - equations.tau, sigma_j, weights)
-    return Estimated(equations, x, A, predicted - equations.tau, spread, weights)
+    return Estimated(equations, x, columns, predicted - tau, sigma, weights)
 
 
-def _spreads(equations: Equations, left: Array, p: int, n: int) -> Array:
-    """Return the standard deviations of the residuals by joint, corrected for p values, (n,)."""
-    rows = max(1, equations.tau.size)
-    found = equations.by_joint(left, n) / np.sqrt(max(0.1, 1 - p / rows))
-    return np.maximum(found, 1e-9 * equations.by_joint(equations.tau, n))
+def _ends(equations: Equations, laws: Sequence[JointLaw], size: int) -> tuple[Array, Array, Array]:
+    """Return bounds of all values and of their steps; values of linear laws have none, (p,) each.
+
+    Velocities of a law are near those of the record; levels are at most three times the torque.
+    """
+    low, high, leap = np.full(size, -np.inf), np.full(size, np.inf), np.full(size, np.inf)
+    first = size - sum(len(law.names) for law in laws)
+    for k, law in enumerate(laws):
+        part = slice(first, first + len(law.names))
+        first, on = part.stop, equations.joint == k
+        if on.any() and not law.linear:
+            speeds = np.log(np.quantile(np.abs(equations.v[on]), [0.01, 1.0]) * NEAR)
+            largest = 3 * float(np.abs(equations.tau[on]).max())
+            level = np.array([unit in ("N", "N m") for unit in law.units])
+            low[part] = np.where(law.logarithmic, speeds[0], 0.0)
+            high[part] = np.where(law.logarithmic, speeds[1], np.where(level, largest, np.inf))
+            leap[part] = np.where(law.logarithmic, LEAP, np.inf)
+    return low, high, leap
 
 
-def _least_squares(A: Array, b: Array, scales: Array) -> Array:
-    """Return the solution of least norm in units of the scales, shape (p,)."""
-    size = np.linalg.norm(A, axis=0)
+def _bounded(columns: Array, values: Array, low: Array, high: Array) -> Array:
+    """Return the least squares solution; entries beyond a bound are held there, shape (p,)."""
+    step = _least_squares(columns, values)
+    out = (step < low) | (step > high)
+    if out.any():
+        step = np.where(out, np.clip(step, low, high), 0.0)
+        step += _least_squares(columns * ~out, values - columns @ step) * ~out
+    return step
+
+
+def _least_squares(columns: Array, values: Array) -> Array:
+    """Return the solution that is least in units of the lengths of the columns, shape (p,)."""
+    size = np.linalg.norm(columns, axis=0)
     size = np.where(size > 0, size, 1.0)
-    return np.linalg.lstsq(A / size, b, rcond=1e-10)[0] / size
+    return np.linalg.lstsq(columns / size, values, rcond=1e-10)[0] / size

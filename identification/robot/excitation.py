@@ -2,9 +2,9 @@
 
     q_j(t) = c_j + sum_l a_jl / (w l) sin(w l t) - b_jl / (w l) cos(w l t),   w = 2 pi / T
 
-The motion starts and ends at rest, sum_l a_jl = sum_l l b_jl = 0, so it can be repeated and appended
-to other motions. The coefficients maximise log det of the information about base parameters,
-offsets, Coulomb and viscous friction; rows are weighted by the largest torques.
+The motion starts and ends at rest, sum_l a_jl = sum_l l b_jl = 0, so it can be repeated. The
+coefficients maximise log det of the information about base parameters, offsets, Coulomb and viscous
+friction; rows are weighted by the largest torques.
 Source: Swevers, Ganseman, Tukel, De Schutter and Van Brussel, IEEE Trans. Robotics 13(5), 1997.
 """
 
@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 
 from identification.data.record import Array
-from identification.robot.base import base_of, columns_of
+from identification.robot.base import base_of
 from identification.robot.dynamics import RobotModel
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
@@ -214,18 +214,17 @@ def _waves(t: Array, period: float, harmonics: int) -> tuple[Array, Array, Array
     """Return q, q' and q'' of unit coefficients at times t (N,), shape (N, 1 + 2 H) each."""
     w = 2 * np.pi / period * np.arange(1, harmonics + 1)
     sine, cosine = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
-    one = np.ones((t.size, 1))
-    return (
-        np.hstack([one, sine / w, -cosine / w]),
-        np.hstack([0 * one, cosine, sine]),
-        np.hstack([0 * one, -w * sine, w * cosine]),
-    )
+    one, none = np.ones((t.size, 1)), np.zeros((t.size, 1))
+    acceleration: Array = np.hstack([none, -w * sine, w * cosine]).astype(np.float64)
+    return np.hstack([one, sine / w, -cosine / w]), np.hstack([none, cosine, sine]), acceleration
 
 
 def _rest(harmonics: int) -> Array:
     """Return two columns whose products with the coefficients vanish at rest, (1 + 2 H, 2)."""
-    each, none = np.ones(harmonics), np.zeros(harmonics)
-    return np.column_stack([[0, *each, *none], [0, *none, *np.arange(1, harmonics + 1)]])
+    found = np.zeros((1 + 2 * harmonics, 2))
+    found[1 : harmonics + 1, 0] = 1.0
+    found[harmonics + 1 :, 1] = np.arange(1, harmonics + 1)
+    return found
 
 
 def _at_rest(coefficients: Array) -> Array:
@@ -242,7 +241,7 @@ def _torques(model: RobotModel) -> ca.Function:
 
 def _rows(model: RobotModel, limits: _Limits) -> ca.Function:
     """Return the function (q, qd, qdd) -> weighted columns of the torques, shape (p, n)."""
-    n, chosen = len(model.joints), base_of(model, columns_of(model, False), False).chosen
+    n, chosen = len(model.joints), base_of(model, False).chosen
     q, v, a = (ca.SX.sym(name, n) for name in ("q", "qd", "qdd"))
     usual = np.std(model.torques(*model.random_motion(GUESSES)), axis=0)
     weight = 1 / np.where(np.isfinite(limits.effort), limits.effort, np.maximum(usual, 1e-9))
@@ -303,6 +302,7 @@ def _inside(
     pairs = zip(signals, (limits.half, limits.speed, limits.acceleration), strict=True)
     size = np.max([most_of / limit for most_of, limit in pairs], axis=0)
     c = c / (size if fill else np.maximum(size, 1.0))[:, None]
+    large = np.zeros(len(c), dtype=np.bool_)
     for _ in range(HALVINGS):
         tau = model.torques(*(part @ (c + centre).T for part in waves))
         large = np.abs(tau).max(axis=0) > limits.effort / MARGIN
@@ -311,6 +311,6 @@ def _inside(
         c = 0.9 * c
     lacking = ", ".join(np.array(model.names)[large])
     raise ValueError(
-        f"{WHERE}: expected efforts that carry the robot in the middle of its limits, got too small "
+        f"{WHERE}: expected efforts that carry the robot in the middle of its range, got too small "
         f"ones of {lacking}"
     )

@@ -6,6 +6,7 @@ from typing import final
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.data.dataset import Dataset
 from identification.data.record import Array
@@ -44,7 +45,7 @@ class JointLaw:
     law: Law
     names: tuple[str, ...]
     units: tuple[str, ...]
-    logarithmic: np.ndarray
+    logarithmic: NDArray[np.bool_]
     linear: bool
     function: ca.Function
 
@@ -83,6 +84,8 @@ class JointLaw:
 
     def at(self, v: Array, x: Array) -> tuple[Array, Array]:
         """Return the friction (R,) and its derivatives by the coordinates (R, k)."""
+        if not v.size:
+            return np.zeros(0), np.zeros((0, x.size))
         F, J = self.function.map(v.size)(v[None, :], np.repeat(x[:, None], v.size, axis=1))
         return F.full().ravel(), J.full().reshape(v.size, -1)
 
@@ -119,7 +122,7 @@ def laws_of(
         if one.states or one.inputs:
             raise ValueError(
                 f"{WHERE}: law of '{joint}': expected a law without states, got {law_name(one)}; "
-                f"fit it afterwards: Fit(Points(offset=True), law, fit.friction_data('{joint}')).solve()"
+                f"fit it afterwards by Fit(Points(offset=True), law, fit.friction_data('{joint}'))"
             )
         widths = {n: (SHARP * max(float(speed), 1e-9)) ** power for n, power in one.widths.items()}
         found.append(JointLaw.of(joint, with_values(one, widths), unit == "rad"))

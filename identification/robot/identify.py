@@ -1,9 +1,8 @@
 """Identification of a robot from its URDF and logs of its joints: `identify_robot`."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import final
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from identification.data.filters import Filter
 from identification.data.record import Array
 from identification.result.series import Estimate
 from identification.result.stored import plain
-from identification.robot.base import Base, base_of, columns_of
+from identification.robot.base import Base, base_of
 from identification.robot.consistent import consistent
 from identification.robot.dynamics import WHERE, RobotModel
 from identification.robot.estimate import METHODS, Equations, Estimated, estimate
@@ -23,20 +22,24 @@ from identification.robot.motion import RobotMotion, motions
 from identification.robot.result import OFFSET, RobotFit, TorqueError, TorqueSeries
 from identification.verdict.minimum import Sandwich
 from symfric.foundation import checks
-from symfric.foundation.parameters import with_values
+from symfric.foundation.parameters import parameters, with_values
 from symfric.laws import Law, law_name
+
+LawLike = Law | str | Mapping[str, Law | str]
 
 HELD = 0.25
 """Last part of every record that is predicted from the first part."""
 LARGE = 30.0
 """Error of a torque above which the model does not describe it [%]."""
+SURE = 4.0
+"""Standard errors by which the power of friction must be negative."""
 WORK = 0.02
-"""Least power of friction, relative to that of the torque, for which its sign is checked."""
+"""Power of friction, relative to that of the torque, below which its sign is not checked."""
+BETTER = 0.3
+"""Decrease of the mean logarithm of the residuals for which a torque has the wrong sign."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Prepared:
+class _Prepared(NamedTuple):
     """Equations of a robot before the fit."""
 
     model: RobotModel
@@ -47,11 +50,17 @@ class _Prepared:
     rotors: bool
     information: Information
 
+    def part(self, k: int) -> slice:
+        """Return the coordinates of the law of joint k among all values."""
+        sizes = [len(law.names) for law in self.laws]
+        first = len(self.base.labels) + len(sizes) + sum(sizes[:k])
+        return slice(first, first + sizes[k])
+
 
 def identify_robot(
     urdf: str | Path,
     data: Dataset,
-    law: Law | str | Mapping[str, Law | str] = USUAL,
+    law: LawLike = USUAL,
     *,
     validation: Dataset | None = None,
     method: str = "weighted",
@@ -69,66 +78,61 @@ def identify_robot(
     identified friction replaces it.
 
     Args:
-        urdf: path of the file, or its content. It defines the kinematics; its inertias are the
-            prior values of combinations that the data do not determine.
-        data: records of the joints, with any number of samples and sample rates.
+        urdf: path of the file, or its content. It defines the kinematics; combinations of inertias
+            that the data do not determine remain close to it.
+        data: records of the joints, each with its own sample rate.
         law: friction law without states, of all joints or by joint.
         validation: records whose torques are predicted. None: the last quarter of every record is
             predicted from the rest; the values follow from all of it.
         method: "weighted": weights of each joint by its residuals (iteratively reweighted least
             squares); "robust": also less weight of outliers (Huber); "ordinary": equal weights.
         rotors: True to estimate the inertia of each rotor, reduced to its joint. It is separate
-            from the links because gears make rotors turn faster.
+            from that of the links, because gears make rotors turn faster.
         filter: cut-off and decimation; None: chosen from the data.
 
     Raises:
         ValueError: mistakes of the file, missing columns, joints that all rest, positions in other
             units, torques with the wrong sign.
 
-    Limits: torques are those of the joints; flexibility, backlash and friction that depends on load
-    or position remain in the residuals. Intervals include the autocorrelation of the residuals, but
-    not the errors of a wrong friction law or of wrong kinematics.
+    Limits: flexibility, backlash and friction that depends on load or position remain in the
+    residuals. Intervals include the autocorrelation of the residuals, but not the errors of a wrong
+    friction law or wrong kinematics.
     """
     checks.choice(f"{WHERE}: method", method, METHODS)
-    checks.flag(f"{WHERE}: rotors", rotors)
-    made = _prepared(urdf, data, law, rotors, filter)
-    model, base, equations = made.model, made.base, made.equations
-    found = estimate(equations, made.laws, base, method)
-    names = _names(made)
-    cover = found.minimum(names).sandwich
-    _check_signs(made, found, cover)
+    made = _prepared(urdf, data, law, checks.flag(f"{WHERE}: rotors", rotors), filter)
+    model, equations = made.model, made.equations
+    found = estimate(equations, made.laws, made.base, method)
+    cover = found.covariance()
+    _check_signs(made, found, cover, method)
     if validation is None:
-        early, late = _split(equations)
-        errors = _errors(
-            made, estimate(equations.at(early), made.laws, base, method), equations.at(late)
-        )
+        early = _early(equations)
+        first = estimate(equations.at(early), made.laws, made.base, method)
+        errors = _errors(made, first.x, equations.at(~early))
         held = f"last {HELD:.0%} of each record, predicted from the rest"
     else:
-        others = motions(model, validation, made.motions[0].filter if filter is None else filter)
-        errors = _errors(made, found, Equations.of(model, others, base, rotors))
-        held = f"on {validation.name}"
+        others = motions(model, validation, filter or made.motions[0].filter)
+        errors = _errors(made, found.x, Equations.of(model, others, made.base, rotors))
+        held = f"{validation.name}, which did not enter the fit"
     pi, spins, x = _consistent(made, found, cover)
-    training = _errors(made, found, equations)
+    training = _errors(made, found.x, equations)
+    is_text = isinstance(urdf, str) and urdf.lstrip().startswith("<")
     return RobotFit(
         name=model.urdf.name,
-        urdf=_text(urdf),
+        urdf=str(urdf) if is_text else Path(urdf).read_text(encoding="utf-8"),
         joints=model.names,
         laws={law.joint: law_name(law.law) for law in made.laws},
-        friction=_friction(made, found, cover),
-        base=_base(made, found, cover),
+        **_estimates(made, found, cover),
         inertial=tuple(pi.tolist()),
         rotors=dict(zip(model.names, spins.tolist(), strict=True)) if rotors else {},
-        offsets=dict(zip(model.names, x[len(base.labels) :].tolist(), strict=False)),
-        law_data={law.joint: plain(with_values(law.law, _values(made, x, k))) for k, law in enumerate(made.laws)},
-        urdf_friction=_urdf_friction(made, x),
+        **_for_consistent(made, x),
         information=made.information,
         validation=errors,
         training=training,
-        consistent=_errors(made, found, equations, x),
-        findings=tuple(_findings(made, training, errors)),
+        consistent=_errors(made, x, equations),
+        findings=tuple(_findings(made, training)),
         series=_series(made, found),
         held=held,
-    )  # fmt: skip
+    )
 
 
 def robot_information(
@@ -142,13 +146,12 @@ def robot_information(
 
 
 def _prepared(
-    urdf: str | Path, data: Dataset, law: Law | str | Mapping[str, Law | str], rotors: bool,
-    filter: Filter | None,
-) -> _Prepared:  # fmt: skip
+    urdf: str | Path, data: Dataset, law: LawLike, rotors: bool, filter: Filter | None
+) -> _Prepared:
     checks.kind(f"{WHERE}: data", data, Dataset, "a Dataset")
     model = RobotModel.read(urdf)
     moved = motions(model, data, filter)
-    base = base_of(model, columns_of(model, rotors), rotors)
+    base = base_of(model, rotors)
     equations = Equations.of(model, moved, base, rotors)
     speeds = np.sqrt(np.mean(np.vstack([one.v for one in moved]) ** 2, axis=0))
     usual, laws = laws_of(model, USUAL, speeds), laws_of(model, law, speeds)
@@ -163,134 +166,95 @@ def _started(
     laws: Sequence[JointLaw],
 ) -> tuple[JointLaw, ...]:  # fmt: skip
     """Return nonlinear laws fitted to the friction that the usual law leaves at each joint."""
-    found, started = estimate(equations, usual, base, "weighted"), list[JointLaw]()
-    rigid = equations.Z[:, : len(base.labels)] @ found.x[: len(base.labels)]
+    found, b = estimate(equations, usual, base, "weighted"), len(base.labels)
+    friction, started = equations.tau - equations.Z[:, :b] @ found.x[:b], list[JointLaw]()
     for k, law in enumerate(laws):
         on = equations.joint == k
         if not law.linear and on.any():
-            turning = model.units[k] == "rad"
-            law = law.fitted(equations.v[on], (equations.tau - rigid)[on], turning)
+            law = law.fitted(equations.v[on], friction[on], model.units[k] == "rad")
         started.append(law)
     return tuple(started)
 
 
-def _names(made: _Prepared) -> list[str]:
-    offsets = [f"{OFFSET} {joint}" for joint in made.model.names]
-    return [
-        *made.base.labels,
-        *offsets,
-        *(f"{n} {law.joint}" for law in made.laws for n in law.names),
-    ]
-
-
-def _part(made: _Prepared, k: int) -> slice:
-    """Return the coordinates of the law of joint k among all values."""
-    sizes = [len(law.names) for law in made.laws]
-    first = len(made.base.labels) + len(sizes) + sum(sizes[:k])
-    return slice(first, first + sizes[k])
-
-
-def _values(made: _Prepared, x: Array, k: int) -> dict[str, float]:
-    """Return the parameters of the law of joint k."""
-    law = made.laws[k]
-    return dict(zip(law.names, law.values(x[_part(made, k)]).tolist(), strict=True))
-
-
-def _intervals(cover: Sandwich, x: Array) -> tuple[Array, Array]:
-    """Return standard errors and half widths of 95 % intervals; NaN without one, shape (p,)."""
+def _estimates(made: _Prepared, found: Estimated, cover: Sandwich) -> dict[str, Any]:
+    """Return base parameters and friction with 95 % intervals."""
     from scipy.special import stdtrit  # noqa: PLC0415  (slow to import)
 
     error = np.sqrt(np.diag(cover.coloured))
     size = np.maximum(np.abs(cover.null).max(axis=0, initial=0.0), 1e-300)
-    lost = (np.abs(cover.null) / size > 1e-4).any(axis=1) | ~(error > 0)
-    error = np.where(lost, np.nan, error)
-    return error, stdtrit(cover.freedom, 0.975) * error
+    error[(np.abs(cover.null) > 1e-4 * size).any(axis=1)] = np.nan
+    half = stdtrit(cover.freedom, 0.975) * error
 
+    def of(k: int, unit: str, logarithmic: bool = False) -> Estimate:
+        x, reach = float(found.x[k]), float(half[k])
+        if not reach > 0:
+            value = float(np.exp(x)) if logarithmic else x
+            return Estimate(value, unit, note="not determined by the data")
+        ends = np.array([x, x - reach, x + reach])
+        value, low, high = (np.exp(np.clip(ends, -30, 30)) if logarithmic else ends).tolist()
+        return Estimate(value, unit, float(error[k]) * (value if logarithmic else 1.0), low, high)
 
-def _estimate(value: float, unit: str, error: float, half: float, log: bool = False) -> Estimate:
-    if not np.isfinite(error):
-        return Estimate(value, unit, note="not determined by the data")
-    low, high = (
-        (value * np.exp(-half), value * np.exp(half)) if log else (value - half, value + half)
-    )
-    return Estimate(value, unit, value * error if log else error, float(low), float(high))
-
-
-def _base(made: _Prepared, found: Estimated, cover: Sandwich) -> dict[str, Estimate]:
-    error, half = _intervals(cover, found.x)
-    rows = zip(
-        made.base.labels,
-        made.base.units,
-        found.x.tolist(),
-        error.tolist(),
-        half.tolist(),
-        strict=False,
-    )
-    return {label: _estimate(x, unit, e, h) for label, unit, x, e, h in rows}
-
-
-def _friction(made: _Prepared, found: Estimated, cover: Sandwich) -> dict[str, dict[str, Estimate]]:
-    error, half = _intervals(cover, found.x)
-    result, b = dict[str, dict[str, Estimate]](), len(made.base.labels)
+    b = len(made.base.labels)
+    base = {label: of(k, made.base.units[k]) for k, label in enumerate(made.base.labels)}
+    friction = dict[str, dict[str, Estimate]]()
     for k, law in enumerate(made.laws):
-        if law.joint in made.information.resting:
-            continue
-        part, own = _part(made, k), dict[str, Estimate]()
-        rows = zip(law.names, law.units, law.values(found.x[part]), error[part], half[part],
-                   law.logarithmic, strict=True)  # fmt: skip
-        for name, unit, value, e, h, log in rows:
-            own[name] = _estimate(float(value), unit, float(e), float(h), bool(log))
-        own[OFFSET] = _estimate(found.x[b + k], made.model.forces[k], error[b + k], half[b + k])
-        result[law.joint] = own
-    return result
+        if law.joint not in made.information.resting:
+            first = made.part(k).start
+            friction[law.joint] = {
+                name: of(first + i, law.units[i], bool(law.logarithmic[i]))
+                for i, name in enumerate(law.names)
+            } | {OFFSET: of(b + k, made.model.forces[k])}
+    return {"base": base, "friction": friction}
 
 
-def _check_signs(made: _Prepared, found: Estimated, cover: Sandwich) -> None:
-    """Check that friction dissipates energy.
+def _check_signs(made: _Prepared, found: Estimated, cover: Sandwich, method: str) -> None:
+    """Check that friction dissipates energy, and that no torque fits better with the other sign.
 
     Raises:
-        ValueError: friction significantly accelerates a joint.
+        ValueError: friction accelerates a joint.
     """
-    wrong = list[str]()
+    wrong, doubt, n = list[str](), False, len(made.laws)
     for k, law in enumerate(made.laws):
-        on, part = made.equations.joint == k, _part(made, k)
-        if not on.any():
-            continue
+        on, part = made.equations.joint == k, made.part(k)
         v, tau = made.equations.v[on], made.equations.tau[on]
-        F, J = law.at(v, found.x[part])
-        power, slope = float(np.mean(v * F)), np.mean(v[:, None] * J, axis=0)
+        if not v.size:
+            continue
+        force, slopes = law.at(v, found.x[part])
+        power, slope = float(np.mean(v * force)), np.mean(v[:, None] * slopes, axis=0)
         error = float(np.sqrt(slope @ cover.coloured[part, part] @ slope))
-        if power + 4 * error < -WORK * float(np.std(tau) * np.std(v)):
+        doubt |= power < 0
+        if power + SURE * error < -WORK * float(np.std(tau) * np.std(v)):
             wrong.append(law.joint)
+    found_at = list[float]()
+    for k in range(n) if doubt else ():
+        sign = np.where(made.equations.joint == k, -1.0, 1.0)
+        turned = made.equations._replace(tau=sign * made.equations.tau)
+        found_at.append(estimate(turned, made.laws, made.base, method).unlikely)
+    if doubt and found.unlikely - min(found_at) > BETTER * made.equations.tau.size / n:
+        wrong = [made.model.names[int(np.argmin(found_at))]]
     if wrong:
-        first = wrong[0]
         raise ValueError(
-            f"{WHERE}: expected friction that opposes the motion, got friction that accelerates "
-            f"{', '.join(wrong)}; if the torque has the wrong sign, pass "
-            f"data.scaled({{'{first}_torque': -1}}) (--scale {first}_torque=-1)"
+            f"{WHERE}: expected torques in the direction of the joints, got that of "
+            f"{', '.join(wrong)} with the other sign, or exchanged columns; turn a sign by "
+            f"data.scaled({{'{wrong[0]}_torque': -1}}) (--scale {wrong[0]}_torque=-1)"
         )
 
 
-def _split(equations: Equations) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return masks of the rows of the first and the last part of every record."""
-    late = np.zeros(equations.tau.size, dtype=bool)
-    ends = dict[int, list[float]]()
-    for c in equations.channels:
-        ends.setdefault(c.record, []).extend((float(c.t[0]), float(c.t[-1])))
-    for c in equations.channels:
-        low, high = min(ends[c.record]), max(ends[c.record])
-        late[c.rows] = c.t > high - HELD * (high - low)
-    return ~late, late
+def _early(equations: Equations) -> NDArray[np.bool_]:
+    """Return a mask of the rows of the first part of every record."""
+    early = np.zeros(equations.tau.size, dtype=np.bool_)
+    for record in np.unique(equations.record):
+        on = equations.record == record
+        t = equations.t[on]
+        early[on] = t <= t.max() - HELD * np.ptp(t)
+    return early
 
 
-def _errors(
-    made: _Prepared, found: Estimated, equations: Equations, x: Array | None = None
-) -> dict[str, TorqueError]:
-    """Return the errors of the predicted torques by joint, of other values if given."""
+def _errors(made: _Prepared, x: Array, equations: Equations) -> dict[str, TorqueError]:
+    """Return the errors of the torques predicted by the values x, by joint."""
     n = len(made.laws)
-    predicted = equations.linearised(made.laws, found.x if x is None else x)[1]
-    rms = equations.by_joint(predicted - equations.tau, n)
-    size = equations.by_joint(equations.tau, n)
+    left = equations.linearised(made.laws, x)[1] - equations.tau
+    rms, size = equations.by_joint(left, n), equations.by_joint(equations.tau, n)
     counts = np.bincount(equations.joint, minlength=n)
     return {
         joint: TorqueError(
@@ -303,41 +267,36 @@ def _errors(
 
 def _consistent(made: _Prepared, found: Estimated, cover: Sandwich) -> tuple[Array, Array, Array]:
     """Return consistent inertial parameters and rotor inertias, and all values that fit to them."""
-    base, model = made.base, made.model
-    b, n = len(base.labels), len(model.joints) if made.rotors else 0
-    sizes = np.array([
-        max(found.x[base.chosen.index(k)] if k in base.chosen else 0.0, 0.05 * scale)
-        for k, scale in enumerate(columns_of(model, made.rotors).scales)
-    ])[model.pi.size :]  # fmt: skip
-    C = cover.coloured[:b, :b]
-    pi, spins = consistent(found.x[:b], C, base.K, model.pi, sizes[:n])
-    x = found.x.copy()
+    base, size, x = made.base, made.model.pi.size, found.x.copy()
+    b, spins = len(base.labels), 0.05 * base.rotors
+    for k, column in enumerate(base.chosen):
+        if column >= size:
+            spins[column - size] = max(x[k], spins[column - size])
+    pi, spins = consistent(x[:b], cover.coloured[:b, :b], base.K, made.model.pi, spins)
     x[:b] = base.K @ np.append(pi, spins)
-    weight = np.sqrt(found.weights) / found.sigma[made.equations.joint]
-    change = (found.A[:, :b] @ (x[:b] - found.x[:b])) * weight
-    rest = found.A[:, b:] * weight[:, None]
-    size = np.linalg.norm(rest, axis=0)
-    size = np.where(size > 0, size, 1.0)
-    x[b:] -= np.linalg.lstsq(rest / size, change, rcond=1e-10)[0] / size
-    return pi, spins, x
+    return pi, spins, found.refitted(x, b)
 
 
-def _urdf_friction(made: _Prepared, x: Array) -> dict[str, tuple[float, float]]:
-    """Return f and d of f sign(v) + d v, fitted to the law at the measured speeds, by joint."""
-    found = dict[str, tuple[float, float]]()
+def _for_consistent(made: _Prepared, x: Array) -> dict[str, Any]:
+    """Return offsets, laws, and f and d of f sign(v) + d v at the measured speeds, by joint."""
+    b, equations = len(made.base.labels), made.equations
+    offsets, laws, simple = dict[str, Any](), dict[str, Any](), dict[str, Any]()
     for k, law in enumerate(made.laws):
-        on = made.equations.joint == k
-        if on.any():
-            v = made.equations.v[on]
-            F = law.at(v, x[_part(made, k)])[0]
-            f, d = np.linalg.lstsq(np.column_stack([np.sign(v), v]), F, rcond=None)[0].tolist()
-            found[law.joint] = (max(f, 0.0), max(d, 0.0))
-    return found
+        v, own = equations.v[equations.joint == k], x[made.part(k)]
+        if not v.size:
+            continue
+        known = parameters(law.law)
+        values = zip(law.names, law.values(own).tolist(), strict=True)
+        least = {name: max(value, float(known[name].lower)) for name, value in values}
+        columns = np.column_stack([np.sign(v), v])
+        f, d = np.linalg.lstsq(columns, law.at(v, own)[0], rcond=None)[0].tolist()
+        offsets[law.joint] = float(x[b + k])
+        laws[law.joint] = plain(with_values(law.law, least))
+        simple[law.joint] = (max(f, 0.0), max(d, 0.0))
+    return {"offsets": offsets, "law_data": laws, "urdf_friction": simple}
 
 
-def _findings(
-    made: _Prepared, training: Mapping[str, TorqueError], errors: Mapping[str, TorqueError]
-) -> Iterator[str]:
+def _findings(made: _Prepared, training: Mapping[str, TorqueError]) -> Iterator[str]:
     """Yield doubts about data and values."""
     given = [j.name for j in made.model.joints if j.friction or j.damping]
     if given:
@@ -346,31 +305,20 @@ def _findings(
     if large:
         yield (
             f"The model does not describe the torques of {', '.join(large)} (more than {LARGE:g} % "
-            "remains): check the columns, the units and whether the log belongs to this robot."
+            "remains): check columns, units and whether the log belongs to this robot."
         )
-    worse = [j for j, e in errors.items() if e.rms > 2 * training[j].rms] if errors else []
-    if worse and not large:
-        yield f"The torques of {', '.join(worse)} are predicted worse than they are fitted."
 
 
 def _series(made: _Prepared, found: Estimated) -> tuple[TorqueSeries, ...]:
     """Return the torques of all rows, also of those that did not enter the fit."""
-    whole = [replace(one, kept=np.ones_like(one.kept)) for one in made.motions]
-    equations = Equations.of(made.model, whole, made.base, made.rotors)
-    predicted = equations.linearised(made.laws, found.x)[1]
-    b, series = len(made.base.labels), list[TorqueSeries]()
-    for c in equations.channels:
-        one, k = made.motions[c.record], made.model.names.index(c.signal)
-        rigid = equations.Z[c.rows, :b] @ found.x[:b]
-        used = one.kept[:, k].astype(float)
-        series.append(
-            TorqueSeries(
-                c.signal, one.name, c.t, one.v[:, k], c.measured, predicted[c.rows], rigid, used
-            )
-        )
+    every = Equations.of(made.model, made.motions, made.base, made.rotors, every=True)
+    predicted, b = every.linearised(made.laws, found.x)[1], len(made.base.labels)
+    rigid, series = every.Z[:, :b] @ found.x[:b], list[TorqueSeries]()
+    for record, one in enumerate(made.motions):
+        for k, joint in enumerate(made.model.names):
+            on = (every.record == record) & (every.joint == k)
+            t, v, tau = every.t[on], every.v[on], every.tau[on]
+            used = one.kept[:, k].astype(float)
+            made_of = joint, one.name, t, v, tau, predicted[on], rigid[on], used
+            series.append(TorqueSeries(*made_of))
     return tuple(series)
-
-
-def _text(urdf: str | Path) -> str:
-    is_text = isinstance(urdf, str) and urdf.lstrip().startswith("<")
-    return str(urdf) if is_text else Path(urdf).read_text(encoding="utf-8")

@@ -116,8 +116,10 @@ def _wrong_numbers(model: RobotModel, record: Record) -> Iterator[str]:
         slack = 0.1 * span
         inside = factor * ends[0] > low[k] - slack and factor * ends[1] < high[k] + slack
         if ends[1] - ends[0] > 1.5 * span:
-            hint = f"they seem to be in {other}: units={{'{channel}': '{other}'}} " * inside
-            hint += f"(--unit {channel}={other})" * inside or "is it the log of another robot?"
+            hint = "is it the log of another robot?"
+            if inside:
+                hint = f"are they in {other}? units={{'{channel}': '{other}'}} "
+                hint += f"(--unit {channel}={other})"
             yield (
                 f"data '{record.name}': column {channel}: expected positions within "
                 f"{low[k]:g} ... {high[k]:g} {model.units[k]}, got {ends[0]:.4g} ... "

@@ -115,8 +115,9 @@ class RobotFit(Showing):
     def shown(self) -> Shown:
         """Return friction with half the width of 95 % intervals, and errors, of each joint."""
         names = list(dict.fromkeys(n for own in self.friction.values() for n in own))
-        units = {n: e.unit for own in self.friction.values() for n, e in own.items()}
-        header = ("joint", *(f"{n} [{units[n]}]" for n in names), "error", "of the torque")
+        each = [{own[n].unit for own in self.friction.values() if n in own} for n in names]
+        units = [f" [{', '.join(sorted(unit))}]" for unit in each]
+        header = ("joint", *map("".join, zip(names, units, strict=True)), "error", "of the torque")
         rows = list[tuple[str, ...]]()
         for joint in self.joints:
             own, off = self.friction.get(joint, {}), self.validation.get(joint)
@@ -136,17 +137,13 @@ class RobotFit(Showing):
 
     def __str__(self) -> str:
         shown = self.shown()
-        widths = [
-            max(map(len, column))
-            for column in zip(shown.table.header, *shown.table.rows, strict=True)
-        ]
+        rows = (shown.table.header, *shown.table.rows)
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         table = [
-            "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip()
-            for row in (shown.table.header, *shown.table.rows)
+            "  ".join(f"{c:{w}}" for c, w in zip(row, widths, strict=True)).rstrip() for row in rows
         ]
-        return "\n".join(
-            [shown.title, *shown.lines, "", *table, *[""] * bool(shown.after), *shown.after]
-        )
+        after = ["", *shown.after] if shown.after else []
+        return "\n".join([shown.title, *shown.lines, "", *table, *after])
 
     @cached_property
     def model(self) -> RobotModel:
@@ -251,7 +248,7 @@ class RobotFit(Showing):
 def _cell(one: Estimate) -> str:
     """Return a value with half the width of its interval."""
     if one.low is None or one.high is None:
-        return f"{one.value:.3g} (no interval)"
+        return "not determined"
     half = (one.high - one.low) / 2
     return f"{one.value:.4g} ± {half:.2g}"
 
