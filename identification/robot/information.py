@@ -1,4 +1,4 @@
-"""What records show about a robot, before the fit: rank, condition, and joints to move.
+"""Information of records about a robot, before the fit: rank, condition, and joints to move.
 
 With s the prior scale of each base parameter (from the file) and sigma the noise of the torques, a
 combination of singular value d in

@@ -102,12 +102,9 @@ def robot(quick: bool = False) -> Iterator[Found]:
         errors = [100 * e.rms / NOISE for e in fit.validation.values()]
         yield goal(f"error of the torques, seed {seed} [% of the noise]", max(errors), 100.0)
     ordinary, weighted = np.mean(hand, axis=0).tolist()
-    yield goal(
-        "friction error relative to ordinary least squares", float(np.mean(ours)) / ordinary, 1.0
-    )
-    yield goal(
-        "friction error relative to weighted least squares", float(np.mean(ours)) / weighted, 1.0
-    )
+    error = float(np.mean(ours))
+    yield goal("friction error relative to ordinary least squares", error / ordinary, 1.0)
+    yield goal("friction error relative to weighted least squares", error / weighted, 1.0)
     yield goal("friction inside the 95 % intervals", float(np.mean(inside)), 0.85, ">=")
     yield goal("processor time [s]", max(seconds), 5.0, seconds=sum(seconds))
 

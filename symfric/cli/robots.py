@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import typer
-
 from identification.data.dataset import Dataset
 from identification.robot.friction import USUAL
 from identification.robot.identify import identify_robot
@@ -37,4 +35,12 @@ def identify(
         fit.plot(plot)
     if urdf:
         fit.to_urdf(urdf)
-    output.finish(fit.to_dict(), json, lambda: typer.echo(str(fit)), plot, urdf)
+    shown = fit.shown()
+
+    def show() -> None:
+        output.show("\n".join((shown.title, *shown.lines, "")))
+        output.show_table(shown.table.header, shown.table.rows)
+        for text in shown.after:
+            output.show(f"\n{text}")
+
+    output.finish(fit.to_dict(), json, show, plot, urdf)

@@ -184,13 +184,16 @@ def test_logs_of_different_rates_and_units_are_fitted_together():
 
 def test_rotor_inertias_are_found_where_they_are_separable():
     t = np.arange(2500) / 250.0
-    rotor = np.array([0.0, 1.5, 0.0])
-    torque = log()[0]["elbow_torque"] + rotor[1] * waves(0, t)[2][:, 1]
-    plain, found = (
-        identify_robot(urdf(), log(elbow_torque=torque), rotors=r) for r in (False, True)
-    )
-    assert found.rotors["elbow"] == pytest.approx(rotor[1], rel=0.1)
-    assert found.training["elbow"].rms < 0.8 * plain.training["elbow"].rms
+    force = log()[0]["slide_torque"] + 10.0 * waves(0, t)[2][:, 2]
+    data = log(slide_torque=force)
+    plain, found = (identify_robot(urdf(), data, rotors=rotors) for rotors in (False, True))
+    assert found.rotors["slide"] == pytest.approx(10.0, rel=0.05)
+    assert found.training["slide"].rms < 0.8 * plain.training["slide"].rms
+    torques = found.torques(*waves(5, t))
+    rigid = newton_euler(*waves(5, t)) + 10.0 * waves(5, t)[2] * np.array([0, 0, 1])
+    v = waves(5, t)[1]
+    error = torques - rigid - COULOMB * np.sign(v) - VISCOUS * v - OFFSET
+    assert np.sqrt(np.mean(error[np.abs(v).min(axis=1) > 0.02] ** 2)) < 0.05
 
 
 @pytest.mark.parametrize("method", ["ordinary", "robust"])
