@@ -9,11 +9,13 @@ from typing import Any, NamedTuple
 
 import typer
 
+from symfric import Drive as Nameplate
 from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
+from symfric.cli.verification import show_sizes, show_verification
 from symfric.codegen import (
     Block,
     Generated,
@@ -24,7 +26,6 @@ from symfric.codegen import (
     verify,
 )
 from symfric.codegen.generated import with_cores
-from symfric.codegen.verification import Check
 from symfric.compensation import Compensation, settings_from_text
 from symfric.compensation import compensator as compensator_block
 from symfric.embedded import CORES, Measured, measure
@@ -52,6 +53,7 @@ APPLIES = {
     "--payload": (INVERSE,),
     "--tunable-gravity": (INVERSE,),
     "--compensation": (COMPENSATOR,),
+    "--drive": (COMPENSATOR,),
     "--preset": (PLANT,),
     "--law-of": (PLANT,),
 }
@@ -103,6 +105,7 @@ def codegen(
     tunable_gravity: bool = False,
     compensator: bool = False,
     compensation: Strings = None,
+    drive: Path | None = None,
     accept: Strings = None,
     compiler: str | None = None,
     json: str | None = None,
@@ -120,6 +123,8 @@ def codegen(
     Example: symfric codegen robot.urdf --inverse-dynamics --payload tool0 --out build
 
     Example: symfric codegen fit.json --compensator --compensation v_blend=0.02 --out build
+
+    Example: symfric codegen fit.json --compensator --drive drive.toml --out build
     """
     check_names("--core", core or (), CORES)
     check_folder(out)
@@ -137,10 +142,12 @@ def codegen(
         "--step-size": step_size, "--method": method, "--free": free, "--fold": fold or None,
         "--turning": turning or None, "--payload": payload, "--compensation": compensation,
         "--tunable-gravity": tunable_gravity or None, "--preset": preset, "--law-of": law_of,
+        "--drive": drive,
     }  # fmt: skip
     check_applicable(subject, [option for option, value in given.items() if value is not None])
     own: dict[str, Any] = {"fold": fold or None, "free": free, "name": name, "h": step_size}
     own = {option: value for option, value in own.items() if value is not None}
+    nameplate = None if drive is None else Nameplate.read(drive)
     options, adjustable = dict[str, Any](), None
     if chosen is None:
         made: Block | AnyLaw = inverse_dynamics_block(
@@ -156,7 +163,8 @@ def codegen(
     else:
         made = opt.with_settings(chosen.law, chosen.text, texts)
         if compensator:
-            made = compensated(made, chosen.drive, compensation or (), turning=turning, **own)
+            own |= {"turning": turning, "drive": nameplate}
+            made = compensated(made, chosen.drive, compensation or (), **own)
         else:
             options = own
             if turning or (chosen.drive is not None and chosen.drive.turning):
@@ -310,11 +318,11 @@ def machine_of(
     return machine
 
 
-def compensated(law: AnyLaw, drive: Drive | None, texts: Sequence[str], **how: Any) -> Block:
+def compensated(law: AnyLaw, axis: Drive | None, texts: Sequence[str], **how: Any) -> Block:
     """Return the compensator of a law, with the load and offset of the fitted drive if given."""
     if not isinstance(law, Law):
         raise ValueError(f"{COMPENSATOR}: expected a law, got a population, whose force is random")
-    subject = law if drive is None else replace(drive, law=law)
+    subject = law if axis is None else replace(axis, law=law)
     return compensator_block(subject, settings=settings_from_text(texts), **how)
 
 
@@ -348,51 +356,3 @@ def robot(
     if not isinstance(machine, MechanismScene):
         raise ValueError(f"{INVERSE}: expected a scene of bodies and joints, got {where}")
     return with_values(machine, values).mechanism()
-
-
-def show_verification(verification: Verification) -> None:
-    """Print the comparison of the C with CasADi, one row per floating point type."""
-    compiler = f" ({verification.compiler})" if verification.compiler else ""
-    output.show(f"{verification.name}: {verification.status}{compiler}")
-    rows = [
-        (check.real, check.steps, len(check.warnings), compared(check), f"{check.error:.2g}",
-         check.worst or "-", ", ".join(check.foreign or ()) or "none")
-        for check in verification.checks
-    ]  # fmt: skip
-    if rows:
-        output.show_table(
-            ["type", "steps", "warnings", "against CasADi", "error", "output", "foreign"], rows
-        )
-    for check in verification.checks:
-        if check.ties:
-            output.show(
-                f"{check.real}: in {check.ties} of {check.steps} steps rounding decides a mode, "
-                "in CasADi as in C"
-            )
-
-
-def compared(check: Check) -> str:
-    """Return a description of the comparison: distance in double precision, or within rounding."""
-    if check.ulp is None:
-        return "within rounding" if check.near else "differs"
-    return "bit for bit equal" if check.ulp == 0 else f"{check.ulp} ulp apart"
-
-
-def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
-    """Print memory on this machine (from `size`, -fstack-usage) and cost on other cores (QEMU)."""
-    rows: list[tuple[str | float, ...]] = []
-    for real in generated.reals:
-        found = generated.manifest["real"][real].get("measured")
-        if found is not None:
-            stack = max(found["stack"].values(), default="-")
-            rows.append((real, found["compiler"], found["text"] or "-", stack, "-", "-"))
-    for m in measured:
-        cells = (m.text, m.stack, m.average, m.maximum) if m.ok else ("-", "-", "-", "-")
-        numbers = (f"{x:.0f}" if isinstance(x, float) else x for x in cells)
-        rows.append((m.real, m.core, *numbers))
-    if rows:
-        head = ["type", "compiler or core", "code [B]", "stack [B]", "average instructions",
-                "most instructions"]  # fmt: skip
-        output.show_table(head, rows)
-    for core, status in dict.fromkeys((m.core, m.status) for m in measured if not m.ok):
-        output.show(f"{core}: {status}")

@@ -181,6 +181,8 @@ class Members:
 
 KNOWN = ("v_ref", "a_ref", "v", "e", "u", "N", "enable")
 """Signals of the loop that can be inputs of a block."""
+ACTING = ("F", "current")
+"""Outputs of blocks that act on the plant."""
 WHERE = "close_loop"
 
 
@@ -211,10 +213,11 @@ def close_loop(
     bits in double.
 
     Args:
-        plant: a model with one input, the force.
+        plant: a model with one input, the force; or the current of a drive (`symfric.driven`), with
+            the numbers of controller, limit and blocks in amperes.
         reference: reference motion with the sample time of the controller.
-        blocks: compensators and observers, whose outputs `F` are added. An output `hold` stops the
-            integrator of the controller.
+        blocks: compensators and observers, whose outputs `F` or `current` are added. An output
+            `hold` stops the integrator of the controller.
         controller: controller; default `Cascade()`.
         cases: name -> parameters of the blocks that differ from the defaults; default one case,
             "compensated".
@@ -288,8 +291,14 @@ def _check(
         checks.kind(f"{WHERE}: blocks", block, Block, "a block, such as compensator(LuGre())")
         names = [v.name for v in block.inputs]
         checks.check_names(f"{WHERE}: inputs of '{block.name}'", names, KNOWN)
-        if "F" not in block.outputs:
-            raise ValueError(f"{WHERE}: block '{block.name}': expected an output F, got none")
+        at = f"{WHERE}: block '{block.name}'"
+        output = next((o for n, o in block.outputs.items() if n in ACTING), None)
+        if output is None:
+            raise ValueError(f"{at}: expected an output {' or '.join(ACTING)}, got none")
+        if (output.unit == "A") != (plant.u[0].unit == "A"):
+            hint = "driven(model, drive) and compensator(..., drive=drive) are in amperes"
+            wanted = f"an output in the unit of the plant's input [{plant.u[0].unit}]"
+            raise ValueError(f"{at}: expected {wanted}, got {output.unit}; {hint}")
         starts = {v.name: float(v.start) for v in block.parameters} | dict(block.constants)
         if "h" in starts and starts["h"] != controller.h:
             raise ValueError(
@@ -371,7 +380,7 @@ def _commanded(
             if name == "u":
                 place -= acted.sum(axis=0) - acted[i]
         block.step()
-        forces[i] = block.outputs["F"]
+        forces[i] = next(block.outputs[name] for name in ACTING if name in block.outputs)
         if "hold" in block.outputs:
             control.inputs["hold"][:] = block.outputs["hold"]
     return control.outputs["u"] + forces.sum(axis=0)
