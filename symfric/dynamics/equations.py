@@ -1,0 +1,190 @@
+"""Equations of a model at constant inputs, M y' = f(y, d), with the conditions on its states.
+
+The unknowns y are the states, accelerations and algebraic variables, and d are the inputs and
+parameters. Modes of friction are constants. The states satisfy
+
+    C(y, d) = 0:   constraints of a mechanism and their rates, and zero slip of sticking contacts
+
+A state on which no equation depends is cyclic: its rate need not vanish in an equilibrium. An
+example is the position of a drive that turns at constant speed.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.foundation.numeric import Array
+from symfric.foundation.variable import stacked
+from symfric.integrator.equations.manifold import holonomic_columns
+from symfric.integrator.equations.system import implicit_columns
+from symfric.model import Contact, Model
+from symfric.model.contact import APPLIED
+from symfric.model.kinds import MODE
+
+Indices = NDArray[np.intp]
+LOOSE = 1e4
+"""Factor by which states of friction laws may change more than those of the machine."""
+DEPENDENT = 1e-9
+"""Relative singular value below which equations count as dependent."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Equations of a model at constant inputs.
+
+    Attributes:
+        model: the model.
+        y: SX symbols (n, 1); the first rows are the states.
+        f: SX (n, 1), right-hand sides.
+        M: constant mass matrix, shape (n, n).
+        names: names of the unknowns.
+    """
+
+    model: Model
+    y: ca.SX
+    f: ca.SX
+    M: Array
+    names: tuple[str, ...]
+
+    @cached_property
+    def d(self) -> ca.SX:
+        """Symbols of inputs and parameters."""
+        return ca.vertcat(self.model.vector("u"), self.model.vector("p"))
+
+    @cached_property
+    def scale(self) -> Array:
+        """Typical magnitudes of the unknowns, shape (n,)."""
+        known = {v.name: v.nominal for v in (*self.model.x, *self.model.z)}
+        return np.array([known.get(name, 1.0) for name in self.names])
+
+    @cached_property
+    def reach(self) -> Array:
+        """Magnitudes of changes of the unknowns, shape (n,).
+
+        States of friction laws and algebraic unknowns follow the states of the machine.
+        """
+        loose = {v.name for c in self.model.contacts for v in c.states}
+        bound = {v.name for v in self.model.x} - loose
+        return self.scale * np.array([1.0 if name in bound else LOOSE for name in self.names])
+
+    @cached_property
+    def modes(self) -> Indices:
+        """Indices of the states that change only by jumps."""
+        whole = [i for i, v in enumerate(self.model.x) if v.kind == MODE]
+        return np.array(whole, dtype=np.intp)
+
+    @cached_property
+    def switching(self) -> tuple[tuple[Contact, int], ...]:
+        """Contacts that stick or slide by modes, and the index of the mode, which is 0 in stick."""
+        names = [v.name for v in self.model.x]
+        return tuple(
+            (c, names.index(v.name))
+            for c in self.model.contacts
+            for s, v in zip(c.law.states, c.states, strict=True)
+            if s.whole and APPLIED in c.given
+        )
+
+    @cached_property
+    def constraints(self) -> ca.SX:
+        """Constraints of a mechanism and their rates."""
+        mechanics = self.model.holonomic
+        if mechanics is None:
+            return ca.SX(0, 1)
+        q, rates = self.y[: mechanics.n], self.y[mechanics.n : 2 * mechanics.n]
+        return ca.vertcat(mechanics.phi, ca.jtimes(mechanics.phi, q, rates))
+
+    @cached_property
+    def slips(self) -> ca.SX:
+        """Sliding velocities of the contacts that stick or slide by modes."""
+        return stacked(ca.SX(c.slip) for c, _ in self.switching)
+
+    @cached_property
+    def cyclic(self) -> Indices:
+        """States on which neither equations nor constraints depend, without modes."""
+        used = ca.sum1(ca.DM(ca.jacobian_sparsity(ca.vertcat(self.f, self.constraints), self.y), 1))
+        return np.setdiff1d(np.flatnonzero(used.full()[0, : len(self.model.x)] == 0), self.modes)
+
+    @cached_property
+    def algebraic(self) -> Indices:
+        """Rows of f without rates."""
+        return np.flatnonzero(~self.M.any(axis=1))
+
+    @cached_property
+    def differential(self) -> Indices:
+        """Rows of f with rates, without those of modes."""
+        own = self.M[:, np.setdiff1d(np.arange(self.M.shape[1]), self.modes)]
+        return np.flatnonzero(own.any(axis=1))
+
+    @cached_property
+    def values(self) -> ca.Function:
+        """Function (y, d) -> f, constraints, slips."""
+        return ca.Function("values", [self.y, self.d], [self.f, self.constraints, self.slips])
+
+    @cached_property
+    def slopes(self) -> ca.Function:
+        """Function (y, d) -> derivatives of f, constraints and slips by y, and of f by d."""
+        parts = [self.f, self.constraints, self.slips]
+        found = [ca.jacobian(part, self.y) for part in parts]
+        return ca.Function("slopes", [self.y, self.d], [*found, ca.jacobian(self.f, self.d)])
+
+    @cached_property
+    def forces(self) -> ca.Function:
+        """Function (y, d) -> forces of all contacts, and their derivatives by y."""
+        forces = ca.densify(stacked(c.friction for c in self.model.contacts))
+        return ca.Function("forces", [self.y, self.d], [forces, ca.jacobian(forces, self.y)])
+
+    def expressed(self, expression: ca.SX) -> ca.Function:
+        """Return an expression of the model as a Function (y, d)."""
+        return ca.Function("expressed", [self.y, self.d], [ca.densify(expression)], {"cse": True})
+
+    @cached_property
+    def contacts(self) -> ca.Function:
+        """Function (y, d) -> rows (slip, force, level against +F, level against -F), one each."""
+        every = self.model.contacts
+        rows = [ca.horzcat(ca.SX(c.slip), c.friction, _level(c, 1), _level(c, -1)) for c in every]
+        table = ca.vertcat(*rows) if rows else ca.SX(0, 4)
+        return ca.Function("contacts", [self.y, self.d], [ca.densify(table)], {"cse": True})
+
+    def data(self, u: Mapping[str, float] | None, p: Mapping[str, float] | None) -> Array:
+        """Return the values of d for inputs and parameters by name."""
+        return np.concatenate([self.model.values("u", u), self.model.values("p", p)])
+
+
+def _level(c: Contact, side: int) -> ca.SX:
+    """Return the static level [N] of a contact against a pull to one side; NaN if undefined."""
+    try:
+        return c.static_level(side)
+    except ValueError:
+        return ca.SX(float("nan"))
+
+
+def equations(where: str, model: Model) -> Equations:
+    """Return the equations of a model, which caches them.
+
+    Raises:
+        ValueError: the equations depend on time.
+    """
+    if "at_rest" in model.memory:
+        return model.memory["at_rest"]
+    mechanics = model.holonomic
+    if mechanics is not None:
+        y, f, mass, names = holonomic_columns(model, replace(mechanics, index=1))
+    elif model.ode is None:
+        y, f, mass, names = implicit_columns(model)
+    else:
+        y, f = ca.vertcat(model.vector("x"), model.vector("z")), ca.vertcat(model.ode, model.alg)
+        mass = ca.diagcat(ca.SX.eye(len(model.x)), ca.SX(len(model.z), len(model.z)))
+        names = [v.name for v in (*model.x, *model.z)]
+    made = Equations(model, y, f, ca.DM(mass).full(), tuple(names))
+    if ca.depends_on(ca.vertcat(f, made.constraints), model.t):
+        raise ValueError(
+            f"{where}: expected equations without explicit time, got '{model.name}', whose "
+            "equations depend on it; make the time-dependent part an input or a parameter"
+        )
+    return model.memory.setdefault("at_rest", made)
