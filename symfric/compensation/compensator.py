@@ -88,20 +88,7 @@ def compensator(
     """
     where = "compensator"
     s = chosen_settings(where, settings, chosen)
-    if isinstance(law, Drive):
-        load = checks.number(f"{where}: N of the drive", law.N, unit="N", lower=0.0)
-        offset = checks.number(f"{where}: offset of the drive", law.offset, unit="N")
-        s = replace(
-            s,
-            N=load if s.N is None else s.N,
-            offset=offset or None if s.offset is None else s.offset,
-        )
-        law, turning = law.law, law.turning or turning
-    if drive is not None:
-        checks.kind(f"{where}: drive", drive, Nameplate, "a drive, such as Drive.read(path)")
-        turning = turning or drive.turning
-        if turning != drive.turning:
-            raise checks.refused(f"{where}: drive", "a rotary drive for a rotary axis", drive)
+    law, s, turning = _axis(law, s, turning, drive, where)
     require_law(where, law)
     where = f"compensator '{law_name(law)}'"
     inner = law_block(law, h=h if law.states else None)
@@ -152,6 +139,27 @@ def compensator(
     )
     block = arranged(folded(block) if checks.flag(f"{where}: fold", fold) else block)
     return in_turning(block) if turning else block
+
+
+def _axis(
+    law: Law | Drive, s: Compensation, turning: bool, drive: Nameplate | None, where: str
+) -> tuple[Law, Compensation, bool]:
+    """Return the law, the settings and the kind of units of an axis, after checking its drive."""
+    if isinstance(law, Drive):
+        load = checks.number(f"{where}: N of the drive", law.N, unit="N", lower=0.0)
+        offset = checks.number(f"{where}: offset of the drive", law.offset, unit="N")
+        s = replace(
+            s,
+            N=load if s.N is None else s.N,
+            offset=offset or None if s.offset is None else s.offset,
+        )
+        law, turning = law.law, law.turning or turning
+    if drive is not None:
+        checks.kind(f"{where}: drive", drive, Nameplate, "a drive, such as Drive.read(path)")
+        if turning and not drive.turning:
+            raise checks.refused(f"{where}: drive", "a rotary drive for a rotary axis", drive)
+        turning = drive.turning
+    return law, s, turning
 
 
 def _velocity(parts: Parts, s: Compensation) -> tuple[ca.SX, ca.SX]:
