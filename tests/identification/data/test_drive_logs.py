@@ -33,7 +33,7 @@ def lossless(**changes: Any) -> Drive:
 @pytest.mark.parametrize("ratio", [2.0, -2.0, 1000.0])
 def test_counts_and_currents_become_position_and_force(ratio: float) -> None:
     d, x, i = (
-        lossless(gear_ratio=ratio, counter=65536, counts_per_turn=800),
+        lossless(gear_ratio=ratio, counter=65536, counts_per_turn=400),
         stroke(),
         np.cos(3 * T),
     )
