@@ -12,14 +12,13 @@ direction of power uses a velocity filtered as that of `InverseDynamics`; near a
 is uncertain, a static law is not compared with the data.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from identification.data.differentiate import Velocity, derivatives
-from identification.data.filters import choose_filter, noise_level, spectrum
+from identification.data.filters import choose_filter
 from identification.data.record import Array, Record
 from symfric.drives.drive import Drive
 from symfric.foundation import checks
@@ -108,15 +107,3 @@ def _velocity(record: Record, force: Array) -> Array:
     mixer = Velocity.of(x, v, step)
     filter = choose_filter(force, step, [mixer.band(x, v, step)])
     return derivatives(x, v, step, filter, mixer)[1]
-
-
-def noise_of(record: Record, name: str | None, given: Mapping[str, float]) -> float | None:
-    """Return the standard deviation of the noise of a signal; None to take it from its spectrum.
-
-    The position of a drive has at least the noise of the counts of its encoder, count / sqrt(12).
-    """
-    if name is None or name in given or name != "x" or record.drive is None:
-        return None if name is None else given.get(name)
-    count = record.drive.count
-    level = noise_level(spectrum(record[name], line=True))
-    return None if count is None else float(np.sqrt(max(level, count**2 / 12)))

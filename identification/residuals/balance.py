@@ -7,8 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.at_load import noise_of
-from identification.data.differentiate import Velocity, derivatives
+from identification.data.differentiate import Velocity, derivatives, noise_of
 from identification.data.filters import Filter, choose_filter
 from identification.data.record import Record
 from identification.residuals.sampled import Sampled, begun, imposed_step, moving_start, usual

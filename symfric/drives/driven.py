@@ -30,7 +30,7 @@ from symfric.model.forces import opened
 from symfric.model.holonomic import Holonomic
 from symfric.model.kinds import WORK
 from symfric.model.model import check_model
-from symfric.model.put import Put
+from symfric.model.start import Put
 
 WHERE = "driven"
 LIMITS = ("saturate", "bounds")

@@ -34,8 +34,7 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model.contact import APPLIED, Contact, Variables
 from symfric.model.parts import Monitor
-from symfric.model.put import Put
-from symfric.model.start import System, rate_of
+from symfric.model.start import Put, System, rate_of
 
 STICKS = 0.5
 """Absolute value of a mode below which a contact sticks. Modes are -1, 0 or 1, except for

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from identification import Dataset, Fit, Fitted, InverseDynamics, load_fit, synthetic_drive_data
-from identification.data.at_load import noise_of
+from identification.data.differentiate import noise_of
 from symfric import Drive
 
 SCREW: dict[str, Any] = {
