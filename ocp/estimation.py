@@ -33,7 +33,7 @@ from ocp.formulation.phase import Ranges, as_box, is_range
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
 from symfric.foundation.parameters import Variable, check_names
-from symfric.foundation.shown import brief
+from symfric.foundation.shown import brief, combination
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator import flow
 from symfric.model import Model, check_model
@@ -51,8 +51,6 @@ DIVERGED = (
     "estimate: the motion became infinite; take more `steps`, a smaller `spread` at the start, or "
     "less noise of states"
 )
-SHOWN = 0.1
-"""Smallest coefficient that is shown; the largest one is 1."""
 PINNED = 1e-4
 """Deviation of a value that is held at its bound, in units of the spread."""
 KNOWN = 0.1
@@ -372,11 +370,8 @@ def _moved(
 def _unobservable(P: Array, free: Array, names: Sequence[str]) -> tuple[str, ...]:
     """Return combinations whose variance the measurements reduce by less than `INFORMED`."""
     ratios, vectors = eigh(P, free + 1e-12 * np.eye(len(names)))
-    found = list[str]()
-    for ratio, v in zip(ratios, vectors.T, strict=True):
-        if ratio > INFORMED and 1.0 / np.linalg.norm(v) > KNOWN:
-            v = v / v[np.argmax(np.abs(v))]
-            terms = ((c, n) for c, n in zip(v, names, strict=True) if abs(c) > SHOWN)
-            text = " ".join(f"{'-' if c < 0 else '+'} {abs(c):.2g} {n}" for c, n in terms)
-            found.append(text.removeprefix("+ "))
-    return tuple(found)
+    return tuple(
+        combination(v, names)
+        for ratio, v in zip(ratios, vectors.T, strict=True)
+        if ratio > INFORMED and 1.0 / np.linalg.norm(v) > KNOWN
+    )

@@ -80,7 +80,7 @@ def adaptation_from_text(texts: Sequence[str]) -> Adaptation:
     Raises:
         ValueError: unknown or repeated names, or values that are not numbers.
     """
-    where, found = "estimation", dict[str, Any]()
+    where, found = "adaptation", dict[str, Any]()
     for text in texts:
         name, _, value = text.partition("=")
         checks.check_names(where, [name], [item.name for item in fields(Adaptation)])

@@ -14,6 +14,7 @@ from symfric.compensation import (
     Comparison,
     close_loop,
     compensator,
+    follow,
     kalman_estimator,
     recursive_estimator,
     sine,
@@ -136,12 +137,12 @@ def test_derivatives_of_the_prediction_are_those_of_differences(law: sf.Law) -> 
     f = Adapted("test", law, None, {"mass": 1.0, "noise": NOISE}, None, turning=False, end=True)
     seen, now = ca.SX.sym("v"), ca.SX.sym("now", len(f.theta))
     ahead, slopes, M = prediction(f, seen, now)
-    x = ca.vertcat(seen, f.z, now)
+    x = ca.vertcat(f.z, seen, now)
     others = [s for s in ca.symvar(ca.vertcat(ahead, M)) if not ca.depends_on(x, s)]
     look = ca.Function("look", [x, ca.vertcat(*others)], [ahead, slopes, M])
     usual = {v.name: float(v.start) for v in f._parts.parameters} | {"force": 3.0, "h": H}
     p = [usual[s.name()] for s in others]
-    sizes = np.array([1e-2, *f.reach, *(float(v.nominal) for v in f.theta)])
+    sizes = np.array([*f.reach, 1e-2, *(float(v.nominal) for v in f.theta)])
     random = np.random.default_rng(2)
     for _ in range(20):
         at = sizes * random.uniform(0.2, 0.9, sizes.size) * random.choice([-1, 1], sizes.size)
@@ -150,10 +151,11 @@ def test_derivatives_of_the_prediction_are_those_of_differences(law: sf.Law) -> 
             ends = [at + sign * step * np.eye(sizes.size)[j] for sign in (1, -1)]
             (up, _, high), (down, _, low) = (look(end, p) for end in ends)
             rate = (up - down).full()[:, 0] / (2 * step)
-            mean = float(look(at, p)[0][0]) - at[0]
-            rate[0] += mean * (float(high) - float(low)) / (2 * step) / mass  # M held
-            scale = sizes[: rate.size] / sizes[j]
-            assert exact[0, j] == pytest.approx(rate[0], rel=1e-4, abs=1e-5 * scale[0])
+            k = len(f.reach)  # row of the velocity
+            mean = float(look(at, p)[0][k]) - at[k]
+            rate[k] += mean * (float(high) - float(low)) / (2 * step) / mass  # M held
+            near = 1e-5 * sizes[k] / sizes[j]
+            assert exact[k, j] == pytest.approx(rate[k], rel=1e-4, abs=near)
 
 
 @pytest.mark.parametrize("make", MAKE)
@@ -371,3 +373,57 @@ def test_close_loop_refuses_estimators_and_values_that_do_not_fit() -> None:
         close_loop(plant, reference, COMPENSATOR, p={"mu_d": np.ones(99)})
     with pytest.raises(ValueError, match="p: expected"):
         close_loop(plant, reference, COMPENSATOR, p={"mu_x": np.ones(100)})
+
+
+@pytest.mark.parametrize("make", MAKE)
+def test_what_a_record_determines_is_said_before_the_estimator_starts(make) -> None:
+    """Nothing at rest; a sum at one speed; all in sliding in both directions."""
+    block, one = make(BRISTLES, mass=1.0, noise=NOISE), np.ones(4000)
+    rest = follow(block, 2.0 * one, 0.0 * one)
+    assert rest.rank == 0
+    assert len(rest.unobservable) == 3
+    steady = follow(block, 6.0 * one, 0.1 * one)
+    assert steady.rank == 1
+    motion = slid(STATIC, 4000, share=1.5)
+    full = follow(block, motion["force"], motion["v"])
+    assert full.rank == 3
+    assert full.unobservable == ()
+    assert "determine all 3 parameters" in full.verdict
+    forward = np.abs(motion["v"]) + 0.05
+    force = np.diff(np.append(0.0, forward)) / H + 4.0 + 20.0 * forward
+    one_way = follow(
+        block, force, forward, learn=1.0 * (np.arange(4000) > 100)
+    )  # without the start
+    assert one_way.rank == 2
+    assert "slide in both directions" in one_way.verdict
+    assert "offset" in one_way.unobservable[0]
+
+
+def test_the_information_of_a_record_is_the_gramian_of_its_regressors(tmp_path) -> None:
+    """Without forgetting: sum of phi phi'/R over the windows that are used, and its rank."""
+    block = recursive_estimator(STATIC, mass=1.0, noise=1e-4, accuracy=0.2, window=20 * H)
+    motion = slid(STATIC, 3000)
+    found = follow(block, motion["force"], motion["v"])
+    v, spread = motion["v"], np.array([1.0, 1.0, 6.0])
+    law = np.array([float(STATIC.force(x, 1.0)) for x in v]) - 20.0 * v
+    phi = spread * np.column_stack([law, 20.0 * v, np.ones(v.size)])
+    rows = phi.reshape(-1, 20, 3).mean(axis=1)[found.used[19::20]]
+    gramian = rows.T @ rows / (0.2**2 + 2 * (1e-4 / (20 * H)) ** 2)
+    assert found.information == pytest.approx(gramian, rel=1e-3)
+    assert found.rank == np.linalg.matrix_rank(rows)
+    assert found.condition == pytest.approx(np.linalg.cond(gramian), rel=1e-2)
+    found.plot(path=tmp_path / "estimates.png")
+    assert (tmp_path / "estimates.png").stat().st_size > 1000
+
+
+def test_follow_refuses_bad_records() -> None:
+    block, one = recursive_estimator(STATIC, mass=1.0, noise=1e-4, h=H), np.ones(10)
+    for arguments, message in (
+        ((COMPENSATOR, one, one), "expected the block of an estimator"),
+        ((block, one, one[:5]), "expected force and v of one length >= 2, got 10 and 5"),
+        ((block, one, np.nan * one), "v: expected finite numbers, got nan at 0"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            follow(*arguments)
+    with pytest.raises(ValueError, match=r"h: expected that of the block, 0\.001 s, got 0\.01"):
+        follow(block, one, one, h=0.01)
