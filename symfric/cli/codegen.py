@@ -21,6 +21,8 @@ from symfric.codegen import (
     plant_block,
     verify,
 )
+from symfric.codegen import prove as prove_block
+from symfric.codegen.blocks.variables import STEP_SIZE
 from symfric.codegen.generated import with_cores
 from symfric.compensation import (
     Adaptation,
@@ -31,12 +33,12 @@ from symfric.compensation import (
 )
 from symfric.compensation import compensator as compensator_block
 from symfric.compensation.adaptation import adaptation_from_text
-from symfric.embedded import CORES, measure
+from symfric.embedded import CORES, StepError, measure, step_errors
 from symfric.foundation import checks
 from symfric.foundation.files import check_folder
 from symfric.foundation.parameters import check_names, parameters
 from symfric.foundation.programs import find_compiler
-from symfric.foundation.status import Status
+from symfric.foundation.status import SolveError, Status
 from symfric.laws import AnyLaw
 from symfric.multibody import Mechanism, read_urdf
 from symfric.scenes import Drive, Scene
@@ -114,6 +116,7 @@ def codegen(
     estimator: str | None = None,
     adaptation: Strings = None,
     accept: Strings = None,
+    prove: bool = False,
     compiler: str | None = None,
     json: str | None = None,
 ) -> None:
@@ -136,6 +139,8 @@ def codegen(
     check_names("--core", core or (), CORES)
     check_folder(out)
     opt.check_outputs(json)
+    if prove and not guards:
+        raise ValueError("--prove: expected guards, whose effect is proved, got --no-guards")
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
     if fit and not law and fit.suffix.lower() not in (".json", ".urdf") and not fit.is_file():
@@ -155,6 +160,7 @@ def codegen(
     own: dict[str, Any] = {"fold": fold or None, "free": free, "name": name, "h": step_size}
     own = {option: value for option, value in own.items() if value is not None}
     options, adjustable = dict[str, Any](), None
+    errors: tuple[StepError, ...] = ()
     if chosen is None:
         made: Block | AnyLaw = inverse_dynamics_block(
             robot(fit, scene, law, opt.numbers("--set", texts)), **own, payload=payload,
@@ -162,10 +168,7 @@ def codegen(
         )  # fmt: skip
     elif scene is not None:
         machine = machine_of(scene, kind_of(scene, "--scene", preset, law_of), chosen, texts)
-        own["method"] = method or "auto"
-        made = plant_block(machine, **own)
-        own.pop("h", None)
-        adjustable = partial(plant_block, machine, **own)
+        made, errors, adjustable = plant(machine, method=method or "auto", **own)
     else:
         made = opt.with_settings(chosen.law, chosen.text, texts)
         if compensator:
@@ -193,8 +196,9 @@ def codegen(
     ]
     generated = with_cores(generated, [m.to_dict() for m in measured])
     law = chosen.text if chosen else law or generated.block.name
-    report(law, generated, verification, measured, json)
-    if not verification.ok:
+    proofs = [prove_block(generated.block, one) for one in generated.reals if prove]
+    report(law, generated, verification, measured, proofs, errors, json)
+    if not verification.ok or not all(found.ok for found in proofs):
         raise typer.Exit(1)
 
 
@@ -309,6 +313,28 @@ def machine_of(
             f"fitted under a load of 1 N; {hint}"
         )
     return machine
+
+
+def plant(
+    machine: Scene, h: float | None = None, **how: Any
+) -> tuple[Block, tuple[StepError, ...], Callable[[], Block]]:
+    """Return the block of a plant, its errors, and a function for the block with h variable."""
+    block, size = plant_block(machine, h=h, **how), STEP_SIZE if h is None else h
+    errors = fixed_steps(machine, size, how["method"])
+    limits = (*block.limits, *(str(one) for one in errors if one.h == size))
+    return replace(block, limits=limits), errors, partial(plant_block, machine, **how)
+
+
+def fixed_steps(machine: Scene, h: float, method: str) -> tuple[StepError, ...]:
+    """Return the errors of steps around h with the inputs of the scene; none if it stops."""
+    if h >= machine.t_end:
+        return ()
+    inputs = {name: own.function for name, own in machine.inputs.items()}
+    try:
+        return step_errors(machine, h, machine.t_end, u=inputs, method=method)
+    except SolveError as error:
+        output.note(f"errors of fixed steps were not measured: {error}")
+        return ()
 
 
 def of_drive(

@@ -1,5 +1,6 @@
 """Settings of a friction compensator, their checks and the resulting formula."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
@@ -77,16 +78,16 @@ class Compensation:
 
 
 def settings_from_text(texts: Sequence[str]) -> Compensation:
-    """Return the settings given by arguments of a command line.
+    """Return the settings given by arguments of a command line, each with one or several settings.
 
-        v_blend=0.02  scales=coulomb:0.9,stribeck:0  without=viscous  stick=1,0.1,1e-3
+        v_blend=0.02,N=100  scales=coulomb:0.9,stribeck:0  without=viscous  stick=1,0.1,1e-3
 
     Raises:
         ValueError: unknown or repeated names, or values that are not numbers.
     """
     where, found = "compensation", dict[str, Any]()
     known = [item.name for item in fields(Compensation)]
-    for text in texts:
+    for text in (setting for some in texts for setting in re.split(r",(?=\w+=)", some)):
         name, _, value = text.partition("=")
         checks.check_names(where, [name], known)
         if name in found or not value:
