@@ -172,9 +172,8 @@ def codegen(
     else:
         made = opt.with_settings(chosen.law, chosen.text, texts)
         if compensator:
-            settings = settings_from_text(compensation or ())
             made = of_drive(compensator_block, COMPENSATOR, made, chosen.drive)(
-                settings=settings, turning=turning, **own
+                settings=settings_from_text(compensation or ()), turning=turning, **own
             )
         elif estimator:
             made = of_drive(ESTIMATORS[estimator], ESTIMATOR, made, chosen.drive)(

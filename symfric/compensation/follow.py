@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from symfric.codegen import Block
 from symfric.compensation.members import Members
@@ -55,7 +55,7 @@ class Followed:
     deviations: Mapping[str, Array]
     units: Mapping[str, str]
     residual: Array
-    used: Array
+    used: NDArray[np.bool_]
     information: Array
 
     __repr__ = brief
