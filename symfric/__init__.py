@@ -29,8 +29,8 @@ Contents; `help` describes each name:
     parameters  Parameter, parameters, with_values, symbolise
 
 The package `ocp` solves optimal control problems, `identification` fits parameters to data,
-`symfric.dynamics` finds equilibria and their stability, `symfric.codegen` writes C, and
-`symfric.fmu` writes FMI units. The command line is `symfric`.
+`symfric.dynamics` finds equilibria, periodic orbits and their stability, `symfric.codegen` writes
+C, and `symfric.fmu` writes FMI units. The command line is `symfric`.
 """
 
 from typing import TYPE_CHECKING
