@@ -171,14 +171,9 @@ def codegen(
         made, errors, adjustable = plant(machine, method=method or "auto", **own)
     else:
         made = opt.with_settings(chosen.law, chosen.text, texts)
-        if compensator:
-            made = of_drive(compensator_block, COMPENSATOR, made, chosen.drive)(
-                settings=settings_from_text(compensation or ()), turning=turning, **own
-            )
-        elif estimator:
-            made = of_drive(ESTIMATORS[estimator], ESTIMATOR, made, chosen.drive)(
-                adaptation_from_text(adaptation or ()), turning=turning, **own
-            )
+        if subject in (COMPENSATOR, ESTIMATOR):
+            texts_of = compensation or adaptation or ()
+            made = online(made, chosen.drive, estimator, texts_of, turning=turning, **own)
         else:
             options = own
             if turning or (chosen.drive is not None and chosen.drive.turning):
@@ -336,13 +331,17 @@ def fixed_steps(machine: Scene, h: float, method: str) -> tuple[StepError, ...]:
         return ()
 
 
-def of_drive(
-    make: Callable[..., Block], option: str, law: AnyLaw, drive: Drive | None
-) -> Callable[..., Block]:
-    """Return `make` of a law, with load, offset and mass of the fitted drive if given."""
+def online(
+    law: AnyLaw, drive: Drive | None, estimator: str | None, texts: Sequence[str], **how: Any
+) -> Block:
+    """Return the compensator or the estimator of a law, with the numbers of the fitted drive."""
+    option = COMPENSATOR if estimator is None else ESTIMATOR
     if not isinstance(law, Law):
         raise ValueError(f"{option}: expected a law, got a population, whose force is random")
-    return partial(make, law if drive is None else replace(drive, law=law))
+    subject = law if drive is None else replace(drive, law=law)
+    if estimator is None:
+        return compensator_block(subject, settings=settings_from_text(texts), **how)
+    return ESTIMATORS[estimator](subject, adaptation_from_text(texts), **how)
 
 
 def robot(
