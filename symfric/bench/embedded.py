@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import final
@@ -11,6 +11,7 @@ from typing import final
 from symfric.bench.report import Found, Progress, Report
 from symfric.codegen import Block, generate, inverse_dynamics_block, law_block, plant_block
 from symfric.embedded import CORES, Absent, Tools, find_tools, measure, wrong_on_target
+from symfric.embedded.measure import REGIMES
 from symfric.laws import GMS, BrownMcPhee, LuGre, MaxwellSlip, VelocityBased
 from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.scenes import Arm, rabinowicz
@@ -81,7 +82,9 @@ def _rows(case: Case, targets: Sequence[tuple[str, str]], tools: Tools) -> Itera
             m = measure(block, real, core, tools=tools)
             yield TITLE, {
                 "block": m.block, "core": core.replace("plus", "+") + " f64" * (real == "double"),
-                "average instructions": whole(m.average), "most instructions": whole(m.maximum),
+                "average instructions": whole(m.average),
+                **{f"{name}, instructions": whole(m.regimes.get(name, nan)) for name in REGIMES},
+                "most instructions": whole(m.maximum),
                 "code [B]": whole(m.text), "library [B]": whole(m.library),
                 "data [B]": whole(m.data), "stack [B]": whole(m.stack), "relative error": m.error,
                 "numbers equal to those on the host [%]": 100 * m.equal,

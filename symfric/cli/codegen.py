@@ -4,35 +4,42 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
-from textwrap import fill
 from typing import Any, NamedTuple
 
 import typer
 
+from symfric import Drive as Nameplate
 from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
+from symfric.cli.codegen_report import report
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
     Block,
-    Generated,
-    Verification,
     generate,
     inverse_dynamics_block,
     plant_block,
     verify,
 )
+from symfric.codegen import prove as prove_block
+from symfric.codegen.blocks.variables import STEP_SIZE
 from symfric.codegen.generated import with_cores
-from symfric.codegen.verification import Check
-from symfric.compensation import Compensation, settings_from_text
+from symfric.compensation import (
+    Adaptation,
+    Compensation,
+    kalman_estimator,
+    recursive_estimator,
+    settings_from_text,
+)
 from symfric.compensation import compensator as compensator_block
-from symfric.embedded import CORES, Measured, measure
+from symfric.compensation.adaptation import adaptation_from_text
+from symfric.embedded import CORES, StepError, measure, step_errors
 from symfric.foundation import checks
 from symfric.foundation.files import check_folder
 from symfric.foundation.parameters import check_names, parameters
 from symfric.foundation.programs import find_compiler
-from symfric.foundation.status import Status
+from symfric.foundation.status import SolveError, Status
 from symfric.laws import AnyLaw
 from symfric.multibody import Mechanism, read_urdf
 from symfric.scenes import Drive, Scene
@@ -40,18 +47,23 @@ from symfric.scenes.linkages import MechanismScene
 
 REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
 COMPENSATION = [item.name for item in fields(Compensation)]
+ADAPTATION = [item.name for item in fields(Adaptation)]
+ESTIMATORS = {"recursive": recursive_estimator, "kalman": kalman_estimator}
 LAW, FUNCTION, POPULATION = "a law", "a law without states", "a population"
 PLANT, INVERSE, COMPENSATOR = "--scene", "--inverse-dynamics", "--compensator"
+ESTIMATOR = "--estimator"
 
 APPLIES = {
-    "--step-size": (LAW, POPULATION, PLANT, INVERSE, COMPENSATOR),
+    "--step-size": (LAW, POPULATION, PLANT, INVERSE, COMPENSATOR, ESTIMATOR),
     "--method": (PLANT,),
     "--free": (LAW, FUNCTION, PLANT),
     "--fold": (LAW, FUNCTION, PLANT, INVERSE, COMPENSATOR),
-    "--turning": (LAW, FUNCTION, COMPENSATOR),
+    "--turning": (LAW, FUNCTION, COMPENSATOR, ESTIMATOR),
     "--payload": (INVERSE,),
     "--tunable-gravity": (INVERSE,),
     "--compensation": (COMPENSATOR,),
+    "--drive": (COMPENSATOR,),
+    "--adaptation": (ESTIMATOR,),
     "--preset": (PLANT,),
     "--law-of": (PLANT,),
 }
@@ -103,7 +115,11 @@ def codegen(
     tunable_gravity: bool = False,
     compensator: bool = False,
     compensation: Strings = None,
+    drive: Path | None = None,
+    estimator: str | None = None,
+    adaptation: Strings = None,
     accept: Strings = None,
+    prove: bool = False,
     compiler: str | None = None,
     json: str | None = None,
 ) -> None:
@@ -120,28 +136,36 @@ def codegen(
     Example: symfric codegen robot.urdf --inverse-dynamics --payload tool0 --out build
 
     Example: symfric codegen fit.json --compensator --compensation v_blend=0.02 --out build
+
+    Example: symfric codegen fit.json --compensator --drive drive.toml --out build
+
+    Example: symfric codegen fit.json --estimator recursive --adaptation noise=1e-4 --out build
     """
     check_names("--core", core or (), CORES)
     check_folder(out)
     opt.check_outputs(json)
+    if prove and not guards:
+        raise ValueError("--prove: expected guards, whose effect is proved, got --no-guards")
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
     if fit and not law and fit.suffix.lower() not in (".json", ".urdf") and not fit.is_file():
         fit, law = None, str(fit)
     texts = opt.assignments("--set", settings)
     chosen = None if inverse_dynamics else chosen_law(fit, law, accept or (), texts)
-    subject = subject_of(chosen, scene, compensator)
+    subject = subject_of(chosen, scene, compensator, estimator)
     kind = ("double" if subject == PLANT else "both") if real is None else real
     check_names("--real", [kind], REALS)
     given = {
         "--step-size": step_size, "--method": method, "--free": free, "--fold": fold or None,
         "--turning": turning or None, "--payload": payload, "--compensation": compensation,
         "--tunable-gravity": tunable_gravity or None, "--preset": preset, "--law-of": law_of,
+        "--adaptation": adaptation, "--drive": drive,
     }  # fmt: skip
     check_applicable(subject, [option for option, value in given.items() if value is not None])
     own: dict[str, Any] = {"fold": fold or None, "free": free, "name": name, "h": step_size}
     own = {option: value for option, value in own.items() if value is not None}
     options, adjustable = dict[str, Any](), None
+    errors: tuple[StepError, ...] = ()
     if chosen is None:
         made: Block | AnyLaw = inverse_dynamics_block(
             robot(fit, scene, law, opt.numbers("--set", texts)), **own, payload=payload,
@@ -149,14 +173,13 @@ def codegen(
         )  # fmt: skip
     elif scene is not None:
         machine = machine_of(scene, kind_of(scene, "--scene", preset, law_of), chosen, texts)
-        own["method"] = method or "auto"
-        made = plant_block(machine, **own)
-        own.pop("h", None)
-        adjustable = partial(plant_block, machine, **own)
+        made, errors, adjustable = plant(machine, method=method or "auto", **own)
     else:
         made = opt.with_settings(chosen.law, chosen.text, texts)
-        if compensator:
-            made = compensated(made, chosen.drive, compensation or (), turning=turning, **own)
+        if subject in (COMPENSATOR, ESTIMATOR):
+            own |= {} if drive is None else {"drive": Nameplate.read(drive)}
+            texts_of = compensation or adaptation or ()
+            made = online(made, chosen.drive, estimator, texts_of, turning=turning, **own)
         else:
             options = own
             if turning or (chosen.drive is not None and chosen.drive.turning):
@@ -173,48 +196,30 @@ def codegen(
     ]
     generated = with_cores(generated, [m.to_dict() for m in measured])
     law = chosen.text if chosen else law or generated.block.name
-    report(law, generated, verification, measured, json)
-    if not verification.ok:
+    proofs = [prove_block(generated.block, one) for one in generated.reals if prove]
+    report(law, generated, verification, measured, proofs, errors, json)
+    if not verification.ok or not all(found.ok for found in proofs):
         raise typer.Exit(1)
 
 
-def report(
-    law: str,
-    generated: Generated,
-    verification: Verification,
-    measured: Sequence[Measured],
-    json: str | None,
-) -> None:
-    """Print or write the verification and the sizes, and print the file names."""
-    content = {
-        "law": law,
-        "files": [str(path) for path in generated.files],
-        "manifest": dict(generated.manifest),
-        "verification": verification.to_dict(),
-        "cores": [m.to_dict() for m in measured],
-    }
-    output.emit_json(content, json)
-    if json != "-":
-        show_verification(verification)
-        show_sizes(generated, measured)
-    names = "  ".join(str(path.relative_to(generated.folder)) for path in generated.files)
-    output.note(f"wrote {len(generated.files)} files into {generated.folder}:")
-    indent: Any = dict.fromkeys(("initial_indent", "subsequent_indent"), "  ")
-    output.note(fill(names, 78, break_long_words=False, break_on_hyphens=False, **indent))
-    output.say_written(json)
-
-
-def subject_of(chosen: Chosen | None, scene: str | None, compensator: bool) -> str:
+def subject_of(
+    chosen: Chosen | None, scene: str | None, compensator: bool, estimator: str | None
+) -> str:
     """Return the type of the subject, a key of `APPLIES`.
 
     Raises:
-        ValueError: a compensator together with a scene or inverse dynamics.
+        ValueError: a compensator or an estimator together with each other, with a scene or with
+            inverse dynamics; an unknown estimator.
     """
-    if compensator and (chosen is None or scene is not None):
-        other = INVERSE if chosen is None else PLANT
-        raise ValueError(f"codegen: {COMPENSATOR}: expected with a law or a fit, got {other}")
-    if compensator:
-        return COMPENSATOR
+    online = COMPENSATOR if compensator else ESTIMATOR
+    if compensator or estimator is not None:
+        both = (ESTIMATOR,) * (compensator and estimator is not None)
+        others = [*both, *[INVERSE] * (chosen is None), *[PLANT] * (scene is not None)]
+        if others:
+            raise ValueError(f"codegen: {online}: expected with a law or a fit, got {others[0]}")
+        if estimator is not None:
+            checks.choice(ESTIMATOR, estimator, ESTIMATORS)
+        return online
     if chosen is None:
         return INVERSE
     if scene is not None:
@@ -310,12 +315,39 @@ def machine_of(
     return machine
 
 
-def compensated(law: AnyLaw, drive: Drive | None, texts: Sequence[str], **how: Any) -> Block:
-    """Return the compensator of a law, with the load and offset of the fitted drive if given."""
+def plant(
+    machine: Scene, h: float | None = None, **how: Any
+) -> tuple[Block, tuple[StepError, ...], Callable[[], Block]]:
+    """Return the block of a plant, its errors, and a function for the block with h variable."""
+    block, size = plant_block(machine, h=h, **how), STEP_SIZE if h is None else h
+    errors = fixed_steps(machine, size, how["method"])
+    limits = (*block.limits, *(str(one) for one in errors if one.h == size))
+    return replace(block, limits=limits), errors, partial(plant_block, machine, **how)
+
+
+def fixed_steps(machine: Scene, h: float, method: str) -> tuple[StepError, ...]:
+    """Return the errors of steps around h with the inputs of the scene; none if it stops."""
+    if h >= machine.t_end:
+        return ()
+    inputs = {name: own.function for name, own in machine.inputs.items()}
+    try:
+        return step_errors(machine, h, machine.t_end, u=inputs, method=method)
+    except SolveError as error:
+        output.note(f"errors of fixed steps were not measured: {error}")
+        return ()
+
+
+def online(
+    law: AnyLaw, axis: Drive | None, estimator: str | None, texts: Sequence[str], **how: Any
+) -> Block:
+    """Return the compensator or the estimator of a law, with the numbers of the fitted drive."""
+    option = COMPENSATOR if estimator is None else ESTIMATOR
     if not isinstance(law, Law):
-        raise ValueError(f"{COMPENSATOR}: expected a law, got a population, whose force is random")
-    subject = law if drive is None else replace(drive, law=law)
-    return compensator_block(subject, settings=settings_from_text(texts), **how)
+        raise ValueError(f"{option}: expected a law, got a population, whose force is random")
+    subject = law if axis is None else replace(axis, law=law)
+    if estimator is None:
+        return compensator_block(subject, settings=settings_from_text(texts), **how)
+    return ESTIMATORS[estimator](subject, adaptation_from_text(texts), **how)
 
 
 def robot(
@@ -348,51 +380,3 @@ def robot(
     if not isinstance(machine, MechanismScene):
         raise ValueError(f"{INVERSE}: expected a scene of bodies and joints, got {where}")
     return with_values(machine, values).mechanism()
-
-
-def show_verification(verification: Verification) -> None:
-    """Print the comparison of the C with CasADi, one row per floating point type."""
-    compiler = f" ({verification.compiler})" if verification.compiler else ""
-    output.show(f"{verification.name}: {verification.status}{compiler}")
-    rows = [
-        (check.real, check.steps, len(check.warnings), compared(check), f"{check.error:.2g}",
-         check.worst or "-", ", ".join(check.foreign or ()) or "none")
-        for check in verification.checks
-    ]  # fmt: skip
-    if rows:
-        output.show_table(
-            ["type", "steps", "warnings", "against CasADi", "error", "output", "foreign"], rows
-        )
-    for check in verification.checks:
-        if check.ties:
-            output.show(
-                f"{check.real}: in {check.ties} of {check.steps} steps rounding decides a mode, "
-                "in CasADi as in C"
-            )
-
-
-def compared(check: Check) -> str:
-    """Return a description of the comparison: distance in double precision, or within rounding."""
-    if check.ulp is None:
-        return "within rounding" if check.near else "differs"
-    return "bit for bit equal" if check.ulp == 0 else f"{check.ulp} ulp apart"
-
-
-def show_sizes(generated: Generated, measured: Sequence[Measured]) -> None:
-    """Print memory on this machine (from `size`, -fstack-usage) and cost on other cores (QEMU)."""
-    rows: list[tuple[str | float, ...]] = []
-    for real in generated.reals:
-        found = generated.manifest["real"][real].get("measured")
-        if found is not None:
-            stack = max(found["stack"].values(), default="-")
-            rows.append((real, found["compiler"], found["text"] or "-", stack, "-", "-"))
-    for m in measured:
-        cells = (m.text, m.stack, m.average, m.maximum) if m.ok else ("-", "-", "-", "-")
-        numbers = (f"{x:.0f}" if isinstance(x, float) else x for x in cells)
-        rows.append((m.real, m.core, *numbers))
-    if rows:
-        head = ["type", "compiler or core", "code [B]", "stack [B]", "average instructions",
-                "most instructions"]  # fmt: skip
-        output.show_table(head, rows)
-    for core, status in dict.fromkeys((m.core, m.status) for m in measured if not m.ok):
-        output.show(f"{core}: {status}")

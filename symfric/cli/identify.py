@@ -21,7 +21,7 @@ from identification.result.fitted import Fitted
 from identification.select import INTERRUPTED, Ranking, select
 from identification.unknowns.spec import above, linear, log, tied
 from identification.verdict.profile import Profile
-from symfric import SolveError, Status
+from symfric import Drive, SolveError, Status
 from symfric.cli import options as opt
 from symfric.cli import output, robots
 from symfric.cli.options import Strings
@@ -43,12 +43,14 @@ def reader(
     step: float | None = None,
     variable: str | None = None,
     scales: Strings = None,
+    drive: Path | None = None,
 ) -> Callable[[list[str]], Dataset]:
     """Return a function that reads files according to --column, --unit, --kind and other options.
 
     --column and --unit are SIGNAL=NAME, repeated, or list all columns in order. Points are a time
     series if a column t or a step is given. With `resample`, records have equal intervals and are
-    split at gaps. `scales` are SIGNAL=FACTOR, such as force=-1 to turn a sign.
+    split at gaps. `scales` are SIGNAL=FACTOR, such as force=-1 to turn a sign. `drive` is the file
+    of the drive whose currents the files contain.
 
     Raises:
         ValueError: a mixture of both forms, or a name without a value.
@@ -59,7 +61,7 @@ def reader(
     how: dict[str, Any] = {
         "columns": named, "units": ", ".join(each) if isinstance(each, list) else each,
         "step": step, "variable": variable, "points": kind == "points" and not timed,
-        "missing": missing,
+        "missing": missing, "drive": None if drive is None else Drive.read(drive),
     }  # fmt: skip
 
     def read(paths: list[str]) -> Dataset:
@@ -164,6 +166,7 @@ def identify(
     missing: str = "refuse",
     resample: bool = False,
     scales: Strings = None,
+    drive: Path | None = None,
     normal_force: float = 1.0,
     fixed: Strings = None,
     free: Strings = None,
@@ -188,6 +191,8 @@ def identify(
     the result meaningless.
 
     Example: symfric identify run*.csv --law stribeck,lugre --validate v.csv --html out.html
+
+    Example: symfric identify log.csv --drive drive.toml --law stribeck
     """
     opt.check_outputs(html, json, urdf, picture=plot)
     given = {
@@ -207,7 +212,7 @@ def identify(
     laws, wishes = opt.laws_of(law), free_in(free)
     first = next(iter(laws.values()))
     chosen = residuals_of(kind, windows, wishes, dead_time)
-    read = reader(columns, units, kind, missing, resample, step, variable, scales)
+    read = reader(columns, units, kind, missing, resample, step, variable, scales, drive)
     request: dict[str, Any] = {
         "free": wishes or None,
         "fixed": opt.numbers("--fix", fixed) or None,

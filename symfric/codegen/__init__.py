@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     )
     from symfric.codegen.generated import Generated as Generated
     from symfric.codegen.generated import generate as generate
+    from symfric.codegen.proof import Proof as Proof
+    from symfric.codegen.proof import prove as prove
     from symfric.codegen.verification import Check as Check
     from symfric.codegen.verification import Verification as Verification
     from symfric.codegen.verification import verify as verify

@@ -8,7 +8,8 @@ are random bits. After every step the program checks that
     outputs are finite (the next step detects states that are not),
     a force F with a limit F_max is within this limit,
     the status agrees with the ranges of inputs, parameters and states before the step, and
-    if the status is 0, all bits equal those of the same step generated without guards.
+    if the status is 0, all bits equal those of the same step generated without guards (not with
+    `FAST` flags, with which compilers round differently in each function).
 
 It also counts the steps with default parameters in which the guards replace an output.
 """
@@ -29,12 +30,17 @@ from symfric.emitter.c99 import REALS, Real
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.graph import graph
-from symfric.foundation.programs import Compiler, finished
+from symfric.foundation.programs import PATIENCE, Compiler, finished
 
 SANITIZED = ("-std=c99", "-O1", "-g", "-ffp-contract=off", "-fsanitize=undefined,address",
              "-fno-sanitize-recover=all")  # fmt: skip
 
+FAST = ("-std=c99", "-O2", "-ffast-math")
+"""Flags with which compilers assume that no number is infinite or NaN."""
+
 STEPS = 1_000_000
+SLOWEST = 1e-4
+"""Time of a step on a loaded machine [s]."""
 COUNTS = ("valid", "repaired", "altered", "unflagged", "unfinished", "last_resort", "beyond")
 
 
@@ -75,8 +81,17 @@ class Fuzzed:
         return not (wrong or self.report)
 
 
-def fuzz(block: Block, real: str, compiler: Compiler, *, steps: int = STEPS) -> Fuzzed:
-    """Run `steps` random steps of the guarded C of `block` under sanitizers.
+def fuzz(
+    block: Block, real: str, compiler: Compiler, *, steps: int = STEPS, fast: bool = False
+) -> Fuzzed:
+    """Run `steps` random steps of the guarded C of `block`.
+
+    Args:
+        block: the block.
+        real: "float" or "double".
+        compiler: C compiler.
+        steps: number of steps.
+        fast: compile the block with `FAST` flags instead of sanitizers.
 
     Raises:
         ValueError: an unknown type, or fewer than one step.
@@ -88,14 +103,19 @@ def fuzz(block: Block, real: str, compiler: Compiler, *, steps: int = STEPS) -> 
     bare = CBlock(replace(block, name=f"{block.name}_bare"), c.real, guards=False)
     with TemporaryDirectory(prefix="symfric-") as name:
         folder = Path(name)
-        write_text(folder / "main.c", _program(c, bare))
-        parts = [folder / "main.c"]
+        write_text(folder / "main.c", _program(c, bare, compared=not fast))
+        target, parts = str(folder / "main"), [str(folder / "main.c")]
         for one in (c, bare):
-            made = generate(one.block, folder, real=real, guards=one.guards, kit=False)
-            parts.append(made.source(real))
-        target = str(folder / "main")
-        compiler.run(*SANITIZED, f"-I{folder}", *map(str, parts), "-o", target, "-lm")
-        done = finished([target, str(steps)])
+            made = str(
+                generate(one.block, folder, real=real, guards=one.guards, kit=False).source(real)
+            )
+            parts.append(made)
+            if fast:  # the checks of the program itself need NaN
+                parts[-1] = f"{made}.o"
+                compiler.run(*FAST, "-c", made, "-o", parts[-1])
+        flags = ("-std=c99", "-O1") if fast else SANITIZED
+        compiler.run(*flags, f"-I{folder}", *parts, "-o", target, "-lm")
+        done = finished([target, str(steps)], limit=PATIENCE + SLOWEST * steps)
     numbers = done.output.split()
     if done.status != 0 or len(numbers) != len(COUNTS):
         said = (done.messages or f"it ended with {done.status}").strip()
@@ -104,7 +124,7 @@ def fuzz(block: Block, real: str, compiler: Compiler, *, steps: int = STEPS) -> 
     return Fuzzed(block.name, real, steps, **found)
 
 
-def _program(c: CBlock, bare: CBlock) -> str:
+def _program(c: CBlock, bare: CBlock, *, compared: bool) -> str:
     """Return the C program that calls the block with numbers in and outside its ranges."""
     block = c.block
     inputs = [range_of(v) for v in block.inputs]
@@ -132,6 +152,7 @@ def _program(c: CBlock, bare: CBlock) -> str:
         size=places.get(STEP_SIZE, -1),
         force=[*block.outputs].index("F") if "F" in block.outputs else -1,
         most=places.get("F_max", -1),
+        compared=int(compared),
         columns="\n".join(_column(name, values, c.real) for name, values in columns.items()),
         default=default.format(c.name),
     )

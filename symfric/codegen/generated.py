@@ -12,6 +12,7 @@ from typing import Any, final
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.blocks.from_law import contact_block, law_block
+from symfric.codegen.blocks.texts import SHEET
 from symfric.codegen.blocks.variables import Fold
 from symfric.codegen.guards import MEANING, Range, Status, parameter_range, range_of
 from symfric.codegen.kit import kit_files
@@ -194,6 +195,7 @@ def manifest(several: Sequence[CBlock], texts: Mapping[str, str]) -> dict[str, A
         "constants": dict(block.constants),
         "guards": guards,
         "status": {str(s.name): {"bit": int(s), "meaning": MEANING[s]} for s in Status if guards},
+        "misra_c_2012_deviations": SHEET["misra"],
         "real": {c.real.name: _described(c) for c in several},
         "files": {
             name: {"bytes": len(data := text.encode()), "sha256": sha256(data).hexdigest()}

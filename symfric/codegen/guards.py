@@ -109,18 +109,27 @@ def bit(c: CBlock, status: Status) -> str:
     return f"{c.name.upper()}_{status.name}"
 
 
-def helpers(c: CBlock, text: str) -> str:
-    """Return the static functions that `text`, the guarded functions of a block, calls."""
+def comparisons(c: CBlock) -> dict[str, str]:
+    """Return the static functions that examine single numbers, by the end of their name."""
     general = filled(
         TEMPLATES / "guards.c",
         name=c.name,
         real=c.real.name,
         whole=f"uint{8 * c.real.size}_t",
         magnitude="UINT32_C(0x7FFFFFFF)" if c.real.size == 4 else "UINT64_C(0x7FFFFFFFFFFFFFFF)",
-        infinite="UINT32_C(0x7F800000)" if c.real.size == 4 else "UINT64_C(0x7FF0000000000000)",
+        largest=_largest(c),
     )
     names = ("bits", "beyond", "outside", "mended")
-    parts: dict[str, str] = dict(zip(names, general.rstrip().split("\n\n"), strict=True))
+    return dict(zip(names, general.rstrip().split("\n\n"), strict=True))
+
+
+def _largest(c: CBlock) -> str:
+    return c.real.literal(float(np.finfo(c.real.kind).max))
+
+
+def helpers(c: CBlock, text: str) -> str:
+    """Return the static functions that `text`, the guarded functions of a block, calls."""
+    parts = comparisons(c)
     limits = [parameter_range(v)[:2] for v in c.block.parameters]
     parts["unfit"] = _any(c, "unfit", "a parameter is outside its range", "param", limits)
     limits = [(-state_limit(v), state_limit(v)) for v in c.block.states]
@@ -216,7 +225,7 @@ def found_states(c: CBlock) -> list[str]:
 
 def finite_outputs(c: CBlock) -> list[str]:
     """Return statements that replace outputs that are not finite by 0."""
-    zero, most = c.real.literal(0.0), c.real.literal(float(np.finfo(c.real.kind).max))
+    zero, most = c.real.literal(0.0), _largest(c)
     if c.block.is_function:
         (shown,) = c.block.outputs
         bad = _if(c, f"{c.name}_beyond({shown}, {most})", Status.OUTPUT, then=[f"return {zero};"])

@@ -1,26 +1,21 @@
 """Closed loop of a drive with friction, its position controller and compiled compensators."""
 
-import ctypes
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, final
 
 import casadi as ca
 import numpy as np
 
-from symfric.codegen import Block, generate
-from symfric.codegen.layout import TEMPLATES, CBlock, filled
-from symfric.codegen.runner import FLAGS
+from symfric.codegen import Block
+from symfric.compensation.members import Members
 from symfric.compensation.result import WITHOUT, Comparison, Loop, Reference
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
-from symfric.foundation.files import write_text
-from symfric.foundation.numeric import Array, bound
+from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Parametric, Variable, param
-from symfric.foundation.programs import CompileError, Compiler, find_compiler, needed_compiler
+from symfric.foundation.programs import Compiler, find_compiler, needed_compiler
 from symfric.foundation.status import SolveError
 from symfric.integrator import stepper
 from symfric.integrator.plant import Plant
@@ -94,93 +89,12 @@ class Cascade(Parametric):
         )
 
 
-COMPILED: dict[tuple[str, str, str], Any] = {}
-"""Fingerprint of a block, type and compiler -> compiled function that steps all members."""
-
-
-@final
-class Members:
-    """Instances of a block; rows of the arrays are members and may be written between steps.
-
-    Attributes:
-        block: the block.
-        state, param, input, output: shapes (members, ...), in the order of the block.
-        status: bits of all steps so far for each member; 0 in the VM, which has no guards.
-        inputs, outputs: columns of the arrays `input` and `output`, by name.
-        step: function that makes one step of all members.
-    """
-
-    def __init__(
-        self,
-        block: Block,
-        values: Sequence[Mapping[str, float]],
-        real: str = "double",
-        compiler: Compiler | None = None,
-    ) -> None:
-        """Begin at the start values, with the parameters among `values` of each member.
-
-        Raises:
-            ValueError: values that are not numbers.
-            CompileError: the compiler rejects the C, or the library does not load.
-        """
-        self.block, count = block, len(values)
-        kind = REALS[real].kind
-
-        def rows(numbers: Sequence[Any]) -> Any:
-            return np.tile(np.array(numbers, kind), (count, 1))
-
-        self.state = rows([v.start for v in block.states])
-        self.param = rows([v.start for v in block.parameters])
-        self.input = rows([0.0] * len(block.inputs))
-        self.output = rows([0.0] * len(block.outputs))
-        self.status = np.zeros(count, np.uint32)
-        self.inputs = {v.name: self.input[:, i] for i, v in enumerate(block.inputs)}
-        self.outputs = {name: self.output[:, i] for i, name in enumerate(block.outputs)}
-        names = [v.name for v in block.parameters]
-        for row, own in zip(self.param, values, strict=True):
-            for name in own.keys() & {*names}:
-                row[names.index(name)] = checks.number(f"block '{block.name}': {name}", own[name])
-        self.step = self._in_c(real, compiler) if compiler else self._in_vm()
-
-    def _in_c(self, real: str, compiler: Compiler) -> Any:
-        key = (self.block.fingerprint, real, str(compiler))
-        step = COMPILED.get(key) or COMPILED.setdefault(key, self._compiled(real, compiler))
-        arrays = (self.state, self.param, self.input, self.output, self.status)
-        given = [ctypes.c_long(len(self.state)), *(ctypes.c_void_p(a.ctypes.data) for a in arrays)]
-        return partial(step, *given)
-
-    def _compiled(self, real: str, compiler: Compiler) -> Any:
-        c = CBlock(self.block, REALS[real])
-        with TemporaryDirectory(prefix="symfric-") as folder:
-            made = generate(self.block, folder, real=real, kit=False)
-            glue, library = Path(folder) / "members.c", Path(folder) / "members.so"
-            write_text(glue, filled(TEMPLATES / "members.c", **c.sizes))
-            parts = [str(made.source(real)), str(glue), "-o", str(library), "-lm"]
-            compiler.run(*FLAGS, "-shared", "-fPIC", *parts)
-            try:
-                found = ctypes.CDLL(str(library))["members"]
-            except OSError as error:
-                raise CompileError(f"the library does not load on this machine: {error}") from None
-        found.restype = None
-        return found
-
-    def _in_vm(self) -> Any:
-        # rows of the arrays are columns in CasADi
-        arrays = [np.array(a, float) for a in (self.state, self.param, self.input)]
-        results = [np.zeros(a.shape) for a in (self.state, self.output)]
-        evaluate = bound(self.block.step.map(len(self.state)), arrays, results)
-
-        def go() -> None:
-            for own, given in zip(arrays, (self.state, self.param, self.input), strict=True):
-                own[:] = given
-            evaluate()
-            self.state[:], self.output[:] = results
-
-        return go
-
-
-KNOWN = ("v_ref", "a_ref", "v", "e", "u", "N", "enable")
+KNOWN = ("v_ref", "a_ref", "v", "e", "u", "N", "enable", "force", "learn")
 """Signals of the loop that can be inputs of a block."""
+ACTING = ("F", "current")
+"""Outputs of blocks that act on the plant."""
+Values = Mapping[str, float | Array]
+"""Parameters by name: numbers, or arrays with one value for each sample."""
 WHERE = "close_loop"
 
 
@@ -190,14 +104,15 @@ def close_loop(
     blocks: Block | Sequence[Block],
     *,
     controller: Cascade | None = None,
-    cases: Mapping[str, Mapping[str, float]] | None = None,
+    estimator: Block | None = None,
+    cases: Mapping[str, Values] | None = None,
     delay: int = 1,
     noise: float = 0.0,
     seed: int = 0,
     real: str = "double",
     backend: str = "auto",
     x0: Mapping[str, float] | None = None,
-    p: Mapping[str, float] | None = None,
+    p: Values | None = None,
     position: str = "x",
     velocity: str = "v",
     load: float = 1.0,
@@ -211,19 +126,24 @@ def close_loop(
     bits in double.
 
     Args:
-        plant: a model with one input, the force.
+        plant: a model with one input, the force; or the current of a drive (`symfric.driven`), with
+            the numbers of controller, limit and blocks in amperes.
         reference: reference motion with the sample time of the controller.
-        blocks: compensators and observers, whose outputs `F` are added. An output `hold` stops the
-            integrator of the controller.
+        blocks: compensators and observers, whose outputs `F` or `current` are added. An output
+            `hold` stops the integrator of the controller.
         controller: controller; default `Cascade()`.
-        cases: name -> parameters of the blocks that differ from the defaults; default one case,
-            "compensated".
+        estimator: block that is called first, such as a `recursive_estimator`. Its outputs are
+            written to the parameters of `blocks` with the same names, and recorded in
+            `Loop.estimates`.
+        cases: name -> parameters of the blocks that differ from the defaults, numbers or one value
+            for each sample; default one case, "compensated".
         delay: number of samples from a command to its force.
         noise: standard deviation [m] of the position before the encoder.
         seed: seed of the noise.
         real: "double" or "float", the type of the C of the blocks.
         backend: "c", "vm" or "auto", which selects C if there is a compiler.
-        x0, p: start values and parameters of the plant, by name.
+        x0, p: start values and parameters of the plant, by name; a parameter may have one value
+            for each sample.
         position, velocity: measured states of the plant.
         load: normal force [N] for blocks with an input N.
 
@@ -243,6 +163,11 @@ def close_loop(
     checks.kind(f"{WHERE}: controller", controller, Cascade, "a controller, Cascade()")
     checks.kind(f"{WHERE}: reference", reference, Reference, "a reference, such as sine(...)")
     _check(plant, given, reference, controller, position, velocity)
+    if estimator is not None:
+        _check_estimator(estimator, given, controller)
+    held, varied = _split(p or {}, reference.x.size)
+    unit = plant.signals[plant.u[0].name]
+    plant = _driven(plant, varied)
     checks.count(f"{WHERE}: delay", delay, least=0)
     checks.number(f"{WHERE}: noise", noise, unit="m", lower=0.0)
     checks.check_names(f"{WHERE}: real", [real], REALS)
@@ -254,20 +179,56 @@ def close_loop(
     run = partial(
         _run, reference=reference, controller=controller, delay=delay, noise=noise, seed=seed,
         real=real, compiler=compiler, measured=(position, velocity), load=load,
+        varied=np.column_stack([np.zeros((reference.x.size, 0)), *varied.values()]),
     )  # fmt: skip
 
     def going(count: int) -> Plant:
-        start, own = ({n: np.full(count, v) for n, v in (of or {}).items()} for of in (x0, p))
+        start, own = ({n: np.full(count, v) for n, v in (of or {}).items()} for of in (x0, held))
         return stepper(plant, controller.h, batch=count, x0=start or None, p=own or None)
 
     known = sorted({v.name for block in given for v in block.parameters})
+    if estimator is not None:
+        known = sorted({*known, *(v.name for v in estimator.parameters)})
     cases = {n: checks.named(f"{WHERE}: case '{n}'", case, known) for n, case in wanted.items()}
+    for case in cases.values():
+        _split(case, reference.x.size)
     runs = run(going(1), (), {WITHOUT: {}})
     if cases:
-        runs |= run(going(len(cases)), given, cases)
+        runs |= run(
+            going(len(cases)), given, cases, estimators=() if estimator is None else (estimator,)
+        )
     engine = "CasADi's VM" if compiler is None else f"C in {real}, {compiler}"
-    units = plant.signals[position], plant.signals[plant.u[0].name]
+    units = plant.signals[position], unit
     return Comparison(plant.name, reference, runs, controller.count, engine, units)
+
+
+def _split(values: Values, steps: int) -> tuple[dict[str, float], dict[str, Array]]:
+    """Return the parameters that are numbers, and those with one value for each sample."""
+    arrays = {n: checks.array(f"{WHERE}: {n}", x) for n, x in values.items() if np.ndim(x)}
+    for name, row in arrays.items():
+        if row.size != steps:
+            raise checks.refused(f"{WHERE}: {name}", f"a number or {steps} values", row)
+    return {n: float(x) for n, x in values.items() if n not in arrays}, arrays
+
+
+def _driven(plant: Model, varied: Mapping[str, Array]) -> Model:
+    """Return the plant with the parameters `varied` as further inputs."""
+    checks.check_names(f"{WHERE}: p", varied, [v.name for v in plant.p])
+    if not varied:
+        return plant
+    own = {v.name: v for v in plant.p}
+    u = (*plant.u, *(own[name] for name in varied))
+    return replace(plant, u=u, p=tuple(v for v in plant.p if v.name not in varied))
+
+
+def _check_estimator(estimator: Block, blocks: Sequence[Block], controller: Cascade) -> None:
+    where = f"{WHERE}: estimator"
+    checks.kind(where, estimator, Block, "a block, such as recursive_estimator(...)")
+    names = {v.name for block in blocks for v in block.parameters}
+    if not names & {*estimator.outputs}:
+        found = ", ".join(estimator.outputs)
+        raise ValueError(f"{where}: expected outputs that are parameters of blocks, got {found}")
+    _check_block(estimator, controller)
 
 
 def _check(
@@ -286,22 +247,32 @@ def _check(
         )
     for block in blocks:
         checks.kind(f"{WHERE}: blocks", block, Block, "a block, such as compensator(LuGre())")
-        names = [v.name for v in block.inputs]
-        checks.check_names(f"{WHERE}: inputs of '{block.name}'", names, KNOWN)
-        if "F" not in block.outputs:
-            raise ValueError(f"{WHERE}: block '{block.name}': expected an output F, got none")
-        starts = {v.name: float(v.start) for v in block.parameters} | dict(block.constants)
-        if "h" in starts and starts["h"] != controller.h:
-            raise ValueError(
-                f"{WHERE}: block '{block.name}': expected the sample time of the controller, "
-                f"{controller.h:g} s, got {starts['h']:g} s; give h = {controller.h:g}"
-            )
+        at = f"{WHERE}: block '{block.name}'"
+        output = next((o for n, o in block.outputs.items() if n in ACTING), None)
+        if output is None:
+            raise ValueError(f"{at}: expected an output {' or '.join(ACTING)}, got none")
+        if (output.unit == "A") != (plant.u[0].unit == "A"):
+            hint = "driven(model, drive) and compensator(..., drive=drive) are in amperes"
+            wanted = f"an output in the unit of the plant's input [{plant.u[0].unit}]"
+            raise ValueError(f"{at}: expected {wanted}, got {output.unit}; {hint}")
+        _check_block(block, controller)
+
+
+def _check_block(block: Block, controller: Cascade) -> None:
+    names = [v.name for v in block.inputs]
+    checks.check_names(f"{WHERE}: inputs of '{block.name}'", names, KNOWN)
+    starts = {v.name: float(v.start) for v in block.parameters} | dict(block.constants)
+    if "h" in starts and starts["h"] != controller.h:
+        raise ValueError(
+            f"{WHERE}: block '{block.name}': expected the sample time of the controller, "
+            f"{controller.h:g} s, got {starts['h']:g} s; give h = {controller.h:g}"
+        )
 
 
 def _run(
     plant: Plant,
     blocks: Sequence[Block],
-    cases: Mapping[str, Mapping[str, float]],
+    cases: Mapping[str, Values],
     *,
     reference: Reference,
     controller: Cascade,
@@ -312,11 +283,16 @@ def _run(
     compiler: Compiler | None,
     measured: tuple[str, str],
     load: float,
+    varied: Array,
+    estimators: Sequence[Block] = (),
 ) -> dict[str, Loop]:
     """Return the loops of all cases for one set of blocks, simulated together."""
     count, steps = len(cases), reference.x.size
     control = Members(controller.block(), [{}] * count, compiler=compiler)
     added = [Members(block, [*cases.values()], real, compiler) for block in blocks]
+    learners = [Members(b, [*cases.values()], real, compiler) for b in estimators]
+    names = [name for block in estimators for name in block.outputs]
+    learnt = np.zeros((steps, len(names), count))
     random = np.random.default_rng(seed)
     places = [[v.name for v in plant.model.x].index(name) for name in measured]
     rows = np.zeros((4, steps + 1, count))  # position, velocity, acting and added force
@@ -330,22 +306,29 @@ def _run(
             now = {
                 "x": rows[0, k] + noise * random.standard_normal(),
                 "r": reference.x[k], "v_ref": reference.v[k], "a_ref": reference.a[k],
-                "u": rows[2, k - 1], "N": load, "enable": 1.0,
+                "u": rows[2, k - 1], "force": rows[2, k - 1], "N": load, "enable": 1.0,
+                "learn": 1.0,
             }  # fmt: skip
-            command = _commanded(control, added, now, forces[k], forces[k + 1 + delay])
+            command = _commanded(control, added, learners, k, now, forces[k], forces[k + 1 + delay])
+            for learner in learners:
+                learnt[k] = learner.output.T
             rows[3, k] = forces[k + 1 + delay].sum(axis=0)
             queue.append(np.clip(command, -controller.limit, controller.limit))
             rows[2, k] = queue.pop(0)
-            rows[:2, k + 1] = plant.step(rows[2, k][:, None])[:, places].T
+            acting = np.column_stack([rows[2, k], np.tile(varied[k], (count, 1))])
+            rows[:2, k + 1] = plant.step(acting)[:, places].T
         k = steps
     except KeyboardInterrupt:
         ended = f"interrupted at {k * controller.h:g} s"
     except SolveError as error:
         ended = f"stopped at {k * controller.h:g} s: {error}"
-    status = np.bitwise_or.reduce([np.zeros(count, np.uint32), *(b.status for b in added)])
+    status = np.bitwise_or.reduce(
+        [np.zeros(count, np.uint32), *(b.status for b in (*added, *learners))]
+    )
     return {
         name: Loop(name, reference, *(rows[i, : k + (i < 2), m] for i in range(4)),
-                   limit=controller.limit, ended=ended, status=int(status[m]))
+                   limit=controller.limit, ended=ended, status=int(status[m]),
+                   estimates={n: learnt[:k, i, m] for i, n in enumerate(names)})
         for m, name in enumerate(cases)
     }  # fmt: skip
 
@@ -353,11 +336,13 @@ def _run(
 def _commanded(
     control: Members,
     added: Sequence[Members],
+    learners: Sequence[Members],
+    k: int,
     now: Mapping[str, float | Array],
     acted: Array,
     forces: Array,
 ) -> Array:
-    """Return the total command of controller and blocks; write the `forces` of the blocks.
+    """Return the total command at sample k; write the `forces` of the blocks.
 
     The input u of an observer excludes the forces `acted` of other blocks over the last interval.
     """
@@ -365,13 +350,22 @@ def _commanded(
         control.inputs[name][:] = now[name]
     control.step()
     seen = {**now, "v": control.outputs["v_m"], "e": control.outputs["e"]}
+    for learner in learners:
+        learner.change(k)
+        for name, place in learner.inputs.items():
+            place[:] = seen[name]
+        learner.step()
     for i, block in enumerate(added):
+        block.change(k)
+        for learner in learners:
+            for name in block.params.keys() & learner.outputs.keys():
+                block.params[name][:] = learner.outputs[name]
         for name, place in block.inputs.items():
             place[:] = seen[name]
             if name == "u":
                 place -= acted.sum(axis=0) - acted[i]
         block.step()
-        forces[i] = block.outputs["F"]
+        forces[i] = next(block.outputs[name] for name in ACTING if name in block.outputs)
         if "hold" in block.outputs:
             control.inputs["hold"][:] = block.outputs["hold"]
     return control.outputs["u"] + forces.sum(axis=0)

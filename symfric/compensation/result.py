@@ -1,7 +1,7 @@
 """References of a position loop with friction, and results with and without compensation."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
@@ -121,6 +121,7 @@ class Loop:
         limit: largest force [N].
         status: bits that the guards of the blocks have set; 0 if nothing was repaired.
         ended: reason of an early end; "" if there is none.
+        estimates: output of the estimator -> its values at the samples, shape (n,).
     """
 
     name: str
@@ -132,6 +133,7 @@ class Loop:
     limit: float
     ended: str = ""
     status: int = 0
+    estimates: Mapping[str, Array] = field(default_factory=dict[str, Array])
 
     def __repr__(self) -> str:
         ended = f", {self.ended}" if self.ended else ""

@@ -1,4 +1,4 @@
-"""Generated C on Cortex-M cores: cross-compilation, runs under QEMU and measurements."""
+"""Cost and accuracy of generated C: runs on Cortex-M cores under QEMU, errors of fixed steps."""
 
 from typing import TYPE_CHECKING
 
@@ -8,6 +8,8 @@ if TYPE_CHECKING:
     from symfric.embedded.measure import Measured as Measured
     from symfric.embedded.measure import measure as measure
     from symfric.embedded.measure import wrong_on_target as wrong_on_target
+    from symfric.embedded.step_errors import StepError as StepError
+    from symfric.embedded.step_errors import step_errors as step_errors
     from symfric.embedded.target import BY as BY
     from symfric.embedded.target import CORES as CORES
     from symfric.embedded.target import Absent as Absent

@@ -1,7 +1,7 @@
 """Cost and accuracy of a step of a block on a Cortex-M core, and unit tests of kits on it."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from math import inf, nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -51,7 +51,9 @@ class Measured:
     Attributes:
         block, real, core, by: names of block, type, core and author of the C; see `CORES`, `BY`.
         status: "measured", or a sentence about absent tools; the numbers are then NaN.
-        average, maximum: average and maximum number of instructions of a step, with the call.
+        average, maximum: average number of instructions of a step over `day`, with the call, and
+            the maximum over `day` and `REGIMES`.
+        regimes: average number of instructions of a step in each of the `REGIMES`.
         text: bytes of code and constants of the block.
         library: bytes of the linked functions of libm and libgcc.
         data: bytes of RAM of an instance: states and adjustable parameters.
@@ -69,6 +71,7 @@ class Measured:
     status: str = MEASURED
     average: float = nan
     maximum: float = nan
+    regimes: Mapping[str, float] = field(default_factory=dict[str, float])
     text: float = nan
     library: float = nan
     data: float = nan
@@ -100,8 +103,8 @@ def measure(
 ) -> Measured:
     """Cross-compile a step of `block`, run it under QEMU and compare it with the host.
 
-    QEMU counts instructions exactly, but not cycles. The inputs are those of `day`. The compiler
-    does not fuse multiply and add (-ffp-contract=off).
+    QEMU counts instructions exactly, but not cycles. The inputs are those of `day`, then those of
+    `regimes`. The compiler does not fuse multiply and add (-ffp-contract=off).
 
     Args:
         block: the block.
@@ -109,7 +112,7 @@ def measure(
         core: one of `CORES`: "m0plus", "m3", "m4f", "m7".
         by: author of the C, one of `BY`.
         flags: flags of the compiler, such as -Os.
-        steps: number of steps, up to 4000.
+        steps: number of steps of `day`, up to 4000.
         guards: True if the C of symfric has guards, see `symfric.codegen.guards`.
         tools: result of `find_tools`.
 
@@ -129,7 +132,9 @@ def measure(
     found = find_tools() if tools is None else tools
     if isinstance(found, Absent):
         return Measured(block.name, real, core, by, f"skipped: {found.advice}")
-    inputs, columns = day(block, steps), len(block.states) + len(block.outputs)
+    further = regimes(block)
+    inputs, columns = np.vstack([day(block, steps), *further.values()]), len(block.states)
+    columns += len(block.outputs)
     c = CBlock(block, REALS[real], guards)
     with TemporaryDirectory(prefix="symfric-") as name:
         folder = Path(name)
@@ -141,7 +146,7 @@ def measure(
         main = filled(
             SOURCES / "measured.c",
             real=real,
-            steps=steps,
+            steps=len(inputs),
             inputs=max(inputs.shape[1], 1),
             columns=columns,
             values=",\n".join(rows),
@@ -152,14 +157,16 @@ def measure(
         results = words["rows"].view(c.real.kind).reshape(-1, columns).astype(float)
         equal = _equal(c, source, inputs, results)
     instructions = (words["ticks"] - words["idle"].mean()) * (1e9 / CLOCK / 2**SHIFT)
+    means = instructions[steps:].reshape(-1, STRETCH).mean(axis=1).tolist()
     expected = run_vm(CBlock(block, c.real), inputs, results[:, : len(block.states)])
     return Measured(
         block.name,
         real,
         core,
         by,
-        average=float(instructions.mean()),
+        average=float(instructions[:steps].mean()),
         maximum=float(round(instructions.max())),
+        regimes=dict(zip(further, means, strict=True)),
         text=int(words["text"][0]),
         library=int(words["library"][0]),
         data=int(words["data"][0]),
@@ -239,6 +246,21 @@ STRETCH = 20
 
 LOADS = (1.0, 1.5, 0.5, 1.0, 0.1, 10.0)
 """Consecutive levels of a load relative to its nominal value, which step up to a hundredfold."""
+
+
+REGIMES = {"rest": 0.0, "creeping": 1e-3, "sliding": 0.5, "no load": 0.5}
+"""Inputs relative to their nominal values, in steady motion; without load, loads are 0."""
+
+
+def regimes(block: Block) -> dict[str, Array]:
+    """Return the inputs of `STRETCH` equal steps in each regime that the block has."""
+    low, nominal = np.array([(v.lower, v.nominal) for v in block.inputs]).reshape(-1, 2).T
+    load = (low >= 0.0) & np.array([v.unit in ("N", "N m") for v in block.inputs], bool)
+    found = {
+        name: nominal * np.where(load, name != "no load", np.where(low >= 0.0, 1.0, level))
+        for name, level in REGIMES.items() if load.any() or name != "no load"
+    }  # fmt: skip
+    return {name: np.tile(row, (STRETCH, 1)) for name, row in found.items()}
 
 
 def day(block: Block, steps: int) -> Array:

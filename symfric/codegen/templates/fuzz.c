@@ -12,6 +12,7 @@ typedef @real real;
 enum { STATES = @states, PARAMS = @params, INPUTS = @inputs, OUTPUTS = @outputs };
 enum { SIZE = @size }; /* index of the parameter that is the step size, or -1 */
 enum { FORCE = @force, MOST = @most }; /* indices of the output F and of its limit F_max, or -1 */
+enum { COMPARED = @compared }; /* 1 if bits are compared with the step without guards */
 @columns
 
 static uint64_t seed = 88172645463325252u;
@@ -190,7 +191,7 @@ int main(int argc, char **argv)
         memcpy(shown, out, sizeof shown);
         memcpy(state, before, sizeof before);
         bare();
-        if (differs(after, state, STATES) || differs(shown, out, OUTPUTS)) { altered++; }
+        if (COMPARED && (differs(after, state, STATES) || differs(shown, out, OUTPUTS))) { altered++; }
         memcpy(state, after, sizeof after);
     }
     printf("%ld %ld %ld %ld ", good, repaired, altered, unflagged);

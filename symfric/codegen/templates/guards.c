@@ -2,7 +2,7 @@
 static @whole @{name}_bits(@real x)
 {
     @whole found;
-    memcpy(&found, &x, sizeof found);
+    (void)memcpy(&found, &x, sizeof found);
     return found;
 }
 
@@ -25,17 +25,18 @@ static @real @{name}_mended(
     @real x, @real low, @real high, @real safe,
     unsigned int clamped, unsigned int not_finite, unsigned int *status)
 {
-    if ((@{name}_bits(x) & @magnitude) >= @infinite) {
+    @real found = x;
+    if (@{name}_beyond(x, @largest)) {
         *status |= not_finite;
-        return safe;
-    }
-    if (x < low) {
+        found = safe;
+    } else if (x < low) {
         *status |= clamped;
-        return low;
-    }
-    if (x > high) {
+        found = low;
+    } else if (x > high) {
         *status |= clamped;
-        return high;
+        found = high;
+    } else {
+        /* within the range */
     }
-    return x;
+    return found;
 }

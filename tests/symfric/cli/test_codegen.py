@@ -15,8 +15,8 @@ from identification import Fit, InverseDynamics, synthetic_drive_data
 from identification.result.fitted import Fitted
 from symfric import Coulomb, Sum, Viscous
 from symfric.cli import codegen as command
-from symfric.cli.codegen import compared, show_verification
-from symfric.codegen import Block
+from symfric.cli.codegen_report import compared, show_verification
+from symfric.codegen import Block, Proof
 from symfric.codegen.verification import Check, Verification
 from symfric.embedded import Measured
 
@@ -69,6 +69,20 @@ def test_parameters_are_variable_unless_folded(symfric) -> None:
     assert "rad/s" in shown and "mode" in shown
 
 
+def test_a_proof_is_shown_and_decides_the_exit_status(symfric, monkeypatch) -> None:
+    line = "codegen --law stribeck --out c --real float --no-kit --prove"
+    for ranges, status, shown in (
+        ({"F": (-2.5, 2.5), "F_end": (-3e38, 3e38)}, "proved", "finite outputs; F within -2.5"),
+        ({"F": (-4.0, 4.0)}, "not proved: F may exceed F_max = 3 N", "F may exceed F_max"),
+    ):
+        found = Proof("stribeck", "float", status, ranges)
+        monkeypatch.setattr("symfric.cli.codegen.prove_block", lambda *given, p=found: p)
+        printed = symfric(f"{line} --json r.json", status=int(not found.ok))
+        assert shown in " ".join(printed.out.split())
+        assert json.loads(Path("r.json").read_text())["proofs"][0]["status"] == status
+    assert "--prove: expected guards" in symfric(f"{line} --no-guards", status=2).err
+
+
 def test_a_scene_becomes_a_plant(symfric) -> None:
     line = "codegen --scene rabinowicz --law lugre --set k=3 --out c --free mu_s --no-kit"
     result = json.loads(symfric(f"{line} --step-size 1e-3 --method backward_euler --json -").out)
@@ -79,8 +93,13 @@ def test_a_scene_becomes_a_plant(symfric) -> None:
     (check,) = result["verification"]["checks"]
     assert (check["real"], check["ulp"]) == ("double", 0)
     assert "backward Euler" in Path("c/rabinowicz_f64.h").read_text()
+    steps = {one["h"]: one["error"] for one in result["step_errors"]}
+    assert [*steps] == [4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4]
+    assert f"error of steps of 0.001 s is {steps[1e-3]:.1g}" in " ".join(
+        Path("c/rabinowicz_f64.h").read_text().split()
+    )
     line = "codegen --scene drive --law stribeck --set turning=true --set m=2 --no-kit --out c"
-    symfric(line)
+    assert "errors of fixed steps over 4 s of the scene:" in symfric(line).out
     assert "moving mass [kg m^2]" in Path("c/drive_f64.h").read_text()
     assert names(described("drive")["parameters"])[:3] == ["m", "N", "offset"]
     symfric(f"{line} --fold --step-size 1e-3")
@@ -118,8 +137,8 @@ def test_robots_become_plants_and_inverse_dynamics(symfric) -> None:
 
 def test_a_law_becomes_a_compensator_with_its_settings(symfric) -> None:
     line = "codegen --law lugre --compensator --out c --real double --no-kit --set mu_d=0.12"
-    line += " --compensation v_blend=0.02 --compensation error_gain=20"
-    line += " --compensation scales=coulomb:0.9 --compensation without=stribeck,viscous"
+    line += " --compensation v_blend=0.02,error_gain=20,scales=coulomb:0.9"
+    line += " --compensation without=stribeck,viscous"
     symfric(line)
     manifest = described("friction_compensator")
     starts = {p["name"]: p["default"] for p in manifest["parameters"]}
@@ -143,6 +162,13 @@ def test_a_compensator_of_a_fit_has_the_load_and_offset_of_its_drive(symfric) ->
     assert starts["N"] == fit.drive.N
     assert starts["offset"] == pytest.approx(fit.drive.offset) == pytest.approx(-3.0, abs=0.2)
     assert starts["mu_d"] == pytest.approx(20.0, rel=0.02)
+    line = "codegen fit.json --estimator recursive --out c --no-kit --real double"
+    symfric(f"{line} --adaptation noise=1e-4,spread=offset:7 --adaptation change=90")
+    manifest = described("friction_estimator")
+    starts = {p["name"]: p["default"] for p in manifest["parameters"]}
+    assert starts["inertia"] == pytest.approx(fit.drive.m)
+    assert (starts["offset_spread"], starts["t_change"]) == (7.0, 90.0)
+    assert {"scale_coulomb", "scale_viscous", "offset"} < {*names(manifest["outputs"])}
 
 
 def test_the_c_of_a_fit_has_its_numbers(symfric) -> None:
@@ -184,17 +210,17 @@ def test_sizes_are_measured_on_cores_without_a_compiler(
         if core == "m3":
             return Measured(block.name, real, core, status="no QEMU")
         return Measured(
-            block.name, real, core, average=12.4, maximum=15.0, text=88.0, stack=16.0, finite=True
-        )
+            block.name, real, core, average=12.4, maximum=15.0, text=88.0, stack=16.0, finite=True,
+            regimes={"rest": 3.0, "sliding": 14.0},
+        )  # fmt: skip
 
     monkeypatch.setattr(command, "measure", measure)
     line = "codegen --law coulomb --real float --no-kit --out c --core m4f --core m3"
     printed = symfric(f"{line} --json r.json", 1).out
     assert "no C compiler found" in printed
     assert Path("c/coulomb_f32.c").is_file()
-    rows = {row.split()[1]: row.split()[2:] for row in printed.splitlines() if row[:5] == "float"}
-    assert rows["m4f"] == ["88", "16", "12", "15"]
-    assert rows["m3"] == ["-"] * 4
+    rows = [line.split()[1:] for line in printed.splitlines() if line[:5] == "float"]
+    assert rows == [["m4f", "88", "16"], ["m4f", "12", "3", "14", "15"]]
     assert "m3: no QEMU" in printed
     assert [m["core"] for m in json.loads(Path("r.json").read_text())["cores"]] == ["m4f", "m3"]
 

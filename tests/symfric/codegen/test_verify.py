@@ -18,7 +18,12 @@ from symfric.codegen.fuzz import Fuzzed
 from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import in_type, run_vm
 from symfric.codegen.verification import excitation, longest_step, runs_away, spoiled, varied
-from symfric.compensation import compensator, gms_observer
+from symfric.compensation import (
+    compensator,
+    disturbance_observer,
+    gms_observer,
+    lugre_observer,
+)
 from symfric.emitter.c99 import DOUBLE, FLOAT
 from symfric.laws import GMS
 from symfric.model.kinds import CONSTRAINTS
@@ -302,6 +307,33 @@ def test_a_law_survives_random_steps(name, compiler):
     assert found.last_resort == 0 or name in LIMITED, found
     assert found.valid > 11_000
     assert found.repaired > 1000
+
+
+FORCES = {
+    "lugre": compensator(LuGre(), N=100.0, limit=60.0, slew=1e4),
+    "static": compensator(Stribeck(), limit=5.0, build_up=1e-3, hold=(1e-4, 1e-3)),
+    "events": compensator(GMS(form="event"), N=10.0, limit=5.0),
+    "reference": compensator(
+        LuGre(), limit=5.0, velocity="reference", delay=1e-3, error_gain=1.0, offset=0.3
+    ),
+    "stuck": compensator(LuGre(), limit=5.0, stick=(1.0, 0.1, 1e-3), dither=(1.0, 100.0)),
+    "lugre_observer": lugre_observer(LuGre(), gain=1.0, limit=2.0),
+    "gms_observer": gms_observer(GMS(form="event"), gain=1.0, limit=2.0),
+    "disturbance_observer": disturbance_observer(1.0, 100.0, order=2, limit=10.0),
+}
+
+
+@pytest.mark.parametrize(
+    ("steps", "fast"),
+    [(20_000, True), pytest.param(10_000_000, True, marks=pytest.mark.slow),
+     pytest.param(10_000_000, False, marks=pytest.mark.slow)],
+)  # fmt: skip
+@pytest.mark.parametrize("name", FORCES)
+def test_no_bits_cause_a_force_beyond_its_limit(name, steps, fast, compiler):
+    """With `fast`, the compiler assumes that NaN does not occur."""
+    for real in ("float", "double") if steps > 20_000 else ("float",):
+        found = fuzz.fuzz(FORCES[name], real, compiler, steps=steps, fast=fast)
+        assert found.ok and found.last_resort == 0, found
 
 
 def test_random_steps_find_guards_that_are_wrong(compiler, monkeypatch):

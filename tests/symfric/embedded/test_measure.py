@@ -7,8 +7,9 @@ from cortex import on_target
 
 from symfric import BrownMcPhee, Dahl, LuGre, VelocityBased
 from symfric.codegen import Block, generate, law_block
+from symfric.compensation import compensator
 from symfric.embedded import CORES, measure, wrong_on_target
-from symfric.embedded.measure import day
+from symfric.embedded.measure import day, regimes
 from symfric.embedded.target import Absent, find_tools
 from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import CompileError
@@ -81,6 +82,26 @@ def test_the_measured_inputs_contain_jumps_of_the_load():
     assert (v == 0).sum() == 80
     assert N.max() / N.min() > 80
     assert (np.abs(N[1:] / N[:-1]) > 10).any()
+
+
+def test_regimes_are_steady_motions_with_and_without_load():
+    found = regimes(law_block(LuGre()))
+    assert [*found] == ["rest", "creeping", "sliding", "no load"]
+    v, N = np.array([rows[0] for rows in found.values()]).T
+    assert v.tolist() == [0.0, 1e-3, 0.5, 0.5]
+    assert (N > 0).tolist() == [True, True, True, False]
+    servo = compensator(LuGre(), N=10.0)  # its load is a parameter, `enable` stays 1
+    found = regimes(servo)
+    assert [*found] == ["rest", "creeping", "sliding"]
+    enable = [v.name for v in servo.inputs].index("enable")
+    assert all((rows[:, enable] == 1.0).all() for rows in found.values())
+
+
+@on_target
+def test_sliding_costs_more_than_a_step_without_load():
+    found = measure(law_block(LuGre()), steps=100)
+    assert found.regimes["no load"] < found.regimes["sliding"] < found.maximum
+    assert max(found.regimes.values()) <= found.maximum
 
 
 @on_target
