@@ -78,7 +78,7 @@ class Equations(NamedTuple):
 
     def at(self, rows: NDArray[np.bool_]) -> "Equations":
         """Return some of the rows."""
-        return Equations(*(column[rows] for column in self))
+        return Equations(*(column[rows] for column in cast(Any, self)))
 
     def linearised(self, laws: Sequence[JointLaw], x: Array) -> tuple[Array, Array]:
         """Return all columns (rows, p) at the values x, and the predicted torques (rows,)."""

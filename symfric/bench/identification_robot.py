@@ -74,7 +74,7 @@ def by_hand(model: RobotModel, data: Dataset, rounds: int) -> Array:
         rows = (A * w[:, None]).reshape(-1, A.shape[2])
         x = np.linalg.lstsq(rows, (tau * w).ravel(), rcond=1e-10)[0]
         w = 1 / np.std(A @ x - tau, axis=0)
-    return x[-2 * n :].reshape(2, n)
+    return np.asarray(x[-2 * n :], np.float64).reshape(2, n)
 
 
 def robot(quick: bool = False) -> Iterator[Found]:
