@@ -137,13 +137,13 @@ def _differences(session: Session, cycles: int) -> tuple[float, float]:
 
 
 def disturbed(
-    session: Session, cycles: int, *, broken: bool = True
+    session: Session, cycles: int, *, scale: float = 1.0, broken: bool = True
 ) -> Iterator[tuple[Array, CycleData, Action]]:
     """Yield measurements, data and result of each cycle of a loop with disturbances.
 
     The plant is the model of the controller, with noise of a hundredth of the nominal states.
-    References jump every 25 cycles, and the state every 100 cycles. If `broken`, a measurement is
-    not finite every 60 cycles.
+    References jump every 25 cycles by about 1, and the state every 100 cycles to about ten nominal
+    states; `scale` multiplies all three. If `broken`, a measurement is not finite every 60 cycles.
     """
     design = session.design
     h, settings, own = design.horizon, design.settings, list(design.measured)
@@ -151,16 +151,17 @@ def disturbed(
     measured, goals = design.x0[own], design.r0
     for k in range(cycles):
         if k % 25 == 0:
-            goals = design.r0 + random.normal(size=design.r0.size)
+            goals = design.r0 + scale * random.normal(size=design.r0.size)
         if k % 100 == 99:
-            measured = 10.0 * nominal * random.normal(size=nominal.size)
+            measured = 10.0 * scale * nominal * random.normal(size=nominal.size)
         if broken and k % 60 == 59:
             measured = np.full(nominal.size, np.nan)
         t = h.step * (k + np.arange(h.count + 1.0))
         data = CycleData(np.tile(goals, (h.count + 1, 1)), t, design.p0, design.bounds)
         action = session.cycle(measured, data, settings.tolerance, settings.iterations)
         yield measured, data, action
-        measured = session.plan.X[1, own] + 0.01 * nominal * random.normal(size=nominal.size)
+        noise = 0.01 * scale * nominal * random.normal(size=nominal.size)
+        measured = session.plan.X[1, own] + noise
 
 
 OWN = ("residual", "violation", "iterations", "program_iterations", "status", "converged")

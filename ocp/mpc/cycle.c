@@ -381,7 +381,8 @@ static int program(NAME_t *m)
     return made;
 }
 
-static double merit(const NAME_t *m, const double (*x)[NX], const double (*u)[NU],
+/* The cost, defects and penalties of a plan; those of the linearised plan have known defects. */
+static double merit(const NAME_t *m, const double (*x)[NX], const double (*u)[NU], int linearised,
                     double *defects, double *prices)
 {
     int k, i;
@@ -390,9 +391,9 @@ static double merit(const NAME_t *m, const double (*x)[NX], const double (*u)[NU
     *prices = 0.0;
     for (k = 0; k < N; k++) {
         for (i = 0; i < NX; i++) {
-            to[i] = x[k][i];
+            to[i] = linearised ? x[k + 1][i] + m->L[k][i] : x[k][i];
         }
-        for (i = 0; i < SUBSTEPS; i++) {
+        for (i = 0; i < SUBSTEPS && !linearised; i++) {
             advance(to, u[k], m->r[k], m->p, to);
         }
         value(x[k], u[k], x[k + 1], m->r[k], m->r[k + 1], m->p, &m->t[k], m->b, to, value_of);
@@ -426,7 +427,7 @@ static double go_on(NAME_t *m, double nu)
 {
     int k, i, tries;
     double defects, prices, cost, slope, fall, before, alpha = 1.0;
-    cost = merit(m, (const double (*)[NX])m->x, (const double (*)[NU])m->u, &defects, &prices);
+    cost = merit(m, (const double (*)[NX])m->x, (const double (*)[NU])m->u, 1, &defects, &prices);
     slope = m->go.slope;
 #if ALL > 0
     {
@@ -456,8 +457,8 @@ static double go_on(NAME_t *m, double nu)
         if (tries == HALVINGS) {
             break;
         }
-        cost = merit(m, (const double (*)[NX])m->aim.x, (const double (*)[NU])m->aim.u, &defects,
-                     &prices);
+        cost = merit(m, (const double (*)[NX])m->aim.x, (const double (*)[NU])m->aim.u, 0,
+                     &defects, &prices);
         cost = cost + prices + nu * defects;
         if (cost <= before + ARMIJO * alpha * fall + ROUNDING * fabs(before)) {
             break;

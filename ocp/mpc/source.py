@@ -81,7 +81,7 @@ RESOLUTION = {DOUBLE: 1e-15, FLOAT: 1.5e-5}
 when iterations end, 130 rounding units."""
 SMALLEST = {DOUBLE: 1e-200, FLOAT: 1e-18}
 """Smallest slack and multiplier in the interior-point method, whose ratios are finite."""
-CLOSE = {DOUBLE: 1e-7, FLOAT: 1e-5}
+CLOSE = {DOUBLE: 1e-7, FLOAT: 1e-4}
 """Value of mu, in units of the curvature, at which a quadratic program is solved."""
 AWAY = 0.1
 """Smallest initial distance of the interior-point method from bounds, in units of the signals."""

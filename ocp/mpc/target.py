@@ -27,6 +27,7 @@ def measure_controller(
     core: str = "m4f",
     *,
     cycles: int = 200,
+    scale: float = 0.1,
     flags: Sequence[str] = ("-O2",),
     tools: Tools | Absent | None = None,
 ) -> Measured:
@@ -40,6 +41,8 @@ def measure_controller(
         made: result of `Controller.to_c`.
         core: one of `symfric.embedded.CORES`: "m0plus", "m3", "m4f", "m7".
         cycles: number of cycles.
+        scale: size of the disturbances: references jump by about `scale`, in their units, every 25
+            cycles, and the state to about ten times `scale` nominal states every 100 cycles.
         flags: flags of the compiler.
         tools: result of `symfric.embedded.find_tools`.
 
@@ -55,12 +58,13 @@ def measure_controller(
     where = "measure_controller"
     checks.kind(where, made, GeneratedController, "what to_c(...) returned")
     checks.choice(f"{where}: core", core, CORES)
+    checks.number(f"{where}: scale", scale, above=0.0)
     checks.count(f"{where}: cycles", cycles, least=1, most=20_000)
     found, name = find_tools() if tools is None else tools, made.design.name
     if isinstance(found, Absent):
         return Measured(name, made.real, core, status=f"skipped: {found.advice}")
     session, rows, expected = Session(made.design, real=REALS[made.real]), [], []
-    for measured, data, action in disturbed(session, cycles, broken=False):
+    for measured, data, action in disturbed(session, cycles, scale=scale, broken=False):
         rows.append(session.given(measured, data, made.design.settings.tolerance))
         expected.append([*action.controls.values()])
     inputs, controls = np.array(rows), np.array(expected)
