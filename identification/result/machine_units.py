@@ -62,7 +62,6 @@ def _sides(data: Dataset, estimates: Mapping[str, Estimate]) -> Iterator[Sides]:
     if len(drives) > 1 or drive is None:
         return
     ratio, K, rotor = (float(x) for x in (drive.ratio, drive.torque_constant, drive.rotor))
-    sense = 1.0 if K > 0 else -1.0
     driving = 1 - drive.losses[0]
     every = {n: e for n, e in estimates.items() if not (e.nuisance or e.fixed)}
     if "m" in every and rotor > 0:
@@ -73,10 +72,9 @@ def _sides(data: Dataset, estimates: Mapping[str, Estimate]) -> Iterator[Sides]:
         if (found := AT_MOTOR.get(e.unit) or AT_MOTOR.get(turned(e.unit))) is None:
             continue
         motor, current, power = found
-        loss = driving if motor.startswith("N") else 1.0
-        scale = ratio**power if name == "offset" else abs(ratio) ** power
-        at_motor = e.value * scale / loss
-        amperes = e.value * scale / (driving * abs(K)) if current else 0.0
-        amperes *= sense if name == "offset" else 1.0
+        signed = name == "offset"  # others are levels in both directions
+        scale = (ratio if signed else abs(ratio)) ** power
+        at_motor = e.value * scale / (driving if motor.startswith("N") else 1.0)
+        amperes = e.value * scale / (driving * (K if signed else abs(K))) if current else 0.0
         error = abs(e.standard_error / e.value) if e.standard_error and e.value else None
         yield Sides(name, e.value, at_motor, amperes, (e.unit, motor, current), error)
