@@ -23,7 +23,7 @@ from identification.unknowns.spec import above, linear, log, tied
 from identification.verdict.profile import Profile
 from symfric import Drive, SolveError, Status
 from symfric.cli import options as opt
-from symfric.cli import output
+from symfric.cli import output, robots
 from symfric.cli.options import Strings
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
@@ -154,7 +154,7 @@ def free_one(name: str, how: str) -> Any:
 
 def identify(
     data: list[str],
-    law: list[str],
+    law: Strings = None,
     validate: Strings = None,
     kind: str = "inverse",
     windows: str | None = None,
@@ -178,10 +178,15 @@ def identify(
     html: Path | None = None,
     plot: Path | None = None,
     json: str | None = None,
+    rotors: bool = False,
+    urdf: Path | None = None,
 ) -> None:
-    """Fit friction laws to measured data and assess the result.
+    """Fit friction laws to measured data, or a robot to logs of its joints, and assess the result.
 
-    The command prints the assessment of the residuals, parameters with 95 % intervals, and
+    If the first file is a URDF, the command identifies inertias and friction of the robot. Columns
+    have the names of the joints, such as shoulder [rad] and shoulder_torque [N m].
+
+    Otherwise it prints the assessment of the residuals, parameters with 95 % intervals, and
     parameters that the data do not identify. The exit status is 1 if the data or the residuals make
     the result meaningless.
 
@@ -189,7 +194,21 @@ def identify(
 
     Example: symfric identify log.csv --drive drive.toml --law stribeck
     """
-    opt.check_outputs(html, json, picture=plot)
+    opt.check_outputs(html, json, urdf, picture=plot)
+    given = {
+        "--rotors": rotors, "--urdf": urdf, "--kind": kind != "inverse", "--windows": windows,
+        "--dead-time": dead_time, "--normal-force": normal_force != 1.0, "--fix": fixed,
+        "--free": free, "--noise": noise, "--starts": starts != 6, "--workers": workers != 1,
+        "--profile": profiles, "--html": html,
+    }  # fmt: skip
+    if data[0].endswith(".urdf"):
+        refuse_options("of a robot", given, 2, None)
+        read = reader(columns, units, "inverse", missing, resample, step, variable, scales)
+        robots.identify(data, law, validate, read, loss, plot, json, rotors, urdf)
+        return
+    refuse_options("without ROBOT.urdf", given, 0, 2)
+    if not law:
+        raise ValueError("identify: expected --law NAME[,NAME], got none; see symfric identify -h")
     laws, wishes = opt.laws_of(law), free_in(free)
     first = next(iter(laws.values()))
     chosen = residuals_of(kind, windows, wishes, dead_time)
@@ -234,6 +253,12 @@ def identify(
 
     output.finish(content, json, show, html, plot)
     refuse(fit, ranking, failed)
+
+
+def refuse_options(where: str, given: dict[str, Any], first: int, last: int | None) -> None:
+    """Raise an error if any of the options with numbers `first` to `last` is given."""
+    if wrong := [name for name in [*given][first:last] if given[name]]:
+        raise ValueError(f"identify {where}: expected no {', '.join(wrong)}, got one")
 
 
 def judged(
