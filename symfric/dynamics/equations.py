@@ -144,6 +144,12 @@ class Equations:
         return ca.Function("expressed", [self.y, self.d], [ca.densify(expression)], {"cse": True})
 
     @cached_property
+    def bounds(self) -> ca.Function:
+        """Function (y, d) -> derivatives of constraints and slips by y."""
+        found = [ca.jacobian(part, self.y) for part in (self.constraints, self.slips)]
+        return ca.Function("bounds", [self.y, self.d], found)
+
+    @cached_property
     def contacts(self) -> ca.Function:
         """Function (y, d) -> rows (slip, force, level against +F, level against -F), one each."""
         every = self.model.contacts
@@ -164,14 +170,22 @@ def _level(c: Contact, side: int) -> ca.SX:
         return ca.SX(float("nan"))
 
 
-def equations(where: str, model: Model) -> Equations:
+def equations(where: str, model: Model, *, timed: bool = False) -> Equations:
     """Return the equations of a model, which caches them.
 
     Raises:
-        ValueError: the equations depend on time.
+        ValueError: the equations depend on time, unless they may be `timed`.
     """
-    if "at_rest" in model.memory:
-        return model.memory["at_rest"]
+    made = model.memory.get("at_rest") or model.memory.setdefault("at_rest", _made(model))
+    if not timed and ca.depends_on(ca.vertcat(made.f, made.constraints), model.t):
+        raise ValueError(
+            f"{where}: expected equations without explicit time, got '{model.name}', whose "
+            "equations depend on it; make the time-dependent part an input or a parameter"
+        )
+    return made
+
+
+def _made(model: Model) -> Equations:
     mechanics = model.holonomic
     if mechanics is not None:
         y, f, mass, names = holonomic_columns(model, replace(mechanics, index=1))
@@ -181,10 +195,4 @@ def equations(where: str, model: Model) -> Equations:
         y, f = ca.vertcat(model.vector("x"), model.vector("z")), ca.vertcat(model.ode, model.alg)
         mass = ca.diagcat(ca.SX.eye(len(model.x)), ca.SX(len(model.z), len(model.z)))
         names = [v.name for v in (*model.x, *model.z)]
-    made = Equations(model, y, f, ca.DM(mass).full(), tuple(names))
-    if ca.depends_on(ca.vertcat(f, made.constraints), model.t):
-        raise ValueError(
-            f"{where}: expected equations without explicit time, got '{model.name}', whose "
-            "equations depend on it; make the time-dependent part an input or a parameter"
-        )
-    return model.memory.setdefault("at_rest", made)
+    return Equations(model, y, f, ca.DM(mass).full(), tuple(names))

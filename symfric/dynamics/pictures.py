@@ -8,8 +8,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
-from symfric.foundation.panels import panels, save
-from symfric.foundation.style import line
+from symfric.foundation.panels import NARROW, panels, save
+from symfric.foundation.style import colour, line
+from symfric.results.sections import sticks
+from symfric.results.trajectory import Trajectory
 
 
 def bode(
@@ -35,4 +37,27 @@ def bode(
     angle.set_ylabel("phase [deg]")
     angle.set_xlabel("frequency [rad/s]")
     size.legend(frameon=False, fontsize="small")
+    return save(figure, path)
+
+
+def portrait(run: Trajectory, x: str, y: str, path: str | Path | None) -> Figure:
+    """Plot a run in the plane of two signals, thick where a contact sticks.
+
+    Args:
+        run: the run.
+        x, y: names of signals or details.
+        path: image file.
+    """
+    figure, (axis,) = panels(1, width=NARROW, height=3.0)
+    across, up = run.at_looks(x), run.at_looks(y)
+    axis.plot(across, up, linewidth=1.2, **line(0))
+    stuck = np.zeros(across.size, dtype=bool)
+    for c in run.model.contacts:
+        stuck |= run.of(sticks(c), run.looks) < 0
+    if stuck.any():
+        thick = np.where(stuck, across, np.nan), np.where(stuck, up, np.nan)
+        axis.plot(*thick, linewidth=4.0, alpha=0.6, label="sticks", color=colour(1))
+        axis.legend(frameon=False, fontsize="small")
+    for name, label in ((x, axis.set_xlabel), (y, axis.set_ylabel)):
+        label(f"{name} [{run.unit(name)}]")
     return save(figure, path)

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
@@ -10,14 +11,15 @@ from typing import TYPE_CHECKING, Any, final
 import casadi as ca
 import numpy as np
 
-from symfric.foundation import packed
+from symfric.foundation import checks, packed
 from symfric.foundation.files import write_table, write_text
-from symfric.foundation.numeric import Array
+from symfric.foundation.numeric import Array, Scalar
 from symfric.foundation.shown import Showing, Shown, Table, among, counted
 from symfric.foundation.variable import stacked
 from symfric.model.kinds import WORK
 from symfric.model.model import friction
 from symfric.results.quadrature import integrals
+from symfric.results.sections import Cycle, crossings, cycle
 from symfric.results.signals import Signals
 from symfric.results.stored import module
 
@@ -161,6 +163,48 @@ class Trajectory(packed.Portable, Signals):
         from symfric.results.pictures import thumbnail  # noqa: PLC0415  (slow to import)
 
         return thumbnail(self)
+
+    def crossings(self, expression: Scalar, direction: int = 0) -> Array:
+        """Return the times [s] at which an expression passes through zero, to rounding.
+
+        They are roots of the dense output, not of samples; `run.at(times)` returns the Poincare
+        section. An expression that stays at zero for a while, as a sliding velocity in stick does,
+        crosses when it leaves zero to the other side. Of two crossings between the end and the
+        middle of one step, both are missed.
+
+        Args:
+            expression: scalar SX in the symbols of the model, or the name of a signal.
+            direction: 1 for rising crossings only, -1 for falling ones, 0 for both.
+
+        Raises:
+            ValueError: an unknown name, foreign symbols, or another direction.
+        """
+        checks.count(f"{self._where}: crossings: direction", direction, least=-1, most=1)
+        return crossings(partial(self.of, self._expression(expression)), self.looks, direction)
+
+    def period(self, expression: Scalar | None = None, tolerance: float = 1e-3) -> Cycle:
+        """Return the cycle that the run settles to, with its period and the end of the transient.
+
+        The states at rising crossings of `expression` are compared. The period is the time of the
+        smallest number of crossings after which all states return. The transient ends at the first
+        crossing from which on every return holds.
+
+        Args:
+            expression: scalar SX, or the name of a signal; by default the state with the largest
+                range, relative to its nominal value, minus the middle of its range.
+            tolerance: largest difference of a state between two returns, relative to its range.
+
+        Raises:
+            ValueError: a run at rest, too few crossings, or a motion that does not repeat.
+        """
+        checks.number(f"{self._where}: period: tolerance", tolerance, above=0.0, upper=1.0)
+        return cycle(self, None if expression is None else self._expression(expression), tolerance)
+
+    def _expression(self, expression: Scalar) -> ca.SX:
+        if isinstance(expression, str):
+            self.check([expression])
+            return self.model.expression(expression)
+        return ca.SX(checks.expression(f"{self._where}: expression", expression))
 
     def energy_balance(self) -> EnergyBalance:
         """Return the energy balance of a mechanism: energy, work by cause, and defect.

@@ -162,6 +162,13 @@ def test_a_compensator_of_a_fit_has_the_load_and_offset_of_its_drive(symfric) ->
     assert starts["N"] == fit.drive.N
     assert starts["offset"] == pytest.approx(fit.drive.offset) == pytest.approx(-3.0, abs=0.2)
     assert starts["mu_d"] == pytest.approx(20.0, rel=0.02)
+    line = "codegen fit.json --estimator recursive --out c --no-kit --real double"
+    symfric(f"{line} --adaptation noise=1e-4,spread=offset:7 --adaptation change=90")
+    manifest = described("friction_estimator")
+    starts = {p["name"]: p["default"] for p in manifest["parameters"]}
+    assert starts["inertia"] == pytest.approx(fit.drive.m)
+    assert (starts["offset_spread"], starts["t_change"]) == (7.0, 90.0)
+    assert {"scale_coulomb", "scale_viscous", "offset"} < {*names(manifest["outputs"])}
 
 
 def test_the_c_of_a_fit_has_its_numbers(symfric) -> None:

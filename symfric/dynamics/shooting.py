@@ -1,0 +1,183 @@
+"""Shooting equations of periodic orbits, with exact derivatives through stick and slip.
+
+The period T is divided into equal segments. With the flow phi of the model,
+
+    phi(T/m, x_i) = x_{i+1},   i = 0 ... m-1,   x_m = S x_0,
+
+where S = 1, or the signs of a symmetric orbit, whose T is half of its period. The unknowns are the
+independent coordinates of each x_i (constraints of mechanisms and sticking contacts are kept), and
+T unless it is given. Without a given period, the correction of x_0 is orthogonal to its rate. The
+derivatives of phi are those of `simulate`, with saltation matrices at events.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, final
+
+import casadi as ca
+import numpy as np
+
+from symfric.dynamics.equations import Equations, Indices, equations
+from symfric.dynamics.tangent import independent
+from symfric.foundation.numeric import Array
+from symfric.foundation.status import SolveError
+from symfric.integrator.equations.inputs import Input
+from symfric.integrator.simulate import simulate
+from symfric.model import Model
+from symfric.model.forces import STICKS
+from symfric.results.trajectory import Trajectory
+
+METHOD = "rodas5p"
+
+
+class Segment(NamedTuple):
+    """Flow from one state over a time.
+
+    Attributes:
+        run: the run, with `t` at its start and end.
+        start, end: consistent states there, shape (nx,).
+        rates: rates of the states there, shape (2, nx).
+        S: derivatives of the end by the start, shape (nx, nx), 0 for modes.
+        of_p: derivatives of the end by each parameter, shape (nx, names).
+    """
+
+    run: Trajectory
+    start: Array
+    end: Array
+    rates: Array
+    S: Array
+    of_p: Array
+
+
+class Linear(NamedTuple):
+    """Shooting equations at one point, linearised.
+
+    Attributes:
+        r: residuals, shape (rows,).
+        J: derivatives by the coordinates of all x_i, then by T unless it is given, then by the
+            parameters, shape (rows, columns); without the phase condition.
+        phase: row of the phase condition, shape (columns,); empty if T is given.
+        monodromy: derivative of S phi(T, x_0) in the coordinates of x_0, shape (k, k).
+        bases: indices of the coordinates and basis of the directions, of each x_i.
+        segments: the flows.
+        time: T.
+    """
+
+    r: Array
+    J: Array
+    phase: Array
+    monodromy: Array
+    bases: tuple[tuple[Indices, Array], ...]
+    segments: tuple[Segment, ...]
+    time: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Shooting:
+    """Shooting equations of a model.
+
+    Attributes:
+        model: the model.
+        u: inputs by name.
+        names: free parameters with respect to which the flow is differentiated.
+        scale: magnitudes of the states, shape (nx,).
+        signs: S, shape (nx,).
+        rtol: relative tolerance of the runs.
+        driven: True if the period is given.
+    """
+
+    model: Model
+    u: Mapping[str, Input]
+    names: tuple[str, ...]
+    scale: Array
+    signs: Array
+    rtol: float
+    driven: bool
+
+    @cached_property
+    def eq(self) -> Equations:
+        """Equations of the model with constraints and slips."""
+        return equations("periodic_orbit", self.model, timed=True)
+
+    @cached_property
+    def states(self) -> Indices:
+        """Indices of the states that are not modes."""
+        return np.setdiff1d(np.arange(len(self.model.x)), self.eq.modes)
+
+    @cached_property
+    def rate(self) -> ca.Function:
+        """Function (t, x, z, u, p) -> rates of the states."""
+        return self.model.function("ode")
+
+    def basis(self, x: Array, p: Array) -> tuple[Indices, Array]:
+        """Return indices of independent states near `x`, and the directions that they span."""
+        eq, nx = self.eq, x.size
+        if not eq.constraints.numel() and not eq.switching:
+            return self.states, np.eye(nx)[:, self.states]
+        y, d = np.zeros(eq.y.numel()), np.concatenate([np.zeros(len(self.model.u)), p])
+        y[:nx] = x
+        of_C, of_slips = (slope.full()[:, :nx] for slope in eq.bounds(y, d))
+        stuck = [i for i, (_, mode) in enumerate(eq.switching) if abs(x[mode]) < STICKS]
+        C = np.vstack([of_C, of_slips[stuck], np.eye(nx)[eq.modes]])
+        return independent(C, eq.scale[:nx], self.states)
+
+    def flow(self, x: Array, t: float, T: float, p: Mapping[str, float]) -> Segment:
+        """Return the flow from `x` at the time `t` over `T`.
+
+        Raises:
+            ValueError: the run fails, or the flow has no derivative.
+        """
+        states = [v.name for v in self.model.x]
+        seeds = [f"x0.{states[i]}" for i in self.states]
+        try:
+            run = simulate(
+                self.model, t + T, t_start=t, x0=dict(zip(states, x.tolist(), strict=True)),
+                u=self.u, p=p, rtol=self.rtol, t_eval=(t, t + T), method=METHOD,
+                sensitivities=[*seeds, *self.names],
+            )  # fmt: skip
+        except SolveError as error:
+            raise ValueError(f"the run of a trial orbit fails: {error}") from error
+        slopes = run.sensitivities
+        ends = np.array([run[name] for name in states]).T
+        by = np.zeros((x.size, x.size))
+        for i, seed in zip(self.states, seeds, strict=True):
+            by[:, i] = [slopes[seed][name][-1] for name in states]
+        of_p = np.array([[slopes[q][name][-1] for q in self.names] for name in states])
+        values = self.model.values("p", p)
+        groups = [np.array([run[v.name] for v in g]) for g in (self.model.z, self.model.u)]
+        rates = [
+            self.rate(run.t[i], ends[i], *(g[:, i] if g.size else [] for g in groups), values)
+            .full().ravel() for i in (0, 1)
+        ]  # fmt: skip
+        return Segment(
+            run, ends[0], ends[1], np.array(rates), by, of_p.reshape(x.size, len(self.names))
+        )
+
+    def linear(self, X: Array, T: float, p: Mapping[str, float]) -> Linear:
+        """Return the shooting equations at the states X (m, nx) and the time T of all segments."""
+        m, values = len(X), self.model.values("p", p)
+        parts = tuple(self.flow(x, i * T / m, T / m, p) for i, x in enumerate(X))
+        bases = tuple(self.basis(part.start, values) for part in parts)
+        at = np.cumsum([0, *(chosen.size for chosen, _ in bases)])
+        more = 0 if self.driven else 1
+        r, J = np.zeros(at[-1]), np.zeros((at[-1], at[-1] + more + len(self.names)))
+        monodromy = bases[0][1]
+        for i, part in enumerate(parts):
+            after, sign = (i + 1) % m, self.signs if i == m - 1 else np.ones(part.end.size)
+            chosen, _ = bases[after]
+            rows, columns = slice(at[after], at[after + 1]), slice(at[i], at[i + 1])
+            end, S = sign * part.end, sign[:, None] * part.S
+            r[rows] = (end - parts[after].start)[chosen]
+            J[rows, columns] += (S @ bases[i][1])[chosen]
+            J[rows, at[after] : at[after + 1]] -= np.eye(chosen.size)
+            if more:
+                J[rows, at[-1]] = (sign * part.rates[1])[chosen] / m
+            J[rows, at[-1] + more :] = (sign[:, None] * part.of_p)[chosen]
+            monodromy = S @ monodromy if i == m - 1 else bases[after][1] @ (S @ monodromy)[chosen]
+        phase = np.zeros(J.shape[1] if more else 0)
+        if more:
+            chosen, T_0 = bases[0]
+            phase[: chosen.size] = (parts[0].rates[0] / self.scale**2) @ T_0
+        return Linear(r, J, phase, monodromy[bases[0][0]], bases, parts, T)

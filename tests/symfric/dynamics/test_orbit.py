@@ -1,0 +1,178 @@
+"""Periodic orbits against closed forms, other formulations and long runs."""
+
+from collections.abc import Callable
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from symfric import ExactCoulomb, LuGre, Model, Variable, contact, drive, rabinowicz, simulate
+from symfric.dynamics import equilibrium, linearize, periodic_orbit
+from symfric.laws import BrownMcPhee, Stribeck, Viscous
+from symfric.multibody import JointSpringDamper
+from symfric.scenes import CoupledBlocks, SliderCrank
+
+
+def test_stick_slip_without_damping_has_its_period_and_forgets() -> None:
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        m, k, v = rng.uniform(0.3, 3.0), rng.uniform(1.0, 30.0), rng.uniform(0.02, 0.3)
+        mu_d = rng.uniform(0.05, 0.3)
+        mu_s = mu_d * rng.uniform(1.2, 2.0)
+        belt = rabinowicz(ExactCoulomb(mu_s=mu_s, mu_d=mu_d), m=m, k=k, v_belt=v)
+        w, rise = np.sqrt(k / m), (mu_s - mu_d) * m * 9.81
+        expected = 2 * rise / (k * v) + 2 / w * (np.pi - np.arctan(rise * w / (k * v)))
+        run = simulate(belt, 5 * expected, x0={"v": v, "x": 0.0})
+        orbit = periodic_orbit(belt, run, rtol=1e-10)
+        assert orbit.period == pytest.approx(expected, rel=1e-9)
+        # one multiplier is that of the motion itself, 1; sticking makes the other one 0
+        assert np.abs(orbit.multipliers).max() < 1e-8 and orbit.multipliers.size == 1
+        assert orbit.stable and orbit.events == ("stick", "slip")
+        assert orbit.amplitude("x") == pytest.approx(np.hypot(v / w, rise / k), rel=1e-7)
+
+
+def test_an_oscillator_that_is_linear_in_energy_has_its_multiplier() -> None:
+    # polar form r' = r (1 - r^2), angle' = 2 has the orbit r = 1 and the multiplier exp(-2 pi)
+    x, y = Variable("x", "m", start=1.2), Variable("y", "m")
+    radial = 1 - x**2 - y**2
+    model = Model("ring", x=(x, y), ode=ca.vertcat(x * radial - 2 * y, y * radial + 2 * x))
+    run = simulate(model, 12.0, rtol=1e-8)
+    for symmetric in (False, True):
+        for segments in (1, 3):
+            orbit = periodic_orbit(model, run, symmetric=symmetric, segments=segments, rtol=1e-11)
+            assert orbit.period == pytest.approx(np.pi, rel=1e-10)
+            assert orbit.multipliers[0] == pytest.approx(np.exp(-2 * np.pi), rel=1e-7)
+
+
+def test_an_unstable_orbit_is_found_from_an_orbit_next_to_it() -> None:
+    # r' = -r (1 - r^2) / 5, multiplier exp(2 pi / 5)
+    x, y = Variable("x", "m", start=1.0), Variable("y", "m")
+    radial = (x**2 + y**2 - 1) / 5
+    model = Model("ring", x=(x, y), ode=ca.vertcat(x * radial - 2 * y, y * radial + 2 * x))
+    run = simulate(model, 16.0, x0={"x": 0.9999}, rtol=1e-10)
+    orbit = periodic_orbit(model, run, segments=4, rtol=1e-11)
+    assert orbit.stable is False
+    assert orbit.multipliers[0] == pytest.approx(np.exp(0.4 * np.pi), rel=1e-8)
+    assert orbit.x["x"] ** 2 + orbit.x["y"] ** 2 == pytest.approx(1.0, rel=1e-9)
+
+
+def hunting(law: object, kd: float, ki: float) -> Model:
+    """Mass under PID control with friction."""
+    x, v, e = Variable("x", "m", start=0.05), Variable("v", "m/s"), Variable("e", "m s")
+    pull = -60 * x - kd * v - ki * e
+    guide = contact("guide", law, v.symbol, 9.81, {"v": 0.0}, F_e=pull)
+    rates = ca.vertcat(v.symbol, pull - guide.force, x.symbol)
+    return Model("hunting", x=(x, v, e), ode=rates, contacts=(guide,))
+
+
+def test_a_hunting_drive_has_a_symmetric_orbit() -> None:
+    smooth = Stribeck(mu_s=0.3, mu_d=0.1, v_s=0.1)
+    for law, kd, ki in ((ExactCoulomb(mu_s=0.3), 3.0, 25.0), (smooth, 0.5, 80.0)):
+        drive_loop = hunting(law, kd, ki)
+        run = simulate(drive_loop, 200.0, rtol=1e-8)
+        whole = periodic_orbit(drive_loop, run)
+        half = periodic_orbit(drive_loop, run, symmetric=True)
+        assert half.period == pytest.approx(whole.period, rel=1e-7)
+        assert half.multipliers[0] == pytest.approx(whole.multipliers[0], rel=1e-4, abs=1e-6)
+        long = simulate(drive_loop, 250.0, rtol=1e-10).period()
+        assert long.period == pytest.approx(whole.period, rel=max(1e-7, long.error))
+        assert long.amplitude("x") == pytest.approx(half.amplitude("x"), rel=max(1e-6, long.error))
+        assert whole.stable and half.symmetric and "symmetric" in repr(half)
+
+
+def test_two_blocks_repeat_as_their_long_run_does() -> None:
+    law = Stribeck(mu_s=0.2, mu_d=0.1, v_s=0.1)
+    blocks = CoupledBlocks(law, v_belt=0.3, start_2=0.1).model()
+    orbit = periodic_orbit(blocks, simulate(blocks, 100.0))
+    cycle = simulate(blocks, 200.0, rtol=1e-10).period()
+    assert cycle.period == pytest.approx(orbit.period, rel=1e-7)
+    assert cycle.amplitude("x_1") == pytest.approx(orbit.amplitude("x_1"), rel=1e-6)
+
+
+def torque(t: ca.SX) -> ca.SX:
+    return 3 * ca.sin(2 * ca.pi * t)
+
+
+def crank(law: object, index: int) -> Model:
+    """Slider-crank with a spring on its crank, moved by a torque."""
+    mechanism = SliderCrank(law, omega=0.0, R=0.02).mechanism()
+    moment = mechanism.input("torque", "N m")
+    mechanism.force(JointSpringDamper("spring", "crank", stiffness=4.0, actuator=moment))
+    return mechanism.build(index=index)
+
+
+@pytest.mark.slow
+def test_a_driven_mechanism_has_one_orbit_in_all_formulations() -> None:
+    for law in (Viscous(), LuGre(), ExactCoulomb()):
+        found = []
+        for index in (0, 1):
+            model = crank(law, index)
+            run = simulate(model, 20.0, u={"torque": torque})
+            found.append(periodic_orbit(model, run, u={"torque": torque}, period=1.0))
+        one, other = found
+        assert one.amplitude("crank") == pytest.approx(other.amplitude("crank"), rel=1e-8)
+        assert np.abs(one.multipliers - other.multipliers).max() < 1e-5
+        assert one.driven and one.multipliers.size == (3 if law.states and len(one.x) == 5 else 2)
+
+
+def test_a_driven_linear_oscillator_has_the_multipliers_of_its_matrix() -> None:
+    spring, law = drive(Viscous(), m=1.0), Viscous()
+    x, v, force = Variable("x", "m"), Variable("v", "m/s"), Variable("force", "N")
+    slip = contact("guide", law, v.symbol, 1.0)
+    rates = ca.vertcat(v.symbol, force - 30 * x - slip.force)
+    model = Model("spring", x=(x, v), u=(force,), ode=rates, contacts=(slip,))
+    given = {"force": torque}
+    run = simulate(model, 5.0, u=given)
+    orbit = periodic_orbit(model, run, u=given, period=1.0, rtol=1e-11)
+    linear = linearize(model, equilibrium(model), outputs=["x"])
+    expected = np.exp(linear.eigenvalues)
+    assert all(np.abs(orbit.multipliers - s).min() < 1e-8 for s in expected)
+    size = 3 * abs(linear.response([2 * np.pi])[0, 0, 0])
+    assert orbit.amplitude("x") == pytest.approx(size, rel=1e-6)
+    assert spring.name == "drive"
+
+
+def test_an_unstable_equilibrium_is_a_guess_and_pictures_show_sticking() -> None:
+    law = ExactCoulomb(mu_s=0.3, mu_d=0.2, v_s=0.2, form="stribeck")
+    belt = rabinowicz(law, v_belt=0.15)
+    at = equilibrium(belt)
+    assert linearize(belt, at).stable is False
+    orbit = periodic_orbit(belt, at)
+    assert orbit.stable
+    again = periodic_orbit(belt, orbit, rtol=1e-11)
+    assert again.period == pytest.approx(orbit.period, rel=1e-8)
+    (axis,) = orbit.plot("x", "v").axes
+    assert axis.get_xlabel() == "x [m]" and len(axis.lines) == 2
+
+
+def test_what_is_no_orbit_is_refused() -> None:
+    belt = rabinowicz(ExactCoulomb(sigma_2=5.0), v_belt=0.3)
+    sliding = simulate(belt, 100.0)
+    stable = equilibrium(belt)
+    pushed = drive(LuGre())
+    run = simulate(pushed, 3.0, u={"force": torque})
+    x, v = Variable("x", "m", start=1.0), Variable("v", "m/s")
+    xdot = ca.SX.sym("xdot", 2)
+    implicit = Model("implicit", x=(x, v), xdot=xdot, residual=ca.vertcat(xdot[0] - v, xdot[1] + x))
+    cases: dict[str, Callable[[], object]] = {
+        "expected an unstable equilibrium": lambda: periodic_orbit(belt, stable),
+        "a run, a periodic orbit or an equilibrium": lambda: periodic_orbit(belt, {"x": 1.0}),
+        "of the input force": lambda: periodic_orbit(pushed, run, u={"force": torque}),
+        "a run of 9 s": lambda: periodic_orbit(pushed, run, u={"force": torque}, period=9.0),
+        "explicit rates": lambda: periodic_orbit(implicit, simulate(implicit, 20.0)),
+        "segments": lambda: periodic_orbit(belt, sliding, segments=0),
+        "rtol": lambda: periodic_orbit(belt, sliding, rtol=0.1),
+        "period": lambda: periodic_orbit(belt, sliding, period=-1.0),
+        "got z": lambda: periodic_orbit(pushed, sliding),
+        "simulate longer": lambda: periodic_orbit(belt, sliding),
+        "got mu": lambda: periodic_orbit(belt, sliding, p={"mu": 1.0}),
+    }
+    for text, call in cases.items():
+        with pytest.raises(ValueError, match=text):
+            call()
+
+
+def test_a_symmetric_orbit_of_a_machine_without_symmetry_is_refused() -> None:
+    belt = rabinowicz(BrownMcPhee())
+    with pytest.raises(ValueError, match="near the guess"):
+        periodic_orbit(belt, simulate(belt, 30.0), symmetric=True)
