@@ -76,14 +76,14 @@ def measure_controller(
             inputs, controls.shape[1], shift=SHIFT, limit=PATIENCE + PER_CYCLE * cycles,
         )  # fmt: skip
     results = words["rows"].view(REALS[made.real].kind).reshape(controls.shape).astype(float)
-    sizes = {what: int(words[what][0]) for what in ("text", "library", "data", "stack")}
     return Measured(
         name, made.real, core,
         average=float(instructions.mean()),
         maximum=float(round(instructions.max())),
         error=float((np.abs(results - controls).max(0) / np.abs(controls).max(0)).max()),
         finite=bool(np.isfinite(results).all()),
-        **sizes,
+        text=int(words["text"][0]), library=int(words["library"][0]),
+        data=int(words["data"][0]), stack=int(words["stack"][0]),
     )  # fmt: skip
 
 
