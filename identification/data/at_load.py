@@ -34,23 +34,24 @@ def at_load(record: Record, drive: Drive) -> Record:
         ValueError: no current, a force at the load instead of or next to it, or positions in units
             that the drive does not relate to its load.
     """
-    where = f"{record.name}: drive"
+    where = f"read '{record.name}': drive"
     signals, units = dict(record.signals), dict(record.units)
     forces = [n for n, unit in units.items() if unit in ("N", "N m")]
     if "current" not in signals or "force" in signals:
         got = ", ".join(f"{n} [{units[n] or '?'}]" for n in signals)
-        hint = "name it with columns={'current': ...} (--column current=...)"
+        name = next((record.columns.get(n, n) for n, unit in units.items() if unit == "A"), "...")
+        hint = f"name it with columns={{'current': '{name}'}} (--column current={name})"
         if forces:
             hint = "a log of forces or torques of the load is read without a drive"
         what = "a column of the current [A] and none of the force of the load"
-        raise ValueError(f"read '{where}': expected {what}, got {got}; {hint}")
+        raise ValueError(f"{where}: expected {what}, got {got}; {hint}")
     along, force = ("rad", "N m") if drive.turning else ("m", "N")
     for name, rate in (("x", ""), ("v", "/s"), ("a", "/s^2")):
         if name in signals:
             unit = units[name].removesuffix(rate) if rate else units[name]
-            factor = _factor(f"read '{where}': {name}", unit, drive)
+            factor = _factor(f"{where}: {name}", unit, drive)
             if name == "x" and unit == "1" and drive.counter is not None:
-                signals[name] = _unwrapped(f"read '{where}': x", signals[name], drive.counter)
+                signals[name] = _unwrapped(f"{where}: x", signals[name], drive.counter)
             signals[name], units[name] = factor * signals[name], along + rate
     found = replace(record, signals=signals, units=units, drive=drive)
     lossless = float(drive.force_constant) * signals.pop("current")

@@ -192,6 +192,8 @@ def record(raw: Raw, wanted: Wanted) -> Record:
     """
     where = f"{raw.verb} '{raw.name}'"
     columns = _labelled(where, raw, wanted)
+    if wanted.drive is not None:
+        columns = tuple(map(_in_amperes, columns))
     have = ", ".join(map(str, columns))
     named = _channels(where, columns, wanted, have)
     requested = wanted.columns.keys() if isinstance(wanted.columns, Mapping) else set[str]()
@@ -233,6 +235,14 @@ def record(raw: Raw, wanted: Wanted) -> Record:
         left_out=left_out,
     )
     return found if wanted.drive is None else at_load(found, wanted.drive)
+
+
+def _in_amperes(column: Column) -> Column:
+    """Return a column such as `current_A` with its unit."""
+    match = fullmatch(r"(.+)_(m?A)", column.label)
+    if column.unit or match is None or not _matches(match[1], "current", OF_DRIVE):
+        return column
+    return replace(column, label=match[1], unit=match[2])
 
 
 def _labelled(where: str, raw: Raw, wanted: Wanted) -> tuple[Column, ...]:

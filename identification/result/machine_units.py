@@ -8,6 +8,8 @@ from identification.data.dataset import Dataset
 from identification.result.series import Estimate
 from symfric.foundation.units import turned
 
+ALONE = "m without rotor"
+"""Name of the mass or inertia of the load alone."""
 AT_MOTOR = {
     "N m": ("N m", "A", -1),
     "N m s/rad": ("N m s/rad", "A s/rad", -2),
@@ -33,7 +35,7 @@ class Sides:
 
     Attributes:
         name: name of the parameter.
-        load, motor, current: values; of a reversed axis only an offset changes its sign.
+        load, motor, current: values; a reversed axis or current changes the sign of an offset only.
         units: their units; "" without a current.
         error: standard error relative to the value; None if unknown.
     """
@@ -65,14 +67,14 @@ def _sides(data: Dataset, estimates: Mapping[str, Estimate]) -> Iterator[Sides]:
     if "m" in every and rotor > 0:
         m = every["m"]
         error = m.standard_error
-        every["m without rotor"] = Estimate(m.value - rotor, m.unit, error)
+        every[ALONE] = Estimate(m.value - rotor, m.unit, error)
     for name, e in every.items():
-        if (found := AT_MOTOR.get(turned(e.unit))) is None:
+        if (found := AT_MOTOR.get(e.unit) or AT_MOTOR.get(turned(e.unit))) is None:
             continue
         motor, current, power = found
-        loss = driving if motor.startswith("N") else 1.0
-        scale = ratio**power if name == "offset" else abs(ratio) ** power
-        at_motor = e.value * scale / loss
-        amperes = e.value * scale / (driving * K) if current else 0.0
+        signed = name == "offset"  # others are levels in both directions
+        scale = (ratio if signed else abs(ratio)) ** power
+        at_motor = e.value * scale / (driving if motor.startswith("N") else 1.0)
+        amperes = e.value * scale / (driving * (K if signed else abs(K))) if current else 0.0
         error = abs(e.standard_error / e.value) if e.standard_error and e.value else None
         yield Sides(name, e.value, at_motor, amperes, (e.unit, motor, current), error)

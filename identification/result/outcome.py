@@ -8,7 +8,7 @@ from textwrap import wrap
 from identification.data.findings import Finding, texts
 from identification.residuals.evaluation import Array
 from identification.result.live import Asked, Live
-from identification.result.machine_units import Sides
+from identification.result.machine_units import ALONE, Sides
 from identification.result.series import Curve, Errors, Estimate, Series, Tried
 from identification.verdict.judge import Verdict
 from symfric.foundation.parameters import Parametric
@@ -255,6 +255,9 @@ def _sides(fit: Outcome) -> Iterator[str]:
         header = ("of the drive", "at the load", "at the motor", "current")
         yield from columns([header, *machine_units(fit)])
         yield DRIVING
+        if any(s.name == ALONE and s.load < 0 for s in fit.sides):
+            yield "m is below the inertia of the rotor: check gear_ratio, the turns of the motor"
+            yield "per turn of the output, rotor_inertia and torque_constant"
 
 
 def _correlations(fit: Outcome) -> Iterator[str]:

@@ -323,7 +323,7 @@ def _use(limited: bool, drive: Nameplate | None) -> Iterator[str]:
         return
     yield USE[0].replace("add F to the force", "add `current` to the current")
     yield "A positive current drives the load towards " + (
-        "positive x." if float(drive.ratio) > 0 else "negative x: the drive is reversed."
+        "positive x." if float(drive.force_constant) > 0 else "negative x: the drive is reversed."
     )
     if limited or drive.current_limit is not None:
         yield LIMITED.replace("F_max", "i_max").replace("F is", "The current is")

@@ -1,7 +1,7 @@
 """Class `Drive`: a motor with gear, encoder and limits, as on its nameplate."""
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import field, fields
 from math import nan, pi
 from pathlib import Path
@@ -12,6 +12,9 @@ from symfric.foundation import checks, units
 from symfric.foundation.numeric import Scalar, equals, is_symbolic
 from symfric.foundation.parameters import Parametric, option, param, parametric
 from symfric.laws.base import smooth
+
+OF_LOAD = ("resolution", "speed_width", "force_width")
+"""Quantities of the load, which are in m and N or in rad and N m."""
 
 
 def given(unit: str, doc: str) -> Any:
@@ -53,7 +56,8 @@ class Drive(Parametric):
     catalogues of gears and ball screws.
 
     Attributes:
-        torque_constant: torque per current [N m/A]; 1 if currents are torques of the motor.
+        torque_constant: torque per current [N m/A]; 1 if currents are torques of the motor, below 0
+            if a positive current turns the motor against its encoder.
         gear_ratio: turns of the motor per turn of the output; a reducing gear has more than 1.
         efficiency: number in (0, 1], or (forward, backward), of gear and screw together.
         rotor_inertia: inertia of rotor, brake and coupling on the side of the motor [kg m^2].
@@ -74,7 +78,7 @@ class Drive(Parametric):
         ValueError: all wrong values in one error.
     """
 
-    torque_constant: Scalar = param(nan, unit="N m/A", doc="torque per current", lower=1e-12)
+    torque_constant: Scalar = param(nan, unit="N m/A", doc="torque per current")
     gear_ratio: Scalar = param(1.0, unit="1", doc="turns of the motor per turn of the output")
     efficiency: float | tuple[float, float] = (1.0, 1.0)
     rotor_inertia: Scalar = param(
@@ -112,8 +116,9 @@ class Drive(Parametric):
             what = "a number > 0 and <= 1, or (forward, backward)"
             yield str(checks.refused("efficiency", what, self.efficiency))
         object.__setattr__(self, "efficiency", (numbers[0], numbers[-1]))
-        if equals(self.gear_ratio, 0.0):
-            yield "gear_ratio: expected a number other than 0, got 0; below 0 it reverses the axis"
+        for name in ("torque_constant", "gear_ratio"):
+            if equals(getattr(self, name), 0.0):
+                yield f"{name}: expected a number other than 0, got 0; below 0 it reverses the axis"
         for item in fields(self):
             unit, value = item.metadata.get("quantity", ""), getattr(self, item.name)
             if unit and value is not None:
@@ -155,7 +160,7 @@ class Drive(Parametric):
         values, problems = dict[str, Any](), list[str]()
         for key, value in data.items():
             try:
-                name, factor = _field(key, axis="rad" if not _linear(data) else "m")
+                name, factor = _field(key)
                 values[name] = value if factor == 1 else factor * checks.number(key, value)
             except ValueError as error:
                 problems.append(str(error))
@@ -198,7 +203,7 @@ class Drive(Parametric):
             if is_symbolic(self.torque_constant):
                 what = "max_current with a symbol as torque_constant"
                 raise checks.refused("Drive: max_torque", what, self.max_torque)
-            limits.append(self.max_torque / float(self.torque_constant))
+            limits.append(self.max_torque / abs(float(self.torque_constant)))
         return min(limits, default=None)
 
     @property
@@ -258,26 +263,18 @@ class Drive(Parametric):
         return 1 - forward, 1 / backward - 1
 
 
-def _linear(data: Mapping[str, Any]) -> bool:
-    return any(key.partition(" ")[0] in ("lead", "drum_radius") for key in data)
-
-
-def _field(key: str, axis: str) -> tuple[str, float]:
-    """Return name and factor to SI units of a key such as `lead [mm]`.
-
-    `axis` is the unit of positions of the load, m or rad.
-    """
+def _field(key: str) -> tuple[str, float]:
+    """Return name and factor to SI units of a key such as `lead [mm]`."""
     match = fullmatch(r"\s*(\w+)\s*(?:\[(.*)\])?\s*", key)
     name, unit = (match[1], match[2]) if match else (key, None)
     known = {item.name: item.metadata for item in fields(Drive)}
     checks.check_names("key", [name], known)
     wanted = known[name].get("quantity", known[name].get("unit", "1"))
-    if axis == "rad" and name in ("resolution", "speed_width", "force_width"):
-        wanted = units.turned(wanted)
     if wanted == "1" and unit is None:
         return name, 1.0
-    meant, si = units.parsed(unit or "?"), units.parsed(wanted)
-    if meant is None or si is None or meant.si != si.si:
+    both = (wanted, units.turned(wanted)) if name in OF_LOAD else (wanted,)
+    meant = units.parsed(unit or "?")
+    if meant is None or meant.si not in [found.si for one in both if (found := units.parsed(one))]:
         such = f'a unit of {wanted} in its key, such as "{name} [{wanted}]"'
         raise ValueError(f"{name}: expected {such}, got {unit or 'none'}")
     return name, meant.factor

@@ -137,6 +137,20 @@ def test_files_of_earlier_versions_have_no_units_of_the_machine(
     assert Fitted.from_json(path).sides == ()
 
 
+def test_a_rotary_axis_has_the_units_of_a_rotary_motor() -> None:
+    t, d = T, Drive(torque_constant=0.5, gear_ratio=0.1, rotor_inertia=500.0)
+    x = 0.3 * np.sin(9 * t) + 0.2 * np.sin(31 * t)
+    v, a = (np.gradient(x, t), np.gradient(np.gradient(x, t), t))
+    i = (2.0 * a + 3.0 * np.sign(v) + v) / float(d.force_constant)
+    log = Dataset.of({"t [s]": t, "x [rad]": 0.1 * x, "current [A]": i}, drive=d)
+    fit = Fit(InverseDynamics(), "coulomb+viscous", log, starts=1).solve(throw=False)
+    sides = {s.name: s for s in fit.sides}
+    assert sides["m"].units == ("kg m^2", "kg m^2", "A s^2/rad")
+    assert sides["m"].load == pytest.approx(2.0, rel=0.05)
+    assert sides["m"].motor == pytest.approx(100 * sides["m"].load)
+    assert "m is below the inertia of the rotor" in str(fit)
+
+
 def test_positions_have_at_least_the_noise_of_their_counts() -> None:
     d = lossless(counts_per_turn=8)
     record = read(d, {"x [m]": stroke(), "current [A]": T})
@@ -150,7 +164,8 @@ def test_positions_have_at_least_the_noise_of_their_counts() -> None:
     ("columns", "changes", "message"),
     [
         ({"x [m]": T, "torque [N m]": T}, {}, "a log of forces or torques of the load is read wi"),
-        ({"x [m]": T}, {}, r"expected a column of the current \[A\].*columns={'current': ...}"),
+        ({"x [m]": T}, {}, r"expected a column of the current \[A\].*columns={'current': '...'}"),
+        ({"x [m]": T, "ActI [A]": T}, {}, "columns={'current': 'ActI'}"),
         ({"x [m]": T, "current": T}, {}, "column 'current': expected a unit of A, mA, got none"),
         ({"x [m]": T, "force [N]": T, "current [A]": T}, {}, "none of the force of the load"),
         ({"counts [counts]": T, "current [A]": T}, {"counts_per_turn": None}, "counts_per_turn or"),
@@ -164,6 +179,27 @@ def test_logs_that_do_not_belong_to_the_drive_are_refused(
 ) -> None:
     with pytest.raises(ValueError, match=message):
         read(lossless(**changes), columns, units={} if "current" in columns else None)
+
+
+def test_a_current_of_the_wrong_sign_is_reported_and_corrected() -> None:
+    data = synthetic_drive_data(seed=1, rate=250.0)[0]
+    d = Drive(**SCREW)
+    i = d.current_for(data["force"], np.gradient(data["x"], data.time))
+    columns = {"t [s]": data.time, "x [m]": data["x"], "current_mA": -1e3 * i}
+    wrong = Dataset.of(columns, drive=d)
+    assert "make the torque_constant of the drive negative" in str(wrong.check())
+    right = Dataset.of(columns, drive=Drive(**{**SCREW, "torque_constant": -0.12}))
+    assert not right.check().errors
+    far = np.abs(np.gradient(data["x"], data.time)) > 2e-3
+    assert np.allclose(right[0]["force"][far], data["force"][far], rtol=1e-3, atol=0.5)
+
+
+def test_a_missing_counter_is_reported() -> None:
+    d = lossless(counts_per_turn=1000)
+    counts = np.rint(stroke() / float(d.count or 0)) % 4096
+    found = Dataset.of({"t [s]": T, "counts [counts]": counts, "current [A]": T}, drive=d).check()
+    assert "the counter wraps after about 409" in str(found)
+    assert "set counter of the drive" in str(found)
 
 
 def test_points_and_other_objects_are_refused() -> None:

@@ -95,6 +95,7 @@ def test_a_file_has_the_numbers_of_the_nameplate(tmp_path: Path) -> None:
         ({}, r"torque_constant: expected a finite number \[N m/A\] or a symbol, got none"),
         ({"torque_constant": inf}, "torque_constant: expected a finite number"),
         ({"gear_ratio": 0}, "gear_ratio: expected a number other than 0, got 0; below 0 it rev"),
+        ({"torque_constant": 0.0}, "torque_constant: expected a number other than 0, got 0"),
         ({"efficiency": 1.01}, r"efficiency: expected a number > 0 and <= 1, or \(forward"),
         ({"efficiency": (0.9, 0.0)}, "efficiency: expected"),
         ({"efficiency": (0.9, 0.9, 0.9)}, "efficiency: expected"),
