@@ -20,7 +20,7 @@ SIAM J. Optim. 4, 1994, 626-636 (smoother as Gauss-Newton step).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, final
 
@@ -33,7 +33,7 @@ from ocp.formulation.phase import Ranges, as_box, is_range
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
 from symfric.foundation.parameters import Variable, check_names
-from symfric.foundation.shown import brief
+from symfric.foundation.shown import brief, combination
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator import flow
 from symfric.model import Model, check_model
@@ -51,8 +51,6 @@ DIVERGED = (
     "estimate: the motion became infinite; take more `steps`, a smaller `spread` at the start, or "
     "less noise of states"
 )
-SHOWN = 0.1
-"""Smallest coefficient that is shown; the largest one is 1."""
 PINNED = 1e-4
 """Deviation of a value that is held at its bound, in units of the spread."""
 KNOWN = 0.1
@@ -122,7 +120,7 @@ def estimate(
     p: Mapping[str, float] | None = None,
     steps: int = 4,
 ) -> Estimate:
-    """Estimate the states of `model`, including those of its laws, and its unknown inputs.
+    """Estimate states of `model`, including those of its laws, and unknown inputs and parameters.
 
     Args:
         model: explicit model without events and without algebraic variables; use a law that is
@@ -131,12 +129,13 @@ def estimate(
             missing sample of a signal is NaN.
         step: sampling interval [s].
         horizon: number of samples M of the horizon.
-        noise: measured signal -> standard deviation of a sample; state or unknown input ->
+        noise: measured signal -> standard deviation of a sample; state or unknown ->
             standard deviation of its random change in one second [unit/sqrt(s)], 0 by default.
-        unknown: inputs that are not measured (loads); they change by noise only.
-        start, spread: state or unknown input -> value at t = 0 and its standard deviation; by
+        unknown: inputs that are not measured (loads), and parameters that drift (wear); they change
+            by noise only.
+        start, spread: state or unknown -> value at t = 0 and its standard deviation; by
             default the start of the variable (0 for states of laws) and its nominal value.
-        bounds: state or unknown input -> (lower, upper), None for no bound; they hold at all
+        bounds: state or unknown -> (lower, upper), None for no bound; they hold at all
             samples. Deviations ignore them, so they are too large near a bound.
         p: parameter -> value.
         steps: number of integration steps in each sampling interval.
@@ -153,10 +152,12 @@ def estimate(
     step = checks.number("estimate: step", step, above=0.0)
     horizon = checks.count("estimate: horizon", horizon, least=2)
     steps = checks.count("estimate: steps", steps)
-    unknown = checks.names("estimate: unknown", unknown, [v.name for v in model.u])
+    unknown = checks.names("estimate: unknown", unknown, [v.name for v in (*model.u, *model.p)])
     rows = _checked(model, data, unknown)
     measured = [name for name in rows if name not in {v.name for v in model.u}]
-    states = [*model.x, *(v for v in model.u if v.name in unknown)]
+    values = dict(zip((v.name for v in model.p), model.values("p", p), strict=True))
+    drifting = [replace(v, start=float(values[v.name])) for v in model.p if v.name in unknown]
+    states = [*model.x, *(v for v in model.u if v.name in unknown), *drifting]
     names = [v.name for v in states]
     start, spread = _numbers("start", start, names), _numbers("spread", spread, names)
     noise = _numbers("noise", noise, [*names, *measured])
@@ -172,10 +173,10 @@ def estimate(
     first = np.array([start.get(v.name, v.start) for v in states], dtype=float)
     first = np.nan_to_num(first) / scale  # states of laws have no start
     walk = np.array([noise.get(v.name, 0.0) for v in states]) / scale
-    loads, values = states[len(model.x) :], model.values("p", p)
+    loads = states[len(model.x) :]
     machine = _Machine(
         *_functions(model, loads, measured, step, steps),
-        fixed=(scale, np.asarray(values, dtype=float)),
+        fixed=(scale, np.array([*values.values()], dtype=float)),
         Q=np.diag(walk**2 * step),
         R=np.array([noise[name] ** 2 for name in measured]),
         lower=box[:, 0] / scale,
@@ -226,24 +227,27 @@ def _functions(
 ) -> tuple[ca.Function, ca.Function]:
     """Return (xi, u, scale, p) -> next xi and its Jacobian, and -> measured signals and theirs.
 
-    xi are states and loads in units of their `scale`, u the measured inputs.
+    xi are states, loads and drifting parameters in units of their `scale`, u the measured inputs.
     """
     kept: dict[Any, tuple[ca.Function, ca.Function]] = model.memory.setdefault("ocp estimate", {})
     key = tuple(v.name for v in loads), tuple(measured), step, steps
     if key in kept:
         return kept[key]
-    nx, given = len(model.x), [v for v in model.u if v not in loads]
+    names = [v.name for v in loads]
+    nx, given = len(model.x), [v for v in model.u if v.name not in names]
     xi, u = ca.MX.sym("xi", nx + len(loads)), ca.MX.sym("u", len(given))
     scale, values = ca.MX.sym("scale", xi.shape[0]), ca.MX.sym("p", len(model.p))
     x = xi * scale
     places = {v.name: u[i] for i, v in enumerate(given)}
-    places |= {v.name: x[nx + i] for i, v in enumerate(loads)}
+    own = {name: x[nx + i] for i, name in enumerate(names)}
+    places |= own
+    p = ca.vertcat(ca.MX(0, 1), *(own.get(v.name, values[i]) for i, v in enumerate(model.p)))
     inputs = ca.vertcat(ca.MX(0, 1), *(places[v.name] for v in model.u))
-    after = flow(model, steps=steps)(x[:nx], inputs, values, step)
+    after = flow(model, steps=steps)(x[:nx], inputs, p, step)
     after = ca.vertcat(after, x[nx:, 0]) / scale
     symbols = [model.vector("x"), model.vector("u"), model.vector("p")]
     seen = ca.vertcat(*(model.expression(name) for name in measured))
-    y = ca.Function("seen", symbols, [seen])(x[:nx], inputs, values)
+    y = ca.Function("seen", symbols, [seen])(x[:nx], inputs, p)
     arguments = [xi, u, scale, values]
     kept[key] = (
         ca.Function("next", arguments, [after, ca.jacobian(after, xi)]),
@@ -372,11 +376,8 @@ def _moved(
 def _unobservable(P: Array, free: Array, names: Sequence[str]) -> tuple[str, ...]:
     """Return combinations whose variance the measurements reduce by less than `INFORMED`."""
     ratios, vectors = eigh(P, free + 1e-12 * np.eye(len(names)))
-    found = list[str]()
-    for ratio, v in zip(ratios, vectors.T, strict=True):
-        if ratio > INFORMED and 1.0 / np.linalg.norm(v) > KNOWN:
-            v = v / v[np.argmax(np.abs(v))]
-            terms = ((c, n) for c, n in zip(v, names, strict=True) if abs(c) > SHOWN)
-            text = " ".join(f"{'-' if c < 0 else '+'} {abs(c):.2g} {n}" for c, n in terms)
-            found.append(text.removeprefix("+ "))
-    return tuple(found)
+    return tuple(
+        combination(v, names)
+        for ratio, v in zip(ratios, vectors.T, strict=True)
+        if ratio > INFORMED and 1.0 / np.linalg.norm(v) > KNOWN
+    )

@@ -8,14 +8,18 @@ from typing import Any, NamedTuple
 
 import typer
 
+from symfric import Drive as Nameplate
 from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.codegen_report import report
+from symfric.cli.controllers import write_controllers
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
     Block,
+    Generated,
+    Verification,
     generate,
     inverse_dynamics_block,
     plant_block,
@@ -24,8 +28,15 @@ from symfric.codegen import (
 from symfric.codegen import prove as prove_block
 from symfric.codegen.blocks.variables import STEP_SIZE
 from symfric.codegen.generated import with_cores
-from symfric.compensation import Compensation, settings_from_text
+from symfric.compensation import (
+    Adaptation,
+    Compensation,
+    kalman_estimator,
+    recursive_estimator,
+    settings_from_text,
+)
 from symfric.compensation import compensator as compensator_block
+from symfric.compensation.adaptation import adaptation_from_text
 from symfric.embedded import CORES, StepError, measure, step_errors
 from symfric.foundation import checks
 from symfric.foundation.files import check_folder
@@ -39,18 +50,23 @@ from symfric.scenes.linkages import MechanismScene
 
 REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
 COMPENSATION = [item.name for item in fields(Compensation)]
+ADAPTATION = [item.name for item in fields(Adaptation)]
+ESTIMATORS = {"recursive": recursive_estimator, "kalman": kalman_estimator}
 LAW, FUNCTION, POPULATION = "a law", "a law without states", "a population"
 PLANT, INVERSE, COMPENSATOR = "--scene", "--inverse-dynamics", "--compensator"
+ESTIMATOR = "--estimator"
 
 APPLIES = {
-    "--step-size": (LAW, POPULATION, PLANT, INVERSE, COMPENSATOR),
+    "--step-size": (LAW, POPULATION, PLANT, INVERSE, COMPENSATOR, ESTIMATOR),
     "--method": (PLANT,),
     "--free": (LAW, FUNCTION, PLANT),
     "--fold": (LAW, FUNCTION, PLANT, INVERSE, COMPENSATOR),
-    "--turning": (LAW, FUNCTION, COMPENSATOR),
+    "--turning": (LAW, FUNCTION, COMPENSATOR, ESTIMATOR),
     "--payload": (INVERSE,),
     "--tunable-gravity": (INVERSE,),
     "--compensation": (COMPENSATOR,),
+    "--drive": (COMPENSATOR,),
+    "--adaptation": (ESTIMATOR,),
     "--preset": (PLANT,),
     "--law-of": (PLANT,),
 }
@@ -102,6 +118,10 @@ def codegen(
     tunable_gravity: bool = False,
     compensator: bool = False,
     compensation: Strings = None,
+    drive: Path | None = None,
+    estimator: str | None = None,
+    adaptation: Strings = None,
+    mpc: str | None = None,
     accept: Strings = None,
     prove: bool = False,
     compiler: str | None = None,
@@ -120,6 +140,12 @@ def codegen(
     Example: symfric codegen robot.urdf --inverse-dynamics --payload tool0 --out build
 
     Example: symfric codegen fit.json --compensator --compensation v_blend=0.02 --out build
+
+    Example: symfric codegen fit.json --compensator --drive drive.toml --out build
+
+    Example: symfric codegen --mpc problem.py --real float --core m4f --out build
+
+    Example: symfric codegen fit.json --estimator recursive --adaptation noise=1e-4 --out build
     """
     check_names("--core", core or (), CORES)
     check_folder(out)
@@ -128,17 +154,21 @@ def codegen(
         raise ValueError("--prove: expected guards, whose effect is proved, got --no-guards")
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
+    if mpc is not None:
+        others = (fit, law, scene, estimator, *(compensator, inverse_dynamics, prove), compiler)
+        return write_controllers(out, mpc, any(others), settings, step_size, real, core, json)
     if fit and not law and fit.suffix.lower() not in (".json", ".urdf") and not fit.is_file():
         fit, law = None, str(fit)
     texts = opt.assignments("--set", settings)
     chosen = None if inverse_dynamics else chosen_law(fit, law, accept or (), texts)
-    subject = subject_of(chosen, scene, compensator)
+    subject = subject_of(chosen, scene, compensator, estimator)
     kind = ("double" if subject == PLANT else "both") if real is None else real
     check_names("--real", [kind], REALS)
     given = {
         "--step-size": step_size, "--method": method, "--free": free, "--fold": fold or None,
         "--turning": turning or None, "--payload": payload, "--compensation": compensation,
         "--tunable-gravity": tunable_gravity or None, "--preset": preset, "--law-of": law_of,
+        "--adaptation": adaptation, "--drive": drive,
     }  # fmt: skip
     check_applicable(subject, [option for option, value in given.items() if value is not None])
     own: dict[str, Any] = {"fold": fold or None, "free": free, "name": name, "h": step_size}
@@ -155,41 +185,57 @@ def codegen(
         made, errors, adjustable = plant(machine, method=method or "auto", **own)
     else:
         made = opt.with_settings(chosen.law, chosen.text, texts)
-        if compensator:
-            made = compensated(made, chosen.drive, compensation or (), turning=turning, **own)
+        if subject in (COMPENSATOR, ESTIMATOR):
+            own |= {} if drive is None else {"drive": Nameplate.read(drive)}
+            texts_of = compensation or adaptation or ()
+            made = online(made, chosen.drive, estimator, texts_of, turning=turning, **own)
         else:
             options = own
             if turning or (chosen.drive is not None and chosen.drive.turning):
                 options["turning"] = True
     generated = generate(made, out, real=REALS[kind], guards=guards, kit=kit, **options)
-    verification = verify(generated, compiler=compiler, adjustable=adjustable)
     if chosen is not None and chosen.forces and subject in (LAW, FUNCTION):
         names = ", ".join(chosen.forces)
         output.note(f"{names}: fitted as forces under a load of 1 N; call the C with N = 1")
-    measured = [
-        measure(generated.block, one, name_of_core, guards=generated.guards)
-        for name_of_core in core or ()
-        for one in generated.reals
-    ]
-    generated = with_cores(generated, [m.to_dict() for m in measured])
     law = chosen.text if chosen else law or generated.block.name
-    proofs = [prove_block(generated.block, one) for one in generated.reals if prove]
+    verification = verify(generated, compiler=compiler, adjustable=adjustable)
+    finish(law, generated, verification, errors, core or (), prove, json)
+
+
+def finish(
+    law: str, generated: Generated, verification: Verification, errors: Sequence[StepError],
+    cores: Sequence[str], prove: bool, json: str | None,
+) -> None:  # fmt: skip
+    """Measure on cores, prove, and report; exit with 1 unless everything holds."""
+    measured = [
+        measure(generated.block, real, core, guards=generated.guards)
+        for core in cores for real in generated.reals
+    ]  # fmt: skip
+    generated = with_cores(generated, [m.to_dict() for m in measured])
+    proofs = [prove_block(generated.block, real) for real in generated.reals if prove]
     report(law, generated, verification, measured, proofs, errors, json)
     if not verification.ok or not all(found.ok for found in proofs):
         raise typer.Exit(1)
 
 
-def subject_of(chosen: Chosen | None, scene: str | None, compensator: bool) -> str:
+def subject_of(
+    chosen: Chosen | None, scene: str | None, compensator: bool, estimator: str | None
+) -> str:
     """Return the type of the subject, a key of `APPLIES`.
 
     Raises:
-        ValueError: a compensator together with a scene or inverse dynamics.
+        ValueError: a compensator or an estimator together with each other, with a scene or with
+            inverse dynamics; an unknown estimator.
     """
-    if compensator and (chosen is None or scene is not None):
-        other = INVERSE if chosen is None else PLANT
-        raise ValueError(f"codegen: {COMPENSATOR}: expected with a law or a fit, got {other}")
-    if compensator:
-        return COMPENSATOR
+    online = COMPENSATOR if compensator else ESTIMATOR
+    if compensator or estimator is not None:
+        both = (ESTIMATOR,) * (compensator and estimator is not None)
+        others = [*both, *[INVERSE] * (chosen is None), *[PLANT] * (scene is not None)]
+        if others:
+            raise ValueError(f"codegen: {online}: expected with a law or a fit, got {others[0]}")
+        if estimator is not None:
+            checks.choice(ESTIMATOR, estimator, ESTIMATORS)
+        return online
     if chosen is None:
         return INVERSE
     if scene is not None:
@@ -307,12 +353,17 @@ def fixed_steps(machine: Scene, h: float, method: str) -> tuple[StepError, ...]:
         return ()
 
 
-def compensated(law: AnyLaw, drive: Drive | None, texts: Sequence[str], **how: Any) -> Block:
-    """Return the compensator of a law, with the load and offset of the fitted drive if given."""
+def online(
+    law: AnyLaw, axis: Drive | None, estimator: str | None, texts: Sequence[str], **how: Any
+) -> Block:
+    """Return the compensator or the estimator of a law, with the numbers of the fitted drive."""
+    option = COMPENSATOR if estimator is None else ESTIMATOR
     if not isinstance(law, Law):
-        raise ValueError(f"{COMPENSATOR}: expected a law, got a population, whose force is random")
-    subject = law if drive is None else replace(drive, law=law)
-    return compensator_block(subject, settings=settings_from_text(texts), **how)
+        raise ValueError(f"{option}: expected a law, got a population, whose force is random")
+    subject = law if axis is None else replace(axis, law=law)
+    if estimator is None:
+        return compensator_block(subject, settings=settings_from_text(texts), **how)
+    return ESTIMATORS[estimator](subject, adaptation_from_text(texts), **how)
 
 
 def robot(

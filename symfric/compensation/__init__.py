@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from symfric.compensation.compensator import compensator as compensator
     from symfric.compensation.estimators import kalman_estimator as kalman_estimator
     from symfric.compensation.estimators import recursive_estimator as recursive_estimator
+    from symfric.compensation.follow import Followed as Followed
+    from symfric.compensation.follow import follow as follow
     from symfric.compensation.force import TERMS as TERMS
     from symfric.compensation.loop import Cascade as Cascade
     from symfric.compensation.loop import close_loop as close_loop

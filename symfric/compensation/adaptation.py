@@ -1,5 +1,6 @@
 """Settings of the estimators of changing friction, and their checks."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
@@ -73,15 +74,15 @@ def chosen_adaptation(
 
 
 def adaptation_from_text(texts: Sequence[str]) -> Adaptation:
-    """Return the settings given by arguments of a command line.
+    """Return the settings given by arguments of a command line, each with one or several settings.
 
-        noise=1e-4  free=scale_coulomb,offset  spread=offset:2  bounds=offset:-5:5
+        noise=1e-4,mass=2  free=scale_coulomb,offset  spread=offset:2  bounds=offset:-5:5
 
     Raises:
         ValueError: unknown or repeated names, or values that are not numbers.
     """
-    where, found = "estimation", dict[str, Any]()
-    for text in texts:
+    where, found = "adaptation", dict[str, Any]()
+    for text in (setting for some in texts for setting in re.split(r",(?=\w+=)", some)):
         name, _, value = text.partition("=")
         checks.check_names(where, [name], [item.name for item in fields(Adaptation)])
         if name in found or not value:

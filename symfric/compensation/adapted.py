@@ -94,7 +94,7 @@ class Adapted:
         require_law(where, law)
         self.where, self._turning = f"{where} '{law_name(law)}'", turning
         if mass is None:
-            raise checks.refused(f"{self.where}: mass", "the moving mass [kg]", None)
+            raise checks.refused(f"{self.where}: mass", "the moving mass [kg]", None, "or a Drive")
         inner = law_block(law, h=h if law.states else None)
         if len(inner.inputs) > 2:
             names = ", ".join(v.name for v in inner.inputs[2:])

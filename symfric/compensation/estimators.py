@@ -146,15 +146,16 @@ def kalman_estimator(
 
         v+  = v + h (force - F(v)) / M,   M = inertia + h max(F'(v), 0)
         z+  = step of the law at v+,   theta+ = theta,   measured: v
-        P+  = A P A' + Q,   A = d(v+, z+, theta+) / d(v, z, theta) at M held
+        P+  = A P A' + Q,   A = d(z+, v+, theta+) / d(z, v, theta) at M held
 
     F is the friction at the end of the step, see `law_block`; the step is implicit in v, and stable
     for any stiffness of bristles. The variance of theta approaches S^2 (S are the spreads) with the
     time constant t_change, as if theta changed randomly by S within it; its mean is kept. Errors of
-    the law are noise with deviation noise_F, correlated over t_window. While the axis is slow,
-    overloaded or excluded by `learn`, v is the measured velocity, the law makes its step at this
-    velocity, and theta is not changed. The part of a residual beyond five deviations is attributed
-    to an impulse.
+    the law are noise of v with deviation noise_F, correlated over t_window; the states of the law
+    have none, since their corrections would make scale and offset look different in steady sliding.
+    While the axis is slow, overloaded or excluded by `learn`, v is the measured velocity, the law
+    makes its step at this velocity, and theta is not changed. The part of a residual beyond five
+    deviations is attributed to an impulse.
 
         X_sd^2 = P_ii max(1, excess)
 
@@ -185,38 +186,36 @@ def kalman_estimator(
     used = ca.logic_and(f.usable(), ca.fmax(ca.fabs(f.v), ca.fabs(seen)) < fastest)
 
     ahead, slopes, M = prediction(f, seen, now)
-    scale = ca.vertcat(noise_v, ca.DM(f.reach), spread)
+    scale = ca.vertcat(ca.DM(f.reach), noise_v, spread)
     fading = (1 - lost) * ca.SX.eye(n)
     moving = slopes / scale[:known] * ca.repmat(scale.T, known, 1)
     A = ca.vertcat(moving, ca.horzcat(ca.SX(n, known), fading))
     walk = ca.repmat(ca.sqrt(1 - (1 - lost) ** 2), n)
-    jump = noise_F * ca.sqrt(ca.fmax(t_window, f.h) * f.h) / (M * noise_v)
-    drift = ca.repmat(noise_F / f.level * ca.sqrt(f.h / t_window), nz)
-    predicted = moved(W, A, ca.vertcat(jump, drift, walk))
-    e = smooth.clip((f.v - ahead[0]) / noise_v, -FARTHEST, FARTHEST)
-    variance = variances(predicted)[0] + 1
-    impulse = e**2 / (GATE * ca.fmax(excess, 1.0)) - variance
-    predicted[0, 0] = ca.sqrt(predicted[0, 0] ** 2 + ca.fmax(impulse, 0.0))
-    after = measured(predicted, ca.SX.eye(known + n)[:, 0], 1.0)
+    jump = noise_F**2 * ca.fmax(t_window, f.h) * f.h / (M * noise_v) ** 2
+    e = smooth.clip((f.v - ahead[nz]) / noise_v, -FARTHEST, FARTHEST)
+    variance = ca.sumsqr(moving[nz, :] @ W) + jump + 1
+    impulse = ca.fmax(e**2 / (GATE * ca.fmax(excess, 1.0)) - variance, 0.0)
+    noise = ca.vertcat(ca.SX.zeros(nz), ca.sqrt(jump + impulse), walk)
+    after = measured(moved(W, A, noise), ca.SX.eye(known + n)[:, nz], 1.0)
     move = scale * after.gain * e
     ratio = smooth.clip(e**2 / variance, 0.0, WORST)
     new = ca.vertcat(
         f.within(now + move[known:]), packed(after.W), 1, M * e * noise_v / f.h,
         excess + _lost(f.h / f.memory) * (ratio - excess),
-        f.v - noise_v * e / after.variance, (ahead + move[:known])[1:, 0],
+        (ahead + move[:known])[:nz, 0], f.v - noise_v * e / after.variance,
     )  # fmt: skip
     apart = ca.diagcat(ca.SX.eye(known), moved(W[known:, known:], fading, walk))
-    held = ca.vertcat(f.v, ca.substitute(f.after, symbols_of(f.theta), now))
+    held = ca.vertcat(ca.substitute(f.after, symbols_of(f.theta), now), f.v)
     rest = ca.vertcat(now, packed(apart), 0, last[1:], held)
     result = ca.if_else(used, new, rest)
-    f.follow(ca.vertcat(states, factor, last, seen, f.z), result)
+    f.follow(ca.vertcat(states, factor, last, f.z, seen), result)
     return _block(f, name, FILTER, result, known, 0.0)
 
 
 def prediction(f: Adapted, seen: ca.SX, now: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return velocity and states of the law after a step, their derivatives, and M.
+    """Return states of the law and velocity after a step, their derivatives, and M.
 
-    The derivatives with respect to velocity, states and estimates are exact at M held: the
+    The derivatives with respect to states, velocity and estimates are exact at M held: the
     derivative of M is a peak of the height 1 / v_eps at v = 0.
 
     Args:
@@ -227,8 +226,8 @@ def prediction(f: Adapted, seen: ca.SX, now: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX
     mass = theta[f.names.index("inertia")] if "inertia" in f.names else f.mass
     m, M = ca.SX.sym("M"), mass + f.h * ca.fmax(ca.jacobian(f.force, f.v), 0.0)
     v = f.v + f.h * (f.given("force") - f.force) / m
-    ahead = ca.vertcat(v, ca.substitute(f.after, f.v, v))
-    slopes = ca.jacobian(ahead, ca.vertcat(f.v, f.z, theta))
+    ahead = ca.vertcat(ca.substitute(f.after, f.v, v), v)
+    slopes = ca.jacobian(ahead, ca.vertcat(f.z, f.v, theta))
     ahead, slopes = ca.substitute([ahead, slopes], [m], [M])
     old, new = ca.vertcat(f.v, theta), ca.vertcat(seen, now)
     found = ca.substitute([ahead, slopes, M], [old], [new])

@@ -212,6 +212,18 @@ def brief(self: Any) -> str:
     return "\n".join([f"<{type(self).__name__}", *(cut(line, WIDTH - 1) for line in lines)]) + ">"
 
 
+LEAST_SHARE = 0.1
+"""Smallest coefficient of a combination that is shown; the largest one is 1."""
+
+
+def combination(weights: Any, names: Iterable[str]) -> str:
+    """Return a weighted sum as text, with the largest weight as 1, such as 1 offset - 0.2 m."""
+    weights = weights / weights[np.argmax(np.abs(weights))]
+    terms = ((c, n) for c, n in zip(weights, names, strict=True) if abs(c) > LEAST_SHARE)
+    text = " ".join(f"{'-' if c < 0 else '+'} {abs(c):.2g} {n}" for c, n in terms)
+    return text.removeprefix("+ ")
+
+
 def in_a_line(value: Any) -> str:
     """Return a description of a value in one line."""
     if isinstance(value, np.ndarray):

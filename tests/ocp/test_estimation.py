@@ -1,5 +1,6 @@
 """The estimator equals dense least squares on linear models, and estimates bristles and loads."""
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -151,6 +152,21 @@ def test_bristles_and_a_load_are_estimated_from_positions() -> None:
         assert np.abs(found["guide_z"] - true["guide_z"])[late].max() < 0.02 * 6e-4
         assert np.abs(found["v"] - true["v"])[late].max() < 0.02
     assert 0.1 < np.sqrt(np.mean(np.square(errors))) < 1.5
+
+
+def test_a_parameter_that_drifts_is_estimated_like_an_unknown_input() -> None:
+    """The load as a parameter, which starts at its value in `p`."""
+    f, y = measured(40)
+    given: dict[str, Any] = {"step": STEP, "horizon": 5, "noise": {"x": 0.01, "load": 0.1}}
+    model = oscillator()
+    push, load = model.u
+    wear = replace(model, u=(push,), p=(load,))
+    wanted = estimate(model, {"f": f, "x": y}, unknown=["load"], start={"load": 0.7}, **given)
+    found = estimate(wear, {"f": f, "x": y}, unknown=["load"], p={"load": 0.7}, **given)
+    assert found["load"] == pytest.approx(wanted["load"], rel=1e-12)
+    assert found.deviations["load"] == pytest.approx(wanted.deviations["load"], rel=1e-12)
+    known = estimate(wear, {"f": f, "x": y}, p={"load": 0.7}, **given | {"noise": {"x": 0.01}})
+    assert "load" not in known.signals
 
 
 def test_combinations_that_data_do_not_determine_are_reported() -> None:

@@ -345,15 +345,15 @@ def test_missing_compiler_is_reported(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_wrong_residual_or_control_in_the_files_is_found(tmp_path: Path) -> None:
     made = controller_of(positioning(), 0.01)
-    for old, new in (
-        ("fabs(S[i] * nominal_u[i])", "0.9 * fabs(S[i] * nominal_u[i])"),
-        ("    u = m->u[0][0];", "    u = m->u[1][0];"),
+    for old, new, why in (
+        ("larger(found, fabs(S[i]", "larger(found, 0.9 * fabs(S[i]", "understates residuals 1.1 t"),
+        ("    u = m->u[0][0];", "    u = m->u[1][0];", "differs by"),
     ):
         generated = made.to_c(tmp_path)
         text = generated.files[1].read_text()
         assert text.count(old) == 1
         generated.files[1].write_text(text.replace(old, new))
-        assert "differs by" in generated.verify(30).status
+        assert why in generated.verify(30).status
 
 
 def test_c_is_c_plus_plus_too(tmp_path: Path) -> None:
