@@ -31,6 +31,8 @@ BANDS = 10.0
 """Largest cut-off of the positions, relative to the bandwidth of the motion."""
 NOISE = 1e-4
 """Largest share of noise in the power of an acceleration, which lowers the inertia."""
+MOST = 20_000
+"""Largest number of equations per record and joint."""
 FEWEST = 10
 """Smallest number of equations of a record."""
 MISTAKES = {"rad": (pi / 180, "deg"), "m": (1e-3, "mm")}
@@ -185,7 +187,8 @@ def _motion(model: RobotModel, record: Record, filter: Filter | None) -> RobotMo
         such = f"below half the sample rate, {0.5 / step:g} Hz"
         raise ValueError(f"data '{record.name}': cut-off: expected {such}, got {filter.cutoff:g}")
     if filter.decimation == 1:
-        filter = replace(filter, decimation=max(1, round(1 / (RATE * filter.cutoff * step))))
+        usual = max(1, round(1 / (RATE * filter.cutoff * step)))
+        filter = replace(filter, decimation=max(usual, record.size // MOST))
     inside = filter.inside(record.size, step)
     rows = Decimation(record.time[inside].size, filter.decimation)
     if rows.rows < FEWEST:

@@ -188,6 +188,8 @@ def test_rotor_inertias_are_found_where_they_are_separable():
     data = log(slide_torque=force)
     plain, found = (identify_robot(urdf(), data, rotors=rotors) for rotors in (False, True))
     assert found.rotors["slide"] == pytest.approx(10.0, rel=0.05)
+    assert any("pass rotors=True" in text for text in plain.findings)
+    assert not found.findings
     assert found.training["slide"].rms < 0.8 * plain.training["slide"].rms
     torques = found.torques(*waves(5, t))
     rigid = newton_euler(*waves(5, t)) + 10.0 * waves(5, t)[2] * np.array([0, 0, 1])
