@@ -53,7 +53,7 @@ class Branch(Showing):
     Attributes:
         model: the model.
         parameter: name of the parameter.
-        p: values of all free parameters at the start.
+        u, p: values of the inputs, and of all free parameters at the start.
         values: values of the parameter, shape (n,).
         x: states, of orbits those at their start, shape (n, nx).
         periods: periods [s], shape (n,); 0 for equilibria.
@@ -66,6 +66,7 @@ class Branch(Showing):
 
     model: Model
     parameter: str
+    u: dict[str, float]
     p: dict[str, float]
     values: Array
     x: Array
@@ -111,7 +112,7 @@ class Branch(Showing):
         x0 = dict(zip((v.name for v in self.model.x), self.x[k].tolist(), strict=True))
         T = float(self.periods[k])
         guess = PeriodicOrbit(
-            self.model, x0, T, {}, p, np.zeros(0, dtype=complex), False, False, 0.0, rtol
+            self.model, x0, T, self.u, p, np.zeros(0, dtype=complex), False, False, 0.0, rtol
         )
         return periodic_orbit(self.model, guess, rtol=rtol)
 
