@@ -181,6 +181,23 @@ class Branch(Showing):
         table = Table(header, tuple(rows), numbers=(1, 2)) if rows else Table((), ())
         return Shown(f"branch of '{self.model.name}'", tuple(lines), table)
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return values, periods, stability and special points as built-in types."""
+        return {
+            "parameter": self.parameter,
+            "kind": "orbits" if self.of_orbits else "equilibria",
+            "values": self.values.tolist(),
+            "periods": self.periods.tolist(),
+            "stable": self.stable.tolist(),
+            "low": self.low.tolist(),
+            "high": self.high.tolist(),
+            "states": [v.name for v in self.model.x],
+            "special": [
+                {"kind": s.kind, "value": s.value, "period": s.period} for s in self.special
+            ],
+            "message": self.message,
+        }
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write the branch to one file, from which `load_branch` restores it exactly."""
         BRANCH.save(path, self)
