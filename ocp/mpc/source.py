@@ -79,6 +79,8 @@ BACK = 0.995
 RESOLUTION = {DOUBLE: 1e-15, FLOAT: 1.5e-5}
 """Estimate of the rounding error of a gradient relative to its terms; in float, where it decides
 when iterations end, 130 rounding units."""
+MOST_IN_FLOAT = 18
+"""Iterations of the interior-point method in float; later ones make no progress."""
 SMALLEST = {DOUBLE: 1e-200, FLOAT: 1e-18}
 """Smallest slack and multiplier in the interior-point method, whose ratios are finite."""
 CLOSE = {DOUBLE: 1e-7, FLOAT: 1e-4}
@@ -247,6 +249,8 @@ def _lines(lines: Iterable[str], margin: int) -> str:
 
 def _macros(design: Design, real: Real) -> str:
     parts: dict[str, int | str] = dict(sizes(design))
+    if real is FLOAT:
+        parts["MOST"] = min(MOST_IN_FLOAT, design.settings.program)
     numbers = {
         "PAIRS": float(parts["ALL"]) + float(design.prices.soft.sum()),
         "CURVATURE": design.horizon.curvature,

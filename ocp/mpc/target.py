@@ -49,7 +49,8 @@ def measure_controller(
     Returns:
         The measurement: `average` and `maximum` instructions of a cycle; `data`, the memory of plan
         and work space; `error`, the largest difference of a control from the host relative to its
-        largest value. Its `status` names absent tools.
+        largest value, which may be large after cycles that do not converge. Its `status` names
+        absent tools.
 
     Raises:
         ValueError: an unknown core, or less than one cycle.
