@@ -110,9 +110,8 @@ class Adapted:
         self.names = [p.name for p in self.theta]
         symbols = {p.name: p.symbol for p in self.theta}
         used = {n: symbols[f"scale_{n}"] for n in found.names if f"scale_{n}" in symbols}
-        self._tied = "coulomb" in used and "stribeck" in found.names and "stribeck" not in used
-        if self._tied:
-            used["stribeck"] = used["coulomb"]
+        if "coulomb" in used and "stribeck" in found.names:
+            used.setdefault("stribeck", used["coulomb"])
         self._parts.parameters = [p for p in self._parts.parameters if p.name not in symbols]
         self.v, self.z = found.v, symbols_of(inner.states)
         load = self._parts.parameter("N", normal)
@@ -229,8 +228,6 @@ class Adapted:
             more: further outputs.
         """
         found = {p.name: Output(now[i], p.unit, p.doc) for i, p in enumerate(self.theta)}
-        if self._tied:
-            found["scale_stribeck"] = replace(found["scale_coulomb"], doc="equals scale_coulomb")
         for i, p in enumerate(self.theta):
             found[f"{p.name}_sd"] = Output(deviation[i], p.unit, f"deviation of {p.name}")
         unseen = ca.dot(variance > SEEN, ca.DM([2.0**i for i in range(len(self.theta))]))

@@ -18,10 +18,7 @@ from symfric.compensation import (
 )
 
 CONTROLLER = Cascade(kp=20.0, kv=60.0, ki=10.0)
-COMPENSATOR = compensator(
-    BRISTLES, v_blend=0.02, error_gain=20.0, offset=0.0,
-    scales={"coulomb": 1.0, "stribeck": 0.0, "viscous": 1.0},
-)  # fmt: skip
+COMPENSATOR = compensator(BRISTLES, v_blend=0.02, error_gain=20.0, offset=0.0, without=["stribeck"])
 COUNTS = 1e-6 / H / np.sqrt(6)
 """Deviation of the velocity from an encoder of 1 um."""
 
