@@ -1,6 +1,6 @@
 """Branches of equilibria and periodic orbits over a parameter, and their special points."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -15,6 +15,7 @@ from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing, Shown, Table
 from symfric.model import Model
+from symfric.results.ensemble import Ensemble
 from symfric.results.stored import Format
 
 if TYPE_CHECKING:
@@ -114,7 +115,10 @@ class Branch(Showing):
         )
         return periodic_orbit(self.model, guess, rtol=rtol)
 
-    def plot(self, state: str, *others: "Branch", path: str | Path | None = None) -> "Figure":
+    def plot(
+        self, state: str, *others: "Branch", runs: Sequence[Ensemble] = (),
+        path: str | Path | None = None,
+    ) -> "Figure":  # fmt: skip
         """Plot a state over the parameter: stable parts solid, unstable ones dashed.
 
         Orbits are shown by their smallest and largest value.
@@ -122,7 +126,13 @@ class Branch(Showing):
         Args:
             state: name of the state.
             others: further branches in the same figure.
+            runs: results of `simulate_many` that vary the parameter, with times `t_eval` after the
+                transient; the extremes over these times are shown as points. Several ensembles with
+                other start values show hysteresis.
             path: image file.
+
+        Raises:
+            ValueError: an unknown state, or an ensemble that does not vary the parameter.
         """
         from symfric.dynamics.pictures import Curve, bifurcation  # noqa: PLC0415  (slow to import)
 
@@ -140,7 +150,19 @@ class Branch(Showing):
             curves.append(Curve(*rows, special))
         (free,) = (v for v in self.model.p if v.name == self.parameter)
         labels = f"{self.parameter} [{free.unit}]", f"{state} [{self.model.x[i].unit}]"
-        return bifurcation(curves, labels, path)
+        points = [self._points(state, study) for study in runs]
+        return bifurcation(curves, points, labels, path)
+
+    def _points(self, state: str, study: Ensemble) -> tuple[Array, Array, Array]:
+        """Return parameter, smallest and largest values of the members of an ensemble."""
+        where = f"branch of '{self.model.name}': plot: runs"
+        if self.parameter not in study.varied or study.t.ndim != 1 or state not in study.signals:
+            raise checks.refused(
+                where, f"ensembles that vary {self.parameter}, with {state} at times t_eval", study
+            )
+        values = study.signals[state]
+        low, high = np.fmin.reduce(values, axis=1), np.fmax.reduce(values, axis=1)
+        return study.varied[self.parameter], low, high
 
     def shown(self) -> Shown:
         """Return the range of the parameter and the special points."""

@@ -18,6 +18,7 @@ from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.model import Model
 
+INTERRUPTED = "interrupted by the user"
 SMALL = 1e-3
 """First amplitude of orbits from a Hopf point, relative to the magnitudes of the states."""
 
@@ -81,7 +82,9 @@ def continuation(
     node = curve.at(z)
     up = tangent(curve, node, _unit(z.size))
     back = _traced(curve, node, -up, span, points // 2, step)
-    on = _traced(curve, node, up, span, points + 1 - len(back.points), step)
+    on = Trace([back.points[0]])
+    if back.message != INTERRUPTED:
+        on = _traced(curve, node, up, span, points + 1 - len(back.points), step)
     return _joined(model, parameter, dict(start.p), [back, on])
 
 
@@ -184,7 +187,7 @@ def _traced(
                 trace.message = f"ends after {points} points"
                 break
     except KeyboardInterrupt:
-        trace.message = "interrupted by the user"
+        trace.message = INTERRUPTED
     return trace
 
 

@@ -150,6 +150,11 @@ class Equations:
         return ca.Function("bounds", [self.y, self.d], found)
 
     @cached_property
+    def sliding(self) -> ca.Function:
+        """Function (y, d) -> slips."""
+        return ca.Function("sliding", [self.y, self.d], [ca.densify(self.slips)])
+
+    @cached_property
     def contacts(self) -> ca.Function:
         """Function (y, d) -> rows (slip, force, level against +F, level against -F), one each."""
         every = self.model.contacts

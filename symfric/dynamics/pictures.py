@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
 from symfric.foundation.panels import NARROW, panels, save
-from symfric.foundation.style import colour, line
+from symfric.foundation.style import EDGE, colour, line
 from symfric.results.sections import sticks
 from symfric.results.trajectory import Trajectory
 
@@ -82,10 +82,21 @@ class Curve(NamedTuple):
 
 
 def bifurcation(
-    curves: Sequence[Curve], labels: tuple[str, str], path: str | Path | None
-) -> Figure:
-    """Plot branches over a parameter: stable parts solid, unstable ones dashed."""
+    curves: Sequence[Curve], runs: Sequence[tuple[Array, Array, Array]], labels: tuple[str, str],
+    path: str | Path | None,
+) -> Figure:  # fmt: skip
+    """Plot branches over a parameter: stable parts solid, unstable ones dashed.
+
+    Args:
+        curves: the branches.
+        runs: parameter, smallest and largest values of runs, shown as points.
+        labels: of both axes.
+        path: image file.
+    """
     figure, (axis,) = panels(1, width=NARROW, height=3.4)
+    for values, low, high in runs:
+        for side in (low, high):
+            axis.plot(values, side, "o", color=EDGE, mfc="none", markersize=4.5, mew=0.6, zorder=3)
     for k, curve in enumerate(curves):
         for side in (curve.low, curve.high):
             for stable, style in ((True, "-"), (False, "--")):

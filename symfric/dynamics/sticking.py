@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple, final
 
 import casadi as ca
@@ -16,7 +15,6 @@ from symfric.dynamics.trace import Family, finer, sequence
 from symfric.foundation.numeric import Array
 from symfric.integrator.simulate import simulate
 from symfric.model import Contact
-from symfric.model.forces import STICKS
 from symfric.results.quadrature import extremes
 from symfric.results.trajectory import Trajectory
 
@@ -50,25 +48,26 @@ class Gap(NamedTuple):
     share: float
 
 
-def gap(run: Trajectory) -> Gap:
-    """Return the smallest distance from sticking in a run over one period."""
-    eq, best = equations("continuation", run.model), Gap(-1, 0.0, 0.0, np.inf)
-    for k, (c, mode) in enumerate(eq.switching):
-        modes = run.of(eq.model.x[mode].symbol, run.looks)
-        if (np.abs(modes) < STICKS).any():
-            continue
+def gap(run: Trajectory, p: Array) -> Gap:
+    """Return the smallest distance from sticking in a run over one period; `p` are parameters."""
+    model, best = run.model, Gap(-1, 0.0, 0.0, np.inf)
+    eq, d = equations("continuation", model), np.concatenate([model.values("u"), p])
+    happened = {name for _, name in run.happened}
 
-        sizes = partial(_sizes, run, ca.SX(c.slip))
-        looked = sizes(run.looks)
-        low, high = extremes(run.looks, looked, sizes)[""]
-        if low / high < best.share:
-            time = float(run.looks[int(np.argmin(looked[""]))])
-            best = Gap(k, time, float(low), float(low / high))
+    def sizes(at: Array) -> dict[str, Array]:
+        y = np.zeros((eq.y.numel(), at.size))
+        y[: len(model.x)] = [*run.states(at).values()]
+        return {str(k): row for k, row in enumerate(np.abs(eq.sliding(y, d).full()))}
+
+    free = {str(k) for k, (c, _) in enumerate(eq.switching) if c.called("stick") not in happened}
+    if not free:
+        return best
+    looked = sizes(run.looks)
+    for name, (low, high) in extremes(run.looks, looked, sizes).items():
+        if name in free and low / high < best.share:
+            time = float(run.looks[int(np.argmin(looked[name]))])
+            best = Gap(int(name), time, float(low), float(low / high))
     return best
-
-
-def _sizes(run: Trajectory, slip: ca.SX, at: Array) -> dict[str, Array]:
-    return {"": np.abs(run.of(slip, at))}
 
 
 def same_sequence(last: Node, new: Node) -> None:
@@ -94,7 +93,7 @@ class Near:
         if not isinstance(self.curve, Orbits):
             return np.inf
         run, problem = step.node.content.segments[0].run, self.curve.problem
-        self.gaps, self.last = (*self.gaps[-1:], gap(run)), step
+        self.gaps, self.last = (*self.gaps[-1:], gap(run, step.node.content.p)), step
         if self.gaps[-1].share < GRAZES:
             return 0.0
         values = np.array([*run.states(run.looks).values()])
@@ -126,7 +125,10 @@ class Near:
                 same_sequence(node, new)
             except ValueError:
                 break
-            found = [*found[-1:], (float(new.z[-1]), gap(new.content.segments[0].run).least)]
+            found = [
+                *found[-1:],
+                (float(new.z[-1]), gap(new.content.segments[0].run, new.content.p).least),
+            ]
         return "grazing", _zero(found, value)
 
 
@@ -179,7 +181,7 @@ def restarted(
     """
     problem, name = curve.problem, curve.name
     model, run = problem.model, node.content.segments[0].run
-    nearest, value = gap(run), float(node.z[-1])
+    nearest, value = gap(run, node.content.p), float(node.z[-1])
     eq = equations("continuation", model)
     for share in NEAR:
         for side in (-1.0, 1.0):

@@ -9,7 +9,18 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from symfric import ExactCoulomb, Law, LuGre, Model, Variable, contact, drive, rabinowicz, simulate
+from symfric import (
+    ExactCoulomb,
+    Law,
+    LuGre,
+    Model,
+    Variable,
+    contact,
+    drive,
+    rabinowicz,
+    simulate,
+    simulate_many,
+)
 from symfric.dynamics import (
     continuation,
     curve,
@@ -196,6 +207,14 @@ def test_a_branch_is_saved_shown_and_interrupted(
     assert axis.get_xlabel() == "p [1]" and axis.get_ylabel() == "x [m]"
     styles = {line.get_linestyle() for line in axis.lines}
     assert {"-", "--"} <= styles and [t.get_text() for t in axis.texts] == ["fold"]
+    model, start_x = start.model, np.array([-0.5, 0.9])
+    speeds = np.array([0.5, 1.0])
+    study = simulate_many(model, 20.0, p={"p": speeds}, x0={"x": start_x}, t_eval=[19.0, 20.0])
+    (axis,) = branch.plot("x", runs=[study]).axes
+    dots = [line for line in axis.lines if line.get_marker() == "o"]
+    assert dots[0].get_ydata() == pytest.approx(np.sqrt(speeds), rel=1e-5)
+    with pytest.raises(ValueError, match="that vary p"):
+        branch.plot("x", runs=[simulate_many(model, 1.0, x0={"x": start_x})])
     own, calls = curve.corrected, []
 
     def interrupted(*arguments: object) -> object:
