@@ -160,6 +160,24 @@ def test_a_resting_joint_is_named_and_costs_only_its_own_rows():
     assert found.friction["elbow"]["mu_d"].value == pytest.approx(COULOMB[1], rel=0.05)
 
 
+def test_what_is_said_about_parameters_holds_for_short_and_small_motions():
+    base, t = base_of(MODEL, rotors=False), np.arange(1500) / 250.0
+    q, v, a = waves(4, t, 0.02)
+    tau = newton_euler(q, v, a) + COULOMB * np.sign(v) + VISCOUS * v
+    tau += 0.1 * np.random.default_rng(0).normal(size=q.shape)
+    small = dict(zip(NAMES, q.T, strict=True))
+    small |= {f"{n}_torque": y for n, y in zip(NAMES, tau.T, strict=True)}
+    for data in (log(4, 6.0, **small), *(log(seed, 1.5) for seed in range(3))):
+        found = identify_robot(urdf(1.3), data)
+        loose = np.array([label in found.information.undetermined for label in base.labels])
+        x = np.array([found.base[label].value for label in base.labels])
+        assert 0 < loose.sum() <= loose.size
+        assert found.information.rank < found.information.total
+        assert np.all(np.abs(x - base.values)[~loose] < base.scales[~loose])
+        near = base.K @ np.array(found.inertial) - 1.3 * base.values
+        assert np.all(np.abs(near)[loose] < base.scales[loose])
+
+
 def test_only_rows_of_the_reversing_joint_are_left_out(fit):
     parts = {one.joint: one.used for one in fit.series}
     assert all(np.mean(used) > 0.6 for used in parts.values())
