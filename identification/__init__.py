@@ -36,6 +36,11 @@ if TYPE_CHECKING:
     from identification.result.fitted import Fitted as Fitted
     from identification.result.fitted import load_fit as load_fit
     from identification.result.series import Estimate as Estimate
+    from identification.robot.excitation import excitation as excitation
+    from identification.robot.identify import identify_robot as identify_robot
+    from identification.robot.identify import robot_information as robot_information
+    from identification.robot.result import RobotFit as RobotFit
+    from identification.robot.result import load_robot as load_robot
     from identification.select import select as select
     from identification.starts.maxwell_slip import fit_elements as fit_elements
     from identification.starts.measured import Measured as Measured

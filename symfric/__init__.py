@@ -17,6 +17,7 @@ Contents; `help` describes each name:
     machines    rabinowicz, drive; more in symfric.scenes (ALL_SCENES by name)
     equations   Model of Variable, Output, Event and Monitor; contact adds a law to it (Contact)
     mechanisms  Mechanism of bodies and joints with friction, read_urdf; more in symfric.multibody
+    drives      Drive: motor, gear and encoder by their nameplate; driven(model, drive) adds them
     running     simulate, simulate_many, stepper, flow; inputs as numbers, functions of time or
                 samples, Hold and Linear (rate_of: their rate); SolveError, Status of failed runs,
                 OverloadWarning, EnergyWarning of doubtful runs
@@ -40,6 +41,8 @@ from symfric.foundation.lazy import load_lazily
 if TYPE_CHECKING:
     from symfric.choice import Choice as Choice
     from symfric.choice import select as select
+    from symfric.drives.drive import Drive as Drive
+    from symfric.drives.driven import driven as driven
     from symfric.figures import FigureData as FigureData
     from symfric.figures import Recommendation as Recommendation
     from symfric.figures import compare as compare

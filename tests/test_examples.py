@@ -35,6 +35,17 @@ def mpc_drive(printed: str) -> bool:
     return near and len(rows) == 3 and "C: verified" in printed
 
 
+def hardware_in_the_loop(printed: str) -> bool:
+    """Cycles of some microseconds, and errors of the plant below those of the controller."""
+    if "expected Linux" in printed:
+        return True
+    cycle, error, plant = (
+        numbers(rf"{what}: ([\d.]+) u[ms]", printed).item()
+        for what in ("cycle", "tracking error after 0.5 s", "error of the plant")
+    )
+    return 0 < cycle < 1000 and 0.1 < error < 500 and plant < 0.1
+
+
 def out_and_back(printed: str) -> bool:
     ((found, exact),) = numbers(r"J = ([\d.]+) .* exact ([\d.]+);", printed)
     known = abs(found - exact) < 1e-3 * exact
@@ -151,6 +162,7 @@ CHECKS = dict.fromkeys(LONG, motion_is_verified) | {
         *(mpc_drive, out_and_back, identify_arm, identify_pendulum, identify_emps, opti_lugre),
         *(identify_raw_files, identify_franka, identify_excitation, robot_feed_forward),
         *(adapt_drive, compensate_drive, rabinowicz, learn_drive, drive_unit),
+        hardware_in_the_loop,
     )
 }
 CHECKS["out_and_back"] = lambda text: motion_is_verified(text) and out_and_back(text)

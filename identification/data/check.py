@@ -135,7 +135,8 @@ def _against(view: View, model: Rough, force: str) -> Iterator[Finding]:
     sure = max(-model.sure(1) if level < 0 else 0.0, -model.sure(2) if viscous < 0 else 0.0)
     if put_in < 0 and sure > SURE and model.explained > LITTLE:
         against = " and accelerates against it" if model.sure(0) < -SURE else ""
-        yield view.error("sign", force, "brakes", against=against)
+        case = "brakes" if view.record.drive is None else "reversed"
+        yield view.error("sign", force, case, against=against)
     elif model.clean and model.explained < NOTHING and model.force.size / model.every > 100:
         signal = view.signal("force")
         white = signal is not None and abs(np.corrcoef(signal[1:], signal[:-1])[0, 1]) < 0.2

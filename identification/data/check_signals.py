@@ -195,7 +195,11 @@ def of_jumps(view: View) -> Iterator[Finding]:
     period = _period(x, far)
     alike = float(np.quantile(heights, 0.9) - np.quantile(heights, 0.1)) <= ALIKE * heights.max()
     if alike and period > 0.8 * np.ptp(x):
-        yield view.error("wrap", name, "wrap", begin, end, count=far.size, period=period)
+        drive = view.record.drive
+        counts = period / abs((drive.count if drive else None) or np.inf)
+        case = "counter" if counts > 0 else "wrap"
+        values = {"count": far.size, "period": period, "counts": counts}
+        yield view.error("wrap", name, case, begin, end, **values)
         return
     pushed, force = False, view.signal("force")
     if force is not None:  # in a true slip, the force jumps, too

@@ -14,6 +14,7 @@ from identification.data.raw import Missing, Wanted, record
 from identification.data.reading import ASSUMED, Paths, columns_of, files, read_records, to_csv
 from identification.data.record import Record, first_of
 from identification.data.resample import delayed, resampled, scaled, unwrapped, without_spikes
+from symfric.drives.drive import Drive
 from symfric.foundation import checks
 
 
@@ -60,6 +61,7 @@ class Dataset:
         variable: str | None = None,
         points: bool = False,
         missing: Missing = "refuse",
+        drive: Drive | None = None,
     ) -> "Dataset":
         """Read records from files: text, `.mat` up to version 7, `.npz`, `.npy`, HDF5, Parquet.
 
@@ -87,11 +89,15 @@ class Dataset:
             missing: "drop" leaves out rows in which a channel has no finite number (an empty cell,
                 NaN) and rows that repeat the previous row including its time; `resampled` then
                 makes the intervals equal and splits records at long gaps.
+            drive: drive whose currents and angles or encoder counts the files contain; the records
+                are those of its load, see `identification.data.at_load`.
 
         Raises:
             ValueError: unusable data, with file, row and column; for several files all errors.
         """
-        wanted = Wanted(columns, units, step, checks.flag("read: points", points), {}, missing)
+        wanted = Wanted(
+            columns, units, step, checks.flag("read: points", points), {}, missing, drive
+        )
         found = read_records(paths, wanted, variable)
         pattern = paths if isinstance(paths, str) and len(files(paths)) > 1 else ""
         return cls(found, pattern)
@@ -107,6 +113,7 @@ class Dataset:
         step: float | None = None,
         points: bool = False,
         missing: Missing = "refuse",
+        drive: Drive | None = None,
         name: str = "data",
         **arrays: object,
     ) -> "Dataset":
@@ -117,7 +124,7 @@ class Dataset:
 
         Args:
             frame: a mapping or a pandas frame with the columns.
-            units, columns, step, points, missing: as in `read`.
+            units, columns, step, points, missing, drive: as in `read`.
             name: name of the record.
             arrays: further columns by name.
 
@@ -127,7 +134,8 @@ class Dataset:
         checks.text("Dataset.of: name", name)
         raw, framed = columns_of(name, frame, arrays)
         points = checks.flag("Dataset.of: points", points)
-        wanted = Wanted(columns, units, step, points, {} if framed else ASSUMED, missing)
+        assumed = {} if framed else ASSUMED
+        wanted = Wanted(columns, units, step, points, assumed, missing, drive)
         return cls((record(raw, wanted),), name)
 
     def __iter__(self) -> Iterator[Record]:

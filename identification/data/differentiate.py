@@ -1,5 +1,6 @@
 """Velocity and acceleration of a record from measured position and velocity, and their noise."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
@@ -195,6 +196,18 @@ class Velocity:
         cut = slice(None) if self.order == 2 or x is None else slice(-1)
         found = band_above(self.power[cut], self.level[cut], step, self.order)
         return max(position_band(x, step), found) if x is not None and v is not None else found
+
+
+def noise_of(record: Record, name: str | None, given: Mapping[str, float]) -> float | None:
+    """Return the standard deviation of the noise of a signal; None to take it from its spectrum.
+
+    The position of a drive has at least the noise of the counts of its encoder, count / sqrt(12).
+    """
+    if name is None or name in given or name != "x" or record.drive is None:
+        return None if name is None else given.get(name)
+    count = record.drive.count
+    level = noise_level(spectrum(record[name], line=True))
+    return None if count is None else float(np.sqrt(max(level, count**2 / 12)))
 
 
 CERTAIN = 4.0

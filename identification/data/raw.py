@@ -1,17 +1,20 @@
 """Raw columns of a file, and their conversion to a record with names, SI units and time."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from re import DOTALL, fullmatch
+from re import fullmatch
 from typing import Any, Literal, TypeVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.data.at_load import at_load
 from identification.data.record import Array, Record
-from identification.data.units import CHANNELS, by_channel, is_common, unit
+from identification.data.units import CHANNELS, OF_DRIVE, Channel, by_channel, is_common, unit
+from symfric.drives.drive import Drive
 from symfric.foundation import checks
+from symfric.foundation.units import parsed
 
 T = TypeVar("T")
 Missing = Literal["refuse", "drop"]
@@ -85,6 +88,7 @@ class Wanted:
         assumed: default units of canonical channels.
         missing: "refuse" or "drop": treatment of rows in which a channel has no number, and of
             rows that repeat the previous one.
+        drive: drive whose log contains a current and possibly counts; None: no drive.
     """
 
     columns: Mapping[str, str] | Sequence[str] | None
@@ -93,9 +97,25 @@ class Wanted:
     points: bool
     assumed: Mapping[str, str]
     missing: Missing
+    drive: Drive | None = None
 
     def __post_init__(self) -> None:
         checks.choice("read: missing", self.missing, ("refuse", "drop"))
+        if self.drive is not None:
+            checks.kind("read: drive", self.drive, Drive, "a drive, such as Drive.read(path)")
+            if self.points:
+                raise ValueError("read: drive: expected records over time, got points=True")
+
+    @property
+    def channels(self) -> Mapping[str, Channel]:
+        """Canonical channels of the files."""
+        return CHANNELS if self.drive is None else OF_DRIVE
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Channels that are recognised by the names of their columns."""
+        motion = MOTION if self.drive is None else tuple(OF_DRIVE)
+        return POINTS if self.points else motion
 
 
 def label(cell: str) -> tuple[str, str]:
@@ -157,9 +177,9 @@ def is_channel(name: str) -> bool:
     return any(_matches(name, channel) for channel in CHANNELS)
 
 
-def _matches(name: str, channel: str) -> bool:
+def _matches(name: str, channel: str, known: Mapping[str, Channel] = CHANNELS) -> bool:
     """Return True if `name` is an alias of `channel`."""
-    names = CHANNELS[channel].aliases
+    names = known[channel].aliases
     return name in names or (len(name) > 1 and name.lower() in names)
 
 
@@ -172,10 +192,12 @@ def record(raw: Raw, wanted: Wanted) -> Record:
     """
     where = f"{raw.verb} '{raw.name}'"
     columns = _labelled(where, raw, wanted)
+    if wanted.drive is not None:
+        columns = tuple(map(_in_amperes, columns))
     have = ", ".join(map(str, columns))
     named = _channels(where, columns, wanted, have)
     requested = wanted.columns.keys() if isinstance(wanted.columns, Mapping) else set[str]()
-    needed = named.keys() & {*requested, *({"v", "F"} if wanted.points else CHANNELS)}
+    needed = named.keys() & {*requested, *({"v", "F"} if wanted.points else wanted.channels)}
     given = _units(where, named, wanted)
     rows = _rows(where, columns, {key: named[key] for key in named if key in needed}, wanted)
     problems: list[str] = []
@@ -203,7 +225,7 @@ def record(raw: Raw, wanted: Wanted) -> Record:
     if not signals and left_out:
         why = "; ".join(f"column '{name}', {bad}" for name, bad in left_out.items())
         raise ValueError(f"{where}: expected a column of numbers besides time, got none: {why}")
-    return Record(
+    found = Record(
         raw.name,
         t,
         signals,
@@ -212,6 +234,15 @@ def record(raw: Raw, wanted: Wanted) -> Record:
         columns={k: c.label for k, c in named.items() if c.label not in (k, "") and k in signals},
         left_out=left_out,
     )
+    return found if wanted.drive is None else at_load(found, wanted.drive)
+
+
+def _in_amperes(column: Column) -> Column:
+    """Return a column such as `current_A` with its unit."""
+    match = fullmatch(r"(.+)_(m?A)", column.label)
+    if column.unit or match is None or not _matches(match[1], "current", OF_DRIVE):
+        return column
+    return replace(column, label=match[1], unit=match[2])
 
 
 def _labelled(where: str, raw: Raw, wanted: Wanted) -> tuple[Column, ...]:
@@ -260,11 +291,11 @@ def _channels(
                 got = f"{len(hits)} of them" if hits else have
                 raise ValueError(f"{where}: expected one column '{name}' for {key}, got {got}")
             take(key, hits[0])
-    for key in POINTS if wanted.points else MOTION:
+    for key in wanted.names:
         if key in found:
             continue
         exact = [c for c in left if c.label == key]
-        near = [c for c in left if _matches(c.label, key)]
+        near = [c for c in left if _matches(c.label, key, wanted.channels)]
         if len(exact) > 1:
             got = ", ".join(f"'{c}'" for c in exact)
             raise ValueError(f"{where}: expected one column for {key}, got {got}")
@@ -298,7 +329,7 @@ def _rows(
 def _units(where: str, named: Mapping[str, Column], wanted: Wanted) -> dict[str, str]:
     """Return the units given by the caller, by channel."""
     if isinstance(wanted.units, str):
-        given = by_channel(f"{where}: units", wanted.units)
+        given = by_channel(f"{where}: units", wanted.units, wanted.channels)
         for key, text in given.items():
             own = named[key].unit if key in named else ""
             if own and unit(own) != unit(text) and text in wanted.units:
@@ -320,7 +351,9 @@ def _scale(key: str, column: Column, given: str, wanted: Wanted) -> tuple[float,
     if key == "t" and not text and wanted.units is not None:
         text = "s"
     meant = unit(text) if text else None
-    channel = CHANNELS.get(key) if not wanted.points or key in ("v", "F", "N") else None
+    if meant is None and wanted.drive is not None:
+        meant = parsed(text)  # counts, whose size is that of the encoder
+    channel = wanted.channels.get(key) if not wanted.points or key in ("v", "F", "N") else None
     if channel and (meant is None or meant.si not in channel.units):
         such = f"a unit of {channel.examples}"
         raise ValueError(f"column '{column}': expected {such}, got {text or 'none'}")
@@ -348,33 +381,3 @@ def _time(
             "spaced samples, or points=True"
         )
     return signals["t"]
-
-
-def gathered(works: Sequence[Callable[[], T]]) -> list[T]:
-    """Return the results of `works`; join their ValueErrors in one error with a line for each."""
-    found: list[T] = []
-    problems: list[str] = []
-    for work in works:
-        try:
-            found.append(work())
-        except ValueError as error:
-            problems.append(str(error))
-    if problems:
-        raise ValueError("\n".join(_once(problems)))
-    return found
-
-
-SHOWN = 3
-"""Number of files with the same problem that a message names."""
-
-
-def _once(problems: Sequence[str]) -> Iterator[str]:
-    """Yield each message once, with the names of all files that have the same problem."""
-    alike = dict[tuple[str, str], list[str]]()
-    for problem in problems:
-        match = fullmatch(r"(\w+ )('[^']*')(:.*)", problem, DOTALL)
-        verb, name, rest = match.groups() if match else (problem, "", "")
-        alike.setdefault((verb, rest), []).append(name)
-    for (verb, rest), names in alike.items():
-        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-        yield f"{verb}{', '.join(names[:SHOWN])}{more}{rest}"

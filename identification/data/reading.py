@@ -1,21 +1,23 @@
 """Readers of files by suffix, and of Python objects, as columns."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from glob import glob, has_magic
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from re import DOTALL, fullmatch
+from typing import Any, TypeVar
 
 import numpy as np
 
 from identification.data.mat_file import read_variables
-from identification.data.raw import Raw, Wanted, column_of, gathered, record
+from identification.data.raw import Raw, Wanted, column_of, record
 from identification.data.record import Record
 from identification.data.units import CHANNELS
 from symfric.foundation import checks
 from symfric.foundation.files import write_table
 
+T = TypeVar("T")
 ASSUMED = {name: channel.units[0] for name, channel in CHANNELS.items()}
 """Default units of arrays; numbers in Python are in SI units."""
 
@@ -149,3 +151,33 @@ def _read(file: Path, wanted: Wanted, variable: str | None) -> list[Record]:
     if isinstance(found, Record):
         return [found]
     return gathered([partial(record, raw, wanted) for raw in found])
+
+
+def gathered(works: Sequence[Callable[[], T]]) -> list[T]:
+    """Return the results of `works`; join their ValueErrors in one error with a line for each."""
+    found: list[T] = []
+    problems: list[str] = []
+    for work in works:
+        try:
+            found.append(work())
+        except ValueError as error:
+            problems.append(str(error))
+    if problems:
+        raise ValueError("\n".join(_once(problems)))
+    return found
+
+
+SHOWN = 3
+"""Number of files with the same problem that a message names."""
+
+
+def _once(problems: Sequence[str]) -> Iterator[str]:
+    """Yield each message once, with the names of all files that have the same problem."""
+    alike = dict[tuple[str, str], list[str]]()
+    for problem in problems:
+        match = fullmatch(r"(\w+ )('[^']*')(:.*)", problem, DOTALL)
+        verb, name, rest = match.groups() if match else (problem, "", "")
+        alike.setdefault((verb, rest), []).append(name)
+    for (verb, rest), names in alike.items():
+        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        yield f"{verb}{', '.join(names[:SHOWN])}{more}{rest}"

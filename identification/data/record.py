@@ -8,6 +8,7 @@ from typing import TypeVar, final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.drives.drive import Drive
 from symfric.foundation import checks
 from symfric.foundation.shown import brief
 
@@ -144,6 +145,7 @@ class Record:
         loop: position controller of the experiment, if known.
         columns: name -> name of the column in its file, if different.
         left_out: column -> reason why it is not a signal.
+        drive: drive whose log was converted to this record; None: no drive.
 
     Raises:
         ValueError: unequal lengths, values that are not finite, times that do not increase, or
@@ -158,6 +160,7 @@ class Record:
     loop: PositionLoop | None = None
     columns: Mapping[str, str] = field(default_factory=dict[str, str])
     left_out: Mapping[str, str] = field(default_factory=dict[str, str])
+    drive: Drive | None = None
 
     __repr__ = brief
 

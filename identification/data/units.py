@@ -61,6 +61,21 @@ CHANNELS: Mapping[str, Channel] = {
     "N": Channel(("N",), ("N", "normal", "normal_force"), "N, mN, kN"),
 }
 """Canonical channels of records over time, and F and N of points."""
+_OF_COUNTS = ("counts", "count", "encoder", "encoder_counts")
+OF_DRIVE: Mapping[str, Channel] = {
+    **{key: CHANNELS[key] for key in ("t", "a")},
+    "x": CHANNELS["x"]._replace(
+        units=("m", "rad", "1"), aliases=(*CHANNELS["x"].aliases, *_OF_COUNTS),
+        examples="counts, rad, deg, rev, m, mm",
+    ),
+    "v": CHANNELS["v"]._replace(units=("m/s", "rad/s", "1/s")),
+    "current": Channel(
+        ("A",),
+        ("current", "motor_current", "current_actual", "i", "I", "iq", "i_q", "i_a", "i_motor"),
+        "A, mA",
+    ),
+}  # fmt: skip
+"""Canonical channels of the log of a `Drive`, before its conversion to the load."""
 
 
 @cache
@@ -82,7 +97,7 @@ def is_common(text: str) -> bool:
     return unit(text) is not None and all(s in COMMON or s.lower() in WORDS for s in symbols)
 
 
-def by_channel(where: str, text: str) -> dict[str, str]:
+def by_channel(where: str, text: str, known: Mapping[str, Channel] = CHANNELS) -> dict[str, str]:
     """Return the units of the canonical channels from the short form `rad, N m`.
 
     Each unit applies to the channels that can have it. Velocity and acceleration follow the
@@ -95,7 +110,7 @@ def by_channel(where: str, text: str) -> dict[str, str]:
     for part in (p.strip() for p in text.split(",")):
         meant = unit(part) if part else None
         channels = [
-            name for name, c in CHANNELS.items() if meant and meant.si in c.units and name != "N"
+            name for name, c in known.items() if meant and meant.si in c.units and name != "N"
         ]
         if not channels:
             raise ValueError(

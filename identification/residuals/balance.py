@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.data.differentiate import Velocity, derivatives
+from identification.data.differentiate import Velocity, derivatives, noise_of
 from identification.data.filters import Filter, choose_filter
 from identification.data.record import Record
 from identification.residuals.sampled import Sampled, begun, imposed_step, moving_start, usual
@@ -277,7 +277,7 @@ def measure(
         if given is None and (v is None or ca.depends_on(known, needed.symbol)):
             missing.append(called.get(needed.name, needed.name))
         raw.append((x, v))
-        known_noise.append(tuple(None if n is None else noise.get(n) for n in names))
+        known_noise.append(tuple(noise_of(record, n, noise) for n in names))
     inputs = [called.get(u.name, u.name) for u in model.u]
     missing += [n for n in inputs if n not in record]
     if missing:

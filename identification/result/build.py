@@ -14,6 +14,7 @@ from identification.data.findings import Finding
 from identification.residuals.evaluation import Array
 from identification.result.fitted import Fitted
 from identification.result.live import Asked, Kind, Live, errors_of, labels
+from identification.result.machine_units import sides_of
 from identification.result.series import (
     Curve,
     Estimate,
@@ -130,11 +131,12 @@ def fitted(
     records = tuple(r.name for r in live.data)
     left_out = set(task.unknowns.nuisance) if len(certain.names) > MOST else set[str]()
     shown = [i for i, name in enumerate(certain.names) if name not in left_out]
+    estimates = _estimates(live)
     return Fitted(
         name=live.subject.name,
         kind=by,
         records=records,
-        parameters=_estimates(live),
+        parameters=estimates,
         names=tuple(certain.names[i] for i in shown),
         correlation=certain.correlation[np.ix_(shown, shown)],
         undetermined=certain.undetermined,
@@ -156,6 +158,7 @@ def fitted(
         made=_made(call, by),
         live=live,
         asked=asked,
+        sides=() if live.data[0].drive is None else sides_of(live.data, estimates),
     )
 
 

@@ -61,6 +61,7 @@ class Fitted(packed.Portable, Outcome):
         made: versions and the call.
         live: problem and minimum; a stored fit restores them from `asked`.
         asked: arguments of the fit and its end; None from JSON.
+        sides: values in the units of the drive of the data; () without a drive.
     """
 
     def to_pack(self) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from textwrap import wrap
 from identification.data.findings import Finding, texts
 from identification.residuals.evaluation import Array
 from identification.result.live import Asked, Live
+from identification.result.machine_units import ALONE, Sides
 from identification.result.series import Curve, Errors, Estimate, Series, Tried
 from identification.verdict.judge import Verdict
 from symfric.foundation.parameters import Parametric
@@ -57,6 +58,7 @@ class Outcome:
     made: dict[str, str] = field(default_factory=dict[str, str])
     live: Live | None = None
     asked: Asked | None = None
+    sides: tuple[Sides, ...] = ()
 
     def __str__(self) -> str:
         return text_of(self)
@@ -83,6 +85,7 @@ def text_of(fit: Outcome) -> str:
         [f"{fit.name} fitted by {fit.kind}: {fit.status.name}", *_indented(sentences(fit))],
         [*_head(fit)],
         [*_parameters(fit)],
+        [*_sides(fit)],
         [*_correlations(fit)],
         [*errors_table("residuals", fit.errors)],
         [*errors_table("on other data", fit.validation or {})],
@@ -231,6 +234,30 @@ def _table(name: str, estimates: dict[str, Estimate]) -> Iterator[str]:
         value = rounded(e.value, e.standard_error)
         rows.append((n, value, unit_of(e.unit), error, interval(e) or e.note))
     return columns(rows)
+
+
+DRIVING = "at motor and current: to drive the load, per speed and angle of the motor"
+
+
+def machine_units(fit: Outcome) -> list[tuple[str, ...]]:
+    """Return rows of name and value at the load, at the motor and as a current."""
+    rows: list[tuple[str, ...]] = []
+    for s in fit.sides:
+        values = (s.load, s.motor, s.current)
+        texts = (rounded(x, None if s.error is None else s.error * abs(x)) for x in values)
+        pairs = zip(texts, s.units, strict=True)
+        rows.append((s.name, *(with_unit(x, unit) if unit else "" for x, unit in pairs)))
+    return rows
+
+
+def _sides(fit: Outcome) -> Iterator[str]:
+    if fit.sides:
+        header = ("of the drive", "at the load", "at the motor", "current")
+        yield from columns([header, *machine_units(fit)])
+        yield DRIVING
+        if any(s.name == ALONE and s.load < 0 for s in fit.sides):
+            yield "m is below the inertia of the rotor: check gear_ratio, the turns of the motor"
+            yield "per turn of the output, rotor_inertia and torque_constant"
 
 
 def _correlations(fit: Outcome) -> Iterator[str]:

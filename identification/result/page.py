@@ -9,6 +9,7 @@ import numpy as np
 from identification.data.findings import grouped
 from identification.data.record import first_of
 from identification.result.outcome import (
+    DRIVING,
     MANY,
     SAME,
     Outcome,
@@ -16,6 +17,7 @@ from identification.result.outcome import (
     correlated,
     count_of,
     interval,
+    machine_units,
     number,
     parted,
     percent,
@@ -169,6 +171,10 @@ def _parameters(fit: Outcome) -> Iterator[str]:
     some = dict(list(nuisance.items())[:MANY])
     more = f", the first {MANY} of {len(nuisance)}" if len(nuisance) > MANY else ""
     yield _estimates(f"Of single records: start values, dead times{more}", some)
+    if fit.sides:
+        header = ("parameter", "at the load", "at the motor", "current")
+        caption = f"In the units of the drive; {DRIVING}"
+        yield html.table(caption, header, machine_units(fit), (1, 2, 3))
     shown = [i for i, n in enumerate(fit.names) if not fit.parameters[n].nuisance]
     names, rows = [fit.names[i] for i in shown], fit.correlation[np.ix_(shown, shown)].tolist()
     values = [[c if isfinite(c) else None for c in row] for row in rows]

@@ -155,6 +155,8 @@ FORMAT = 1
 
 APART = ("law", "machine", "live", "asked")
 """Fields that are not stored as plain data."""
+NEWER = {"sides"}
+"""Fields that files of earlier versions do not have."""
 
 
 def to_dict(fit: Outcome) -> dict[str, Any]:
@@ -200,7 +202,9 @@ def read(kind: type[Outcome], path: str | Path, own: Mapping[str, type[Parametri
 def _made(kind: type[Outcome], data: dict[str, Any], own: Mapping[str, type[Parametric]] | None):
     hints = storable.hints_of(kind)
     values: dict[str, Any] = {
-        f.name: revived(hints[f.name], data[f.name]) for f in fields(kind) if f.name not in APART
+        f.name: revived(hints[f.name], data[f.name])
+        for f in fields(kind)
+        if f.name not in (*APART, *(NEWER - data.keys()))
     }
     law, machine = (
         from_data(data[key], own) if known(data[key], own or {}) else None

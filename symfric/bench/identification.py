@@ -15,6 +15,7 @@ from symfric.bench.identification_measured import emps, franka
 from symfric.bench.identification_memory import gms, lugre
 from symfric.bench.identification_online import online
 from symfric.bench.identification_repeats import starts, velocity
+from symfric.bench.identification_robot import robot
 from symfric.bench.identification_verdicts import TITLE, draw, verdicts
 from symfric.bench.report import Found, Progress, Report, goal, timed
 from symfric.foundation.parameters import check_names
@@ -128,6 +129,7 @@ CASES: Mapping[str, Callable[[bool], Iterator[Found]]] = {
     "gms": gms,
     "files": files,
     "length": length,
+    "robot": robot,
     "online": online,
 }
 

@@ -8,14 +8,18 @@ from typing import Any, NamedTuple
 
 import typer
 
+from symfric import Drive as Nameplate
 from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.codegen_report import report
+from symfric.cli.controllers import write_controllers
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
     Block,
+    Generated,
+    Verification,
     generate,
     inverse_dynamics_block,
     plant_block,
@@ -61,6 +65,7 @@ APPLIES = {
     "--payload": (INVERSE,),
     "--tunable-gravity": (INVERSE,),
     "--compensation": (COMPENSATOR,),
+    "--drive": (COMPENSATOR,),
     "--adaptation": (ESTIMATOR,),
     "--preset": (PLANT,),
     "--law-of": (PLANT,),
@@ -113,8 +118,10 @@ def codegen(
     tunable_gravity: bool = False,
     compensator: bool = False,
     compensation: Strings = None,
+    drive: Path | None = None,
     estimator: str | None = None,
     adaptation: Strings = None,
+    mpc: str | None = None,
     accept: Strings = None,
     prove: bool = False,
     compiler: str | None = None,
@@ -134,6 +141,10 @@ def codegen(
 
     Example: symfric codegen fit.json --compensator --compensation v_blend=0.02 --out build
 
+    Example: symfric codegen fit.json --compensator --drive drive.toml --out build
+
+    Example: symfric codegen --mpc problem.py --real float --core m4f --out build
+
     Example: symfric codegen fit.json --estimator recursive --adaptation noise=1e-4 --out build
     """
     check_names("--core", core or (), CORES)
@@ -143,6 +154,9 @@ def codegen(
         raise ValueError("--prove: expected guards, whose effect is proved, got --no-guards")
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
+    if mpc is not None:
+        others = (fit, law, scene, estimator, *(compensator, inverse_dynamics, prove), compiler)
+        return write_controllers(out, mpc, any(others), settings, step_size, real, core, json)
     if fit and not law and fit.suffix.lower() not in (".json", ".urdf") and not fit.is_file():
         fit, law = None, str(fit)
     texts = opt.assignments("--set", settings)
@@ -154,7 +168,7 @@ def codegen(
         "--step-size": step_size, "--method": method, "--free": free, "--fold": fold or None,
         "--turning": turning or None, "--payload": payload, "--compensation": compensation,
         "--tunable-gravity": tunable_gravity or None, "--preset": preset, "--law-of": law_of,
-        "--adaptation": adaptation,
+        "--adaptation": adaptation, "--drive": drive,
     }  # fmt: skip
     check_applicable(subject, [option for option, value in given.items() if value is not None])
     own: dict[str, Any] = {"fold": fold or None, "free": free, "name": name, "h": step_size}
@@ -172,6 +186,7 @@ def codegen(
     else:
         made = opt.with_settings(chosen.law, chosen.text, texts)
         if subject in (COMPENSATOR, ESTIMATOR):
+            own |= {} if drive is None else {"drive": Nameplate.read(drive)}
             texts_of = compensation or adaptation or ()
             made = online(made, chosen.drive, estimator, texts_of, turning=turning, **own)
         else:
@@ -179,18 +194,25 @@ def codegen(
             if turning or (chosen.drive is not None and chosen.drive.turning):
                 options["turning"] = True
     generated = generate(made, out, real=REALS[kind], guards=guards, kit=kit, **options)
-    verification = verify(generated, compiler=compiler, adjustable=adjustable)
     if chosen is not None and chosen.forces and subject in (LAW, FUNCTION):
         names = ", ".join(chosen.forces)
         output.note(f"{names}: fitted as forces under a load of 1 N; call the C with N = 1")
-    measured = [
-        measure(generated.block, one, name_of_core, guards=generated.guards)
-        for name_of_core in core or ()
-        for one in generated.reals
-    ]
-    generated = with_cores(generated, [m.to_dict() for m in measured])
     law = chosen.text if chosen else law or generated.block.name
-    proofs = [prove_block(generated.block, one) for one in generated.reals if prove]
+    verification = verify(generated, compiler=compiler, adjustable=adjustable)
+    finish(law, generated, verification, errors, core or (), prove, json)
+
+
+def finish(
+    law: str, generated: Generated, verification: Verification, errors: Sequence[StepError],
+    cores: Sequence[str], prove: bool, json: str | None,
+) -> None:  # fmt: skip
+    """Measure on cores, prove, and report; exit with 1 unless everything holds."""
+    measured = [
+        measure(generated.block, real, core, guards=generated.guards)
+        for core in cores for real in generated.reals
+    ]  # fmt: skip
+    generated = with_cores(generated, [m.to_dict() for m in measured])
+    proofs = [prove_block(generated.block, real) for real in generated.reals if prove]
     report(law, generated, verification, measured, proofs, errors, json)
     if not verification.ok or not all(found.ok for found in proofs):
         raise typer.Exit(1)
@@ -332,13 +354,13 @@ def fixed_steps(machine: Scene, h: float, method: str) -> tuple[StepError, ...]:
 
 
 def online(
-    law: AnyLaw, drive: Drive | None, estimator: str | None, texts: Sequence[str], **how: Any
+    law: AnyLaw, axis: Drive | None, estimator: str | None, texts: Sequence[str], **how: Any
 ) -> Block:
     """Return the compensator or the estimator of a law, with the numbers of the fitted drive."""
     option = COMPENSATOR if estimator is None else ESTIMATOR
     if not isinstance(law, Law):
         raise ValueError(f"{option}: expected a law, got a population, whose force is random")
-    subject = law if drive is None else replace(drive, law=law)
+    subject = law if axis is None else replace(axis, law=law)
     if estimator is None:
         return compensator_block(subject, settings=settings_from_text(texts), **how)
     return ESTIMATORS[estimator](subject, adaptation_from_text(texts), **how)

@@ -21,9 +21,9 @@ from identification.result.fitted import Fitted
 from identification.select import INTERRUPTED, Ranking, select
 from identification.unknowns.spec import above, linear, log, tied
 from identification.verdict.profile import Profile
-from symfric import SolveError, Status
+from symfric import Drive, SolveError, Status
 from symfric.cli import options as opt
-from symfric.cli import output
+from symfric.cli import output, robots
 from symfric.cli.options import Strings
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
@@ -43,12 +43,14 @@ def reader(
     step: float | None = None,
     variable: str | None = None,
     scales: Strings = None,
+    drive: Path | None = None,
 ) -> Callable[[list[str]], Dataset]:
     """Return a function that reads files according to --column, --unit, --kind and other options.
 
     --column and --unit are SIGNAL=NAME, repeated, or list all columns in order. Points are a time
     series if a column t or a step is given. With `resample`, records have equal intervals and are
-    split at gaps. `scales` are SIGNAL=FACTOR, such as force=-1 to turn a sign.
+    split at gaps. `scales` are SIGNAL=FACTOR, such as force=-1 to turn a sign. `drive` is the file
+    of the drive whose currents the files contain.
 
     Raises:
         ValueError: a mixture of both forms, or a name without a value.
@@ -59,7 +61,7 @@ def reader(
     how: dict[str, Any] = {
         "columns": named, "units": ", ".join(each) if isinstance(each, list) else each,
         "step": step, "variable": variable, "points": kind == "points" and not timed,
-        "missing": missing,
+        "missing": missing, "drive": None if drive is None else Drive.read(drive),
     }  # fmt: skip
 
     def read(paths: list[str]) -> Dataset:
@@ -152,7 +154,7 @@ def free_one(name: str, how: str) -> Any:
 
 def identify(
     data: list[str],
-    law: list[str],
+    law: Strings = None,
     validate: Strings = None,
     kind: str = "inverse",
     windows: str | None = None,
@@ -164,6 +166,7 @@ def identify(
     missing: str = "refuse",
     resample: bool = False,
     scales: Strings = None,
+    drive: Path | None = None,
     normal_force: float = 1.0,
     fixed: Strings = None,
     free: Strings = None,
@@ -175,20 +178,41 @@ def identify(
     html: Path | None = None,
     plot: Path | None = None,
     json: str | None = None,
+    rotors: bool = False,
+    urdf: Path | None = None,
 ) -> None:
-    """Fit friction laws to measured data and assess the result.
+    """Fit friction laws to measured data, or a robot to logs of its joints, and assess the result.
 
-    The command prints the assessment of the residuals, parameters with 95 % intervals, and
+    If the first file is a URDF, the command identifies inertias and friction of the robot. Columns
+    have the names of the joints, such as shoulder [rad] and shoulder_torque [N m].
+
+    Otherwise it prints the assessment of the residuals, parameters with 95 % intervals, and
     parameters that the data do not identify. The exit status is 1 if the data or the residuals make
     the result meaningless.
 
     Example: symfric identify run*.csv --law stribeck,lugre --validate v.csv --html out.html
+
+    Example: symfric identify log.csv --drive drive.toml --law stribeck
     """
-    opt.check_outputs(html, json, picture=plot)
+    opt.check_outputs(html, json, urdf, picture=plot)
+    given = {
+        "--rotors": rotors, "--urdf": urdf, "--kind": kind != "inverse", "--windows": windows,
+        "--dead-time": dead_time, "--normal-force": normal_force != 1.0, "--fix": fixed,
+        "--free": free, "--noise": noise, "--starts": starts != 6, "--workers": workers != 1,
+        "--profile": profiles, "--html": html,
+    }  # fmt: skip
+    if data[0].endswith(".urdf"):
+        refuse_options("of a robot", given, 2, None)
+        read = reader(columns, units, "inverse", missing, resample, step, variable, scales)
+        robots.identify(data, law, validate, read, loss, plot, json, rotors, urdf)
+        return
+    refuse_options("without ROBOT.urdf", given, 0, 2)
+    if not law:
+        raise ValueError("identify: expected --law NAME[,NAME], got none; see symfric identify -h")
     laws, wishes = opt.laws_of(law), free_in(free)
     first = next(iter(laws.values()))
     chosen = residuals_of(kind, windows, wishes, dead_time)
-    read = reader(columns, units, kind, missing, resample, step, variable, scales)
+    read = reader(columns, units, kind, missing, resample, step, variable, scales, drive)
     request: dict[str, Any] = {
         "free": wishes or None,
         "fixed": opt.numbers("--fix", fixed) or None,
@@ -229,6 +253,12 @@ def identify(
 
     output.finish(content, json, show, html, plot)
     refuse(fit, ranking, failed)
+
+
+def refuse_options(where: str, given: dict[str, Any], first: int, last: int | None) -> None:
+    """Raise an error if any of the options with numbers `first` to `last` is given."""
+    if wrong := [name for name in [*given][first:last] if given[name]]:
+        raise ValueError(f"identify {where}: expected no {', '.join(wrong)}, got one")
 
 
 def judged(

@@ -209,7 +209,8 @@ def input_from_text(name: str, text: str, unit: str) -> Linear | float:
             ) from None
     else:
         return checks.number(f"--input {name}", value)
-    from identification.data.raw import gathered, label  # noqa: PLC0415 (slow to import)
+    from identification.data.raw import label  # noqa: PLC0415 (slow to import)
+    from identification.data.reading import gathered  # noqa: PLC0415
     from identification.data.text import read_text  # noqa: PLC0415 (slow to import)
 
     place = Path(file)

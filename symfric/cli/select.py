@@ -57,6 +57,7 @@ def select(
     units: Strings = None,
     missing: str = "refuse",
     resample: bool = False,
+    drive: Path | None = None,
     normal_force: float = 1.0,
     paper: bool = False,
     plot: Path | None = None,
@@ -90,7 +91,7 @@ def select(
         machine = _with(kind_of(scene, preset=preset, law_of=law_of), scene, given)
     misfits = None
     if data:
-        records = reader(columns, units, kind, missing, resample)(data)
+        records = reader(columns, units, kind, missing, resample, drive=drive)(data)
         able = [n for n, c in candidates.items() if not lacking(words, phenomena(c))]
         candidates, misfits = fitted(able, records, residuals_of(kind, None, {}), normal_force)
     with reported(f"select {scene}") as tell, stoppable():

@@ -1,6 +1,6 @@
 """Friction compensator as a block: the force to add to the force of a controller."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -12,6 +12,7 @@ from symfric.codegen.blocks.from_law import in_turning
 from symfric.codegen.blocks.variables import arranged, step_size
 from symfric.compensation.force import LIMITED, TABLES, Parts, Terms, finished, terms, within_load
 from symfric.compensation.settings import Compensation, chosen_settings, formula
+from symfric.drives.drive import Drive as Nameplate
 from symfric.foundation import checks
 from symfric.foundation.variable import starts_of, symbols_of
 from symfric.laws import Law, law_name
@@ -38,6 +39,7 @@ def compensator(
     h: float | None = None,
     turning: bool = False,
     fold: bool = False,
+    drive: Nameplate | None = None,
     settings: Compensation | None = None,
     **chosen: Any,
 ) -> Block:
@@ -48,6 +50,13 @@ def compensator(
 
     The law makes the step of `law_block`. Scales act on forces and not on the states of the law, so
     that they can be changed while the machine moves.
+
+    With a `drive`, the output is a current [A], the last stages act on it, and so does its limit:
+
+        i = limit(slew(F_m(ramp [...], v_c) k_i)),   k_i = 1 / (ratio torque_constant)
+
+    with the force F_m of the motor for a force at the load (`Drive.from_load`). The power flow is
+    that of the force of the block alone, which drives while F v_c > 0.
 
     Limits: a force above the actual friction (a scale above 1, or too high a law) is negative
     damping: with `error_gain` the axis then hunts at rest. A law of the measured velocity alone
@@ -69,6 +78,8 @@ def compensator(
         h: sample time [s] as a constant; without it h is a parameter, by default 1 ms.
         turning: True for units rad/s and N m.
         fold: True if all parameters except h become constants.
+        drive: drive of the axis; the current is limited to its `current_limit` and to `limit`
+            [N] at an efficiency of 1.
         settings: features; keywords name fields of `Compensation` and replace those in `settings`.
 
     Raises:
@@ -77,15 +88,7 @@ def compensator(
     """
     where = "compensator"
     s = chosen_settings(where, settings, chosen)
-    if isinstance(law, Drive):
-        load = checks.number(f"{where}: N of the drive", law.N, unit="N", lower=0.0)
-        offset = checks.number(f"{where}: offset of the drive", law.offset, unit="N")
-        s = replace(
-            s,
-            N=load if s.N is None else s.N,
-            offset=offset or None if s.offset is None else s.offset,
-        )
-        law, turning = law.law, law.turning or turning
+    law, s, turning = _axis(law, s, turning, drive, where)
     require_law(where, law)
     where = f"compensator '{law_name(law)}'"
     inner = law_block(law, h=h if law.states else None)
@@ -93,6 +96,10 @@ def compensator(
         names = ", ".join(v.name for v in inner.inputs[2:])
         raise ValueError(f"{where}: expected a law of v and N only, got one with {names}")
     found, size, parts = terms(law, inner), step_size(where, h, inner), Parts(inner)
+    counting = list[ca.SX]()
+    if s.counts is not None:
+        counting = counted(parts, drive, size.h, s.counts, where)
+        parts.derived["v"] = counting[-1]
     wanted, moved = _velocity(parts, s)
     if isinstance(s.N, str):
         normal = parts.given("N")
@@ -102,6 +109,7 @@ def compensator(
     old = ca.vertcat(found.v, found.N, z)
     new = ca.vertcat(moved, normal, within_load(found.law, z, normal) if inner.states else z)
     parts.next = ca.vertsplit(ca.substitute(inner.next, old, new)) if inner.states else []
+    parts.next += counting
     if s.build_up is not None:
         if law.states:
             raise ValueError(
@@ -111,25 +119,47 @@ def compensator(
         built = built_up(parts, moved, size.h, s.build_up, s.build_up_table)
         found = found.one_sided(built)
     force = ca.substitute(_scaled(parts, found, s, where), old, new)
-    force = _added(parts, force, s, wanted, size.h, where)
+    force = _added(parts, force, s, wanted, size.h, where, drive, moved)
     more = _held(parts, s)
     parts.inputs.sort(key=lambda v: [*TABLES["inputs"]].index(v.name))
+    added = "force" if drive is None else "current"
     used = [p for p in size.parameters if ca.depends_on(ca.vertcat(force, *parts.next), p.symbol)]
     block = Block(
         "friction_compensator" if name is None else name,
-        doc=f"Friction compensator: the force to add to that of a controller. {inner.doc}",
-        outputs={"F": Output(force, "N", "force to add to that of the controller")} | more,
+        doc=f"Friction compensator: the {added} to add to that of a controller. {inner.doc}",
+        outputs=_output(force, drive) | more,
         about=inner.about,
         constants=dict(inner.constants) | size.constants,
-        equations=f"{formula(s)}\n\n{inner.equations}",
+        equations=f"{formula(s, drive is not None)}\n\n{inner.equations}",
         discretisation=without_end(inner.discretisation),
-        use=(*USE, *[LIMITED] * (s.limit is not None)),
+        use=tuple(_use(s.limit is not None, drive)),
         limits=(OVER, *inner.limits),
         sources=inner.sources,
         **parts.variables(tuple(used)),
     )
     block = arranged(folded(block) if checks.flag(f"{where}: fold", fold) else block)
     return in_turning(block) if turning else block
+
+
+def _axis(
+    law: Law | Drive, s: Compensation, turning: bool, drive: Nameplate | None, where: str
+) -> tuple[Law, Compensation, bool]:
+    """Return the law, the settings and the kind of units of an axis, after checking its drive."""
+    if isinstance(law, Drive):
+        load = checks.number(f"{where}: N of the drive", law.N, unit="N", lower=0.0)
+        offset = checks.number(f"{where}: offset of the drive", law.offset, unit="N")
+        s = replace(
+            s,
+            N=load if s.N is None else s.N,
+            offset=offset or None if s.offset is None else s.offset,
+        )
+        law, turning = law.law, law.turning or turning
+    if drive is not None:
+        checks.kind(f"{where}: drive", drive, Nameplate, "a drive, such as Drive.read(path)")
+        if turning and not drive.turning:
+            raise checks.refused(f"{where}: drive", "a rotary drive for a rotary axis", drive)
+        turning = drive.turning
+    return law, s, turning
 
 
 def _velocity(parts: Parts, s: Compensation) -> tuple[ca.SX, ca.SX]:
@@ -251,9 +281,10 @@ def freed(
 
 
 def _added(
-    parts: Parts, force: ca.SX, s: Compensation, wanted: ca.SX, h: ca.SX | float, where: str
-) -> ca.SX:
-    """Return the force of the law plus all additional forces, within its limits."""
+    parts: Parts, force: ca.SX, s: Compensation, wanted: ca.SX, h: ca.SX | float, where: str,
+    drive: Nameplate | None, moved: ca.SX,
+) -> ca.SX:  # fmt: skip
+    """Return the force of the law plus all additional forces, or its current, within limits."""
     if s.offset is not None:
         force = force + parts.parameter("offset", s.offset)
     if s.inertia is not None:
@@ -266,4 +297,59 @@ def _added(
         end = ca.SX(smooth.fraction(parts.state("phase") + pace * h))
         parts.next.append(end)
         force = force + amplitude * ca.sin(2 * ca.pi * end)
-    return finished(parts, force, s.ramp, s.limit, h, where, s.slew)
+    if drive is None:
+        return finished(parts, force, s.ramp, s.limit, h, where, s.slew)
+    k, exact = 1 / float(drive.force_constant), replace(drive, force_width=0.0)
+
+    def amperes(force: ca.SX) -> ca.SX:
+        return ca.SX(parts.parameter("k_i", k) * exact.from_load(force, moved))
+
+    given = None if s.limit is None else abs(k) * s.limit
+    limit = min((i for i in (given, drive.current_limit) if i is not None), default=None)
+    slew = None if s.slew is None else abs(k) * s.slew
+    return finished(parts, force, s.ramp, limit, h, where, slew, amperes)
+
+
+def _output(force: ca.SX, drive: Nameplate | None) -> dict[str, Output]:
+    if drive is None:
+        return {"F": Output(force, "N", "force to add to that of the controller")}
+    return {"current": Output(force, "A", "current to add to that of the controller")}
+
+
+def _use(limited: bool, drive: Nameplate | None) -> Iterator[str]:
+    """Yield advice for the header."""
+    if drive is None:
+        yield from (*USE, *[LIMITED] * limited)
+        return
+    yield USE[0].replace("add F to the force", "add `current` to the current")
+    yield "A positive current drives the load towards " + (
+        "positive x." if float(drive.force_constant) > 0 else "negative x: the drive is reversed."
+    )
+    if limited or drive.current_limit is not None:
+        yield LIMITED.replace("F_max", "i_max").replace("F is", "The current is")
+
+
+def counted(
+    parts: Parts, drive: Nameplate | None, h: ca.SX | float, lag: float, where: str
+) -> list[ca.SX]:
+    """Return the states after the step for the velocity of the load from the counts of an encoder.
+
+        v+ = v + h / (h + t_counts) (count d / h - v),   d = counts - counts of the last call
+
+    d is taken modulo the counter of the drive, the nearest to 0. The first call gives v = 0. The
+    states are the counts, 1 after the first call, and the velocity.
+
+    Raises:
+        ValueError: no drive, or one without an encoder.
+    """
+    if drive is None or drive.count is None:
+        such = "a drive with counts_per_turn or resolution"
+        raise checks.refused(f"{where}: counts", such, drive)
+    counts = ca.floor(parts.given("counts") + 0.5)  # whole numbers are exact in float, too
+    last, begun = parts.state("counted"), parts.state("begun")
+    before, t = parts.state("v_before"), parts.parameter("t_counts", lag)
+    d = counts - last
+    if drive.counter is not None:
+        d = d - drive.counter * ca.floor(d / drive.counter + 0.5)
+    v = before + h / (h + t) * (drive.count * begun * d / h - before)
+    return [counts, ca.SX(1.0), ca.SX(v)]

@@ -5,7 +5,7 @@ modified force or velocity; the C contains only the chosen stages.
 """
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
@@ -217,6 +217,7 @@ class Parts:
     Attributes:
         states, inputs, parameters: variables as in `Block`.
         next: states after the step.
+        derived: expressions of signals that are not inputs, by name.
     """
 
     def __init__(self, inner: Block | None = None, v: Variable | None = None) -> None:
@@ -224,13 +225,16 @@ class Parts:
         self.states = [*inner.states] if inner else []
         self.parameters = [p for p in inner.parameters if p.name != "h"] if inner else []
         self.inputs, self.next = [v] if v else [], list[ca.SX]()
+        self.derived = dict[str, ca.SX]()
 
     def state(self, name: str) -> ca.SX:
         """Add a state and return its symbol; the caller appends its next value to `next`."""
         return self._added(self.states, Variable(self._free(name), **TABLES["states"][name]))
 
     def given(self, name: str) -> ca.SX:
-        """Return the symbol of an input; add the input at its first use."""
+        """Return the symbol of an input, or its expression; add the input at its first use."""
+        if name in self.derived:
+            return self.derived[name]
         if name not in [v.name for v in self.inputs]:
             self.inputs.append(Variable(name, **TABLES["inputs"][name]))
         return next(v.symbol for v in self.inputs if v.name == name)
@@ -266,6 +270,7 @@ def finished(
     h: ca.SX | float,
     where: str,
     slew: float | None = None,
+    amperes: Callable[[ca.SX], ca.SX] | None = None,
 ) -> ca.SX:
     """Return the force with fading by `enable`, a limit of its rate, and last a limit.
 
@@ -274,7 +279,10 @@ def finished(
 
     Args:
         ramp, limit, slew: time [s], largest force [N] and rate [N/s]; None if not chosen.
+        amperes: function of the force to the current that is then limited, by i_max [A] and i_rate
+            [A/s]; `limit` and `slew` are in these units.
     """
+    letter = "F" if amperes is None else "i"
     if ramp is not None:
         checks.number(f"{where}: ramp", ramp, unit="s", above=0.0)
         on = parts.given("enable")
@@ -282,12 +290,14 @@ def finished(
         end = ca.SX(smooth.clip(e + ca.if_else(on > 0.5, h, -h) / duration, 0.0, 1.0))
         parts.next.append(end)
         force = force * smooth.step3(end)
+    if amperes is not None:
+        force = amperes(force)
     if slew is not None:
-        rate, last = parts.parameter("F_rate", slew), parts.state("F_last")
+        rate, last = parts.parameter(f"{letter}_rate", slew), parts.state(f"{letter}_last")
         force = ca.SX(last + smooth.clip(force - last, -rate * h, rate * h))
     if limit is not None:
         checks.number(f"{where}: limit", limit, unit="N", lower=0.0)
-        most = parts.parameter("F_max", limit)
+        most = parts.parameter(f"{letter}_max", limit)
         force = ca.SX(smooth.clip(force, -most, most))
     if slew is not None:
         parts.next.append(force)

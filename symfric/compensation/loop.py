@@ -91,6 +91,8 @@ class Cascade(Parametric):
 
 KNOWN = ("v_ref", "a_ref", "v", "e", "u", "N", "enable", "force", "learn")
 """Signals of the loop that can be inputs of a block."""
+ACTING = ("F", "current")
+"""Outputs of blocks that act on the plant."""
 Values = Mapping[str, float | Array]
 """Parameters by name: numbers, or arrays with one value for each sample."""
 WHERE = "close_loop"
@@ -124,10 +126,11 @@ def close_loop(
     bits in double.
 
     Args:
-        plant: a model with one input, the force.
+        plant: a model with one input, the force; or the current of a drive (`symfric.driven`), with
+            the numbers of controller, limit and blocks in amperes.
         reference: reference motion with the sample time of the controller.
-        blocks: compensators and observers, whose outputs `F` are added. An output `hold` stops the
-            integrator of the controller.
+        blocks: compensators and observers, whose outputs `F` or `current` are added. An output
+            `hold` stops the integrator of the controller.
         controller: controller; default `Cascade()`.
         estimator: block that is called first, such as a `recursive_estimator`. Its outputs are
             written to the parameters of `blocks` with the same names, and recorded in
@@ -244,8 +247,14 @@ def _check(
         )
     for block in blocks:
         checks.kind(f"{WHERE}: blocks", block, Block, "a block, such as compensator(LuGre())")
-        if "F" not in block.outputs:
-            raise ValueError(f"{WHERE}: block '{block.name}': expected an output F, got none")
+        at = f"{WHERE}: block '{block.name}'"
+        output = next((o for n, o in block.outputs.items() if n in ACTING), None)
+        if output is None:
+            raise ValueError(f"{at}: expected an output {' or '.join(ACTING)}, got none")
+        if (output.unit == "A") != (plant.u[0].unit == "A"):
+            hint = "driven(model, drive) and compensator(..., drive=drive) are in amperes"
+            wanted = f"an output in the unit of the plant's input [{plant.u[0].unit}]"
+            raise ValueError(f"{at}: expected {wanted}, got {output.unit}; {hint}")
         _check_block(block, controller)
 
 
@@ -356,7 +365,7 @@ def _commanded(
             if name == "u":
                 place -= acted.sum(axis=0) - acted[i]
         block.step()
-        forces[i] = block.outputs["F"]
+        forces[i] = next(block.outputs[name] for name in ACTING if name in block.outputs)
         if "hold" in block.outputs:
             control.inputs["hold"][:] = block.outputs["hold"]
     return control.outputs["u"] + forces.sum(axis=0)

@@ -55,6 +55,9 @@ class Compensation:
         ramp: time [s] of fading in and out at the input `enable`; None omits this input.
         limit: largest force [N].
         slew: fastest change of the force [N/s].
+        counts: with a drive, the block has the input `counts` of its encoder instead of the
+            measured velocity; this is the time constant [s] of the filter of their difference, 0
+            for none.
     """
 
     velocity: str = "blend"
@@ -75,6 +78,7 @@ class Compensation:
     ramp: float | None = 0.1
     limit: float | None = None
     slew: float | None = None
+    counts: float | None = None
 
 
 def settings_from_text(texts: Sequence[str]) -> Compensation:
@@ -169,8 +173,8 @@ def _check_table(where: str, s: Compensation) -> None:
         )  # fmt: skip
 
 
-def formula(s: Compensation) -> str:
-    """Return the formula of the block, line by line."""
+def formula(s: Compensation, amperes: bool = False) -> str:
+    """Return the formula of the block, line by line; `amperes` for a current as output."""
     desired = "v_ref" + " + t_ahead a_ref" * (s.delay is not None)
     desired += " + k_error e" * (s.error_gain is not None)
     velocity = {
@@ -190,10 +194,11 @@ def formula(s: Compensation) -> str:
     force += " + F_stick stuck" * (s.stick is not None)
     force += " + F_dither sin(2 pi phase)" * (s.dither is not None)
     lines.append(f"F = {force}, terms of the law by their scales")
+    unit, out = ("i", "current = k_i F_m(F, v_c), F") if amperes else ("F", "F")
     stages = (
         ("faded in by enable over t_ramp", s.ramp),
-        ("changed by at most F_rate h per step", s.slew),
-        ("within +-F_max", s.limit),
+        (f"{'current ' * amperes}changed by at most {unit}_rate h per step", s.slew),
+        (f"{'current ' * amperes}within +-{unit}_max", True if amperes else s.limit),
     )
     last = ", ".join(text for text, value in stages if value is not None)
-    return "\n".join([*lines, *[f"F {last}"] * bool(last)])
+    return "\n".join([*lines, *[f"{out} {last}"] * bool(last)])

@@ -23,8 +23,7 @@ Source: Pfeiffer & Glocker, Multibody Dynamics with Unilateral Contacts, 1996, c
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import Any, TypeVar, final
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -34,8 +33,8 @@ from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model.contact import APPLIED, Contact, Variables
-from symfric.model.parts import Event, Monitor, Output
-from symfric.model.start import System, rate_of
+from symfric.model.parts import Monitor
+from symfric.model.start import Put, System, rate_of
 
 STICKS = 0.5
 """Absolute value of a mode below which a contact sticks. Modes are -1, 0 or 1, except for
@@ -221,7 +220,7 @@ def by_laws(model: System, expression: ca.SX) -> ca.SX:
         ValueError: friction forces depend on each other.
     """
     forces = {c.name: c.friction for c in model.contacts}
-    return _Put(f"model '{model.name}': contacts", model.contacts, forces)(expression)
+    return _put(f"model '{model.name}': contacts", model.contacts, forces)(expression)
 
 
 def closed(model: System) -> dict[str, Any]:
@@ -237,7 +236,7 @@ def closed(model: System) -> dict[str, Any]:
             where, "none together with `holonomic`; a Mechanism makes them", model.contacts
         )
     contacts, unknown = completed(model)
-    put = _Put(where, contacts, {c.name: c.friction for c in contacts})
+    put = _put(where, contacts, {c.name: c.friction for c in contacts})
     changes = put.explicit(model)
     held = [(c, unknown[c.name].symbol) for c in contacts if c.name in unknown]
     rows = [put(c.friction + _change(c, model) - F_e) for c, F_e in held]
@@ -312,7 +311,7 @@ def with_forces(
         )
     free = {v.name for v in p}
     fixed = [v for c in contacts for v in c.widths.values() if v.name not in free]
-    put = _Put(where, contacts, forces, fixed)
+    put = _put(where, contacts, forces, fixed)
     rows = put(ca.SX(0, 1) if alg is None else ca.SX(alg))
     inputs = {c.variable.name for c in contacts}
     own = {v.name for c in contacts for v in c.widths.values()}
@@ -343,57 +342,21 @@ def with_forces(
     }
 
 
-@final
-class _Put:
-    """Substitution that replaces the symbols of friction forces by expressions."""
-
-    def __init__(
-        self, where: str, contacts: Sequence[Contact], forces: Mapping[str, Scalar],
-        fixed: Iterable[Variable] = (),
-    ) -> None:  # fmt: skip
-        F = stacked(c.force for c in contacts)
-        values = stacked(ca.SX(forces[c.name]) for c in contacts)
-        for _ in contacts:  # a normal force may follow from the friction of another contact
-            if ca.depends_on(values, F):
-                values = ca.substitute(values, F, values)
+def _put(
+    where: str, contacts: Sequence[Contact], forces: Mapping[str, Scalar],
+    fixed: Iterable[Variable] = (),
+) -> Put:  # fmt: skip
+    """Return the substitution that replaces the symbols of friction forces by expressions."""
+    F = stacked(c.force for c in contacts)
+    values = stacked(ca.SX(forces[c.name]) for c in contacts)
+    for _ in contacts:  # a normal force may follow from the friction of another contact
         if ca.depends_on(values, F):
-            raise ValueError(
-                f"{where}: expected friction forces that do not depend on each other, got a loop; "
-                "make the normal force an algebraic variable"
-            )
-        fixed = tuple(fixed)
-        numbers = ca.SX(starts_of(fixed))
-        self.old = ca.vertcat(F, symbols_of(fixed))
-        self.new = ca.vertcat(ca.substitute(values, symbols_of(fixed), numbers), numbers)
-
-    def __call__(self, expression: Scalar) -> ca.SX:
-        return ca.substitute(ca.SX(expression), self.old, self.new)
-
-    def explicit(self, model: System) -> dict[str, Any]:
-        """Return equations, outputs, monitors and events of a model after the substitution."""
-        names = list(model.outputs)
-        parts = [ca.SX(0, 1) if model.ode is None else ca.SX(model.ode), ca.SX(model.alg)]
-        parts += [ca.SX(model.outputs[name].expression) for name in names]
-        ode, alg, *values = ca.substitute(parts, [self.old], [self.new])  # together: shared parts
-        pairs = zip(names, values, strict=True)
-        return {
-            "ode": ode,
-            "alg": alg,
-            "outputs": {n: replace(model.outputs[n], expression=value) for n, value in pairs},
-            "monitors": tuple(map(self.monitor, model.monitors)),
-            "events": tuple(map(self.event, model.events)),
-            "details": partial(self.outputs, model.details),
-        }
-
-    def outputs(self, write: Callable[[], Mapping[str, Output]]) -> dict[str, Output]:
-        """Return the further results of `write` after the substitution."""
-        return {n: replace(o, expression=self(o.expression)) for n, o in write().items()}
-
-    def monitor(self, monitor: Monitor) -> Monitor:
-        """Return a monitor after the substitution."""
-        return replace(monitor, expression=self(monitor.expression))
-
-    def event(self, event: Event) -> Event:
-        """Return an event after the substitution."""
-        reset = {name: self(value) for name, value in event.reset.items()}
-        return replace(event, expression=self(event.expression), reset=reset)
+            values = ca.substitute(values, F, values)
+    if ca.depends_on(values, F):
+        raise ValueError(
+            f"{where}: expected friction forces that do not depend on each other, got a loop; "
+            "make the normal force an algebraic variable"
+        )
+    fixed = tuple(fixed)
+    numbers, old = ca.SX(starts_of(fixed)), symbols_of(fixed)
+    return Put(ca.vertcat(F, old), ca.vertcat(ca.substitute(values, old, numbers), numbers))

@@ -1,16 +1,16 @@
-"""Fields of a model, start values of its states, and accelerations."""
+"""Fields of a model, start values of its states, accelerations, and substitution in its parts."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any, NamedTuple, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import evaluate, evaluate_all
+from symfric.foundation.numeric import Scalar, evaluate, evaluate_all
 from symfric.foundation.parameters import Variable
 from symfric.foundation.units import per_second
 from symfric.foundation.variable import stacked, starts_of, symbols_of
@@ -219,3 +219,44 @@ def rate_of(expression: ca.SX, model: System) -> ca.SX:
     if mechanics is not None:
         rates = ca.vertcat(x[mechanics.n : 2 * mechanics.n], mechanics.a, mechanics.rates)
     return ca.jtimes(expression, x, rates) + ca.jacobian(expression, model.t)
+
+
+@final
+class Put(NamedTuple):
+    """Substitution of the symbols `old` by the expressions `new`, both SX (n, 1)."""
+
+    old: ca.SX
+    new: ca.SX
+
+    def __call__(self, expression: Scalar) -> ca.SX:
+        """Return the expression after the substitution."""
+        return ca.substitute(ca.SX(expression), self.old, self.new)
+
+    def explicit(self, model: System) -> dict[str, Any]:
+        """Return equations, outputs, monitors and events of a model after the substitution."""
+        names = list(model.outputs)
+        parts = [ca.SX(0, 1) if model.ode is None else ca.SX(model.ode), ca.SX(model.alg)]
+        parts += [ca.SX(model.outputs[name].expression) for name in names]
+        ode, alg, *values = ca.substitute(parts, [self.old], [self.new])  # together: shared parts
+        pairs = zip(names, values, strict=True)
+        return {
+            "ode": ode,
+            "alg": alg,
+            "outputs": {n: replace(model.outputs[n], expression=value) for n, value in pairs},
+            "monitors": tuple(map(self.monitor, model.monitors)),
+            "events": tuple(map(self.event, model.events)),
+            "details": partial(self.outputs, model.details),
+        }
+
+    def outputs(self, write: Callable[[], Mapping[str, Output]]) -> dict[str, Output]:
+        """Return the further results of `write` after the substitution."""
+        return {n: replace(o, expression=self(o.expression)) for n, o in write().items()}
+
+    def monitor(self, monitor: Monitor) -> Monitor:
+        """Return a monitor after the substitution."""
+        return replace(monitor, expression=self(monitor.expression))
+
+    def event(self, event: Event) -> Event:
+        """Return an event after the substitution."""
+        reset = {name: self(value) for name, value in event.reset.items()}
+        return replace(event, expression=self(event.expression), reset=reset)

@@ -206,7 +206,7 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
         raise ValueError(f"{where}: expected a file, got nothing there; check the path")
     content = str(source).strip().encode() if is_text else Path(source).read_bytes()
     try:
-        robot = _tags(content, "utf-8" if is_text else None)
+        robot = tags(content, "utf-8" if is_text else None)
     except expat.ExpatError as error:
         raise ValueError(f"{where}: expected XML, got {error}") from None
     if robot.tag != "robot":
@@ -229,9 +229,11 @@ def parse(source: str | Path, strict: bool = False) -> Urdf:
     return Urdf(name, links, joints, left, tuple(notes.doubts))
 
 
-def _tags(content: bytes, encoding: str | None) -> ET.Element:
+def tags(content: bytes, encoding: str | None, *, comments: bool = False) -> ET.Element:
     """Return the outermost tag; undeclared prefixes are accepted, because many files have them."""
-    builder, parser = ET.TreeBuilder(), expat.ParserCreate(encoding)
+    builder = ET.TreeBuilder(insert_comments=comments)
+    parser = expat.ParserCreate(encoding)
+    parser.CommentHandler = builder.comment if comments else None
     parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
     parser.CharacterDataHandler = builder.data
     parser.Parse(content, True)

@@ -237,7 +237,7 @@ def _machine(
     made = mechanism.prepare(parameters)
     eq, u = made.eq, tuple(mechanism.inputs)
     _check(eq, mechanism)
-    T, offset, leads = _couplings(eq)
+    T, offset, leads = couplings(eq)
     joints = tuple(made.q[i] for i in leads)
     inputs = [
         Variable(
@@ -298,7 +298,7 @@ def _check(eq: Equations, mechanism: Mechanism) -> None:
         )
 
 
-def _couplings(eq: Equations) -> tuple[ca.DM, ca.DM, list[int]]:
+def couplings(eq: Equations) -> tuple[ca.DM, ca.DM, list[int]]:
     """Return T, c and the indices of the leading coordinates y; all coordinates are T y + c.
 
     Raises:

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import crane
 import numpy as np
 import pytest
 
@@ -153,3 +154,22 @@ def test_free_parameters_have_the_specifications_of_python() -> None:
         "g": linear(0, 2, 1), "h": above("a"), "i": tied("a", 1.2), "x0": "rest",
         "dead_time": (0, 1e-3),
     }  # fmt: skip
+
+
+def test_a_robot_is_identified_from_its_urdf_and_logs(symfric) -> None:
+    Path("crane.urdf").write_text(crane.urdf(1.2, '<dynamics damping="9"/>'))
+    crane.log(0, 6.0).to_csv("run.csv")
+    crane.log(1, 6.0).to_csv("other.csv")
+    line = "identify crane.urdf run.csv --validate other.csv"
+    printed = symfric(f"{line} --urdf new.urdf --plot fit.png --json fit.json")
+    assert printed.out.startswith(
+        "robot 'crane': 3 joints, law coulomb+viscous\nThe log determines"
+    )
+    assert "other.csv, which did not enter the fit" in printed.out
+    assert printed.err == "wrote fit.png, new.urdf, fit.json\n"
+    found = json.loads(Path("fit.json").read_text())
+    for joint, level in zip(crane.NAMES, crane.COULOMB, strict=True):
+        estimate = found["friction"][joint]["mu_d"]
+        assert abs(estimate["value"] - level) < 4 * estimate["standard_error"]
+    assert 'damping="9"' not in Path("new.urdf").read_text()
+    assert "other sign" in symfric(f"{line} --scale slide_torque=-1", 2).err

@@ -74,7 +74,7 @@ def test_laws_without_the_required_phenomena_are_not_fitted(symfric, monkeypatch
         raise ValueError("enough")
 
     monkeypatch.setattr(command, "fitted", stop)
-    monkeypatch.setattr(command, "reader", lambda *_: lambda _: None)
+    monkeypatch.setattr(command, "reader", lambda *_, **__: lambda _: None)
     symfric("select drive --law dahl,lugre,coulomb --need presliding,stribeck --data d", 2)
     assert requested == ["lugre"]
 

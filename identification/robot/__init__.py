@@ -1,0 +1,1 @@
+"""Inertias and friction of a robot from its URDF and logs of its joints."""

@@ -1,0 +1,220 @@
+"""Least squares of the torques of a robot: ordinary, weighted by joint, or robust.
+
+    tau_j = Y_j x + offset_j + F_j(q_j', theta_j),    weights 1 / sigma_j
+
+sigma_j is the standard deviation of the residuals of joint j, which is estimated together with the
+values (iteratively reweighted least squares). Nonlinear laws are linearised (Gauss and Newton). The
+covariance includes the autocorrelation of the residuals of each joint, see `Sandwich`.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.data.record import Array
+from identification.residuals.evaluation import Channel
+from identification.robot.base import Base, regressor
+from identification.robot.dynamics import RobotModel
+from identification.robot.friction import JointLaw, coordinates
+from identification.robot.motion import RobotMotion
+from identification.verdict.minimum import Minimum, Sandwich
+
+METHODS = ("ordinary", "weighted", "robust")
+ROUNDS = 20
+"""Largest number of iterations."""
+CLOSE = 1e-6
+"""Change of the logarithms of all sigma below which the iteration ends."""
+HUBER = 1.345
+"""Residual in standard deviations above which Huber's weight decreases."""
+HALVINGS = 4
+"""Largest number of halvings of a step of a nonlinear law."""
+NEAR = np.array([0.5, 3.0])
+"""Bounds of a velocity of a law, relative to the slowest and the fastest speeds."""
+LEAP = 2.0
+"""Largest change of the logarithm of a parameter in one step."""
+
+
+class Equations(NamedTuple):
+    """Rows of the joints that move, in order of record, joint and time.
+
+    Attributes:
+        Z: columns of base parameters and offsets, shape (rows, b + n).
+        v, tau: velocity of the joint, measured torque, shape (rows,).
+        joint, record: indices, shape (rows,).
+        t: times [s], shape (rows,).
+        noise: standard deviation of the noise of the torque by its spectrum, shape (rows,).
+    """
+
+    Z: Array
+    v: Array
+    tau: Array
+    joint: NDArray[np.int64]
+    record: NDArray[np.int64]
+    t: Array
+    noise: Array
+
+    @classmethod
+    def of(
+        cls, model: RobotModel, motions: Sequence[RobotMotion], base: Base, rotors: bool,
+        every: bool = False,
+    ) -> "Equations":  # fmt: skip
+        """Return the rows of all records without reversals, or `every` row."""
+        blocks = list[tuple[Any, ...]]()
+        for record, one in enumerate(motions):
+            columns = regressor(model, one.q, one.v, one.a, rotors)[..., base.chosen]
+            for k, offset in enumerate(np.eye(len(model.joints))):
+                on = np.ones_like(one.kept[:, k]) if every else one.kept[:, k]
+                n = int(on.sum())
+                blocks.append((
+                    np.hstack([columns[on, k], np.tile(offset, (n, 1))]), one.v[on, k],
+                    one.tau[on, k], np.full(n, k), np.full(n, record), one.t[on],
+                    np.full(n, one.noise[k]),
+                ))  # fmt: skip
+        joined = cast(Any, [np.concatenate(part) for part in zip(*blocks, strict=True)])
+        return cls(*joined)
+
+    def at(self, rows: NDArray[np.bool_]) -> "Equations":
+        """Return some of the rows."""
+        return Equations(*(column[rows] for column in cast(Any, self)))
+
+    def linearised(self, laws: Sequence[JointLaw], x: Array) -> tuple[Array, Array]:
+        """Return all columns (rows, p) at the values x, and the predicted torques (rows,)."""
+        first = self.Z.shape[1]
+        predicted, blocks = self.Z @ x[:first], [self.Z]
+        for k, law in enumerate(laws):
+            on, last = self.joint == k, first + len(law.names)
+            columns = np.zeros((self.tau.size, last - first))
+            force, columns[on] = law.at(self.v[on], x[first:last])
+            predicted[on] += force
+            blocks.append(columns)
+            first = last
+        return np.hstack(blocks), predicted
+
+    def by_joint(self, values: Array, n: int) -> Array:
+        """Return the root mean square of values by joint; NaN for joints without rows, (n,)."""
+        sums, counts = (np.bincount(self.joint, w, n) for w in (values**2, None))
+        return np.sqrt(np.divide(sums, counts, out=np.full(n, np.nan), where=counts > 0))
+
+
+class Estimated(NamedTuple):
+    """Estimate of p values: base parameters, offsets and coordinates of the laws.
+
+    Attributes:
+        equations: the rows.
+        x: values, shape (p,).
+        A: columns at x, shape (rows, p).
+        residuals: predicted - measured, shape (rows,).
+        sigma: standard deviation of the residuals of each joint, shape (n,).
+        weights: weights of the rows relative to 1 / sigma^2, shape (rows,).
+    """
+
+    equations: Equations
+    x: Array
+    A: Array
+    residuals: Array
+    sigma: Array
+    weights: Array
+
+    @property
+    def unlikely(self) -> float:
+        """Negative logarithm of the likelihood up to a constant."""
+        return float(np.sum(np.log(self.sigma[self.equations.joint])))
+
+    def covariance(self) -> Sandwich:
+        """Return the covariance of the values."""
+        e, p, size = self.equations, self.x.size, 1 / self.sigma[self.equations.joint]
+        same = (np.diff(e.joint) == 0) & (np.diff(e.record) == 0)
+        ends = [0, *(np.flatnonzero(~same) + 1).tolist(), e.tau.size]
+        channels = [
+            Channel(0, "", "", slice(i, j), e.t[i:j], e.tau[i:j], {}) for i, j in pairwise(ends)
+        ]
+        return Minimum(
+            channels=channels, unknowns=(), names=("",) * p, values=self.x, slope=np.eye(p),
+            held=np.zeros(p, dtype=bool), r=self.residuals * size * self.weights,
+            J=self.A * size[:, None], gain=np.where(self.weights < 1.0, 0.0, 1.0),
+            raw=self.residuals, noise={}, change=lambda values: 0.0,
+        ).sandwich  # fmt: skip
+
+    def refitted(self, x: Array, count: int) -> Array:
+        """Return `x` with all values after the first `count` adapted to these, to first order."""
+        weight = np.sqrt(self.weights) / self.sigma[self.equations.joint]
+        change = (self.A[:, :count] @ (x - self.x)[:count]) * weight
+        rest = self.x[count:] - _least_squares(self.A[:, count:] * weight[:, None], change)
+        return np.append(x[:count], rest)
+
+
+def estimate(
+    equations: Equations, laws: Sequence[JointLaw], base: Base, method: str
+) -> Estimated:  # fmt: skip
+    """Return the estimate by one of `METHODS`."""
+    n, tau = len(laws), equations.tau
+    x = np.concatenate([base.values, np.zeros(n), coordinates(laws)])
+    linear = all(law.linear for law in laws)
+    low, high, leap = _ends(equations, laws, x.size)
+    x = np.clip(x, low, high)
+    least = 1e-9 * np.nan_to_num(equations.by_joint(tau, n), nan=1.0) + 1e-300
+    sigma, weights = np.ones(n), np.ones(tau.size)
+    columns, predicted = equations.linearised(laws, x)
+    for _ in range(ROUNDS):
+        w = np.sqrt(weights) / sigma[equations.joint]
+        ends = np.maximum(low - x, -leap), np.minimum(high - x, leap)
+        step = _bounded(columns * w[:, None], (tau - predicted) * w, *ends)
+        before = np.linalg.norm((tau - predicted) * w)
+        for _ in range(HALVINGS):
+            columns, predicted = equations.linearised(laws, x + step)
+            if linear or np.linalg.norm((tau - predicted) * w) <= before:
+                break
+            step = step / 2
+        x, left = x + step, predicted - tau
+        spread = equations.by_joint(left, n) / np.sqrt(max(0.1, 1 - x.size / tau.size))
+        spread = np.maximum(np.nan_to_num(spread, nan=1.0), least)
+        if method == "ordinary":
+            spread = np.full(n, np.linalg.norm(left) / np.sqrt(tau.size))
+        if method == "robust":
+            size = np.maximum(np.abs(left) / spread[equations.joint], HUBER)
+            weights = HUBER / size
+        change = np.abs(np.log(spread / sigma)).max()
+        sigma = spread
+        if change < CLOSE:
+            break
+    return Estimated(equations, x, columns, predicted - tau, sigma, weights)
+
+
+def _ends(equations: Equations, laws: Sequence[JointLaw], size: int) -> tuple[Array, Array, Array]:
+    """Return bounds of all values and of their steps; values of linear laws have none, (p,) each.
+
+    Velocities of a law are near those of the record; levels are at most three times the torque.
+    """
+    low, high, leap = np.full(size, -np.inf), np.full(size, np.inf), np.full(size, np.inf)
+    first = size - sum(len(law.names) for law in laws)
+    for k, law in enumerate(laws):
+        part = slice(first, first + len(law.names))
+        first, on = part.stop, equations.joint == k
+        if on.any() and not law.linear:
+            speeds = np.log(np.quantile(np.abs(equations.v[on]), [0.01, 1.0]) * NEAR)
+            largest = 3 * float(np.abs(equations.tau[on]).max())
+            level = np.array([unit in ("N", "N m") for unit in law.units])
+            low[part] = np.where(law.logarithmic, speeds[0], 0.0)
+            high[part] = np.where(law.logarithmic, speeds[1], np.where(level, largest, np.inf))
+            leap[part] = np.where(law.logarithmic, LEAP, np.inf)
+    return low, high, leap
+
+
+def _bounded(columns: Array, values: Array, low: Array, high: Array) -> Array:
+    """Return the least squares solution; entries beyond a bound are held there, shape (p,)."""
+    step = _least_squares(columns, values)
+    out = (step < low) | (step > high)
+    if out.any():
+        step = np.where(out, np.clip(step, low, high), 0.0)
+        step += _least_squares(columns * ~out, values - columns @ step) * ~out
+    return step
+
+
+def _least_squares(columns: Array, values: Array) -> Array:
+    """Return the solution that is least in units of the lengths of the columns, shape (p,)."""
+    size = np.linalg.norm(columns, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    return np.linalg.lstsq(columns / size, values, rcond=1e-10)[0] / size

@@ -1,0 +1,1 @@
+"""Motors with gears by their nameplate, and models that they drive."""
