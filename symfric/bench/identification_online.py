@@ -108,7 +108,7 @@ class Axis:
         block = compensator(
             believed, v_blend=0.02, error_gain=20.0, offset=0.0, without=["stribeck"]
         )
-        worn = {n: self.scale * float(getattr(believed, n)) for n in free[:2]}
+        worn: dict[str, Any] = {n: self.scale * float(getattr(believed, n)) for n in free[:2]}
         worn["offset"] = d["load"] * (self.reference.t > d["at"] * self.t_end)
         if name:
             how["estimator"] = MAKE[name](
@@ -176,11 +176,13 @@ def online(quick: bool) -> Iterator[Found]:
         seconds, runs = timed(lambda name=name: [axis.loops(name) for axis in axes])
         rows = [
             judged(
-                *(run.estimates[n][begin:] for n in ("scale_coulomb", "scale_coulomb_sd")),
-                axis.scale[begin : run.force.size], axis.controller.h,
+                run.estimates["scale_coulomb"][begin:],
+                run.estimates["scale_coulomb_sd"][begin:],
+                axis.scale[begin : run.force.size],
+                axis.controller.h,
             )
             for axis, run in zip(axes, runs, strict=True)
-        ]  # fmt: skip
+        ]
         ratios = [run.rms / best for run, best in zip(runs, right, strict=True)]
         for row, own in zip(rows, ratios, strict=True):
             row["error over that of true levels"] = own
@@ -196,7 +198,7 @@ def horizons(axes: Sequence[Axis]) -> Iterator[Found]:
     """Yield the rows of moving horizons over the first 4 s, without the first second."""
     seconds, found = timed(lambda: [axis.horizon() for axis in axes])
     h, begin = EVERY * axes[0].controller.h, 100
-    rows = [judged(*(f[n][begin:] for n in ("value", "sd", "true")), h) for f in found]
+    rows = [judged(f["value"][begin:], f["sd"][begin:], f["true"][begin:], h) for f in found]
     yield from _rows("moving horizon, 100 Hz", rows)
     steps = sum(f["true"].size for f in found)
     yield f"moving horizon: {1e3 * seconds / steps:.3g} ms of processor time per sample"
