@@ -66,8 +66,9 @@ class Axis:
         """Return a law with the curve of this axis."""
         level = self.drawn["level"]
         own: dict[str, Any] = {"mu_s": 1.5 * level, "mu_d": level, "v_s": 5e-3}
+        own["sigma_2"] = 5.0 * level
         springs = {"sigma_0": 5e4 * stiffness * level, "sigma_1": 75.0 * level}
-        return kind(**own, **({} if kind is Stribeck else springs), sigma_2=5.0 * level)
+        return kind(**own, **({} if kind is Stribeck else springs))
 
     @property
     def scale(self) -> Array:
