@@ -256,6 +256,28 @@ def test_pendulum_is_balanced_on_a_cart_with_sharper_friction() -> None:
     assert np.abs(found["x"]).max() < 1.0
 
 
+def test_weights_may_be_parameters() -> None:
+    """A controller with named weights equals one with these numbers, also if they change."""
+    named = track("x", "goal", "stiff") + effort("force", "cost")
+    names = Problem(
+        Phase(rubbing(), T=0.2), named, bounds={"force": (-20.0, 20.0)},
+        p={"goal": 0.1, "stiff": 900.0, "cost": 1e-2},
+    )  # fmt: skip
+    session = controller_of(names, 0.01, tolerance=1e-6).start()
+    for stiff, cost in ((900.0, 1e-2), (400.0, 3e-2)):
+        number = track("x", "goal", stiff) + effort("force", cost)
+        problem = Problem(
+            Phase(rubbing(), T=0.2), number, bounds={"force": (-20.0, 20.0)}, p={"goal": 0.1}
+        )
+        expected = controller_of(problem, 0.01, tolerance=1e-6).start().step([0.0, 0.2])
+        session.forget()
+        found = session.step([0.0, 0.2], {"stiff": stiff, "cost": cost})
+        assert found.converged and expected.converged
+        assert found.controls["force"] == pytest.approx(expected.controls["force"], rel=1e-4)
+    with pytest.raises(ValueError, match="track: weight"):
+        track("x", 0.0, -1.0)
+
+
 def test_two_inputs_hold_an_unstable_mode_within_their_bounds() -> None:
     cost = track("x", "far", 10.0) + track("v", 0.0, 1.0) + track("w", 0.0, 1.0)
     cost += effort("a", 0.01) + effort("b", 0.01)
