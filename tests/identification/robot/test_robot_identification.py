@@ -31,6 +31,33 @@ def test_the_regressor_predicts_the_torques_of_newton_and_euler():
     assert np.allclose(MODEL.torques(q, v, a), newton_euler(q, v, a), atol=1e-12)
 
 
+def test_branches_and_listed_order_do_not_exchange_joints():
+    def limb(name, before, y):
+        return (
+            f'<link name="{name}_link"><inertial><origin xyz="0.2 {y} 0"/><mass value="{1 + y}"/>'
+            '<inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="{name}" type="revolute"><parent link="{before}"/>'
+            f'<child link="{name}_link"/><origin xyz="0 {y} 0.1"/><axis xyz="0 1 0"/></joint>'
+        )
+
+    parts = [limb("z", "base", 0.3), limb("a", "z_link", 0.1), limb("m", "base", -0.2)]
+    parts += [limb("b", "m_link", 0.4)]
+    found = list[dict[str, float]]()
+    for order in (parts, parts[::-1], [parts[k] for k in (2, 0, 3, 1)]):
+        model = RobotModel.read(f'<robot name="two"><link name="base"/>{"".join(order)}</robot>')
+        place = {name: k for k, name in enumerate(model.names)}
+        number = np.array([[float("zamb".index(name) + 1) for name in place]])
+        q, v, a = number, 2 * number, 3 * number
+        found.append(dict(zip(place, model.torques(q, v, a)[0].tolist(), strict=True)))
+    for other in found[1:]:
+        assert other == pytest.approx(found[0])
+    arm = found[0]
+    alone = RobotModel.read(f'<robot name="one"><link name="base"/>{parts[2]}{parts[3]}</robot>')
+    q, v, a = (np.array([[i * 3.0, i * 4.0]]) for i in (1, 2, 3))
+    torques = dict(zip(alone.names, alone.torques(q, v, a)[0].tolist(), strict=True))
+    assert torques == pytest.approx({name: arm[name] for name in ("m", "b")})
+
+
 def test_base_parameters_determine_all_torques():
     base = base_of(MODEL, rotors=False)
     q, v, a = MODEL.random_motion(30, seed=3)
@@ -264,8 +291,8 @@ BAD = {
         "got that of elbow with the other sign.*elbow_torque=-1",
     ),
     "all signs": (lambda: columns(turned), "got that of shoulder, elbow, slide with"),
-    "degrees": (lambda: columns(scaled("elbow", 57.3)), r"are they in deg\?.*elbow=deg"),
-    "millimetres": (lambda: columns(scaled("slide", 1e3)), r"are they in mm\?.*slide=mm"),
+    "degrees": (lambda: columns(scaled("elbow", 57.3)), r"is it in deg\?.*elbow=deg"),
+    "millimetres": (lambda: columns(scaled("slide", 1e3)), r"is it in mm\?.*slide=mm"),
     "missing": (lambda: log(elbow=None), r"expected columns elbow \[rad\], got"),
     "another robot": (strange, "robot other than 'crane'"),
     "rest": (lambda: columns(resting), "joints that move, got .* where all rest"),
