@@ -263,3 +263,15 @@ def test_names_and_units_are_those_of_the_compensator() -> None:
     assert all(block.outputs[name].unit == units[name] for name in names)
     states = {v.name: float(v.start) for v in block.states}
     assert (states["offset_now"], states["inertia_now"]) == (0.5, 2.0)
+
+
+def test_the_filter_estimates_parameters_of_the_law_itself() -> None:
+    """Levels and viscous coefficient by their own names; least squares for a law without states."""
+    motion = slid(STATIC, 6000, share=1.5)
+    for make, law in ((kalman_estimator, BRISTLES), (recursive_estimator, STATIC)):
+        block = make(law, mass=1.0, noise=NOISE, free=["mu_d", "sigma_2"])
+        found = columns(block, inputs(block, **motion))
+        assert found["mu_d"][-1] == pytest.approx(6.0, abs=3 * found["mu_d_sd"][-1])
+        assert found["sigma_2"][-1] == pytest.approx(30.0, abs=3 * found["sigma_2_sd"][-1])
+        assert (found["mu_d_sd"][-1], found["sigma_2_sd"][-1]) < (0.7, 7.0)
+        assert block.outputs["sigma_2"].unit == "N s/m"
