@@ -73,9 +73,9 @@ def _factor(where: str, unit: str, drive: Drive) -> float:
     if unit == "rad" and drive.encoder == "motor":
         return 1 / float(drive.ratio)
     if (unit == "rad") != drive.turning:
-        side = "angle" if drive.turning else "length, or an angle of the motor,"
+        such = "an angle of the load" if drive.turning else "a length, or an angle of the motor"
         hint = "lead or drum_radius make the axis of a drive linear"
-        raise checks.refused(where, f"an {side} of the load".replace("an l", "a l"), unit, hint)
+        raise checks.refused(where, such, unit, hint)
     return 1.0
 
 
