@@ -42,7 +42,7 @@ extras:
 	@if .venv-extras/bin/python -m pip install --quiet --editable ".[fmu,cuda-check,pinocchio,interop,cluster]"; then \
 		.venv-extras/bin/python -m pytest -n auto --dist loadfile -p no:cacheprovider \
 			tests/interop tests/symfric/fmu tests/symfric/integrator/cuda tests/symfric/codegen/blocks \
-			tests/symfric/multibody/urdf; \
+			tests/symfric/multibody/urdf tests/identification/robot; \
 	else echo "extras: the wheels of FMPy, NVRTC, Pinocchio, rockit, do-mpc or Dask are not available, nothing run"; fi
 
 stress: $(VENV)/.test

@@ -35,6 +35,17 @@ def mpc_drive(printed: str) -> bool:
     return near and len(rows) == 3 and "C: verified" in printed
 
 
+def hardware_in_the_loop(printed: str) -> bool:
+    """Cycles of some microseconds, and errors of the plant below those of the controller."""
+    if "expected Linux" in printed:
+        return True
+    cycle, error, plant = (
+        numbers(rf"{what}: ([\d.]+) u[ms]", printed).item()
+        for what in ("cycle", "tracking error after 0.5 s", "error of the plant")
+    )
+    return 0 < cycle < 1000 and 0.1 < error < 500 and plant < 0.1
+
+
 def out_and_back(printed: str) -> bool:
     ((found, exact),) = numbers(r"J = ([\d.]+) .* exact ([\d.]+);", printed)
     known = abs(found - exact) < 1e-3 * exact
@@ -98,6 +109,13 @@ def compensate_drive(printed: str) -> bool:
     return "C: verified" in printed and before.min() > 1000.0 and after.max() < 1.0
 
 
+def adapt_drive(printed: str) -> bool:
+    """Within 1.5 times the error with the true levels, in Python and in C; fixed levels are not."""
+    ratios = numbers(r"(?:squares|filter|all in C): ([\d.]+)", printed).ravel()
+    fixed = numbers(r"fixed levels:? (?:RMS error )?([\d.]+)", printed).ravel()
+    return ratios.size == 3 and ratios.max() < 1.5 and fixed.size == 2 and fixed.min() > 3.0
+
+
 def rabinowicz(printed: str) -> bool:
     """Exact Coulomb friction has a period of 6.069995 s."""
     period = {row[0]: float(row[1]) for row in table(printed)}
@@ -123,7 +141,14 @@ def opti_lugre(printed: str) -> bool:
 
 
 LONG = {
-    *("arm_to_a_place", "co_design", "compensate_drive", "crank_start_up", "identify_arm"),
+    *(
+        "adapt_drive",
+        "arm_to_a_place",
+        "co_design",
+        "compensate_drive",
+        "crank_start_up",
+        "identify_arm",
+    ),
     *("identify_emps", "identify_excitation", "identify_franka", "identify_gms"),
     *("identify_pendulum", "identify_raw_files", "quarter_car_profile", "robot_feed_forward"),
     *("swing_up", "through_a_spring"),
@@ -136,7 +161,8 @@ CHECKS = dict.fromkeys(LONG, motion_is_verified) | {
     for check in (
         *(mpc_drive, out_and_back, identify_arm, identify_pendulum, identify_emps, opti_lugre),
         *(identify_raw_files, identify_franka, identify_excitation, robot_feed_forward),
-        *(compensate_drive, rabinowicz, learn_drive, drive_unit),
+        *(adapt_drive, compensate_drive, rabinowicz, learn_drive, drive_unit),
+        hardware_in_the_loop,
     )
 }
 CHECKS["out_and_back"] = lambda text: motion_is_verified(text) and out_and_back(text)

@@ -84,7 +84,8 @@ class RobotModel:
         regressor, leads = _regressor(mechanism, [*weights.values()])
         bodies = tuple(link for link, weight in weights.items() if weight.mass > 0)
         numbers = [inertial_numbers(weights[link]) for link in bodies]
-        joints = tuple(moved[k] for k in leads)
+        called = dict(zip((joint.name for joint in mechanism.joints), moved, strict=True))
+        joints = tuple(called[name] for name in leads)
         return cls(source, urdf, joints, bodies, np.concatenate(numbers), regressor)
 
     @property
@@ -160,10 +161,8 @@ def inertial_of(numbers: Array) -> Inertial:
     return Inertial(m, c, J - m * (c @ c * np.eye(3) - np.outer(c, c)))
 
 
-def _regressor(
-    mechanism: Mechanism, weights: Sequence[Inertial]
-) -> tuple[ca.Function, Sequence[int]]:
-    """Return Y of the bodies with a mass, and the indices of the leading joints."""
+def _regressor(mechanism: Mechanism, weights: Sequence[Inertial]) -> tuple[ca.Function, list[str]]:
+    """Return Y of the bodies with a mass, and the names of the leading joints."""
     bodies, variables = [mechanism.bodies[0]], list[Variable]()
     for body, weight in zip(mechanism.bodies[1:], weights, strict=True):
         if not weight.mass > 0:
@@ -178,21 +177,16 @@ def _regressor(
         variables += own
         bodies.append(replace(body, mass=m, com=others[:3], inertia=others[3:], ideal=True))
     mechanism.bodies = bodies
-    eq = mechanism.prepare(tuple(variables)).eq
+    made = mechanism.prepare(tuple(variables))
+    eq = made.eq
     T, offset, leads = couplings(eq)
     motion = [ca.SX.sym(name, len(leads)) for name in ("q", "qd", "qdd")]
     y, yd, ydd = motion
     u = symbols_of(mechanism.inputs)
-    values = [
-        T @ y + offset,
-        T @ yd,
-        T @ ydd,
-        ca.SX.zeros(eq.m),
-        ca.SX(starts_of(mechanism.inputs)),
-    ]
+    none, inputs = ca.SX.zeros(eq.m), ca.SX(starts_of(mechanism.inputs))
+    values = [T @ y + offset, T @ yd, T @ ydd, none, inputs]
     balance = ca.substitute([eq.balance], [eq.q, eq.qd, eq.a, eq.lam, u], values)[0]
-    pi_symbols = symbols_of(variables)
-    slopes = ca.jacobian(ca.SX(T.T) @ balance, pi_symbols)
+    slopes = ca.jacobian(ca.SX(T.T) @ balance, symbols_of(variables))
     simple = ca.DM([1.0, *[0.0] * 9] * (len(variables) // 10))
-    Y = ca.densify(ca.substitute(slopes, pi_symbols, simple))
-    return ca.Function("Y", motion, [Y], ["q", "qd", "qdd"], ["Y"], {"cse": True}), leads
+    columns = ca.densify(ca.substitute(slopes, symbols_of(variables), simple))
+    return ca.Function("Y", motion, [columns], {"cse": True}), [made.q[k].name for k in leads]

@@ -38,6 +38,7 @@ RIDGE = 1e-9
 """Least information, relative to that of one column."""
 HALVINGS = 60
 """Largest number of reductions by 10 %."""
+UNITS = ("", "/s", "/s^2")
 GUESSES = 30
 """Number of random motions of which the best one is improved."""
 
@@ -51,7 +52,6 @@ class Excitation:
         joints, units: names and units of the coordinates.
         period: T [s].
         coefficients: c, a_1 ... a_H, b_1 ... b_H of each joint, shape (n, 1 + 2 H).
-        torques: torques of the file's inertias at `times(100 / T)`, without friction.
         condition: condition number of the scaled regressor.
         gain: information relative to the best random motion, as the factor by which standard
             errors decrease on average (geometric mean).
@@ -68,10 +68,8 @@ class Excitation:
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         """Return position, velocity and acceleration at times t (N,), shape (N, n) each."""
-        harmonics = (self.coefficients.shape[1] - 1) // 2
-        return tuple(
-            part @ self.coefficients.T for part in _waves(np.asarray(t), self.period, harmonics)
-        )  # type: ignore[return-value]
+        q, v, a = _waves(t, self.period, self.coefficients.shape[1] // 2)
+        return q @ self.coefficients.T, v @ self.coefficients.T, a @ self.coefficients.T
 
     def to_csv(self, path: str | Path, rate: float = 1000.0, periods: int = 1) -> Path:
         """Write time, positions and velocities in SI units at `rate` [Hz].
@@ -83,11 +81,8 @@ class Excitation:
         t = np.arange(round(count * self.period * rate) + 1) / rate
         q, v, _ = self.at(t)
         pairs = [*zip(self.joints, self.units, strict=True)]
-        header = [
-            "t [s]",
-            *(f"{j} [{u}]" for j, u in pairs),
-            *(f"{j}_velocity [{u}/s]" for j, u in pairs),
-        ]
+        header = ["t [s]", *(f"{joint} [{unit}]" for joint, unit in pairs)]
+        header += [f"{joint}_velocity [{unit}/s]" for joint, unit in pairs]
         write_table(path, header, np.column_stack([t, q, v]).tolist())
         return Path(path)
 
@@ -99,11 +94,11 @@ class Excitation:
         t = np.linspace(0.0, self.period, 400)
         figure, axes = panels(3, width=8.0)
         unit = " or ".join(dict.fromkeys(self.units))
-        labels = (f"position [{unit}]", f"velocity [{unit}/s]", f"acceleration [{unit}/s^2]")
-        for axis, part, label in zip(axes, self.at(t), labels, strict=True):
+        labels = ("position", "velocity", "acceleration")
+        for axis, part, label, per in zip(axes, self.at(t), labels, UNITS, strict=True):
             for k, joint in enumerate(self.joints):
                 axis.plot(t, part[:, k], label=joint, **line(k))
-            axis.set_ylabel(label.replace(" or rad/s", "/s or rad/s"))
+            axis.set_ylabel(f"{label} [{unit}{per}]")
         axes[-1].set_xlabel("t [s]")
         axes[0].legend(loc="upper right", fontsize="small", ncols=4)
         return save(figure, path)
@@ -141,176 +136,152 @@ def excitation(
     H = checks.count(f"{WHERE}: harmonics", harmonics, least=2)
     share = checks.number(f"{WHERE}: share", share, above=0.0, upper=1.0)
     checks.count(f"{WHERE}: iterations", iterations)
+    where = f"{WHERE}: acceleration"
+    most = inf if acceleration is None else checks.number(where, acceleration, above=0.0)
     model = RobotModel.read(urdf)
-    limits, count = _Limits.of(model, share, acceleration), SAMPLES * H
-    waves = _waves(period * np.arange(count) / count, period, H)
-    rows = _rows(model, limits)
-    guess = _guess(model, waves, limits, rows, seed)
-    found = _at_rest(_improved(model, waves, limits, rows, guess, iterations))
-    fine = _waves(np.linspace(0.0, period, 40 * H), period, H)
-    chosen = _inside(model, limits, found, fine)
-    before, after = (_columns(rows, waves, each) for each in (guess, chosen))
-    more = np.linalg.slogdet(after.T @ after)[1] - np.linalg.slogdet(before.T @ before)[1]
-    return Excitation(
-        model.names, model.units, period, chosen, float(np.linalg.cond(after / _sizes(after))),
-        float(np.exp(more / (2 * after.shape[1]))),
-    )  # fmt: skip
+    low, high = model.span
+    limits = [(high - low) / 2, model.limits("velocity"), np.full(low.size, most)]
+    limits = [MARGIN * share * limit for limit in (*limits, model.limits("effort"))]
+    task = _Task(model, (low + high) / 2, limits, _rows(model, limits), period, H)
+    guess = task.guess(seed, np.linspace(0.0, period, SAMPLES * H, endpoint=False))
+    better = task.improved(guess, iterations)
+    chosen = task.inside(better, np.linspace(0.0, period, 4 * SAMPLES * H))
+    columns = task.columns(chosen)
+    more = _information(columns) - _information(task.columns(guess))
+    condition = float(np.linalg.cond(columns / _sizes(columns)))
+    gain = float(np.exp(more / (2 * columns.shape[1])))
+    return Excitation(model.names, model.units, period, chosen, condition, gain)
 
 
-def _improved(
-    model: RobotModel, waves: Sequence[Array], limits: "_Limits", rows: ca.Function, guess: Array,
-    iterations: int,
-) -> Array:  # fmt: skip
-    """Return coefficients with more information, found by Ipopt from a guess."""
-    A, count = _columns(rows, waves, guess), len(waves[0])
-    size = _sizes(A)
-    gram = (A / size).T @ (A / size) + RIDGE * np.eye(size.size)
-    whiten = np.linalg.inv(np.linalg.cholesky(gram)) / size
-    c = ca.MX.sym("c", *guess.shape)
-    q, v, a = (ca.mtimes(c, ca.DM(part.T)) for part in waves)
-    X = ca.mtimes(ca.DM(whiten), ca.reshape(rows.map(count)(q, v, a), size.size, -1))
-    information = ca.log(ca.det(ca.mtimes(X, X.T))) / size.size
-    tau = _torques(model).map(count)(q, v, a)
-    held, pairs = list[ca.MX](), ((q - ca.DM(limits.middle), limits.half), (v, limits.speed),
-                                  (a, limits.acceleration), (tau, limits.effort))  # fmt: skip
-    for signal, most in pairs:
-        finite = np.flatnonzero(np.isfinite(most)).tolist()
-        if finite:
-            held.append(ca.vec(signal[finite, :] / ca.DM(most[finite])))
-    ends = ca.vec(ca.mtimes(c, ca.DM(_rest(guess.shape[1] // 2))))
-    g = ca.vertcat(*held, ends)
-    bound = np.append(np.ones(g.numel() - ends.numel()), np.zeros(ends.numel()))
-    options = {
-        "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.tol": 1e-3,
-        "ipopt.max_iter": iterations, "ipopt.hessian_approximation": "limited-memory",
-    }  # fmt: skip
-    problem = {"x": ca.vec(c), "f": -information, "g": g}
-    solver = ca.nlpsol("excitation", "ipopt", problem, options)
-    found = solver(x0=guess.ravel(order="F"), lbg=-bound, ubg=bound)
-    return np.asarray(found["x"]).reshape(guess.shape, order="F")
+class _Task(NamedTuple):
+    """Search of coefficients c, a, b, shape (n, 1 + 2 H).
 
+    Attributes:
+        model: the robot.
+        middle: middle positions, shape (n,).
+        limits: limits of position about the middle, velocity, acceleration, effort, (n,) each.
+        rows: CasADi function (q, qd, qdd) -> weighted columns (p, n), torques (n,).
+        period, harmonics: T [s] and H.
+    """
 
-class _Limits(NamedTuple):
-    """Limits of all joints with a margin, shape (n,) each; infinite without one."""
-
+    model: RobotModel
     middle: Array
-    half: Array
-    speed: Array
-    acceleration: Array
-    effort: Array
+    limits: Sequence[Array]
+    rows: ca.Function
+    period: float
+    harmonics: int
 
-    @classmethod
-    def of(cls, model: RobotModel, share: float, acceleration: float | None) -> "_Limits":
-        """Return the part `share` of the limits of the file."""
-        where = f"{WHERE}: acceleration"
-        most = inf if acceleration is None else checks.number(where, acceleration, above=0.0)
-        (low, high), part = model.span, MARGIN * share
-        speed, effort = (part * model.limits(key) for key in ("velocity", "effort"))
-        fastest = np.full(low.size, share * most)
-        return cls((low + high) / 2, part * (high - low) / 2, speed, fastest, effort)
+    @property
+    def waves(self) -> tuple[Array, Array, Array]:
+        """Unit motions at the samples of the optimisation."""
+        t = np.linspace(0.0, self.period, SAMPLES * self.harmonics, endpoint=False)
+        return _waves(t, self.period, self.harmonics)
+
+    def columns(self, c: Array) -> Array:
+        """Return the weighted columns over all samples and joints, shape (N n, p)."""
+        q, v, a = (c @ part.T for part in self.waves)
+        return self.rows.map(q.shape[1])(q, v, a)[0].full().T
+
+    def guess(self, seed: int, t: Array) -> Array:
+        """Return the random motion within the limits that has the most information."""
+        rng, shape = np.random.default_rng(seed), (self.middle.size, 2 * self.harmonics - 1)
+        basis, found = _at_rest(self.harmonics), list[Array]()
+        for _ in range(GUESSES):
+            c = rng.normal(size=shape) @ basis.T
+            q = self.waves[0] @ c.T
+            c[:, 0] += self.middle - (q.max(axis=0) + q.min(axis=0)) / 2
+            found.append(self.inside(c, t, fill=True))
+        return max(found, key=lambda c: _information(self.columns(c)))
+
+    def improved(self, guess: Array, iterations: int) -> Array:
+        """Return coefficients with more information, found by Ipopt."""
+        start = self.columns(guess)
+        scaled = start / _sizes(start)
+        gram = scaled.T @ scaled + RIDGE * np.eye(scaled.shape[1])
+        whiten = np.linalg.inv(np.linalg.cholesky(gram)) / _sizes(start)
+        basis = _at_rest(self.harmonics)
+        z = ca.MX.sym("z", guess.shape[0], basis.shape[1])
+        q, v, a = (ca.mtimes(z, ca.DM((part @ basis).T)) for part in self.waves)
+        columns, tau = self.rows.map(q.shape[1])(q, v, a)
+        white = ca.mtimes(ca.DM(whiten), ca.reshape(columns, whiten.shape[0], -1))
+        information = ca.log(ca.det(ca.mtimes(white, white.T))) / whiten.shape[0]
+        held = list[ca.MX]()
+        for signal, most in zip((q - ca.DM(self.middle), v, a, tau), self.limits, strict=True):
+            finite = np.flatnonzero(np.isfinite(most)).tolist()
+            held += [ca.vec(signal[finite, :] / ca.DM(most[finite]))] if finite else []
+        options = {
+            "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.tol": 1e-3,
+            "ipopt.max_iter": iterations, "ipopt.hessian_approximation": "limited-memory",
+        }  # fmt: skip
+        problem = {"x": ca.vec(z), "f": -information, "g": ca.vertcat(*held)}
+        solver = ca.nlpsol("excitation", "ipopt", problem, options)
+        found = solver(x0=(guess @ basis).ravel(order="F"), lbg=-1.0, ubg=1.0)
+        return np.asarray(found["x"]).reshape(z.shape, order="F") @ basis.T
+
+    def inside(self, c: Array, t: Array, *, fill: bool = False) -> Array:
+        """Return a motion scaled about the middle until it is within the limits at times t.
+
+        With `fill`, smaller motions are enlarged.
+
+        Raises:
+            ValueError: the torques of standstill exceed the limits of the effort.
+        """
+        waves = _waves(t, self.period, self.harmonics)
+        centre = self.middle[:, None] * np.eye(1, c.shape[1])
+        c = c - centre
+        pairs = zip(waves, self.limits[:3], strict=True)
+        size = np.max([np.abs(part @ c.T).max(axis=0) / limit for part, limit in pairs], axis=0)
+        c, large = c / (size if fill else np.maximum(size, 1.0))[:, None], np.zeros(0)
+        for _ in range(HALVINGS):
+            tau = self.model.torques(*(part @ (c + centre).T for part in waves))
+            large = np.abs(tau).max(axis=0) > self.limits[3] / MARGIN
+            if not large.any():
+                return c + centre
+            c = 0.9 * c
+        lacking = [name for name, on in zip(self.model.names, large, strict=True) if on]
+        raise ValueError(
+            f"{WHERE}: expected efforts that carry the robot in the middle of its range, got too "
+            f"small ones of {', '.join(lacking)}"
+        )
 
 
 def _waves(t: Array, period: float, harmonics: int) -> tuple[Array, Array, Array]:
     """Return q, q' and q'' of unit coefficients at times t (N,), shape (N, 1 + 2 H) each."""
-    w = 2 * np.pi / period * np.arange(1, harmonics + 1)
+    w = 2 * np.pi / period * np.arange(1.0, harmonics + 1)
     sine, cosine = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
-    one, none = np.ones((t.size, 1)), np.zeros((t.size, 1))
-    acceleration: Array = np.hstack([none, -w * sine, w * cosine]).astype(np.float64)
-    return np.hstack([one, sine / w, -cosine / w]), np.hstack([none, cosine, sine]), acceleration
+    none = np.zeros((len(sine), 1))
+    a: Array = np.hstack([none, -w * sine, w * cosine])
+    return np.hstack([none + 1, sine / w, -cosine / w]), np.hstack([none, cosine, sine]), a
 
 
-def _rest(harmonics: int) -> Array:
-    """Return two columns whose products with the coefficients vanish at rest, (1 + 2 H, 2)."""
-    found = np.zeros((1 + 2 * harmonics, 2))
-    found[1 : harmonics + 1, 0] = 1.0
-    found[harmonics + 1 :, 1] = np.arange(1, harmonics + 1)
-    return found
+def _at_rest(harmonics: int) -> Array:
+    """Return a basis of coefficients that start and end at rest, shape (1 + 2 H, 2 H - 1)."""
+    none = np.zeros(harmonics)
+    ends = np.array([[0, *(none + 1), *none], [0, *none, *np.arange(1, harmonics + 1)]])
+    return np.linalg.svd(ends)[2][2:].T
 
 
-def _at_rest(coefficients: Array) -> Array:
-    """Return the nearest coefficients that start and end at rest."""
-    B = _rest((coefficients.shape[1] - 1) // 2)
-    return coefficients - coefficients @ B @ np.linalg.pinv(B)
-
-
-def _torques(model: RobotModel) -> ca.Function:
-    """Return the function (q, qd, qdd) -> torques of the inertias of the file."""
-    motion = [ca.SX.sym(name, len(model.joints)) for name in ("q", "qd", "qdd")]
-    return ca.Function("tau", motion, [model.regressor(*motion) @ ca.DM(model.pi)])
-
-
-def _rows(model: RobotModel, limits: _Limits) -> ca.Function:
-    """Return the function (q, qd, qdd) -> weighted columns of the torques, shape (p, n)."""
-    n, chosen = len(model.joints), base_of(model, False).chosen
-    q, v, a = (ca.SX.sym(name, n) for name in ("q", "qd", "qdd"))
+def _rows(model: RobotModel, limits: Sequence[Array]) -> ca.Function:
+    """Return the function (q, qd, qdd) -> weighted columns (p, n), torques of the file (n,)."""
+    n, (half, speed, _, effort) = len(model.joints), limits
+    motion = [ca.SX.sym(name, n) for name in ("q", "qd", "qdd")]
+    every, v = model.regressor(*motion), motion[1]
     usual = np.std(model.torques(*model.random_motion(GUESSES)), axis=0)
-    weight = 1 / np.where(np.isfinite(limits.effort), limits.effort, np.maximum(usual, 1e-9))
-    creep = CREEP * np.where(np.isfinite(limits.speed), limits.speed, limits.half)
+    weight = 1 / np.where(np.isfinite(effort), effort, np.maximum(usual, 1e-9))
+    creep = CREEP * np.where(np.isfinite(speed), speed, half)
     friction = [ca.diag(ca.tanh(v / ca.DM(creep))), ca.diag(v), ca.SX.eye(n)]
-    Y = ca.horzcat(model.regressor(q, v, a)[:, list(chosen)], *friction)
-    return ca.Function("rows", [q, v, a], [ca.densify((ca.diag(ca.DM(weight)) @ Y).T)])
+    columns = ca.horzcat(every[:, list(base_of(model, False).chosen)], *friction)
+    weighted = ca.densify((ca.diag(ca.DM(weight)) @ columns).T)
+    return ca.Function("rows", motion, [weighted, every @ ca.DM(model.pi)])
 
 
-def _columns(rows: ca.Function, waves: Sequence[Array], coefficients: Array) -> Array:
-    """Return the weighted columns over all samples and joints, shape (N n, p)."""
-    q, v, a = (coefficients @ part.T for part in waves)
-    return rows.map(q.shape[1])(q, v, a).full().T
-
-
-def _sizes(A: Array) -> Array:
-    size = np.linalg.norm(A, axis=0)
+def _sizes(columns: Array) -> Array:
+    size = np.linalg.norm(columns, axis=0)
     return np.where(size > 0, size, 1.0)
 
 
-def _guess(
-    model: RobotModel, waves: Sequence[Array], limits: _Limits, rows: ca.Function, seed: int
-) -> Array:
-    """Return the random motion within the limits that has the most information."""
-    rng, n, width = np.random.default_rng(seed), len(model.joints), waves[0].shape[1]
-    best, most = np.zeros((n, width)), -inf
-    for _ in range(GUESSES):
-        found = _at_rest(rng.normal(size=best.shape))
-        q = waves[0][:, 1:] @ found[:, 1:].T
-        found[:, 0] = limits.middle - (q.max(axis=0) + q.min(axis=0)) / 2
-        found = _inside(model, limits, found, waves, fill=True)
-        A = _columns(rows, waves, found)
-        gram = A.T @ A / np.outer(_sizes(A), _sizes(A)) + RIDGE * np.eye(A.shape[1])
-        information = float(np.linalg.slogdet(gram)[1] + 2 * np.sum(np.log(_sizes(A))))
-        if information > most:
-            best, most = found, information
-    return best
-
-
-def _inside(
-    model: RobotModel, limits: _Limits, coefficients: Array, waves: Sequence[Array],
-    *, fill: bool = False,
-) -> Array:  # fmt: skip
-    """Return a motion scaled about the middle of its limits, so that it satisfies them.
-
-    Args:
-        model, limits: the robot.
-        coefficients: the motion, shape (n, 1 + 2 H).
-        waves: unit motions at the times at which limits are checked.
-        fill: enlarge smaller motions, too.
-
-    Raises:
-        ValueError: the torques of standstill exceed the limits of the effort.
-    """
-    centre = limits.middle[:, None] * np.eye(1, coefficients.shape[1])
-    c = coefficients - centre
-    signals = (np.abs(part @ c.T).max(axis=0) for part in waves)
-    pairs = zip(signals, (limits.half, limits.speed, limits.acceleration), strict=True)
-    size = np.max([most_of / limit for most_of, limit in pairs], axis=0)
-    c = c / (size if fill else np.maximum(size, 1.0))[:, None]
-    large = np.zeros(len(c), dtype=np.bool_)
-    for _ in range(HALVINGS):
-        tau = model.torques(*(part @ (c + centre).T for part in waves))
-        large = np.abs(tau).max(axis=0) > limits.effort / MARGIN
-        if not large.any():
-            return c + centre
-        c = 0.9 * c
-    lacking = ", ".join(np.array(model.names)[large])
-    raise ValueError(
-        f"{WHERE}: expected efforts that carry the robot in the middle of its range, got too small "
-        f"ones of {lacking}"
-    )
+def _information(columns: Array) -> float:
+    """Return log det of the information, at least `RIDGE` for each scaled column."""
+    size = _sizes(columns)
+    gram = columns.T @ columns / np.outer(size, size) + RIDGE * np.eye(size.size)
+    return float(np.linalg.slogdet(gram)[1] + 2 * np.sum(np.log(size)))

@@ -35,6 +35,10 @@ SURE = 4.0
 """Standard errors by which the power of friction must be negative."""
 WORK = 0.02
 """Power of friction, relative to that of the torque, below which its sign is not checked."""
+POOR = 5.0
+"""Error of a torque above which rotor inertias are tried [%]."""
+WORSE = 1.2
+"""Ratio of the errors with consistent inertias and without constraint that is reported."""
 BETTER = 0.3
 """Decrease of the mean logarithm of the residuals for which a torque has the wrong sign."""
 
@@ -114,7 +118,7 @@ def identify_robot(
         errors = _errors(made, found.x, Equations.of(model, others, made.base, rotors))
         held = f"{validation.name}, which did not enter the fit"
     pi, spins, x = _consistent(made, found, cover)
-    training = _errors(made, found.x, equations)
+    training, physical = (_errors(made, values, equations) for values in (found.x, x))
     is_text = isinstance(urdf, str) and urdf.lstrip().startswith("<")
     return RobotFit(
         name=model.urdf.name,
@@ -128,8 +132,8 @@ def identify_robot(
         information=made.information,
         validation=errors,
         training=training,
-        consistent=_errors(made, x, equations),
-        findings=tuple(_findings(made, training)),
+        consistent=physical,
+        findings=(*_findings(made, training, physical), *_rotors_missing(made, found, method)),
         series=_series(made, found),
         held=held,
     )
@@ -296,7 +300,9 @@ def _for_consistent(made: _Prepared, x: Array) -> dict[str, Any]:
     return {"offsets": offsets, "law_data": laws, "urdf_friction": simple}
 
 
-def _findings(made: _Prepared, training: Mapping[str, TorqueError]) -> Iterator[str]:
+def _findings(
+    made: _Prepared, training: Mapping[str, TorqueError], physical: Mapping[str, TorqueError]
+) -> Iterator[str]:
     """Yield doubts about data and values."""
     given = [j.name for j in made.model.joints if j.friction or j.damping]
     if given:
@@ -307,6 +313,24 @@ def _findings(made: _Prepared, training: Mapping[str, TorqueError]) -> Iterator[
             f"The model does not describe the torques of {', '.join(large)} (more than {LARGE:g} % "
             "remains): check columns, units and whether the log belongs to this robot."
         )
+    worse = [joint for joint, error in physical.items() if error.rms > WORSE * training[joint].rms]
+    if worse and not large:
+        yield (
+            f"No positive masses explain the torques of {', '.join(worse)} as well as the estimate:"
+            " are the kinematics and the friction law right?"
+        )
+
+
+def _rotors_missing(made: _Prepared, found: Estimated, method: str) -> Iterator[str]:
+    """Yield a message if rotor inertias reduce large errors."""
+    before = _errors(made, found.x, made.equations)
+    if made.rotors or max(error.percent for error in before.values()) < POOR:
+        return
+    base = base_of(made.model, rotors=True)
+    equations = Equations.of(made.model, made.motions, base, rotors=True)
+    after = estimate(equations, made.laws, base, method)
+    if found.unlikely - after.unlikely > BETTER * equations.tau.size / len(made.laws):
+        yield "Rotor inertias explain part of the errors: pass rotors=True (--rotors)."
 
 
 def _series(made: _Prepared, found: Estimated) -> tuple[TorqueSeries, ...]:

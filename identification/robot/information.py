@@ -72,7 +72,7 @@ def information(
     alone = (columns[:, :b] - along @ (along.T @ columns[:, :b])) * base.scales
     _, d, Vt = np.linalg.svd(alone, full_matrices=False)
     known = d > 1 / SURE
-    error = np.sqrt(np.sum((Vt.T / np.sqrt(1 + d**2)) ** 2, axis=1))
+    error = np.sqrt(np.sum((Vt.T / np.maximum(d, 1e-300)) ** 2, axis=1))
     loose = [int(k) for k in np.argsort(-error) if error[k] > SURE]
     moves = np.logical_or.reduce([one.moves for one in motions])
     resting = tuple(joint for joint, on in zip(model.names, moves, strict=True) if not on)

@@ -6,10 +6,10 @@ and decimated. The friction of a joint is ambiguous where its own velocity chang
 equations of this joint are omitted there.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import pi
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,10 @@ BANDS = 10.0
 """Largest cut-off of the positions, relative to the bandwidth of the motion."""
 NOISE = 1e-4
 """Largest share of noise in the power of an acceleration, which lowers the inertia."""
+MOST = 20_000
+"""Largest number of equations per record and joint."""
+UNLIMITED = 20.0
+"""Usual range of joints without limits [rad, m]."""
 FEWEST = 10
 """Smallest number of equations of a record."""
 MISTAKES = {"rad": (pi / 180, "deg"), "m": (1e-3, "mm")}
@@ -67,63 +71,53 @@ class RobotMotion:
     __repr__ = brief
 
 
-def column(record: Record, joint: str, names: Iterable[str]) -> str | None:
-    """Return the channel of a joint, None without one."""
-    return next((n for n in (name.format(joint) for name in names) if n in record), None)
+class Channels(NamedTuple):
+    """Channels of a joint in a record; None if missing."""
+
+    position: str | None
+    velocity: str | None
+    torque: str | None
 
 
-def check_columns(model: RobotModel, data: Dataset) -> None:
-    """Check names, units and ranges of the columns.
+def channels(model: RobotModel, record: Record) -> list[Channels]:
+    """Return the channels of each joint."""
+    names = (POSITIONS, VELOCITIES, TORQUES)
+    return [
+        Channels(*(next((n for n in (f.format(j) for f in forms) if n in record), None)
+                   for forms in names))
+        for j in model.names
+    ]  # fmt: skip
 
-    Raises:
-        ValueError: missing columns, units of another kind, positions in degrees or millimetres;
-            all problems at once.
-    """
-    problems = list[str]()
-    for record in data:
-        missing = [
-            f"{joint} [{unit}]" if names is POSITIONS else f"{joint}_torque [{force}]"
-            for names in (POSITIONS, TORQUES)
-            for joint, unit, force in zip(model.names, model.units, model.forces, strict=True)
-            if column(record, joint, names) is None
-        ]
-        have, hint = ", ".join(record.signals), "name others with columns= (--column NAME=COLUMN)"
-        if len(missing) == 2 * len(model.joints):
+
+def problems(model: RobotModel, record: Record) -> Iterator[str]:
+    """Yield messages about missing columns, other units, positions in degrees or millimetres."""
+    found, where = channels(model, record), f"data '{record.name}'"
+    every = [*zip(found, model.names, model.units, model.forces, strict=True)]
+    missing = [f"{joint} [{unit}]" for c, joint, unit, _ in every if c.position is None]
+    missing += [f"{joint}_torque [{force}]" for c, joint, _, force in every if c.torque is None]
+    if missing:
+        hint = "name others with columns= (--column NAME=COLUMN), or fix joints in the URDF"
+        if len(missing) == 2 * len(found):
             hint = f"is it the log of a robot other than '{model.urdf.name}'? {hint}"
-        if missing:
-            problems.append(
-                f"data '{record.name}': expected columns {', '.join(missing)}, got {have}; {hint}, "
-                "or fix joints without a log in the URDF"
-            )
-        else:
-            problems += _wrong_numbers(model, record)
-    if problems:
-        raise ValueError(f"{WHERE}: " + "; ".join(problems))
-
-
-def _wrong_numbers(model: RobotModel, record: Record) -> Iterator[str]:
-    """Yield messages about units and positions of one record."""
+        have = ", ".join(record.signals)
+        yield f"{where}: expected columns {', '.join(missing)}, got {have}; {hint}"
+        return
     low, high = model.limits("lower", -np.inf), model.limits("upper")
-    for k, joint in enumerate(model.names):
-        for names, unit in ((POSITIONS, model.units[k]), (TORQUES, model.forces[k])):
-            channel = column(record, joint, names) or joint
-            if record.unit(channel) not in ("", unit):
-                yield f"column {channel}: expected unit {unit}, got {record.unit(channel)}"
-        channel = column(record, joint, POSITIONS) or joint
-        q, (factor, other) = record[channel], MISTAKES[model.units[k]]
-        span = high[k] - low[k] if np.isfinite(high[k] - low[k]) else 20.0
-        ends = float(q.min()), float(q.max())
-        slack = 0.1 * span
-        inside = factor * ends[0] > low[k] - slack and factor * ends[1] < high[k] + slack
+    for k, (c, joint, unit, force) in enumerate(every):
+        name = c.position or joint
+        for channel, wanted in ((name, unit), (c.torque or joint, force)):
+            if record.unit(channel) not in ("", wanted):
+                yield f"{where}: column {channel}: expected {wanted}, got {record.unit(channel)}"
+        q, (factor, other) = record[name], MISTAKES[unit]
+        span, ends = high[k] - low[k], (float(q.min()), float(q.max()))
+        span = span if np.isfinite(span) else UNLIMITED
         if ends[1] - ends[0] > 1.5 * span:
             hint = "is it the log of another robot?"
-            if inside:
-                hint = f"are they in {other}? units={{'{channel}': '{other}'}} "
-                hint += f"(--unit {channel}={other})"
+            if factor * (ends[1] - ends[0]) < 1.5 * span:
+                hint = f"is it in {other}? units={{'{name}': '{other}'}} (--unit {name}={other})"
             yield (
-                f"data '{record.name}': column {channel}: expected positions within "
-                f"{low[k]:g} ... {high[k]:g} {model.units[k]}, got {ends[0]:.4g} ... "
-                f"{ends[1]:.4g}; {hint}"
+                f"{where}: column {name}: expected positions within {low[k]:g} ... {high[k]:g} "
+                f"{unit}, got {ends[0]:.4g} ... {ends[1]:.4g}; {hint}"
             )
 
 
@@ -137,55 +131,53 @@ def motions(model: RobotModel, data: Dataset, filter: Filter | None) -> tuple[Ro
             for which noise has a negligible share in the acceleration.
 
     Raises:
-        ValueError: see `check_columns`; unequal intervals, records shorter than the filter, or no
-            joint moves.
+        ValueError: see `problems`; unequal intervals, records shorter than the filter, or no joint
+            moves.
     """
-    check_columns(model, data)
+    if wrong := [text for record in data for text in problems(model, record)]:
+        raise ValueError(f"{WHERE}: " + "; ".join(wrong))
     found = tuple(_motion(model, record.uniform(), filter) for record in data)
     if not any(one.moves.any() for one in found):
         raise ValueError(f"{WHERE}: expected joints that move, got '{data.name}', where all rest")
     return found
 
 
-def _signals(model: RobotModel, record: Record) -> Iterator[tuple[Array, Array | None, Array]]:
-    """Yield position, velocity if measured, and torque of each joint."""
-    for joint in model.names:
-        q, tau = (record[column(record, joint, names) or joint] for names in (POSITIONS, TORQUES))
-        rate = column(record, joint, VELOCITIES)
-        yield q, None if rate is None else record[rate], tau
+Signals = tuple[Array, Array | None, Array]
+"""Position, velocity if measured, and torque of a joint."""
+
+
+def _signals(model: RobotModel, record: Record) -> list[Signals]:
+    """Return the signals of each joint."""
+    return [
+        (record[q or ""], None if v is None else record[v], record[tau or ""])
+        for q, v, tau in channels(model, record)
+    ]
 
 
 def _cutoff(q: Array, v: Array | None, mixer: Velocity, step: float) -> float | None:
     """Return the cut-off [Hz] that suits one joint; None if its motion does not exceed noise."""
-    band, highest = mixer.band(q, v, step), 0.1 / step
-    for cutoff in np.geomspace(BANDS, 2.0, 8) * band:
-        filter = Filter(min(float(cutoff), highest))
-        _, speed, acceleration = (
-            y[filter.inside(q.size, step)] for y in derivatives(q, v, step, filter, mixer)
-        )
-        noise = mixer.errors(filter, step)
-        if not speed.size:
-            continue
-        if noise[1] ** 2 < NOISE * np.mean(acceleration**2):
+    for cutoff in (np.geomspace(BANDS, 2.0, 8) * mixer.band(q, v, step)).tolist():
+        filter = Filter(min(cutoff, 0.1 / step))
+        a = derivatives(q, v, step, filter, mixer)[2][filter.inside(q.size, step)]
+        if a.size and mixer.errors(filter, step)[1] ** 2 < NOISE * np.mean(a**2):
             return filter.cutoff
     return None
 
 
 def _motion(model: RobotModel, record: Record, filter: Filter | None) -> RobotMotion:
     step = record.step
-    signals = [*_signals(model, record)]
+    signals = _signals(model, record)
     mixers = [Velocity.of(q, v, step) for q, v, _ in signals]
     if filter is None:
-        each = [
-            _cutoff(q, v, mixer, step) for (q, v, _), mixer in zip(signals, mixers, strict=True)
-        ]
-        known = [cutoff for cutoff in each if cutoff is not None]
+        pairs = zip(signals, mixers, strict=True)
+        known = [found for (q, v, _), mixer in pairs if (found := _cutoff(q, v, mixer, step))]
         filter = Filter(float(np.median(known)) if known else 0.1 / step)
     if not filter.cutoff * step < 0.5:
         such = f"below half the sample rate, {0.5 / step:g} Hz"
         raise ValueError(f"data '{record.name}': cut-off: expected {such}, got {filter.cutoff:g}")
     if filter.decimation == 1:
-        filter = replace(filter, decimation=max(1, round(1 / (RATE * filter.cutoff * step))))
+        usual = max(1, round(1 / (RATE * filter.cutoff * step)))
+        filter = replace(filter, decimation=max(usual, record.size // MOST))
     inside = filter.inside(record.size, step)
     rows = Decimation(record.time[inside].size, filter.decimation)
     if rows.rows < FEWEST:

@@ -14,7 +14,7 @@ from identification.result.series import Estimate
 from identification.result.stored import from_data, plain, revived
 from identification.robot.dynamics import RobotModel, inertial_of
 from identification.robot.information import Information
-from identification.robot.update import updated_urdf, write_urdf
+from identification.robot.update import updated_urdf
 from symfric.foundation import checks
 from symfric.foundation.files import read_json, write_text
 from symfric.foundation.shown import Showing, Shown, Table, counted
@@ -124,16 +124,12 @@ class RobotFit(Showing):
             cells = [_cell(own[n]) if n in own else "-" for n in names]
             last = ("-", "-") if off is None else (f"{off.rms:.3g}", f"{off.percent:.2g} %")
             rows.append((joint, *cells, *last))
+        laws = " and ".join(dict.fromkeys(self.laws.values()))
         lines = (*self.information.sentences, f"Error of the torques: {self.held}.")
         return Shown(
-            f"robot '{self.name}': {counted(len(self.joints), 'joint')}, law {self._law}",
+            f"robot '{self.name}': {counted(len(self.joints), 'joint')}, law {laws}",
             lines, Table(header, tuple(rows)), self.findings,
         )  # fmt: skip
-
-    @property
-    def _law(self) -> str:
-        """Texts of all laws."""
-        return " and ".join(dict.fromkeys(self.laws.values()))
 
     def __str__(self) -> str:
         shown = self.shown()
@@ -181,14 +177,10 @@ class RobotFit(Showing):
         checks.choice("friction_data: joint", joint, self.joints)
         turning = self.model.units[self.joints.index(joint)] == "rad"
         units = {"v": "rad/s", "F": "N m"} if turning else {"v": "m/s", "F": "N"}
-        each = (
-            Dataset.of(
-                t=s.t, v=s.v, F=s.measured - s.rigid, units=units, name=f"{joint} of {s.record}"
-            )
-            for s in self.series
-            if s.joint == joint
-        )
-        return Dataset(tuple(one for data in each for one in data))
+        own = [one for one in self.series if one.joint == joint]
+        friction = [(one.t, one.v, one.measured - one.rigid, one.record) for one in own]
+        each = [Dataset.of(t=t, v=v, F=F, units=units, name=name)[0] for t, v, F, name in friction]
+        return Dataset(tuple(each))
 
     def to_urdf(self, path: str | Path) -> Path:
         """Write the URDF with consistent inertias, Coulomb friction and damping.
@@ -197,7 +189,8 @@ class RobotFit(Showing):
         f sign(w) + d w, to which other laws are approximated at the recorded speeds.
         """
         text = updated_urdf(self.model, np.array(self.inertial), self.urdf_friction)
-        return write_urdf(path, text)
+        write_text(path, f'<?xml version="1.0"?>\n{text}\n')
+        return Path(path)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as JSON-compatible data, without the torques over time."""

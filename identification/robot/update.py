@@ -6,7 +6,6 @@ from pathlib import Path
 
 from identification.data.record import Array
 from identification.robot.dynamics import COLUMNS, ROWS, RobotModel, inertial_of
-from symfric.foundation.files import write_text
 from symfric.multibody.urdf import carried
 from symfric.multibody.urdf_file import tags
 
@@ -49,13 +48,7 @@ def updated_urdf(model: RobotModel, pi: Array, friction: Mapping[str, tuple[floa
             dynamics.set("friction", repr(max(found[0], 0.0)))
             dynamics.set("damping", repr(max(found[1], 0.0)))
     ET.indent(robot)
-    return ET.tostring(robot, encoding="unicode") + "\n"
-
-
-def write_urdf(path: str | Path, text: str) -> Path:
-    """Write a URDF file and return its path."""
-    write_text(path, f'<?xml version="1.0"?>\n{text}')
-    return Path(path)
+    return ET.tostring(robot, encoding="unicode")
 
 
 def _inertial(numbers: Array) -> ET.Element:

@@ -338,7 +338,7 @@ TIME = at_end(lambda s: s.t)
 """Cost equal to the total duration [s] of all phases."""
 
 
-def track(name: str, reference: float | str | Expression, weight: float) -> Cost:
+def track(name: str, reference: float | str | Expression, weight: float | str) -> Cost:
     """Return the integral of weight (signal - reference)^2 as a cost.
 
     Args:
@@ -346,22 +346,32 @@ def track(name: str, reference: float | str | Expression, weight: float) -> Cost
         reference: a number; a function of the signals, such as `lambda s: 0.1 * ca.sin(s.t)`; or
             the name of a parameter or signal. A name that the model does not have becomes a
             parameter of the problem with its value in `p`, such as the goal of a controller.
-        weight: positive weight.
+        weight: positive weight, or the name of a parameter, as for `reference`.
     """
     name = checks.text("track", name, "the name of a signal")
-    weight = checks.number("track: weight", weight, above=0.0)
+    names, factor = tuple[str, ...](), 1.0
+    if isinstance(weight, str):
+        names = (checks.text("track: weight", weight, "a name or a positive number"),)
+    else:
+        factor = checks.number("track: weight", weight, above=0.0)
     if isinstance(reference, str):
-        goal = checks.text("track: reference", reference, "a name, a number or a function")
-        return Cost(squares=((weight, lambda s: s[name] - s[goal]),), references=(goal,))
-    if callable(reference):
-        follow = _checked("track: reference", reference)
-        return Cost(squares=((weight, lambda s: s[name] - follow(s)),))
-    number = checks.number("track: reference", reference, hint="or a function, or a name")
-    return Cost(squares=((weight, lambda s: s[name] - number),))
+        names += (checks.text("track: reference", reference, "a name, a number or a function"),)
+    elif callable(reference):
+        reference = _checked("track: reference", reference)
+    else:
+        reference = checks.number("track: reference", reference, hint="or a function, or a name")
+
+    def residual(s: Signals) -> Scalar:
+        goal = s[reference] if isinstance(reference, str) else reference
+        goal = goal(s) if callable(goal) else goal
+        scale = ca.sqrt(s[weight]) if isinstance(weight, str) else 1.0
+        return scale * (s[name] - goal)
+
+    return Cost(squares=((factor, residual),), references=names)
 
 
-def effort(name: str, weight: float = 1.0) -> Cost:
-    """Return the integral of weight signal^2 as a cost."""
+def effort(name: str, weight: float | str = 1.0) -> Cost:
+    """Return the integral of weight signal^2 as a cost; see `track` for the weight."""
     return track(name, 0.0, weight)
 
 

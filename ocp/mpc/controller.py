@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from re import fullmatch
@@ -12,27 +12,32 @@ from typing import final
 
 import numpy as np
 
+from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.mpc.closed_loop import SLACK, ClosedLoopRun, Optimality, Reference, run_closed_loop
 from ocp.mpc.design import Control, CycleData, CycleStatus, Design, Settings
 from ocp.mpc.horizon import Horizon
-from ocp.mpc.session import Session
+from ocp.mpc.session import Action, Session
 from ocp.mpc.source import header, source, timed
 from symfric.codegen.blocks.block import KEYWORDS
 from symfric.codegen.runner import compile_object, needed_symbols
-from symfric.emitter.c99 import TRANSCENDENTAL
+from symfric.emitter.c99 import FLOAT, REALS, TRANSCENDENTAL
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.variable import Variable
 from symfric.model import Model
 
-ALLOWED = frozenset(TRANSCENDENTAL.values()) | {
-    "sqrt", "fabs", "fmin", "fmax", "floor", "ceil", "copysign", "sincos", "memcpy", "memmove",
-    "memset", "_GLOBAL_OFFSET_TABLE_",
+MATH = frozenset(TRANSCENDENTAL.values()) | {
+    "sqrt", "fabs", "fmin", "fmax", "floor", "ceil", "copysign", "sincos",
+}  # fmt: skip
+ALLOWED = MATH | {f"{name}f" for name in MATH} | {
+    "memcpy", "memmove", "memset", "_GLOBAL_OFFSET_TABLE_",
 }  # fmt: skip
 """Symbols that the object file may need: functions of math.h and those inserted by compilers."""
 
+UNDERSTATED = {"double": 1.0 + SLACK, "float": 4.0}
+"""Largest `ControllerCheck.understated` of a verified controller."""
 TINY = float(np.finfo(float).tiny)
 
 
@@ -46,8 +51,9 @@ class ControllerCheck:
         cycles: number of checked cycles.
         warnings: warnings of the compiler.
         foreign: symbols other than those of math.h that the object file needs; None without `nm`.
-        difference: largest relative difference of a control from its plan, and of a residual from
-            the independent check, relative to the larger of the residual and the tolerance.
+        difference: largest relative difference of a control from its plan.
+        understated: largest ratio of an independent residual in double to the reported residual,
+            or to the tolerance if that is larger.
         bytes: size of the struct with plan and work space.
     """
 
@@ -56,6 +62,7 @@ class ControllerCheck:
     warnings: tuple[str, ...]
     foreign: tuple[str, ...] | None
     difference: float
+    understated: float
     bytes: int
 
     @property
@@ -73,67 +80,88 @@ class GeneratedController:
         folder: folder of the files.
         files: paths of header and source.
         design: definition of the controller.
+        real: floating-point type of the C.
     """
 
     folder: Path
     files: tuple[Path, Path]
     design: Design
+    real: str = "double"
 
     def verify(self, cycles: int = 100) -> ControllerCheck:
         """Compile the files and check their results independently; see `ControllerCheck`.
 
-        The plant is the model of the controller, with noise, references that jump, distant states,
-        and measurements that are not finite. The independent residual is that of
+        The loop is that of `disturbed`. The independent residual is that of
         `Controller.simulate`, by derivatives of the whole program with CasADi.
         """
         compiler, design = find_compiler(), self.design
         if compiler is None:
             reason = "not verified: no C compiler found; install gcc or clang, or set CC"
-            return ControllerCheck(reason, 0, (), None, np.inf, 0)
+            return ControllerCheck(reason, 0, (), None, np.inf, np.inf, 0)
         try:
             with TemporaryDirectory(prefix="symfric-") as name:
                 target = Path(name) / "controller.o"
                 warnings = tuple(compile_object(compiler, self.files[1], target))
                 needed = needed_symbols(target)
-            session = Session(design, *(f.read_text("utf-8") for f in self.files))
-            difference = _difference(session, cycles)
+            texts = (f.read_text("utf-8") for f in self.files)
+            session = Session(design, *texts, real=REALS[self.real])
+            difference, understated = _differences(session, cycles)
         except CompileError as error:
-            return ControllerCheck(f"not verified: {error}", 0, (), None, np.inf, 0)
+            return ControllerCheck(f"not verified: {error}", 0, (), None, np.inf, np.inf, 0)
         foreign = None if needed is None else tuple(sorted(needed - ALLOWED))
         wrong = [f"{len(warnings)} warnings"] * bool(warnings)
         wrong += [f"needs {', '.join(foreign)}"] if foreign else []
         wrong += [f"differs by {difference:.1e}"] * (difference > SLACK)
+        most = UNDERSTATED[self.real]
+        wrong += [f"understates residuals {understated:.1f} times"] * (understated > most)
         status = f"failed: {'; '.join(wrong)}" if wrong else "verified"
-        return ControllerCheck(status, cycles, warnings, foreign, difference, session.bytes)
+        found = difference, understated, session.bytes
+        return ControllerCheck(status, cycles, warnings, foreign, *found)
 
 
-def _difference(session: Session, cycles: int) -> float:
-    """Return the largest relative difference over the loop of `GeneratedController.verify`."""
+def _differences(session: Session, cycles: int) -> tuple[float, float]:
+    """Return the attributes `difference` and `understated` of a `ControllerCheck`."""
+    design, check = session.design, Optimality(session.design)
+    own, tolerance, worst, understated = list(design.measured), design.settings.tolerance, 0.0, 0.0
+    for measured, data, action in disturbed(session, cycles):
+        plan, pairs = session.plan, list[tuple[float, float]]()
+        if action.status is not CycleStatus.FAILED:
+            planned = (c.of(plan.X, plan.U, data.b) for c in design.controls)
+            pairs += zip(action.controls.values(), planned, strict=True)
+            if action.status is not CycleStatus.BAD_INPUT:
+                pairs += zip(plan.X[0, own], measured, strict=True)
+                least = max(action.residual, tolerance)
+                understated = max(understated, check.residual(plan, data) / least)
+        worst = max([worst, *(abs(a - b) / max(abs(b), TINY) for a, b in pairs)])
+    return float(worst), float(understated)
+
+
+def disturbed(
+    session: Session, cycles: int, *, scale: float = 1.0, broken: bool = True
+) -> Iterator[tuple[Array, CycleData, Action]]:
+    """Yield measurements, data and result of each cycle of a loop with disturbances.
+
+    The plant is the model of the controller, with noise of a hundredth of the nominal states.
+    References jump every 25 cycles by about 1, and the state every 100 cycles to about ten nominal
+    states; `scale` multiplies all three. If `broken`, a measurement is not finite every 60 cycles.
+    """
     design = session.design
     h, settings, own = design.horizon, design.settings, list(design.measured)
-    random, check, nominal = np.random.default_rng(0), Optimality(design), h.model.nominal("x")[own]
-    measured, goals, worst = design.x0[own], design.r0, 0.0
+    random, nominal = np.random.default_rng(0), h.model.nominal("x")[own]
+    measured, goals = design.x0[own], design.r0
     for k in range(cycles):
         if k % 25 == 0:
-            goals = design.r0 + random.normal(size=design.r0.size)
+            goals = design.r0 + scale * random.normal(size=design.r0.size)
         if k % 100 == 99:
-            measured = 10.0 * nominal * random.normal(size=nominal.size)
-        if k % 60 == 59:
+            measured = 10.0 * scale * nominal * random.normal(size=nominal.size)
+        if broken and k % 60 == 59:
             measured = np.full(nominal.size, np.nan)
         t = h.step * (k + np.arange(h.count + 1.0))
         data = CycleData(np.tile(goals, (h.count + 1, 1)), t, design.p0, design.bounds)
         action = session.cycle(measured, data, settings.tolerance, settings.iterations)
-        plan, pairs = session.plan, list[tuple[float, float, float]]()
-        if action.status is not CycleStatus.FAILED:
-            planned = (c.of(plan.X, plan.U, data.b) for c in design.controls)
-            both = zip(action.controls.values(), planned, strict=True)
-            pairs += [(u, v, TINY) for u, v in both]
-            if action.status is not CycleStatus.BAD_INPUT:
-                pairs += [(x, y, TINY) for x, y in zip(plan.X[0, own], measured, strict=True)]
-                pairs.append((action.residual, check.residual(plan, data), settings.tolerance))
-        worst = max([worst, *(abs(a - b) / max(abs(b), size) for a, b, size in pairs)])
-        measured = plan.X[1, own] + 0.01 * nominal * random.normal(size=nominal.size)
-    return float(worst)
+        yield measured, data, action
+        noise = 0.01 * scale * nominal * random.normal(size=nominal.size)
+        measured = session.plan.X[1, own] + noise
 
 
 OWN = ("residual", "violation", "iterations", "program_iterations", "status", "converged")
@@ -234,21 +262,29 @@ class Controller:
             x0=x0, p=p, plant_p=plant_p, noise=noise, seed=seed, check=check,
         )  # fmt: skip
 
-    def to_c(self, folder: str | Path) -> GeneratedController:
-        """Write the controller as C99: `NAME.h` and `NAME.c`.
+    def to_c(self, folder: str | Path, real: str = "double") -> GeneratedController:
+        """Write the controller as C99: `NAME.h` and `NAME.c`, in float `NAME_f32.h`, `NAME_f32.c`.
 
         The C code allocates no memory, needs only math.h, and has only constant data; its memory is
         a struct of the caller. All loops are bounded, so the time of a cycle is bounded. Each cycle
-        reports the residual of its output. `start` runs the same code.
+        reports the residual of its output. `start` runs the same code in double. In float, the
+        residual contains an estimate of rounding errors, see `ocp.mpc.source`.
+
+        Args:
+            folder: folder of the files.
+            real: "double" or "float".
 
         Raises:
             ValueError: the folder is invalid, or an operation does not exist in C99.
         """
-        design, place = self.design, checks.path("to_c: folder", folder)
+        checks.choice("to_c: real", real, REALS)
+        design, place, kind = self.design, checks.path("to_c: folder", folder), REALS[real]
+        if kind is FLOAT:
+            design = replace(design, name=f"{design.name}_{kind.suffix}")
         files = place / f"{design.name}.h", place / f"{design.name}.c"
-        for file, text in zip(files, (header(design), source(design)), strict=True):
+        for file, text in zip(files, (header(design, kind), source(design, kind)), strict=True):
             write_text(file, text)
-        return GeneratedController(place, files, design)
+        return GeneratedController(place, files, design, real)
 
 
 def controller_of(

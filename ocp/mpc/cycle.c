@@ -147,12 +147,18 @@ static void curve(NAME_t *m)
     }
 }
 
-/* The residual of the plan; the largest violation of a soft row. */
-static double residual_of(NAME_t *m, double *violation)
+/* The residual of the plan; the largest violation of a soft row; an estimate of the rounding
+   errors of the residual from the terms that multipliers of the rows cancel. */
+static double residual_of(NAME_t *m, double *violation, double *rounding)
 {
     int k, i;
     double l[NX], S[NU + NX], found = 0.0;
+#if ROWS > 0
+    const double none[ROWS] = {0.0};
+    double l_free[NX], S_free[NU + NX];
+#endif
     *violation = 0.0;
+    *rounding = 0.0;
 #if END
     end_adjoint(m->L_end, m->z + N * ROWS, l);
 #else
@@ -161,9 +167,16 @@ static double residual_of(NAME_t *m, double *violation)
     }
 #endif
     for (k = N - 1; k >= 0; k--) {
+#if ROWS > 0
+        adjoint(l, m->L[k], none, l_free, S_free);
+#endif
         adjoint(l, m->L[k], m->z + k * ROWS, l, S);
         for (i = 0; i < NU; i++) {
             found = larger(found, fabs(S[i] * nominal_u[i]) / CURVATURE);
+#if ROWS > 0
+            S_free[i] -= S[i];
+            *rounding = larger(*rounding, RESOLUTION * fabs(S_free[i] * nominal_u[i]) / CURVATURE);
+#endif
         }
         for (i = 0; i < NX; i++) {
             m->lam[k][i] = S[NU + i];
@@ -309,10 +322,10 @@ static void interior_step(NAME_t *m, double mu)
     direction(m);
     alpha = reach(m, BACK);
     for (j = 0; j < ALL; j++) {
-        m->ts[j] += alpha * m->dt[j];
-        m->zn[j] += alpha * m->dz[j];
-        m->s[j] += alpha * m->ds[j];
-        m->y[j] += alpha * m->dy[j];
+        m->ts[j] = larger(m->ts[j] + alpha * m->dt[j], SMALLEST);
+        m->zn[j] = larger(m->zn[j] + alpha * m->dz[j], SMALLEST);
+        m->s[j] = larger(m->s[j] + alpha * m->ds[j], SMALLEST);
+        m->y[j] = larger(m->y[j] + alpha * m->dy[j], SMALLEST);
         m->go.D[j] += alpha * (m->aim.D[j] - m->go.D[j]);
         m->dt[j] = 0.0;
         m->dz[j] = 0.0;
@@ -368,7 +381,8 @@ static int program(NAME_t *m)
     return made;
 }
 
-static double merit(const NAME_t *m, const double (*x)[NX], const double (*u)[NU],
+/* The cost, defects and penalties of a plan; those of the linearised plan have known defects. */
+static double merit(const NAME_t *m, const double (*x)[NX], const double (*u)[NU], int linearised,
                     double *defects, double *prices)
 {
     int k, i;
@@ -377,9 +391,9 @@ static double merit(const NAME_t *m, const double (*x)[NX], const double (*u)[NU
     *prices = 0.0;
     for (k = 0; k < N; k++) {
         for (i = 0; i < NX; i++) {
-            to[i] = x[k][i];
+            to[i] = linearised ? x[k + 1][i] + m->L[k][i] : x[k][i];
         }
-        for (i = 0; i < SUBSTEPS; i++) {
+        for (i = 0; i < SUBSTEPS && !linearised; i++) {
             advance(to, u[k], m->r[k], m->p, to);
         }
         value(x[k], u[k], x[k + 1], m->r[k], m->r[k + 1], m->p, &m->t[k], m->b, to, value_of);
@@ -413,7 +427,7 @@ static double go_on(NAME_t *m, double nu)
 {
     int k, i, tries;
     double defects, prices, cost, slope, fall, before, alpha = 1.0;
-    cost = merit(m, (const double (*)[NX])m->x, (const double (*)[NU])m->u, &defects, &prices);
+    cost = merit(m, (const double (*)[NX])m->x, (const double (*)[NU])m->u, 1, &defects, &prices);
     slope = m->go.slope;
 #if ALL > 0
     {
@@ -443,8 +457,8 @@ static double go_on(NAME_t *m, double nu)
         if (tries == HALVINGS) {
             break;
         }
-        cost = merit(m, (const double (*)[NX])m->aim.x, (const double (*)[NU])m->aim.u, &defects,
-                     &prices);
+        cost = merit(m, (const double (*)[NX])m->aim.x, (const double (*)[NU])m->aim.u, 0,
+                     &defects, &prices);
         cost = cost + prices + nu * defects;
         if (cost <= before + ARMIJO * alpha * fall + ROUNDING * fabs(before)) {
             break;
@@ -489,18 +503,18 @@ static void shift(NAME_t *m)
 
 static void improve(NAME_t *m, const NAME_param_t *param, NAME_out_t *out)
 {
-    double nu = 0.0;
+    double nu = 0.0, rounding;
     out->iterations = 0;
     out->program_iterations = 0;
     for (;;) {
         linearise(m);
-        out->residual = residual_of(m, &out->violation);
+        out->residual = residual_of(m, &out->violation, &rounding) + rounding;
         if (!isfinite(out->residual)) {
             out->status = NAME_FAILED;
             break;
         }
-        if (out->residual <= param->tolerance) {
-            out->status = NAME_CONVERGED;
+        if (out->residual <= param->tolerance || out->residual <= 2.0 * rounding) {
+            out->status = out->residual <= param->tolerance ? NAME_CONVERGED : NAME_ROUNDED;
             break;
         }
         if (out->iterations >= param->iterations) {

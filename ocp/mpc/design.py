@@ -23,6 +23,7 @@ class CycleStatus(IntEnum):
     NOT_CONVERGED = 1
     BAD_INPUT = 2
     FAILED = 3
+    ROUNDED = 4
 
     @property
     def sentence(self) -> str:
@@ -34,6 +35,8 @@ class CycleStatus(IntEnum):
             2: "bad input: a number is not finite; the plan of the previous cycle continues",
             3: "failed: numbers were not finite; the plan of the previous cycle continues, the "
             "next one restarts",
+            4: "optimal up to rounding errors, which are larger than the tolerance; `residual` "
+            "contains an estimate of them",
         }[int(self)]
 
 

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 
 from ocp.formulation.phase import Array
 from ocp.mpc.design import CycleData, CycleStatus, Design, Plan
-from ocp.mpc.source import header, sizes, source, timed
+from ocp.mpc.source import header, sizes, source, timed, typed
+from symfric.emitter.c99 import DOUBLE, Real
 from symfric.foundation import checks
 from symfric.foundation.numeric import address
 from symfric.integrator.compiled.compiler import FLAGS, library, opened
@@ -61,25 +62,29 @@ class Action:
 class Session:
     """Running controller with its current plan, created by `Controller.start`."""
 
-    def __init__(self, design: Design, head: str = "", body: str = "") -> None:
+    def __init__(self, design: Design, head: str = "", body: str = "", real: Real = DOUBLE) -> None:
         """Compile the C code of `design`, or that of the header `head` and the source `body`.
+
+        `real` is the type of the numbers in C.
 
         Raises:
             CompileError: there is no compiler, or it failed.
         """
         self.design = design
         parts = sizes(design)
-        self._doubles = len(design.controls) + 2
-        text = (body or source(design)).replace(
-            f'#include "{design.name}.h"', head or header(design)
+        self._numbers = len(design.controls) + 2
+        text = (body or source(design, real)).replace(
+            f'#include "{design.name}.h"', head or header(design, real)
         )
         text += "#include <string.h>\n"
         text += f"#define SF_PARAM {parts['NPAR'] + parts['NB'] + 1}\n"
-        text += f"#define SF_OUT {self._doubles}\n\n{WRAPPER.replace('NAME', design.name)}"
+        text += f"#define SF_OUT {self._numbers}\n\n"
+        text += typed(WRAPPER.replace("NAME", design.name), real)
         names = ("sf_cycle", "sf_init", "sf_bytes", "sf_plan")
         self._library = opened(library(text, *names, flags=SCALAR), names)
         self.bytes: int = int(self._library.sf_bytes())
         """Size of the struct with plan and work space."""
+        self._kind = real.kind
         self._self = np.zeros(self.bytes // 8 + 1)
         self._timed = timed(design)
         self._cycle = self._library.sf_cycle
@@ -124,11 +129,12 @@ class Session:
 
     def cycle(self, measured: Array, data: CycleData, tolerance: float, iterations: int) -> Action:
         """Compute one cycle from arrays; see `step`."""
-        into = np.concatenate([measured, data.R.T.ravel(), data.t[: int(self._timed)]])
-        param = np.concatenate([data.p, data.b, [tolerance]])
-        out, counts = np.zeros(self._doubles), np.zeros(3, dtype=np.int32)
-        places = [address(self._self), address(param), iterations]
-        places += [address(into), address(out), counts.ctypes.data]
+        with np.errstate(over="ignore"):
+            param = self.given(measured, data, tolerance).astype(self._kind)
+        into = param[data.p.size + data.b.size + 1 :]
+        out, counts = np.zeros(self._numbers, self._kind), np.zeros(3, dtype=np.int32)
+        places = [address(self._self), param.ctypes.data, iterations]
+        places += [into.ctypes.data, out.ctypes.data, counts.ctypes.data]
         busy, began = thread_time(), perf_counter()
         self._cycle(*places)
         seconds, cpu = perf_counter() - began, thread_time() - busy
@@ -140,6 +146,11 @@ class Session:
             CycleStatus(status), seconds, cpu,
         )  # fmt: skip
 
+    def given(self, measured: Array, data: CycleData, tolerance: float) -> Array:
+        """Return the members of the structs of parameters (without `iterations`) and inputs."""
+        into = [measured, data.R.T.ravel(), data.t[: int(self._timed)]]
+        return np.concatenate([data.p, data.b, [tolerance], *into])
+
     def forget(self) -> None:
         """Discard the plan, and restart from a plan at the start values of the model."""
         self._library.sf_init(ctypes.c_void_p(address(self._self)))
@@ -148,11 +159,10 @@ class Session:
     def plan(self) -> Plan:
         """Current plan, whose first row is the current time."""
         parts = sizes(self.design)
-        X, U = np.zeros((parts["N"] + 1, parts["NX"])), np.zeros((parts["N"], parts["NU"]))
-        z = np.zeros(parts["ALL"])
-        arrays = [ctypes.c_void_p(a.ctypes.data) for a in (self._self, X, U, z)]
-        self._library.sf_plan(*arrays)
-        return Plan(X, U, z)
+        shapes = (parts["N"] + 1, parts["NX"]), (parts["N"], parts["NU"]), (parts["ALL"],)
+        arrays = [np.zeros(shape, self._kind) for shape in shapes]
+        self._library.sf_plan(*(ctypes.c_void_p(a.ctypes.data) for a in (self._self, *arrays)))
+        return Plan(*(a.astype(float) for a in arrays))
 
     def _measured(self, x: ArrayLike | Mapping[str, float]) -> Array:
         names = self.design.measured_names

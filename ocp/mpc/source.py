@@ -34,6 +34,10 @@ Elimination of t, s and y from Newton's method leaves a weight w and a slope e f
 with f = 0 for a hard row, which enter the recursion over the intervals. Mehrotra's predictor and
 corrector use the same matrices. If the minimum without rows satisfies all rows, it is the solution.
 
+In float, gradients with multipliers of thousands of curvatures have rounding errors above the
+tolerance. The residual contains an estimate of them, and iterations end where it dominates
+(`CycleStatus.ROUNDED`); `GeneratedController.verify` compares the result with double precision.
+
 C names begin with the name of the controller. `NAME_t` contains plan and work space; `NAME_param_t`
 (defaults `NAME_default`) model parameters, bounds, tolerance and iterations; `NAME_in_t`
 measurements and references; `NAME_out_t` controls and results. `NAME_init` and `NAME_step` are the
@@ -44,6 +48,7 @@ Sources: Nocedal and Wright, Numerical Optimization, 2nd ed., (18.36) (weight of
     1992; Frison and Diehl, HPIPM, IFAC 2020 (soft rows).
 """
 
+import re
 from collections import Counter
 from collections.abc import Iterable
 from importlib.metadata import version
@@ -53,10 +58,11 @@ import casadi as ca
 
 from ocp.mpc.design import Control, CycleStatus, Design
 from symfric.codegen.layout import filled, folded
-from symfric.emitter.c99 import DOUBLE, TRANSCENDENTAL, macro
+from symfric.emitter.c99 import DOUBLE, FLOAT, TRANSCENDENTAL, Real, macro
 from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph
 
+FLOAT_NAMES = {"fabs": "fabsf", "HUGE_VAL": "HUGE_VALF"}
 FOLDER = Path(__file__).parent
 """Folder of the templates in C.
 
@@ -66,17 +72,24 @@ macros for sizes and functions for kernels. Loops are bounded, and memory is a s
 PLAIN = 2
 """Number of iterations without curvature of the equations, which helps only near the optimum."""
 ARMIJO = 1e-4
-ROUNDING = 1e-12
+ROUNDING = {DOUBLE: 1e-12, FLOAT: 1e-5}
 """Relative increase of the merit by rounding errors that a step may have."""
 BACK = 0.995
 """Step of the interior-point method, as a share of the step to the boundary."""
-CLOSE = 1e-7
+RESOLUTION = {DOUBLE: 1e-15, FLOAT: 1.5e-5}
+"""Estimate of the rounding error of a gradient relative to its terms; in float, where it decides
+when iterations end, 130 rounding units."""
+MOST_IN_FLOAT = 18
+"""Iterations of the interior-point method in float; later ones make no progress."""
+SMALLEST = {DOUBLE: 1e-200, FLOAT: 1e-18}
+"""Smallest slack and multiplier in the interior-point method, whose ratios are finite."""
+CLOSE = {DOUBLE: 1e-7, FLOAT: 1e-4}
 """Value of mu, in units of the curvature, at which a quadratic program is solved."""
 AWAY = 0.1
 """Smallest initial distance of the interior-point method from bounds, in units of the signals."""
 
 
-def header(design: Design) -> str:
+def header(design: Design, real: Real = DOUBLE) -> str:
     """Return the text of the header file."""
     name, h, parts = design.name, design.horizon, sizes(design)
     n, nx, nu, rows = parts["N"], parts["NX"], parts["NU"], parts["ALL"]
@@ -99,7 +112,7 @@ def header(design: Design) -> str:
     out = [(c.name, f"input over the next {h.step:g} s [{c.unit}]") for c in design.controls]
     out.append(("residual", "of the conditions of optimality, of the plan that this is from"))
     out.append(("violation", "largest of a soft bound, in units of its signal"))
-    return filled(
+    text = filled(
         FOLDER / "controller.h",
         banner=_banner(f"{name}.h"),
         name=name,
@@ -115,9 +128,19 @@ def header(design: Design) -> str:
         out=_members(out),
         indent=" " * (len(name) + 11),
     )
+    return typed(text, real)
 
 
-def source(design: Design) -> str:
+def typed(text: str, real: Real) -> str:
+    """Return C for double with numbers and functions of another type."""
+    if real is DOUBLE:
+        return text
+    text = re.sub(r"\bdouble\b", real.name, text)
+    text = re.sub(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?)(?![\w.])", rf"\1{real.letter}", text)
+    return re.sub(r"\b(fabs(?=\()|HUGE_VAL\b)", lambda m: FLOAT_NAMES[m[1]], text)
+
+
+def source(design: Design, real: Real = DOUBLE) -> str:
     """Return the text of the source file.
 
     Raises:
@@ -125,7 +148,7 @@ def source(design: Design) -> str:
     """
     h, kernels, calls = design.horizon, list[str](), Counter[str]()
     for kernel in design.kernels.all:
-        text, called = _kernel(kernel)
+        text, called = _kernel(kernel, real)
         kernels.append(text)
         calls += called
     parameters = [f"m->p[{i}] = param->{name};" for i, name in enumerate(h.parameters)]
@@ -136,11 +159,13 @@ def source(design: Design) -> str:
     needed += [f"m->b[{i}]" for i in range(len(bounds))]
     finite = [f"sound = sound && isfinite({number});" for number in needed]
     now = "in->t + " if timed(design) else ""
-    each = [f"m->t[k] = {now}{DOUBLE.literal(h.step)} * (double)k;"]
+    each = [f"m->t[k] = {now}{real.literal(h.step)} * (double)k;"]
     each += [f"m->r[k][{i}] = in->{name}[k];" for i, name in enumerate(h.references)]
     each += [f"sound = sound && isfinite(m->r[k][{i}]);" for i in range(len(h.references))]
     pairs = zip(design.measured, design.measured_names, strict=True)
-    return filled(
+    loops = (FOLDER / "cycle.c").read_text(encoding="utf-8").rstrip()
+    loops = loops.replace("NAME", design.name).replace("move_t", f"{design.name}_move_t")
+    text = filled(
         FOLDER / "controller.c",
         banner=_banner(f"{design.name}.c"),
         name=design.name,
@@ -150,19 +175,16 @@ def source(design: Design) -> str:
         each=_lines(each, 8),
         measured=_lines((f"m->x[0][{i}] = in->{name};" for i, name in pairs), 4),
         controls="".join(map(_shown, design.controls)),
-        macros=_macros(design),
+        macros=_macros(design, real),
         functions_of_libm="".join(
-            f"#ifndef {macro(c, DOUBLE)}\n#define {macro(c, DOUBLE)} {c}\n#endif\n"
+            f"#ifndef {macro(c, real)}\n#define {macro(c, real)} {c}{real.letter}\n#endif\n"
             for c in sorted(set(calls) & set(TRANSCENDENTAL.values()))
         ),
-        tables=_tables(design),
+        tables=_tables(design, real),
         kernels="".join(kernels),
-        loops=(FOLDER / "cycle.c")
-        .read_text(encoding="utf-8")
-        .rstrip()
-        .replace("NAME", design.name)
-        .replace("move_t", f"{design.name}_move_t"),
+        loops=loops,
     )
+    return typed(text, real)
 
 
 def _banner(file: str) -> str:
@@ -225,24 +247,28 @@ def _lines(lines: Iterable[str], margin: int) -> str:
     return "".join(f"{' ' * margin}{line}\n" for line in lines)
 
 
-def _macros(design: Design) -> str:
+def _macros(design: Design, real: Real) -> str:
     parts: dict[str, int | str] = dict(sizes(design))
+    if real is FLOAT:
+        parts["MOST"] = min(MOST_IN_FLOAT, design.settings.program)
     numbers = {
         "PAIRS": float(parts["ALL"]) + float(design.prices.soft.sum()),
         "CURVATURE": design.horizon.curvature,
-        "CLOSE": CLOSE,
+        "CLOSE": CLOSE[real],
         "AWAY": AWAY,
         "BACK": BACK,
         "ARMIJO": ARMIJO,
-        "ROUNDING": ROUNDING,
+        "ROUNDING": ROUNDING[real],
+        "RESOLUTION": RESOLUTION[real],
+        "SMALLEST": SMALLEST[real],
     }
-    parts |= {name: DOUBLE.literal(value) for name, value in numbers.items()}
+    parts |= {name: real.literal(value) for name, value in numbers.items()}
     lines = [f"#define {name} {value}" for name, value in parts.items()]
     row = "((j) < N * ROWS ? (j) % ROWS : ROWS + (j) - N * ROWS)" if parts["ROWS"] else "(j)"
     return "\n".join([*lines, f"#define ROW(j) {row}", ""])
 
 
-def _tables(design: Design) -> str:
+def _tables(design: Design, real: Real) -> str:
     """Return the constant arrays and the default parameters."""
     name, h, prices = design.name, design.horizon, design.row_prices
     tables = {
@@ -256,23 +282,23 @@ def _tables(design: Design) -> str:
         tables |= {"rho": prices.rho.tolist(), "sigma": prices.sigma.tolist()}
     text = ""
     for table, values in tables.items():
-        numbers = ", ".join(map(DOUBLE.literal, values))
+        numbers = ", ".join(map(real.literal, values))
         text += folded(f"static const double {table}[{len(values)}] = {{{numbers}}};", "") + "\n"
     if prices.soft.size:
         flags = ", ".join(str(int(flag)) for flag in prices.soft)
         text += f"static const int soft[{prices.soft.size}] = {{{flags}}};\n"
     values = [*design.p0.tolist(), *design.bounds.tolist(), design.settings.tolerance]
-    numbers = ", ".join([*map(DOUBLE.literal, values), str(design.settings.iterations)])
+    numbers = ", ".join([*map(real.literal, values), str(design.settings.iterations)])
     return f"{text}\nconst {name}_param_t {name}_default = {{\n    {numbers}\n}};\n\n"
 
 
-def _kernel(function: ca.Function) -> tuple[str, Counter[str]]:
+def _kernel(function: ca.Function, real: Real) -> tuple[str, Counter[str]]:
     """Return a static C function with columns as arguments, and the functions that it calls."""
     whole = graph(function)
     count, results = function.n_in(), function.n_out()
     names = [[f"a{i}_{j}" for j in range(function.size1_in(i))] for i in range(count)]
     targets = [[f"r{i}[{j}] = {{}};" for j in range(function.size1_out(i))] for i in range(results)]
-    code = emit(whole, names, targets, DOUBLE)
+    code = emit(whole, names, targets, real)
     used = sorted(code.used)
     loads = [f"const double a{i}_{j} = a{i}[{j}];" for i, j in used]
     idle = [f"(void)a{i};" for i in range(count) if i not in {u[0] for u in used}]

@@ -14,7 +14,7 @@ from symfric.embedded import CORES, Absent, Tools, find_tools, measure, wrong_on
 from symfric.embedded.measure import REGIMES
 from symfric.laws import GMS, BrownMcPhee, LuGre, MaxwellSlip, VelocityBased
 from symfric.laws.dynamic.maxwell_slip import Element
-from symfric.scenes import Arm, rabinowicz
+from symfric.scenes import Arm, drive, rabinowicz
 
 TEN = tuple(Element(5e4 * 2.0**-i, 0.1) for i in range(10))
 """Ten elements, each with a tenth of the friction, and stiffnesses over three decades."""
@@ -63,6 +63,39 @@ CASES = (
 """Laws, Rabinowicz's stick-slip test as a plant, and an arm with joint friction."""
 
 
+CYCLES = 1000
+"""Cycles of a predictive controller; a tenth with `quick`."""
+CONTROLLERS = (
+    "Predictive controller of a drive with friction, 20 intervals: instructions per cycle in a "
+    "loop with disturbances"
+)
+
+
+def controllers(quick: bool, tools: Tools) -> Iterator[Found]:
+    """Measure a controller with one and with up to 20 quadratic programs in a cycle."""
+    from ocp import Phase, Problem, at_end, effort, track  # noqa: PLC0415  (slow to import)
+    from ocp.mpc.target import measure_controller  # noqa: PLC0415
+
+    model = drive(BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-2), m=1.0, N=1.0)
+    cost = track("x", "goal", 900.0) + track("v", 0.0, 1.0) + effort("force", 1e-3)
+    cost += at_end(lambda s: 100 * (s.x - s.goal) ** 2 + s.v**2)
+    bounds = {"force": (-20.0, 20.0)}
+    problem = Problem(Phase(model, T=0.2), cost, bounds=bounds, p={"goal": 0.0})
+    for core, real in (("m4f", "float"), ("m7", "double")):
+        for programs in (1, 20):
+            with TemporaryDirectory(prefix="symfric-") as folder:
+                made = problem.to_mpc(0.01, iterations=programs).to_c(folder, real)
+                cycles = CYCLES // 10 if quick else CYCLES
+                m = measure_controller(made, core, cycles=cycles, tools=tools)
+            yield CONTROLLERS, {
+                "core": core, "type": real, "quadratic programs at most": programs,
+                "cycles": cycles,
+                "average instructions": whole(m.average), "most instructions": whole(m.maximum),
+                "code [B]": whole(m.text), "library [B]": whole(m.library),
+                "data [B]": whole(m.data), "stack [B]": whole(m.stack),
+            }  # fmt: skip
+
+
 def bench(quick: bool = False, progress: Progress = None) -> Report:
     """Measure and test every block on every core; with `quick`, only on the M4F."""
     tools = find_tools()
@@ -70,6 +103,7 @@ def bench(quick: bool = False, progress: Progress = None) -> Report:
         return Report(notes=[f"embedded: skipped, {tools.advice}"])
     targets = [("m4f", "float")] if quick else TARGETS
     tasks = {case.name: partial(_rows, case, targets, tools) for case in CASES}
+    tasks["predictive controller"] = partial(controllers, quick, tools)
     return Report().collect(tasks, progress)
 
 

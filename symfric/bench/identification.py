@@ -13,6 +13,7 @@ from symfric.bench.identification_files import File, campaign
 from symfric.bench.identification_length import length
 from symfric.bench.identification_measured import emps, franka
 from symfric.bench.identification_memory import gms, lugre
+from symfric.bench.identification_online import online
 from symfric.bench.identification_repeats import starts, velocity
 from symfric.bench.identification_robot import robot
 from symfric.bench.identification_verdicts import TITLE, draw, verdicts
@@ -129,6 +130,7 @@ CASES: Mapping[str, Callable[[bool], Iterator[Found]]] = {
     "files": files,
     "length": length,
     "robot": robot,
+    "online": online,
 }
 
 

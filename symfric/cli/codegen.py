@@ -13,10 +13,13 @@ from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.codegen_report import report
+from symfric.cli.controllers import write_controllers
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
     Block,
+    Generated,
+    Verification,
     generate,
     inverse_dynamics_block,
     plant_block,
@@ -118,6 +121,7 @@ def codegen(
     drive: Path | None = None,
     estimator: str | None = None,
     adaptation: Strings = None,
+    mpc: str | None = None,
     accept: Strings = None,
     prove: bool = False,
     compiler: str | None = None,
@@ -139,6 +143,8 @@ def codegen(
 
     Example: symfric codegen fit.json --compensator --drive drive.toml --out build
 
+    Example: symfric codegen --mpc problem.py --real float --core m4f --out build
+
     Example: symfric codegen fit.json --estimator recursive --adaptation noise=1e-4 --out build
     """
     check_names("--core", core or (), CORES)
@@ -148,6 +154,9 @@ def codegen(
         raise ValueError("--prove: expected guards, whose effect is proved, got --no-guards")
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
+    if mpc is not None:
+        others = (fit, law, scene, estimator, *(compensator, inverse_dynamics, prove), compiler)
+        return write_controllers(out, mpc, any(others), settings, step_size, real, core, json)
     if fit and not law and fit.suffix.lower() not in (".json", ".urdf") and not fit.is_file():
         fit, law = None, str(fit)
     texts = opt.assignments("--set", settings)
@@ -185,18 +194,25 @@ def codegen(
             if turning or (chosen.drive is not None and chosen.drive.turning):
                 options["turning"] = True
     generated = generate(made, out, real=REALS[kind], guards=guards, kit=kit, **options)
-    verification = verify(generated, compiler=compiler, adjustable=adjustable)
     if chosen is not None and chosen.forces and subject in (LAW, FUNCTION):
         names = ", ".join(chosen.forces)
         output.note(f"{names}: fitted as forces under a load of 1 N; call the C with N = 1")
-    measured = [
-        measure(generated.block, one, name_of_core, guards=generated.guards)
-        for name_of_core in core or ()
-        for one in generated.reals
-    ]
-    generated = with_cores(generated, [m.to_dict() for m in measured])
     law = chosen.text if chosen else law or generated.block.name
-    proofs = [prove_block(generated.block, one) for one in generated.reals if prove]
+    verification = verify(generated, compiler=compiler, adjustable=adjustable)
+    finish(law, generated, verification, errors, core or (), prove, json)
+
+
+def finish(
+    law: str, generated: Generated, verification: Verification, errors: Sequence[StepError],
+    cores: Sequence[str], prove: bool, json: str | None,
+) -> None:  # fmt: skip
+    """Measure on cores, prove, and report; exit with 1 unless everything holds."""
+    measured = [
+        measure(generated.block, real, core, guards=generated.guards)
+        for core in cores for real in generated.reals
+    ]  # fmt: skip
+    generated = with_cores(generated, [m.to_dict() for m in measured])
+    proofs = [prove_block(generated.block, real) for real in generated.reals if prove]
     report(law, generated, verification, measured, proofs, errors, json)
     if not verification.ok or not all(found.ok for found in proofs):
         raise typer.Exit(1)

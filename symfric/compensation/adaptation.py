@@ -9,10 +9,11 @@ from symfric.compensation.force import PARAMETERS, TABLES
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 
-SHARES = {"accuracy": 0.05, "memory": 0.1}
+SHARES = {"accuracy": 0.05, "memory": 0.05}
 """Default accuracy over the level of the law, and default memory over the time of change."""
-SLIDING, SAMPLES, AROUND = 5.0, 10, 5.0
-"""Slowest sliding over the noise of the velocity; window in samples; bounds over the spread."""
+SLIDING, FALLEN, SAMPLES, AROUND = 5.0, 2.0, 10, 5.0
+"""Slowest sliding over the noise of the velocity, and over the velocity scale of the law; window in
+samples; bounds over the spread."""
 
 
 @final
@@ -30,14 +31,17 @@ class Adaptation:
             samples and 2 mass noise / accuracy, the time in which noise of the velocity causes an
             error of the force of that size.
         change: time [s] in which a parameter may change by its spread.
-        memory: time constant [s] of forgetting of the recursive least squares; default a tenth of
-            `change`. It must exceed the time in which the motion shows all parameters.
-        slowest: speed [m/s] below which samples are not used; default 5 `noise`. Use several v_s
-            of a law whose curve at low speeds is not known.
+        memory: time constant [s] of forgetting of the recursive least squares; default a twentieth
+            of `change`, which causes a lag of 5 % of the spread. It must exceed the time in which
+            the motion shows all parameters.
+        slowest: speed [m/s] below which samples are not used; default the larger of 5 `noise` and
+            twice the velocity scale of the law, such as v_s, where the excess of break-away has
+            fallen to 2 %. Stiffness and curve at lower speeds are seldom known well.
         valid: force [N] from which samples are not used, such as the limit of the drive.
         free: estimated parameters of the compensator: scales, offset, inertia, or parameters of
             the law. Default: the scales of dry and viscous friction, and the offset. Without
-            "scale_stribeck", it equals "scale_coulomb", as if all dry levels change together.
+            "scale_stribeck", all dry levels change by "scale_coulomb"; write it to scale_stribeck
+            of the compensator, too, unless that is 0 against hunting.
         spread: parameter -> standard deviation of its changes; default 1 for scales, the level of
             the law for the offset, and half the start value for other parameters.
         bounds: parameter -> (lowest, highest) output; default five spreads around the start value,

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import isfinite
 from typing import Any, final
 
 import casadi as ca
@@ -11,6 +12,7 @@ from symfric.codegen import Block, law_block
 from symfric.codegen.blocks.from_law import in_turning
 from symfric.codegen.blocks.variables import arranged, step_size
 from symfric.compensation.adaptation import (
+    FALLEN,
     SAMPLES,
     SHARES,
     SLIDING,
@@ -104,15 +106,15 @@ class Adapted:
         self._inner, size, self._parts = inner, step_size(where, h, inner), Parts(inner)
         self.h, self._sizes, found = size.h, size.parameters, terms(law, inner)
         own = {p.name: p for p in self._parts.parameters}
-        self.level = _level(law, normal)
+        self.level, scale = _level(law, normal), float(law.velocity_scale)
+        self._slow = scale if isfinite(scale) else 0.0
         scales = scale_parameters([n for n in found.names if n != "bristle"], offset, mass)
         self.theta = estimated(self.where, s, scales | own, self.level, _idle(law, inner))
         self.names = [p.name for p in self.theta]
         symbols = {p.name: p.symbol for p in self.theta}
         used = {n: symbols[f"scale_{n}"] for n in found.names if f"scale_{n}" in symbols}
-        self._tied = "coulomb" in used and "stribeck" in found.names and "stribeck" not in used
-        if self._tied:
-            used["stribeck"] = used["coulomb"]
+        if "coulomb" in used and "stribeck" in found.names:
+            used.setdefault("stribeck", used["coulomb"])
         self._parts.parameters = [p for p in self._parts.parameters if p.name not in symbols]
         self.v, self.z = found.v, symbols_of(inner.states)
         load = self._parts.parameter("N", normal)
@@ -210,7 +212,8 @@ class Adapted:
     def usable(self) -> ca.SX:
         """Return the condition that the present sample may change the estimates."""
         s = self._s
-        least = SLIDING * (s.noise or 0.0) if s.slowest is None else s.slowest
+        least = max(SLIDING * (s.noise or 0.0), FALLEN * self._slow)
+        least = least if s.slowest is None else s.slowest
         most = BOUNDLESS * self.level if s.valid is None else s.valid
         slides = ca.fabs(self.v) >= self.parameter("v_least", least)
         valid = ca.fabs(self.given("force")) < self.parameter("F_valid", most)
@@ -229,8 +232,6 @@ class Adapted:
             more: further outputs.
         """
         found = {p.name: Output(now[i], p.unit, p.doc) for i, p in enumerate(self.theta)}
-        if self._tied:
-            found["scale_stribeck"] = replace(found["scale_coulomb"], doc="equals scale_coulomb")
         for i, p in enumerate(self.theta):
             found[f"{p.name}_sd"] = Output(deviation[i], p.unit, f"deviation of {p.name}")
         unseen = ca.dot(variance > SEEN, ca.DM([2.0**i for i in range(len(self.theta))]))

@@ -5,6 +5,11 @@ from typing import TYPE_CHECKING
 from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
+    from symfric.dynamics.branch import Branch as Branch
+    from symfric.dynamics.branch import Special as Special
+    from symfric.dynamics.branch import load_branch as load_branch
+    from symfric.dynamics.continuation import continuation as continuation
+    from symfric.dynamics.continuation import orbits_from as orbits_from
     from symfric.dynamics.equilibrium import Equilibrium as Equilibrium
     from symfric.dynamics.equilibrium import Holding as Holding
     from symfric.dynamics.equilibrium import equilibrium as equilibrium

@@ -82,17 +82,25 @@ def _settled(
     return y, own.size - rank - eq.cyclic.size
 
 
+def rows_at_rest(eq: Equations, y: Array, d: Array) -> tuple[Array, Array]:
+    """Return the residuals of an equilibrium, and their derivatives by y and by d in columns."""
+    f, C, slips = (value.full().ravel() for value in eq.values(y, d))
+    every = [slope.full() for slope in eq.slopes(y, d)]
+    of_f, of_C, of_slips = (np.hstack(pair) for pair in zip(every[:3], every[3:], strict=True))
+    others = np.delete(eq.M, np.union1d(eq.cyclic, eq.modes), axis=1).any(axis=1)
+    kept = others | ~eq.M.any(axis=1)
+    stuck = [i for i, (_, mode) in enumerate(eq.switching) if abs(y[mode]) < STICKS]
+    return np.concatenate([f[kept], C, slips[stuck]]), np.vstack(
+        [of_f[kept], of_C, of_slips[stuck]]
+    )
+
+
 def _rows(
     eq: Equations, y: Array, d: Array, more: Condition | None, unloaded: Sequence[int]
 ) -> tuple[Array, Array]:
     """Return the residuals of an equilibrium and their derivatives by y."""
-    f, C, slips = (value.full().ravel() for value in eq.values(y, d))
-    of_f, of_C, of_slips, _ = (slope.full() for slope in eq.slopes(y, d))
-    idle = np.union1d(eq.cyclic, eq.modes)
-    others = np.delete(eq.M, idle, axis=1).any(axis=1)
-    kept = others | ~eq.M.any(axis=1)
-    stuck = [i for i, (_, mode) in enumerate(eq.switching) if abs(y[mode]) < STICKS]
-    rows, slopes = [f[kept], C, slips[stuck]], [of_f[kept], of_C, of_slips[stuck]]
+    r, of_both = rows_at_rest(eq, y, d)
+    rows, slopes = [r], [of_both[:, : y.size]]
     if unloaded:
         forces, of_forces = (value.full() for value in eq.forces(y, d))
         rows.append(forces.ravel()[[*unloaded]])

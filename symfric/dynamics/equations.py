@@ -128,10 +128,10 @@ class Equations:
 
     @cached_property
     def slopes(self) -> ca.Function:
-        """Function (y, d) -> derivatives of f, constraints and slips by y, and of f by d."""
+        """Function (y, d) -> derivatives of f, constraints and slips by y, then by d."""
         parts = [self.f, self.constraints, self.slips]
-        found = [ca.jacobian(part, self.y) for part in parts]
-        return ca.Function("slopes", [self.y, self.d], [*found, ca.jacobian(self.f, self.d)])
+        found = [ca.jacobian(part, of) for of in (self.y, self.d) for part in parts]
+        return ca.Function("slopes", [self.y, self.d], found)
 
     @cached_property
     def forces(self) -> ca.Function:
@@ -148,6 +148,11 @@ class Equations:
         """Function (y, d) -> derivatives of constraints and slips by y."""
         found = [ca.jacobian(part, self.y) for part in (self.constraints, self.slips)]
         return ca.Function("bounds", [self.y, self.d], found)
+
+    @cached_property
+    def sliding(self) -> ca.Function:
+        """Function (y, d) -> slips."""
+        return ca.Function("sliding", [self.y, self.d], [ca.densify(self.slips)])
 
     @cached_property
     def contacts(self) -> ca.Function:

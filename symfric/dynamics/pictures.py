@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
 from symfric.foundation.panels import NARROW, panels, save
-from symfric.foundation.style import colour, line
+from symfric.foundation.style import EDGE, colour, line
 from symfric.results.sections import sticks
 from symfric.results.trajectory import Trajectory
 
@@ -60,4 +61,58 @@ def portrait(run: Trajectory, x: str, y: str, path: str | Path | None) -> Figure
         axis.legend(frameon=False, fontsize="small")
     for name, label in ((x, axis.set_xlabel), (y, axis.set_ylabel)):
         label(f"{name} [{run.unit(name)}]")
+    return save(figure, path)
+
+
+class Curve(NamedTuple):
+    """Branch in a bifurcation diagram.
+
+    Attributes:
+        values: parameter, shape (n,).
+        low, high: smallest and largest value of a state, shape (n,); equal for equilibria.
+        stable: True for each stable point, shape (n,).
+        special: (kind, parameter, value of the state) of each special point.
+    """
+
+    values: Array
+    low: Array
+    high: Array
+    stable: NDArray[np.bool_]
+    special: Sequence[tuple[str, float, float]]
+
+
+def bifurcation(
+    curves: Sequence[Curve], runs: Sequence[tuple[Array, Array, Array]], labels: tuple[str, str],
+    path: str | Path | None,
+) -> Figure:  # fmt: skip
+    """Plot branches over a parameter: stable parts solid, unstable ones dashed.
+
+    Args:
+        curves: the branches.
+        runs: parameter, smallest and largest values of runs, shown as points.
+        labels: of both axes.
+        path: image file.
+    """
+    figure, (axis,) = panels(1, width=NARROW, height=3.4)
+    for values, low, high in runs:
+        for side in (low, high):
+            axis.plot(values, side, "o", color=EDGE, mfc="none", markersize=4.5, mew=0.6, zorder=3)
+    for k, curve in enumerate(curves):
+        for side in (curve.low, curve.high):
+            for stable, style in ((True, "-"), (False, "--")):
+                shown = curve.stable == stable
+                shown[:-1] |= shown[1:] & (not stable)
+                shown[1:] |= shown[:-1] & (not stable)
+                axis.plot(
+                    curve.values, np.where(shown, side, np.nan), style, color=colour(k),
+                    linewidth=1.6 if stable else 1.1,
+                )  # fmt: skip
+        for kind, value, height in curve.special:
+            axis.plot([value], [height], "o", color=colour(k), markersize=4)
+            axis.annotate(
+                kind, (value, height), xytext=(4, 5), textcoords="offset points", fontsize="small"
+            )
+    axis.margins(0.08, 0.12)
+    axis.set_xlabel(labels[0])
+    axis.set_ylabel(labels[1])
     return save(figure, path)

@@ -62,6 +62,7 @@ class Linear(NamedTuple):
         bases: indices of the coordinates and basis of the directions, of each x_i.
         segments: the flows.
         time: T.
+        p: values of the parameters.
     """
 
     r: Array
@@ -71,6 +72,7 @@ class Linear(NamedTuple):
     bases: tuple[tuple[Indices, Array], ...]
     segments: tuple[Segment, ...]
     time: float
+    p: Array
 
 
 @final
@@ -114,12 +116,12 @@ class Shooting:
     def basis(self, x: Array, p: Array) -> tuple[Indices, Array]:
         """Return indices of independent states near `x`, and the directions that they span."""
         eq, nx = self.eq, x.size
-        if not eq.constraints.numel() and not eq.switching:
+        stuck = [i for i, (_, mode) in enumerate(eq.switching) if abs(x[mode]) < STICKS]
+        if not eq.constraints.numel() and not stuck:
             return self.states, np.eye(nx)[:, self.states]
         y, d = np.zeros(eq.y.numel()), np.concatenate([np.zeros(len(self.model.u)), p])
         y[:nx] = x
         of_C, of_slips = (slope.full()[:, :nx] for slope in eq.bounds(y, d))
-        stuck = [i for i, (_, mode) in enumerate(eq.switching) if abs(x[mode]) < STICKS]
         C = np.vstack([of_C, of_slips[stuck], np.eye(nx)[eq.modes]])
         return independent(C, eq.scale[:nx], self.states)
 
@@ -180,4 +182,4 @@ class Shooting:
         if more:
             chosen, T_0 = bases[0]
             phase[: chosen.size] = (parts[0].rates[0] / self.scale**2) @ T_0
-        return Linear(r, J, phase, monodromy[bases[0][0]], bases, parts, T)
+        return Linear(r, J, phase, monodromy[bases[0][0]], bases, parts, T, values)

@@ -60,7 +60,7 @@ def independent(C: Array, scale: Array, states: Indices) -> tuple[Indices, Array
 
 def conditions(eq: Equations, y: Array, d: Array) -> tuple[Array, Array, Array]:
     """Return C, and derivatives of f by y and by d, at y."""
-    J, of_C, of_slips, K = (slope.full() for slope in eq.slopes(y, d))
+    J, of_C, of_slips, K, *_ = (slope.full() for slope in eq.slopes(y, d))
     stuck = [i for i, (_, mode) in enumerate(eq.switching) if abs(y[mode]) < STICKS]
     modes = np.eye(y.size)[eq.modes]
     return np.vstack([J[eq.algebraic], of_C, of_slips[stuck], modes]), J, K

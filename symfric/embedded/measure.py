@@ -8,6 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from symfric.codegen.blocks.block import Block
 from symfric.codegen.generated import Generated
@@ -18,6 +19,7 @@ from symfric.embedded.target import (
     BY,
     CLOCK,
     CORES,
+    PATIENCE,
     SHIFT,
     SOURCES,
     Absent,
@@ -142,21 +144,10 @@ def measure(
             source, parts = own(block, real, folder, guards=guards)
         else:
             source, parts = by_casadi(block, real, folder, functions_of_float=by != "casadi")
-        rows = [f"{{{literals(row, real) or '0'}}}" for row in inputs.tolist()]
-        main = filled(
-            SOURCES / "measured.c",
-            real=real,
-            steps=len(inputs),
-            inputs=max(inputs.shape[1], 1),
-            columns=columns,
-            values=",\n".join(rows),
-            **parts,
-        )
         target = Target(CORES[core], found, flags)
-        words = target.heard(target.linked(folder, main, (source,)))
+        words, instructions = counted(target, folder, source, parts, real, inputs, columns)
         results = words["rows"].view(c.real.kind).reshape(-1, columns).astype(float)
         equal = _equal(c, source, inputs, results)
-    instructions = (words["ticks"] - words["idle"].mean()) * (1e9 / CLOCK / 2**SHIFT)
     means = instructions[steps:].reshape(-1, STRETCH).mean(axis=1).tolist()
     expected = run_vm(CBlock(block, c.real), inputs, results[:, : len(block.states)])
     return Measured(
@@ -175,6 +166,45 @@ def measure(
         equal=equal,
         finite=bool(np.isfinite(results).all()),
     )
+
+
+def counted(
+    target: Target,
+    folder: Path,
+    source: Path,
+    parts: Mapping[str, str],
+    real: str,
+    inputs: Array,
+    columns: int,
+    *,
+    shift: int = SHIFT,
+    limit: float = PATIENCE,
+) -> tuple[dict[str, NDArray[np.uint32]], Array]:
+    """Run `source` on a core; return the words of `sources/measured.c` and the instructions.
+
+    Args:
+        target: core with tools and flags.
+        folder: folder for the files of the program.
+        source: file with the step.
+        parts: other placeholders of `sources/measured.c`.
+        real: floating-point type.
+        inputs: inputs of every step, shape (steps, inputs).
+        columns: number of results of a step.
+        shift, limit: see `Target.heard`.
+    """
+    rows = [f"{{{literals(row, real) or '0'}}}" for row in inputs.tolist()]
+    main = filled(
+        SOURCES / "measured.c",
+        real=real,
+        steps=len(inputs),
+        inputs=max(inputs.shape[1], 1),
+        columns=columns,
+        values=",\n".join(rows),
+        **parts,
+    )
+    image = target.linked(folder, main, (source,))
+    words = target.heard(image, shift=shift, limit=limit)
+    return words, (words["ticks"] - words["idle"].mean()) * (1e9 / CLOCK / 2**shift)
 
 
 def _error(block: Block, a: Array, b: Array) -> float:

@@ -232,8 +232,15 @@ class Target:
         gcc.run(*options, *linking, "--specs=nosys.specs", *objects, "-lm", "-o", str(image))
         return image
 
-    def heard(self, image: Path) -> dict[str, NDArray[np.uint32]]:
+    def heard(
+        self, image: Path, *, shift: int = SHIFT, limit: float = PATIENCE
+    ) -> dict[str, NDArray[np.uint32]]:
         """Run an image under QEMU; return the words that it reports after each name.
+
+        Args:
+            image: result of `linked`.
+            shift: binary logarithm of the time of an instruction [ns], see `SHIFT`.
+            limit: time limit [s].
 
         Raises:
             CompileError: the program does not start or end, or ends in a fault.
@@ -242,10 +249,10 @@ class Target:
         command = (
             *(self.tools.qemu, "-M", core.machine, "-display", "none", "-monitor", "none"),
             *("-serial", "none", "-semihosting-config", "enable=on,target=native"),
-            *("-icount", f"shift={SHIFT}", "-kernel", str(image)),
+            *("-icount", f"shift={shift}", "-kernel", str(image)),
         )
         try:
-            done = finished(command, limit=PATIENCE, name=f"{core.title} under QEMU")
+            done = finished(command, limit=limit, name=f"{core.title} under QEMU")
         except ProgramError as error:
             raise CompileError(str(error)) from None
         lines = (done.output.decode(errors="replace") + done.messages).split()

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from symfric.emitter.c99 import DOUBLE
-from symfric.fmu.variables import LEAST_RTOL
+from symfric.fmu.variables import LEAST_RTOL, fixed_parameters
 from symfric.foundation.numeric import Array
 from symfric.integrator.arguments import chosen
 from symfric.integrator.equations.expressions import pieces
@@ -267,7 +267,7 @@ def tables(own: Equations) -> str:
     """Return names, start values and ranges as C."""
     model, system = own.model, own.integrator.system
     data = [*model.values("p"), *model.values("u")]
-    guess = [float(v.start) for v in model.z]
+    guess, fixed = [float(v.start) for v in model.z], fixed_parameters(model)
     parts = [
         _strings("model_unknown_names", system.names),
         _strings("model_signal_names", model.signals),
@@ -277,6 +277,7 @@ def tables(own: Equations) -> str:
         _table("model_guess", [*guess, 0.0]),
         _table("model_lower", [v.lower for v in model.p]),
         _table("model_upper", [v.upper for v in model.p]),
+        _table("model_fixed", [int(v.name in fixed) for v in model.p], "int"),
         _table("model_start_values", own.y0),
         _table("model_place_of_z", _places(own.integrator), "int"),
     ]

@@ -66,8 +66,11 @@ def entries(
         exchange: True to add rates and event indicators.
     """
     found = [*_signals(model, start, given, exchange)]
+    fixed = fixed_parameters(model)
     found += [
-        _bounded(v, k, "parameter", "tunable", "exact", float(v.start))
+        _bounded(
+            v, k, "parameter", "fixed" if v.name in fixed else "tunable", "exact", float(v.start)
+        )
         for k, v in enumerate(model.p, start=len(found))
     ]
     number = len(found)
@@ -86,6 +89,26 @@ def entries(
             doc="steps of the integrator so far, rejected ones included",
         ),
     )  # fmt: skip
+
+
+def fixed_parameters(model: Model) -> set[str]:
+    """Return the parameters that must not change after the initialisation.
+
+    These are the dimensions of a mechanism with loops, whose change would violate the constraints,
+    and parameters of start values only.
+    """
+    h, events = model.holonomic, model.events
+    running = [model.ode, model.alg] if h is None else [h.implicit, h.rates, h.pressing]
+    running += [o.expression for o in model.outputs.values()]
+    running += [e for event in events for e in (event.expression, *event.reset.values())]
+    used = _symbols(*(ca.SX(e) for e in running if e is not None))
+    lengths = set[int]() if h is None else _symbols(h.phi)
+    symbols = {v.name: v.symbol.element_hash() for v in model.p}
+    return {name for name, own in symbols.items() if own in lengths or own not in used}
+
+
+def _symbols(*expressions: ca.SX) -> set[int]:
+    return {symbol.element_hash() for symbol in ca.symvar(ca.veccat(*expressions))}
 
 
 def _signals(

@@ -4,6 +4,7 @@
 #define STEPS @steps
 #define PAINT 0xDEADBEEFu
 #define DEPTH 16384 /* number of words of the stack that are examined */
+#define EXAMINED 4000 /* largest number of steps that use the examined stack */
 #define IDLE 400
 #define SYST_CSR (*(volatile uint32_t *)0xE000E010u)
 #define SYST_RVR (*(volatile uint32_t *)0xE000E014u)
@@ -48,7 +49,7 @@ static __attribute__((noinline)) uint32_t stack(void)
     int k;
     __asm__ volatile("mov %0, sp" : "=r"(top));
     for (p = top - DEPTH; p < top - 8; p++) { *p = PAINT; }
-    for (k = 0; k < STEPS; k++) { one(k); }
+    for (k = 0; k < STEPS && k < EXAMINED; k++) { one(k); }
     for (p = top - DEPTH; p < top - 8 && *p == PAINT; p++) { }
     return (uint32_t)((uintptr_t)top - (uintptr_t)p);
 }

@@ -185,6 +185,12 @@ static Outcome set(Instance *unit, unsigned int reference, double value)
         if (!within(unit, model_parameter_names[i], value, model_lower[i], model_upper[i])) {
             return REFUSED;
         }
+        if (!early && model_fixed[i] && value != m->set[i]) {
+            snprintf(unit->said, SAID, "set %s: expected a value before the end of the "
+                     "initialisation, after which it is fixed; it is unchanged",
+                     model_parameter_names[i]);
+            return REFUSED;
+        }
         m->set[i] = value;
     } else if (place == OF_RTOL) {
         if (!within(unit, "the relative tolerance", value, LEAST_RTOL, LARGEST_RTOL)) {

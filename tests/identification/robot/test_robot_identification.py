@@ -31,6 +31,33 @@ def test_the_regressor_predicts_the_torques_of_newton_and_euler():
     assert np.allclose(MODEL.torques(q, v, a), newton_euler(q, v, a), atol=1e-12)
 
 
+def test_branches_and_listed_order_do_not_exchange_joints():
+    def limb(name, before, y):
+        return (
+            f'<link name="{name}_link"><inertial><origin xyz="0.2 {y} 0"/><mass value="{1 + y}"/>'
+            '<inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="{name}" type="revolute"><parent link="{before}"/>'
+            f'<child link="{name}_link"/><origin xyz="0 {y} 0.1"/><axis xyz="0 1 0"/></joint>'
+        )
+
+    parts = [limb("z", "base", 0.3), limb("a", "z_link", 0.1), limb("m", "base", -0.2)]
+    parts += [limb("b", "m_link", 0.4)]
+    found = list[dict[str, float]]()
+    for order in (parts, parts[::-1], [parts[k] for k in (2, 0, 3, 1)]):
+        model = RobotModel.read(f'<robot name="two"><link name="base"/>{"".join(order)}</robot>')
+        place = {name: k for k, name in enumerate(model.names)}
+        number = np.array([[float("zamb".index(name) + 1) for name in place]])
+        q, v, a = number, 2 * number, 3 * number
+        found.append(dict(zip(place, model.torques(q, v, a)[0].tolist(), strict=True)))
+    for other in found[1:]:
+        assert other == pytest.approx(found[0])
+    arm = found[0]
+    alone = RobotModel.read(f'<robot name="one"><link name="base"/>{parts[2]}{parts[3]}</robot>')
+    q, v, a = (np.array([[i * 3.0, i * 4.0]]) for i in (1, 2, 3))
+    torques = dict(zip(alone.names, alone.torques(q, v, a)[0].tolist(), strict=True))
+    assert torques == pytest.approx({name: arm[name] for name in ("m", "b")})
+
+
 def test_base_parameters_determine_all_torques():
     base = base_of(MODEL, rotors=False)
     q, v, a = MODEL.random_motion(30, seed=3)
@@ -160,6 +187,24 @@ def test_a_resting_joint_is_named_and_costs_only_its_own_rows():
     assert found.friction["elbow"]["mu_d"].value == pytest.approx(COULOMB[1], rel=0.05)
 
 
+def test_what_is_said_about_parameters_holds_for_short_and_small_motions():
+    base, t = base_of(MODEL, rotors=False), np.arange(1500) / 250.0
+    q, v, a = waves(4, t, 0.02)
+    tau = newton_euler(q, v, a) + COULOMB * np.sign(v) + VISCOUS * v
+    tau += 0.1 * np.random.default_rng(0).normal(size=q.shape)
+    small = dict(zip(NAMES, q.T, strict=True))
+    small |= {f"{n}_torque": y for n, y in zip(NAMES, tau.T, strict=True)}
+    for data in (log(4, 6.0, **small), *(log(seed, 1.5) for seed in range(3))):
+        found = identify_robot(urdf(1.3), data)
+        loose = np.array([label in found.information.undetermined for label in base.labels])
+        x = np.array([found.base[label].value for label in base.labels])
+        assert 0 < loose.sum() <= loose.size
+        assert found.information.rank < found.information.total
+        assert np.all(np.abs(x - base.values)[~loose] < base.scales[~loose])
+        near = base.K @ np.array(found.inertial) - 1.3 * base.values
+        assert np.all(np.abs(near)[loose] < base.scales[loose])
+
+
 def test_only_rows_of_the_reversing_joint_are_left_out(fit):
     parts = {one.joint: one.used for one in fit.series}
     assert all(np.mean(used) > 0.6 for used in parts.values())
@@ -188,6 +233,8 @@ def test_rotor_inertias_are_found_where_they_are_separable():
     data = log(slide_torque=force)
     plain, found = (identify_robot(urdf(), data, rotors=rotors) for rotors in (False, True))
     assert found.rotors["slide"] == pytest.approx(10.0, rel=0.05)
+    assert any("pass rotors=True" in text for text in plain.findings)
+    assert not found.findings
     assert found.training["slide"].rms < 0.8 * plain.training["slide"].rms
     torques = found.torques(*waves(5, t))
     rigid = newton_euler(*waves(5, t)) + 10.0 * waves(5, t)[2] * np.array([0, 0, 1])
@@ -244,8 +291,8 @@ BAD = {
         "got that of elbow with the other sign.*elbow_torque=-1",
     ),
     "all signs": (lambda: columns(turned), "got that of shoulder, elbow, slide with"),
-    "degrees": (lambda: columns(scaled("elbow", 57.3)), r"are they in deg\?.*elbow=deg"),
-    "millimetres": (lambda: columns(scaled("slide", 1e3)), r"are they in mm\?.*slide=mm"),
+    "degrees": (lambda: columns(scaled("elbow", 57.3)), r"is it in deg\?.*elbow=deg"),
+    "millimetres": (lambda: columns(scaled("slide", 1e3)), r"is it in mm\?.*slide=mm"),
     "missing": (lambda: log(elbow=None), r"expected columns elbow \[rad\], got"),
     "another robot": (strange, "robot other than 'crane'"),
     "rest": (lambda: columns(resting), "joints that move, got .* where all rest"),

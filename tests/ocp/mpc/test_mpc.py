@@ -256,6 +256,28 @@ def test_pendulum_is_balanced_on_a_cart_with_sharper_friction() -> None:
     assert np.abs(found["x"]).max() < 1.0
 
 
+def test_weights_may_be_parameters() -> None:
+    """A controller with named weights equals one with these numbers, also if they change."""
+    named = track("x", "goal", "stiff") + effort("force", "cost")
+    names = Problem(
+        Phase(rubbing(), T=0.2), named, bounds={"force": (-20.0, 20.0)},
+        p={"goal": 0.1, "stiff": 900.0, "cost": 1e-2},
+    )  # fmt: skip
+    session = controller_of(names, 0.01, tolerance=1e-6).start()
+    for stiff, cost in ((900.0, 1e-2), (400.0, 3e-2)):
+        number = track("x", "goal", stiff) + effort("force", cost)
+        problem = Problem(
+            Phase(rubbing(), T=0.2), number, bounds={"force": (-20.0, 20.0)}, p={"goal": 0.1}
+        )
+        expected = controller_of(problem, 0.01, tolerance=1e-6).start().step([0.0, 0.2])
+        session.forget()
+        found = session.step([0.0, 0.2], {"stiff": stiff, "cost": cost})
+        assert found.converged and expected.converged
+        assert found.controls["force"] == pytest.approx(expected.controls["force"], rel=1e-4)
+    with pytest.raises(ValueError, match="track: weight"):
+        track("x", 0.0, -1.0)
+
+
 def test_two_inputs_hold_an_unstable_mode_within_their_bounds() -> None:
     cost = track("x", "far", 10.0) + track("v", 0.0, 1.0) + track("w", 0.0, 1.0)
     cost += effort("a", 0.01) + effort("b", 0.01)
@@ -345,15 +367,15 @@ def test_missing_compiler_is_reported(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_wrong_residual_or_control_in_the_files_is_found(tmp_path: Path) -> None:
     made = controller_of(positioning(), 0.01)
-    for old, new in (
-        ("fabs(S[i] * nominal_u[i])", "0.9 * fabs(S[i] * nominal_u[i])"),
-        ("    u = m->u[0][0];", "    u = m->u[1][0];"),
+    for old, new, why in (
+        ("larger(found, fabs(S[i]", "larger(found, 0.9 * fabs(S[i]", "understates residuals 1.1 t"),
+        ("    u = m->u[0][0];", "    u = m->u[1][0];", "differs by"),
     ):
         generated = made.to_c(tmp_path)
         text = generated.files[1].read_text()
         assert text.count(old) == 1
         generated.files[1].write_text(text.replace(old, new))
-        assert "differs by" in generated.verify(30).status
+        assert why in generated.verify(30).status
 
 
 def test_c_is_c_plus_plus_too(tmp_path: Path) -> None:

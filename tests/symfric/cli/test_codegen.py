@@ -83,6 +83,43 @@ def test_a_proof_is_shown_and_decides_the_exit_status(symfric, monkeypatch) -> N
     assert "--prove: expected guards" in symfric(f"{line} --no-guards", status=2).err
 
 
+PROBLEM = """
+from ocp import Phase, Problem, effort, track
+from symfric import BrownMcPhee, drive
+
+def problem(m=1.0):
+    model = drive(BrownMcPhee(mu_s=6.0, mu_d=4.0, v_t=1e-2), m=m, N=1.0)
+    cost = track("x", "goal", 900.0) + effort("force", 1e-3)
+    return Problem(Phase(model, T=0.1), cost, bounds={"force": (-20, 20)}, p={"goal": 0.0})
+
+def quick():
+    return problem().to_mpc(0.01, iterations=1)
+"""
+
+
+def test_a_problem_becomes_a_controller(symfric, monkeypatch) -> None:
+    Path("move.py").write_text(PROBLEM)
+    line = "codegen --mpc move.py --out c --set m=2 --step-size 0.02"
+    printed = symfric(f"{line} --json r.json")
+    assert "5 intervals of 0.02 s" in printed.out
+    assert [row["status"] for row in json.loads(Path("r.json").read_text())["checks"]] == (
+        ["verified", "verified"]
+    )
+    assert {p.name for p in Path("c").iterdir()} == {
+        "drive_mpc.c", "drive_mpc.h", "drive_mpc_f32.c", "drive_mpc_f32.h"
+    }  # fmt: skip
+    measured = Measured("drive_mpc", "float", "m7", average=2.5e5, maximum=6e5, finite=True)
+    monkeypatch.setattr("ocp.mpc.target.measure_controller", lambda *given: measured)
+    shown = symfric("codegen --mpc move.py:quick --out c --real float --core m7").out
+    assert "250000" in shown and "600000" in shown
+    for wrong, message in (
+        ("move.py:quick --step-size 0.1", "--step-size: expected none with a controller"),
+        ("move.py --compensator", "codegen --mpc: expected only"),
+        ("none.py", "which does not exist"),
+    ):
+        assert message in symfric(f"codegen --mpc {wrong} --out d", 2).err
+
+
 def test_a_scene_becomes_a_plant(symfric) -> None:
     line = "codegen --scene rabinowicz --law lugre --set k=3 --out c --free mu_s --no-kit"
     result = json.loads(symfric(f"{line} --step-size 1e-3 --method backward_euler --json -").out)

@@ -253,4 +253,3 @@ def test_names_and_units_are_those_of_the_compensator() -> None:
     assert all(block.outputs[name].unit == units[name] for name in names)
     states = {v.name: float(v.start) for v in block.states}
     assert (states["offset_now"], states["inertia_now"]) == (0.5, 2.0)
-    assert "scale_stribeck" in kalman_estimator(drive, noise=NOISE).outputs

@@ -172,6 +172,15 @@ def test_invalid_communication_steps_are_refused_without_effect(opened, t, size,
     steps(unit, 0.1)
 
 
+def test_lengths_and_start_values_are_fixed_after_the_initialisation(opened):
+    unit, _ = opened(Second, "loop", {"r": 0.06})
+    assert unit.set(m_slider=1.5, r=0.06) == OK
+    for name in ("r", "omega"):
+        assert unit.set(**{name: 0.07}) == DISCARD
+        assert f"set {name}: expected a value before the end of the init" in unit.messages[-1][1]
+    assert unit.get("r", "m_slider").tolist() == [0.06, 1.5]
+
+
 def test_invalid_values_and_calls_out_of_order_are_refused(opened, exported):
     unit, _ = opened(Second, "wire")
     assert unit.step(0.0, 0.1) == ERROR

@@ -1,6 +1,7 @@
 """C of units without warnings, their descriptions, their units, and runs of exported units."""
 
 import shutil
+from dataclasses import replace
 from xml.etree import ElementTree as Xml
 from zipfile import ZipFile
 
@@ -16,7 +17,7 @@ from symfric.bench.report import GOALS, Report
 from symfric.codegen.runner import WARNINGS
 from symfric.fmu import export_fmu, running
 from symfric.fmu.export import KINDS
-from symfric.fmu.variables import direct
+from symfric.fmu.variables import direct, fixed_parameters
 from symfric.foundation.parameters import Variable
 from symfric.foundation.programs import CompileError, Compiler
 from symfric.foundation.units import exponents, per_second
@@ -78,6 +79,18 @@ def test_the_description_lists_units_variables_and_the_experiment(tmp_path, no_c
     assert [variables[n].get("initial") for n in "zx"] == ["approx", "exact"]
     assert "position" in variables["x"].get("description")
     assert variables["rtol"].find("Real").get("start") == "1e-07"
+
+
+def test_dimensions_of_loops_and_start_values_are_fixed(tmp_path, no_compiler):
+    _, variables = described(SliderCrank(BrownMcPhee()), tmp_path, 3)
+    fixed = {n for n, v in variables.items() if v.get("variability") == "fixed"}
+    assert {"r", "l", "omega"} <= fixed
+    assert not {"m_slider", "mu_s", "g"} & fixed
+    x, p, begin = Variable("x", "m"), Variable("p", "1/s", start=1.0), Variable("x_0", "m")
+    model = Model(
+        "m", x=(replace(x, start=2 * begin.symbol),), p=(p, begin), ode=-p.symbol * x.symbol
+    )
+    assert fixed_parameters(model) == {"x_0"}
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

@@ -1,0 +1,245 @@
+"""Continuation of equilibria and periodic orbits in a parameter, through folds and grazing."""
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+
+import numpy as np
+
+from symfric.dynamics.branch import Branch, Special
+from symfric.dynamics.curve import Node, Step, corrected, followed, located, tangent
+from symfric.dynamics.equilibrium import Equilibrium
+from symfric.dynamics.families import Equilibria, Orbits
+from symfric.dynamics.orbit import PeriodicOrbit
+from symfric.dynamics.shooting import Shooting
+from symfric.dynamics.sticking import Near, restarted, same_sequence
+from symfric.dynamics.trace import Family, Point, Trace, note, point, sequence, vanishing
+from symfric.foundation import checks
+from symfric.foundation.numeric import Array
+from symfric.foundation.parameters import check_names
+from symfric.model import Model
+
+INTERRUPTED = "interrupted by the user"
+SMALL = 1e-3
+"""First amplitude of orbits from a Hopf point, relative to the magnitudes of the states."""
+
+
+def continuation(
+    start: Equilibrium | PeriodicOrbit,
+    parameter: str,
+    between: tuple[float, float],
+    *,
+    points: int = 200,
+    step: float = 0.05,
+    rtol: float = 1e-8,
+) -> Branch:
+    """Return the branch of equilibria or periodic orbits through a start, in both directions.
+
+    Pseudo-arclength continuation passes folds and follows unstable parts. Special points are
+    located on the way: folds, Hopf points, branch points, period doublings, Neimark-Sacker points,
+    and the grazing of a sliding orbit by the set of stick. Exact friction needs no smoothing: at a
+    grazing, the branch continues with the orbit of the other sequence of stick and slip. They are
+    located to about 1e-8 of the range; a fold that is sharper than a thousandth of a step only to
+    that step, and a Hopf point at which orbits vanish by extrapolation to 1e-5.
+
+    Args:
+        start: isolated equilibrium, or a periodic orbit whose period is not given. Neither is
+            symmetric.
+        parameter: name of a free parameter of the model.
+        between: smallest and largest value of the parameter.
+        points: largest number of points.
+        step: longest step, relative to the magnitudes of states, period and range of the parameter.
+        rtol: relative tolerance of the runs of orbits.
+
+    Returns:
+        The branch. After an interrupt (Ctrl-C) it contains the points found so far.
+
+    Raises:
+        ValueError: bad input, or no curve at the start.
+    """
+    where = "continuation"
+    if not isinstance(start, Equilibrium | PeriodicOrbit):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise checks.refused(f"{where}: start", "an equilibrium or a periodic orbit", start)
+    model = start.model
+    hint = f"free it when the model is made, such as rabinowicz(law, free=['{parameter}'])"
+    check_names(f"{where}: parameter", [parameter], [v.name for v in model.p], hint)
+    span = _span(where, between, start.p[parameter], parameter)
+    checks.count(f"{where}: points", points, least=2)
+    checks.number(f"{where}: step", step, above=0.0, upper=1.0)
+    if isinstance(start, PeriodicOrbit):
+        if start.driven or start.symmetric:
+            raise checks.refused(
+                f"{where}: start", "an orbit without given period or symmetry", start,
+                "periodic_orbit(...) without period= and symmetric=",
+            )  # fmt: skip
+        curve, z = _orbits(start, parameter, span, rtol)
+    elif start.free:
+        raise checks.refused(
+            f"{where}: start", "an isolated equilibrium", start,
+            f"contacts at rest hold a set of dimension {start.free}; survives() returns its ends",
+        )  # fmt: skip
+    else:
+        curve, z = _equilibria(start, parameter, span)
+    node = curve.at(z)
+    up = tangent(curve, node, _unit(z.size))
+    back = _traced(curve, node, -up, span, points // 2, step)
+    on = Trace([back.points[0]])
+    if back.message != INTERRUPTED:
+        on = _traced(curve, node, up, span, points + 1 - len(back.points), step)
+    return _joined(model, parameter, dict(start.p), [back, on])
+
+
+def orbits_from(
+    branch: Branch,
+    hopf: Special,
+    between: tuple[float, float],
+    *,
+    points: int = 200,
+    step: float = 0.05,
+    rtol: float = 1e-8,
+) -> Branch:
+    """Return the branch of periodic orbits that begins at a Hopf point of a branch of equilibria.
+
+    The arguments are those of `continuation`.
+
+    Raises:
+        ValueError: bad input, a point of another kind, or no orbit next to it.
+    """
+    where, model = "orbits_from", branch.model
+    if not isinstance(hopf, Special) or hopf.kind != "Hopf":  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise checks.refused(f"{where}: hopf", "a Hopf point, branch.located('Hopf')[0]", hopf)
+    span = _span(where, between, hopf.value, branch.parameter)
+    nominal = np.maximum(model.nominal("x"), np.abs(hopf.x))
+    problem = Shooting(
+        model, {}, (branch.parameter,), nominal, np.ones(nominal.size), rtol, driven=False
+    )
+    scale = np.concatenate([nominal, [hopf.period, span[1] - span[0]]])
+    curve = Orbits(problem, branch.p, scale, 10 * rtol)
+    along = np.concatenate([hopf.direction / nominal, [0.0, 0.0]])
+    along /= np.linalg.norm(along)
+    z = np.concatenate([hopf.x, [hopf.period, hopf.value]])
+    node, _ = corrected(curve, z + SMALL * along * scale, along)
+    tau = tangent(curve, node, along)
+    part = _traced(curve, node, tau, span, points, step)
+    return _joined(model, branch.parameter, branch.p, [Trace(), part])
+
+
+def _span(where: str, between: tuple[float, float], value: float, name: str) -> tuple[float, float]:
+    ends = checks.array(f"{where}: between", between, what="two numbers")
+    if ends.size != 2:
+        raise checks.refused(f"{where}: between", "two numbers", between)
+    low, high = ends.tolist()
+    if not low <= value <= high or not low < high:
+        raise ValueError(
+            f"{where}: between: expected a range that contains the start, {name} = {value:g}, got "
+            f"{low:g} ... {high:g}"
+        )
+    return low, high
+
+
+def _unit(n: int) -> Array:
+    found = np.zeros(n)
+    found[-1] = 1.0
+    return found
+
+
+def _orbits(
+    start: PeriodicOrbit, name: str, span: tuple[float, float], rtol: float
+) -> tuple[Orbits, Array]:
+    """Return the equations of orbits through `start`, and the unknowns there."""
+    model = start.model
+    reach = [start.run.extremes[v.name] for v in model.x]
+    scale = np.maximum([high - low for low, high in reach], 1e-9 * model.nominal("x"))
+    problem = Shooting(model, start.u, (name,), scale, np.ones(scale.size), rtol, driven=False)
+    z = np.array([*start.x.values(), start.period, start.p[name]])
+    every = np.concatenate([scale, [start.period, span[1] - span[0]]])
+    return Orbits(problem, start.p, every, 10 * rtol), z
+
+
+def _equilibria(
+    start: Equilibrium, name: str, span: tuple[float, float]
+) -> tuple[Equilibria, Array]:
+    """Return the equations of equilibria through `start`, and the unknowns there."""
+    eq, k = start.equations, [*start.u, *start.p].index(name)
+    scale = np.append(np.maximum(eq.scale, np.abs(start.y)), span[1] - span[0])
+    return Equilibria(eq, start.data, k, scale, 1e-11), np.append(start.y, start.data[k])
+
+
+def _traced(
+    curve: Family, node: Node, tau: Array, span: tuple[float, float], points: int, step: float
+) -> Trace:
+    """Return the part of the curve from `node` in the direction `tau`."""
+    trace = Trace([point(curve, node)])
+    try:
+        for found in _steps(curve, node, tau, span, step, trace):
+            note(curve, found, trace)
+            if not span[0] < found.node.z[-1] < span[1]:
+                edge = span[0] if found.node.z[-1] <= span[0] else span[1]
+                last, _ = located(curve, found, partial(_beyond, edge))
+                trace.points.append(point(curve, last))
+                trace.message = "ends at the given range"
+                break
+            trace.points.append(point(curve, found.node))
+            if (value := vanishing(curve, trace.points)) is not None:
+                trace.add("Hopf", curve, found.node, value)
+                trace.message = "ends at a Hopf point"
+                break
+            if len(trace.points) >= points:
+                trace.message = f"ends after {points} points"
+                break
+    except KeyboardInterrupt:
+        trace.message = INTERRUPTED
+    return trace
+
+
+def _beyond(edge: float, node: Node, _: Array) -> float:
+    return float(node.z[-1]) - edge
+
+
+def _steps(
+    curve: Family, node: Node, tau: Array, span: tuple[float, float], step: float, trace: Trace
+) -> Iterator[Step]:
+    """Yield steps along the curve, also across changes of stick and slip."""
+    known = {sequence(node)}
+    while True:
+        near = Near(curve)
+        for found in followed(curve, node, tau, step, same_sequence, near.most):
+            node, tau = found.node, found.tau
+            yield found
+        if not isinstance(curve, Orbits) or not curve.problem.eq.switching:
+            trace.message = "ends where no further step was possible; try a smaller step or rtol"
+            return
+        kind, value = near.boundary(node)
+        trace.add(kind, curve, node, value)
+        other = restarted(curve, node, span, known)
+        if other is None:
+            trace.message = f"ends where the sequence of stick and slip changes ({kind})"
+            return
+        node, away = other
+        known.add(sequence(node))
+        trace.points.append(point(curve, node))
+        tau = tangent(curve, node, away * _unit(node.z.size))
+
+
+def _joined(model: Model, name: str, p: Mapping[str, float], parts: list[Trace]) -> Branch:
+    """Return the branch of a backward and a forward part."""
+    back, on = parts
+    points = [*reversed(back.points[1:]), *on.points]
+    shift = max(len(back.points) - 1, 0)
+    special = [
+        Special(s.kind, s.value, shift + 1 - s.index, s.x, s.period, s.direction)
+        for s in reversed(back.special)
+    ]
+    special += [
+        Special(s.kind, s.value, shift + s.index, s.x, s.period, s.direction) for s in on.special
+    ]
+    width = max(pt.exponents.size for pt in points)
+    exponents = np.full((len(points), width, 2), np.nan)
+    for row, pt in zip(exponents, points, strict=True):
+        row[: pt.exponents.size] = np.column_stack([pt.exponents.real, pt.exponents.imag])
+    column = {n: np.array([getattr(pt, n) for pt in points]) for n in Point._fields[:3]}
+    message = "; ".join(m for m in (back.message, on.message) if m)
+    return Branch(
+        model, name, dict(p), column["value"], column["x"], column["period"], exponents,
+        np.array([pt.low for pt in points]), np.array([pt.high for pt in points]),
+        tuple(pt.sequence for pt in points), tuple(special), message,
+    )  # fmt: skip

@@ -1,0 +1,209 @@
+"""Pseudo-arclength continuation of the solutions of equations with one parameter.
+
+    r(z) = 0,   one unknown more than equations
+
+A step predicts z + ds tau along the unit tangent tau, and Newton's method corrects it in the plane
+orthogonal to tau. Coordinates are scaled. The step length follows the number of corrections.
+Source: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, 1977.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from symfric.dynamics.equations import Indices
+from symfric.foundation.numeric import Array
+
+CORRECTIONS, FEW = 6, 2
+"""Largest number of corrections, and the number up to which the next step is longer."""
+GROWTH, SHRINKAGE = 1.5, 0.4
+"""Factors of the step after few corrections, and after a failure."""
+SHORTEST = 1e-6
+"""Shortest step relative to the longest one."""
+FARTHEST = 0.5
+"""Largest correction relative to the step."""
+SHARP = 1e-3
+"""Step, relative to the longest one, below which a turn is too sharp to be resolved."""
+DEPENDENT = 1e-12
+
+
+class Node(NamedTuple):
+    """Linearised equations at z.
+
+    Attributes:
+        z: all unknowns, the parameter last, shape (n,).
+        r: residuals, shape (m,).
+        J: derivatives by the coordinates, shape (m, m + 1 or more rows).
+        chosen: indices of the coordinates in z; the parameter is the last one.
+        D: change of z by the coordinates, shape (n, coordinates).
+        content: what the equations were made from.
+    """
+
+    z: Array
+    r: Array
+    J: Array
+    chosen: Indices
+    D: Array
+    content: Any
+
+
+class Equations(ABC):
+    """Equations r(z) = 0 of a curve.
+
+    Attributes:
+        scale: magnitudes of z, shape (n,).
+        tolerance: largest residual and correction, relative to `scale`.
+    """
+
+    scale: Array
+    tolerance: float
+
+    @abstractmethod
+    def at(self, z: Array) -> Node:
+        """Return the linearised equations; residuals are relative to their magnitudes.
+
+        Raises:
+            ValueError: the equations have no values there.
+        """
+
+
+def tangent(curve: Equations, node: Node, along: Array) -> Array:
+    """Return the unit tangent at `node` in the direction of `along`, scaled, shape (n,)."""
+    s = curve.scale[node.chosen]
+    rows = np.vstack([node.J * s, (along[node.chosen])])
+    right = np.zeros(rows.shape[0])
+    right[-1] = 1.0
+    found: Array = np.linalg.lstsq(rows, right, rcond=DEPENDENT)[0].astype(float)
+    tau = (node.D @ (s * found)) / curve.scale
+    return tau / np.linalg.norm(tau[node.chosen])
+
+
+def corrected(curve: Equations, z: Array, tau: Array) -> tuple[Node, int]:
+    """Return the solution next to `z` in the plane orthogonal to `tau`, and the corrections.
+
+    Raises:
+        ValueError: the correction does not converge.
+    """
+    start, before = z, np.inf
+    for count in range(CORRECTIONS + 1):
+        node = curve.at(z)
+        s = curve.scale[node.chosen]
+        off = float(tau @ ((node.z - start) / curve.scale))
+        rows = np.vstack([node.J * s, tau[node.chosen]])
+        right = np.append(-node.r, -off)
+        size = float(np.abs(node.r).max(initial=0.0))
+        if size <= curve.tolerance:
+            return node, count
+        if size > before:
+            break
+        before = size
+        step = np.linalg.lstsq(rows, right, rcond=DEPENDENT)[0]
+        z = node.z + node.D @ (s * step)
+    raise ValueError("the correction does not converge")
+
+
+class Step(NamedTuple):
+    """Step of a continuation.
+
+    Attributes:
+        node, tau: solution and tangent at its end.
+        start, along: node and tangent at its start.
+        length: its length.
+        sharp: True if the curve turns back within the step, too sharply to be resolved.
+    """
+
+    node: Node
+    tau: Array
+    start: Node
+    along: Array
+    length: float
+    sharp: bool
+
+
+def followed(
+    curve: Equations, node: Node, tau: Array, longest: float,
+    accept: Callable[[Node, Node], None], most: Callable[[Step], float],
+) -> Iterator[Step]:  # fmt: skip
+    """Yield steps along the curve until no step is possible.
+
+    The prediction has order 2 from the second step on.
+
+    Args:
+        curve: the equations.
+        node, tau: start and its tangent.
+        longest: longest step.
+        accept: function of the last and a new node that raises a ValueError to refuse the new one.
+        most: function of a step that returns the largest length of the next one; 0 ends the curve.
+    """
+    length, bend, turn = longest / 10, np.zeros_like(tau), _turn(curve, node, tau)
+    while length >= SHORTEST * longest:
+        move = length * tau + length**2 / 2 * bend
+        try:
+            new, count = corrected(curve, node.z + move * curve.scale, tau)
+            off = float(np.linalg.norm(((new.z - node.z) / curve.scale - move)[new.chosen]))
+            if off > FARTHEST * length:
+                raise ValueError("the correction leads to another part of the curve")
+            accept(node, new)
+            after = tangent(curve, new, tau)
+            other = turn * _turn(curve, new, after) < 0
+            if other and length > SHARP * longest:
+                raise ValueError("the orientation of the curve changes within the step")
+            sharp = other and turn * _turn_before(curve, new, after, length) < 0
+        except ValueError:
+            length *= SHRINKAGE
+            continue
+        if sharp:
+            after = -after
+        elif other:
+            turn = -turn  # a branch point
+        step = Step(new, after, node, tau, length, sharp)
+        yield step
+        node, bend = new, np.zeros_like(tau) if sharp else (after - tau) / length
+        tau, longer = after, length * GROWTH if count <= FEW else length
+        length = min(longest, longer, most(step))
+
+
+def _turn_before(curve: Equations, node: Node, tau: Array, length: float) -> float:
+    """Return the orientation on the same part of the curve as `node`, a step before it.
+
+    If it equals that of `node`, the last step did not cross a branch point: it led across a turn to
+    the other part of the curve.
+    """
+    back, _ = corrected(curve, node.z - length * tau * curve.scale, tau)
+    return _turn(curve, back, tangent(curve, back, tau))
+
+
+def _turn(curve: Equations, node: Node, tau: Array) -> float:
+    """Return the orientation of the curve, 1 or -1, which is constant except at branch points.
+
+    It is the sign of the determinant of the equations with the tangent; 0 if they are not square.
+    """
+    rows = np.vstack([node.J * curve.scale[node.chosen], tau[node.chosen]])
+    return float(np.linalg.slogdet(rows)[0]) if rows.shape[0] == rows.shape[1] else 0.0
+
+
+def located(
+    curve: Equations, step: Step, test: Callable[[Node, Array], float]
+) -> tuple[Node, Array]:
+    """Return the node of a step, and its tangent, at which `test` of these changes its sign.
+
+    If the equations cannot be solved there, it is the end of the step.
+    """
+    found: dict[float, tuple[Node, Array]] = {}
+
+    def value(length: float) -> float:
+        z = step.start.z + length * step.along * curve.scale
+        node, _ = corrected(curve, z, step.along)
+        found[length] = node, tangent(curve, node, step.along)
+        return test(*found[length])
+
+    try:
+        root: Any = brentq(value, 0.0, step.length, xtol=1e-12 * step.length)
+    except (ValueError, RuntimeError):
+        return step.node, step.tau
+    if root not in found:
+        value(float(root))
+    return found[float(root)]

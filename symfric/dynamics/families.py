@@ -1,0 +1,115 @@
+"""Equations of a family of periodic orbits over one parameter, and of a family of equilibria."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.dynamics.balance import rows_at_rest
+from symfric.dynamics.curve import Equations as Curve
+from symfric.dynamics.curve import Node
+from symfric.dynamics.equations import Equations
+from symfric.dynamics.shooting import Linear, Shooting
+from symfric.dynamics.tangent import tangent
+from symfric.foundation.numeric import Array
+
+TINY = 1e-300
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Orbits(Curve):
+    """Equations of periodic orbits; z = (x, T, parameter), and the phase condition is a row.
+
+    Attributes:
+        problem: shooting equations with the derivatives by the parameter.
+        p: values of all free parameters.
+        scale, tolerance: see `Curve`.
+    """
+
+    problem: Shooting
+    p: Mapping[str, float]
+    scale: Array
+    tolerance: float
+
+    @property
+    def name(self) -> str:
+        """Name of the parameter."""
+        return self.problem.names[0]
+
+    def at(self, z: Array) -> Node:
+        """Return the linearised shooting equations; see `Curve.at`."""
+        nx = z.size - 2
+        if not z[nx] > 0:
+            raise ValueError("the period falls to zero")
+        p = {**self.p, self.name: float(z[-1])}
+        found = self.problem.linear(z[None, :nx], float(z[nx]), p)
+        chosen, basis = found.bases[0]
+        k = chosen.size
+        D = np.zeros((z.size, k + 2))
+        D[:nx, :k], D[nx, k], D[-1, k + 1] = basis, 1.0, 1.0
+        s = self.scale[chosen]
+        phase = found.phase * self.scale[[*chosen, nx, nx + 1]]
+        phase = found.phase / max(float(np.abs(phase).max()), TINY)
+        r, J = np.append(found.r / s, 0.0), np.vstack([found.J / s[:, None], phase])
+        z = np.concatenate([found.segments[0].start, z[nx:]])
+        return Node(z, r, J, np.array([*chosen, nx, nx + 1]), D, found)
+
+
+def multipliers(at: Linear) -> NDArray[np.complex128]:
+    """Return the Floquet multipliers without that of the direction of motion."""
+    found = np.linalg.eigvals(at.monodromy).astype(complex)
+    found = np.delete(found, int(np.argmin(np.abs(found - 1))))
+    return found[np.argsort(-np.abs(found))]
+
+
+class State(NamedTuple):
+    """Equilibrium on a curve: its unknowns, and the eigenvalues of small deviations [1/s]."""
+
+    y: Array
+    d: Array
+    eigenvalues: NDArray[np.complex128]
+    vectors: NDArray[np.complex128]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Equilibria(Curve):
+    """Equations of equilibria; z = (y, parameter), with the modes of y as constants.
+
+    Attributes:
+        eq: equations of the model.
+        d: inputs and parameters.
+        index: index of the parameter in d.
+        scale, tolerance: see `Curve`.
+    """
+
+    eq: Equations
+    d: Array
+    index: int
+    scale: Array
+    tolerance: float
+
+    def at(self, z: Array) -> Node:
+        """Return the linearised equations of an equilibrium; see `Curve.at`."""
+        y, d = z[:-1], self.d.copy()
+        d[self.index] = z[-1]
+        r, J = rows_at_rest(self.eq, y, d)
+        own = np.setdiff1d(np.arange(y.size), np.union1d(self.eq.modes, self.eq.cyclic))
+        chosen = np.append(own, y.size)
+        columns = np.append(own, y.size + self.index)
+        size = np.maximum((np.abs(J[:, columns]) * self.scale[chosen]).max(axis=1), TINY)
+        D = np.eye(z.size)[:, chosen]
+        return Node(z, r / size, J[:, columns] / size[:, None], chosen, D, (y, d))
+
+    def state(self, node: Node) -> State:
+        """Return the equilibrium with its eigenvalues."""
+        y, d = node.content
+        linear = tangent(self.eq, y, d)
+        values: NDArray[np.complex128]
+        values, vectors = (part.astype(complex) for part in np.linalg.eig(linear.A))
+        order = np.argsort(-values.real)
+        directions = (linear.T @ vectors).astype(complex)
+        return State(y, d, values[order], directions[:, order])
