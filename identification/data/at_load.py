@@ -10,6 +10,10 @@ The efficiency is applied as known. A record does not distinguish it from fricti
 the load; with an efficiency of 1, the losses of the gear are part of the fitted friction. The
 direction of power uses a velocity filtered as that of `InverseDynamics`; near a reversal, where it
 is uncertain, a static law is not compared with the data.
+
+Limits: with a coarse encoder and an efficiency below 1, a fit may be DOUBTFUL although its
+intervals contain the true values: 10 of 10 simulated records of an axis with 2000 counts per turn,
+a ratio of 50 and efficiencies of 0.85 and 0.7; with 65536 counts per turn 2 of 10.
 """
 
 from dataclasses import replace
