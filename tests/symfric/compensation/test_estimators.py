@@ -104,7 +104,7 @@ def test_derivatives_of_the_prediction_are_those_of_differences(law: sf.Law) -> 
     x = ca.vertcat(f.z, seen, now)
     others = [s for s in ca.symvar(ca.vertcat(ahead, M)) if not ca.depends_on(x, s)]
     look = ca.Function("look", [x, ca.vertcat(*others)], [ahead, slopes, M])
-    usual = {v.name: float(v.start) for v in f._parts.parameters} | {"force": 3.0, "h": H}
+    usual = {v.name: float(v.start) for v in f.parts.parameters} | {"force": 3.0, "h": H}
     p = [usual[s.name()] for s in others]
     sizes = np.array([*f.reach, 1e-2, *(float(v.nominal) for v in f.theta)])
     random = np.random.default_rng(2)
