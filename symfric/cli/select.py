@@ -86,7 +86,7 @@ def select(
     levels = opt.numbers("--set", {n: given.pop(n) for n in OF_FRICTION if n in given})
     candidates, formed_by_user = _candidates(opt.laws_of(law or [*ALL_LAWS]), given)
     if ".py" in scene:
-        machine: Any = _function_of_file(scene, opt.numbers("--set", given))
+        machine: Any = function_of_file("select", scene, opt.numbers("--set", given))
     else:
         machine = _with(kind_of(scene, preset=preset, law_of=law_of), scene, given)
     misfits = None
@@ -181,11 +181,11 @@ def _candidates(named: dict[str, Law], given: dict[str, str]) -> tuple[dict[str,
     return laws, chosen
 
 
-def _function_of_file(text: str, values: dict[str, float]) -> Callable[..., Any]:
+def function_of_file(where: str, text: str, values: dict[str, float]) -> Callable[..., Any]:
     """Return the callable FILE.py[:NAME], with the numbers of --set as keyword arguments."""
-    _, found = opt.named_in_file("select", text, "machine", callable)
+    _, found = opt.named_in_file(where, text, "machine", callable)
     if not callable(found):
-        raise checks.refused(f"select '{text}'", "a function law -> Model, or a scene", found)
+        raise checks.refused(f"{where} '{text}'", "a function law -> Model, or a scene", found)
     first, *others = signature(found).parameters or [""]
     check_names(f"--set of {text}, a function of {first}", values, others)
     return partial(found, **values) if values else found

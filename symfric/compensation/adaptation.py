@@ -1,11 +1,11 @@
 """Settings of the estimators of changing friction, and their checks."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
 from symfric.compensation.force import PARAMETERS, TABLES
+from symfric.compensation.settings import pairs_of
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable
 
@@ -86,11 +86,7 @@ def adaptation_from_text(texts: Sequence[str]) -> Adaptation:
         ValueError: unknown or repeated names, or values that are not numbers.
     """
     where, found = "adaptation", dict[str, Any]()
-    for text in (setting for some in texts for setting in re.split(r",(?=\w+=)", some)):
-        name, _, value = text.partition("=")
-        checks.check_names(where, [name], [item.name for item in fields(Adaptation)])
-        if name in found or not value:
-            raise checks.refused(where, "NAME=VALUE, every name once", text)
+    for name, value in pairs_of(where, texts, [item.name for item in fields(Adaptation)]):
         parts, at = value.split(","), f"{where}: {name}"
         if name == "free":
             found[name] = tuple(parts)

@@ -22,7 +22,6 @@ from symfric.compensation.adaptation import (
     scale_parameters,
 )
 from symfric.compensation.force import TABLES, Parts, terms, within_load
-from symfric.compensation.square_root import factor
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable, parameters
 from symfric.foundation.variable import starts_of, symbols_of
@@ -32,20 +31,8 @@ from symfric.laws.base.law import require_law
 from symfric.model import Output
 from symfric.scenes import Drive
 
-USE = (
-    "Call it once per sample, before the compensator, with the total force that acted over the "
-    "last interval (after the delay of the drive) and the velocity at its end. Then copy its "
-    "outputs to the parameters of the compensator with the same names.",
-    "Each estimate X is within X_low ... X_high for all bits of states and inputs.",
-    "Set learn to 0 while other forces act, such as those of a contact or a brake.",
-    "unseen is the sum of 2^k over the estimates k = 0, 1, ... that the data do not determine: "
-    "their variance is above a quarter of the square of X_spread.",
-)
-LIMITS = (
-    "Estimates change only while the axis slides faster than v_least under a force below F_valid.",
-    "X_sd is valid if errors of the law are correlated over t_window only. It increases with the "
-    "residuals, but does not contain errors of mass, torque constant and delay.",
-)
+TEXTS: dict[str, Any] = TABLES["estimators"]
+"""Texts of the headers of estimators."""
 SEEN = 0.25
 """Variance relative to that of the spread, below which the data determine a parameter."""
 FAR = 1e29
@@ -60,6 +47,7 @@ class Adapted:
 
     Attributes:
         where: beginning of messages.
+        parts: variables of the block.
         v: symbol of the measured velocity.
         z: symbols of the states of the law; `block` replaces them by their values within bounds.
         theta: estimated parameters; `nominal` is the spread.
@@ -69,7 +57,7 @@ class Adapted:
         level: force of the law at rest [N].
         h: step size [s].
         mass: moving mass [kg], a parameter; not used if it is estimated.
-        memory: parameter t_memory [s].
+        memory, change: parameters t_memory and t_change [s].
         reach: largest states of the law under the load, else their nominal values.
     """
 
@@ -103,9 +91,9 @@ class Adapted:
             raise ValueError(f"{self.where}: expected a law of v and N, got one with {names}")
         if end and "F_end" in inner.outputs:
             inner = replace(inner, outputs={"F": inner.outputs["F_end"]})
-        self._inner, size, self._parts = inner, step_size(where, h, inner), Parts(inner)
+        self._inner, size, self.parts = inner, step_size(where, h, inner), Parts(inner)
         self.h, self._sizes, found = size.h, size.parameters, terms(law, inner)
-        own = {p.name: p for p in self._parts.parameters}
+        own = {p.name: p for p in self.parts.parameters}
         self.level, scale = _level(law, normal), float(law.velocity_scale)
         self._slow = scale if isfinite(scale) else 0.0
         scales = scale_parameters([n for n in found.names if n != "bristle"], offset, mass)
@@ -115,53 +103,42 @@ class Adapted:
         used = {n: symbols[f"scale_{n}"] for n in found.names if f"scale_{n}" in symbols}
         if "coulomb" in used and "stribeck" in found.names:
             used.setdefault("stribeck", used["coulomb"])
-        self._parts.parameters = [p for p in self._parts.parameters if p.name not in symbols]
+        self.parts.parameters = [p for p in self.parts.parameters if p.name not in symbols]
         self.v, self.z = found.v, symbols_of(inner.states)
-        load = self._parts.parameter("N", normal)
+        load = self.parts.parameter("N", normal)
         self._held = within_load(found.law, self.z, load) if inner.states else self.z
         given = [n for n in own if n in symbols]
         old = ca.vertcat(found.N, *(own[n].symbol for n in given))
         new = ca.vertcat(load, *(symbols[n] for n in given))
         force, self.after = ca.substitute([found.scaled(used), ca.SX(inner.next)], [old], [new])
-        every = (*self._parts.parameters, *self.theta)
+        every = (*self.parts.parameters, *self.theta)
         most = ca.vertcat(1e30 * ca.DM.ones(self.z.shape), starts_of(every))
         most = ca.evalf(ca.substitute(self._held, ca.vertcat(self.z, symbols_of(every)), most))
         usual = [v.nominal for v in inner.states]
         self.reach = [x if x < FAR else y for x, y in zip(most.nonzeros(), usual, strict=True)]
-        self.force = force + symbols.get("offset", self._parts.parameter("offset", offset))
-        self.mass, self._mass = self._parts.parameter("inertia", mass), mass
+        self.force = force + symbols.get("offset", self.parts.parameter("offset", offset))
+        self.mass, self._mass = self.parts.parameter("inertia", mass), mass
         memory = SHARES["memory"] * s.change if s.memory is None else s.memory
-        self.memory = self._parts.parameter("t_memory", memory)
+        self.memory = self.parts.parameter("t_memory", memory)
+        self.change = self.parts.parameter("t_change", s.change)
         self._next = dict[str, ca.SX]()
         seen: dict[str, Any] = {"nominal": 0.1, "doc": "measured velocity"}
-        self._parts.inputs = [replace(v, **seen) for v in inner.inputs[:1]]
+        self.parts.inputs = [replace(v, **seen) for v in inner.inputs[:1]]
         self.follow(self.z, self.after)
-
-    def parameter(self, name: str, start: float) -> ca.SX:
-        """Add a parameter and return its symbol."""
-        return self._parts.parameter(name, start)
-
-    def given(self, name: str) -> ca.SX:
-        """Return the symbol of an input."""
-        return self._parts.given(name)
 
     def states(self, *names: str) -> list[ca.SX]:
         """Add states of `variables.toml` and return their symbols."""
-        return [self._parts.state(name) for name in names]
+        return [self.parts.state(name) for name in names]
 
     def add(self, *variables: Variable) -> ca.SX:
         """Add states and return their symbols as a column."""
-        self._parts.states += variables
+        self.parts.states += variables
         return symbols_of(variables)
 
     def follow(self, states: ca.SX, values: ca.SX) -> None:
         """Set the values of states after the step."""
         pairs = zip(ca.vertsplit(states), ca.vertsplit(ca.densify(values)), strict=True)
         self._next |= {state.name(): value for state, value in pairs if state.numel()}
-
-    def numbered(self, what: str, doc: str) -> ca.SX:
-        """Add one state for each estimated parameter, and return their symbols."""
-        return self.add(*(Variable(f"{p.name}_{what}", "", doc=doc) for p in self.theta))
 
     def estimates(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Add the estimates; return their symbols, their values within bounds, and spreads."""
@@ -177,7 +154,7 @@ class Adapted:
                 Variable(f"{p.name}_high", unit, start=p.upper, nominal=scale, lower=least,
                          doc="highest estimate"),
             )  # fmt: skip
-            self._parts.parameters += own
+            self.parts.parameters += own
             columns.append([v.symbol for v in own])
         spread, low, high = (ca.vertcat(*column) for column in zip(*columns, strict=True))
         states = self.add(
@@ -191,23 +168,18 @@ class Adapted:
         """Return values within the bounds of the estimates."""
         return ca.SX(smooth.clip(theta, *self._bounds))
 
-    def covariance(self, n: int) -> tuple[ca.SX, ca.SX]:
-        """Add the factor of a covariance of n variables; return its symbols and its value."""
-        variables, found = factor(n)
-        return self.add(*variables), found
-
     def noises(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Add parameters, and return noise_v [m/s], noise_F [N] and t_window [s]."""
         s, noise = self._s, self._s.noise or 0.0
         accuracy = SHARES["accuracy"] * self.level if s.accuracy is None else s.accuracy
         step = float(next((v.start for v in self._sizes), self.h))
         usual = max(SAMPLES * step, 2 * self._mass * noise / accuracy)
-        window = self.parameter("t_window", usual if s.window is None else s.window)
-        return self.parameter("noise_v", noise), self.parameter("noise_F", accuracy), window
-
-    def change(self) -> ca.SX:
-        """Add and return the parameter t_change [s]."""
-        return self.parameter("t_change", self._s.change)
+        window = self.parts.parameter("t_window", usual if s.window is None else s.window)
+        return (
+            self.parts.parameter("noise_v", noise),
+            self.parts.parameter("noise_F", accuracy),
+            window,
+        )
 
     def usable(self) -> ca.SX:
         """Return the condition that the present sample may change the estimates."""
@@ -215,18 +187,18 @@ class Adapted:
         least = max(SLIDING * (s.noise or 0.0), FALLEN * self._slow)
         least = least if s.slowest is None else s.slowest
         most = BOUNDLESS * self.level if s.valid is None else s.valid
-        slides = ca.fabs(self.v) >= self.parameter("v_least", least)
-        valid = ca.fabs(self.given("force")) < self.parameter("F_valid", most)
-        return ca.SX(ca.logic_and(ca.logic_and(slides, valid), self.given("learn") > 0.5))
+        slides = ca.fabs(self.v) >= self.parts.parameter("v_least", least)
+        valid = ca.fabs(self.parts.given("force")) < self.parts.parameter("F_valid", most)
+        return ca.SX(ca.logic_and(ca.logic_and(slides, valid), self.parts.given("learn") > 0.5))
 
     def block(
-        self, name: str, texts: Mapping[str, Any], now: ca.SX, deviation: ca.SX, variance: ca.SX,
+        self, name: str, kind: str, now: ca.SX, deviation: ca.SX, variance: ca.SX,
         **more: Output,
     ) -> Block:  # fmt: skip
         """Return the finished block.
 
         Args:
-            texts: fields doc, equations and sources of the block.
+            kind: "recursive" or "kalman", for the texts.
             now, deviation: estimates and their deviations.
             variance: variances relative to the squares of the spreads.
             more: further outputs.
@@ -236,7 +208,7 @@ class Adapted:
             found[f"{p.name}_sd"] = Output(deviation[i], p.unit, f"deviation of {p.name}")
         unseen = ca.dot(variance > SEEN, ca.DM([2.0**i for i in range(len(self.theta))]))
         found |= {"unseen": Output(unseen, "1", "sum of 2^k of undetermined estimates"), **more}
-        parts, inner = self._parts, self._inner
+        parts, inner = self.parts, self._inner
         parts.inputs.sort(key=lambda v: [*TABLES["inputs"]].index(v.name))
         results = [self._next[v.name] for v in parts.states]
         results += [ca.SX(o.expression) for o in found.values()]
@@ -248,9 +220,10 @@ class Adapted:
         parts.parameters = [p for p in parts.parameters if ca.depends_on(everything, p.symbol)]
         block = Block(
             checks.identifier(f"{self.where}: name", name),
-            doc=f"{texts['doc']} {inner.doc}",
-            equations=f"{texts['equations']}\n\n{inner.equations}",
-            sources=(*texts["sources"], *inner.sources), use=USE, limits=(*LIMITS, *inner.limits),
+            doc=f"{TEXTS[kind]['doc']} {inner.doc}",
+            equations=f"{TEXTS[kind]['equations'].strip()}\n\n{inner.equations}",
+            sources=(TEXTS["source"], *inner.sources), use=(*TEXTS["use"],),
+            limits=(*TEXTS["limits"], *inner.limits),
             constants=dict(inner.constants) | ({} if self._sizes else {"h": float(self.h)}),
             about=inner.about, outputs=found, **parts.variables(self._sizes),
         )  # fmt: skip

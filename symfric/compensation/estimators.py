@@ -11,7 +11,8 @@ import casadi as ca
 from symfric.codegen import Block
 from symfric.compensation.adaptation import Adaptation
 from symfric.compensation.adapted import Adapted
-from symfric.compensation.square_root import measured, moved, packed, unpacked, variances
+from symfric.compensation.square_root import factor, measured, moved, packed, unpacked, variances
+from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import symbols_of
 from symfric.laws import Law
 from symfric.laws.base import smooth
@@ -26,25 +27,6 @@ FARTHEST = 500.0
 """Largest residual over its deviation; more would lose the digits of single precision."""
 FASTEST = 1e6
 """Largest velocity over its deviation of samples that are used, for the same reason."""
-LEAST_SQUARES = {
-    "doc": "Estimator of friction by recursive least squares with forgetting.",
-    "equations": (
-        "y  = mean force - inertia (v - v_first) / T - known friction, over a window T\n"
-        "e  = y - phi' X,   phi = mean of d friction / dX\n"
-        "1/P+ = k/P + (1 - k)/X_spread^2 + phi phi'/R,   k = exp(-T / t_memory)\n"
-        "X+ = X + P+ phi e / R,   R = noise_F^2 + 2 (inertia noise_v / T)^2"
-    ),
-    "sources": ("Carlson, AIAA Journal 11, 1973 (square root of the covariance)",),
-}
-FILTER = {
-    "doc": "Extended Kalman filter of velocity, friction states and changing parameters.",
-    "equations": (
-        "v+ = v + h (force - F) / (inertia + h max(dF/dv, 0)),   F at the end of the step\n"
-        "z+ = step of the law at v+,   X+ = X,   measured: v\n"
-        "cov X+ = k^2 cov X + (1 - k^2) X_spread^2,   k = exp(-h / t_change)"
-    ),
-    "sources": LEAST_SQUARES["sources"],
-}
 
 
 def recursive_estimator(
@@ -95,9 +77,10 @@ def recursive_estimator(
     _require_linear(f, ca.vertcat(phi, f.after))
     before, first = ends = f.states("v_before", "v_first")
     count, unfit, total = sample = f.states("samples", "unfit", "total")
-    sums = f.numbered("sum", "sum over the window of its regressor")
+    sums = f.add(*(Variable(f"{x}_sum", "", doc="sum of its regressor") for x in f.names))
     states, now, spread = f.estimates()
-    factor, W = f.covariance(n)
+    stored, W = factor(n)
+    kept = f.add(*stored)
     last, excess = _last(f)
     noise_v, noise_F, t_window = f.noises()
 
@@ -105,7 +88,7 @@ def recursive_estimator(
     count = smooth.clip(count, 0.0, 1e9) + 1
     T = count * f.h
     ended = t_window - f.h / 2 < T
-    total = total + f.given("force") - ca.substitute(f.force, theta, ca.DM.zeros(n))
+    total = total + f.parts.given("force") - ca.substitute(f.force, theta, ca.DM.zeros(n))
     summed = ca.vertcat(count, ca.if_else(bad, 1, unfit), total, sums + phi)
     f.follow(ca.vertcat(*sample, sums), ca.if_else(ended, 0, summed))
     f.follow(ca.vertcat(*ends), ca.vertcat(f.v, ca.if_else(ended, f.v, first)))
@@ -128,9 +111,9 @@ def recursive_estimator(
     old = ca.vertcat(now, packed(faded), 0, last[1:])
     good = ca.if_else(summed[1] < 0.5, new, old)
     result = ca.if_else(ended, good, ca.vertcat(now, packed(W), last))
-    f.follow(ca.vertcat(states, factor, last), result)
-    lag = f.memory / f.change()
-    return _block(f, name, LEAST_SQUARES, result, 0, lag)
+    f.follow(ca.vertcat(states, kept, last), result)
+    lag = f.memory / f.change
+    return _block(f, name, "recursive", result, 0, lag)
 
 
 def kalman_estimator(
@@ -179,10 +162,11 @@ def kalman_estimator(
     known = 1 + nz
     (seen,) = f.states("v_seen")
     states, now, spread = f.estimates()
-    factor, W = f.covariance(known + n)
+    stored, W = factor(known + n)
+    kept = f.add(*stored)
     last, excess = _last(f)
     noise_v, noise_F, t_window = f.noises()
-    lost, fastest = _lost(f.h / f.change()), FASTEST * noise_v
+    lost, fastest = _lost(f.h / f.change), FASTEST * noise_v
     used = ca.logic_and(f.usable(), ca.fmax(ca.fabs(f.v), ca.fabs(seen)) < fastest)
 
     ahead, slopes, M = prediction(f, seen, now)
@@ -208,8 +192,8 @@ def kalman_estimator(
     held = ca.vertcat(ca.substitute(f.after, symbols_of(f.theta), now), f.v)
     rest = ca.vertcat(now, packed(apart), 0, last[1:], held)
     result = ca.if_else(used, new, rest)
-    f.follow(ca.vertcat(states, factor, last, f.z, seen), result)
-    return _block(f, name, FILTER, result, known, 0.0)
+    f.follow(ca.vertcat(states, kept, last, f.z, seen), result)
+    return _block(f, name, "kalman", result, known, 0.0)
 
 
 def prediction(f: Adapted, seen: ca.SX, now: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
@@ -225,7 +209,7 @@ def prediction(f: Adapted, seen: ca.SX, now: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX
     theta = symbols_of(f.theta)
     mass = theta[f.names.index("inertia")] if "inertia" in f.names else f.mass
     m, M = ca.SX.sym("M"), mass + f.h * ca.fmax(ca.jacobian(f.force, f.v), 0.0)
-    v = f.v + f.h * (f.given("force") - f.force) / m
+    v = f.v + f.h * (f.parts.given("force") - f.force) / m
     ahead = ca.vertcat(ca.substitute(f.after, f.v, v), v)
     slopes = ca.jacobian(ahead, ca.vertcat(f.z, f.v, theta))
     ahead, slopes = ca.substitute([ahead, slopes], [m], [M])
@@ -246,7 +230,7 @@ def _lost(ratio: ca.SX) -> ca.SX:
 
 
 def _block(
-    f: Adapted, name: str, texts: dict[str, Any], result: ca.SX, known: int, lag: ca.SX | float
+    f: Adapted, name: str, kind: str, result: ca.SX, known: int, lag: ca.SX | float
 ) -> Block:
     """Return the block whose states after the step are `result`, `known` of which are no estimates.
 
@@ -261,7 +245,7 @@ def _block(
     variance = variances(W)[known:]
     deviation = f.spread * ca.sqrt(variance * ca.fmax(last[2], 1.0) + lag**2)
     return f.block(
-        name, texts, result[:n], deviation, variance,
+        name, kind, result[:n], deviation, variance,
         residual=Output(last[1], "N", "measured minus predicted force"),
         excess=Output(last[2], "1", "mean square of residuals over their variance"),
         used=Output(last[0], "1", "1: the last data changed the estimates"),

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.codegen import Block
+from symfric.compensation.force import TABLES
 from symfric.compensation.members import Members
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
@@ -24,15 +25,6 @@ SEEN = 3.0
 variance is at most a quarter of that of the spreads."""
 FOREVER = 1e6
 """Time constants [s] without forgetting."""
-ADVICE = {
-    "scale_coulomb": "slide faster than v_least",
-    "scale_force": "slide faster than v_least",
-    "scale_viscous": "slide at speeds that differ by a factor of two",
-    "scale_stribeck": "slide at speeds around v_s",
-    "offset": "slide in both directions",
-    "inertia": "accelerate",
-}
-"""Parameter -> motion that shows it."""
 
 
 @final
@@ -91,7 +83,9 @@ class Followed:
             return f"The data determine all {count} parameters (condition {self.condition:.0e})."
         vectors = [v for value, v in zip(*self._modes, strict=True) if value <= SEEN]
         names = [n for i, n in enumerate(self.estimates) if max(abs(v[i]) for v in vectors) > 0.3]
-        advice = "; ".join(dict.fromkeys(ADVICE.get(n, "move differently") for n in names))
+        advice = "; ".join(
+            dict.fromkeys(TABLES["advice"].get(n, "move differently") for n in names)
+        )
         return (
             f"The data determine {rank} of {count} parameters, not {', '.join(self.unobservable)}; "
             f"{advice}."

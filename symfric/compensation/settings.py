@@ -1,7 +1,7 @@
 """Settings of a friction compensator, their checks and the resulting formula."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
@@ -81,6 +81,18 @@ class Compensation:
     counts: float | None = None
 
 
+def pairs_of(where: str, texts: Sequence[str], known: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield name and value of each setting NAME=VALUE,NAME=VALUE; names are `known`, and once."""
+    found = set[str]()
+    for text in (setting for some in texts for setting in re.split(r",(?=\w+=)", some)):
+        name, _, value = text.partition("=")
+        checks.check_names(where, [name], known)
+        if name in found or not value:
+            raise checks.refused(where, "NAME=VALUE, every name once", text)
+        found.add(name)
+        yield name, value
+
+
 def settings_from_text(texts: Sequence[str]) -> Compensation:
     """Return the settings given by arguments of a command line, each with one or several settings.
 
@@ -90,12 +102,7 @@ def settings_from_text(texts: Sequence[str]) -> Compensation:
         ValueError: unknown or repeated names, or values that are not numbers.
     """
     where, found = "compensation", dict[str, Any]()
-    known = [item.name for item in fields(Compensation)]
-    for text in (setting for some in texts for setting in re.split(r",(?=\w+=)", some)):
-        name, _, value = text.partition("=")
-        checks.check_names(where, [name], known)
-        if name in found or not value:
-            raise checks.refused(where, "NAME=VALUE, every name once", text)
+    for name, value in pairs_of(where, texts, [item.name for item in fields(Compensation)]):
         at, parts = f"{where}: {name}", tuple(value.split(","))
         if name == "velocity" or (name == "N" and value == "input"):
             found[name] = value

@@ -53,7 +53,7 @@ class Branch(Showing):
     Attributes:
         model: the model.
         parameter: name of the parameter.
-        p: values of all free parameters at the start.
+        u, p: values of the inputs, and of all free parameters at the start.
         values: values of the parameter, shape (n,).
         x: states, of orbits those at their start, shape (n, nx).
         periods: periods [s], shape (n,); 0 for equilibria.
@@ -66,6 +66,7 @@ class Branch(Showing):
 
     model: Model
     parameter: str
+    u: dict[str, float]
     p: dict[str, float]
     values: Array
     x: Array
@@ -111,7 +112,7 @@ class Branch(Showing):
         x0 = dict(zip((v.name for v in self.model.x), self.x[k].tolist(), strict=True))
         T = float(self.periods[k])
         guess = PeriodicOrbit(
-            self.model, x0, T, {}, p, np.zeros(0, dtype=complex), False, False, 0.0, rtol
+            self.model, x0, T, self.u, p, np.zeros(0, dtype=complex), False, False, 0.0, rtol
         )
         return periodic_orbit(self.model, guess, rtol=rtol)
 
@@ -179,6 +180,23 @@ class Branch(Showing):
         header = ("special point", self.parameter, "period [s]")
         table = Table(header, tuple(rows), numbers=(1, 2)) if rows else Table((), ())
         return Shown(f"branch of '{self.model.name}'", tuple(lines), table)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return values, periods, stability and special points as built-in types."""
+        return {
+            "parameter": self.parameter,
+            "kind": "orbits" if self.of_orbits else "equilibria",
+            "values": self.values.tolist(),
+            "periods": self.periods.tolist(),
+            "stable": self.stable.tolist(),
+            "low": self.low.tolist(),
+            "high": self.high.tolist(),
+            "states": [v.name for v in self.model.x],
+            "special": [
+                {"kind": s.kind, "value": s.value, "period": s.period} for s in self.special
+            ],
+            "message": self.message,
+        }
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the branch to one file, from which `load_branch` restores it exactly."""

@@ -85,7 +85,8 @@ def continuation(
     on = Trace([back.points[0]])
     if back.message != INTERRUPTED:
         on = _traced(curve, node, up, span, points + 1 - len(back.points), step)
-    return _joined(model, parameter, dict(start.p), [back, on])
+    u = {name: float(value) for name, value in start.u.items()}  # pyright: ignore
+    return _joined(model, parameter, u, dict(start.p), [back, on])
 
 
 def orbits_from(
@@ -110,7 +111,7 @@ def orbits_from(
     span = _span(where, between, hopf.value, branch.parameter)
     nominal = np.maximum(model.nominal("x"), np.abs(hopf.x))
     problem = Shooting(
-        model, {}, (branch.parameter,), nominal, np.ones(nominal.size), rtol, driven=False
+        model, branch.u, (branch.parameter,), nominal, np.ones(nominal.size), rtol, driven=False
     )
     scale = np.concatenate([nominal, [hopf.period, span[1] - span[0]]])
     curve = Orbits(problem, branch.p, scale, 10 * rtol)
@@ -120,7 +121,7 @@ def orbits_from(
     node, _ = corrected(curve, z + SMALL * along * scale, along)
     tau = tangent(curve, node, along)
     part = _traced(curve, node, tau, span, points, step)
-    return _joined(model, branch.parameter, branch.p, [Trace(), part])
+    return _joined(model, branch.parameter, branch.u, branch.p, [Trace(), part])
 
 
 def _span(where: str, between: tuple[float, float], value: float, name: str) -> tuple[float, float]:
@@ -220,7 +221,9 @@ def _steps(
         tau = tangent(curve, node, away * _unit(node.z.size))
 
 
-def _joined(model: Model, name: str, p: Mapping[str, float], parts: list[Trace]) -> Branch:
+def _joined(
+    model: Model, name: str, u: Mapping[str, float], p: Mapping[str, float], parts: list[Trace]
+) -> Branch:
     """Return the branch of a backward and a forward part."""
     back, on = parts
     points = [*reversed(back.points[1:]), *on.points]
@@ -239,7 +242,7 @@ def _joined(model: Model, name: str, p: Mapping[str, float], parts: list[Trace])
     column = {n: np.array([getattr(pt, n) for pt in points]) for n in Point._fields[:3]}
     message = "; ".join(m for m in (back.message, on.message) if m)
     return Branch(
-        model, name, dict(p), column["value"], column["x"], column["period"], exponents,
+        model, name, dict(u), dict(p), column["value"], column["x"], column["period"], exponents,
         np.array([pt.low for pt in points]), np.array([pt.high for pt in points]),
         tuple(pt.sequence for pt in points), tuple(special), message,
     )  # fmt: skip

@@ -191,6 +191,20 @@ def test_a_radial_oscillator_has_its_branch_of_orbits() -> None:
     assert end.kind == "Hopf" and abs(end.value) < 1e-5
 
 
+def test_inputs_stay_those_of_the_start() -> None:
+    x, y, p, a = Variable("x", "m"), Variable("y", "m"), Variable("p", "1"), Variable("a", "1")
+    radial = a - x**2 - y**2
+    ode = ca.vertcat(x * radial - (2 + p) * y, y * radial + (2 + p) * x)
+    model = Model("ring", x=(x, y), u=(a,), p=(p,), ode=ode)
+    start = {"x": 1.5, "y": 0.0}
+    orbit = periodic_orbit(model, simulate(model, 20.0, x0=start, u={"a": 2.0}), u={"a": 2.0})
+    branch = continuation(orbit, "p", (-0.5, 0.5), points=10)
+    assert branch.u == {"a": 2.0}
+    assert branch.orbit(3).amplitude("x") == pytest.approx(np.sqrt(2.0), rel=1e-6)
+    at = equilibrium(model, u={"a": -1.0})
+    assert continuation(at, "p", (-0.5, 0.5), points=4).stable.all()
+
+
 def test_a_branch_is_saved_shown_and_interrupted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
