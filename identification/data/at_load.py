@@ -10,6 +10,10 @@ The efficiency is applied as known. A record does not distinguish it from fricti
 the load; with an efficiency of 1, the losses of the gear are part of the fitted friction. The
 direction of power uses a velocity filtered as that of `InverseDynamics`; near a reversal, where it
 is uncertain, a static law is not compared with the data.
+
+Limits: with a coarse encoder and an efficiency below 1, a fit may be DOUBTFUL although its
+intervals contain the true values: 10 of 10 simulated records of an axis with 2000 counts per turn,
+a ratio of 50 and efficiencies of 0.85 and 0.7; with 65536 counts per turn 2 of 10.
 """
 
 from dataclasses import replace
@@ -73,9 +77,9 @@ def _factor(where: str, unit: str, drive: Drive) -> float:
     if unit == "rad" and drive.encoder == "motor":
         return 1 / float(drive.ratio)
     if (unit == "rad") != drive.turning:
-        side = "angle" if drive.turning else "length, or an angle of the motor,"
+        such = "an angle of the load" if drive.turning else "a length, or an angle of the motor"
         hint = "lead or drum_radius make the axis of a drive linear"
-        raise checks.refused(where, f"an {side} of the load".replace("an l", "a l"), unit, hint)
+        raise checks.refused(where, such, unit, hint)
     return 1.0
 
 

@@ -1,4 +1,4 @@
-"""Friction compensators and observers as blocks, and tests of them in closed loops."""
+"""Friction compensators, observers and estimators as blocks, and tests of them in closed loops."""
 
 from typing import TYPE_CHECKING
 

@@ -122,12 +122,12 @@ def compensator(
     force = _added(parts, force, s, wanted, size.h, where, drive, moved)
     more = _held(parts, s)
     parts.inputs.sort(key=lambda v: [*TABLES["inputs"]].index(v.name))
-    added = "force" if drive is None else "current"
+    out, unit, added = ("F", "N", "force") if drive is None else ("current", "A", "current")
     used = [p for p in size.parameters if ca.depends_on(ca.vertcat(force, *parts.next), p.symbol)]
     block = Block(
         "friction_compensator" if name is None else name,
         doc=f"Friction compensator: the {added} to add to that of a controller. {inner.doc}",
-        outputs=_output(force, drive) | more,
+        outputs={out: Output(force, unit, f"{added} to add to that of the controller")} | more,
         about=inner.about,
         constants=dict(inner.constants) | size.constants,
         equations=f"{formula(s, drive is not None)}\n\n{inner.equations}",
@@ -308,12 +308,6 @@ def _added(
     limit = min((i for i in (given, drive.current_limit) if i is not None), default=None)
     slew = None if s.slew is None else abs(k) * s.slew
     return finished(parts, force, s.ramp, limit, h, where, slew, amperes)
-
-
-def _output(force: ca.SX, drive: Nameplate | None) -> dict[str, Output]:
-    if drive is None:
-        return {"F": Output(force, "N", "force to add to that of the controller")}
-    return {"current": Output(force, "A", "current to add to that of the controller")}
 
 
 def _use(limited: bool, drive: Nameplate | None) -> Iterator[str]:

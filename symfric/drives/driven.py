@@ -53,12 +53,12 @@ def driven(
 
         motor_torque   torque_constant i [N m]
         motor_speed    ratio v [rad/s]
-        gear_loss      F_m v - phi v [W], >= 0
+        gear_loss      F_m v - phi v [W], >= 0 where |F_m| is not rounded
         copper_loss    i^2 resistance [W]; i^2 [A^2] without a resistance
 
     The input `current` has the bounds +-`current_limit` of the drive, which optimal control obeys:
-    integral(lambda s: s.copper_loss) is its cost. Gear ratios of several joints are added one
-    by one, each with a name.
+    integral(lambda s: s.copper_loss) is its cost. Drives of several joints are added one by one,
+    each with a name.
 
     In the energy balance of a mechanism, the work of the actuator is that of the motor, the losses
     of the gear are "gear", and the kinetic energy includes the rotor.

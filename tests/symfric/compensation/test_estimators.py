@@ -4,6 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from one_program import Stepper, along
+from scipy.signal import lfilter
 from slides import BRISTLES, MAKE, NOISE, STATIC, H, columns, inputs, slid
 
 import symfric as sf
@@ -144,11 +145,19 @@ def test_estimates_do_not_depend_on_units(make, length: float, force: float) -> 
 
 @pytest.mark.parametrize("make", MAKE)
 @pytest.mark.parametrize(
-    ("h", "level"),
-    [(1e-3, 1e-3), (1e-3, 1e3), (1e-2, 1.0), pytest.param(1e-4, 1.0, marks=pytest.mark.slow)],
+    ("h", "level", "colour"),
+    [
+        (1e-3, 1e-3, 0.0),
+        (1e-3, 1e3, 0.0),
+        (1e-3, 1.0, 0.98),
+        (1e-2, 1.0, 0.0),
+        pytest.param(1e-4, 1.0, 0.0, marks=pytest.mark.slow),
+    ],
 )
-def test_levels_and_sample_times_off_by_decades(make, h: float, level: float) -> None:
-    """Friction of 1.6 times the law is found within three of its deviations."""
+def test_levels_and_sample_times_off_by_decades(
+    make, h: float, level: float, colour: float
+) -> None:
+    """Friction of 1.6 times the law is found within three deviations, also in coloured noise."""
     law = sf.LuGre(
         mu_s=6 * level, mu_d=4 * level, v_s=5e-3, sigma_0=1e5 * level, sigma_1=300 * level,
         sigma_2=20 * level,
@@ -161,7 +170,8 @@ def test_levels_and_sample_times_off_by_decades(make, h: float, level: float) ->
     friction = np.array([1.6 * inner(v=x, N=1.0)["F"] for x in v[1:]])
     force = mass * np.diff(v) / h + friction
     block = make(law, mass=mass, noise=noise, h=h)
-    seen = v[1:] + noise * random.standard_normal(n)
+    white = np.sqrt(1 - colour**2) * random.standard_normal(n)
+    seen = v[1:] + noise * lfilter([1.0], [1.0, -colour], white)
     found = columns(block, inputs(block, v=seen, force=force))
     assert abs(found["scale_coulomb"][-1] - 1.6) < 3 * found["scale_coulomb_sd"][-1] < 0.6
     assert found["unseen"][-1] == 0
@@ -253,3 +263,15 @@ def test_names_and_units_are_those_of_the_compensator() -> None:
     assert all(block.outputs[name].unit == units[name] for name in names)
     states = {v.name: float(v.start) for v in block.states}
     assert (states["offset_now"], states["inertia_now"]) == (0.5, 2.0)
+
+
+def test_the_filter_estimates_parameters_of_the_law_itself() -> None:
+    """Levels and viscous coefficient by their own names; least squares for a law without states."""
+    motion = slid(STATIC, 6000, share=1.5)
+    for make, law in ((kalman_estimator, BRISTLES), (recursive_estimator, STATIC)):
+        block = make(law, mass=1.0, noise=NOISE, free=["mu_d", "sigma_2"])
+        found = columns(block, inputs(block, **motion))
+        assert found["mu_d"][-1] == pytest.approx(6.0, abs=3 * found["mu_d_sd"][-1])
+        assert found["sigma_2"][-1] == pytest.approx(30.0, abs=3 * found["sigma_2_sd"][-1])
+        assert (found["mu_d_sd"][-1], found["sigma_2_sd"][-1]) < (0.7, 7.0)
+        assert block.outputs["sigma_2"].unit == "N s/m"
