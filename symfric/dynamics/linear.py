@@ -1,5 +1,7 @@
 """Linear models of a machine near an equilibrium, with names and units."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -132,9 +134,7 @@ class LinearModel(Showing):
             )
         return self.C @ np.linalg.solve(matrix, np.tile(self.B, (w.size, 1, 1))) + self.D
 
-    def plot(
-        self, frequencies: ArrayLike | None = None, path: str | Path | None = None
-    ) -> "Figure":
+    def plot(self, frequencies: ArrayLike | None = None, path: str | Path | None = None) -> Figure:
         """Plot magnitude and phase of the frequency response of all outputs to all inputs.
 
         Args:
