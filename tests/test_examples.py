@@ -140,6 +140,12 @@ def opti_lugre(printed: str) -> bool:
     return iterations <= 15 and abs(cost - 1.114) < 1e-3 and abs(miss) < 1.0
 
 
+def hunting_drive(printed: str) -> bool:
+    """The axis hunts below the fold and rests above it."""
+    below, above = numbers(r"N s/m: ([\d.]+) mm", printed).ravel()
+    return 10 < below < 30 and above == 0 and "k_d = 9.12344" in printed
+
+
 LONG = {
     *(
         "adapt_drive",
@@ -155,13 +161,13 @@ LONG = {
 }
 """Whole solves of several seconds; `tests/examples/test_motions.py` checks their problems."""
 
-SLOW = LONG | {"mpc_drive", "out_and_back", "press"}
+SLOW = LONG | {"hunting_drive", "mpc_drive", "out_and_back", "press"}
 CHECKS = dict.fromkeys(LONG, motion_is_verified) | {
     check.__name__: check
     for check in (
         *(mpc_drive, out_and_back, identify_arm, identify_pendulum, identify_emps, opti_lugre),
         *(identify_raw_files, identify_franka, identify_excitation, robot_feed_forward),
-        *(adapt_drive, compensate_drive, rabinowicz, learn_drive, drive_unit),
+        *(adapt_drive, compensate_drive, rabinowicz, learn_drive, drive_unit, hunting_drive),
         hardware_in_the_loop,
     )
 }

@@ -100,7 +100,7 @@ class Excitation:
                 axis.plot(t, part[:, k], label=joint, **line(k))
             axis.set_ylabel(f"{label} [{unit}{per}]")
         axes[-1].set_xlabel("t [s]")
-        axes[0].legend(loc="upper right", fontsize="small", ncols=4)
+        axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize="small", ncols=7)
         return save(figure, path)
 
 

@@ -38,8 +38,8 @@ def continuation(
     located on the way: folds, Hopf points, branch points, period doublings, Neimark-Sacker points,
     and the grazing of a sliding orbit by the set of stick. Exact friction needs no smoothing: at a
     grazing, the branch continues with the orbit of the other sequence of stick and slip. They are
-    located to about 1e-8 of the range; a fold that is sharper than a thousandth of a step only to
-    that step, and a Hopf point at which orbits vanish by extrapolation to 1e-5.
+    located to about 1e-8 of the range, and a Hopf point at which orbits vanish by extrapolation to
+    1e-5. `Branch.message` names those that were located to a step only, such as very sharp folds.
 
     Args:
         start: isolated equilibrium, or a periodic orbit whose period is not given. Neither is
@@ -240,7 +240,7 @@ def _joined(
     for row, pt in zip(exponents, points, strict=True):
         row[: pt.exponents.size] = np.column_stack([pt.exponents.real, pt.exponents.imag])
     column = {n: np.array([getattr(pt, n) for pt in points]) for n in Point._fields[:3]}
-    message = "; ".join(m for m in (back.message, on.message) if m)
+    message = "; ".join(m for m in (back.message, on.message, *back.notes, *on.notes) if m)
     return Branch(
         model, name, dict(u), dict(p), column["value"], column["x"], column["period"], exponents,
         np.array([pt.low for pt in points]), np.array([pt.high for pt in points]),

@@ -193,10 +193,12 @@ def located(
     If the equations cannot be solved there, it is the end of the step.
     """
     found: dict[float, tuple[Node, Array]] = {}
+    way = step.length * step.along * curve.scale
+    bend = step.node.z - step.start.z - way
 
     def value(length: float) -> float:
-        z = step.start.z + length * step.along * curve.scale
-        node, _ = corrected(curve, z, step.along)
+        share = length / step.length
+        node, _ = corrected(curve, step.start.z + share * way + share**2 * bend, step.along)
         found[length] = node, tangent(curve, node, step.along)
         return test(*found[length])
 

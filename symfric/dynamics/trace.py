@@ -44,12 +44,17 @@ class Trace:
     points: list[Point] = field(default_factory=list[Point])
     special: list[Special] = field(default_factory=list[Special])
     message: str = ""
+    notes: list[str] = field(default_factory=list[str])
 
     def add(self, kind: str, curve: "Family", node: Node, value: float | None = None) -> None:
         """Add a special point at a node, or at another value of the parameter next to it."""
         at = float(node.z[-1]) if value is None else value
         found = Special(kind, at, len(self.points), *state(curve, node), np.zeros(0))
         self.special.append(found)
+
+    def rough(self, kind: str, value: float) -> None:
+        """Note that a special point was located to the end of its step only."""
+        self.notes.append(f"the {kind} near {value:.6g} is located to its step only")
 
 
 def size(curve: Orbits, point: Point) -> float:
@@ -116,11 +121,14 @@ def note(curve: Family, step: Step, trace: Trace) -> None:
     if step.sharp:
         far = max((step.start, step.node), key=lambda n: float(n.z[-1]) * step.along[-1])
         trace.add("fold", curve, far)
+        trace.rough("fold", float(far.z[-1]))
         return
     turns = bool(step.along[-1] * step.tau[-1] < 0)
     if turns:
         node, _ = located(finer(curve), step, lambda _, tau: float(tau[-1]))
         trace.add("fold", curve, node)
+        if node is step.node:
+            trace.rough("fold", float(node.z[-1]))
     before, after = (growths(curve, n) for n in (step.start, step.node))
     first, last = (int((g > NEUTRAL).sum()) for g in (before, after))
     if first == last or before.size != after.size or (turns and abs(first - last) == 1):
@@ -129,6 +137,8 @@ def note(curve: Family, step: Step, trace: Trace) -> None:
         if before[k] * after[k] < 0:
             node, _ = located(finer(curve), step, lambda n, _, k=k: float(growths(curve, n)[k]))
             trace.special.append(named(curve, node, k, len(trace.points)))
+            if node is step.node:
+                trace.rough(trace.special[-1].kind, float(node.z[-1]))
             return
 
 

@@ -133,6 +133,31 @@ def test_the_fold_of_the_smooth_belt_is_that_of_auto() -> None:
 
 
 @pytest.mark.slow
+def test_a_fold_does_not_depend_on_range_and_step() -> None:
+    x, v, e = Variable("x", "m", start=0.05), Variable("v", "m/s"), Variable("e", "m s")
+    k_d = Variable("k_d", "N s/m", start=3.0)
+    law = ExactCoulomb(mu_s=0.3, mu_d=0.1, v_s=0.05, form="stribeck")
+    force = -60 * x - k_d * v - 25 * e
+    guide = contact("guide", law, v.symbol, 9.81, {"v": 0.0}, F_e=force)
+    ode = ca.vertcat(v.symbol, force - guide.force, x.symbol)
+    model = Model("axis", x=(x, v, e), p=(k_d,), ode=ode, contacts=(guide,))
+    orbit = periodic_orbit(model, simulate(model, 150.0))
+    branches = [
+        continuation(orbit, "k_d", (2.0, high), step=step)
+        for high, step in ((20.0, 0.05), (200.0, 0.05), (20.0, 0.03))
+    ]
+    found = [b.located("fold")[0].value for b in branches]
+    assert found == pytest.approx([9.1234419577] * 3, abs=1e-8)
+    near = np.abs(branches[0].values - 0.98 * found[0]) + 99 * ~branches[0].stable
+    start = branches[0].orbit(int(near.argmin())).x
+    # below it, the orbit of the example hunts; above, every motion comes to rest
+    for share, rests in ((0.99, False), (1.01, True)):
+        p = {"k_d": share * found[0]}
+        late = simulate(model, 400.0, x0=start, p=p, rtol=1e-8).at([390.0, 394.0, 398.0])
+        assert bool(np.abs(late["x"]).max() < 1e-6) is rests
+
+
+@pytest.mark.slow
 def test_bristles_double_their_period_before_the_fold() -> None:
     model = belt(LuGre(**LEVELS))
     run = simulate(model, 60.0, x0={"x": 0.0, "v": 0.8}, rtol=1e-8)
