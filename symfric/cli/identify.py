@@ -181,7 +181,7 @@ def identify(
     rotors: bool = False,
     urdf: Path | None = None,
 ) -> None:
-    """Fit friction laws to measured data, or a robot to logs of its joints, and assess the result.
+    """Fit friction laws or a robot to measured data and assess the result.
 
     If the first file is a URDF, the command identifies inertias and friction of the robot. Columns
     have the names of the joints, such as shoulder [rad] and shoulder_torque [N m].

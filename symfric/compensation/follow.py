@@ -1,5 +1,7 @@
 """Estimates of changing friction from a record, and what the record determines."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -91,7 +93,7 @@ class Followed:
             f"{advice}."
         )
 
-    def plot(self, *names: str, path: str | Path | None = None) -> "Figure":
+    def plot(self, *names: str, path: str | Path | None = None) -> Figure:
         """Plot estimates with bands of two deviations, and the residuals.
 
         Args:
