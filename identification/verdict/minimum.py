@@ -276,8 +276,11 @@ def minimum(task: Task, point: Point) -> Minimum:
     known, box = {s: x for s, x in task.noise.items() if s not in task.estimated}, task.unknowns
     raw = point.evaluation.r
     change = partial(_change, task, raw)
+    noisy = getattr(task.residuals, "motion_noise", lambda _: np.zeros(len(task.channels)))
+    each = zip(task.channels, noisy(point.values).tolist(), strict=True)
+    channels = [replace(channel, motion_noise=level) for channel, level in each]
     return Minimum(
-        task.channels, box.unknowns, box.names, point.values, point.slope, box.at_bound(point.w),
+        channels, box.unknowns, box.names, point.values, point.slope, box.at_bound(point.w),
         point.weights * point.r, point.J, gain, raw, known, change,
     )  # fmt: skip
 
