@@ -1,11 +1,12 @@
 """Proof of the contract of guarded C by abstract interpretation, with Eva of Frama-C.
 
 Eva computes an interval for every number of a program. One step is analysed from arbitrary bits of
-states, inputs and parameters (except the limit F_max, which has its default). It proves that
+states, inputs and parameters (except limits, which have their defaults). It proves that
 
     no operation is undefined (memory, overflow of integers, shifts, conversions),
-    all outputs are finite, and
-    a force F with a limit F_max is within this limit.
+    all outputs are finite,
+    a force F with a limit F_max is within this limit, and
+    an output X with parameters X_low and X_high is between them.
 
 Eva does not follow a number through its bits. The helpers of `guards` that compare bits are
 therefore analysed as comparisons of numbers; a test shows that both agree for all floats.
@@ -104,9 +105,10 @@ def _status(c: CBlock, alarms: int, ranges: Mapping[str, tuple[float, float]]) -
     """Return `PROVED`, or a sentence that names what is not proved."""
     doubts = [f"{alarms} operation{'s' * (alarms > 1)} may be undefined"] * bool(alarms)
     doubts += [f"{n} may not be finite" for n, x in ranges.items() if not all(map(isfinite, x))]
-    limit = _limit(c)
-    if limit is not None and any(abs(end) > limit for end in ranges["F"]):
-        doubts.append(f"F may exceed F_max = {limit:g} {c.block.outputs['F'].unit}")
+    for name, (low, high) in _limits(c).items():
+        if not low <= ranges[name][0] <= ranges[name][1] <= high:
+            unit = c.block.outputs[name].unit
+            doubts.append(f"{name} may leave {low:g} ... {high:g} {unit}")
     return f"not proved: {', '.join(doubts)}" if doubts else PROVED
 
 
@@ -117,23 +119,33 @@ def _interval(values: Sequence[float]) -> tuple[float, float]:
     return min(values), max(values)
 
 
-def _limit(c: CBlock) -> float | None:
-    """Return the default of the limit of the force F, rounded to the type; None without a limit."""
-    defaults = dict(zip((v.name for v in c.block.parameters), c.default.tolist(), strict=True))
-    return defaults.get("F_max") if "F" in c.block.outputs else None
+def _limits(c: CBlock) -> dict[str, tuple[float, float]]:
+    """Return the limits of outputs: defaults of F_max, or of X_low and X_high."""
+    value = dict(zip((v.name for v in c.block.parameters), c.default.tolist(), strict=True))
+    found = {
+        name: (value[f"{name}_low"], value[f"{name}_high"])
+        for name in c.block.outputs if {f"{name}_low", f"{name}_high"} <= {*value}
+    }  # fmt: skip
+    if "F_max" in value and "F" in c.block.outputs:
+        found["F"] = -value["F_max"], value["F_max"]
+    return found
 
 
 def _program(c: CBlock) -> str:
     """Return the C with helpers that compare numbers, and a step from arbitrary bits."""
-    text, parts, limit = source(c), comparisons(c), _limit(c)
+    text, parts = source(c), comparisons(c)
     for what in ("bits", "beyond", "outside"):
         text = text.replace(parts[what], "")
-    place = [v.name for v in c.block.parameters].index("F_max") if limit is not None else 0
+    limits = {"F_max", *(f"{name}_{end}" for name in _limits(c) for end in ("low", "high"))}
+    fixed = [
+        f"param[{k}] = {c.real.literal(float(v.start))};"
+        for k, v in enumerate(c.block.parameters) if v.name in limits
+    ]  # fmt: skip
     return filled(
         TEMPLATES / "proof.c",
         **c.sizes,
         source=COMPARISONS.format(c.name) + text,
-        limit="" if limit is None else f"param[{place}] = {c.real.literal(limit)};",
+        limits="\n    ".join(fixed),
         shown="\n    ".join(
             f"Frama_C_show_each_{k}(out[{k}]);" for k in range(len(c.block.outputs))
         ),

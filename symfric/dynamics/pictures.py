@@ -17,7 +17,7 @@ from symfric.results.trajectory import Trajectory
 
 def bode(
     frequencies: Array, G: NDArray[np.complex128], names: Sequence[Sequence[str]],
-    path: str | Path | None,
+    path: str | Path | None, across: str = "frequency [rad/s]",
 ) -> Figure:  # fmt: skip
     """Plot magnitude and phase of a frequency response.
 
@@ -26,6 +26,7 @@ def bode(
         G: response, shape (m, outputs, inputs).
         names: legend entries, by output and input.
         path: image file.
+        across: label of the horizontal axis.
     """
     figure, (size, angle) = panels(2, width=6.0)
     for i, row in enumerate(names):
@@ -36,7 +37,7 @@ def bode(
             angle.semilogx(frequencies, phase, linewidth=1.4, **look)
     size.set_ylabel("magnitude")
     angle.set_ylabel("phase [deg]")
-    angle.set_xlabel("frequency [rad/s]")
+    angle.set_xlabel(across)
     size.legend(frameon=False, fontsize="small")
     return save(figure, path)
 

@@ -9,7 +9,7 @@ int main(void)
     Frama_C_make_unknown((char *)state, sizeof state);
     Frama_C_make_unknown((char *)param, sizeof param);
     Frama_C_make_unknown((char *)in, sizeof in);
-    @limit
+    @limits
     @step
     @shown
     return (int)*status;

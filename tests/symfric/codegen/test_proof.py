@@ -11,7 +11,12 @@ from symfric.codegen import law_block, proof, prove
 from symfric.codegen.guards import comparisons
 from symfric.codegen.layout import CBlock
 from symfric.codegen.proof import Proof
-from symfric.compensation import compensator, disturbance_observer, lugre_observer
+from symfric.compensation import (
+    compensator,
+    disturbance_observer,
+    kalman_estimator,
+    lugre_observer,
+)
 from symfric.emitter.c99 import FLOAT
 from symfric.foundation.programs import CompileError, finished
 from symfric.laws import ALL_LAWS, LuGre
@@ -43,6 +48,18 @@ def test_forces_are_proved_to_be_finite_and_within_their_limit(name):
 
 
 @needs_eva
+def test_estimates_are_proved_to_stay_within_their_bounds():
+    estimator = kalman_estimator(LuGre(), mass=1.0, noise=1e-3, change=60.0)
+    found = prove(estimator)
+    assert found.ok, found
+    bounds = {v.name: float(v.start) for v in estimator.parameters}
+    for name in ("scale_coulomb", "offset"):
+        low, high = found.ranges[name]
+        assert bounds[f"{name}_low"] <= low < high <= bounds[f"{name}_high"]
+    assert found.ranges["used"] == (0.0, 1.0)
+
+
+@needs_eva
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in ALL_LAWS if name not in HARD])
 def test_every_law_is_proved(name):
@@ -54,7 +71,7 @@ def test_every_law_is_proved(name):
 def test_a_force_beyond_its_limit_is_not_proved():
     F = LIMITED.outputs["F"]
     found = prove(replace(LIMITED, outputs={"F": replace(F, expression=1.01 * F.expression)}))
-    assert found.status == "not proved: F may exceed F_max = 60 N"
+    assert found.status == "not proved: F may leave -60 ... 60 N"
 
 
 @needs_eva

@@ -1,0 +1,252 @@
+"""Harmonic balance: predicted oscillations of a linear loop with one contact."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import log
+from typing import final
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RectBivariateSpline
+from scipy.optimize import root
+
+from symfric.dynamics.describing import RUN, Harmonic
+from symfric.dynamics.orbit import PeriodicOrbit, found
+from symfric.dynamics.shooting import METHOD
+from symfric.foundation import checks
+from symfric.foundation.numeric import Array
+from symfric.foundation.shown import Showing, Shown
+from symfric.integrator.simulate import simulate
+from symfric.laws.base.law import Law
+from symfric.model import Model, check_model
+from symfric.model.contact import APPLIED
+
+COARSE, FINE = 12, 240
+"""Numbers of amplitudes and frequencies at which the law and the loop are evaluated."""
+BALANCED, SAME = 1e-7, 1e-4
+"""Largest residual of a solution, and relative distance below which two solutions are the same."""
+RTOL, STEP = 1e-9, 1e-5
+"""Relative tolerance of the describing function, and step of its difference quotients."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """Linear loop x' = A x + b F + c with the sliding velocity v = C x of its contact.
+
+    Attributes:
+        A, b, C: shapes (n, n), (n,), (n,).
+        rest: states without friction force.
+        law: describing function n(V, w) of the contact.
+    """
+
+    A: Array
+    b: Array
+    C: Array
+    rest: Array
+    law: Harmonic
+
+    def states(self, w: float) -> NDArray[np.complex128]:
+        """Return the response (i w - A)^-1 b of the states to the friction force."""
+        return np.linalg.solve(1j * w * np.eye(self.b.size) - self.A, self.b).astype(complex)
+
+    def response(self, w: Array) -> NDArray[np.complex128]:
+        """Return the response G(i w) of the sliding velocity to the friction force."""
+        return np.array([self.C @ self.states(float(one)) for one in w])
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class HarmonicBalance(Showing):
+    """Predicted oscillation of a linear loop with one contact.
+
+    Attributes:
+        model: the model.
+        speed: amplitude V of the sliding velocity [m/s].
+        frequency: w [rad/s].
+        value: describing function n(V, w) of the contact [N s/m].
+        x: states of the machine at the largest sliding velocity, by name.
+        amplitudes: amplitude of each state of the machine, by name.
+        u, p: inputs, and values of free parameters.
+    """
+
+    model: Model
+    speed: float
+    frequency: float
+    value: complex
+    x: Mapping[str, float]
+    amplitudes: Mapping[str, float]
+    u: Mapping[str, float]
+    p: Mapping[str, float]
+
+    @property
+    def period(self) -> float:
+        """Period 2 pi / w [s]."""
+        return 2 * np.pi / self.frequency
+
+    def orbit(self, *, symmetric: bool = False, rtol: float = 1e-9) -> PeriodicOrbit:
+        """Return the periodic orbit near the prediction, stable or unstable.
+
+        Args:
+            symmetric, rtol: as in `periodic_orbit`.
+
+        Raises:
+            ValueError: bad input, or no orbit was found near the prediction.
+        """
+        where = "HarmonicBalance.orbit"
+        checks.flag(f"{where}: symmetric", symmetric)
+        checks.number(f"{where}: rtol", rtol, above=0.0, upper=1e-5)
+        model, T, u, p = self.model, self.period, dict(self.u), dict(self.p)
+        run = simulate(model, RUN * T, x0=self.x, u=u, p=p, rtol=1e-7, method=METHOD)
+        return found(model, run, 0.0, T, u, p, symmetric, 1, rtol, driven=False)
+
+    def shown(self) -> Shown:
+        """Return amplitudes and period."""
+        units = {v.name: v.unit for v in self.model.x}
+        amplitudes = ", ".join(f"{k} {a:.6g} {units[k]}" for k, a in self.amplitudes.items())
+        title = f"predicted oscillation of '{self.model.name}'"
+        return Shown(title, (f"period {self.period:.6g} s, amplitudes: {amplitudes}",))
+
+
+def harmonic_balance(
+    model: Model,
+    amplitudes: Sequence[float],
+    frequencies: Sequence[float],
+    *,
+    u: Mapping[str, float] | None = None,
+    p: Mapping[str, float] | None = None,
+) -> tuple[HarmonicBalance, ...]:
+    """Return the predicted oscillations of a linear loop with one contact, the slowest first.
+
+        v = V cos(w t),   1 = G(i w) n(V, w)
+
+    G is the response of the sliding velocity to the friction force, and n the describing function
+    of the law. The prediction is that of the first harmonic: it is good if the loop suppresses the
+    others. Motions with long stick are not sinusoidal: hunting that needs a static level above the
+    dynamic one is not predicted (see `describing_function`). `orbit` of a prediction returns the
+    exact orbit next to it, and `periodic_orbit` finds orbits from runs.
+    Source: Olsson and Astrom, Friction Generated Limit Cycles, IEEE TCST 9(4), 2001, 629-636.
+
+    Args:
+        model: explicit model, linear except for one contact with constant normal force.
+        amplitudes: (low, high), searched range of V [m/s].
+        frequencies: (low, high), searched range of w [rad/s].
+        u, p: inputs, and values of free parameters, by name.
+
+    Returns:
+        All solutions that a grid over the range shows; empty without one.
+
+    Raises:
+        ValueError: bad input, or a model that is not linear.
+    """
+    where = "harmonic_balance"
+    check_model(where, model)
+    u, p = model.named("u", u), model.named("p", p)
+    V, w = _range(f"{where}: amplitudes", amplitudes), _range(f"{where}: frequencies", frequencies)
+    loop = _loop(where, model, model.values("u", u), model.values("p", p))
+    every = list[Array]()
+    for guess in _guesses(loop, V, w):
+        solution = root(_residual, guess, args=(loop,), options={"eps": STEP**2})
+        new = np.asarray(solution.x, float)
+        inside = np.log([V[0], w[0]]) - SAME <= new, new <= np.log([V[1], w[1]]) + SAME
+        if not np.all(inside) or np.abs(_residual(new, loop)).max() > BALANCED:
+            continue
+        if all(np.abs(new - old).max() > SAME for old in every):
+            every.append(new)
+    every.sort(key=lambda one: float(one[1]))
+    return tuple(_predicted(model, loop, np.exp(one), u, p) for one in every)
+
+
+def _range(where: str, value: object) -> tuple[float, float]:
+    """Return a range of positive numbers."""
+    ends = checks.array(where, value, what="(low, high)")
+    if ends.size != 2 or not 0 < ends[0] < ends[1]:
+        raise checks.refused(where, "(low, high) with 0 < low < high", value)
+    return float(ends[0]), float(ends[1])
+
+
+def _loop(where: str, model: Model, u: Array, p: Array) -> Loop:
+    """Return the linear loop of a model."""
+    bare = model.open
+    if len(model.contacts) != 1 or bare.ode is None or bare.z or bare.holonomic is not None:
+        raise checks.refused(
+            f"{where}: model", "an explicit model with one contact and without algebraic variables",
+            model,
+        )  # fmt: skip
+    (contact,), rates = model.contacts, bare.ode
+    if further := {name for name in contact.given if name != APPLIED}:
+        raise checks.refused(
+            f"{where}: model", f"a law without the inputs {checks.listed(further)}", contact.law
+        )
+    x, F, data = bare.vector("x"), contact.force, [ca.vertcat(model.vector("u"), model.vector("p"))]
+    every, slip = ca.vertcat(x, F, model.t), ca.SX(contact.slip)
+    parts = [
+        ca.jacobian(rates, x), ca.jacobian(rates, F), ca.jacobian(slip, x), ca.SX(contact.N)
+    ]  # fmt: skip
+    offset = ca.substitute(ca.vertcat(rates, slip), every, 0)
+    forced = ca.depends_on(slip, F) or ca.depends_on(ca.vertcat(rates, slip), model.t)
+    if forced or ca.depends_on(ca.vertcat(*map(ca.vec, parts)), every):
+        raise checks.refused(
+            f"{where}: model", "equations that are linear except for the contact, "
+            "with a constant normal force and without time", model,
+            "it holds for linear loops only",
+        )  # fmt: skip
+    outputs = [ca.densify(part) for part in (*parts, offset)]
+    A, b, C, N, c = (
+        part.full() for part in ca.Function("loop", data, outputs)(np.concatenate([u, p]))
+    )
+    rows = np.vstack([A, C])
+    rest = np.linalg.lstsq(rows, -c[:, 0], rcond=None)[0]
+    if np.abs(rows @ rest + c[:, 0]).max() > BALANCED * max(1.0, float(np.abs(c).max())):
+        raise checks.refused(
+            f"{where}: model", "a loop that rests without friction force", model,
+            "a constant load or speed is a bias, which this balance leaves out",
+        )  # fmt: skip
+    law = checks.kind(f"{where}: model", contact.law, Law, "a law, such as LuGre()")
+    return Loop(A, b[:, 0], C[0], rest, Harmonic(law, float(N[0, 0]), RTOL))
+
+
+def _residual(at: Array, loop: Loop) -> Array:
+    """Return real and imaginary part of 1 / (G(i w) n(V, w)) - 1 at (log V, log w)."""
+    V, w = np.exp(at).tolist()
+    off = 1 / (complex(loop.response(np.array([w]))[0]) * loop.law(V, w)) - 1
+    return np.array([off.real, off.imag])
+
+
+def _guesses(loop: Loop, V: tuple[float, float], w: tuple[float, float]) -> Array:
+    """Return (log V, log w) of the cells in which both parts of the balance change their signs.
+
+    The describing function is interpolated; the response of the loop is not.
+    """
+    coarse, fine = (
+        [np.linspace(log(low), log(high), n) for low, high in (V, w)] for n in (COARSE, FINE)
+    )
+    known = loop.law.table(np.exp(coarse[0]), np.exp(coarse[1]))
+    scale = np.exp(coarse[0])[:, None]
+    parts = (known.real * scale, known.imag * scale)
+    real, imag = (
+        RectBivariateSpline(coarse[0], coarse[1], part)(fine[0], fine[1]) for part in parts
+    )
+    n = (real + 1j * imag) / np.exp(fine[0])[:, None]
+    with np.errstate(all="ignore"):  # no force in a dead band
+        off = 1 / (loop.response(np.exp(fine[1])) * n) - 1
+    changes = np.ones((FINE - 1, FINE - 1), bool)
+    for part in (off.real, off.imag):
+        corners = np.array([part[:-1, :-1], part[1:, :-1], part[:-1, 1:], part[1:, 1:]])
+        changes &= (corners.min(axis=0) <= 0) & (corners.max(axis=0) >= 0)
+    i, k = np.nonzero(changes)
+    return np.array([fine[0][i], fine[1][k]]).T
+
+
+def _predicted(
+    model: Model, loop: Loop, at: Array, u: Mapping[str, float], p: Mapping[str, float]
+) -> HarmonicBalance:
+    """Return the prediction at (V, w)."""
+    V, w = float(at[0]), float(at[1])
+    value = loop.law(V, w)
+    states = loop.states(w) * value * V
+    names = [v.name for v in model.open.x]
+    x = dict(zip(names, (loop.rest + states.real).tolist(), strict=True))
+    sizes = dict(zip(names, np.abs(states).tolist(), strict=True))
+    return HarmonicBalance(model, V, w, value, x, sizes, u, p)
