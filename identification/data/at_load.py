@@ -13,7 +13,7 @@ is uncertain, a static law is not compared with the data.
 
 The losses make the force jump at reversals, which widens its band. The filter then keeps more of
 the noise of the acceleration, and the residuals of a coarse encoder consist mostly of it; see
-`identification.verdict.judge` for dependence on accelerations.
+`identification.verdict.judge` for dependence on past motion.
 """
 
 from dataclasses import replace

@@ -74,12 +74,14 @@ class Family(NamedTuple):
         hint: likely cause of the dependence.
         columns: columns of the regression, shape (n, q), or alternatives of them.
         smoothed: True for columns from a smoothed signal, which leaves systematic errors.
+        noisy: True for past rates or accelerations, whose noise the residuals may contain.
     """
 
     what: str
     hint: str
     columns: "Array | Waves"
     smoothed: bool = False
+    noisy: bool = False
 
 
 def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> Iterator[Family]:
@@ -116,7 +118,8 @@ def families(regressors: Sequence[Regressor], position: Count, basis: Array) -> 
             continue
         columns = np.column_stack([lagged(signal, position, d) for d in delays])
         hint = f"dynamics or a delay from {name} is missing"
-        yield Family(f"the present and past of {name}", hint, columns, kind == "acceleration")
+        smoothed, what = kind == "acceleration", f"the present and past of {name}"
+        yield Family(what, hint, columns, smoothed, smoothed or kind == "velocity")
         if kind != "velocity":
             continue
         speed, size = np.abs(signal), np.abs(signal).max()

@@ -16,9 +16,9 @@ Therefore
   implausible.
 
 Limits: residuals below the `resolution` of a measured signal carry no information. A measured
-acceleration shares its noise with the residuals of inverse dynamics. A dependence on present and
-past accelerations that is not larger than this noise is ignored, and so is an error of the model
-of that size.
+motion shares its noise with the residuals of inverse dynamics. A dependence on present and past
+velocities or accelerations that is not larger than this noise is ignored, and so is an error of the
+model of that size.
 """
 
 from collections.abc import Iterator, Mapping
@@ -55,7 +55,7 @@ MOVED = 2.0
 SMOOTHED = 1e-3
 """Size of an ignored dependence on a smoothed acceleration, relative to the range of a signal."""
 NOISY = 1.25
-"""Size of an ignored dependence on a measured acceleration, relative to that of its noise."""
+"""Size of an ignored dependence on past measured motion, relative to that of its noise."""
 UNEXPLAINED = 0.7
 """Ratio of residuals to the spread of the signal above which a model explains almost nothing."""
 LITTLE = 0.9
@@ -209,8 +209,8 @@ def _independent(
     level = float(np.linalg.norm(found.raw[channel.rows])) / weighted if weighted > 0 else 1.0
     for family, (statistic, p, explained, moved) in some:
         size, share = explained * level, explained**2 / (float(r @ r) / r.size)
-        smooth = max(SMOOTHED * float(np.ptp(channel.measured)), NOISY * channel.motion_noise)
-        least = smooth if family.smoothed else fine
+        least = SMOOTHED * float(np.ptp(channel.measured)) if family.smoothed else fine
+        least = max(least, NOISY * channel.motion_noise) if family.noisy else least
         passed = p >= limit or size <= least or (share < SHARE and moved < MOVED)
         text = (
             f"The residuals of {name} depend on {family.what}: {size:.2g} {unit} rms, "
