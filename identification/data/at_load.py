@@ -11,9 +11,9 @@ the load; with an efficiency of 1, the losses of the gear are part of the fitted
 direction of power uses a velocity filtered as that of `InverseDynamics`; near a reversal, where it
 is uncertain, a static law is not compared with the data.
 
-Limits: with a coarse encoder and an efficiency below 1, a fit may be DOUBTFUL although its
-intervals contain the true values: 10 of 10 simulated records of an axis with 2000 counts per turn,
-a ratio of 50 and efficiencies of 0.85 and 0.7; with 65536 counts per turn 2 of 10.
+The losses make the force jump at reversals, which widens its band. The filter then keeps more of
+the noise of the acceleration, and the residuals of a coarse encoder consist mostly of it; see
+`identification.verdict.judge` for dependence on accelerations.
 """
 
 from dataclasses import replace

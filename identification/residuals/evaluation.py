@@ -34,6 +34,7 @@ class Channel:
         breaks: first rows of the second and later windows, counted in the channel; residuals on
             either side are not neighbours.
         ordered: True if neighbouring rows are neighbours in time.
+        motion_noise: rms [unit] of the residuals by the noise of the regressors, at the minimum.
     """
 
     record: int
@@ -45,6 +46,7 @@ class Channel:
     regressors: Mapping[str, Array]
     breaks: tuple[int, ...] = ()
     ordered: bool = True
+    motion_noise: float = 0.0
 
 
 class Evaluation(NamedTuple):
@@ -52,6 +54,17 @@ class Evaluation(NamedTuple):
 
     r: Array
     J: Array
+
+
+RANK = 1e-9
+"""Smallest nonzero singular value of sensitivities, relative to the largest."""
+
+
+def shifted_by(J: Array, c: Array) -> Array:
+    """Return J (J'J)^-1 c, by which residuals change if J'r changes by c, shape (rows,)."""
+    _, s, Vt = np.linalg.svd(np.linalg.qr(J, mode="r"))
+    axes = Vt[s > RANK * s.max(initial=1e-300)]
+    return J @ (axes.T @ (axes @ c / s[: len(axes)] ** 2))
 
 
 class Residuals(Protocol):
@@ -111,6 +124,11 @@ class Blocks:
         A fit searches there first.
         """
         return None
+
+    def motion_noise(self, values: Array) -> Array:
+        """Return the rms of the residuals by the noise of the measured motion, per channel."""
+        del values
+        return np.zeros(len(self.channels))
 
     @abstractmethod
     def blocks(self, p: Array, own: Array) -> Iterator[tuple[Array, Array] | str]:
@@ -184,6 +202,10 @@ class Extended:
     def linear(self) -> bool:
         """True if the residuals are linear in all values."""
         return self.residuals.linear
+
+    def motion_noise(self, values: Array) -> Array:
+        """Return the rms of the residuals by the noise of the measured motion, per channel."""
+        return self.residuals.motion_noise(values)
 
     def at(self, values: Array) -> Evaluation | str:
         """Return residuals and derivatives, or a message."""

@@ -21,8 +21,8 @@ from identification.residuals.balance import (
     coordinates,
     measure,
 )
-from identification.residuals.evaluation import DEAD_TIME, Array, Blocks, Channel
-from identification.residuals.sampled import Sampled, preload, same
+from identification.residuals.evaluation import DEAD_TIME, Array, Blocks, Channel, shifted_by
+from identification.residuals.sampled import Path, Sampled, preload, same, scaled
 from identification.unknowns.roles import width_of
 from identification.unknowns.spec import Unknown
 from identification.unknowns.subject import Subject
@@ -31,8 +31,6 @@ from symfric.integrator.compiled.columns import Columns
 from symfric.model import Model
 
 WHERE = "InverseDynamics"
-RANK = 1e-9
-"""Smallest nonzero singular value of sensitivities, relative to the largest."""
 PART = 20_000
 """Number of equations of a long record in which a fit searches first."""
 FEWEST, ENOUGH = 10, 100
@@ -78,9 +76,8 @@ class InverseDynamics:
     rows with algebraic unknowns; with a filter of the user, the noise of the acceleration must be
     small against the acceleration. Errors are those of the force up to the cut-off of the record: a
     force of pulses is wide-band and includes all noise and every resonance, so its percentage is
-    not comparable with that of a slow record (EMPS: 10.9 % of the pulses, 5.9 % with the filter of
-    the slow record; the mass is the same within .2 %). Channels of a model have the names of its
-    states and inputs; velocities without a channel are derived from the positions.
+    not comparable with that of a slow record (EMPS: 10.9 %, 5.9 % with the filter of the slow
+    record). Channels of a model have the names of its states and inputs; others are derived.
     Source: Gautier, Janot and Vandanjon, IEEE Trans. Control Syst. Technol. 21(2), 2013 (IDIM-LS).
     """
 
@@ -382,19 +379,22 @@ class InverseRows(Blocks):
                 both = part.equations(k, np.column_stack([path.rows[:, k], J]))
                 yield both[:, 0] - self._bias(part, k, p, both[:, 1:]), both[:, 1:]
 
+    def motion_noise(self, values: Array) -> Array:
+        """Return the rms of the residuals by the noise of the measured motion, per channel."""
+        p, count = values[: len(self.parameters)], range(len(self.rows))
+        each = (self._noisy(part, k, p) for part in self.pieces for k in count)
+        return np.array([0.0 if e is None else float(np.linalg.norm(e.rows)) for e in each])
+
+    def _noisy(self, part: Piece, k: int, p: Array) -> Path | None:
+        """Return G S of row k, divided by the root of the number of equations, and derivatives."""
+        motion, here = part.motion, part.decimation.centres
+        at = some(here(np.arange(motion.t.size)[motion.inside])[part.kept[k]])
+        return scaled(self.slopes, motion.w[:, at], motion.step, p, k, part.errors)
+
     def _bias(self, part: Piece, k: int, p: Array, J: Array) -> Array:
         """Return J (J'J)^-1 c for row k of a record, shape (rows,)."""
-        if self.slopes is None or not p.size:
+        found = self._noisy(part, k, p) if p.size else None
+        if found is None:
             return np.zeros(len(J))
-        motion = part.motion
-        kept = part.kept[k]
-        at = some(part.decimation.centres(np.arange(motion.t.size)[motion.inside])[kept])
-        found = self.slopes.along(motion.w[:, at], motion.step, p)
-        if isinstance(found, str):
-            return np.zeros(len(J))
-        place = slice(k * part.errors.size, (k + 1) * part.errors.size)
-        c = np.einsum("ij,j,ijp->p", found.rows[:, place], part.errors**2, found.slopes[:, place])
-        c = np.append(c * (kept.size / at.size), np.zeros(J.shape[1] - p.size))
-        _, s, Vt = np.linalg.svd(np.linalg.qr(J, mode="r"))
-        axes = Vt[s > RANK * s.max(initial=1e-300)]
-        return J @ (axes.T @ (axes @ c / s[: len(axes)] ** 2))
+        c = np.einsum("ij,ijp->p", *found) * part.kept[k].size
+        return shifted_by(J, np.append(c, np.zeros(J.shape[1] - p.size)))

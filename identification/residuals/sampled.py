@@ -252,6 +252,18 @@ class Sampled:
         return _Along(self, w.T, h, p, w[:, 0] if begin is None else begin).path()
 
 
+def scaled(of: Sampled | None, w: Array, h: float, p: Array, k: int, sizes: Array) -> Path | None:
+    """Return the rows of block k at n samples, times `sizes` / sqrt(n), and their derivatives by p.
+
+    Blocks have as many rows as `sizes`. None: no rows, or not finite.
+    """
+    found = "" if of is None else of.along(w, h, p)
+    if isinstance(found, str):
+        return None
+    place, each = slice(k * sizes.size, (k + 1) * sizes.size), sizes / np.sqrt(w.shape[1])
+    return Path(found.rows[:, place] * each, found.slopes[:, place] * each[:, None])
+
+
 class _Along:
     """Evaluation of a record of n samples at the parameters p."""
 

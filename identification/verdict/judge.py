@@ -15,7 +15,10 @@ Therefore
 * errors in the data, a mass at its bound, or residuals as large as the signal make a result
   implausible.
 
-Limits: residuals below the `resolution` of a measured signal carry no information.
+Limits: residuals below the `resolution` of a measured signal carry no information. A measured
+acceleration shares its noise with the residuals of inverse dynamics. A dependence on present and
+past accelerations that is not larger than this noise is ignored, and so is an error of the model
+of that size.
 """
 
 from collections.abc import Iterator, Mapping
@@ -51,6 +54,8 @@ MOVED = 2.0
 """Change of the fitted values by a missing term, in standard errors, below which it is ignored."""
 SMOOTHED = 1e-3
 """Size of an ignored dependence on a smoothed acceleration, relative to the range of a signal."""
+NOISY = 1.25
+"""Size of an ignored dependence on a measured acceleration, relative to that of its noise."""
 UNEXPLAINED = 0.7
 """Ratio of residuals to the spread of the signal above which a model explains almost nothing."""
 LITTLE = 0.9
@@ -204,7 +209,8 @@ def _independent(
     level = float(np.linalg.norm(found.raw[channel.rows])) / weighted if weighted > 0 else 1.0
     for family, (statistic, p, explained, moved) in some:
         size, share = explained * level, explained**2 / (float(r @ r) / r.size)
-        least = SMOOTHED * float(np.ptp(channel.measured)) if family.smoothed else fine
+        smooth = max(SMOOTHED * float(np.ptp(channel.measured)), NOISY * channel.motion_noise)
+        least = smooth if family.smoothed else fine
         passed = p >= limit or size <= least or (share < SHARE and moved < MOVED)
         text = (
             f"The residuals of {name} depend on {family.what}: {size:.2g} {unit} rms, "

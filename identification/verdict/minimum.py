@@ -13,7 +13,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.residuals.evaluation import Array, Channel
+from identification.residuals.evaluation import Array, Blocks, Channel, Extended
 from identification.solving.task import Point, Task, influence
 from identification.unknowns.spec import Unknown
 from identification.verdict.colour import Colour, Count, colour
@@ -276,8 +276,12 @@ def minimum(task: Task, point: Point) -> Minimum:
     known, box = {s: x for s, x in task.noise.items() if s not in task.estimated}, task.unknowns
     raw = point.evaluation.r
     change = partial(_change, task, raw)
+    channels, residuals = task.channels, task.residuals
+    if isinstance(residuals, Blocks | Extended):
+        each = zip(channels, residuals.motion_noise(point.values).tolist(), strict=True)
+        channels = [replace(channel, motion_noise=level) for channel, level in each]
     return Minimum(
-        task.channels, box.unknowns, box.names, point.values, point.slope, box.at_bound(point.w),
+        channels, box.unknowns, box.names, point.values, point.slope, box.at_bound(point.w),
         point.weights * point.r, point.J, gain, raw, known, change,
     )  # fmt: skip
 

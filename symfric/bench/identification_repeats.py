@@ -19,7 +19,7 @@ from symfric.laws import QuarterCarGeneral, QuarterCarSimple
 from symfric.model import Model
 from symfric.scenes import Drive, QuarterCar
 
-SEEDS, QUICK = 100, 2
+SEEDS, QUICK = 100, 1
 BLOCK = {"m": 2.0, "mu_d": 1.0, "sigma_2": 0.8}
 """True parameters of the simulated motion."""
 POSITION, VELOCITY = 1e-4, 0.2

@@ -176,3 +176,14 @@ def test_every_record_has_its_dead_time() -> None:
     rows = plain(moved(DRIVE) + moved(DRIVE), one, dead_time=(0.0, 0.02))
     assert rows.names == ("m", "dead_time[0]", "dead_time[1]")
     check_slopes(rows, np.array([4.0, 1e-3, 2.3e-3]))
+
+
+def test_the_noise_of_the_motion_has_its_size_in_the_residuals() -> None:
+    """Of the true values only the noise of the position is left, white or of rounding."""
+    clean, random = moved(DRIVE)[0], np.random.default_rng(3)
+    steps = 2e-5 * random.standard_normal(clean.size)
+    for x in (clean["x"] + steps, 5e-5 * np.rint((clean["x"] + steps) / 5e-5)):
+        data = Dataset.of(t=clean.time, x=x, force=clean["force"])
+        rows = plain(data)
+        left = float(np.sqrt(np.mean(evaluated(rows, TRUE).r ** 2)))
+        assert rows.motion_noise(TRUE)[0] == pytest.approx(left, rel=0.15)

@@ -1,6 +1,7 @@
 """Tests of residuals: false alarms, and what they find; records that begin loaded."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -47,6 +48,23 @@ def test_what_is_missing_is_named(
     failed = [t for t in found.tests if t.decides and not t.passed]
     assert any(named in t.name for t in failed)
     assert failed[0].p < ALARM
+
+
+def test_noise_of_the_acceleration_is_no_model_error() -> None:
+    """Past accelerations explain residuals that contain their noise, but also a true lag."""
+    n, m = 2000, motion(2000)
+    known = 5.0 * (m["v"] - np.roll(m["v"], 1))
+    noise = 0.3 * np.random.default_rng(5).standard_normal(n)
+    J = np.column_stack([coulomb(n), known + noise])
+    for lag, good in ((0.0, True), (2.0, False)):
+        late = lag * np.roll(noise, 16) + 0.01 * ar1(n, 0.0, 2)
+        found = fitted(
+            J, J @ [*TRUTH, 1.0] + late + np.roll(noise, 8), regressors={"a": known + noise}
+        )
+        (channel,) = found.channels
+        level = replace(channel, motion_noise=float(np.std(noise)))
+        assert not judge(found).good
+        assert judge(replace(found, channels=(level,))).good is good
 
 
 def test_rounding_is_no_model_error() -> None:
