@@ -12,6 +12,8 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import root
 
 from symfric.dynamics.describing import RUN, Harmonic
+from symfric.dynamics.equilibrium import equilibrium
+from symfric.dynamics.linear import LinearModel, linearize
 from symfric.dynamics.orbit import PeriodicOrbit, found
 from symfric.dynamics.shooting import METHOD
 from symfric.foundation import checks
@@ -33,27 +35,21 @@ RTOL, STEP = 1e-9, 1e-5
 @final
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """Linear loop x' = A x + b F + c with the sliding velocity v = C x of its contact.
+    """Linear loop with the sliding velocity v = C x of its contact.
 
     Attributes:
-        A, b, C: shapes (n, n), (n,), (n,).
-        rest: states without friction force.
+        linear: response of all states to the friction force.
+        C: shape (n,).
         law: describing function n(V, w) of the contact.
     """
 
-    A: Array
-    b: Array
+    linear: LinearModel
     C: Array
-    rest: Array
     law: Harmonic
 
-    def states(self, w: float) -> NDArray[np.complex128]:
-        """Return the response (i w - A)^-1 b of the states to the friction force."""
-        return np.linalg.solve(1j * w * np.eye(self.b.size) - self.A, self.b).astype(complex)
-
-    def response(self, w: Array) -> NDArray[np.complex128]:
-        """Return the response G(i w) of the sliding velocity to the friction force."""
-        return np.array([self.C @ self.states(float(one)) for one in w])
+    def states(self, w: Array) -> NDArray[np.complex128]:
+        """Return the response of the states to the friction force, shape (m, n)."""
+        return self.linear.response(w)[:, :, 0]
 
 
 @final
@@ -121,15 +117,16 @@ def harmonic_balance(
 
         v = V cos(w t),   1 = G(i w) n(V, w)
 
-    G is the response of the sliding velocity to the friction force, and n the describing function
-    of the law. The prediction is that of the first harmonic: it is good if the loop suppresses the
-    others. Motions with long stick are not sinusoidal: hunting that needs a static level above the
-    dynamic one is not predicted (see `describing_function`). `orbit` of a prediction returns the
-    exact orbit next to it, and `periodic_orbit` finds orbits from runs.
+    G is the response of the sliding velocity to the friction force, linear near the equilibrium
+    without this force, and n the describing function of the law. The prediction is that of the
+    first harmonic: it is good if the loop suppresses the others. Motions with long stick are not
+    sinusoidal: hunting that needs a static level above the dynamic one is not predicted (see
+    `describing_function`). `orbit` of a prediction returns the exact orbit next to it, and
+    `periodic_orbit` finds orbits from runs.
     Source: Olsson and Astrom, Friction Generated Limit Cycles, IEEE TCST 9(4), 2001, 629-636.
 
     Args:
-        model: explicit model, linear except for one contact with constant normal force.
+        model: model with one contact; it should be linear, and its normal force constant.
         amplitudes: (low, high), searched range of V [m/s].
         frequencies: (low, high), searched range of w [rad/s].
         u, p: inputs, and values of free parameters, by name.
@@ -138,13 +135,13 @@ def harmonic_balance(
         All solutions that a grid over the range shows; empty without one.
 
     Raises:
-        ValueError: bad input, or a model that is not linear.
+        ValueError: bad input, or no rest without friction force, as under a constant load.
     """
     where = "harmonic_balance"
     check_model(where, model)
     u, p = model.named("u", u), model.named("p", p)
     V, w = _range(f"{where}: amplitudes", amplitudes), _range(f"{where}: frequencies", frequencies)
-    loop = _loop(where, model, model.values("u", u), model.values("p", p))
+    loop = _loop(where, model, u, p)
     every = list[Array]()
     for guess in _guesses(loop, V, w):
         solution = root(_residual, guess, args=(loop,), options={"eps": STEP**2})
@@ -166,51 +163,35 @@ def _range(where: str, value: object) -> tuple[float, float]:
     return float(ends[0]), float(ends[1])
 
 
-def _loop(where: str, model: Model, u: Array, p: Array) -> Loop:
-    """Return the linear loop of a model."""
-    bare = model.open
-    if len(model.contacts) != 1 or bare.ode is None or bare.z or bare.holonomic is not None:
+def _loop(where: str, model: Model, u: Mapping[str, float], p: Mapping[str, float]) -> Loop:
+    """Return the loop, linear near its equilibrium without friction force."""
+    if len(model.contacts) != 1 or any(name != APPLIED for name in model.contacts[0].given):
         raise checks.refused(
-            f"{where}: model", "an explicit model with one contact and without algebraic variables",
-            model,
-        )  # fmt: skip
-    (contact,), rates = model.contacts, bare.ode
-    if further := {name for name in contact.given if name != APPLIED}:
-        raise checks.refused(
-            f"{where}: model", f"a law without the inputs {checks.listed(further)}", contact.law
+            f"{where}: model", "a model with one contact, whose law has no further inputs", model
         )
-    x, F, data = bare.vector("x"), contact.force, [ca.vertcat(model.vector("u"), model.vector("p"))]
-    every, slip = ca.vertcat(x, F, model.t), ca.SX(contact.slip)
-    parts = [
-        ca.jacobian(rates, x), ca.jacobian(rates, F), ca.jacobian(slip, x), ca.SX(contact.N)
-    ]  # fmt: skip
-    offset = ca.substitute(ca.vertcat(rates, slip), every, 0)
-    forced = ca.depends_on(slip, F) or ca.depends_on(ca.vertcat(rates, slip), model.t)
-    if forced or ca.depends_on(ca.vertcat(*map(ca.vec, parts)), every):
-        raise checks.refused(
-            f"{where}: model", "equations that are linear except for the contact, "
-            "with a constant normal force and without time", model,
-            "it holds for linear loops only",
-        )  # fmt: skip
-    outputs = [ca.densify(part) for part in (*parts, offset)]
-    A, b, C, N, c = (
-        part.full() for part in ca.Function("loop", data, outputs)(np.concatenate([u, p]))
+    (contact,), bare = model.contacts, model.open
+    law = checks.kind(f"{where}: model", contact.law, Law, "a law, such as LuGre()")
+    force = contact.variable.name
+    at = equilibrium(bare, u={**u, force: 0.0}, p=p)
+    names = [v.name for v in bare.x]
+    linear = linearize(bare, at, inputs=[force], outputs=names)
+    slip = ca.SX(contact.slip)
+    slopes = at.equations.expressed(
+        ca.horzcat(slip, ca.SX(contact.N), ca.jacobian(slip, bare.vector("x")))
     )
-    rows = np.vstack([A, C])
-    rest = np.linalg.lstsq(rows, -c[:, 0], rcond=None)[0]
-    if np.abs(rows @ rest + c[:, 0]).max() > BALANCED * max(1.0, float(np.abs(c).max())):
+    v, N, *C = slopes(at.y, at.data).full()[0].tolist()
+    if max(map(abs, (v, *at.drift.values()))) > BALANCED:
         raise checks.refused(
             f"{where}: model", "a loop that rests without friction force", model,
-            "a constant load or speed is a bias, which this balance leaves out",
+            "a constant speed or load is a bias, which this balance leaves out",
         )  # fmt: skip
-    law = checks.kind(f"{where}: model", contact.law, Law, "a law, such as LuGre()")
-    return Loop(A, b[:, 0], C[0], rest, Harmonic(law, float(N[0, 0]), RTOL))
+    return Loop(linear, np.array(C), Harmonic(law, N, RTOL))
 
 
 def _residual(at: Array, loop: Loop) -> Array:
     """Return real and imaginary part of 1 / (G(i w) n(V, w)) - 1 at (log V, log w)."""
     V, w = np.exp(at).tolist()
-    off = 1 / (complex(loop.response(np.array([w]))[0]) * loop.law(V, w)) - 1
+    off = 1 / (complex(loop.states(np.array([w]))[0] @ loop.C) * loop.law(V, w)) - 1
     return np.array([off.real, off.imag])
 
 
@@ -230,7 +211,7 @@ def _guesses(loop: Loop, V: tuple[float, float], w: tuple[float, float]) -> Arra
     )
     n = (real + 1j * imag) / np.exp(fine[0])[:, None]
     with np.errstate(all="ignore"):  # no force in a dead band
-        off = 1 / (loop.response(np.exp(fine[1])) * n) - 1
+        off = 1 / ((loop.states(np.exp(fine[1])) @ loop.C) * n) - 1
     changes = np.ones((FINE - 1, FINE - 1), bool)
     for part in (off.real, off.imag):
         corners = np.array([part[:-1, :-1], part[1:, :-1], part[:-1, 1:], part[1:, 1:]])
@@ -245,8 +226,8 @@ def _predicted(
     """Return the prediction at (V, w)."""
     V, w = float(at[0]), float(at[1])
     value = loop.law(V, w)
-    states = loop.states(w) * value * V
-    names = [v.name for v in model.open.x]
-    x = dict(zip(names, (loop.rest + states.real).tolist(), strict=True))
+    states = loop.states(at[1:])[0] * value * V
+    names, rest = loop.linear.outputs, np.array([*loop.linear.at.x.values()])
+    x = dict(zip(names, (rest + states.real).tolist(), strict=True))
     sizes = dict(zip(names, np.abs(states).tolist(), strict=True))
     return HarmonicBalance(model, V, w, value, x, sizes, u, p)
