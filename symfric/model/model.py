@@ -20,7 +20,13 @@ from symfric.foundation.variable import stacked
 from symfric.model.forces import closed, opened, reopened, with_forces
 from symfric.model.holonomic import Holonomic
 from symfric.model.parts import Monitor, Output
-from symfric.model.problems import GROUPS, equation_problems, kind_problems, naming_problems
+from symfric.model.problems import (
+    GROUPS,
+    contact_problems,
+    equation_problems,
+    kind_problems,
+    naming_problems,
+)
 from symfric.model.start import System, accelerations
 
 Variables = tuple[Variable, ...]
@@ -107,6 +113,7 @@ class Model(Showing, System):
 
     def _close(self) -> None:
         """Replace the contact forces by those of their laws, and store the open form."""
+        self._refuse(contact_problems(self))
         given = {item.name: getattr(self, item.name) for item in fields(self)}
         object.__setattr__(self, "opening", partial(opened, given, Model))
         for name, value in closed(self).items():

@@ -79,6 +79,18 @@ def _column(where: str, value: Any) -> None:
         raise ValueError(f"{where}: expected a column, got a row; write casadi.vertcat(...)")
 
 
+def contact_problems(model: System) -> list[str]:
+    """Return a message about states of contacts that are listed as states of the model, too."""
+    own = {v.symbol.element_hash() for v in (*model.x, *model.z)}
+    both = [v.name for c in model.contacts for v in c.states if v.symbol.element_hash() in own]
+    if not both:
+        return []
+    return [
+        f"x: expected the states of the model only, got {', '.join(both)} of its contacts; leave "
+        "them and their rates out, the model adds them"
+    ]
+
+
 def naming_problems(model: System) -> list[str]:
     """Return messages about names that are repeated, reserved, invalid or undefined."""
     problems: list[str] = []

@@ -86,6 +86,14 @@ def test_inconsistent_models_and_bad_values_are_refused() -> None:
     assert not_refused(Path(__file__).with_name("refusals.toml"), *packages, **names) == []
 
 
+def test_states_of_contacts_belong_to_the_contacts() -> None:
+    s, v = sf.Variable("s", "m"), sf.Variable("v", "m/s")
+    slip = sf.contact("ground", sf.LuGre(), v, 9.81)
+    rates = ca.vertcat(v.symbol, 1 - slip.force, 0)
+    with pytest.raises(ValueError, match="x: expected the states of the model only, got z of its"):
+        sf.Model("sled", x=(s, v, *slip.states), ode=rates, contacts=(slip,))
+
+
 def test_details_are_written_once_and_on_request() -> None:
     x, calls = sf.Variable("x", "m"), []
 
