@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from symfric.dynamics.equations import DEPENDENT, Equations
 from symfric.foundation.numeric import Array
-from symfric.model.forces import STICKS
 
 ITERATIONS, HALVINGS = 50, 10
 """Largest numbers of Gauss-Newton steps, and of halvings of one step."""
@@ -89,7 +88,7 @@ def rows_at_rest(eq: Equations, y: Array, d: Array) -> tuple[Array, Array]:
     of_f, of_C, of_slips = (np.hstack(pair) for pair in zip(every[:3], every[3:], strict=True))
     others = np.delete(eq.M, np.union1d(eq.cyclic, eq.modes), axis=1).any(axis=1)
     kept = others | ~eq.M.any(axis=1)
-    stuck = [i for i, (_, mode) in enumerate(eq.switching) if abs(y[mode]) < STICKS]
+    stuck = eq.stuck(y)
     return np.concatenate([f[kept], C, slips[stuck]]), np.vstack(
         [of_f[kept], of_C, of_slips[stuck]]
     )

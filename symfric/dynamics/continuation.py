@@ -176,7 +176,8 @@ def _traced(
             if not span[0] < found.node.z[-1] < span[1]:
                 edge = span[0] if found.node.z[-1] <= span[0] else span[1]
                 last, _ = located(curve, found, partial(_beyond, edge))
-                trace.points.append(point(curve, last))
+                if last is not found.node:
+                    trace.points.append(point(curve, last))
                 trace.message = "ends at the given range"
                 break
             trace.points.append(point(curve, found.node))
@@ -206,6 +207,9 @@ def _steps(
         for found in followed(curve, node, tau, step, same_sequence, near.most):
             node, tau = found.node, found.tau
             yield found
+        if isinstance(curve, Equilibria) and curve.turns(node.z + step * tau * curve.scale):
+            trace.message = "ends where a sliding contact comes to rest"
+            return
         if not isinstance(curve, Orbits) or not curve.problem.eq.switching:
             trace.message = "ends where no further step was possible; try a smaller step or rtol"
             return

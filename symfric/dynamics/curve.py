@@ -28,6 +28,8 @@ FARTHEST = 0.5
 SHARP = 1e-3
 """Step, relative to the longest one, below which a turn is too sharp to be resolved."""
 DEPENDENT = 1e-12
+NEAR = 1e-6
+"""Change of sign of a test that counts as located, relative to its values at the ends of a step."""
 
 
 class Node(NamedTuple):
@@ -190,9 +192,11 @@ def located(
 ) -> tuple[Node, Array]:
     """Return the node of a step, and its tangent, at which `test` of these changes its sign.
 
-    If the equations cannot be solved there, it is the end of the step.
+    The search ends where the equations cannot be solved more accurately. If it ends far from the
+    change, the end of the step is returned.
     """
     found: dict[float, tuple[Node, Array]] = {}
+    values: dict[float, float] = {}
     way = step.length * step.along * curve.scale
     bend = step.node.z - step.start.z - way
 
@@ -200,12 +204,16 @@ def located(
         share = length / step.length
         node, _ = corrected(curve, step.start.z + share * way + share**2 * bend, step.along)
         found[length] = node, tangent(curve, node, step.along)
-        return test(*found[length])
+        values[length] = test(*found[length])
+        return values[length]
 
     try:
         root: Any = brentq(value, 0.0, step.length, xtol=1e-12 * step.length)
     except (ValueError, RuntimeError):
-        return step.node, step.tau
+        sizes = {length: abs(at) for length, at in values.items()}
+        root = min(sizes, key=lambda length: sizes[length], default=None)
+        if root is None or sizes[root] > NEAR * max(sizes.values()):
+            return step.node, step.tau
     if root not in found:
         value(float(root))
     return found[float(root)]

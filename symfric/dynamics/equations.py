@@ -24,6 +24,7 @@ from symfric.integrator.equations.manifold import holonomic_columns
 from symfric.integrator.equations.system import implicit_columns
 from symfric.model import Contact, Model
 from symfric.model.contact import APPLIED
+from symfric.model.forces import STICKS
 from symfric.model.kinds import MODE
 
 Indices = NDArray[np.intp]
@@ -89,6 +90,10 @@ class Equations:
             for s, v in zip(c.law.states, c.states, strict=True)
             if s.whole and APPLIED in c.given
         )
+
+    def stuck(self, y: Array) -> list[int]:
+        """Return the indices of the switching contacts that stick, by their modes."""
+        return [i for i, (_, mode) in enumerate(self.switching) if abs(y[mode]) < STICKS]
 
     @cached_property
     def constraints(self) -> ca.SX:

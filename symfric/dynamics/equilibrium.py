@@ -107,7 +107,7 @@ class Equilibrium(Showing):
                 load, as laws with a smooth sign do, or has no static level.
         """
         where = f"equilibrium of '{self.model.name}': survives"
-        check_names(where, [name], [*self.u, *self.p])
+        check_names(where, [name], [*self.u, *self.p], "free a parameter when the model is made")
         held = [c for c in self.contacts if c.state == "stick"]
         if not held:
             raise ValueError(f"{where}: expected a contact at rest, got none; all of them slide")
@@ -168,7 +168,7 @@ def equilibrium(
     """
     check_model("equilibrium", model)
     eq = equations("equilibrium", model)
-    d = np.concatenate([model.values("u", u), model.values("p", p)])
+    d = eq.data(u, p)
     found = with_modes(eq, _start(eq, guess, p), d)
     if found is None:
         raise ValueError(

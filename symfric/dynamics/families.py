@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from symfric.dynamics.balance import rows_at_rest
 from symfric.dynamics.curve import Equations as Curve
 from symfric.dynamics.curve import Node
 from symfric.dynamics.equations import Equations
-from symfric.dynamics.shooting import Linear, Shooting
+from symfric.dynamics.shooting import Shooting
 from symfric.dynamics.tangent import tangent
 from symfric.foundation.numeric import Array
 
@@ -39,6 +39,12 @@ class Orbits(Curve):
         """Name of the parameter."""
         return self.problem.names[0]
 
+    @property
+    def u(self) -> Array:
+        """Values of the inputs, which are constant."""
+        known: Any = self.problem.u
+        return self.problem.model.values("u", known)
+
     def at(self, z: Array) -> Node:
         """Return the linearised shooting equations; see `Curve.at`."""
         nx = z.size - 2
@@ -56,13 +62,6 @@ class Orbits(Curve):
         r, J = np.append(found.r / s, 0.0), np.vstack([found.J / s[:, None], phase])
         z = np.concatenate([found.segments[0].start, z[nx:]])
         return Node(z, r, J, np.array([*chosen, nx, nx + 1]), D, found)
-
-
-def multipliers(at: Linear) -> NDArray[np.complex128]:
-    """Return the Floquet multipliers without that of the direction of motion."""
-    found = np.linalg.eigvals(at.monodromy).astype(complex)
-    found = np.delete(found, int(np.argmin(np.abs(found - 1))))
-    return found[np.argsort(-np.abs(found))]
 
 
 class State(NamedTuple):
@@ -94,8 +93,9 @@ class Equilibria(Curve):
 
     def at(self, z: Array) -> Node:
         """Return the linearised equations of an equilibrium; see `Curve.at`."""
-        y, d = z[:-1], self.d.copy()
-        d[self.index] = z[-1]
+        if self.turns(z):
+            raise ValueError("a sliding contact comes to rest")
+        y, d = self._split(z)
         r, J = rows_at_rest(self.eq, y, d)
         own = np.setdiff1d(np.arange(y.size), np.union1d(self.eq.modes, self.eq.cyclic))
         chosen = np.append(own, y.size)
@@ -103,6 +103,17 @@ class Equilibria(Curve):
         size = np.maximum((np.abs(J[:, columns]) * self.scale[chosen]).max(axis=1), TINY)
         D = np.eye(z.size)[:, chosen]
         return Node(z, r / size, J[:, columns] / size[:, None], chosen, D, (y, d))
+
+    def turns(self, z: Array) -> bool:
+        """Return True if a contact slides against the direction of its mode."""
+        modes = z[[mode for _, mode in self.eq.switching]]
+        return bool((modes * self.eq.sliding(*self._split(z)).full().ravel() < 0).any())
+
+    def _split(self, z: Array) -> tuple[Array, Array]:
+        """Return the unknowns, and inputs and parameters."""
+        d = self.d.copy()
+        d[self.index] = z[-1]
+        return z[:-1], d
 
     def state(self, node: Node) -> State:
         """Return the equilibrium with its eigenvalues."""

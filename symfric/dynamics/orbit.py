@@ -126,9 +126,18 @@ class PeriodicOrbit(Showing):
         for v in self.model.x:
             low, high = self.cycle.extremes(v.name)
             rows.append((v.name, v.unit, f"{low:.6g}", f"{high:.6g}"))
-        title = f"{words[self.stable]} periodic orbit of '{self.model.name}'{kind}"
+        title = f"periodic orbit of '{self.model.name}'{kind}, {words[self.stable]}"
         table = Table(("state", "unit", "least", "greatest"), tuple(rows), numbers=(2, 3))
         return Shown(title, tuple(lines), table)
+
+
+def guessed(
+    model: Model, x: Mapping[str, float], period: float, u: Mapping[str, float],
+    p: Mapping[str, float], rtol: float,
+) -> PeriodicOrbit:  # fmt: skip
+    """Return a guess of an orbit for `periodic_orbit`, from its start and its period."""
+    unknown = np.zeros(0, dtype=complex)
+    return PeriodicOrbit(model, x, period, u, p, unknown, False, False, 0.0, rtol)
 
 
 def periodic_orbit(
@@ -355,11 +364,7 @@ def _orbit(problem: Shooting, p: Mapping[str, float], at: Linear, symmetric: boo
     """Return the orbit with its multipliers and its error."""
     model, start = problem.model, at.segments[0].start
     x = dict(zip((v.name for v in model.x), start.tolist(), strict=True))
-    multipliers = np.linalg.eigvals(at.monodromy).astype(complex)
-    multipliers = multipliers**2 if symmetric else multipliers
-    if not problem.driven:
-        multipliers = np.delete(multipliers, int(np.argmin(np.abs(multipliers - 1))))
-    multipliers = multipliers[np.argsort(-np.abs(multipliers))]
+    multipliers = at.multipliers(driven=problem.driven, symmetric=symmetric)
     rtol = max(problem.rtol / 100, 1e-13)
     finer = simulate(
         model, at.time, x0=x, u=problem.u, p=p, rtol=rtol, t_eval=(0.0, at.time), method=METHOD

@@ -17,6 +17,7 @@ from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from symfric.dynamics.equations import Equations, Indices, equations
 from symfric.dynamics.tangent import independent
@@ -25,7 +26,6 @@ from symfric.foundation.status import SolveError
 from symfric.integrator.equations.inputs import Input
 from symfric.integrator.simulate import simulate
 from symfric.model import Model
-from symfric.model.forces import STICKS
 from symfric.results.trajectory import Trajectory
 
 METHOD = "rodas5p"
@@ -74,6 +74,16 @@ class Linear(NamedTuple):
     time: float
     p: Array
 
+    def multipliers(self, *, driven: bool, symmetric: bool = False) -> NDArray[np.complex128]:
+        """Return the Floquet multipliers of a period, the largest first.
+
+        That of the direction of motion is left out unless the period is given.
+        """
+        found = np.linalg.eigvals(self.monodromy).astype(complex) ** (1 + symmetric)
+        if not driven:
+            found = np.delete(found, int(np.argmin(np.abs(found - 1))))
+        return found[np.argsort(-np.abs(found))]
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -116,7 +126,7 @@ class Shooting:
     def basis(self, x: Array, p: Array) -> tuple[Indices, Array]:
         """Return indices of independent states near `x`, and the directions that they span."""
         eq, nx = self.eq, x.size
-        stuck = [i for i, (_, mode) in enumerate(eq.switching) if abs(x[mode]) < STICKS]
+        stuck = eq.stuck(x)
         if not eq.constraints.numel() and not stuck:
             return self.states, np.eye(nx)[:, self.states]
         y, d = np.zeros(eq.y.numel()), np.concatenate([np.zeros(len(self.model.u)), p])

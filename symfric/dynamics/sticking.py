@@ -8,7 +8,6 @@ import casadi as ca
 import numpy as np
 
 from symfric.dynamics.curve import Node, Step, corrected
-from symfric.dynamics.equations import equations
 from symfric.dynamics.families import Orbits
 from symfric.dynamics.orbit import periodic_orbit
 from symfric.dynamics.trace import Family, finer, sequence
@@ -48,10 +47,10 @@ class Gap(NamedTuple):
     share: float
 
 
-def gap(run: Trajectory, p: Array) -> Gap:
-    """Return the smallest distance from sticking in a run over one period; `p` are parameters."""
-    model, best = run.model, Gap(-1, 0.0, 0.0, np.inf)
-    eq, d = equations("continuation", model), np.concatenate([model.values("u"), p])
+def gap(curve: Orbits, node: Node) -> Gap:
+    """Return the smallest distance of an orbit from sticking."""
+    run, eq, model = node.content.segments[0].run, curve.problem.eq, curve.problem.model
+    best, d = Gap(-1, 0.0, 0.0, np.inf), np.concatenate([curve.u, node.content.p])
     happened = {name for _, name in run.happened}
 
     def sizes(at: Array) -> dict[str, Array]:
@@ -93,7 +92,7 @@ class Near:
         if not isinstance(self.curve, Orbits):
             return np.inf
         run, problem = step.node.content.segments[0].run, self.curve.problem
-        self.gaps, self.last = (*self.gaps[-1:], gap(run, step.node.content.p)), step
+        self.gaps, self.last = (*self.gaps[-1:], gap(self.curve, step.node)), step
         if self.gaps[-1].share < GRAZES:
             return 0.0
         values = np.array([*run.states(run.looks).values()])
@@ -111,13 +110,12 @@ class Near:
 
     def boundary(self, node: Node) -> tuple[str, float]:
         """Return the kind and the parameter of the change after `node`."""
-        value, last = float(node.z[-1]), self.last
-        if last is None or not self.gaps:
+        value, last, curve = float(node.z[-1]), self.last, finer(self.curve)
+        if not isinstance(curve, Orbits) or last is None or not self.gaps:
             return "change of stick and slip", value
         if self.gaps[-1].share > NEARLY:
             return _stopping(last)
-        way, curve = self._way(), finer(self.curve)
-        found = list[tuple[float, float]]()
+        way, found = self._way(), list[tuple[float, float]]()
         for share in (0.0, CLOSER, CLOSER**0.1):
             z = last.node.z + share * way * last.tau * curve.scale
             try:
@@ -125,10 +123,7 @@ class Near:
                 same_sequence(node, new)
             except ValueError:
                 break
-            found = [
-                *found[-1:],
-                (float(new.z[-1]), gap(new.content.segments[0].run, new.content.p).least),
-            ]
+            found = [*found[-1:], (float(new.z[-1]), gap(curve, new).least)]
         return "grazing", _zero(found, value)
 
 
@@ -181,8 +176,7 @@ def restarted(
     """
     problem, name = curve.problem, curve.name
     model, run = problem.model, node.content.segments[0].run
-    nearest, value = gap(run, node.content.p), float(node.z[-1])
-    eq = equations("continuation", model)
+    nearest, value = gap(curve, node), float(node.z[-1])
     for share in NEAR:
         for side in (-1.0, 1.0):
             p = {**curve.p, name: value + side * share * (span[1] - span[0])}
@@ -190,14 +184,14 @@ def restarted(
                 continue
             x = {v.name: float(run.at(nearest.time)[v.name][0]) for v in model.x}
             if nearest.contact >= 0:
-                c, mode = eq.switching[nearest.contact]
+                c, mode = problem.eq.switching[nearest.contact]
                 x[model.x[mode].name] = 0.0
                 x |= _at_rest(curve, c, x, p)
             try:
                 settled = simulate(
                     model, PERIODS * float(node.z[-2]), x0=x, u=problem.u, p=p, rtol=1e-7
                 )
-                orbit = periodic_orbit(model, settled, p=p, rtol=problem.rtol)
+                orbit = periodic_orbit(model, settled, u=problem.u, p=p, rtol=problem.rtol)
                 z = np.array([*orbit.x.values(), orbit.period, p[name]])
                 found = curve.at(z)
             except ValueError:
@@ -211,8 +205,10 @@ def _at_rest(
     curve: Orbits, c: Contact, x: Mapping[str, float], p: Mapping[str, float]
 ) -> dict[str, float]:
     """Return the states by name that a contact sets where its slip becomes zero."""
-    model, found = curve.problem.model, dict[str, float]()
-    for name, value in c.rest.items():
-        function = ca.Function("rest", [model.vector("x"), model.vector("p")], [ca.SX(value)])
-        found[name] = float(function([*x.values()], model.values("p", p)))
-    return found
+    model = curve.problem.model
+    symbols = [model.vector(group) for group in ("x", "u", "p")]
+    known = [*x.values()], curve.u, model.values("p", p)
+    return {
+        name: float(ca.Function("rest", symbols, [ca.SX(value)])(*known))
+        for name, value in c.rest.items()
+    }

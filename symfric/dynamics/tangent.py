@@ -16,7 +16,6 @@ from scipy.linalg import qr
 from symfric.dynamics.equations import DEPENDENT, Equations, Indices
 from symfric.foundation.numeric import Array
 from symfric.integrator.equations.matrices import null_space
-from symfric.model.forces import STICKS
 
 
 class Tangent(NamedTuple):
@@ -61,7 +60,7 @@ def independent(C: Array, scale: Array, states: Indices) -> tuple[Indices, Array
 def conditions(eq: Equations, y: Array, d: Array) -> tuple[Array, Array, Array]:
     """Return C, and derivatives of f by y and by d, at y."""
     J, of_C, of_slips, K, *_ = (slope.full() for slope in eq.slopes(y, d))
-    stuck = [i for i, (_, mode) in enumerate(eq.switching) if abs(y[mode]) < STICKS]
+    stuck = eq.stuck(y)
     modes = np.eye(y.size)[eq.modes]
     return np.vstack([J[eq.algebraic], of_C, of_slips[stuck], modes]), J, K
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from symfric.dynamics.branch import Special
 from symfric.dynamics.curve import Node, Step, located
-from symfric.dynamics.families import Equilibria, Orbits, multipliers
+from symfric.dynamics.families import Equilibria, Orbits
 from symfric.dynamics.shooting import Linear
 from symfric.foundation.numeric import Array
 from symfric.results.quadrature import extremes
@@ -101,7 +101,7 @@ def state(curve: Family, node: Node) -> tuple[Array, float]:
 def exponents(curve: Family, node: Node) -> NDArray[np.complex128]:
     """Return the eigenvalues of an equilibrium, or the multipliers of an orbit."""
     if isinstance(curve, Orbits):
-        return multipliers(node.content)
+        return node.content.multipliers(driven=False)
     return curve.state(node).eigenvalues
 
 
