@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.dynamics.orbit import PeriodicOrbit, periodic_orbit
+from symfric.dynamics.orbit import PeriodicOrbit, guessed, periodic_orbit
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
@@ -89,6 +89,11 @@ class Branch(Showing):
         return bool(self.periods.size and self.periods[0] > 0)
 
     @property
+    def content(self) -> str:
+        """Name of what the points are: "periodic orbits" or "equilibria"."""
+        return "periodic orbits" if self.of_orbits else "equilibria"
+
+    @property
     def stable(self) -> NDArray[np.bool_]:
         """True for each point at which all deviations decay, shape (n,)."""
         growth = np.abs(self.exponents) - 1 if self.of_orbits else self.exponents.real
@@ -110,10 +115,7 @@ class Branch(Showing):
         k = checks.count(where, index, least=-self.values.size, most=self.values.size - 1)
         p = self.p | {self.parameter: float(self.values[k])}
         x0 = dict(zip((v.name for v in self.model.x), self.x[k].tolist(), strict=True))
-        T = float(self.periods[k])
-        guess = PeriodicOrbit(
-            self.model, x0, T, self.u, p, np.zeros(0, dtype=complex), False, False, 0.0, rtol
-        )
+        guess = guessed(self.model, x0, float(self.periods[k]), self.u, p, rtol)
         return periodic_orbit(self.model, guess, rtol=rtol)
 
     def plot(
@@ -148,7 +150,7 @@ class Branch(Showing):
                 (s.kind, s.value, float(b.high[k, i])) for s, k in zip(b.special, at, strict=True)
             ]
             rows = b.values[order], b.low[order, i], b.high[order, i], b.stable[order]
-            curves.append(Curve(*rows, special))
+            curves.append(Curve(b.content, *rows, special))
         (free,) = (v for v in self.model.p if v.name == self.parameter)
         labels = f"{self.parameter} [{free.unit}]", f"{state} [{self.model.x[i].unit}]"
         points = [self._points(state, study) for study in runs]
@@ -167,10 +169,9 @@ class Branch(Showing):
 
     def shown(self) -> Shown:
         """Return the range of the parameter and the special points."""
-        what = "periodic orbits" if self.of_orbits else "equilibria"
         low, high = self.values.min(initial=np.inf), self.values.max(initial=-np.inf)
         lines = [
-            f"{self.values.size} {what}, {int(self.stable.sum())} of them stable, "
+            f"{self.values.size} {self.content}, {int(self.stable.sum())} of them stable, "
             f"{self.parameter} from {low:.6g} to {high:.6g}",
             self.message,
         ]

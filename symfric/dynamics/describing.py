@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symfric.dynamics.linear import positive
 from symfric.dynamics.orbit import periodic_orbit
 from symfric.dynamics.shooting import METHOD
 from symfric.foundation import checks
@@ -21,6 +22,7 @@ from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Law, require_law
 from symfric.model import Contact, Model
 from symfric.results.quadrature import integral_between
+from symfric.scenes.base import divides_by_load
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,12 +64,14 @@ class DescribingFunction(Showing):
         """
         from symfric.dynamics.pictures import bode  # noqa: PLC0415  (slow to import)
 
+        up = "magnitude [N s/m]"
         if self.frequencies.size == 1:
-            names = [[f"{self.frequencies[0]:.3g} rad/s [N s/m]"]]
-            across = "amplitude of the velocity [m/s]"
-            return bode(self.amplitudes, self.values[:, :, None], names, path, across)
-        names = [[f"{V:.3g} m/s [N s/m]"] for V in self.amplitudes]
-        return bode(self.frequencies, self.values.T[:, :, None], names, path)
+            names = [[f"{self.frequencies[0]:.3g} rad/s"]]
+            labels = "amplitude of the velocity [m/s]", up
+            return bode(self.amplitudes, self.values[:, :, None], names, path, labels)
+        names = [[f"{V:.3g} m/s"] for V in self.amplitudes]
+        labels = "frequency [rad/s]", up
+        return bode(self.frequencies, self.values.T[:, :, None], names, path, labels)
 
     def shown(self) -> Shown:
         """Return magnitudes and phases."""
@@ -118,24 +122,18 @@ def describing_function(
     """
     where = "describing_function"
     require_law(f"{where}: law", law)
-    V = _positive(f"{where}: amplitudes", amplitudes, "amplitudes > 0 of the velocity [m/s]")
-    w = _positive(f"{where}: frequencies", frequencies, "frequencies > 0 [rad/s]")
+    V = positive(f"{where}: amplitudes", amplitudes, "amplitudes > 0 of the velocity [m/s]")
+    w = positive(f"{where}: frequencies", frequencies, "frequencies > 0 [rad/s]")
     load = checks.number(f"{where}: N", N, unit="N", lower=0.0)
     if further := [i.name for i in law.inputs if i.name != FORCE]:
         raise checks.refused(
             f"{where}: law", f"a law without the inputs {checks.listed(further)}", law,
             "give them constant values, as in the contact of a model",
         )  # fmt: skip
+    if load == 0 and divides_by_load(law):
+        raise checks.refused(f"{where}: N", "a normal force > 0 N, by which the law divides", load)
     checks.number(f"{where}: rtol", rtol, above=0.0, upper=1e-5)
     return DescribingFunction(law, load, V, w, Harmonic(law, load, rtol).table(V, w))
-
-
-def _positive(where: str, value: object, what: str) -> Array:
-    """Return a non-empty array of positive numbers."""
-    found = checks.array(where, value, what=what)
-    if not found.size or not (found > 0).all():
-        raise checks.refused(where, what, found.min() if found.size else "none")
-    return found
 
 
 @final

@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import root
 
-from symfric.dynamics.describing import RUN, Harmonic
+from symfric.dynamics.describing import Harmonic
 from symfric.dynamics.equilibrium import equilibrium
 from symfric.dynamics.linear import LinearModel, linearize
-from symfric.dynamics.orbit import PeriodicOrbit, found
-from symfric.dynamics.shooting import METHOD
+from symfric.dynamics.orbit import PeriodicOrbit, guessed, periodic_orbit
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.shown import Showing, Shown
-from symfric.integrator.simulate import simulate
 from symfric.laws.base.law import Law
 from symfric.model import Model, check_model
 from symfric.model.contact import APPLIED
@@ -90,12 +88,8 @@ class HarmonicBalance(Showing):
         Raises:
             ValueError: bad input, or no orbit was found near the prediction.
         """
-        where = "HarmonicBalance.orbit"
-        checks.flag(f"{where}: symmetric", symmetric)
-        checks.number(f"{where}: rtol", rtol, above=0.0, upper=1e-5)
-        model, T, u, p = self.model, self.period, dict(self.u), dict(self.p)
-        run = simulate(model, RUN * T, x0=self.x, u=u, p=p, rtol=1e-7, method=METHOD)
-        return found(model, run, 0.0, T, u, p, symmetric, 1, rtol, driven=False)
+        guess = guessed(self.model, self.x, self.period, self.u, self.p, rtol)
+        return periodic_orbit(self.model, guess, symmetric=symmetric, rtol=rtol)
 
     def shown(self) -> Shown:
         """Return amplitudes and period."""

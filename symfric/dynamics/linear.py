@@ -77,7 +77,7 @@ class LinearModel(Showing):
         upper = [complex(s) for s in self.eigenvalues if s.imag >= 0]
         sizes = [abs(s) for s in upper]
         return tuple(
-            Eigenvalue(s, size, -s.real / size if size else float("nan"))
+            Eigenvalue(s, size, 0.0 - s.real / size if size else float("nan"))
             for s, size in zip(upper, sizes, strict=True)
         )
 
@@ -140,14 +140,19 @@ class LinearModel(Showing):
         Args:
             frequencies: w [rad/s]; by default two decades around the eigenvalues.
             path: image file.
+
+        Raises:
+            ValueError: a frequency that is not positive, or no input.
         """
         from symfric.dynamics.pictures import bode  # noqa: PLC0415  (slow to import)
 
+        if not self.inputs:
+            raise ValueError("plot: expected a model with inputs, got none; see linearize(inputs=)")
         sizes = np.abs(self.eigenvalues)
         sizes = sizes[sizes > 0] if (sizes > 0).any() else np.ones(1)
         w = np.geomspace(sizes.min() / 10, sizes.max() * 10, 600)
         if frequencies is not None:
-            w = checks.array("plot: frequencies", frequencies, what="frequencies [rad/s]")
+            w = positive("plot: frequencies", frequencies, "frequencies > 0 [rad/s]")
         names = [
             [f"{out} / {one} [{self.units[out]} / ({self.units[one]})]" for one in self.inputs]
             for out in self.outputs
@@ -162,7 +167,7 @@ class LinearModel(Showing):
             (("states", self.states), ("inputs", self.inputs), ("outputs", self.outputs))
             if names
         ]  # fmt: skip
-        words = {True: "stable", False: "unstable", None: "neither decays nor grows"}
+        words = {True: "stable", False: "unstable", None: "on the limit of stability"}
         rows = [
             (f"{m.value:.6g}" if m.value.imag else f"{m.value.real:.6g}",
              f"{m.frequency:.6g}", f"{m.damping:.4g}")
@@ -171,6 +176,14 @@ class LinearModel(Showing):
         header = ("eigenvalue [1/s]", "frequency [rad/s]", "damping")
         title = f"linear model of '{self.at.model.name}', {words[self.stable]}"
         return Shown(title, tuple(lines), Table(header, tuple(rows), numbers=(0, 1, 2)))
+
+
+def positive(where: str, value: object, what: str) -> Array:
+    """Return a non-empty array of positive numbers."""
+    found = checks.array(where, value, what=what)
+    if not found.size or not (found > 0).all():
+        raise checks.refused(where, what, found.min() if found.size else "none")
+    return found
 
 
 def linearize(
@@ -201,7 +214,10 @@ def linearize(
     check_model(where, model)
     if not isinstance(at, Equilibrium) or at.model is not model:  # pyright: ignore[reportUnnecessaryIsInstance]
         raise checks.refused(
-            f"{where}: at", f"an equilibrium of '{model.name}'", at, "pass equilibrium(model)"
+            f"{where}: at",
+            f"an equilibrium of '{model.name}'",
+            at,
+            "pass equilibrium(model) of the same model object",
         )
     data, eq, found = [*at.u, *at.p], at.equations, at.tangent
     inputs = [*at.u] if inputs is None else checks.names(f"{where}: inputs", inputs)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
@@ -17,7 +18,7 @@ from symfric.results.trajectory import Trajectory
 
 def bode(
     frequencies: Array, G: NDArray[np.complex128], names: Sequence[Sequence[str]],
-    path: str | Path | None, across: str = "frequency [rad/s]",
+    path: str | Path | None, labels: tuple[str, str] = ("frequency [rad/s]", "magnitude"),
 ) -> Figure:  # fmt: skip
     """Plot magnitude and phase of a frequency response.
 
@@ -26,7 +27,7 @@ def bode(
         G: response, shape (m, outputs, inputs).
         names: legend entries, by output and input.
         path: image file.
-        across: label of the horizontal axis.
+        labels: of the horizontal axis and of the magnitude.
     """
     figure, (size, angle) = panels(2, width=6.0)
     for i, row in enumerate(names):
@@ -35,9 +36,9 @@ def bode(
             size.loglog(frequencies, np.abs(G[:, i, j]), label=name, linewidth=1.4, **look)
             phase = np.degrees(np.unwrap(np.angle(G[:, i, j])))
             angle.semilogx(frequencies, phase, linewidth=1.4, **look)
-    size.set_ylabel("magnitude")
+    size.set_ylabel(labels[1])
     angle.set_ylabel("phase [deg]")
-    angle.set_xlabel(across)
+    angle.set_xlabel(labels[0])
     size.legend(frameon=False, fontsize="small")
     return save(figure, path)
 
@@ -58,7 +59,10 @@ def portrait(run: Trajectory, x: str, y: str, path: str | Path | None) -> Figure
         stuck |= run.of(sticks(c), run.looks) < 0
     if stuck.any():
         thick = np.where(stuck, across, np.nan), np.where(stuck, up, np.nan)
-        axis.plot(*thick, linewidth=4.0, alpha=0.6, label="sticks", color=colour(1))
+        axis.plot(  # markers show stick at one point of the plane
+            *thick, "-o", linewidth=4.0, markersize=4.0, mew=0.0, zorder=1.5, label="sticks",
+            color=colour(1),
+        )  # fmt: skip
         axis.legend(frameon=False, fontsize="small")
     for name, label in ((x, axis.set_xlabel), (y, axis.set_ylabel)):
         label(f"{name} [{run.unit(name)}]")
@@ -69,12 +73,14 @@ class Curve(NamedTuple):
     """Branch in a bifurcation diagram.
 
     Attributes:
+        name: legend entry.
         values: parameter, shape (n,).
         low, high: smallest and largest value of a state, shape (n,); equal for equilibria.
         stable: True for each stable point, shape (n,).
         special: (kind, parameter, value of the state) of each special point.
     """
 
+    name: str
     values: Array
     low: Array
     high: Array
@@ -94,7 +100,7 @@ def bifurcation(
         labels: of both axes.
         path: image file.
     """
-    figure, (axis,) = panels(1, width=NARROW, height=3.4)
+    figure, (axis,) = panels(1, width=NARROW, height=3.6)
     for values, low, high in runs:
         for side in (low, high):
             axis.plot(values, side, "o", color=EDGE, mfc="none", markersize=4.5, mew=0.6, zorder=3)
@@ -108,12 +114,31 @@ def bifurcation(
                     curve.values, np.where(shown, side, np.nan), style, color=colour(k),
                     linewidth=1.6 if stable else 1.1,
                 )  # fmt: skip
+    axis.margins(0.08, 0.12)
+    left, right = axis.get_xlim()
+    for k, curve in enumerate(curves):
         for kind, value, height in curve.special:
             axis.plot([value], [height], "o", color=colour(k), markersize=4)
+            side = 1 if value < left + (right - left) / 4 else -1
             axis.annotate(
-                kind, (value, height), xytext=(4, 5), textcoords="offset points", fontsize="small"
-            )
-    axis.margins(0.08, 0.12)
+                kind, (value, height), xytext=(4 * side, 5), textcoords="offset points",
+                fontsize="small", ha="left" if side > 0 else "right",
+            )  # fmt: skip
     axis.set_xlabel(labels[0])
     axis.set_ylabel(labels[1])
+    _legend(figure, curves, bool(runs))
     return save(figure, path)
+
+
+def _legend(figure: Figure, curves: Sequence[Curve], with_runs: bool) -> None:
+    """Add a legend below a bifurcation diagram."""
+    handles = [Line2D([], [], color=colour(k), label=c.name) for k, c in enumerate(curves)]
+    if not all(curve.stable.all() for curve in curves):
+        handles.append(Line2D([], [], color=EDGE, linestyle="--", label="unstable"))
+    if with_runs:
+        handles.append(
+            Line2D([], [], color=EDGE, marker="o", linestyle="", mfc="none", label="runs")
+        )
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=4, frameon=False, fontsize="small"
+    )

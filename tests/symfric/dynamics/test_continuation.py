@@ -230,6 +230,39 @@ def test_inputs_stay_those_of_the_start() -> None:
     assert continuation(at, "p", (-0.5, 0.5), points=4).stable.all()
 
 
+def test_a_belt_whose_speed_is_an_input_has_its_grazing() -> None:
+    x, v = Variable("x", "m"), Variable("v", "m/s", start=0.8)
+    speed, c = Variable("v_b", "m/s", start=0.8), Variable("c", "N s/m")
+    pull = -x.symbol - c * v
+    slip = contact("belt", EXACT, v - speed, 1.0, {"v": speed.symbol}, F_e=pull)
+    rates = ca.vertcat(v.symbol, pull - slip.force)
+    model = Model("belt", x=(x, v), u=(speed,), p=(c,), ode=rates, contacts=(slip,))
+    u = {"v_b": 0.75}
+    orbit = periodic_orbit(model, simulate(model, 30.0, u=u), u=u)
+    branch = continuation(orbit, "c", (-0.02, 0.3))
+    (end,) = branch.special
+
+    def miss(c: float) -> float:
+        def rates(_: float, y: np.ndarray) -> list[float]:
+            r = y[1] - 0.75
+            return [y[1], -y[0] - c * y[1] + 1 + 0.5 * np.exp(-((r / 0.2) ** 2)) - 0.1 * r]
+
+        return highest(rates, [1.5 - 0.75 * c, 0.75]) - 0.75
+
+    assert end.kind == "grazing"
+    assert end.value == pytest.approx(brentq(miss, 0.05, 0.25, xtol=1e-13), abs=1e-7)
+    assert branch.values.min() == pytest.approx(-0.02, abs=1e-7)
+
+
+def test_sliding_ends_where_the_belt_stops() -> None:
+    model = rabinowicz(ExactCoulomb(), free=["v_belt"])
+    branch = continuation(equilibrium(model), "v_belt", (-0.5, 0.5), points=60)
+    assert 0 < branch.values.min() < 1e-6 and branch.values.max() == pytest.approx(0.5, abs=1e-9)
+    assert "comes to rest" in branch.message
+    mu_d = ExactCoulomb().mu_d
+    assert branch.x[:, 0] == pytest.approx(np.full(branch.values.size, mu_d * 0.8 * 9.81 / 2.1))
+
+
 def test_a_branch_is_saved_shown_and_interrupted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -246,6 +279,8 @@ def test_a_branch_is_saved_shown_and_interrupted(
     assert axis.get_xlabel() == "p [1]" and axis.get_ylabel() == "x [m]"
     styles = {line.get_linestyle() for line in axis.lines}
     assert {"-", "--"} <= styles and [t.get_text() for t in axis.texts] == ["fold"]
+    (legend,) = axis.figure.legends
+    assert [t.get_text() for t in legend.get_texts()] == ["equilibria", "unstable"]
     model, start_x = start.model, np.array([-0.5, 0.9])
     speeds = np.array([0.5, 1.0])
     study = simulate_many(model, 20.0, p={"p": speeds}, x0={"x": start_x}, t_eval=[19.0, 20.0])

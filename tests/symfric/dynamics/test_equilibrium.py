@@ -217,6 +217,8 @@ def test_what_has_no_equilibrium_is_refused() -> None:
         "such as ExactCoulomb": lambda: smooth.survives("force"),
         "the package control": lambda: linearize(other, at).to_control(),
         "without resonance": lambda: linearize(belt, sliding).response([1.0, np.sqrt(2.1 / 0.8)]),
+        "a model with inputs": lambda: linearize(belt, sliding).plot(),
+        "frequencies > 0": lambda: linearize(other, at).plot([-1.0]),
         "got nothing": lambda: linearize(belt, sliding, outputs=["nothing"]),
     }
     for text, call in cases.items():
