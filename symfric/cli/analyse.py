@@ -53,6 +53,8 @@ def analyse(
     if len(laws) != 1:
         raise ValueError(f"--law: expected one law, got {len(laws)}; analyse one at a time")
     model, first, until = _machine(scene, laws, settings, preset, law_of, name, x0, t_end)
+    own = next(v.name for v in model.x if v.kind != MODE) if state is None else state
+    check_names("--state", [own], [v.name for v in model.x])
     (free,) = (v for v in model.p if v.name == name)
     p = {name: _inside(free, low, high)}
     with output.progress(f"analyse {scene}") as tell:
@@ -66,7 +68,6 @@ def analyse(
             branches = [rest]
             for hopf in rest.located("Hopf"):
                 branches.append(orbits_from(rest, hopf, (low, high), points=points, step=longest))
-    own = next(v.name for v in model.x if v.kind != MODE) if state is None else state
     if plot:
         branches[0].plot(own, *branches[1:], path=plot)
     if save:

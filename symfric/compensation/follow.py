@@ -107,9 +107,10 @@ class Followed:
         figure, axes = panels(len(shown) + 1)
         for axis, name in zip(axes, shown, strict=False):
             value, band = self.estimates[name], 2 * self.deviations[name]
-            axis.fill_between(self.t, value - band, value + band, alpha=0.2)
-            axis.plot(self.t, value, linewidth=1.2)
+            axis.fill_between(self.t, value - band, value + band, alpha=0.2, label="two deviations")
+            axis.plot(self.t, value, linewidth=1.2, label="estimate")
             axis.set_ylabel(f"{name} [{self.units[name]}]")
+        axes[0].legend(frameon=False, fontsize="small", ncols=2)
         axes[-1].plot(self.t[self.used], self.residual[self.used], ".", markersize=1.5)
         axes[-1].set_ylabel("residual [N]")
         axes[-1].set_xlabel("t [s]")
@@ -145,7 +146,10 @@ def follow(
     if signals["force"].size != size or size < 2:
         sizes = f"{signals['force'].size} and {size}"
         raise ValueError(f"{where}: expected force and v of one length >= 2, got {sizes}")
-    signals["learn"] = np.broadcast_to(checks.array(f"{where}: learn", learn, ndim=None), size)
+    given = checks.array(f"{where}: learn", learn, ndim=None)
+    if given.shape not in ((), (size,)):
+        raise checks.refused(f"{where}: learn", f"a number or {size} numbers", learn)
+    signals["learn"] = np.broadcast_to(given, size)
     own = estimator.sample_time
     step = checks.number(f"{where}: h", own if h is None else h, unit="s", above=0.0)
     if "h" in estimator.constants and step != own:

@@ -147,3 +147,5 @@ def test_follow_refuses_bad_records() -> None:
             follow(*arguments)
     with pytest.raises(ValueError, match=r"h: expected that of the block, 0\.001 s, got 0\.01"):
         follow(block, one, one, h=0.01)
+    with pytest.raises(ValueError, match="learn: expected a number or 10 numbers"):
+        follow(block, one, one, learn=one[:5])
