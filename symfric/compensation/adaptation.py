@@ -40,8 +40,8 @@ class Adaptation:
         valid: force [N] from which samples are not used, such as the limit of the drive.
         free: estimated parameters of the compensator: scales, offset, inertia, or parameters of
             the law. Default: the scales of dry and viscous friction, and the offset. Without
-            "scale_stribeck", all dry levels change by "scale_coulomb"; write it to scale_stribeck
-            of the compensator, too, unless that is 0 against hunting.
+            "scale_stribeck", all dry levels change by "scale_coulomb". Write its estimate also to
+            scale_stribeck of the compensator, unless scale_stribeck is 0 against hunting.
         spread: parameter -> standard deviation of its changes; default 1 for scales, the level of
             the law for the offset, and half the start value for other parameters.
         bounds: parameter -> (lowest, highest) output; default five spreads around the start value,

@@ -339,7 +339,7 @@ def counted(
     if drive is None or drive.count is None:
         such = "a drive with counts_per_turn or resolution"
         raise checks.refused(f"{where}: counts", such, drive)
-    counts = ca.floor(parts.given("counts") + 0.5)  # whole numbers are exact in float, too
+    counts = ca.floor(parts.given("counts") + 0.5)  # whole numbers are also exact in float
     last, begun = parts.state("counted"), parts.state("begun")
     before, t = parts.state("v_before"), parts.parameter("t_counts", lag)
     d = counts - last
