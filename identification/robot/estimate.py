@@ -33,6 +33,8 @@ HALVINGS = 4
 """Largest number of halvings of a step of a nonlinear law."""
 NEAR = np.array([0.5, 3.0])
 """Bounds of a velocity of a law, relative to the slowest and the fastest speeds."""
+ZERO = 1e-9
+"""Length of a column, relative to the longest one, that is due to rounding."""
 LEAP = 2.0
 """Largest change of the logarithm of a parameter in one step."""
 
@@ -93,6 +95,11 @@ class Equations(NamedTuple):
             first = last
         return np.hstack(blocks), predicted
 
+    def one_way(self, n: int) -> NDArray[np.bool_]:
+        """Return a mask of the joints that rest or move in one direction, shape (n,)."""
+        moved = [np.sign(self.v[self.joint == k]) for k in range(n)]
+        return np.array([abs(side.sum()) == side.size for side in moved])
+
     def by_joint(self, values: Array, n: int) -> Array:
         """Return the root mean square of values by joint; NaN for joints without rows, (n,)."""
         sums, counts = (np.bincount(self.joint, w, n) for w in (values**2, None))
@@ -123,6 +130,12 @@ class Estimated(NamedTuple):
         """Negative logarithm of the likelihood up to a constant."""
         return float(np.sum(np.log(self.sigma[self.equations.joint])))
 
+    @property
+    def dissipation(self) -> float:
+        """Sum of the power of friction over all rows."""
+        e, first = self.equations, self.equations.Z.shape[1]
+        return float(e.v @ (e.tau + self.residuals - e.Z @ self.x[:first]))
+
     def covariance(self) -> Sandwich:
         """Return the covariance of the values."""
         e, p, size = self.equations, self.x.size, 1 / self.sigma[self.equations.joint]
@@ -146,9 +159,7 @@ class Estimated(NamedTuple):
         return np.append(x[:count], rest)
 
 
-def estimate(
-    equations: Equations, laws: Sequence[JointLaw], base: Base, method: str
-) -> Estimated:  # fmt: skip
+def estimate(equations: Equations, laws: Sequence[JointLaw], base: Base, method: str) -> Estimated:
     """Return the estimate by one of `METHODS`."""
     n, tau = len(laws), equations.tau
     x = np.concatenate([base.values, np.zeros(n), coordinates(laws)])
@@ -216,5 +227,5 @@ def _bounded(columns: Array, values: Array, low: Array, high: Array) -> Array:
 def _least_squares(columns: Array, values: Array) -> Array:
     """Return the solution that is least in units of the lengths of the columns, shape (p,)."""
     size = np.linalg.norm(columns, axis=0)
-    size = np.where(size > 0, size, 1.0)
+    size = np.where(size > ZERO * size.max(), size, np.inf)
     return np.linalg.lstsq(columns / size, values, rcond=1e-10)[0] / size

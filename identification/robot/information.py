@@ -29,7 +29,7 @@ SURE = 0.5
 ACCURACY = 0.01
 """Least noise of a torque relative to its root mean square."""
 HELPS = 0.5
-"""Part of the largest effect above which a joint is recommended, too."""
+"""Part of the largest effect above which a joint is also recommended."""
 
 
 @final
@@ -88,6 +88,10 @@ def information(
         sentences.append(_advice(model, motions, base, directions, moves, rotors))
     for joint in resting:
         sentences.append(f"{joint} rests: it has no friction here, and its torque is not used.")
+    one_way = [j for j, on in zip(model.names, equations.one_way(n) & moves, strict=True) if on]
+    if one_way:
+        what = f"The friction level and the offset of {', '.join(one_way)} are not separable"
+        sentences.append(f"{what}: move both ways.")
     undetermined = tuple(base.labels[k] for k in loose)
     return Information(b, rank, condition, undetermined, resting, tuple(sentences))
 
