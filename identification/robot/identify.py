@@ -17,7 +17,7 @@ from identification.robot.consistent import consistent
 from identification.robot.dynamics import WHERE, RobotModel
 from identification.robot.estimate import METHODS, Equations, Estimated, estimate
 from identification.robot.friction import USUAL, JointLaw, laws_of
-from identification.robot.information import Information, information
+from identification.robot.information import Information, information, seen_in
 from identification.robot.motion import RobotMotion, motions
 from identification.robot.result import OFFSET, RobotFit, TorqueError, TorqueSeries
 from identification.verdict.minimum import Sandwich
@@ -165,10 +165,12 @@ def _prepared(
     equations = Equations.of(model, moved, base, rotors)
     speeds = np.sqrt(np.mean(np.vstack([one.v for one in moved]) ** 2, axis=0))
     usual, laws = laws_of(model, USUAL, speeds), laws_of(model, law, speeds)
-    seen = information(model, moved, base, equations, usual, rotors)
+    seen = seen_in(equations, base, usual)
+    told = information(model, moved, base, equations, seen, rotors)
+    equations = seen.without_faint(equations, base)
     if not all(one.linear for one in laws):
         laws = _started(model, equations, base, usual, laws)
-    return _Prepared(model, base, moved, equations, laws, rotors, seen)
+    return _Prepared(model, base, moved, equations, laws, rotors, told)
 
 
 def _started(
