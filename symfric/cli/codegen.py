@@ -126,7 +126,7 @@ def codegen(
     compiler: str | None = None,
     json: str | None = None,
 ) -> None:
-    """Write a friction law, a plant or inverse dynamics as C99, and verify it.
+    """Write a law, plant, compensator or controller as C99, and verify it.
 
     The C is compiled and compared with CasADi over more than 20 000 steps, including bad inputs and
     other parameters. The exit status is 1 if the results differ or could not be compared, for

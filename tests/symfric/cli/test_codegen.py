@@ -114,10 +114,7 @@ def test_a_problem_becomes_a_controller(symfric, monkeypatch) -> None:
     assert "250000" in shown and "600000" in shown
     for wrong, message in (
         ("move.py:quick --step-size 0.1", "--step-size: expected none with a controller"),
-        (
-            "move.py --compensator --fold --no-guards --free m",
-            "got --fold, --free, --guards, --comp",
-        ),
+        ("move.py --compensator --fold --no-guards", "got --fold, --no-guards, --compensator"),
         ("move.py --law lugre --name x", "got --law, --name"),
         ("none.py", "which does not exist"),
     ):

@@ -116,6 +116,9 @@ def test_reports_are_read(monkeypatch, tmp_path):
     beyond = f"{end} [-61. .. 60.]\n[eva] proof.c:9: Frama_C_show_each_beyond_0: [-61. .. -60.1]"
     assert reported(f"{beyond}\n{none}").status == "not proved: F may leave -60 ... 60 N"
     assert not reported(none).ok
+    monkeypatch.setattr(proof, "LIMIT", 0.0)
+    assert reported(none).status.startswith("not proved: frama-c")
+    monkeypatch.setattr(proof, "LIMIT", 60.0)
     with pytest.raises(CompileError, match="frama-c failed with status 1"):
         reported("syntax error", 1)
     with pytest.raises(ValueError, match="expected one of double, float"):
