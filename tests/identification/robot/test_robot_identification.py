@@ -178,7 +178,8 @@ def test_a_resting_joint_is_named_and_costs_only_its_own_rows(noise):
     tau = (
         newton_euler(q, v, a) + COULOMB * np.sign(v) + VISCOUS * v + 0.05 * rng.normal(size=q.shape)
     )
-    data = log(slide=q[:, 2] + noise * rng.normal(size=t.size), **{f"{n}_torque": y for n, y in zip(NAMES, tau.T, strict=True)})
+    slide = q[:, 2] + noise * rng.normal(size=t.size)
+    data = log(slide=slide, **{f"{n}_torque": y for n, y in zip(NAMES, tau.T, strict=True)})
     seen = robot_information(urdf(), data)
     assert seen.resting == ("slide",)
     assert seen.rank < seen.total
