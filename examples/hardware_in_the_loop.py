@@ -58,7 +58,7 @@ def main(out: Path) -> None:
     below.semilogy(t, 1e6 * busy, label="cycle")
     below.semilogy(t, 1e6 * late, label="late start")
     below.set(xlabel="t [s]", ylabel="time [us]")
-    below.legend()
+    below.legend(loc="center right")
     save(figure, out / "hardware_in_the_loop.png")
 
 

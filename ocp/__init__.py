@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from ocp.mpc.closed_loop import plot_loops as plot_loops
     from ocp.mpc.controller import Controller as Controller
     from ocp.mpc.controller import controller_of as controller_of
+    from ocp.mpc.target import measure_controller as measure_controller
     from ocp.solve import solve as solve
     from ocp.solving.active import Active as Active
     from ocp.solving.live import LivePlot as LivePlot

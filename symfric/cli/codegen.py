@@ -13,7 +13,7 @@ from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.codegen_report import report
-from symfric.cli.controllers import write_controllers
+from symfric.cli.controllers import OPTIONS, REALS, write_controllers
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
@@ -48,7 +48,6 @@ from symfric.multibody import Mechanism, read_urdf
 from symfric.scenes import Drive, Scene
 from symfric.scenes.linkages import MechanismScene
 
-REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
 COMPENSATION = [item.name for item in fields(Compensation)]
 ADAPTATION = [item.name for item in fields(Adaptation)]
 ESTIMATORS = {"recursive": recursive_estimator, "kalman": kalman_estimator}
@@ -127,7 +126,7 @@ def codegen(
     compiler: str | None = None,
     json: str | None = None,
 ) -> None:
-    """Write a friction law, a plant or inverse dynamics as C99, and verify it.
+    """Write a law, plant, compensator or controller as C99, and verify it.
 
     The C is compiled and compared with CasADi over more than 20 000 steps, including bad inputs and
     other parameters. The exit status is 1 if the results differ or could not be compared, for
@@ -147,6 +146,7 @@ def codegen(
 
     Example: symfric codegen fit.json --estimator recursive --adaptation noise=1e-4 --out build
     """
+    others = opt.changed(codegen, locals(), OPTIONS)
     check_names("--core", core or (), CORES)
     check_folder(out)
     opt.check_outputs(json)
@@ -155,8 +155,7 @@ def codegen(
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
     if mpc is not None:
-        others = (fit, law, scene, estimator, *(compensator, inverse_dynamics, prove), compiler)
-        return write_controllers(out, mpc, any(others), settings, step_size, real, core, json)
+        return write_controllers(out, mpc, others, settings, step_size, real, core, json)
     if fit and not law and fit.suffix.lower() not in (".json", ".urdf") and not fit.is_file():
         fit, law = None, str(fit)
     texts = opt.assignments("--set", settings)

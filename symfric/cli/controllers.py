@@ -1,5 +1,6 @@
 """`symfric codegen --mpc`: write predictive controllers as C, verify and measure them."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,29 +11,32 @@ from symfric.cli import output
 from symfric.cli.options import Strings
 from symfric.foundation.parameters import check_names
 
-TYPES = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
+REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
+"""Value of --real -> floating-point types."""
+OPTIONS = ("out", "mpc", "settings", "step_size", "real", "core", "json")
+"""Options of `symfric codegen` that apply to a controller."""
 STEP = 0.01
 """Default time between cycles [s] of a controller of a problem."""
 
 
 def write_controllers(
-    out: Path, text: str, others: bool, settings: Strings, step: float | None,
+    out: Path, text: str, others: Sequence[str], settings: Strings, step: float | None,
     real: str | None, cores: Strings, json: str | None,
 ) -> None:  # fmt: skip
     """Write the controller of FILE.py[:NAME] in each type, verify it, and measure it on cores.
 
     Raises:
-        ValueError: further options, a file without a problem or controller, or a step size for a
-            controller, which has its own.
+        ValueError: `others`, further options; a file without a problem or controller, or a step
+            size for a controller, which has its own.
     """
     from ocp import Controller, Problem  # noqa: PLC0415  (slow to import)
-    from ocp.mpc.target import measure_controller  # noqa: PLC0415
+    from ocp.mpc.target import measure_controller  # noqa: PLC0415  (slow to import)
 
-    check_names("--real", [real or "both"], TYPES)
+    check_names("--real", [real or "both"], REALS)
     if others:
         raise ValueError(
-            "codegen --mpc: expected only --set, --step-size, --real, --core and --json in "
-            "addition, got another option"
+            "codegen --mpc: expected only --out, --set, --step-size, --real, --core and --json in "
+            f"addition, got {', '.join(others)}"
         )
     numbers, kinds = opt.numbers("--set", settings), (Problem, Controller)
     made = opt.held_by_file("codegen", text, "problem", numbers, "Problem or Controller", kinds)
@@ -41,7 +45,7 @@ def write_controllers(
     elif step is not None:
         raise ValueError(f"--step-size: expected none with a controller, which has {made.step:g} s")
     rows, content, measured = [], dict[str, Any](files=[], checks=[]), []
-    for kind in TYPES[real or "both"]:
+    for kind in REALS[real or "both"]:
         files = made.to_c(out, kind)
         check = files.verify()
         content["files"] += map(str, files.files)

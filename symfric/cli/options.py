@@ -2,7 +2,7 @@
 
 import runpy
 import traceback
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
@@ -118,6 +118,17 @@ def called_with(text: str, make: Callable[..., Any], values: dict[str, float]) -
         what = "a function whose arguments have defaults or numbers of --set"
         raise ValueError(f"'{text}': expected {what}, got none for {', '.join(missing)}")
     return make(**values)
+
+
+def changed(
+    command: Callable[..., Any], given: Mapping[str, Any], allowed: Iterable[str]
+) -> list[str]:
+    """Return the options of a command that differ from their defaults and are not `allowed`."""
+    return [
+        f"--{'no-' * (known.default is True)}{name.replace('_', '-')}"
+        for name, known in signature(command).parameters.items()
+        if name not in allowed and given[name] != known.default
+    ]
 
 
 def held_by_file(

@@ -18,7 +18,7 @@ Abstractions*, VMCAI 2017; https://frama-c.com.
 
 import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, isnan, nan
 from pathlib import Path
@@ -32,12 +32,12 @@ from symfric.codegen.source import header, source
 from symfric.emitter.c99 import REALS
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
-from symfric.foundation.programs import CompileError, finished
+from symfric.foundation.programs import CompileError, ProgramError, finished
 
 PROGRAM = "frama-c"
 OPTIONS = ("-no-unicode", "-eva", "-eva-precision", "3", "-warn-special-float", "none")
 LIMIT = 600.0
-"""Time limit [s]."""
+"""Time limit [s]; a plant of many bodies exceeds it and is not proved."""
 PROVED = "proved"
 
 COMPARISONS = """\
@@ -45,6 +45,7 @@ COMPARISONS = """\
 #define {0}_outside(x, low, high) ((x) != (x) || (x) < (low) || (x) > (high))
 """
 SHOWN = re.compile(r"Frama_C_show_each_(\d+): (.*)")
+BEYOND = re.compile(r"Frama_C_show_each_beyond_(\d+):")
 NUMBER = re.compile(r"NaN|-?inf|-?\d[-+.\de]*")
 
 
@@ -55,7 +56,7 @@ class Proof:
 
     Attributes:
         status: "proved", or a sentence: what is not proved, or which tool is absent.
-        ranges: interval of each output; NaN if Eva cannot exclude NaN.
+        ranges: interval of each output, rounded to twelve digits; NaN if Eva cannot exclude NaN.
     """
 
     name: str
@@ -78,7 +79,7 @@ def prove(block: Block, real: str = "float") -> Proof:
 
     Raises:
         ValueError: an unknown type.
-        CompileError: Frama-C rejects the C, or exceeds `LIMIT`.
+        CompileError: Frama-C rejects the C.
     """
     checks.choice("prove: real", real, REALS)
     c = CBlock(block, REALS[real])
@@ -89,7 +90,10 @@ def prove(block: Block, real: str = "float") -> Proof:
         folder = Path(name)
         write_text(folder / f"{c.name}.h", header(c))
         write_text(folder / "proof.c", _program(c))
-        done = finished((PROGRAM, *OPTIONS, str(folder / "proof.c")), limit=LIMIT)
+        try:
+            done = finished((PROGRAM, *OPTIONS, str(folder / "proof.c")), limit=LIMIT)
+        except ProgramError as error:
+            return Proof(block.name, real, f"not proved: {error}", {})
     text = done.output.decode(errors="replace")
     alarms = re.search(r"(\d+) alarms? generated", text)
     if done.status or alarms is None:
@@ -98,15 +102,18 @@ def prove(block: Block, real: str = "float") -> Proof:
     for place, values in SHOWN.findall(text):
         found[int(place)] += map(float, NUMBER.findall(values))
     ranges = {n: _interval(x) for n, x in zip(block.outputs, found, strict=True)}
-    return Proof(block.name, real, _status(c, int(alarms[1]), ranges), ranges)
+    beyond = {[*block.outputs][int(place)] for place in BEYOND.findall(text)}
+    return Proof(block.name, real, _status(c, int(alarms[1]), ranges, beyond), ranges)
 
 
-def _status(c: CBlock, alarms: int, ranges: Mapping[str, tuple[float, float]]) -> str:
+def _status(
+    c: CBlock, alarms: int, ranges: Mapping[str, tuple[float, float]], beyond: Collection[str]
+) -> str:
     """Return `PROVED`, or a sentence that names what is not proved."""
     doubts = [f"{alarms} operation{'s' * (alarms > 1)} may be undefined"] * bool(alarms)
     doubts += [f"{n} may not be finite" for n, x in ranges.items() if not all(map(isfinite, x))]
     for name, (low, high) in _limits(c).items():
-        if not low <= ranges[name][0] <= ranges[name][1] <= high:
+        if name in beyond:
             unit = c.block.outputs[name].unit
             doubts.append(f"{name} may leave {low:g} ... {high:g} {unit}")
     return f"not proved: {', '.join(doubts)}" if doubts else PROVED
@@ -133,20 +140,25 @@ def _limits(c: CBlock) -> dict[str, tuple[float, float]]:
 
 def _program(c: CBlock) -> str:
     """Return the C with helpers that compare numbers, and a step from arbitrary bits."""
-    text, parts = source(c), comparisons(c)
+    text, parts, limits = source(c), comparisons(c), _limits(c)
     for what in ("bits", "beyond", "outside"):
         text = text.replace(parts[what], "")
-    limits = {"F_max", *(f"{name}_{end}" for name in _limits(c) for end in ("low", "high"))}
+    names = {"F_max", *(f"{name}_{end}" for name in limits for end in ("low", "high"))}
     fixed = [
         f"param[{k}] = {c.real.literal(float(v.start))};"
-        for k, v in enumerate(c.block.parameters) if v.name in limits
+        for k, v in enumerate(c.block.parameters) if v.name in names
     ]  # fmt: skip
+    shown = list[str]()
+    for k, name in enumerate(c.block.outputs):
+        shown.append(f"Frama_C_show_each_{k}(out[{k}]);")
+        if name in limits:  # compared here, since Eva prints twelve digits
+            low, high = map(c.real.literal, limits[name])
+            shown.append(f"if (out[{k}] < {low} || out[{k}] > {high}) {{")
+            shown.append(f"    Frama_C_show_each_beyond_{k}(out[{k}]);\n    }}")
     return filled(
         TEMPLATES / "proof.c",
         **c.sizes,
         source=COMPARISONS.format(c.name) + text,
         limits="\n    ".join(fixed),
-        shown="\n    ".join(
-            f"Frama_C_show_each_{k}(out[{k}]);" for k in range(len(c.block.outputs))
-        ),
+        shown="\n    ".join(shown),
     )

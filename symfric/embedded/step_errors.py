@@ -16,6 +16,7 @@ from symfric.emitter.c99 import DOUBLE
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.integrator import Input, simulate
+from symfric.model import Model
 
 FACTORS = (4.0, 2.0, 1.0, 0.5, 0.25)
 """Step sizes to compare, relative to the chosen one."""
@@ -48,7 +49,7 @@ class StepError:
 
 
 def step_errors(
-    machine: Machine,
+    machine: Model | Machine,
     h: float,
     t_end: float,
     *,
@@ -61,7 +62,7 @@ def step_errors(
     time: it grows with the duration in stick-slip, and is large in chaotic motion at any h.
 
     Args:
-        machine: scene, with its default parameters.
+        machine: model or scene, with its default parameters.
         h: step size [s]; it is compared with 4, 2, 1/2 and 1/4 times its value.
         t_end: duration [s]; shorter if it needs more than `MOST` steps of h/4.
         u: inputs, as for `simulate`.
@@ -74,14 +75,15 @@ def step_errors(
     checks.number("step_errors: h", h, unit="s", above=0.0)
     checks.number("step_errors: t_end", t_end, unit="s", above=h)
     block, t_end = plant_block(machine, method=method), min(t_end, MOST * h / 4)
+    model = machine if isinstance(machine, Model) else machine.model()
     sizes = [h * factor for factor in FACTORS if h * factor <= t_end]
-    return tuple(_error(machine, block, size, t_end, u) for size in sizes)
+    return tuple(_error(model, block, size, t_end, u) for size in sizes)
 
 
 def _error(
-    machine: Machine, block: Block, h: float, t_end: float, u: Mapping[str, Input] | None
+    model: Model, block: Block, h: float, t_end: float, u: Mapping[str, Input] | None
 ) -> StepError:
-    model, steps = machine.model(), int(t_end / h + 1e-9)
+    steps = int(t_end / h + 1e-9)
     times = h / 2 * np.arange(2 * steps + 1)  # ends and middles of the steps
     exact = simulate(model, times[-1], u=u, rtol=RTOL, t_eval=times)
     held = np.column_stack([np.zeros((steps, 0)), *(exact[v.name][1::2] for v in block.inputs)])

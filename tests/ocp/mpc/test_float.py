@@ -108,6 +108,13 @@ def test_a_drive_in_float_fits_into_ten_milliseconds_of_a_small_core(tmp_path: P
     assert found.data < 8000
 
 
+@on_target
+def test_cycles_that_the_timer_cannot_count_are_not_reported(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("ocp.mpc.target.LONGEST", 1e4)
+    found = measure_controller(controller().to_c(tmp_path, "float"), cycles=3)
+    assert found.status.startswith("not measured: cycles of more than") and not found.ok
+
+
 def test_bad_arguments_and_absent_tools_are_named(tmp_path: Path) -> None:
     made = controller()
     with pytest.raises(ValueError, match="to_c: real: expected"):

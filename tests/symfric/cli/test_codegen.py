@@ -114,7 +114,8 @@ def test_a_problem_becomes_a_controller(symfric, monkeypatch) -> None:
     assert "250000" in shown and "600000" in shown
     for wrong, message in (
         ("move.py:quick --step-size 0.1", "--step-size: expected none with a controller"),
-        ("move.py --compensator", "codegen --mpc: expected only"),
+        ("move.py --compensator --fold --no-guards", "got --fold, --no-guards, --compensator"),
+        ("move.py --law lugre --name x", "got --law, --name"),
         ("none.py", "which does not exist"),
     ):
         assert message in symfric(f"codegen --mpc {wrong} --out d", 2).err

@@ -68,6 +68,17 @@ def test_every_law_is_proved(name):
 
 
 @needs_eva
+@pytest.mark.parametrize("real", ["float", "double"])
+def test_limits_that_are_rounded_are_compared_exactly(real):
+    """Eva prints 2/3 and 0.3f with twelve digits, above their values."""
+    for limit in (2 / 3, 0.3):
+        assert prove(compensator(Stribeck(), limit=limit), real).ok
+    F = LIMITED.outputs["F"]
+    above = replace(LIMITED, outputs={"F": replace(F, expression=(1 + 1e-6) * F.expression)})
+    assert not prove(above, real).ok
+
+
+@needs_eva
 def test_a_force_beyond_its_limit_is_not_proved():
     F = LIMITED.outputs["F"]
     found = prove(replace(LIMITED, outputs={"F": replace(F, expression=1.01 * F.expression)}))
@@ -102,7 +113,12 @@ def test_reports_are_read(monkeypatch, tmp_path):
     )
     assert reported(f"{end} [-60. .. inf]\n{none}").status.startswith("not proved: F may not be")
     assert isnan(reported(f"{end} [-1. .. 1.] U {{NaN}}\n{none}").ranges["F"][0])
+    beyond = f"{end} [-61. .. 60.]\n[eva] proof.c:9: Frama_C_show_each_beyond_0: [-61. .. -60.1]"
+    assert reported(f"{beyond}\n{none}").status == "not proved: F may leave -60 ... 60 N"
     assert not reported(none).ok
+    monkeypatch.setattr(proof, "LIMIT", 0.0)
+    assert reported(none).status.startswith("not proved: frama-c")
+    monkeypatch.setattr(proof, "LIMIT", 60.0)
     with pytest.raises(CompileError, match="frama-c failed with status 1"):
         reported("syntax error", 1)
     with pytest.raises(ValueError, match="expected one of double, float"):

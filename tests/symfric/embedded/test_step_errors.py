@@ -34,6 +34,8 @@ def test_errors_equal_those_of_a_loop_in_numpy():
 def test_shorter_steps_are_more_accurate_and_long_ones_diverge():
     belt = [e.error for e in step_errors(Rabinowicz(BrownMcPhee()), 1e-3, 4.0)]
     assert belt[0] > 3 * belt[2] > 9 * belt[4]
+    own = step_errors(Rabinowicz(BrownMcPhee()).model(), 1e-3, 4.0)  # numbers instead of symbols
+    assert own[2].error == pytest.approx(belt[2], rel=1e-3)
     stuck = step_errors(Drive(LuGre()), 8e-3, 4.0, u={"force": lambda t: 2 * ca.sin(np.pi * t)})
     assert stuck[0].error > 0.5
     assert str(stuck[2]).startswith("The largest error of steps of 0.008 s is ")
