@@ -17,12 +17,12 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
 from symfric.foundation.shown import Showing, Shown, Table
+from symfric.foundation.status import SolveError
 from symfric.integrator.simulate import simulate
 from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Law, require_law
 from symfric.model import Contact, Model
 from symfric.results.quadrature import integral_between
-from symfric.scenes.base import divides_by_load
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -130,8 +130,6 @@ def describing_function(
             f"{where}: law", f"a law without the inputs {checks.listed(further)}", law,
             "give them constant values, as in the contact of a model",
         )  # fmt: skip
-    if load == 0 and divides_by_load(law):
-        raise checks.refused(f"{where}: N", "a normal force > 0 N, by which the law divides", load)
     checks.number(f"{where}: rtol", rtol, above=0.0, upper=1e-5)
     return DescribingFunction(law, load, V, w, Harmonic(law, load, rtol).table(V, w))
 
@@ -141,7 +139,7 @@ class Harmonic:
     """First harmonic of the force of a law: n(V, w) [N s/m]."""
 
     def __init__(self, law: Law, N: float, rtol: float) -> None:
-        self.law, self.rtol = law, rtol
+        self.law, self.N, self.rtol = law, N, rtol
         if all(s.whole for s in law.states) and (not law.states or self._applied):
             angle, top = ca.SX.sym("angle"), ca.SX.sym("V")
             force = self._memoryless(top * ca.sin(angle), angle, N)
@@ -182,10 +180,10 @@ class Harmonic:
             orbit = periodic_orbit(
                 model, run, p=p, period=T, symmetric=self.law.facts.odd, rtol=self.rtol
             )
-        except ValueError as error:
+        except (ValueError, SolveError) as error:
             raise ValueError(
                 f"describing_function: expected a periodic motion of {type(self.law).__name__} at "
-                f"V = {V:g} m/s and w = {w:g} rad/s, got none: {error}"
+                f"N = {self.N:g} N, V = {V:g} m/s and w = {w:g} rad/s, got none: {error}"
             ) from error
         run, (contact,), angle = orbit.run, model.contacts, w * model.t
         parts = [

@@ -185,7 +185,7 @@ BAD: list[tuple[Callable[[], object], str]] = [
     (lambda: describing_function(LuGre(), [], [1.0]), "got 'none'"),
     (lambda: describing_function(LuGre(), [1.0], [-2.0]), "expected frequencies > 0"),
     (lambda: describing_function(LuGre(), [1.0], [1.0], N=-1.0), "N: expected"),
-    (lambda: describing_function(LuGre(), [1.0], [1.0], N=0.0), "N: expected a normal force > 0"),
+    (lambda: describing_function(LuGre(), [1.0], [1.0], N=0.0), "at N = 0 N, V = 1 m/s"),
     (lambda: describing_function(Wojewoda(), [1.0], [1.0]), "without the inputs dv"),
     (lambda: harmonic_balance(forced(), (0.1, 1.0), (1.0, 9.0)), "without explicit time"),
     (lambda: harmonic_balance(loaded(), (0.1, 1.0), (1.0, 9.0)), "rests without friction force"),
