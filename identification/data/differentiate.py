@@ -203,11 +203,11 @@ def noise_of(record: Record, name: str | None, given: Mapping[str, float]) -> fl
 
     The position of a drive has at least the noise of the counts of its encoder, count / sqrt(12).
     """
-    if name is None or name in given or name != "x" or record.drive is None:
+    count = None if record.drive is None else record.drive.count
+    if name != "x" or name in given or count is None:
         return None if name is None else given.get(name)
-    count = record.drive.count
     level = noise_level(spectrum(record[name], line=True))
-    return None if count is None else float(np.sqrt(max(level, count**2 / 12)))
+    return float(np.sqrt(max(level, count**2 / 12)))
 
 
 CERTAIN = 4.0

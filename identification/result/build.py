@@ -158,7 +158,7 @@ def fitted(
         made=_made(call, by),
         live=live,
         asked=asked,
-        sides=() if live.data[0].drive is None else sides_of(live.data, estimates),
+        sides=() if live.data[0].drive is None else tuple(sides_of(live.data, estimates)),
     )
 
 

@@ -48,15 +48,11 @@ class Sides:
     error: float | None = None
 
 
-def sides_of(data: Dataset, estimates: Mapping[str, Estimate]) -> tuple[Sides, ...]:
-    """Return the values of a fit to logs of one drive in all units; () without a drive.
+def sides_of(data: Dataset, estimates: Mapping[str, Estimate]) -> Iterator[Sides]:
+    """Yield the values of a fit to logs of one drive in all units; none without a drive.
 
     A mass is that of load and rotor; "m without rotor" is that of the load.
     """
-    return tuple(_sides(data, estimates))
-
-
-def _sides(data: Dataset, estimates: Mapping[str, Estimate]) -> Iterator[Sides]:
     drives = {id(record.drive): record.drive for record in data}
     drive = next(iter(drives.values()))
     if len(drives) > 1 or drive is None:

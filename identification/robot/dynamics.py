@@ -40,7 +40,6 @@ class RobotModel:
     """Robot of a URDF file whose n joints have measured torques.
 
     Attributes:
-        source: path of the file, or its content.
         urdf: content of the file, in which joints that move no mass are fixed.
         joints: the n joints; joints that mimic another one are not included.
         bodies: link that names each of k moving bodies with a mass.
@@ -48,7 +47,6 @@ class RobotModel:
         regressor: CasADi function (q, qd, qdd) -> Y, shape (n, 10 k).
     """
 
-    source: str | Path
     urdf: Urdf
     joints: tuple[UrdfJoint, ...]
     bodies: tuple[str, ...]
@@ -86,7 +84,7 @@ class RobotModel:
         numbers = [inertial_numbers(weights[link]) for link in bodies]
         called = dict(zip((joint.name for joint in mechanism.joints), moved, strict=True))
         joints = tuple(called[name] for name in leads)
-        return cls(source, urdf, joints, bodies, np.concatenate(numbers), regressor)
+        return cls(urdf, joints, bodies, np.concatenate(numbers), regressor)
 
     @property
     def names(self) -> tuple[str, ...]:

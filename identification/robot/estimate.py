@@ -33,6 +33,7 @@ HALVINGS = 4
 """Largest number of halvings of a step of a nonlinear law."""
 NEAR = np.array([0.5, 3.0])
 """Bounds of a velocity of a law, relative to the slowest and the fastest speeds."""
+NONE = np.zeros(0)
 LEAP = 2.0
 """Largest change of the logarithm of a parameter in one step."""
 
@@ -93,6 +94,11 @@ class Equations(NamedTuple):
             first = last
         return np.hstack(blocks), predicted
 
+    def one_way(self, n: int) -> NDArray[np.bool_]:
+        """Return a mask of the joints that rest or move in one direction, shape (n,)."""
+        moved = [np.sign(self.v[self.joint == k]) for k in range(n)]
+        return np.array([abs(side.sum()) == side.size for side in moved])
+
     def by_joint(self, values: Array, n: int) -> Array:
         """Return the root mean square of values by joint; NaN for joints without rows, (n,)."""
         sums, counts = (np.bincount(self.joint, w, n) for w in (values**2, None))
@@ -123,6 +129,12 @@ class Estimated(NamedTuple):
         """Negative logarithm of the likelihood up to a constant."""
         return float(np.sum(np.log(self.sigma[self.equations.joint])))
 
+    @property
+    def dissipation(self) -> float:
+        """Sum of the power of friction over all rows."""
+        e, first = self.equations, self.equations.Z.shape[1]
+        return float(e.v @ (e.tau + self.residuals - e.Z @ self.x[:first]))
+
     def covariance(self) -> Sandwich:
         """Return the covariance of the values."""
         e, p, size = self.equations, self.x.size, 1 / self.sigma[self.equations.joint]
@@ -146,9 +158,7 @@ class Estimated(NamedTuple):
         return np.append(x[:count], rest)
 
 
-def estimate(
-    equations: Equations, laws: Sequence[JointLaw], base: Base, method: str
-) -> Estimated:  # fmt: skip
+def estimate(equations: Equations, laws: Sequence[JointLaw], base: Base, method: str) -> Estimated:
     """Return the estimate by one of `METHODS`."""
     n, tau = len(laws), equations.tau
     x = np.concatenate([base.values, np.zeros(n), coordinates(laws)])
@@ -161,7 +171,7 @@ def estimate(
     for _ in range(ROUNDS):
         w = np.sqrt(weights) / sigma[equations.joint]
         ends = np.maximum(low - x, -leap), np.minimum(high - x, leap)
-        step = _bounded(columns * w[:, None], (tau - predicted) * w, *ends)
+        step = _bounded(columns * w[:, None], (tau - predicted) * w, base.scales, *ends)
         before = np.linalg.norm((tau - predicted) * w)
         for _ in range(HALVINGS):
             columns, predicted = equations.linearised(laws, x + step)
@@ -203,18 +213,25 @@ def _ends(equations: Equations, laws: Sequence[JointLaw], size: int) -> tuple[Ar
     return low, high, leap
 
 
-def _bounded(columns: Array, values: Array, low: Array, high: Array) -> Array:
+def _bounded(columns: Array, values: Array, scales: Array, low: Array, high: Array) -> Array:
     """Return the least squares solution; entries beyond a bound are held there, shape (p,)."""
-    step = _least_squares(columns, values)
+    step = _least_squares(columns, values, scales)
     out = (step < low) | (step > high)
     if out.any():
         step = np.where(out, np.clip(step, low, high), 0.0)
-        step += _least_squares(columns * ~out, values - columns @ step) * ~out
+        step += _least_squares(columns * ~out, values - columns @ step, scales) * ~out
     return step
 
 
-def _least_squares(columns: Array, values: Array) -> Array:
-    """Return the solution that is least in units of the lengths of the columns, shape (p,)."""
+def _least_squares(columns: Array, values: Array, scales: Array = NONE) -> Array:
+    """Return the solution that is least in units of its scales, shape (p,).
+
+    Args:
+        columns, values: shapes (rows, p) and (rows,).
+        scales: prior scales of the first values; others have the inverse length of their column.
+    """
     size = np.linalg.norm(columns, axis=0)
     size = np.where(size > 0, size, 1.0)
+    first = slice(0, len(scales))
+    size[first] = max(np.max(size[first] * scales, initial=0.0), 1e-300) / scales
     return np.linalg.lstsq(columns / size, values, rcond=1e-10)[0] / size

@@ -38,6 +38,8 @@ RIDGE = 1e-9
 """Least information, relative to that of one column."""
 HALVINGS = 60
 """Largest number of reductions by 10 %."""
+ITERATIONS = 60
+"""Largest number of iterations."""
 UNITS = ("", "/s", "/s^2")
 GUESSES = 30
 """Number of random motions of which the best one is improved."""
@@ -112,7 +114,6 @@ def excitation(
     acceleration: float | None = None,
     share: float = 1.0,
     seed: int = 0,
-    iterations: int = 60,
 ) -> Excitation:
     """Return an informative motion within the limits of the URDF for position, speed and effort.
 
@@ -123,7 +124,6 @@ def excitation(
         acceleration: largest acceleration [rad/s^2, m/s^2]; None: only effort limits it.
         share: part of the limits that the motion may use, 0 < share <= 1.
         seed: seed of the random start motions.
-        iterations: largest number of iterations.
 
     Raises:
         ValueError: arguments out of range, mistakes of the file, a posture that needs more torque
@@ -135,7 +135,6 @@ def excitation(
     period = checks.number(f"{WHERE}: period", period, unit="s", above=0.0)
     H = checks.count(f"{WHERE}: harmonics", harmonics, least=2)
     share = checks.number(f"{WHERE}: share", share, above=0.0, upper=1.0)
-    checks.count(f"{WHERE}: iterations", iterations)
     where = f"{WHERE}: acceleration"
     most = inf if acceleration is None else checks.number(where, acceleration, above=0.0)
     model = RobotModel.read(urdf)
@@ -144,7 +143,7 @@ def excitation(
     limits = [MARGIN * share * limit for limit in (*limits, model.limits("effort"))]
     task = _Task(model, (low + high) / 2, limits, _rows(model, limits), period, H)
     guess = task.guess(seed, np.linspace(0.0, period, SAMPLES * H, endpoint=False))
-    better = task.improved(guess, iterations)
+    better = task.improved(guess)
     chosen = task.inside(better, np.linspace(0.0, period, 4 * SAMPLES * H))
     columns = task.columns(chosen)
     more = _information(columns) - _information(task.columns(guess))
@@ -193,7 +192,7 @@ class _Task(NamedTuple):
             found.append(self.inside(c, t, fill=True))
         return max(found, key=lambda c: _information(self.columns(c)))
 
-    def improved(self, guess: Array, iterations: int) -> Array:
+    def improved(self, guess: Array) -> Array:
         """Return coefficients with more information, found by Ipopt."""
         start = self.columns(guess)
         scaled = start / _sizes(start)
@@ -211,7 +210,7 @@ class _Task(NamedTuple):
             held += [ca.vec(signal[finite, :] / ca.DM(most[finite]))] if finite else []
         options = {
             "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.tol": 1e-3,
-            "ipopt.max_iter": iterations, "ipopt.hessian_approximation": "limited-memory",
+            "ipopt.max_iter": ITERATIONS, "ipopt.hessian_approximation": "limited-memory",
         }  # fmt: skip
         problem = {"x": ca.vec(z), "f": -information, "g": ca.vertcat(*held)}
         solver = ca.nlpsol("excitation", "ipopt", problem, options)

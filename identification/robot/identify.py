@@ -17,7 +17,7 @@ from identification.robot.consistent import consistent
 from identification.robot.dynamics import WHERE, RobotModel
 from identification.robot.estimate import METHODS, Equations, Estimated, estimate
 from identification.robot.friction import USUAL, JointLaw, laws_of
-from identification.robot.information import Information, information
+from identification.robot.information import Information, information, seen_in
 from identification.robot.motion import RobotMotion, motions
 from identification.robot.result import OFFSET, RobotFit, TorqueError, TorqueSeries
 from identification.verdict.minimum import Sandwich
@@ -77,7 +77,7 @@ def identify_robot(
 
     The columns of the data have the names of the joints: position `shoulder [rad]`, torque
     `shoulder_torque [N m]`, and optionally `shoulder_velocity [rad/s]`; `q_shoulder` and
-    `tau_shoulder` are accepted, too. Torques are positive along the joint. Every joint must be in
+    `tau_shoulder` are also accepted. Torques are positive along the joint. Every joint must be in
     the log, except those that mimic another joint. The friction of the file is not used: the
     identified friction replaces it.
 
@@ -95,8 +95,8 @@ def identify_robot(
         filter: cut-off and decimation; None: chosen from the data.
 
     Raises:
-        ValueError: mistakes of the file, missing columns, joints that all rest, positions in other
-            units, torques with the wrong sign.
+        ValueError: mistakes of the file, missing columns, joints that all rest, a log that shows
+            neither inertias nor friction, positions in other units, torques with the wrong sign.
 
     Limits: flexibility, backlash and friction that depends on load or position remain in the
     residuals. Intervals include the autocorrelation of the residuals, but not the errors of a wrong
@@ -105,6 +105,12 @@ def identify_robot(
     checks.choice(f"{WHERE}: method", method, METHODS)
     made = _prepared(urdf, data, law, checks.flag(f"{WHERE}: rotors", rotors), filter)
     model, equations = made.model, made.equations
+    if made.information.rank == 0 and equations.one_way(len(made.laws)).all():
+        lengths = ", ".join(f"{record.time[-1] - record.time[0]:.3g} s" for record in data)
+        raise ValueError(
+            f"{WHERE}: expected a log that shows inertias or friction, got '{data.name}' of "
+            f"{lengths}, in which no joint reverses; record for longer"
+        )
     found = estimate(equations, made.laws, made.base, method)
     cover = found.covariance()
     _check_signs(made, found, cover, method)
@@ -159,10 +165,12 @@ def _prepared(
     equations = Equations.of(model, moved, base, rotors)
     speeds = np.sqrt(np.mean(np.vstack([one.v for one in moved]) ** 2, axis=0))
     usual, laws = laws_of(model, USUAL, speeds), laws_of(model, law, speeds)
-    seen = information(model, moved, base, equations, usual, rotors)
+    seen = seen_in(equations, base, usual)
+    told = information(model, moved, base, equations, seen, rotors)
+    equations = seen.without_faint(equations, base)
     if not all(one.linear for one in laws):
         laws = _started(model, equations, base, usual, laws)
-    return _Prepared(model, base, moved, equations, laws, rotors, seen)
+    return _Prepared(model, base, moved, equations, laws, rotors, told)
 
 
 def _started(
@@ -181,7 +189,10 @@ def _started(
 
 
 def _estimates(made: _Prepared, found: Estimated, cover: Sandwich) -> dict[str, Any]:
-    """Return base parameters and friction with 95 % intervals."""
+    """Return base parameters and friction with 95 % intervals.
+
+    A level or offset is not determined if half of its interval exceeds the largest torque.
+    """
     from scipy.special import stdtrit  # noqa: PLC0415  (slow to import)
 
     error = np.sqrt(np.diag(cover.coloured))
@@ -189,9 +200,9 @@ def _estimates(made: _Prepared, found: Estimated, cover: Sandwich) -> dict[str, 
     error[(np.abs(cover.null) > 1e-4 * size).any(axis=1)] = np.nan
     half = stdtrit(cover.freedom, 0.975) * error
 
-    def of(k: int, unit: str, logarithmic: bool = False) -> Estimate:
+    def of(k: int, unit: str, most: float, logarithmic: bool = False) -> Estimate:
         x, reach = float(found.x[k]), float(half[k])
-        if not reach > 0:
+        if not 0 < reach < (most if unit in ("N", "N m") else np.inf):
             value = float(np.exp(x)) if logarithmic else x
             return Estimate(value, unit, note="not determined by the data")
         ends = np.array([x, x - reach, x + reach])
@@ -199,15 +210,16 @@ def _estimates(made: _Prepared, found: Estimated, cover: Sandwich) -> dict[str, 
         return Estimate(value, unit, float(error[k]) * (value if logarithmic else 1.0), low, high)
 
     b = len(made.base.labels)
-    base = {label: of(k, made.base.units[k]) for k, label in enumerate(made.base.labels)}
+    base = {label: of(k, made.base.units[k], np.inf) for k, label in enumerate(made.base.labels)}
     friction = dict[str, dict[str, Estimate]]()
     for k, law in enumerate(made.laws):
         if law.joint not in made.information.resting:
             first = made.part(k).start
+            most = np.abs(made.equations.tau[made.equations.joint == k]).max()
             friction[law.joint] = {
-                name: of(first + i, law.units[i], bool(law.logarithmic[i]))
+                name: of(first + i, law.units[i], most, bool(law.logarithmic[i]))
                 for i, name in enumerate(law.names)
-            } | {OFFSET: of(b + k, made.model.forces[k])}
+            } | {OFFSET: of(b + k, made.model.forces[k], most)}
     return {"base": base, "friction": friction}
 
 
@@ -233,7 +245,9 @@ def _check_signs(made: _Prepared, found: Estimated, cover: Sandwich, method: str
     for k in range(n) if doubt else ():
         sign = np.where(made.equations.joint == k, -1.0, 1.0)
         turned = made.equations._replace(tau=sign * made.equations.tau)
-        found_at.append(estimate(turned, made.laws, made.base, method).unlikely)
+        other = estimate(turned, made.laws, made.base, method)
+        # all torques with the other sign fit equally well, but their friction adds energy
+        found_at.append(other.unlikely if other.dissipation > 0 else np.inf)
     if doubt and found.unlikely - min(found_at) > BETTER * made.equations.tau.size / n:
         wrong = [made.model.names[int(np.argmin(found_at))]]
     if wrong:

@@ -11,7 +11,7 @@ is determined if this is below one half.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,45 @@ from symfric.foundation.shown import among
 
 SURE = 0.5
 """Largest standard error of a determined parameter, relative to its scale."""
+ZERO = 1e-9
+"""Entry of a projection that is due to rounding."""
 ACCURACY = 0.01
 """Least noise of a torque relative to its root mean square."""
+FAINT = 10.0
+"""Standard error, relative to the scale, of a combination that does not enter the fit."""
 HELPS = 0.5
-"""Part of the largest effect above which a joint is recommended, too."""
+"""Part of the largest effect above which a joint is also recommended."""
+
+
+class Seen(NamedTuple):
+    """Singular values d (k,) and right singular vectors V' (k, b) of the scaled columns."""
+
+    d: Array
+    Vt: Array
+
+    def without_faint(self, equations: Equations, base: Base) -> Equations:
+        """Return the equations without combinations that only change torques far below noise."""
+        V, b = self.Vt[self.d > 1 / FAINT].T, len(base.labels)
+        if V.shape[1] == b:
+            return equations
+        among = V @ V.T
+        among[np.abs(among) < ZERO] = 0.0
+        Z = equations.Z.copy()
+        Z[:, :b] = Z[:, :b] @ (base.scales[:, None] * among / base.scales)
+        return equations._replace(Z=Z)
+
+
+def seen_in(equations: Equations, base: Base, laws: Sequence[JointLaw]) -> Seen:
+    """Compare the regressor with the noise of the torques, which is at least 1 % of a torque."""
+    n, b = len(laws), len(base.labels)
+    size = equations.by_joint(equations.tau, n)[equations.joint]
+    sigma = np.maximum(np.maximum(equations.noise, ACCURACY * size), 1e-300)
+    x = np.concatenate([base.values, np.zeros(n), coordinates(laws)])
+    columns = equations.linearised(laws, x)[0] / sigma[:, None]
+    U, s, _ = np.linalg.svd(columns[:, b:], full_matrices=False)
+    along = U[:, s > 1e-9 * s.max(initial=0.0)]
+    alone = (columns[:, :b] - along @ (along.T @ columns[:, :b])) * base.scales
+    return Seen(*np.linalg.svd(alone, full_matrices=False)[1:])
 
 
 @final
@@ -59,18 +94,10 @@ class Information:
 
 def information(
     model: RobotModel, motions: Sequence[RobotMotion], base: Base, equations: Equations,
-    laws: Sequence[JointLaw], rotors: bool,
+    seen: Seen, rotors: bool,
 ) -> Information:  # fmt: skip
-    """Compare the regressor with the noise of the torques, which is at least 1 % of a torque."""
-    n, b = len(model.joints), len(base.labels)
-    size = equations.by_joint(equations.tau, n)[equations.joint]
-    sigma = np.maximum(np.maximum(equations.noise, ACCURACY * size), 1e-300)
-    x = np.concatenate([base.values, np.zeros(n), coordinates(laws)])
-    columns = equations.linearised(laws, x)[0] / sigma[:, None]
-    U, s, _ = np.linalg.svd(columns[:, b:], full_matrices=False)
-    along = U[:, s > 1e-9 * s.max(initial=0.0)]
-    alone = (columns[:, :b] - along @ (along.T @ columns[:, :b])) * base.scales
-    _, d, Vt = np.linalg.svd(alone, full_matrices=False)
+    """Return the combinations that are determined, and the joints to move, in words."""
+    n, b, (d, Vt) = len(model.joints), len(base.labels), seen
     known = d > 1 / SURE
     error = np.sqrt(np.sum((Vt.T / np.maximum(d, 1e-300)) ** 2, axis=1))
     loose = [int(k) for k in np.argsort(-error) if error[k] > SURE]
@@ -88,6 +115,10 @@ def information(
         sentences.append(_advice(model, motions, base, directions, moves, rotors))
     for joint in resting:
         sentences.append(f"{joint} rests: it has no friction here, and its torque is not used.")
+    one_way = [j for j, on in zip(model.names, equations.one_way(n) & moves, strict=True) if on]
+    if one_way:
+        what = f"The friction level and the offset of {', '.join(one_way)} are not separable"
+        sentences.append(f"{what}: move both ways.")
     undetermined = tuple(base.labels[k] for k in loose)
     return Information(b, rank, condition, undetermined, resting, tuple(sentences))
 

@@ -17,7 +17,7 @@ from identification.robot.information import Information
 from identification.robot.update import updated_urdf
 from symfric.foundation import checks
 from symfric.foundation.files import read_json, write_text
-from symfric.foundation.shown import Showing, Shown, Table, counted
+from symfric.foundation.shown import Showing, Shown, Table, columns, counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -117,7 +117,8 @@ class RobotFit(Showing):
         names = list(dict.fromkeys(n for own in self.friction.values() for n in own))
         each = [{own[n].unit for own in self.friction.values() if n in own} for n in names]
         units = [f" [{', '.join(sorted(unit))}]" for unit in each]
-        header = ("joint", *map("".join, zip(names, units, strict=True)), "error", "of the torque")
+        error = f"error{units[names.index(OFFSET)] if names else ''}"
+        header = ("joint", *map("".join, zip(names, units, strict=True)), error, "of the torque")
         rows = list[tuple[str, ...]]()
         for joint in self.joints:
             own, off = self.friction.get(joint, {}), self.validation.get(joint)
@@ -133,11 +134,7 @@ class RobotFit(Showing):
 
     def __str__(self) -> str:
         shown = self.shown()
-        rows = (shown.table.header, *shown.table.rows)
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        table = [
-            "  ".join(f"{c:{w}}" for c, w in zip(row, widths, strict=True)).rstrip() for row in rows
-        ]
+        table = columns((shown.table.header, *shown.table.rows))
         after = ["", *shown.after] if shown.after else []
         return "\n".join([shown.title, *shown.lines, "", *table, *after])
 
@@ -188,7 +185,7 @@ class RobotFit(Showing):
         Limits: the format has neither offsets nor rotor inertias, and of friction only
         f sign(w) + d w, to which other laws are approximated at the recorded speeds.
         """
-        text = updated_urdf(self.model, np.array(self.inertial), self.urdf_friction)
+        text = updated_urdf(self.urdf, self.model, np.array(self.inertial), self.urdf_friction)
         write_text(path, f'<?xml version="1.0"?>\n{text}\n')
         return Path(path)
 
@@ -227,12 +224,15 @@ class RobotFit(Showing):
                 right.plot(t[used], error[used], ".", color=colour(0), ms=2.0, mew=0)
             left.set_ylabel(f"{joint} [{unit}]")
             if k == 0:
-                left.set_title("torque", fontsize="medium")
+                left.set_title("torque", fontsize="medium", loc="left")
                 right.set_title(
                     "measured - predicted (grey: reversals, not fitted)", fontsize="medium"
                 )
                 handles, labels = left.get_legend_handles_labels()
-                left.legend(handles[:2], labels[:2], fontsize="small", markerscale=3)
+                left.legend(
+                    handles[:2], labels[:2], loc="lower right", bbox_to_anchor=(1.0, 1.0),
+                    frameon=False, fontsize="small", ncols=2,
+                )  # fmt: skip
         for axis in rows[-1]:
             axis.set_xlabel("t [s]")
         return save(figure, path)

@@ -2,7 +2,6 @@
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from pathlib import Path
 
 from identification.data.record import Array
 from identification.robot.dynamics import COLUMNS, ROWS, RobotModel, inertial_of
@@ -12,21 +11,21 @@ from symfric.multibody.urdf_file import tags
 ENTRIES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
-def updated_urdf(model: RobotModel, pi: Array, friction: Mapping[str, tuple[float, float]]) -> str:
+def updated_urdf(
+    content: str, model: RobotModel, pi: Array, friction: Mapping[str, tuple[float, float]]
+) -> str:
     """Return the URDF with new inertias and friction; other tags and comments are unchanged.
 
     The inertia of a body that consists of several links is written to the link that names it; the
     links behind fixed joints become massless. `<dynamics>` is replaced, not added to.
 
     Args:
-        model: the robot.
+        content: the URDF.
+        model: its robot.
         pi: inertial parameters, shape (10 k,).
         friction: joint -> Coulomb friction [N m, N] and damping [N m s/rad, N s/m].
     """
-    content = model.source
-    is_text = isinstance(content, str) and content.lstrip().startswith("<")
-    raw = content.strip().encode() if is_text else Path(content).read_bytes()  # type: ignore[union-attr]
-    robot = tags(raw, "utf-8" if is_text else None, comments=True)
+    robot = tags(content.strip().encode(), "utf-8", comments=True)
     places, numbers = carried(model.urdf), dict(zip(model.bodies, pi.reshape(-1, 10), strict=True))
     for link in robot.findall("link"):
         name = link.get("name", "")
@@ -45,8 +44,8 @@ def updated_urdf(model: RobotModel, pi: Array, friction: Mapping[str, tuple[floa
             dynamics = joint.find("dynamics")
             if dynamics is None:
                 dynamics = ET.SubElement(joint, "dynamics")
-            dynamics.set("friction", repr(max(found[0], 0.0)))
-            dynamics.set("damping", repr(max(found[1], 0.0)))
+            dynamics.set("friction", repr(found[0]))
+            dynamics.set("damping", repr(found[1]))
     ET.indent(robot)
     return ET.tostring(robot, encoding="unicode")
 

@@ -195,18 +195,17 @@ def identify(
     Example: symfric identify log.csv --drive drive.toml --law stribeck
     """
     opt.check_outputs(html, json, urdf, picture=plot)
-    given = {
-        "--rotors": rotors, "--urdf": urdf, "--kind": kind != "inverse", "--windows": windows,
-        "--dead-time": dead_time, "--normal-force": normal_force != 1.0, "--fix": fixed,
-        "--free": free, "--noise": noise, "--starts": starts != 6, "--workers": workers != 1,
-        "--profile": profiles, "--html": html,
-    }  # fmt: skip
     if data[0].endswith(".urdf"):
-        refuse_options("of a robot", given, 2, None)
+        refuse_options("of a robot", {
+            "--drive": drive, "--kind": kind != "inverse", "--windows": windows,
+            "--dead-time": dead_time, "--normal-force": normal_force != 1.0, "--fix": fixed,
+            "--free": free, "--noise": noise, "--starts": starts != 6, "--workers": workers != 1,
+            "--profile": profiles, "--html": html,
+        })  # fmt: skip
         read = reader(columns, units, "inverse", missing, resample, step, variable, scales)
         robots.identify(data, law, validate, read, loss, plot, json, rotors, urdf)
         return
-    refuse_options("without ROBOT.urdf", given, 0, 2)
+    refuse_options("without ROBOT.urdf", {"--rotors": rotors, "--urdf": urdf})
     if not law:
         raise ValueError("identify: expected --law NAME[,NAME], got none; see symfric identify -h")
     laws, wishes = opt.laws_of(law), free_in(free)
@@ -255,9 +254,9 @@ def identify(
     refuse(fit, ranking, failed)
 
 
-def refuse_options(where: str, given: dict[str, Any], first: int, last: int | None) -> None:
-    """Raise an error if any of the options with numbers `first` to `last` is given."""
-    if wrong := [name for name in [*given][first:last] if given[name]]:
+def refuse_options(where: str, options: dict[str, Any]) -> None:
+    """Raise an error if any of the options is given."""
+    if wrong := [name for name, given in options.items() if given]:
         raise ValueError(f"identify {where}: expected no {', '.join(wrong)}, got one")
 
 

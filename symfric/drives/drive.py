@@ -1,7 +1,7 @@
 """Class `Drive`: a motor with gear, encoder and limits, as on its nameplate."""
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import field, fields
 from math import nan, pi
 from pathlib import Path
@@ -158,9 +158,18 @@ class Drive(Parametric):
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{where}: expected TOML, got an error: {error}") from None
         values, problems = dict[str, Any](), list[str]()
+        keys = {key: _name_and_unit(key) for key in data}
+        known = {item.name: item.metadata for item in fields(cls)}
+        try:
+            checks.check_names("key", [name for name, _ in keys.values()], known)
+        except ValueError as error:
+            problems.append(str(error))
         for key, value in data.items():
+            name, unit = keys[key]
+            if name not in known:
+                continue
             try:
-                name, factor = _field(key)
+                factor = _factor(name, unit, known[name])
                 values[name] = value if factor == 1 else factor * checks.number(key, value)
             except ValueError as error:
                 problems.append(str(error))
@@ -263,18 +272,20 @@ class Drive(Parametric):
         return 1 - forward, 1 / backward - 1
 
 
-def _field(key: str) -> tuple[str, float]:
-    """Return name and factor to SI units of a key such as `lead [mm]`."""
+def _name_and_unit(key: str) -> tuple[str, str | None]:
+    """Return name and unit of a key such as `lead [mm]`."""
     match = fullmatch(r"\s*(\w+)\s*(?:\[(.*)\])?\s*", key)
-    name, unit = (match[1], match[2]) if match else (key, None)
-    known = {item.name: item.metadata for item in fields(Drive)}
-    checks.check_names("key", [name], known)
-    wanted = known[name].get("quantity", known[name].get("unit", "1"))
+    return (match[1], match[2]) if match else (key, None)
+
+
+def _factor(name: str, unit: str | None, known: Mapping[str, Any]) -> float:
+    """Return the factor from the unit of a key to SI units."""
+    wanted = known.get("quantity", known.get("unit", "1"))
     if wanted == "1" and unit is None:
-        return name, 1.0
+        return 1.0
     both = (wanted, units.turned(wanted)) if name in OF_LOAD else (wanted,)
     meant = units.parsed(unit or "?")
     if meant is None or meant.si not in [found.si for one in both if (found := units.parsed(one))]:
         such = f'a unit of {wanted} in its key, such as "{name} [{wanted}]"'
         raise ValueError(f"{name}: expected {such}, got {unit or 'none'}")
-    return name, meant.factor
+    return meant.factor

@@ -169,7 +169,8 @@ def test_the_table_and_the_figure_show_every_joint(fit, tmp_path):
     assert (tmp_path / "fit.png").stat().st_size > 1000
 
 
-def test_a_resting_joint_is_named_and_costs_only_its_own_rows():
+@pytest.mark.parametrize("noise", [0.0, 1e-8, 1e-6])
+def test_a_resting_joint_is_named_and_costs_only_its_own_rows(noise):
     t = np.arange(2500) / 250.0
     q, v, a = waves(0, t)
     q[:, 2], v[:, 2], a[:, 2] = 0.2, 0.0, 0.0
@@ -177,7 +178,8 @@ def test_a_resting_joint_is_named_and_costs_only_its_own_rows():
     tau = (
         newton_euler(q, v, a) + COULOMB * np.sign(v) + VISCOUS * v + 0.05 * rng.normal(size=q.shape)
     )
-    data = log(slide=q[:, 2], **{f"{n}_torque": y for n, y in zip(NAMES, tau.T, strict=True)})
+    slide = q[:, 2] + noise * rng.normal(size=t.size)
+    data = log(slide=slide, **{f"{n}_torque": y for n, y in zip(NAMES, tau.T, strict=True)})
     seen = robot_information(urdf(), data)
     assert seen.resting == ("slide",)
     assert seen.rank < seen.total
@@ -185,6 +187,7 @@ def test_a_resting_joint_is_named_and_costs_only_its_own_rows():
     found = identify_robot(urdf(), data)
     assert "slide" not in found.friction
     assert found.friction["elbow"]["mu_d"].value == pytest.approx(COULOMB[1], rel=0.05)
+    assert all(np.abs(one.predicted).max() < 5 * np.abs(tau).max() for one in found.series)
 
 
 def test_what_is_said_about_parameters_holds_for_short_and_small_motions():
@@ -203,6 +206,16 @@ def test_what_is_said_about_parameters_holds_for_short_and_small_motions():
         assert np.all(np.abs(x - base.values)[~loose] < base.scales[~loose])
         near = base.K @ np.array(found.inertial) - 1.3 * base.values
         assert np.all(np.abs(near)[loose] < base.scales[loose])
+
+
+def test_motion_in_one_direction_has_a_sentence_and_no_levels():
+    data = log(1, 5.0, rate=1000.0).between(3.0, 3.5)
+    v = np.diff([data[0][name] for name in NAMES], axis=1)
+    assert np.all(np.abs(np.sign(v).sum(axis=1)) == v.shape[1])
+    seen = robot_information(urdf(), data)
+    assert any(f"offset of {', '.join(NAMES)} are not separable" in s for s in seen.sentences)
+    found = identify_robot(urdf(), data).friction
+    assert all(own[key].low is None for own in found.values() for key in ("mu_d", "offset"))
 
 
 def test_only_rows_of_the_reversing_joint_are_left_out(fit):
@@ -297,6 +310,10 @@ BAD = {
     "another robot": (strange, "robot other than 'crane'"),
     "rest": (lambda: columns(resting), "joints that move, got .* where all rest"),
     "short": (lambda: log(duration=0.3), "expected at least 10 equations"),
+    "one way": (
+        lambda: log(1, 5.0, 1000.0, 5.0).between(3.0, 3.4),
+        "no joint reverses; record for longer",
+    ),
 }
 
 
@@ -305,6 +322,21 @@ def test_bad_logs(case):
     make, message = BAD[case]
     with pytest.raises(ValueError, match=message):
         identify_robot(urdf(), make())
+
+
+@pytest.mark.parametrize("joint", NAMES[:2])
+def test_of_two_joints_the_one_with_the_other_sign_is_named(joint):
+    two = urdf().replace('type="prismatic"', 'type="fixed"')
+    t = np.arange(1500) / 250.0
+    q, v, a = (y[:, :2] for y in waves(0, t))
+    tau = RobotModel.read(two).torques(q, v, a) + COULOMB[:2] * np.sign(v) + VISCOUS[:2] * v
+    tau += 0.05 * np.random.default_rng(0).normal(size=q.shape)
+    tau[:, NAMES.index(joint)] *= -1
+    columns = {name: q[:, k] for k, name in enumerate(NAMES[:2])}
+    columns |= {f"{name}_torque": tau[:, k] for k, name in enumerate(NAMES[:2])}
+    units = {name: "N m" if "torque" in name else "rad" for name in columns}
+    with pytest.raises(ValueError, match=f"got that of {joint} with the other sign"):
+        identify_robot(two, Dataset.of({"t": t, **columns}, units=units))
 
 
 def test_bad_robots_and_laws():

@@ -173,3 +173,4 @@ def test_a_robot_is_identified_from_its_urdf_and_logs(symfric) -> None:
         assert abs(estimate["value"] - level) < 4 * estimate["standard_error"]
     assert 'damping="9"' not in Path("new.urdf").read_text()
     assert "other sign" in symfric(f"{line} --scale slide_torque=-1", 2).err
+    assert "expected no --drive" in symfric(f"{line} --drive axis.toml", 2).err

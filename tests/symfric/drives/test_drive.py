@@ -114,8 +114,9 @@ def test_wrong_values_are_refused(given: dict[str, float], message: str) -> None
 
 def test_all_problems_of_a_file_are_in_one_sentence(tmp_path: Path) -> None:
     path = tmp_path / "drive.toml"
-    path.write_text('torque_constant = 1\ngear_ration = 3\n"lead [N]" = 2\n')
-    with pytest.raises(ValueError, match="did you mean gear_ratio") as error:
+    path.write_text('torque_constant = 1\ngear_ration = 3\ndiameter = 1\n"lead [N]" = 2\n')
+    both = "got gear_ration, diameter; did you mean gear_ratio"
+    with pytest.raises(ValueError, match=both) as error:
         Drive.read(path)
     for part in (r'such as "torque_constant [N m/A]", got none', 'such as "lead [m]", got N'):
         assert part in str(error.value)
