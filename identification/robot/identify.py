@@ -158,7 +158,6 @@ def robot_information(
 def _prepared(
     urdf: str | Path, data: Dataset, law: LawLike, rotors: bool, filter: Filter | None
 ) -> _Prepared:
-    checks.kind(f"{WHERE}: data", data, Dataset, "a Dataset")
     model = RobotModel.read(urdf)
     moved = motions(model, data, filter)
     base = base_of(model, rotors)
