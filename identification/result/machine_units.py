@@ -62,8 +62,7 @@ def sides_of(data: Dataset, estimates: Mapping[str, Estimate]) -> Iterator[Sides
     every = {n: e for n, e in estimates.items() if not (e.nuisance or e.fixed)}
     if "m" in every and rotor > 0:
         m = every["m"]
-        error = m.standard_error
-        every[ALONE] = Estimate(m.value - rotor, m.unit, error)
+        every[ALONE] = Estimate(m.value - rotor, m.unit, m.standard_error)
     for name, e in every.items():
         if (found := AT_MOTOR.get(e.unit) or AT_MOTOR.get(turned(e.unit))) is None:
             continue

@@ -55,8 +55,6 @@ class Excitation:
         period: T [s].
         coefficients: c, a_1 ... a_H, b_1 ... b_H of each joint, shape (n, 1 + 2 H).
         condition: condition number of the scaled regressor.
-        gain: information relative to the best random motion, as the factor by which standard
-            errors decrease on average (geometric mean).
     """
 
     joints: tuple[str, ...]
@@ -64,7 +62,6 @@ class Excitation:
     period: float
     coefficients: Array
     condition: float
-    gain: float
 
     __repr__ = brief
 
@@ -143,13 +140,10 @@ def excitation(
     limits = [MARGIN * share * limit for limit in (*limits, model.limits("effort"))]
     task = _Task(model, (low + high) / 2, limits, _rows(model, limits), period, H)
     guess = task.guess(seed, np.linspace(0.0, period, SAMPLES * H, endpoint=False))
-    better = task.improved(guess)
-    chosen = task.inside(better, np.linspace(0.0, period, 4 * SAMPLES * H))
+    chosen = task.inside(task.improved(guess), np.linspace(0.0, period, 4 * SAMPLES * H))
     columns = task.columns(chosen)
-    more = _information(columns) - _information(task.columns(guess))
     condition = float(np.linalg.cond(columns / _sizes(columns)))
-    gain = float(np.exp(more / (2 * columns.shape[1])))
-    return Excitation(model.names, model.units, period, chosen, condition, gain)
+    return Excitation(model.names, model.units, period, chosen, condition)
 
 
 class _Task(NamedTuple):

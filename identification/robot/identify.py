@@ -128,7 +128,7 @@ def identify_robot(
     is_text = isinstance(urdf, str) and urdf.lstrip().startswith("<")
     return RobotFit(
         name=model.urdf.name,
-        urdf=str(urdf) if is_text else Path(urdf).read_text(encoding="utf-8"),
+        urdf=str(urdf) if is_text else Path(urdf).read_text(encoding="utf-8-sig"),
         joints=model.names,
         laws={law.joint: law_name(law.law) for law in made.laws},
         **_estimates(made, found, cover),
@@ -139,7 +139,10 @@ def identify_robot(
         validation=errors,
         training=training,
         consistent=physical,
-        findings=(*_findings(made, training, physical), *_rotors_missing(made, found, method)),
+        findings=(
+            *_findings(made, training, physical),
+            *_rotors_missing(made, found, training, method),
+        ),
         series=_series(made, found),
         held=held,
     )
@@ -158,7 +161,6 @@ def robot_information(
 def _prepared(
     urdf: str | Path, data: Dataset, law: LawLike, rotors: bool, filter: Filter | None
 ) -> _Prepared:
-    checks.kind(f"{WHERE}: data", data, Dataset, "a Dataset")
     model = RobotModel.read(urdf)
     moved = motions(model, data, filter)
     base = base_of(model, rotors)
@@ -166,11 +168,11 @@ def _prepared(
     speeds = np.sqrt(np.mean(np.vstack([one.v for one in moved]) ** 2, axis=0))
     usual, laws = laws_of(model, USUAL, speeds), laws_of(model, law, speeds)
     seen = seen_in(equations, base, usual)
-    told = information(model, moved, base, equations, seen, rotors)
+    info = information(model, moved, base, equations, seen, rotors)
     equations = seen.without_faint(equations, base)
     if not all(one.linear for one in laws):
         laws = _started(model, equations, base, usual, laws)
-    return _Prepared(model, base, moved, equations, laws, rotors, told)
+    return _Prepared(model, base, moved, equations, laws, rotors, info)
 
 
 def _started(
@@ -335,10 +337,11 @@ def _findings(
         )
 
 
-def _rotors_missing(made: _Prepared, found: Estimated, method: str) -> Iterator[str]:
+def _rotors_missing(
+    made: _Prepared, found: Estimated, training: Mapping[str, TorqueError], method: str
+) -> Iterator[str]:
     """Yield a message if rotor inertias reduce large errors."""
-    before = _errors(made, found.x, made.equations)
-    if made.rotors or max(error.percent for error in before.values()) < POOR:
+    if made.rotors or max(error.percent for error in training.values()) < POOR:
         return
     base = base_of(made.model, rotors=True)
     equations = Equations.of(made.model, made.motions, base, rotors=True)

@@ -6,7 +6,8 @@ combination of singular value d in
     sigma^-1 Y_1 diag(s) = U D V',
 
 after offsets and friction are projected out, has the standard error 1 / d relative to its scale. It
-is determined if this is below one half.
+is determined if this is below one half. Above 10, it does not enter the fit: noise of the torques
+and errors of the model would move it far from the file.
 """
 
 from collections.abc import Sequence

@@ -19,6 +19,7 @@ from identification.data.differentiate import Velocity, derivatives, uncertain
 from identification.data.filters import Decimation, Filter, rounded_level, spectrum
 from identification.data.record import Array, Record
 from identification.robot.dynamics import WHERE, RobotModel
+from symfric.foundation import checks
 from symfric.foundation.shown import brief
 
 POSITIONS = ("{}", "q_{}", "{}_position", "{}_pos", "{}_angle")
@@ -90,7 +91,7 @@ def channels(model: RobotModel, record: Record) -> list[Channels]:
 
 
 def problems(model: RobotModel, record: Record) -> Iterator[str]:
-    """Yield messages about missing columns, other units, positions in degrees or millimetres."""
+    """Yield messages about missing or constant columns and about other units."""
     found, where = channels(model, record), f"data '{record.name}'"
     every = [*zip(found, model.names, model.units, model.forces, strict=True)]
     missing = [f"{joint} [{unit}]" for c, joint, unit, _ in every if c.position is None]
@@ -108,7 +109,10 @@ def problems(model: RobotModel, record: Record) -> Iterator[str]:
         for channel, wanted in ((name, unit), (c.torque or joint, force)):
             if record.unit(channel) not in ("", wanted):
                 yield f"{where}: column {channel}: expected {wanted}, got {record.unit(channel)}"
-        q, (factor, other) = record[name], MISTAKES[unit]
+        q, tau, (factor, other) = record[name], record[c.torque or ""], MISTAKES[unit]
+        if np.ptp(q) > 0 and np.ptp(tau) == 0:
+            such = "torques that change while the joint moves"
+            yield f"{where}: column {c.torque}: expected {such}, got {tau[0]:g} in every row"
         span, ends = high[k] - low[k], (float(q.min()), float(q.max()))
         span = span if np.isfinite(span) else UNLIMITED
         if ends[1] - ends[0] > 1.5 * span:
@@ -134,24 +138,15 @@ def motions(model: RobotModel, data: Dataset, filter: Filter | None) -> tuple[Ro
         ValueError: see `problems`; unequal intervals, records shorter than the filter, or no joint
             moves.
     """
+    checks.kind(f"{WHERE}: data", data, Dataset, "a Dataset")
+    if filter is not None:
+        checks.kind(f"{WHERE}: filter", filter, Filter, "a filter, such as Filter(10.0)")
     if wrong := [text for record in data for text in problems(model, record)]:
         raise ValueError(f"{WHERE}: " + "; ".join(wrong))
     found = tuple(_motion(model, record.uniform(), filter) for record in data)
     if not any(one.moves.any() for one in found):
         raise ValueError(f"{WHERE}: expected joints that move, got '{data.name}', where all rest")
     return found
-
-
-Signals = tuple[Array, Array | None, Array]
-"""Position, velocity if measured, and torque of a joint."""
-
-
-def _signals(model: RobotModel, record: Record) -> list[Signals]:
-    """Return the signals of each joint."""
-    return [
-        (record[q or ""], None if v is None else record[v], record[tau or ""])
-        for q, v, tau in channels(model, record)
-    ]
 
 
 def _cutoff(q: Array, v: Array | None, mixer: Velocity, step: float) -> float | None:
@@ -166,7 +161,10 @@ def _cutoff(q: Array, v: Array | None, mixer: Velocity, step: float) -> float | 
 
 def _motion(model: RobotModel, record: Record, filter: Filter | None) -> RobotMotion:
     step = record.step
-    signals = _signals(model, record)
+    signals = [
+        (record[q or ""], None if v is None else record[v], record[tau or ""])
+        for q, v, tau in channels(model, record)
+    ]
     mixers = [Velocity.of(q, v, step) for q, v, _ in signals]
     if filter is None:
         pairs = zip(signals, mixers, strict=True)

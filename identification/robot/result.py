@@ -114,10 +114,11 @@ class RobotFit(Showing):
 
     def shown(self) -> Shown:
         """Return friction with half the width of 95 % intervals, and errors, of each joint."""
-        names = list(dict.fromkeys(n for own in self.friction.values() for n in own))
+        every = dict.fromkeys(n for own in self.friction.values() for n in own)
+        names = sorted(every, key=lambda name: name == OFFSET)
         each = [{own[n].unit for own in self.friction.values() if n in own} for n in names]
         units = [f" [{', '.join(sorted(unit))}]" for unit in each]
-        error = f"error{units[names.index(OFFSET)] if names else ''}"
+        error = f"error{units[-1] if units else ''}"
         header = ("joint", *map("".join, zip(names, units, strict=True)), error, "of the torque")
         rows = list[tuple[str, ...]]()
         for joint in self.joints:
@@ -158,6 +159,10 @@ class RobotFit(Showing):
             q, qd, qdd: motion in the order of `joints`, shape (N, n) each.
         """
         q, qd, qdd = (np.asarray(y, dtype=float) for y in (q, qd, qdd))
+        if not q.shape == qd.shape == qdd.shape == (q.size // len(self.joints), len(self.joints)):
+            such = f"q, qd and qdd of shape (N, {len(self.joints)})"
+            got = f"{q.shape}, {qd.shape} and {qdd.shape}"
+            raise ValueError(f"torques: expected {such}, got {got}")
         tau = self.model.torques(q, qd, qdd, np.array(self.inertial))
         for k, joint in enumerate(self.joints):
             tau[:, k] += self.rotors.get(joint, 0.0) * qdd[:, k] + self.offsets.get(joint, 0.0)

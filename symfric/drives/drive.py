@@ -43,9 +43,9 @@ class Drive(Parametric):
 
         phi = eta_f F_m  if F_m v > 0,   F_m / eta_b  if F_m v < 0,   F_m  at rest
 
-    At |v| below `speed_width` the loss rises smoothly (C2) from zero at rest; |F_m| is rounded over
-    `force_width`. Both are widths at the load, so that gear ratio and torque constant do not change
-    the motion of a load under F_m. For efficiencies of 1, phi = F_m without smoothing.
+    The loss rises smoothly (C2) from zero at rest to its value at `speed_width`; |F_m| is rounded
+    over `force_width`. Both are widths at the load, so that gear ratio and torque constant do not
+    change the motion of a load under F_m. Efficiencies of 1 give phi = F_m without smoothing.
 
     Limits: the losses are those of the torque of the windings. The torque that accelerates the
     rotor does not pass the gear, so that the loss is off by up to (1 - eta) m_r |a|. A gear that

@@ -4,12 +4,12 @@ The input force F of a model is replaced by that of a drive,
 
     F = phi(F_m, v) - m_r a,   F_m = ratio torque_constant clip(i, +-limit)
 
-In explicit equations the acceleration is a = alpha + beta F, which gives
+The acceleration of explicit equations is a = alpha + beta F, which gives
 
     a = (alpha + beta phi) / (1 + beta m_r)
 
-In the equations of a mechanism, M a - g F = ..., the velocity is v = g' q', and the acceleration of
-the balance replaces a.
+A mechanism, M a - g F = ..., has the velocity v = g' q', and the acceleration of its balance
+replaces a.
 """
 
 from collections.abc import Callable, Mapping
@@ -60,8 +60,8 @@ def driven(
     integral(lambda s: s.copper_loss) is its cost. Drives of several joints are added one by one,
     each with a name.
 
-    In the energy balance of a mechanism, the work of the actuator is that of the motor, the losses
-    of the gear are "gear", and the kinetic energy includes the rotor.
+    The energy balance of a mechanism has the work of the motor as that of the actuator, and the
+    losses of the gear as "gear"; the kinetic energy includes the rotor.
 
     Args:
         model: explicit model, or model of a mechanism, in which the force is an input.

@@ -308,6 +308,10 @@ BAD = {
     "millimetres": (lambda: columns(scaled("slide", 1e3)), r"is it in mm\?.*slide=mm"),
     "missing": (lambda: log(elbow=None), r"expected columns elbow \[rad\], got"),
     "another robot": (strange, "robot other than 'crane'"),
+    "no torque": (
+        lambda: log(elbow_torque=0 * log()[0].time),
+        "elbow_torque: expected torques that change",
+    ),
     "rest": (lambda: columns(resting), "joints that move, got .* where all rest"),
     "short": (lambda: log(duration=0.3), "expected at least 10 equations"),
     "one way": (
@@ -347,6 +351,17 @@ def test_bad_robots_and_laws():
         ValueError, match="expected a law without states, got lugre; fit it afterwards"
     ):
         identify_robot(urdf(), log(), "lugre")
+
+
+def test_bad_arguments(fit):
+    with pytest.raises(ValueError, match=r"data: expected a Dataset, got 'log\.csv'"):
+        identify_robot(urdf(), log(duration=2.0), validation="log.csv")
+    with pytest.raises(ValueError, match=r"filter: expected a filter, such as Filter\(10.0\)"):
+        identify_robot(urdf(), log(duration=2.0), filter=10.0)
+    with pytest.raises(ValueError, match=r"shape \(N, 3\), got \(5, 2\), \(5, 2\) and \(5, 2\)"):
+        fit.torques(*np.zeros((3, 5, 2)))
+    with pytest.raises(ValueError, match=r"shape \(N, 3\), got \(3,\)"):
+        fit.torques(*np.zeros((3, 3)))
 
 
 def test_unordered_times_name_the_row():
