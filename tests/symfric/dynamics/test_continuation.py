@@ -6,6 +6,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from hunting import hunting
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -134,13 +135,8 @@ def test_the_fold_of_the_smooth_belt_is_that_of_auto() -> None:
 
 @pytest.mark.slow
 def test_a_fold_does_not_depend_on_range_and_step() -> None:
-    x, v, e = Variable("x", "m", start=0.05), Variable("v", "m/s"), Variable("e", "m s")
-    k_d = Variable("k_d", "N s/m", start=3.0)
     law = ExactCoulomb(mu_s=0.3, mu_d=0.1, v_s=0.05, form="stribeck")
-    force = -60 * x - k_d * v - 25 * e
-    guide = contact("guide", law, v.symbol, 9.81, {"v": 0.0}, F_e=force)
-    ode = ca.vertcat(v.symbol, force - guide.force, x.symbol)
-    model = Model("axis", x=(x, v, e), p=(k_d,), ode=ode, contacts=(guide,))
+    model = hunting(law, Variable("k_d", "N s/m", start=3.0), 25.0)
     orbit = periodic_orbit(model, simulate(model, 150.0))
     branches = [
         continuation(orbit, "k_d", (2.0, high), step=step)

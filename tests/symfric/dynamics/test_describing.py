@@ -6,11 +6,12 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from hunting import hunting
 from scipy.integrate import quad, solve_ivp
 
 from symfric import ExactCoulomb, LuGre, Model, Variable, contact, drive, rabinowicz, simulate
 from symfric.dynamics import describing_function, harmonic_balance, periodic_orbit
-from symfric.laws import ALL_LAWS, Coulomb, Dahl, Law, MaxwellSlip, Stribeck, Viscous, Wojewoda
+from symfric.laws import ALL_LAWS, Coulomb, Dahl, MaxwellSlip, Stribeck, Viscous, Wojewoda
 from symfric.laws.base.law import FORCE
 
 
@@ -101,15 +102,6 @@ def test_every_law_dissipates_and_tends_to_its_sliding_force() -> None:
         assert (found.real > -1e-12).all(), name
 
 
-def loop(law: Law, k_d: float, k_i: float, k_p: float = 60.0) -> Model:
-    """Mass of 1 kg under PID control with friction; the target is 0.2 m."""
-    x, v, e = Variable("x", "m"), Variable("v", "m/s"), Variable("e", "m s")
-    pull = -k_p * (x - 0.2) - k_d * v - k_i * e
-    guide = contact("guide", law, v.symbol, 9.81, {"v": 0.0}, F_e=pull)
-    rates = ca.vertcat(v.symbol, pull - guide.force, x.symbol - 0.2)
-    return Model("loop", x=(x, v, e), ode=rates, contacts=(guide,))
-
-
 def test_the_balance_of_coulomb_friction_has_its_closed_form() -> None:
     # i w (k_p - w^2) - (k_d + n) w^2 + k_i = 0: w^2 = k_p and n = k_i / k_p - k_d
     for k_d, k_i, k_p, mu in (
@@ -117,7 +109,7 @@ def test_the_balance_of_coulomb_friction_has_its_closed_form() -> None:
         (1.0, 40.0, 20.0, 0.3),
         (0.1, 30.0, 90.0, 0.2),
     ):
-        machine = loop(ExactCoulomb(mu_s=1.5 * mu, mu_d=mu), k_d, k_i, k_p)
+        machine = hunting(ExactCoulomb(mu_s=1.5 * mu, mu_d=mu), k_d, k_i, k_p, target=0.2)
         (one,) = harmonic_balance(machine, (1e-3, 50.0), (0.5, 30.0))
         speed = 4 * mu * 9.81 / (np.pi * (k_i / k_p - k_d))
         assert one.speed == pytest.approx(speed, rel=1e-6)
@@ -130,7 +122,7 @@ def test_the_balance_of_coulomb_friction_has_its_closed_form() -> None:
 def test_the_balance_is_near_the_exact_orbit_and_nearer_at_larger_motions() -> None:
     law, errors = ExactCoulomb(mu_s=0.1, mu_d=0.1), list[float]()
     for k_i in (90.0, 50.0):
-        (one,) = harmonic_balance(loop(law, 0.5, k_i), (0.1, 20.0), (4.0, 15.0))
+        (one,) = harmonic_balance(hunting(law, 0.5, k_i, target=0.2), (0.1, 20.0), (4.0, 15.0))
         orbit = one.orbit()
         assert orbit.stable is False
         errors.append(abs(one.period / orbit.period - 1))
@@ -142,7 +134,7 @@ def test_the_balance_is_near_the_exact_orbit_and_nearer_at_larger_motions() -> N
 @pytest.mark.slow
 def test_bristles_keep_the_balance_near_the_orbit() -> None:
     law = LuGre(mu_s=0.3, mu_d=0.1, sigma_0=1e3, sigma_1=30.0, v_s=0.05)
-    (one,) = harmonic_balance(loop(law, 0.5, 80.0), (0.3, 6.0), (4.0, 15.0))
+    (one,) = harmonic_balance(hunting(law, 0.5, 80.0, target=0.2), (0.3, 6.0), (4.0, 15.0))
     orbit = one.orbit()
     assert one.value.imag > 1e-3
     assert one.period == pytest.approx(orbit.period, rel=0.01)
@@ -150,7 +142,7 @@ def test_bristles_keep_the_balance_near_the_orbit() -> None:
 
 
 def test_hunting_by_static_friction_is_not_predicted() -> None:
-    machine = loop(ExactCoulomb(mu_s=0.3, mu_d=0.1), 3.0, 25.0)
+    machine = hunting(ExactCoulomb(mu_s=0.3, mu_d=0.1), 3.0, 25.0, target=0.2)
     orbit = periodic_orbit(machine, simulate(machine, 100.0))
     assert orbit.stable and "stick" in orbit.events
     assert harmonic_balance(machine, (1e-4, 10.0), (0.05, 30.0)) == ()
@@ -163,7 +155,9 @@ def test_pictures_and_descriptions_name_units(tmp_path: Path) -> None:
     single = describing_function(Coulomb(), [1e-5, 1e-3], [1.0]).plot(tmp_path / "one.png")
     assert single.axes[1].get_xlabel() == "amplitude of the velocity [m/s]"
     assert (tmp_path / "over_frequency.png").exists()
-    (one,) = harmonic_balance(loop(ExactCoulomb(), 0.5, 80.0), (0.1, 9.0), (4.0, 15.0))
+    (one,) = harmonic_balance(
+        hunting(ExactCoulomb(), 0.5, 80.0, target=0.2), (0.1, 9.0), (4.0, 15.0)
+    )
     assert "period" in repr(one) and "m s" in repr(one)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 import pytest
+from hunting import hunting
 
 from symfric import ExactCoulomb, LuGre, Model, Variable, contact, drive, rabinowicz, simulate
 from symfric.dynamics import equilibrium, linearize, periodic_orbit
@@ -54,15 +55,6 @@ def test_an_unstable_orbit_is_found_from_an_orbit_next_to_it() -> None:
     assert orbit.stable is False
     assert orbit.multipliers[0] == pytest.approx(np.exp(0.4 * np.pi), rel=1e-8)
     assert orbit.x["x"] ** 2 + orbit.x["y"] ** 2 == pytest.approx(1.0, rel=1e-9)
-
-
-def hunting(law: object, kd: float, ki: float) -> Model:
-    """Mass under PID control with friction."""
-    x, v, e = Variable("x", "m", start=0.05), Variable("v", "m/s"), Variable("e", "m s")
-    pull = -60 * x - kd * v - ki * e
-    guide = contact("guide", law, v.symbol, 9.81, {"v": 0.0}, F_e=pull)
-    rates = ca.vertcat(v.symbol, pull - guide.force, x.symbol)
-    return Model("hunting", x=(x, v, e), ode=rates, contacts=(guide,))
 
 
 def test_a_hunting_drive_has_a_symmetric_orbit() -> None:
