@@ -45,7 +45,7 @@ def continuation(
         start: isolated equilibrium, or a periodic orbit whose period is not given. Neither is
             symmetric.
         parameter: name of a free parameter of the model.
-        between: smallest and largest value of the parameter.
+        between: smallest and largest value of the parameter, within its bounds.
         points: largest number of points.
         step: longest step, relative to the magnitudes of states, period and range of the parameter.
         rtol: relative tolerance of the runs of orbits.
@@ -62,7 +62,7 @@ def continuation(
     model = start.model
     hint = f"free it when the model is made, such as rabinowicz(law, free=['{parameter}'])"
     check_names(f"{where}: parameter", [parameter], [v.name for v in model.p], hint)
-    span = _span(where, between, start.p[parameter], parameter)
+    span = _span(where, model, between, start.p[parameter], parameter)
     checks.count(f"{where}: points", points, least=2)
     checks.number(f"{where}: step", step, above=0.0, upper=1.0)
     if isinstance(start, PeriodicOrbit):
@@ -108,7 +108,7 @@ def orbits_from(
     where, model = "orbits_from", branch.model
     if not isinstance(hopf, Special) or hopf.kind != "Hopf":  # pyright: ignore[reportUnnecessaryIsInstance]
         raise checks.refused(f"{where}: hopf", "a Hopf point, branch.located('Hopf')[0]", hopf)
-    span = _span(where, between, hopf.value, branch.parameter)
+    span = _span(where, model, between, hopf.value, branch.parameter)
     nominal = np.maximum(model.nominal("x"), np.abs(hopf.x))
     problem = Shooting(
         model, branch.u, (branch.parameter,), nominal, np.ones(nominal.size), rtol, driven=False
@@ -124,7 +124,10 @@ def orbits_from(
     return _joined(model, branch.parameter, branch.u, branch.p, [Trace(), part])
 
 
-def _span(where: str, between: tuple[float, float], value: float, name: str) -> tuple[float, float]:
+def _span(
+    where: str, model: Model, between: tuple[float, float], value: float, name: str
+) -> tuple[float, float]:
+    """Return the range of a parameter, which contains `value` and is within its bounds."""
     ends = checks.array(f"{where}: between", between, what="two numbers")
     if ends.size != 2:
         raise checks.refused(f"{where}: between", "two numbers", between)
@@ -134,6 +137,8 @@ def _span(where: str, between: tuple[float, float], value: float, name: str) -> 
             f"{where}: between: expected a range that contains the start, {name} = {value:g}, got "
             f"{low:g} ... {high:g}"
         )
+    for end in (low, high):
+        model.values("p", {name: end})
     return low, high
 
 

@@ -309,11 +309,13 @@ def test_what_has_no_branch_is_refused() -> None:
         ode=ca.vertcat(v.symbol, -k * x - c.force),
     )  # fmt: skip
     rest = continuation(at, "v_b", (0.7, 0.9), points=6)
+    heavy = equilibrium(rabinowicz(EXACT, free=["m"]))
     for call, text in {
         lambda: continuation(at, "v", (0.1, 1.0)): "expected one of v_b, got v",
         lambda: continuation(at, "v_b", (0.1, 0.5)): "contains the start, v_b = 0.8",
         lambda: continuation(at, "v_b", (0.9, 0.5)): "contains the start",
         lambda: continuation(at, "v_b", (0.5,)): "between",
+        lambda: continuation(heavy, "m", (-1.0, 2.0)): r"m: expected a number > 0 \[kg\], got -1",
         lambda: continuation(at, "v_b", (0.5, 0.9), points=1): "points",
         lambda: continuation(at, "v_b", (0.5, 0.9), step=0.0): "step",
         lambda: continuation(model, "v_b", (0.5, 0.9)): "an equilibrium or a periodic orbit",
