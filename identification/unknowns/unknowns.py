@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 DECADES = 6.0
 """Decades from the start beyond which the solver ignores a bound of a logarithmic value, because
-its steps depend on distant bounds, too. The law still checks the bound.
+its steps also depend on distant bounds. The law still checks the bound.
 """
 VANISHED = 12.0 * float(np.log(10.0))
 """Logarithmic distance from the start at which a value that tends to zero or infinity is treated as
@@ -60,7 +60,7 @@ class Coordinate:
         inverse: (p, q) -> w.
         lower, upper: bounds of w.
         floor, ceiling: coordinates beyond which p counts as zero or infinite. The search does not
-            use them, because its steps depend on distant bounds, too.
+            use them, because its steps also depend on distant bounds.
     """
 
     value: Callable[[Any, Any], Any]

@@ -7,7 +7,7 @@ removes the remaining violation; its multipliers mu, nu are additional unknowns:
     v_(k+1) = v_end + phi_q' nu,   phi_q v_(k+1) + phi_t = 0
 
 phi_q is evaluated at q_end, so each node is an explicit function of the preceding interval.
-The user may prescribe dependent coordinates, too. Those that follow from the others are released,
+The user may also prescribe dependent coordinates. Those that follow from the others are released,
 so that no condition is redundant.
 
 Source: Gear, Leimkuhler and Gupta, J. Comput. Appl. Math. 12/13, 1985, 77-90 (constraints on two

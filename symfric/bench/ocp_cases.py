@@ -172,7 +172,7 @@ def _cart(cart: float, bob: float, length: float, damping: float = 0.0) -> Rate:
 
 
 def _spring(guided: bool) -> Rate:
-    """Return the rates of motor and load: x, X, x', X'; a guided motor has friction, too."""
+    """Return the rates of motor and load: x, X, x', X'; a guided motor also has friction."""
 
     def rate(m: Any, x: Sequence[Any], u: Any, F: Sequence[Any]) -> list[Any]:
         spring = 200.0 * (x[0] - x[1]) + 2.0 * (x[2] - x[3])

@@ -188,7 +188,7 @@ def stress(
 
     Half of the cases use ten laws and six scenes that have an independent implementation, solved by
     SciPy at 1e-10; the others are compared with other methods at smaller tolerances. Parameters,
-    tolerances, methods, inputs and start values are random, too. A case is right, refused, loose,
+    tolerances, methods, inputs and start values are also random. A case is right, refused, loose,
     undecided, silently wrong, not finite, a crash or a hang. The last four classes are failures:
     these cases are saved, and the exit status is 1. The files are updated every minute.
 

@@ -185,7 +185,7 @@ def show_scene(found: dict[str, Any]) -> None:
         for state, rate in found["integrals"].items() if part == "inputs" else ():
             output.show(f"--input {state}=FILE.csv:COLUMN gives {rate} as the rate of {state}.\n")
     if found["law"] is None:
-        output.show("--law NAME shows the parameters of a law in it, too.")
+        output.show("--law NAME also shows the parameters of a law in it.")
 
 
 def _cell(entry: dict[str, Any], key: str) -> Any:

@@ -80,7 +80,7 @@ def _column(where: str, value: Any) -> None:
 
 
 def contact_problems(model: System) -> list[str]:
-    """Return a message about states of contacts that are listed as states of the model, too."""
+    """Return a message about states of contacts that the model lists as its own."""
     own = {v.symbol.element_hash() for v in (*model.x, *model.z)}
     both = [v.name for c in model.contacts for v in c.states if v.symbol.element_hash() in own]
     if not both:

@@ -151,7 +151,7 @@ def campaign(
 
 
 def rerun(case: Case, limit: float = LIMIT) -> Verdict:
-    """Judge one case in a separate process, so that a crash is a verdict, too."""
+    """Judge one case in a separate process, so that a crash is also a verdict."""
     ((_, outcome),) = outcomes(_judged, [(0, (case, WORK))], 1, limit)
     return _verdict(outcome)
 

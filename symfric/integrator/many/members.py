@@ -58,7 +58,7 @@ class Stretch:
         h_min: smallest step of each member [s], shape (members,).
         times: times of the results [s], shape (members or 1, n); results after the end are NaN.
         max_steps: largest number of attempts of a member, including those of earlier runs.
-        follow: True if algebraic unknowns have to be updated to the data at the start, too.
+        follow: True if algebraic unknowns also have to be updated to the data at the start.
     """
 
     breaks: Array

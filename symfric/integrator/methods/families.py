@@ -350,7 +350,7 @@ def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
 
     They are the weights of the rate in the end value and in the mean of a solution of
     dz/dt = a + b z over a step: z(h) = z + h phi1(b h) dz/dt, mean z = z + h phi2(b h) dz/dt.
-    Values and derivatives are correct at zero, too. Far below zero, exp is 0; its error is one unit
+    Values and derivatives are also correct at zero. Far below zero, exp is 0; its error is one unit
     in the last place of 1, not of exp itself.
     """
     near = ca.fabs(x) < SMALL
