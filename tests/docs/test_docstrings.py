@@ -193,6 +193,7 @@ STATIC = (
     "stribeck", "tustin", "lorentzian", "brown_mcphee", "simscape_breakaway", "specker", "benson",
     "andersson", "duan_singh", "berger", "popp_stelter", "makkar_dixon", "self_tuning", "rui_wang",
     "capstan", "steady_state_lugre", "quarter_car_simple", "viscous", "hollars",
+    "mixed_lubrication",
 )  # fmt: skip
 
 
