@@ -68,9 +68,11 @@ def test_warm_oil_moves_the_minimum_and_keeps_its_friction() -> None:
 
     def least(T: float) -> tuple[float, float]:
         warm = sf.TemperatureDependent(lubricated, T=T, k_wet=0.04)
-        found = minimize_scalar(
-            lambda x: float(warm.force(np.exp(x), 50.0)), bounds=(-12, 3), options={"xatol": 1e-9}
-        )
+
+        def force(x: float) -> float:
+            return float(warm.force(np.exp(x), 50.0))
+
+        found = minimize_scalar(force, bounds=(-12, 3), options={"xatol": 1e-9})
         return float(np.exp(found.x)), float(found.fun)
 
     (cold, one), (hot, other) = least(293.15), least(333.15)
