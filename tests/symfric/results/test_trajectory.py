@@ -176,8 +176,9 @@ def test_a_run_prints_how_it_ended_and_the_ranges_of_its_signals(sticking: sf.Tr
     assert text.startswith(
         "run of 'rabinowicz' from 0 to 6 s\nfriction: belt by ExactCoulomb\nSUCC"
     )
+    assert f"), {len(run.happened)} event" in text
     assert "further" not in text, "details are not evaluated for it"
-    assert f"{run.statistics.steps} steps of Rodas5P, {len(run.happened)} event" in text
+    assert f"{run.statistics.steps} steps of Rodas5P ({run.statistics.backend}), " in text
     row = next(line.split() for line in text.splitlines() if line.startswith("  friction"))
     low, high = run.extremes["friction"]
     numbers = (run["friction"][0], run["friction"][-1], low, high)
