@@ -159,8 +159,10 @@ def test_modes_of_a_run_are_whole_numbers_everywhere(name: str, tmp_path: Path) 
 
 @pytest.mark.parametrize("times", [None, np.linspace(0.0, 8.0, 41)])
 def test_modes_of_an_ensemble_are_whole_numbers(times: np.ndarray | None) -> None:
-    starts, how = {"x": np.linspace(0.0, 0.3, 3)}, {"method": "dopri5", "backend": "vm"}
-    study = sf.simulate_many(MODEL["exact"], 8.0, t_eval=times, x0=starts, **how)
+    study = sf.simulate_many(
+        MODEL["exact"], 8.0, t_eval=times, x0={"x": np.linspace(0.0, 0.3, 3)}, method="dopri5",
+        backend="vm",
+    )  # fmt: skip
     assert whole(study.signals["mode"])
     assert whole(study.extremes["mode"])
 
