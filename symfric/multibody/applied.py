@@ -48,7 +48,7 @@ from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Switch
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Variables, kinds
-from symfric.multibody.contact import Contact
+from symfric.multibody.contact import Contact, places_of
 from symfric.multibody.equations import Equations
 from symfric.multibody.joints import Floating
 from symfric.multibody.prepare import Prepared
@@ -232,9 +232,8 @@ class _Maker:
     def refuse(self, contacts: Sequence[Contact], expected: str, advice: str) -> ValueError:
         """Return the error for contacts whose laws cannot stick here."""
         law = type(contacts[0].friction.law).__name__
-        joints = ", ".join(dict.fromkeys(c.place for c in contacts))
         return ValueError(
-            f"{self.where} > {joints} > friction > law: expected {expected}, got {law}, "
+            f"{self.where} > {places_of(contacts)} > friction > law: expected {expected}, got {law}, "
             f"which needs the applied force; {advice}"
         )
 

@@ -4,7 +4,7 @@ Only the contacts of this module apply friction laws to bodies, with the minus s
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, final
 
@@ -66,6 +66,14 @@ class Contact(ABC):
     @abstractmethod
     def normal(self, kin: Kinematics, pressing: Mapping[str, Wrench]) -> ca.SX:
         """Return the normal force [N]; `pressing` is that of `Equations`."""
+
+
+def places_of(contacts: Iterable[Contact]) -> str:
+    """Return the types and names of the parts of several contacts, for messages."""
+    parts: dict[str, dict[str, None]] = {}
+    for contact in contacts:
+        parts.setdefault(contact.kind, {})[f"'{contact.part}'"] = None
+    return " and ".join(f"{kind} {', '.join(names)}" for kind, names in parts.items())
 
 
 @final

@@ -18,6 +18,7 @@ from symfric.model import Model, Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import assemble
 from symfric.multibody.constraints import Constraint
+from symfric.multibody.contact import places_of
 from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Force, Gravity, SpringDamper
 from symfric.multibody.joint import Joint
@@ -340,8 +341,7 @@ def functions(
         if c.N is not c.normal:
             forces = ca.substitute(forces, c.N, c.normal)
     if ca.depends_on(forces, eq.F):
-        pressed = (c.contact.place for c in contacts if ca.depends_on(c.normal, eq.F))
-        names = ", ".join(dict.fromkeys(pressed))
+        names = places_of(c.contact for c in contacts if ca.depends_on(c.normal, eq.F))
         raise ValueError(
             f"{where} > {names} > friction: expected a normal force that does not depend on "
             "friction; use `build` for a model, or a constant normal force"

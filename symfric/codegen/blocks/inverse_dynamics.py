@@ -289,6 +289,10 @@ def _check(eq: Equations, mechanism: Mechanism) -> None:
     everything = ca.veccat(eq.balance, *eq.normals, eq.phi)
     if ca.depends_on(everything, eq.kin.t):
         raise ValueError(f"{where}: expected time-independent forces and constraints, got others")
+    if rubbing := [c.part for c in eq.contacts if not isinstance(c, JointContact)]:
+        raise ValueError(
+            f"{where}: expected couplings without friction, got friction in {', '.join(rubbing)}"
+        )
     if ca.depends_on(stacked(eq.normals), eq.F):
         pressed = [
             c.part for c, N in zip(eq.contacts, eq.normals, strict=True) if ca.depends_on(N, eq.F)

@@ -206,7 +206,7 @@ def test_where_rest_cannot_be_determined_the_joint_is_named() -> None:
     law, named = ExactCoulomb(), "> friction > law: expected one that needs only v"
     for build, message in (
         (driven(law).build, f"joint 'shaft' {named} and N, because"),
-        (moving_rod(law).build, "joint 's0', joint 's1' > friction > law: .* in a loop that moves"),
+        (moving_rod(law).build, "joint 's0', 's1' > friction > law: .* in a loop that moves"),
         (FourBar(Karnopp(form="event")).model, "one that stops only at v = 0 in a loop"),
         (partial(SliderCrank(law).mechanism().build, formulation="absolute"),
          "a loop of at most 8 coordinates"),
