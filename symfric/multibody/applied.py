@@ -233,8 +233,8 @@ class _Maker:
         """Return the error for contacts whose laws cannot stick here."""
         law = type(contacts[0].friction.law).__name__
         return ValueError(
-            f"{self.where} > {places_of(contacts)} > friction > law: expected {expected}, got {law}, "
-            f"which needs the applied force; {advice}"
+            f"{self.where} > {places_of(contacts)} > friction > law: expected {expected}, got "
+            f"{law}, which needs the applied force; {advice}"
         )
 
     def group(
