@@ -67,7 +67,7 @@ def vanishing(curve: Family, points: list[Point]) -> float | None:
 
     The square of their size is linear in the parameter near a Hopf point.
     """
-    if not isinstance(curve, Orbits) or len(points) < 2:
+    if not isinstance(curve, Orbits) or curve.problem.driven or len(points) < 2:
         return None
     one, other = points[-2:]
     a, b = size(curve, one) ** 2, size(curve, other) ** 2
@@ -101,7 +101,7 @@ def state(curve: Family, node: Node) -> tuple[Array, float]:
 def exponents(curve: Family, node: Node) -> NDArray[np.complex128]:
     """Return the eigenvalues of an equilibrium, or the multipliers of an orbit."""
     if isinstance(curve, Orbits):
-        return node.content.multipliers(driven=False)
+        return node.content.multipliers(driven=curve.problem.driven)
     return curve.state(node).eigenvalues
 
 
