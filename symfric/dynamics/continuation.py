@@ -12,7 +12,7 @@ from symfric.dynamics.families import Equilibria, Orbits
 from symfric.dynamics.orbit import PeriodicOrbit
 from symfric.dynamics.shooting import Shooting
 from symfric.dynamics.sticking import Near, restarted, same_sequence
-from symfric.dynamics.trace import Family, Point, Trace, note, point, sequence, vanishing
+from symfric.dynamics.trace import Family, Point, Trace, kind_of, note, point, vanishing
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
@@ -208,28 +208,44 @@ def _steps(
     curve: Family, node: Node, tau: Array, span: tuple[float, float], step: float, trace: Trace
 ) -> Iterator[Step]:
     """Yield steps along the curve, also across changes of stick and slip."""
-    known = {sequence(node)}
+    known = {kind_of(curve, node)}
     while True:
         near = Near(curve)
         for found in followed(curve, node, tau, step, same_sequence, near.most):
             node, tau = found.node, found.tau
+            known.add(kind_of(curve, node))
             yield found
         if isinstance(curve, Equilibria) and curve.turns(node.z + step * tau * curve.scale):
             trace.message = "ends where a sliding contact comes to rest"
             return
-        if not isinstance(curve, Orbits) or not curve.problem.eq.switching:
-            trace.message = "ends where no further step was possible; try a smaller step or rtol"
-            return
-        kind, value = near.boundary(node)
-        trace.add(kind, curve, node, value)
-        other = restarted(curve, node, span, known)
+        other = _other(curve, node, near, span, known, trace)
         if other is None:
-            trace.message = f"ends where the sequence of stick and slip changes ({kind})"
             return
         node, away = other
-        known.add(sequence(node))
+        known.add(kind_of(curve, node))
         trace.points.append(point(curve, node))
         tau = tangent(curve, node, away * _unit(node.z.size))
+
+
+def _other(
+    curve: Family, node: Node, near: Near, span: tuple[float, float], known: set[str], trace: Trace
+) -> tuple[Node, float] | None:
+    """Return the orbit beyond the end of a smooth part, and the direction away from `node`.
+
+    The part ends at a change of stick and slip, or at a fold that is too sharp to be followed.
+    """
+    trace.message = "ends where no further step was possible; try a smaller step or rtol"
+    if not isinstance(curve, Orbits):
+        return None
+    if curve.problem.eq.switching:
+        kind, value = near.boundary(node)
+        trace.add(kind, curve, node, value)
+        trace.message = f"ends where the sequence of stick and slip changes ({kind})"
+    other = restarted(curve, node, span, lambda new: kind_of(curve, new) not in known)
+    if other is not None and not curve.problem.eq.switching:
+        trace.add("fold", curve, node)
+        trace.rough("fold", float(node.z[-1]))
+    return other
 
 
 def _joined(

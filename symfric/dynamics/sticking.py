@@ -1,6 +1,6 @@
 """Change of the sequence of stick and slip along a branch of periodic orbits."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
@@ -175,9 +175,9 @@ def _slowest(run: Trajectory) -> tuple[float, float]:
 
 
 def restarted(
-    curve: Orbits, node: Node, span: tuple[float, float], known: Collection[str]
+    curve: Orbits, node: Node, span: tuple[float, float], accept: Callable[[Node], bool]
 ) -> tuple[Node, float] | None:
-    """Return an orbit with a sequence that is not `known`, and the direction away from `node`.
+    """Return an orbit next to `node` that is accepted, and the direction away from `node`.
 
     The contact that is nearest to sticking is put into stick where it is nearest, and a run leads
     to the other orbit. Without such a contact, the run starts from the orbit itself.
@@ -207,7 +207,7 @@ def restarted(
                 found = curve.at(z)
             except (ValueError, SolveError):
                 continue
-            if sequence(found) not in known:
+            if accept(found):
                 return found, side
     return None
 

@@ -142,6 +142,16 @@ def note(curve: Family, step: Step, trace: Trace) -> None:
             return
 
 
+def kind_of(curve: Family, node: Node) -> str:
+    """Return the events of an orbit, or without events the side of a fold on which it is.
+
+    The parity of the number of real multipliers above 1 changes at a fold.
+    """
+    found = exponents(curve, node)
+    above = (np.abs(found.imag) < REAL * np.abs(found)) & (found.real > 1)
+    return sequence(node) or ("odd" if above.sum() % 2 else "even")
+
+
 def growths(curve: Family, node: Node) -> Array:
     """Return the growth of all deviations, the largest first."""
     found = exponents(curve, node)
