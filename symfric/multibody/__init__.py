@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from symfric.multibody.couplings import Gear as Gear
     from symfric.multibody.couplings import Rolling as Rolling
     from symfric.multibody.couplings import Screw as Screw
+    from symfric.multibody.efficiency import efficiency as efficiency
     from symfric.multibody.element_friction import ElementFriction as ElementFriction
     from symfric.multibody.element_friction import MeshFriction as MeshFriction
     from symfric.multibody.element_friction import ThreadFriction as ThreadFriction

@@ -11,7 +11,7 @@ import casadi as ca
 from symfric.foundation.checks import shown
 from symfric.foundation.numeric import Scalar, equals, is_symbolic
 from symfric.multibody.constraints import Constraint, Held, impossible, linear, wraps
-from symfric.multibody.contact import Contact, element_contact
+from symfric.multibody.contact import Contact, End, element_contact
 from symfric.multibody.element_friction import ElementFriction, MeshFriction, ThreadFriction
 from symfric.multibody.kinematics import Kinematics
 
@@ -114,8 +114,8 @@ class Coupling(Constraint):
             return ()
         (a, along_a), (b, along_b) = ((kin.topology.joints[name], d) for name, d in self._ends)
         lever_a, lever_b, divisor = self.friction.flank(self._ratio, self.linear)
-        levers = (a, along_a, lever_a), (b, along_b, lever_b)
-        return (element_contact(self.name, kin, self.friction, levers, lam / divisor),)
+        ends = End(a, along_a, -self._ratio, lever_a), End(b, along_b, 1.0, lever_b)
+        return (element_contact(self.name, kin, self.friction, ends, lam, divisor),)
 
 
 @final
