@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
+    from symfric.multibody.cams import Cam as Cam
+    from symfric.multibody.cams import CamFriction as CamFriction
     from symfric.multibody.constraints import Constraint as Constraint
     from symfric.multibody.constraints import PrescribedMotion as PrescribedMotion
     from symfric.multibody.constraints import UserConstraint as UserConstraint
