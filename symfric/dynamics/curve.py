@@ -2,7 +2,7 @@
 
     r(z) = 0,   one unknown more than equations
 
-A step extrapolates the last points and their unit tangents tau by Hermite's polynomial, and Newton's
+A step extrapolates the last points and their unit tangents tau by Hermite's polynomial. Newton's
 method corrects the prediction in the plane orthogonal to tau. Coordinates are scaled. The step
 length follows the number of corrections.
 Source: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, 1977.

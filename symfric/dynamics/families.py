@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Self, final
+from typing import NamedTuple, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,23 +55,20 @@ class Orbits(Curve):
     def _node(self, z: Array, found: Linear) -> Node:
         """Return the node of linearised shooting equations at z."""
         nx, (chosen, basis), part = z.size - 2, found.bases[0], found.segments[0]
-        k = chosen.size
-        s, chosen_x = self.scale[chosen], np.append(chosen, nx + 1)
-        if self.problem.driven:
-            D = np.zeros((z.size, k + 1))
-            D[:nx, :k], D[-1, k] = basis, 1.0
-            z = np.concatenate([part.start, z[nx:]])
-            return Node(z, found.r / s, found.J / s[:, None], chosen_x, D, found)
-        D = np.zeros((z.size, k + 2))
-        D[:nx, :k], D[nx, k], D[-1, k + 1] = basis, 1.0, 1.0
-        state, rate = (part.start, part.rates[0]) if self.section is None else self.section
-        normal = rate / self.problem.scale**2
-        phase = np.append(normal @ basis, [0.0, 0.0])
-        size = max(float(np.abs(phase[:k] * s).max()), TINY)
-        r = np.append(found.r / s, normal @ (part.start - state) / size)
-        z = np.concatenate([part.start, z[nx:]])
-        J = np.vstack([found.J / s[:, None], phase / size])
-        return Node(z, r, J, np.array([*chosen, nx, nx + 1]), D, found)
+        z, s = np.concatenate([part.start, z[nx:]]), self.scale[chosen]
+        free = [nx + 1] if self.problem.driven else [nx, nx + 1]
+        every = np.append(chosen, free)
+        D = np.zeros((z.size, every.size))
+        D[:nx, : chosen.size], D[free, range(chosen.size, every.size)] = basis, 1.0
+        r, J = found.r / s, found.J / s[:, None]
+        if not self.problem.driven:
+            state, rate = (part.start, part.rates[0]) if self.section is None else self.section
+            normal = rate / self.problem.scale**2
+            phase = normal @ basis
+            size = max(float(np.abs(phase * s).max()), TINY)
+            r = np.append(r, normal @ (part.start - state) / size)
+            J = np.vstack([J, np.append(phase, [0.0, 0.0]) / size])
+        return Node(z, r, J, every, D, found)
 
     def anchored(self, node: Node) -> tuple[Self, Node]:
         """Return the equations with a section that the orbit of `node` crosses; see `Curve`."""
