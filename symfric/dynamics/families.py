@@ -60,15 +60,15 @@ class Orbits(Curve):
         every = np.append(chosen, free)
         D = np.zeros((z.size, every.size))
         D[:nx, : chosen.size], D[free, range(chosen.size, every.size)] = basis, 1.0
-        r, J = found.r / s, found.J / s[:, None]
+        rows, slopes = [found.r / s], [found.J / s[:, None]]
         if not self.problem.driven:
             state, rate = (part.start, part.rates[0]) if self.section is None else self.section
             normal = rate / self.problem.scale**2
             phase = normal @ basis
             size = max(float(np.abs(phase * s).max()), TINY)
-            r = np.append(r, normal @ (part.start - state) / size)
-            J = np.vstack([J, np.append(phase, [0.0, 0.0]) / size])
-        return Node(z, r, J, every, D, found)
+            rows.append(np.array([normal @ (part.start - state) / size]))
+            slopes.append(np.append(phase, [0.0, 0.0])[None, :] / size)
+        return Node(z, np.concatenate(rows), np.vstack(slopes), every, D, found)
 
     def anchored(self, node: Node) -> tuple[Self, Node]:
         """Return the equations with a section that the orbit of `node` crosses; see `Curve`."""
