@@ -232,10 +232,11 @@ class _Maker:
     def refuse(self, contacts: Sequence[Contact], expected: str, advice: str) -> ValueError:
         """Return the error for contacts whose laws cannot stick here."""
         law = type(contacts[0].friction.law).__name__
-        joints = ", ".join(dict.fromkeys(f"'{c.joint}'" for c in contacts))
+        joints = ", ".join(dict.fromkeys(f"'{c.joint}'" for c in contacts if c.element is None))
+        place = f"joint {joints} > friction > law" if joints else contacts[0].law_place
         return ValueError(
-            f"{self.where} > joint {joints} > friction > law: expected {expected}, got {law}, "
-            f"which needs the applied force; {advice}"
+            f"{self.where} > {place}: expected {expected}, got {law}, which needs the applied "
+            f"force; {advice}"
         )
 
     def group(
@@ -255,7 +256,7 @@ class _Maker:
             raise self.refuse(contacts, what, "use one form")
         by_modes, single = modes == {True}, columns == ()
         start = float(self.numbers(change)[0, 0]) / here
-        still = {f"{contacts[0].name}_rate"} if single else {rates[k].name for k in columns}
+        still = {contacts[0].rate} if single else {rates[k].name for k in columns}
         direction: Variables = ()
         if by_modes and not single:
             begin = ca.SX(smooth.sign(rate, 0.0))

@@ -27,9 +27,10 @@ from symfric.model import Contact, Model, Monitor, Output, Variables, kinds
 from symfric.model.holonomic import Holonomic, Inner
 from symfric.multibody.applied import Rest, rests, solve_mass
 from symfric.multibody.equations import Equations, normals_with
+from symfric.multibody.joint import depends_on_load
 from symfric.multibody.prepare import Prepared, with_cuts, without_friction
 from symfric.multibody.results import Put, constraint_units, results, sketch
-from symfric.multibody.slips import Slip, depends_on_load, events, keeps_deflection, slips
+from symfric.multibody.slips import Slip, events, keeps_deflection, slips
 
 AT_REST = 1e-9
 """Sliding velocity [m/s] below which figures show a law with modes as sticking.
@@ -121,7 +122,7 @@ def _contact(s: Slip) -> Contact:
     return Contact(
         contact.name, contact.slip, s.N if known else ca.SX(np.nan), contact.friction.law,
         given=s.inputs, states=s.states, force=contact.F, turning=contact.friction.turning,
-        widths={"eps": width} if s.N is not s.normal else {},
+        widths={"eps": width} if s.N is not s.normal and contact.element is None else {},
     )  # fmt: skip
 
 
@@ -136,7 +137,8 @@ def _opened(
     names = {c.name for c in frictional}
     free: list[Slip] = []
     for s, normal in zip(contacts, normals_with(made.eq, eps), strict=True):
-        own = s if s.N is s.normal else replace(s, normal=normal)
+        given = s.N is s.normal or s.contact.element is not None
+        own = s if given else replace(s, normal=normal)
         if s.contact.name in names:
             own = replace(own, states=(), rate=ca.SX(0, 1), force=s.contact.F, inputs={})
         free.append(own)
@@ -154,10 +156,11 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip]) -> Inner | N
         return None
     pairs = zip(contacts, cut.normals, strict=True)
     normals = (normal - s.N for s, normal in pairs if s.unknown)
+    loads = [stacked(c.N for c in own.contacts) for own in (cut, eq)]
     f, values = ca.substitute(
         [ca.vertcat(cut.balance, *normals), cuts.values],
-        [ca.vertcat(cut.a, cut.F)],
-        [ca.vertcat(eq.a, stacked(s.force for s in contacts))],
+        [ca.vertcat(cut.a, cut.F, loads[0])],
+        [ca.vertcat(eq.a, stacked(s.force for s in contacts), loads[1])],
     )
     kept = cuts.needed(f)
     groups: list[ca.SX] = []
@@ -179,12 +182,12 @@ def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[s
     """
     values, words, bristles = list[ca.SX](), list[str](), list[Slip]()
     for s in contacts:
-        friction, joint = s.contact.friction, s.contact.joint
+        friction, place = s.contact.friction, s.contact.place
         law = type(friction.law).__name__
         given = is_symbolic(friction.normal) or is_symbolic(friction.preload)
         if s.unknown or (given and not ca.depends_on(s.N, reactive)):
             values.append(s.N / (s.unknown[0].nominal if s.unknown else 1.0))
-            words.append(f"normal force of joint '{joint}' with {law}")
+            words.append(f"normal force of {place} with {law}")
         if s.unknown and keeps_deflection(friction.law):
             bristles.append(s)
     return stacked(values), tuple(words), _advice(bristles)

@@ -10,7 +10,9 @@ import numpy as np
 from symfric.foundation.checks import shown
 from symfric.foundation.numeric import is_number, is_symbolic
 from symfric.foundation.variable import strays, symbols_of
+from symfric.laws import Law
 from symfric.model import Variables
+from symfric.multibody.element import FrictionElement
 from symfric.multibody.forces import Part
 from symfric.multibody.joint import Joint, JointFriction
 from symfric.multibody.spatial import GROUND, Body
@@ -114,10 +116,21 @@ def _rubbing(where: str, joint: Joint, friction: object, known: ca.SX) -> Iterat
         yield f"{where}: expected JointFriction(law, radius=...), got {shown(friction)}"
         return
     yield from (f"{where}: {text}" for text in friction.problems(joint.rubs))
-    law, v, N = friction.law, ca.SX.sym("v"), ca.SX.sym("N")
-    z = ca.SX.sym("z", len(law.states))
+    yield from _declared(where, friction, friction.law, known)
+
+
+def elements(forces: Iterable[Part], known: ca.SX) -> Iterator[str]:
+    """Yield messages about undeclared symbols in brakes, clutches and belts."""
+    for part in forces:
+        if isinstance(part, FrictionElement):
+            yield from _declared(f"{part.kind} '{part.name}'", part, part.law, known)
+
+
+def _declared(where: str, part: object, law: Law, known: ca.SX) -> Iterator[str]:
+    """Yield messages about undeclared symbols in the numbers and in the law of a part."""
+    v, N, z = ca.SX.sym("v"), ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
     offered = {i.name: ca.SX.sym(i.name) for i in law.inputs}
-    given = [value for name, value in vars(friction).items() if name != "law"]
+    given = [value for name, value in vars(part).items() if name != "law"]
     given += [law.force(v, N, z, **offered), law.rate(v, N, z, **offered)]
     known = ca.vertcat(v, N, z, *offered.values(), known)
     yield from undeclared(where, given, known, "parameters and inputs")

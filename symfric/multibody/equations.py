@@ -19,6 +19,7 @@ from symfric.multibody.dynamics import (
     loop_of,
     normalisations,
 )
+from symfric.multibody.element import UNLOADED, FrictionElement
 from symfric.multibody.forces import ZERO, Axial, Force, Gravity, Load
 from symfric.multibody.joint import Contact
 from symfric.multibody.kinematics import Cuts, Kinematics, Turn, kinematics
@@ -149,7 +150,8 @@ def equations(
     every[independent] = lam
     sizes = (part.phi.numel() for part in (*loops, *held))
     own = [every[i:j, 0] for i, j in pairwise(accumulate(sizes, initial=0))]
-    contacts = tuple(_contacts(kin))
+    elements = (f for f in forces if isinstance(f, FrictionElement))
+    contacts = (*_contacts(kin), *(element.contact(kin) for element in elements))
     loads = [load for f in forces if not isinstance(f, Gravity) for load in f.loads(kin)]
     loads += [load for c in contacts for load in _rubbing(kin, c)]
     weights = [load for f in gravity for load in f.loads(kin)]
@@ -195,16 +197,19 @@ def _contacts(kin: Kinematics) -> Iterator[Contact]:
             continue
         for direction in joint.rubs:
             name = joint.name if len(joint.rubs) == 1 else f"{joint.name}_{direction}"
-            rate = kin.spin(joint) if direction == "ball" else kin.rate(joint, direction)
-            slip = rate if direction == "slide" else friction.arm * rate
+            turns = kin.spin(joint) if direction == "ball" else kin.rate(joint, direction)
+            slip = turns if direction == "slide" else friction.arm * turns
             law = SpatialSlip(friction.law) if direction == "ball" else friction.law
             pressed = name if direction in ("x", "y") else joint.name
             F = ca.SX.sym(f"{name}_friction", slip.numel())
-            yield Contact(name, joint.name, direction, friction, law, pressed, slip, F)
+            rate = f"{name}_rate"
+            yield Contact(name, joint.name, direction, friction, law, pressed, slip, F, rate)
 
 
 def _rubbing(kin: Kinematics, contact: Contact) -> list[Load | Axial]:
-    """Return the loads of a friction force on the child and the parent of its joint."""
+    """Return the loads of a friction force on the children and parents of its joints."""
+    if isinstance(contact.element, FrictionElement):
+        return [*contact.element.friction_loads(kin, contact.F)]
     joint = kin.topology.joints[contact.joint]
     if contact.direction != "ball":
         return [Axial(joint, contact.direction, contact.load)]
@@ -218,6 +223,8 @@ def _rubbing(kin: Kinematics, contact: Contact) -> list[Load | Axial]:
 
 def _normal(kin: Kinematics, contact: Contact, pressing: Mapping[str, Wrench]) -> ca.SX:
     """Return the normal force of a contact [N]."""
+    if contact.element is not None:
+        return contact.element.normal_force(contact.F, contact.F / (contact.N + UNLOADED))
     joint, (F, T) = kin.topology.joints[contact.joint], pressing[contact.joint]
     if contact.direction not in ("x", "y"):
         return joint.normal_force(contact.friction, F, T)

@@ -30,9 +30,9 @@ bristles of other laws are vectors, see `Isotropic`. Source: Haug, Mech. Based D
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from math import inf
-from typing import Any, ClassVar, Self, final
+from typing import Any, ClassVar, Protocol, Self, final
 
 import casadi as ca
 import numpy as np
@@ -173,10 +173,24 @@ class JointFriction:
         return sum((self.magnitude(*f) for f in pressing), start=ca.SX(self.preload))
 
 
+def depends_on_load(law: Law) -> bool:
+    """Return True if the friction force or the rates of `law` depend on the normal force."""
+    N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
+    v = ca.SX.sym("v")
+    return ca.depends_on(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)), N)
+
+
+class Element(Protocol):
+    """Normal force of a brake, clutch or belt; `symfric.multibody.element` implements it."""
+
+    def normal_force(self, F: ca.SX, m: ca.SX) -> ca.SX: ...  # noqa: D102
+    def explicit_normal(self, force: ca.SX, N: ca.SX) -> ca.SX | None: ...  # noqa: D102
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """Friction of a joint in one direction.
+    """Friction of a joint in one direction, or of an element.
 
     Attributes:
         name: prefix of the results of the contact.
@@ -187,6 +201,9 @@ class Contact:
         pressed: name of the normal force, which directions of one bearing share.
         slip: sliding velocity [m/s], shape (1, 1); for a ball (3, 1).
         F: symbols of the friction force [N], of the same shape.
+        rate: name of the rate that is zero if the slip is, if there is one.
+        element: brake, clutch or belt with this friction; None for a bearing.
+        N: symbol of the normal force of an element [N].
     """
 
     name: str
@@ -197,6 +214,19 @@ class Contact:
     pressed: str
     slip: ca.SX
     F: ca.SX
+    rate: str = ""
+    element: "Element | None" = None
+    N: ca.SX = field(default_factory=lambda: ca.SX(0, 1))
+
+    @property
+    def place(self) -> str:
+        """Bearing or element in messages."""
+        return f"joint '{self.joint}'" if self.element is None else f"element '{self.name}'"
+
+    @property
+    def law_place(self) -> str:
+        """Field of the law in messages."""
+        return f"{self.place} > friction > law" if self.element is None else f"{self.place} > law"
 
     def unit(self, of_sliding: str) -> str:
         """Return a unit of the law; that of rotation if the law is one of moment and rate."""

@@ -18,6 +18,7 @@ from symfric.model import Model, Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import assemble
 from symfric.multibody.constraints import Constraint
+from symfric.multibody.element import FrictionElement
 from symfric.multibody.forces import Force, Gravity, SpringDamper
 from symfric.multibody.joint import Joint
 from symfric.multibody.prepare import (
@@ -31,7 +32,7 @@ from symfric.multibody.prepare import (
     written,
 )
 from symfric.multibody.results import sketch
-from symfric.multibody.slips import slips
+from symfric.multibody.slips import explicit_normal, slips
 from symfric.multibody.spatial import GROUND, Body, Frame, Vector, is_vector
 from symfric.multibody.start import following, project
 from symfric.multibody.topology import Topology, spanning_tree
@@ -84,7 +85,8 @@ class Mechanism(packed.Portable, Showing):
             rows.append((j.name, type(j).__name__, f"{j.parent} - {j.child}", law))
         for part in (*self.forces, *self.constraints):
             ends = f"{part.a} - {part.b}" if isinstance(part, SpringDamper) else ""
-            rows.append((part.name, type(part).__name__, ends, ""))
+            law = type(part.law).__name__ if isinstance(part, FrictionElement) else ""
+            rows.append((part.name, type(part).__name__, ends, law))
         inputs = f"inputs: {among(v.name for v in self.inputs)}"
         return Shown(
             f"mechanism '{self.name}': {counted(len(bodies), 'body', 'bodies')}, "
@@ -231,6 +233,7 @@ class Mechanism(packed.Portable, Showing):
         problems += checks.naming(bodies, self.joints, (*self.forces, *self.constraints), u)
         weights = list(checks.weights(bodies, p))
         bearings = list(checks.bearings(self.joints, symbols_of(p), symbols_of(u)))
+        bearings += checks.elements(self.forces, symbols_of((*p, *u)))
         self._refuse([*problems, *weights, *bearings] if problems else ())
         tree = spanning_tree({body.name: body for body in bodies}, self.joints)
         loose = list(checks.connected(tree))
@@ -325,20 +328,21 @@ def functions(
     if applied := [c for c in eq.contacts if c.law.inputs]:
         law = type(applied[0].friction.law).__name__
         raise ValueError(
-            f"{where} > joint '{applied[0].joint}' > friction > law: expected one that needs only "
+            f"{where} > {applied[0].law_place}: expected one that needs only "
             f"v and N, got {law}, whose force in stick depends on the motion; use `build`"
         )
     contacts = slips(eq, [1.0] * len(eq.contacts))
     forces = stacked(c.force for c in contacts)
     for c in contacts:
         if c.N is not c.normal:
-            forces = ca.substitute(forces, c.N, c.normal)
+            forces = ca.substitute(forces, c.N, explicit_normal(c))
     if ca.depends_on(forces, eq.F):
-        pressed = (c.contact.joint for c in contacts if ca.depends_on(c.normal, eq.F))
-        names = ", ".join(f"'{name}'" for name in dict.fromkeys(pressed))
+        pressed = [c.contact for c in contacts if ca.depends_on(explicit_normal(c), eq.F)]
+        names = ", ".join(dict.fromkeys(f"'{c.joint}'" for c in pressed if c.element is None))
+        place = f"joint {names} > friction" if names else pressed[0].law_place
         raise ValueError(
-            f"{where} > joint {names} > friction: expected a normal force that does not depend on "
-            "friction; use `build` for a model, or a constant normal force"
+            f"{where} > {place}: expected a normal force that does not depend on friction; use "
+            "`build` for a model, or a constant normal force"
         )
     still = [ca.SX.zeros(x.numel()) for x in (eq.a, eq.lam, eq.F)]
     (bias,) = ca.substitute([eq.balance], [eq.a, eq.lam, eq.F], still)

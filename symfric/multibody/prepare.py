@@ -312,8 +312,10 @@ def without_friction(made: Prepared) -> tuple[Array, Array, Array]:
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
     turned = ca.densify(starts_of(turn.angle for turn in eq.turns))
-    symbols = [eq.angles, eq.F, symbols_of(made.u), eq.kin.t]
+    loads = stacked(c.N for c in eq.contacts)
+    symbols = [eq.angles, eq.F, symbols_of(made.u), eq.kin.t, loads]
     zero = [turned, ca.SX.zeros(eq.F.numel()), ca.SX(starts_of(made.u)), ca.SX(0)]
+    zero.append(ca.SX.ones(loads.numel()))
     expressions = [ca.vertcat(eq.balance, eq.phi_ddot), stacked(eq.normals)]
     rows, normals = ca.substitute(expressions, symbols, zero)
     arguments = [unknowns, eq.q, eq.qd, symbols_of(made.p)]

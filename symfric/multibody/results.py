@@ -10,6 +10,7 @@ from symfric.foundation.variable import stacked, strays
 from symfric.model import Output
 from symfric.model.kinds import WORK
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
+from symfric.multibody.element import UNLOADED, FrictionElement
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import SpringDamper
 from symfric.multibody.joint import COMPONENTS, FORCE_NAMES
@@ -32,7 +33,7 @@ def results(eq: Equations, undetermined: Sequence[str], p: ca.SX, put: Put) -> d
         put: function that rewrites expressions in the symbols of the model.
     """
     still = ca.vertcat(eq.q, eq.angles, p)
-    found = [*_reactions(eq, undetermined), *_centres(eq), *_work(eq, still)]
+    found = [*_reactions(eq, undetermined), *_centres(eq), *_elements(eq), *_work(eq, still)]
     values = put([output.expression for _, output in found])
     own = {str(eq.q[i]) for i in range(eq.n)}
     return {
@@ -73,6 +74,26 @@ def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
             yield f"{name}_{axis}", Output(at[i], "m", f"centre of mass of '{name}' along {axis}")
         for i, axis in enumerate("xyz"):
             yield f"{name}_v{axis}", Output(v[i], "m/s", f"its velocity along {axis}")
+
+
+def _elements(eq: Equations) -> Iterator[tuple[str, Output]]:
+    """Yield loads, tensions and the fraction of self-energising of brakes, clutches and belts."""
+    for contact in eq.contacts:
+        element, name, F = contact.element, contact.name, contact.F
+        if not isinstance(element, FrictionElement):
+            continue
+        loads = element.friction_loads(eq.kin, F)
+        for load in loads:
+            what, unit = ("force", "N") if load.joint.linear(load.direction) else ("moment", "N m")
+            own = name if len(loads) == 1 else f"{name}_{load.joint.name}"
+            doc = f"{what} of friction on the child of '{load.joint.name}'"
+            yield f"{own}_{what}", Output(load.value, unit, doc)
+        for end, tension in element.tensions(F).items():
+            yield f"{name}_{end}", Output(tension, "N", f"tension of the {end} end")
+        m = F / (contact.N + UNLOADED)
+        share = ca.SX(element.pressing(m)[1]) * m
+        doc = "fraction of the normal force that friction causes, 1 if the brake locks itself"
+        yield f"{name}_locking", Output(share, "1", doc)
 
 
 def _work(eq: Equations, still: ca.SX) -> Iterator[tuple[str, Output]]:

@@ -16,7 +16,7 @@ from symfric.model import Event, Variables, kinds
 from symfric.model.contact import mode_events
 from symfric.multibody.applied import Rest, capacity_of, forward, switches_at
 from symfric.multibody.equations import Equations
-from symfric.multibody.joint import Contact
+from symfric.multibody.joint import Contact, depends_on_load
 
 
 @final
@@ -43,13 +43,6 @@ class Slip:
     rate: ca.SX
     force: ca.SX
     inputs: dict[str, ca.SX]
-
-
-def depends_on_load(law: Law) -> bool:
-    """Return True if the friction force or the rates of `law` depend on the normal force."""
-    N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
-    v = ca.SX.sym("v")
-    return ca.depends_on(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)), N)
 
 
 def keeps_deflection(law: Law) -> bool:
@@ -80,9 +73,11 @@ def slips(
     for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
         law, pressed = contact.friction.law, contact.pressed
         if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(law):
-            doc = f"normal force of joint '{contact.joint}' with {type(law).__name__}"
+            doc = f"normal force of {contact.place} with {type(law).__name__}"
             size, kind = max(1.0, abs(start)), kinds.NORMAL_FORCE
-            new = Variable(f"{pressed}_N", "N", start=start, nominal=size, doc=doc, kind=kind)
+            new = Variable(
+                f"{pressed}_N", "N", start=start, nominal=size, doc=doc, symbol=contact.N, kind=kind
+            )
             normal = unknowns.setdefault(pressed, new).symbol
         pressing.append(normal)
     levels = [capacity_of(c.law, N) if groups else N
@@ -112,6 +107,18 @@ def slips(
     return tuple(found)
 
 
+def explicit_normal(slip: Slip) -> ca.SX:
+    """Return the normal force in terms of accelerations, multipliers, and states of the laws.
+
+    That of an element contains its friction force unless the law is proportional to the load.
+    """
+    element = slip.contact.element
+    if element is None or not ca.depends_on(slip.normal, slip.contact.F):
+        return slip.normal
+    explicit = element.explicit_normal(slip.force, slip.N)
+    return slip.normal if explicit is None else explicit
+
+
 def _states(contact: Contact, begin: ca.SX) -> Iterator[Variable]:
     """Yield the states of a law with their names in the model."""
     for i, s in enumerate(contact.law.states):
@@ -128,7 +135,7 @@ def events(contacts: Sequence[Slip], groups: Sequence[Rest], rates: Variables) -
     found: list[Event] = []
     for i, slip in enumerate(contacts):
         if i not in in_loops:
-            own = f"{slip.contact.name}_rate"
+            own = slip.contact.rate
             halted = still.get(i, (own,) if own in names else ())
             found += _of_contact(slip, dict.fromkeys(halted, 0.0))
     for rest in groups:

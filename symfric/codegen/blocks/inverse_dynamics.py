@@ -160,7 +160,9 @@ class _Machine(NamedTuple):
         return self.name if self.name[:1].isalpha() else f"robot_{self.name.lstrip('_')}"
 
     def along(self, contact: Contact) -> str:
-        """Return the coordinate that a contact resists."""
+        """Return the coordinate that a contact resists, or the name of a brake or belt."""
+        if contact.element is not None:
+            return contact.name
         joint = self.eq.kin.topology.link_of[contact.joint].joint
         return joint.coordinate(joint.directions[contact.direction])
 
@@ -287,10 +289,8 @@ def _check(eq: Equations, mechanism: Mechanism) -> None:
     everything = ca.veccat(eq.balance, *eq.normals, eq.phi)
     if ca.depends_on(everything, eq.kin.t):
         raise ValueError(f"{where}: expected time-independent forces and constraints, got others")
-    if ca.depends_on(stacked(eq.normals), eq.F):
-        pressed = [
-            c.joint for c, N in zip(eq.contacts, eq.normals, strict=True) if ca.depends_on(N, eq.F)
-        ]
+    pairs = ((c, N) for c, N in zip(eq.contacts, eq.normals, strict=True) if c.element is None)
+    if pressed := [c.joint for c, N in pairs if ca.depends_on(N, eq.F)]:
         raise ValueError(
             f"{where}: expected normal forces that do not depend on friction, got that of "
             f"{', '.join(dict.fromkeys(pressed))}, which depends on other friction; give it a "

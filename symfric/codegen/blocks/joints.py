@@ -55,9 +55,8 @@ def contact_step(
     law, friction = contact.friction.law, contact.friction
     if law.inputs:
         raise ValueError(
-            f"inverse dynamics: joint '{contact.joint}' > friction > law: expected one that needs "
-            f"only v and N, got {type(law).__name__}, which also needs "
-            f"{', '.join(i.name for i in law.inputs)}"
+            f"inverse dynamics: {contact.law_place}: expected one that needs only v and N, got "
+            f"{type(law).__name__}, which also needs {', '.join(i.name for i in law.inputs)}"
         )
     block = law_block(law, free=() if fold else None, turning=friction.turning)
     v, N = block.inputs
@@ -65,14 +64,30 @@ def contact_step(
     if level:
         normal = level[0].symbol
     sizes = [variable for variable in block.parameters if variable.name == "h"]
+    symbols, values = [v.symbol, symbols_of(sizes)], [contact.slip, h if sizes else ca.SX(0, 1)]
     parts = (block.outputs["F"].expression, block.next, *(s for s, _ in block.resets.values()))
-    force, following, *sliding = ca.substitute(
-        [ca.SX(part) for part in parts],
-        [v.symbol, N.symbol, symbols_of(sizes)],
-        [contact.slip, normal, h if sizes else ca.SX(0, 1)],
-    )
+    parts = ca.substitute([ca.SX(part) for part in parts], symbols, values)
+    if contact.element is not None and ca.depends_on(normal, contact.F):
+        normal = _explicit(contact, parts[0], N.symbol)
+    force, following, *sliding = ca.substitute(parts, [N.symbol], [normal])
     parameters = (*(v for v in block.parameters if v not in sizes), *level)
     return ContactStep(along, block, force, parameters, following, *sliding or [ca.SX(0, 1)])
+
+
+def _explicit(contact: Contact, force: ca.SX, N: ca.SX) -> ca.SX:
+    """Return the normal force of an element with the friction force `force` in terms of N.
+
+    Raises:
+        ValueError: the force is not proportional to the normal force.
+    """
+    found = None if contact.element is None else contact.element.explicit_normal(force, N)
+    if found is None:
+        raise ValueError(
+            f"inverse dynamics: {contact.law_place}: expected one whose force is proportional to "
+            f"the normal force, got {type(contact.law).__name__}; friction presses this element, "
+            "and no equation is solved"
+        )
+    return found
 
 
 def _level(friction: JointFriction) -> Variables:

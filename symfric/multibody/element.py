@@ -1,0 +1,183 @@
+"""Base class of brakes, clutches and belts: friction under an actuating force.
+
+An element acts in joints j with displacements s_j and levers c_j. Its normal force N follows from
+the actuating force P and, where friction presses by itself, from the friction force F:
+
+    v = sum c_j s_j',   load on joint j = -c_j F(v, N)
+    N = G(m) P + B(m) F,   m = F / N,   P = preload + max(actuation, 0)
+
+G is the gain of the lever or wedge, B that of the friction force; m is the mobilised coefficient,
+which in sliding is the friction coefficient. With it, N = G P / (1 - B m): the element locks itself
+if B m reaches 1. A negative actuation releases the element, which cannot pull.
+"""
+
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
+from typing import ClassVar
+
+import casadi as ca
+
+from symfric.foundation.checks import as_number
+from symfric.foundation.numeric import Scalar, is_number
+from symfric.foundation.variable import take_si
+from symfric.laws import Law
+from symfric.laws.base import smooth
+from symfric.laws.base.law import require_law
+from symfric.multibody.forces import Axial, Force, Load
+from symfric.multibody.joint import OFFERED, Contact, JointFriction, depends_on_load
+from symfric.multibody.kinematics import Kinematics
+
+EXPONENT = 50.0
+"""Largest |m| times the wrap angle in exp(m angle), so that no iterate of a solver overflows."""
+
+UNLOADED = 1e-12
+"""Force [N] that keeps F / N finite for a released element; it must be negligible under load."""
+
+Lever = tuple[str, str, Scalar]
+"""Joint, direction, lever c_j."""
+
+
+def wrapped(m: ca.SX, angle: Scalar) -> tuple[ca.SX, ca.SX]:
+    """Return exp(m angle), the ratio of the tensions, and N / T of an arc with slack tension T.
+
+    N = T (exp(m angle) - 1) / m is the integral of the tension over the wrap angle.
+    """
+    x = smooth.clip(m * angle, -EXPONENT, EXPONENT)
+    return ca.exp(x), angle * ca.SX(smooth.phi1(x))
+
+
+class FrictionElement(Force):
+    """Brake, clutch or belt whose normal force follows from an actuating force.
+
+    Any law of v, N and F_e whose force depends on the normal force is possible, with bristles and
+    with true sticking. The actuating force and the geometry may be numbers or parameters, the
+    actuating force also an input of the mechanism. A negative number is refused; an input or a
+    parameter below zero releases the element.
+
+    Results: `<name>_N`, `<name>_slip`, `<name>_friction`, `<name>_power` as of a joint; on request
+    the loads `<name>_moment` [N m] or `<name>_force` [N] on the child of the joint, with the name
+    of the joint before the unit if there are two, and `<name>_locking` = B m, the fraction of the
+    normal force that friction itself causes. The element locks itself at 1: a run in which it
+    slides ends there with an error, because the equilibrium of the element has no solution.
+
+    Limits: bearings are loaded by moments and forces about and along the axes only.
+    """
+
+    kind: ClassVar[str] = "element"
+    actuator: ClassVar[str] = "force"
+    """Name of the field with the actuating force."""
+    above_zero: ClassVar[tuple[str, ...]] = ()
+    """Names of the fields that must be above zero."""
+    other_than_zero: ClassVar[tuple[str, ...]] = ()
+    """Names of the fields whose sign is a direction."""
+
+    law: Law
+    preload: Scalar
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        require_law(f"{name}: law", self.law)
+        take_si(name, self, *(item.name for item in fields(self) if item.type is Scalar))
+
+    @abstractmethod
+    def levers(self) -> tuple[Lever, ...]:
+        """Return the joints with their directions and levers."""
+
+    @abstractmethod
+    def pressing(self, m: ca.SX) -> tuple[Scalar, Scalar]:
+        """Return the gains G and B at the mobilised coefficient m."""
+
+    def tensions(self, F: ca.SX) -> dict[str, ca.SX]:
+        """Return the tensions [N] of a band, rope or belt under the friction force F, by end."""
+        return {}
+
+    @property
+    def conservative(self) -> bool:
+        """True if the element has no load apart from friction, whose work is counted there."""
+        return True
+
+    @property
+    def actuation(self) -> ca.SX:
+        """Actuating force P [N], at least the preload."""
+        given = getattr(self, self.actuator)
+        return ca.SX(self.preload + (given if is_number(given) else smooth.positive(given, 0.0)))
+
+    def normal_force(self, F: ca.SX, m: ca.SX) -> ca.SX:
+        """Return N = G(m) P + B(m) F [N]."""
+        G, B = self.pressing(m)
+        return G * self.actuation + B * F
+
+    def explicit_normal(self, force: ca.SX, N: ca.SX) -> ca.SX | None:
+        """Return N = G P / (1 - B m) for a friction force m N; None for a force of another form.
+
+        `force` is the friction force in terms of the symbol N.
+        """
+        m = ca.jacobian(force, N)
+        if ca.depends_on(m, N) or not ca.substitute(force, N, ca.SX(0)).is_zero():
+            return None
+        G, B = self.pressing(m)
+        return ca.SX(G * self.actuation / (1 - B * m))
+
+    def contact(self, kin: Kinematics) -> Contact:
+        """Return the contact of the element."""
+        known, own = kin.topology, self.levers()
+        joint, direction, _ = own[0]
+        alone = len(own) == 1 and joint in known.link_of
+        rate = known.joints[joint].coordinate(known.joints[joint].directions[direction])
+        F, N = (ca.SX.sym(f"{self.name}_{what}") for what in ("friction", "N"))
+        return Contact(
+            self.name, joint, direction, JointFriction(self.law), self.law, self.name,
+            self.slip(kin), F, f"{rate}_rate" if alone else "", self, N,
+        )  # fmt: skip
+
+    def joints(self) -> Iterable[tuple[str, str]]:
+        """Return the joints of the element with their directions."""
+        return [(joint, direction) for joint, direction, _ in self.levers()]
+
+    def slip(self, kin: Kinematics) -> ca.SX:
+        """Return the sliding velocity sum c_j s_j' [m/s]."""
+        known = kin.topology.joints
+        rates = (c * kin.rate(known[joint], along) for joint, along, c in self.levers())
+        return sum(rates, start=ca.SX(0))
+
+    def friction_loads(self, kin: Kinematics, F: ca.SX) -> list[Axial]:
+        """Return the loads -c_j F of the friction force on the joints."""
+        known = kin.topology.joints
+        return [Axial(known[joint], along, -c * F) for joint, along, c in self.levers()]
+
+    def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
+        """Yield nothing: an actuating force inside a brake does not load the bodies."""
+        yield from ()
+
+    def problems(self) -> Iterator[str]:
+        """Yield messages about invalid numbers and laws, and about a joint that occurs twice."""
+        yield from super().problems()
+        size = {name: as_number(getattr(self, name)) for name in vars(self)}
+        for name in self.above_zero:
+            if (x := size[name]) is not None and x <= 0:
+                yield f"{name}: expected a number > 0, got {x:g}"
+        for name in self.other_than_zero:
+            if size[name] == 0:
+                yield f"{name}: expected a number other than 0, got 0"
+        for name in (self.actuator, "preload"):
+            if (x := size[name]) is not None and x < 0:
+                yield f"{name}: expected a number >= 0, got {x:g}; friction needs pressure"
+        yield from self._unsuitable()
+        joints = [pair[0] for pair in self.joints()]
+        if len(set(joints)) < len(joints):
+            yield f"expected two joints, got {joints[0]} twice"
+
+    def _unsuitable(self) -> Iterator[str]:
+        """Yield a message if the law has further inputs or ignores the normal force."""
+        law = type(self.law).__name__
+        if strange := [i.name for i in self.law.inputs if i.name not in OFFERED]:
+            known = ", ".join(("v", "N", *OFFERED))
+            yield f"law: expected one that needs only {known}, got {law}, which also needs " + (
+                ", ".join(strange)
+            )
+        elif not depends_on_load(self.law):
+            yield (
+                f"law: expected one that depends on the normal force, got {law}; no actuation "
+                "would change its friction"
+            )
