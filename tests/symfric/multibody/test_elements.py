@@ -1,0 +1,397 @@
+"""Brakes, clutches and belts against closed forms of equilibrium and motion."""
+
+from collections.abc import Callable
+from math import cos, exp, log, pi, sin, tanh
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from chains import attach
+from scipy.integrate import quad, solve_ivp
+from tables import Names, table
+
+import symfric as sf
+from symfric import ExactCoulomb, Trajectory, Variable, simulate
+from symfric import multibody as mb
+from symfric.codegen import inverse_dynamics_block
+from symfric.laws import ALL_LAWS, Law, law_from_text
+
+pytestmark = pytest.mark.heavy
+
+
+def dry(mu: float, mu_d: float | None = None) -> Law:
+    return ExactCoulomb(mu_s=mu, mu_d=mu if mu_d is None else mu_d)
+
+
+def shafts(*rates: float, J: float = 0.5) -> mb.Mechanism:
+    """Shafts a, b, ... on the ground without weight."""
+    m = mb.Mechanism("train", gravity=(0.0, 0.0, 0.0))
+    for name, rate in zip("abcdef", rates, strict=False):
+        attach(m, mb.Revolute, name, f"shaft_{name}", J=J, rate=rate)
+    return m
+
+
+def turning(element: mb.Force, *rates: float, rope: bool = False) -> mb.Mechanism:
+    m = shafts(*rates)
+    if rope:
+        attach(m, mb.Prismatic, "rope", "load")
+    m.force(element)
+    return m
+
+
+def at_start(m: mb.Mechanism, formulation: str = "joint") -> Trajectory:
+    return simulate(m.build(formulation=formulation), 1e-6, samples=2)
+
+
+Case = tuple[mb.Force, dict[str, float]]
+
+
+def lever(mu: float, s: int, P: float, arms: tuple[float, float, float]) -> tuple[float, float]:
+    """Normal and friction force of one shoe, from its two equations as a linear system."""
+    a_force, a_normal, a_friction = arms
+    rows = [[a_normal, -s * a_friction], [-mu, 1.0]]
+    N, F = np.linalg.solve(rows, [P * a_force, 0.0])
+    return float(N), float(F)
+
+
+def disc(rng: np.random.Generator, mu: float, s: int, law: Law, worn: bool = False) -> Case:
+    """Torque of the ring by quadrature of the pressure, p constant or p ~ 1/r."""
+    outer, share, P, n = 10 ** rng.uniform(-2, 1), rng.uniform(0, 1), 10 ** rng.uniform(0, 6), 3
+    inner, half = share * outer, rng.uniform(0.1, pi / 2)
+    power = 0 if worn else 1  # of r in p r dr
+    load, torque = (quad(lambda r, k=k: r ** (power + k), inner, outer)[0] for k in (0, 1))
+    element = mb.DiscClutch("w", "a", law, P, outer, inner, "b", n, half,
+                            "uniform wear" if worn else "uniform pressure")  # fmt: skip
+    N = n * P / sin(half)
+    T = mu * N * torque / load
+    return element, {"N": N, "friction": s * mu * N, "a_moment": -s * T, "b_moment": s * T}
+
+
+def worn(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
+    return disc(rng, mu, s, law, worn=True)
+
+
+def shoe(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
+    """Each kind of shoe; a self-energising share of up to 0.9."""
+    r, P, size = 10 ** rng.uniform(-2, 1), 10 ** rng.uniform(0, 6), 10 ** rng.uniform(-3, 1)
+    k = rng.uniform(0.01, 0.9) / mu
+    arms = (size * rng.uniform(0.5, 3), size, k * size)
+    kind, signs = [
+        ("leading", [1]), ("trailing", [-1]), ("leading and trailing", [1, -1]),
+        ("two leading", [1, 1]),
+    ][rng.integers(4)]  # fmt: skip
+    N, F = np.sum([lever(mu, s * sign, P, arms) for sign in signs], axis=0)
+    element = mb.DrumBrake("w", "a", law, P, r, *arms, shoes=kind)
+    return element, {"N": N, "friction": s * F, "moment": -s * r * F}
+
+
+def band(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
+    """Moments about the pivot, with the ends in the ratio of Eytelwein."""
+    r, P, size = 10 ** rng.uniform(-2, 1), 10 ** rng.uniform(0, 6), 10 ** rng.uniform(-3, 1)
+    angle = rng.uniform(0.1, 4 * pi)
+    ratio, arm = exp(s * mu * angle), size * rng.uniform(0.5, 9)
+    tight = size * rng.choice([0.0, -1.0, 0.9 / max(ratio, 1.0)])
+    T_2 = P * arm / (size - tight * ratio)
+    F = T_2 * (ratio - 1)
+    element = mb.BandBrake("w", "a", law, P, r, angle, arm, size, tight)
+    share = tight / size * F / T_2 / (1 - tight / size)
+    return element, {
+        "N": s * F / mu, "friction": F, "moment": -r * F, "slack": T_2, "tight": T_2 * ratio,
+        "locking": share,
+    }  # fmt: skip
+
+
+def capstan(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
+    r, P, angle = 10 ** rng.uniform(-2, 1), 10 ** rng.uniform(0, 6), rng.uniform(0.1, 6 * pi)
+    groove = rng.uniform(0.3, pi / 2)
+    T = P * exp(s * mu * angle / sin(groove))
+    element = mb.CapstanDrum("w", "rope", law, P, r, angle, "a", groove)
+    return element, {"load": T, "rope_force": T - P, "a_moment": -r * (T - P), "locking": 0.0}
+
+
+def belt(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
+    r, P, angle = 10 ** rng.uniform(-2, 1), 10 ** rng.uniform(0, 6), rng.uniform(0.1, 2 * pi)
+    groove, gear = rng.uniform(0.3, pi / 2), rng.choice([-3.0, 0.2])
+    F = 2 * P * tanh(s * mu * angle / sin(groove) / 2)
+    element = mb.Belt("w", "a", "b", law, P, r, r * gear, angle, groove)
+    return element, {
+        "friction": F, "a_moment": -r * F, "b_moment": r * gear * F, "tight": P + F / 2,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("make", [disc, worn, shoe, band, capstan, belt])
+@pytest.mark.parametrize("s", [1, -1])
+def test_forces_are_those_of_equilibrium(make: Callable[..., Case], s: int) -> None:
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        mu = 10 ** rng.uniform(-2, -0.2)
+        law = dry(mu) if seed % 2 else sf.Coulomb(mu_d=mu, v_eps=1e-6)
+        element, expected = make(rng, mu, s, law)
+        m = turning(element, s * 10.0, 0.0, rope=make is capstan)
+        run = at_start(m)
+        for name, value in expected.items():
+            assert run[f"w_{name}"][0] == pytest.approx(value, rel=1e-9, abs=1e-300), (seed, name)
+        power = run["w_friction"][0] * run["w_slip"][0]
+        assert run["w_power"][0] == pytest.approx(power)
+        assert power > 0
+
+
+def test_absolute_coordinates_give_the_same_forces() -> None:
+    m = driven(drum(sf.BrownMcPhee(), 100.0), 3.0)
+    m.force(mb.DiscClutch("c", "a", sf.BrownMcPhee(), 50.0, 0.2, 0.1, pressure="uniform wear"))
+    runs = [simulate(m.build(formulation=f), 0.5, rtol=1e-9) for f in ("joint", "absolute")]
+    for name in ("w_N", "c_power", "w_slip"):
+        assert runs[0][name] == pytest.approx(runs[1][name], rel=1e-9, abs=1e-9)
+
+
+def test_long_shoes_have_the_arms_of_their_pressure() -> None:
+    """Moments about the pivot of the elements of the lining, p = sin, by quadrature."""
+    for r, d, start, end in ((0.15, 0.1, 0.1, 2.2), (2.0, 1.9, 0.0, pi), (1e-3, 5e-4, 1.0, 1.1)):
+        load = quad(sin, start, end)[0]
+        normal = quad(lambda t, d=d: d * sin(t) ** 2, start, end)[0]
+        friction = quad(lambda t, r=r, d=d: (r - d * cos(t)) * sin(t), start, end)[0]
+        expected = normal / load, friction / load
+        assert mb.shoe_arms(r, d, start, end) == pytest.approx(expected, rel=1e-12)
+
+
+SHOE = (0.2, 0.3, 0.16, 0.17)
+"""Radius and arms; leading shoes lock at mu = 16/17."""
+K = 17 / 16
+
+
+def drum(law: Law, P: Any, shoes: str = "leading") -> mb.DrumBrake:
+    return mb.DrumBrake("w", "a", law, P, *SHOE, shoes=shoes)
+
+
+def driven(element: mb.Force, *rates: float) -> mb.Mechanism:
+    m = turning(element, *rates)
+    m.force(mb.JointSpringDamper("motor", "a", actuator=m.input("torque", "N m")))
+    return m
+
+
+@pytest.mark.parametrize("s", [1, -1])
+def test_a_brake_holds_up_to_its_static_level(s: int) -> None:
+    law, up = dry(0.4, 0.3), exp(s * 0.4 * 4)
+    ring = 2 / 3 * (0.2**3 - 0.1**3) / (0.2**2 - 0.1**2)
+    for element, level in (
+        (drum(law, 100.0), 0.2 * 0.4 * 100 * 0.3 / 0.16 / (1 - s * 0.4 * K)),
+        (drum(law, 100.0, "leading and trailing"), 30 * 0.2 * 5 / (1 - (0.4 * K) ** 2)),
+        (mb.BandBrake("w", "a", law, 100.0, 0.2, 4.0, 0.3, 0.05, 0.005),
+         s * 6 * (up - 1) / (0.05 - 0.005 * up)),
+        (mb.DiscClutch("w", "a", law, 100.0, 0.2, 0.1, faces=3), 120 * ring),
+    ):  # fmt: skip
+        torque = lambda t, level=level: s * level * t  # noqa: E731
+        run = simulate(driven(element, 0.0).build(), 1.2, u={"torque": torque}, rtol=1e-8)
+        ((t, what),) = run.happened
+        assert (t, what) == (pytest.approx(1.0, rel=1e-9), "w_slip")
+        assert np.abs(run["a_rate"][run.t < 0.999]).max() < 1e-12
+
+
+def test_a_clutch_locks_after_the_time_of_the_closed_form() -> None:
+    m = shafts(150.0, J=0.2)
+    attach(m, mb.Revolute, "b", "load", J=0.64)
+    m.force(mb.DiscClutch("w", "a", dry(0.3), 2000.0, 0.15, 0.1, "b", 2, pressure="uniform wear"))
+    run = simulate(m.build(), 1.0, rtol=1e-9)
+    T = 0.3 * 2000 * 2 * 0.125
+    gain = T * (1 / 0.2 + 1 / 0.64)
+    ((t, what),) = run.happened
+    assert (t, what) == (pytest.approx(150 / gain, rel=1e-9), "w_stick")
+    heat = T * 150**2 / (2 * gain)
+    assert run.energy_balance().work["friction"][-1] == pytest.approx(-heat, rel=1e-9)
+    assert run.final["a_rate"] == pytest.approx(150 * 0.2 / 0.84, rel=1e-12)
+    assert run.final["w_slip"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_shoe_above_its_limit_locks_itself() -> None:
+    """mu k > 1: no torque turns the drum against the shoe; sliding has no solution there."""
+    held, free, sliding = (driven(drum(dry(1.0), 100.0), rate) for rate in (0.0, 0.0, 9.0))
+    run = simulate(held.build(), 1.0, u={"torque": lambda t: 1e6 * t})
+    assert run.happened == ()
+    assert abs(run.final["a"]) < 1e-9
+    level = 0.2 * 100 * 0.3 / 0.16 / (1 + K)
+    run = simulate(free.build(), 1.5, u={"torque": lambda t: -level * t})
+    assert run.happened[0] == (pytest.approx(1.0, rel=1e-9), "w_slip")
+    with pytest.raises(sf.SolveError, match="friction jams, most of all through w_N.*lock itself"):
+        simulate(sliding.build(), 1.0)
+    near = at_start(turning(drum(dry(0.999 / K), 100.0), 9.0))
+    assert near["w_locking"][0] == pytest.approx(0.999, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", ["exact_coulomb", "brown_mcphee", "lugre_normalised"])
+def test_a_released_element_has_no_friction_and_never_pulls(law: str) -> None:
+    def bodies(make: Callable[[Any], mb.Force]) -> Trajectory:
+        m = shafts(20.0, 0.0)
+        attach(m, mb.Prismatic, "rope", "load")
+        m.force(make(m.input("P", "N", start=1.0)))
+        wave = {"P": lambda t: 50 * ca.sin(2 * pi * t)}
+        return simulate(m.build(), 1.0, u=wave, samples=101)
+
+    own = law_from_text(law)
+    for make in (
+        lambda P: drum(own, P, "leading and trailing"),
+        lambda P: mb.BandBrake("w", "a", own, P, 0.2, 4.0, 0.3, 0.05, 0.005),
+        lambda P: mb.DiscClutch("w", "a", own, P, 0.2, 0.1, "b"),
+        lambda P: mb.CapstanDrum("w", "rope", own, P, 0.1, 9.0, "a"),
+        lambda P: mb.Belt("w", "a", "b", own, P, 0.1, 0.2, 3.0),
+    ):
+        run = bodies(make)
+        released = (run.t > 0.505) & (run.t < 1.0)
+        assert np.abs(run["w_friction"][released]).max() < 1e-9
+        assert np.ptp(run["a_rate"][released]) < 1e-5  # error of the run
+        assert run["w_N"].min() > -1e-9
+        assert run["w_friction"][1:50].max() > 1.0
+
+
+def accepts(law: Law) -> bool:
+    try:
+        driven(drum(law, 100.0), 3.0).prepare()
+    except ValueError as error:
+        assert "element 'w' > law: expected one that" in str(error)
+        return False
+    return True
+
+
+@pytest.mark.slow
+def test_every_law_brakes_or_is_refused_in_one_sentence() -> None:
+    refused = set[str]()
+    for name in ALL_LAWS:
+        law = law_from_text(name)
+        if not accepts(law):
+            refused.add(name)
+            continue
+        run = simulate(driven(drum(law, 100.0), 3.0).build(), 0.2, rtol=1e-8)
+        balance = run.energy_balance()
+        assert run.final["a_rate"] < 3.0, name
+        assert np.abs(balance.defect).max() < 1e-6 * balance.scale, name
+    assert refused == set()
+
+
+def random_train(seed: int) -> tuple[mb.Mechanism, Callable[[np.ndarray], np.ndarray]]:
+    """Three shafts and a load under a motor, with four elements, and its accelerations by hand."""
+    rng = np.random.default_rng(seed)
+    law = sf.Coulomb(mu_d=rng.uniform(0.05, 0.4), v_eps=0.05)
+    J, mass, torque = rng.uniform(0.1, 2, 3), rng.uniform(1, 20), rng.uniform(5, 20)
+    P, r, angle = rng.uniform(20, 200, 4), rng.uniform(0.05, 0.3, 4), rng.uniform(1, 6, 2)
+    kind = rng.choice(["leading", "trailing"])
+    m = mb.Mechanism("train", gravity=(0.0, 0.0, 0.0))
+    for name, inertia, rate in zip("abc", J, rng.uniform(-20, 20, 3), strict=True):
+        attach(m, mb.Revolute, name, f"shaft_{name}", J=float(inertia), rate=float(rate))
+    attach(m, mb.Prismatic, "rope", "load", mass=float(mass))
+    m.force(mb.JointSpringDamper("motor", "a", actuator=float(torque)))
+    m.force(mb.Belt("belt", "a", "b", law, P[0], r[0], r[1], angle[0]))
+    m.force(mb.DiscClutch("clutch", "b", law, P[1], 0.2, 0.1, "c"))
+    m.force(mb.CapstanDrum("winch", "rope", law, P[2], r[2], angle[1], "c"))
+    m.force(mb.DrumBrake("brake", "c", law, P[3], r[3], 0.3, 0.16, 0.1, shoes=str(kind)))
+    ring, k = 2 / 3 * (0.2**3 - 0.1**3) / (0.2**2 - 0.1**2), 0.1 / 0.16
+
+    def accelerations(w: np.ndarray) -> np.ndarray:
+        mu = lambda v: law.mu_d * np.tanh(v / 0.05)  # noqa: E731
+        F = 2 * P[0] * np.tanh(mu(r[0] * w[0] - r[1] * w[1]) * angle[0] / 2)
+        T = mu(ring * (w[1] - w[2])) * P[1] * ring
+        R = P[2] * np.expm1(mu(r[2] * w[2] - w[3]) * angle[1])
+        m_c = mu(r[3] * w[2])
+        B = r[3] * m_c * P[3] * 0.3 / 0.16 / (1 - m_c * k * (1 if kind == "leading" else -1))
+        moments = torque - r[0] * F, r[1] * F - T, T - r[2] * R - B
+        return np.array([*(M / j for M, j in zip(moments, J, strict=True)), (P[2] + R) / mass])
+
+    return m, accelerations
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_energy_of_random_trains_closes(seed: int) -> None:
+    m, accelerations = random_train(seed)
+    run = simulate(m.build(), 0.5, rtol=1e-11, samples=51)
+    balance = run.energy_balance()
+    assert np.abs(balance.defect).max() < 1e-9 * balance.scale
+    losses = sum(run.integral(f"{name}_power") for name in ("belt", "clutch", "winch", "brake"))
+    put_in = balance.work["motor"] + balance.work["winch"]
+    assert put_in - losses == pytest.approx(
+        run["kinetic"] - run["kinetic"][0], abs=1e-9 * balance.scale
+    )
+    names = ("a_rate", "b_rate", "c_rate", "rope_rate")
+    begin = [run[name][0] for name in names]
+    same = solve_ivp(lambda _, w: accelerations(w), (0, 0.5), begin, "Radau", rtol=1e-11, atol=1e-11)
+    assert [run.final[name] for name in names] == pytest.approx(same.y[:, -1], abs=1e-7)
+
+
+def test_inverse_dynamics_needs_what_the_motion_gives() -> None:
+    """The torque of the motor in C and in `functions`, for the accelerations of the model."""
+    P = Variable("P", "N", start=80.0)
+    for seed in range(3):
+        m, accelerations = random_train(seed)
+        m.forces = [f for f in m.forces if f.name != "motor"]
+        m.forces[-1] = mb.DrumBrake("brake", "c", m.forces[-1].law, P, *SHOE)
+        w = np.random.default_rng(seed).normal(size=4) * 9
+        a = np.random.default_rng(seed + 9).normal(size=4)
+        block = inverse_dynamics_block(m, p=(P,))
+        values = [float(v.start) for v in block.parameters]
+        _, found = block.step(ca.DM(), values, np.concatenate([np.zeros(4), w, a]))
+        same = mb.functions(m, p=(P,))["inverse_dynamics"](np.zeros(4), w, a, [], [], [], [80.0])
+        assert found.full().ravel() == pytest.approx(same.full().ravel(), rel=1e-13)
+        lost = at_start(moving(m, w), "joint")
+        friction = sum(
+            lost[f"{n}_friction"][0] * lost[f"{n}_slip"][0]
+            for n in ("belt", "clutch", "winch", "brake")
+        )
+        inertia = mb.functions(m, p=(P,))["mass"](np.zeros(4), [80.0]).full() @ a
+        hand = m.forces[-2].tension * w[3]
+        assert w @ (found.full().ravel() - inertia) == pytest.approx(friction - hand, rel=1e-9)
+
+
+def moving(m: mb.Mechanism, rates: np.ndarray) -> mb.Mechanism:
+    """The mechanism at other rates, with the brake at 80 N."""
+    joints = [type(j)(j.name, j.parent, j.child, rate=float(w)) for j, w in zip(m.joints, rates)]
+    other = mb.Mechanism("moving", gravity=(0.0, 0.0, 0.0))
+    other.bodies, other.joints, other.frames, other.forces = m.bodies, joints, m.frames, m.forces
+    other.forces = [*m.forces[:-1], mb.DrumBrake("brake", "c", m.forces[0].law, 80.0, *SHOE)]
+    return other
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", [sf.BrownMcPhee(mu_s=0.3, mu_d=0.3, mu_v=0.0), dry(0.3)])
+def test_the_optimal_stop_presses_constantly(law: Law) -> None:
+    """Least integral of P^2: the torque J w / T is constant, P by the closed form."""
+    from ocp import Phase, Problem, integral, solve
+
+    m = shafts(20.0)
+    m.force(drum(law, m.input("P", "N", start=10.0, nominal=100.0), "leading and trailing"))
+    phase = Phase(m.build(), T=1.0, start={"a": 0.0, "a_rate": 20.0}, end={"a_rate": 0.0})
+    problem = Problem(phase, integral(lambda s: (s.P / 100) ** 2), bounds={"P": (0.0, 500.0)})
+    solution = solve(problem, intervals=10)
+    P = 0.5 * 20 * (1 - (0.3 * K) ** 2) / (2 * 0.2 * 0.3 * 0.3 / 0.16)
+    assert solution.verified
+    assert solution.cost == pytest.approx((P / 100) ** 2, rel=1e-8)
+
+
+def test_a_plain_bearing_follows_its_hersey_number() -> None:
+    """J w' = -r F(r w, N) with N the weight of the rotor."""
+    law = sf.MixedLubrication(eta=0.03, A=2e-3)
+    m = mb.Mechanism("rotor", gravity=(-10.0, 0.0, 0.0))
+    bearing = mb.JointFriction(law, radius=0.02, eps=1e-9)
+    attach(m, mb.Revolute, "a", "rotor", mass=20.0, J=0.05, rate=100.0, friction=bearing)
+    run = simulate(m.build(), 3.0, rtol=1e-9)
+    H = 0.03 * 0.02 * run["a_rate"] * 2e-3 / 200.0
+    mu = 0.1 / (1 + (H / 1e-8) ** 2) + H / 2e-5
+    assert run["a_friction"][:-1] == pytest.approx(200.0 * mu[:-1], rel=1e-6)
+    assert log(H[0] / 1e-8) > 4  # from the film ...
+    same = solve_ivp(
+        lambda _, w: [-0.02 / 0.05 * law.force(0.02 * w[0], 200.0)], (0, 3), [100.0], "LSODA",
+        rtol=1e-10, atol=1e-10,
+    )  # fmt: skip
+    assert run.final["a_rate"] == pytest.approx(same.y[0, -1], abs=1e-6)
+
+
+NAMES = Names(
+    vars(mb) | {"np": np, "ca": ca, "LAW": sf.BrownMcPhee(), "SHOE": SHOE, "kN": Variable("P", "kN")}
+)
+
+
+def test_mistakes_are_described_in_one_sentence() -> None:
+    """Elements in elements.toml, in a mechanism with the shafts a, b and the joint rope."""
+    for text, message in table(__file__, "elements").items():
+        with pytest.raises(ValueError) as caught:
+            turning(NAMES.value(text), 1.0, 2.0, rope=True).build()
+        found = str(caught.value)
+        assert message in found, (text, found)
+        assert "\n" not in found, found
