@@ -10,7 +10,7 @@ import casadi as ca
 from symfric.foundation.checks import as_number
 from symfric.foundation.numeric import Scalar, equals
 from symfric.laws import Law
-from symfric.multibody.element import FrictionElement, Lever, wrapped
+from symfric.multibody.element import FrictionElement, wrapped
 from symfric.multibody.forces import Axial, Load
 from symfric.multibody.kinematics import Kinematics
 
@@ -77,12 +77,13 @@ class CapstanDrum(_Wound):
     groove: Scalar = pi / 2
     preload: Scalar = 0.0
 
-    def levers(self) -> tuple[Lever, ...]:
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """Return the rope and, if it is given, the drum."""
+        return ((self.rope, "slide"), *([(self.drum, "turn")] if self.drum else ()))
+
+    def levers(self) -> tuple[Scalar, ...]:
         """Return -1 for the rope and the radius of the drum."""
-        return (
-            (self.rope, "slide", -1.0),
-            *([(self.drum, "turn", self.radius)] * (self.drum != "")),
-        )
+        return (-1.0, self.radius) if self.drum else (-1.0,)
 
     def pressing(self, m: ca.SX) -> tuple[Scalar, Scalar]:
         """Return N over the tension of the free end, and 0."""
@@ -141,9 +142,13 @@ class Belt(_Wound):
     groove: Scalar = pi / 2
     preload: Scalar = 0.0
 
-    def levers(self) -> tuple[Lever, ...]:
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """Return both pulleys."""
+        return (self.a, "turn"), (self.b, "turn")
+
+    def levers(self) -> tuple[Scalar, ...]:
         """Return the radius of a and minus that of b."""
-        return (self.a, "turn", self.radius_a), (self.b, "turn", -self.radius_b)
+        return self.radius_a, -self.radius_b
 
     def pressing(self, m: ca.SX) -> tuple[Scalar, Scalar]:
         """Return N over the mean tension, and 0."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import cos, pi, sin
+from math import cos, inf, pi, sin
 from types import MappingProxyType
 from typing import final
 
@@ -12,7 +12,7 @@ from symfric.foundation import checks
 from symfric.foundation.checks import as_number
 from symfric.foundation.numeric import Scalar, equals
 from symfric.laws import Law
-from symfric.multibody.element import FrictionElement, Lever, wrapped
+from symfric.multibody.element import FrictionElement, wrapped
 
 PRESSURES = ("uniform pressure", "uniform wear")
 
@@ -68,10 +68,13 @@ class DiscClutch(FrictionElement):
             return (R + r) / 2
         return 2 * (R * R + R * r + r * r) / (3 * (R + r))
 
-    def levers(self) -> tuple[Lever, ...]:
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """Return a and, if it is given, b."""
+        return tuple((name, "turn") for name in (self.a, self.b) if name)
+
+    def levers(self) -> tuple[Scalar, ...]:
         """Return the mean radius for a, and minus that for b."""
-        r = self.radius
-        return ((self.a, "turn", r), *([(self.b, "turn", -r)] if self.b else ()))
+        return (self.radius, -self.radius) if self.b else (self.radius,)
 
     def pressing(self, m: ca.SX) -> tuple[Scalar, Scalar]:
         """Return the gain of faces and wedge, and 0."""
@@ -172,9 +175,13 @@ class DrumBrake(FrictionElement):
     shoes: str = "leading and trailing"
     preload: Scalar = 0.0
 
-    def levers(self) -> tuple[Lever, ...]:
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """Return the joint of the drum."""
+        return ((self.joint, "turn"),)
+
+    def levers(self) -> tuple[Scalar, ...]:
         """Return the radius of the drum."""
-        return ((self.joint, "turn", self.radius),)
+        return (self.radius,)
 
     def pressing(self, m: ca.SX) -> tuple[Scalar, Scalar]:
         """Return the gains of the levers of all shoes."""
@@ -233,9 +240,13 @@ class BandBrake(FrictionElement):
     arm_tight: Scalar = 0.0
     preload: Scalar = 0.0
 
-    def levers(self) -> tuple[Lever, ...]:
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """Return the joint of the drum."""
+        return ((self.joint, "turn"),)
+
+    def levers(self) -> tuple[Scalar, ...]:
         """Return the radius of the drum."""
-        return ((self.joint, "turn", self.radius),)
+        return (self.radius,)
 
     def pressing(self, m: ca.SX) -> tuple[Scalar, Scalar]:
         """Return the gains of the lever, times N / T_2 of the arc."""
@@ -253,7 +264,7 @@ class BandBrake(FrictionElement):
         """Yield a message about a lever that locks without friction."""
         yield from super().problems()
         tight, slack = as_number(self.arm_tight), as_number(self.arm_slack)
-        if tight is not None and slack is not None and tight >= slack > 0:
+        if tight is not None and slack is not None and inf > tight >= slack > 0:
             yield (
                 f"arm_tight: expected a number < arm_slack = {slack:g} m, got {tight:g}; the "
                 "lever would lock without friction"

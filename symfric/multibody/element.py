@@ -12,9 +12,9 @@ if B m reaches 1. A negative actuation releases the element, which cannot pull.
 """
 
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator
-from dataclasses import fields
-from typing import ClassVar
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import ClassVar, final
 
 import casadi as ca
 
@@ -24,8 +24,10 @@ from symfric.foundation.variable import take_si
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.laws.base.law import require_law
+from symfric.multibody.contact import Contact, Lever, depends_on_load
+from symfric.multibody.dynamics import Wrench
 from symfric.multibody.forces import Axial, Force, Load
-from symfric.multibody.joint import OFFERED, Contact, JointFriction, depends_on_load
+from symfric.multibody.joint import OFFERED, JointFriction
 from symfric.multibody.kinematics import Kinematics
 
 EXPONENT = 50.0
@@ -33,9 +35,6 @@ EXPONENT = 50.0
 
 UNLOADED = 1e-12
 """Force [N] that keeps F / N finite for a released element; it must be negligible under load."""
-
-Lever = tuple[str, str, Scalar]
-"""Joint, direction, lever c_j."""
 
 
 def wrapped(m: ca.SX, angle: Scalar) -> tuple[ca.SX, ca.SX]:
@@ -81,8 +80,12 @@ class FrictionElement(Force):
         take_si(name, self, *(item.name for item in fields(self) if item.type is Scalar))
 
     @abstractmethod
-    def levers(self) -> tuple[Lever, ...]:
-        """Return the joints with their directions and levers."""
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """Return the joints of the element with their directions."""
+
+    @abstractmethod
+    def levers(self) -> tuple[Scalar, ...]:
+        """Return the lever c_j of each joint."""
 
     @abstractmethod
     def pressing(self, m: ca.SX) -> tuple[Scalar, Scalar]:
@@ -103,48 +106,16 @@ class FrictionElement(Force):
         given = getattr(self, self.actuator)
         return ca.SX(self.preload + (given if is_number(given) else smooth.positive(given, 0.0)))
 
-    def normal_force(self, F: ca.SX, m: ca.SX) -> ca.SX:
-        """Return N = G(m) P + B(m) F [N]."""
-        G, B = self.pressing(m)
-        return G * self.actuation + B * F
-
-    def explicit_normal(self, force: ca.SX, N: ca.SX) -> ca.SX | None:
-        """Return N = G P / (1 - B m) for a friction force m N; None for a force of another form.
-
-        `force` is the friction force in terms of the symbol N.
-        """
-        m = ca.jacobian(force, N)
-        if ca.depends_on(m, N) or not ca.substitute(force, N, ca.SX(0)).is_zero():
-            return None
-        G, B = self.pressing(m)
-        return ca.SX(G * self.actuation / (1 - B * m))
-
-    def contact(self, kin: Kinematics) -> Contact:
+    def contact(self, kin: Kinematics) -> "PressedContact":
         """Return the contact of the element."""
-        known, own = kin.topology, self.levers()
-        joint, direction, _ = own[0]
-        alone = len(own) == 1 and joint in known.link_of
-        rate = known.joints[joint].coordinate(known.joints[joint].directions[direction])
+        pairs = zip(self.joints(), self.levers(), strict=True)
+        levers = [(kin.topology.joints[name], way, c) for (name, way), c in pairs]
+        slip = sum((c * kin.rate(joint, way) for joint, way, c in levers), start=ca.SX(0))
         F, N = (ca.SX.sym(f"{self.name}_{what}") for what in ("friction", "N"))
-        return Contact(
-            self.name, joint, direction, JointFriction(self.law), self.law, self.name,
-            self.slip(kin), F, f"{rate}_rate" if alone else "", self, N,
+        return PressedContact(
+            self.name, self.name, JointFriction(self.law), self.law, self.name, slip, F, self,
+            tuple(levers), N,
         )  # fmt: skip
-
-    def joints(self) -> Iterable[tuple[str, str]]:
-        """Return the joints of the element with their directions."""
-        return [(joint, direction) for joint, direction, _ in self.levers()]
-
-    def slip(self, kin: Kinematics) -> ca.SX:
-        """Return the sliding velocity sum c_j s_j' [m/s]."""
-        known = kin.topology.joints
-        rates = (c * kin.rate(known[joint], along) for joint, along, c in self.levers())
-        return sum(rates, start=ca.SX(0))
-
-    def friction_loads(self, kin: Kinematics, F: ca.SX) -> list[Axial]:
-        """Return the loads -c_j F of the friction force on the joints."""
-        known = kin.topology.joints
-        return [Axial(known[joint], along, -c * F) for joint, along, c in self.levers()]
 
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield nothing: an actuating force inside a brake does not load the bodies."""
@@ -164,9 +135,9 @@ class FrictionElement(Force):
             if (x := size[name]) is not None and x < 0:
                 yield f"{name}: expected a number >= 0, got {x:g}; friction needs pressure"
         yield from self._unsuitable()
-        joints = [pair[0] for pair in self.joints()]
-        if len(set(joints)) < len(joints):
-            yield f"expected two joints, got {joints[0]} twice"
+        ends = self.joints()
+        if len(set(ends)) < len(ends):
+            yield f"expected two joints, got {ends[0][0]} twice"
 
     def _unsuitable(self) -> Iterator[str]:
         """Yield a message if the law has further inputs or ignores the normal force."""
@@ -181,3 +152,67 @@ class FrictionElement(Force):
                 f"law: expected one that depends on the normal force, got {law}; no actuation "
                 "would change its friction"
             )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PressedContact(Contact):
+    """Friction of an element under an actuating force.
+
+    Attributes:
+        element: brake, clutch or belt.
+        levers: joint, direction and c_j of each displacement.
+        N: symbol of the normal force [N].
+    """
+
+    kind = "element"
+
+    element: FrictionElement
+    levers: tuple[Lever, ...]
+    N: ca.SX
+
+    @property
+    def law_place(self) -> str:
+        """Field of the law, for messages."""
+        return f"{self.place} > law"
+
+    @property
+    def link(self) -> str:
+        """First joint."""
+        return self.levers[0][0].name
+
+    @property
+    def rate(self) -> str:
+        """Name of the rate of the only joint; empty if there are two."""
+        joint, direction, _ = self.levers[0]
+        own = f"{joint.coordinate(joint.directions[direction])}_rate"
+        return own if len(self.levers) == 1 else ""
+
+    @property
+    def normal_symbol(self) -> ca.SX:
+        """Symbol of the normal force."""
+        return self.N
+
+    @property
+    def mobilised(self) -> ca.SX:
+        """Mobilised coefficient m = F / N."""
+        return self.F / (self.N + UNLOADED)
+
+    def loads(self, kin: Kinematics) -> list[Axial]:
+        """Return the loads -c_j F on the joints."""
+        return [Axial(joint, way, -c * self.F) for joint, way, c in self.levers]
+
+    def normal(self, kin: Kinematics, pressing: Mapping[str, Wrench]) -> ca.SX:
+        """Return N = G(m) P + B(m) F."""
+        G, B = self.element.pressing(self.mobilised)
+        return G * self.element.actuation + B * self.F
+
+    def explicit_normal(self, normal: ca.SX, force: ca.SX, N: ca.SX) -> ca.SX:
+        """Return N = G P / (1 - B m) for a friction force m N; otherwise `normal`."""
+        if not ca.depends_on(normal, self.F):
+            return normal
+        m = ca.jacobian(force, N)
+        if ca.depends_on(m, N) or not ca.substitute(force, N, ca.SX(0)).is_zero():
+            return normal
+        G, B = self.element.pressing(m)
+        return ca.SX(G * self.element.actuation / (1 - B * m))

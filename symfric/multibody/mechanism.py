@@ -18,7 +18,9 @@ from symfric.model import Model, Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import assemble
 from symfric.multibody.constraints import Constraint
+from symfric.multibody.contact import places_of
 from symfric.multibody.element import FrictionElement
+from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Force, Gravity, SpringDamper
 from symfric.multibody.joint import Joint
 from symfric.multibody.prepare import (
@@ -32,7 +34,7 @@ from symfric.multibody.prepare import (
     written,
 )
 from symfric.multibody.results import sketch
-from symfric.multibody.slips import explicit_normal, slips
+from symfric.multibody.slips import slips
 from symfric.multibody.spatial import GROUND, Body, Frame, Vector, is_vector
 from symfric.multibody.start import following, project
 from symfric.multibody.topology import Topology, spanning_tree
@@ -233,7 +235,14 @@ class Mechanism(packed.Portable, Showing):
         problems += checks.naming(bodies, self.joints, (*self.forces, *self.constraints), u)
         weights = list(checks.weights(bodies, p))
         bearings = list(checks.bearings(self.joints, symbols_of(p), symbols_of(u)))
-        bearings += checks.elements(self.forces, symbols_of((*p, *u)))
+        rubbing = ((c, getattr(c, "friction", None)) for c in self.constraints)
+        known = symbols_of((*p, *u))
+        for c, friction in rubbing:
+            if isinstance(friction, ElementFriction):
+                bearings += checks.rubbing(f"{c.kind} '{c.name}' > friction", friction, known)
+        for f in self.forces:
+            if isinstance(f, FrictionElement):
+                bearings += checks.rubbing(f"{f.kind} '{f.name}'", f, known)
         self._refuse([*problems, *weights, *bearings] if problems else ())
         tree = spanning_tree({body.name: body for body in bodies}, self.joints)
         loose = list(checks.connected(tree))
@@ -328,21 +337,20 @@ def functions(
     if applied := [c for c in eq.contacts if c.law.inputs]:
         law = type(applied[0].friction.law).__name__
         raise ValueError(
-            f"{where} > {applied[0].law_place}: expected one that needs only "
-            f"v and N, got {law}, whose force in stick depends on the motion; use `build`"
+            f"{where} > {applied[0].law_place}: expected one that needs only v and N, got {law}, "
+            "whose force in stick depends on the motion; use `build`"
         )
     contacts = slips(eq, [1.0] * len(eq.contacts))
     forces = stacked(c.force for c in contacts)
     for c in contacts:
         if c.N is not c.normal:
-            forces = ca.substitute(forces, c.N, explicit_normal(c))
+            normal = c.contact.explicit_normal(c.normal, c.force, c.N)
+            forces = ca.substitute(forces, c.N, normal)
     if ca.depends_on(forces, eq.F):
-        pressed = [c.contact for c in contacts if ca.depends_on(explicit_normal(c), eq.F)]
-        names = ", ".join(dict.fromkeys(f"'{c.joint}'" for c in pressed if c.element is None))
-        place = f"joint {names} > friction" if names else pressed[0].law_place
+        names = places_of(c.contact for c in contacts if ca.depends_on(c.normal, eq.F))
         raise ValueError(
-            f"{where} > {place}: expected a normal force that does not depend on friction; use "
-            "`build` for a model, or a constant normal force"
+            f"{where} > {names} > friction: expected a normal force that does not depend on "
+            "friction; use `build` for a model, or a constant normal force"
         )
     still = [ca.SX.zeros(x.numel()) for x in (eq.a, eq.lam, eq.F)]
     (bias,) = ca.substitute([eq.balance], [eq.a, eq.lam, eq.F], still)

@@ -10,7 +10,7 @@ from symfric.foundation.variable import stacked, strays
 from symfric.model import Output
 from symfric.model.kinds import WORK
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
-from symfric.multibody.element import UNLOADED, FrictionElement
+from symfric.multibody.element import PressedContact
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import SpringDamper
 from symfric.multibody.joint import COMPONENTS, FORCE_NAMES
@@ -79,10 +79,10 @@ def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
 def _elements(eq: Equations) -> Iterator[tuple[str, Output]]:
     """Yield loads, tensions and the fraction of self-energising of brakes, clutches and belts."""
     for contact in eq.contacts:
-        element, name, F = contact.element, contact.name, contact.F
-        if not isinstance(element, FrictionElement):
+        if not isinstance(contact, PressedContact):
             continue
-        loads = element.friction_loads(eq.kin, F)
+        element, name, F = contact.element, contact.name, contact.F
+        loads = contact.loads(eq.kin)
         for load in loads:
             what, unit = ("force", "N") if load.joint.linear(load.direction) else ("moment", "N m")
             own = name if len(loads) == 1 else f"{name}_{load.joint.name}"
@@ -90,8 +90,7 @@ def _elements(eq: Equations) -> Iterator[tuple[str, Output]]:
             yield f"{own}_{what}", Output(load.value, unit, doc)
         for end, tension in element.tensions(F).items():
             yield f"{name}_{end}", Output(tension, "N", f"tension of the {end} end")
-        m = F / (contact.N + UNLOADED)
-        share = ca.SX(element.pressing(m)[1]) * m
+        share = ca.SX(element.pressing(contact.mobilised)[1]) * contact.mobilised
         doc = "fraction of the normal force that friction causes, 1 if the brake locks itself"
         yield f"{name}_locking", Output(share, "1", doc)
 
@@ -167,7 +166,7 @@ def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
     marks: list[Mark] = []
     for joint in joints:
         slips = ((c.name, scales[c.name]) for c in eq.contacts
-                 if c.joint == joint.name and c.name in scales)  # fmt: skip
+                 if c.part == joint.name and c.name in scales)  # fmt: skip
         slips = tuple((f"{name}_slip", scale) for name, scale in slips)
         marks.append(_mark(joint.name, joint.symbol, (joint.parent, joint.child), used, slips))
     for force in springs:

@@ -15,8 +15,8 @@ from symfric.laws.base.law import FORCE
 from symfric.model import Event, Variables, kinds
 from symfric.model.contact import mode_events
 from symfric.multibody.applied import Rest, capacity_of, forward, switches_at
+from symfric.multibody.contact import Contact, depends_on_load
 from symfric.multibody.equations import Equations
-from symfric.multibody.joint import Contact, depends_on_load
 
 
 @final
@@ -75,8 +75,9 @@ def slips(
         if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(law):
             doc = f"normal force of {contact.place} with {type(law).__name__}"
             size, kind = max(1.0, abs(start)), kinds.NORMAL_FORCE
+            symbol = ca.SX(0, 0) if contact.normal_symbol.is_empty() else contact.normal_symbol
             new = Variable(
-                f"{pressed}_N", "N", start=start, nominal=size, doc=doc, symbol=contact.N, kind=kind
+                f"{pressed}_N", "N", start=start, nominal=size, doc=doc, symbol=symbol, kind=kind
             )
             normal = unknowns.setdefault(pressed, new).symbol
         pressing.append(normal)
@@ -105,18 +106,6 @@ def slips(
         unknown = () if own is None else (own,)
         found.append(Slip(contact, unknown, N, eq.normals[i], states, rate, force, inputs))
     return tuple(found)
-
-
-def explicit_normal(slip: Slip) -> ca.SX:
-    """Return the normal force in terms of accelerations, multipliers, and states of the laws.
-
-    That of an element contains its friction force unless the law is proportional to the load.
-    """
-    element = slip.contact.element
-    if element is None or not ca.depends_on(slip.normal, slip.contact.F):
-        return slip.normal
-    explicit = element.explicit_normal(slip.force, slip.N)
-    return slip.normal if explicit is None else explicit
 
 
 def _states(contact: Contact, begin: ca.SX) -> Iterator[Variable]:

@@ -16,12 +16,15 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Output, Variables
 from symfric.multibody import Mechanism
+from symfric.multibody.contact import Contact, JointContact
+from symfric.multibody.element import PressedContact
 from symfric.multibody.equations import Equations
-from symfric.multibody.joint import Contact
 from symfric.multibody.urdf import read_urdf
 
 WHERE = "inverse dynamics"
 
+OPEN = JointContact, PressedContact
+"""Contacts whose normal force follows from the motion without multipliers."""
 SAID = SHEET["mechanism"]
 
 
@@ -160,11 +163,11 @@ class _Machine(NamedTuple):
         return self.name if self.name[:1].isalpha() else f"robot_{self.name.lstrip('_')}"
 
     def along(self, contact: Contact) -> str:
-        """Return the coordinate that a contact resists, or the name of a brake or belt."""
-        if contact.element is not None:
-            return contact.name
-        joint = self.eq.kin.topology.link_of[contact.joint].joint
-        return joint.coordinate(joint.directions[contact.direction])
+        """Return the coordinate that a contact resists."""
+        if isinstance(contact, JointContact):
+            joint = self.eq.kin.topology.link_of[contact.part].joint
+            return joint.coordinate(joint.directions[contact.direction])
+        return contact.name
 
     def label(self, coordinate: str) -> str:
         """Return the number of a leading coordinate, or the name of another coordinate."""
@@ -289,8 +292,13 @@ def _check(eq: Equations, mechanism: Mechanism) -> None:
     everything = ca.veccat(eq.balance, *eq.normals, eq.phi)
     if ca.depends_on(everything, eq.kin.t):
         raise ValueError(f"{where}: expected time-independent forces and constraints, got others")
-    pairs = ((c, N) for c, N in zip(eq.contacts, eq.normals, strict=True) if c.element is None)
-    if pressed := [c.joint for c, N in pairs if ca.depends_on(N, eq.F)]:
+    if rubbing := [c.part for c in eq.contacts if not isinstance(c, OPEN)]:
+        raise ValueError(
+            f"{where}: expected couplings without friction, got friction in {', '.join(rubbing)}"
+        )
+    pairs = [*zip(eq.contacts, eq.normals, strict=True)]
+    pressed = [c.part for c, N in pairs if isinstance(c, JointContact) and ca.depends_on(N, eq.F)]
+    if pressed:
         raise ValueError(
             f"{where}: expected normal forces that do not depend on friction, got that of "
             f"{', '.join(dict.fromkeys(pressed))}, which depends on other friction; give it a "

@@ -13,8 +13,10 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, symbols_of
 from symfric.model import Variables
 from symfric.multibody import GROUND, Body, Mechanism
+from symfric.multibody.contact import Contact
+from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Gravity
-from symfric.multibody.joint import Contact, JointFriction
+from symfric.multibody.joint import JointFriction
 from symfric.multibody.spatial import Frame, skew, vector
 
 
@@ -67,30 +69,19 @@ def contact_step(
     symbols, values = [v.symbol, symbols_of(sizes)], [contact.slip, h if sizes else ca.SX(0, 1)]
     parts = (block.outputs["F"].expression, block.next, *(s for s, _ in block.resets.values()))
     parts = ca.substitute([ca.SX(part) for part in parts], symbols, values)
-    if contact.element is not None and ca.depends_on(normal, contact.F):
-        normal = _explicit(contact, parts[0], N.symbol)
+    normal = contact.explicit_normal(normal, parts[0], N.symbol)
+    if ca.depends_on(normal, contact.F):
+        raise ValueError(
+            f"inverse dynamics: {contact.law_place}: expected one whose force is proportional to "
+            f"the normal force, got {type(law).__name__}; friction presses this element, and no "
+            "equation is solved"
+        )
     force, following, *sliding = ca.substitute(parts, [N.symbol], [normal])
     parameters = (*(v for v in block.parameters if v not in sizes), *level)
     return ContactStep(along, block, force, parameters, following, *sliding or [ca.SX(0, 1)])
 
 
-def _explicit(contact: Contact, force: ca.SX, N: ca.SX) -> ca.SX:
-    """Return the normal force of an element with the friction force `force` in terms of N.
-
-    Raises:
-        ValueError: the force is not proportional to the normal force.
-    """
-    found = None if contact.element is None else contact.element.explicit_normal(force, N)
-    if found is None:
-        raise ValueError(
-            f"inverse dynamics: {contact.law_place}: expected one whose force is proportional to "
-            f"the normal force, got {type(contact.law).__name__}; friction presses this element, "
-            "and no equation is solved"
-        )
-    return found
-
-
-def _level(friction: JointFriction) -> Variables:
+def _level(friction: JointFriction | ElementFriction) -> Variables:
     """Return the constant normal force of a joint as a parameter; () if it is not constant."""
     if friction.normal is None or not is_number(friction.normal):
         return ()
