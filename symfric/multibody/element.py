@@ -24,10 +24,10 @@ from symfric.foundation.variable import take_si
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.laws.base.law import require_law
-from symfric.multibody.contact import Contact, Lever, depends_on_load
+from symfric.multibody.contact import Contact, depends_on_load
 from symfric.multibody.dynamics import Wrench
 from symfric.multibody.forces import Axial, Force, Load
-from symfric.multibody.joint import OFFERED, JointFriction
+from symfric.multibody.joint import OFFERED, Joint, JointFriction
 from symfric.multibody.kinematics import Kinematics
 
 EXPONENT = 50.0
@@ -35,6 +35,10 @@ EXPONENT = 50.0
 
 UNLOADED = 1e-12
 """Force [N] that keeps F / N finite for a released element; it must be negligible under load."""
+
+
+Lever = tuple[Joint, str, Scalar]
+"""Joint, direction, lever c_j."""
 
 
 def wrapped(m: ca.SX, angle: Scalar) -> tuple[ca.SX, ca.SX]:
@@ -55,10 +59,12 @@ class FrictionElement(Force):
     parameter below zero releases the element.
 
     Results: `<name>_N`, `<name>_slip`, `<name>_friction`, `<name>_power` as of a joint; on request
-    the loads `<name>_moment` [N m] or `<name>_force` [N] on the child of the joint, with the name
-    of the joint before the unit if there are two, and `<name>_locking` = B m, the fraction of the
-    normal force that friction itself causes. The element locks itself at 1: a run in which it
-    slides ends there with an error, because the equilibrium of the element has no solution.
+    the loads `<name>_load_a` [N m or N] and powers `<name>_power_a` [W] of friction on the child of
+    the first joint, `<name>_load_b` and `<name>_power_b` on that of the second one, and
+    `<name>_locking` = B m with m from the static level, the part of the normal force that friction
+    causes. The element locks itself from 1 on: at rest it holds any load in this direction, and a
+    run in which it slides ends with an error, because its equilibrium has no solution. `efficiency`
+    is the ratio of the energies over a run.
 
     Limits: bearings are loaded by moments and forces about and along the axes only.
     """

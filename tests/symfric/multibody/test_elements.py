@@ -66,7 +66,7 @@ def disc(rng: np.random.Generator, mu: float, s: int, law: Law, worn: bool = Fal
                             "uniform wear" if worn else "uniform pressure")  # fmt: skip
     N = n * P / sin(half)
     T = mu * N * torque / load
-    return element, {"N": N, "friction": s * mu * N, "a_moment": -s * T, "b_moment": s * T}
+    return element, {"N": N, "friction": s * mu * N, "load_a": -s * T, "load_b": s * T}
 
 
 def worn(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
@@ -84,7 +84,7 @@ def shoe(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
     ][rng.integers(4)]  # fmt: skip
     N, F = np.sum([lever(mu, s * sign, P, arms) for sign in signs], axis=0)
     element = mb.DrumBrake("w", "a", law, P, r, *arms, shoes=kind)
-    return element, {"N": N, "friction": s * F, "moment": -s * r * F}
+    return element, {"N": N, "friction": s * F, "load_a": -s * r * F}
 
 
 def band(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
@@ -98,7 +98,7 @@ def band(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
     element = mb.BandBrake("w", "a", law, P, r, angle, arm, size, tight)
     share = tight / size * F / T_2 / (1 - tight / size)
     return element, {
-        "N": s * F / mu, "friction": F, "moment": -r * F, "slack": T_2, "tight": T_2 * ratio,
+        "N": s * F / mu, "friction": F, "load_a": -r * F, "slack": T_2, "tight": T_2 * ratio,
         "locking": share,
     }  # fmt: skip
 
@@ -108,7 +108,7 @@ def capstan(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
     groove = rng.uniform(0.3, pi / 2)
     T = P * exp(s * mu * angle / sin(groove))
     element = mb.CapstanDrum("w", "rope", law, P, r, angle, "a", groove)
-    return element, {"load": T, "rope_force": T - P, "a_moment": -r * (T - P), "locking": 0.0}
+    return element, {"load": T, "load_a": T - P, "load_b": -r * (T - P), "locking": 0.0}
 
 
 def belt(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
@@ -117,7 +117,7 @@ def belt(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
     F = 2 * P * tanh(s * mu * angle / sin(groove) / 2)
     element = mb.Belt("w", "a", "b", law, P, r, r * gear, angle, groove)
     return element, {
-        "friction": F, "a_moment": -r * F, "b_moment": r * gear * F, "tight": P + F / 2,
+        "friction": F, "load_a": -r * F, "load_b": r * gear * F, "tight": P + F / 2,
     }  # fmt: skip
 
 
