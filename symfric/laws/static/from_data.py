@@ -17,6 +17,8 @@ class Level(Parametric):
     c: Scalar = fields.COEFFICIENT(0.1, doc="coefficient of the curve")
 
 
+LEVELS = (Level(0.15), Level(0.14), Level(0.12), Level(0.1), Level(0.1), Level(0.11))
+"""Coefficients of a curve that falls and rises."""
 SPEED = partial(param, unit="m/s", role="geometry", lower=1e-12)
 
 
@@ -43,7 +45,7 @@ class Spline(StaticLaw):
 
     facts = Facts(("D", "S", "St", "V"), "C2 at the knots", "one source")
 
-    levels: tuple[Level, ...] = tuple(Level(c) for c in (0.15, 0.14, 0.12, 0.1, 0.1, 0.11))
+    levels: tuple[Level, ...] = LEVELS
     v_first: Scalar = SPEED(1e-3, doc="speed of the first bend")
     v_last: Scalar = SPEED(1.0, doc="speed of the last knot")
     v_eps: Scalar = fields.V_EPS(1e-4, lower=1e-12)
