@@ -78,7 +78,9 @@ class Status(Enum):
     @property
     def ok(self) -> bool:
         """True if the result can be used."""
-        return self.name in ("SUCCESS", "TERMINATED", "SOLVED", "ACCEPTABLE", "DOUBTFUL")
+        return self in (
+            Status.SUCCESS, Status.TERMINATED, Status.SOLVED, Status.ACCEPTABLE, Status.DOUBTFUL,
+        )  # fmt: skip
 
 
 class SolveError(RuntimeError):

@@ -22,8 +22,8 @@ import symfric as sf
 from symfric.integrator import arguments, simulate_by_peer
 from symfric.integrator.arguments import LOOSE, check_span, chosen
 from symfric.integrator.methods.tableaux import RADAU5, RODAS5P
+from symfric.integrator.prepared import REMEMBERED
 from symfric.integrator.running import run as running
-from symfric.integrator.simulate import REMEMBERED
 
 M, C = 0.8, 2.0
 RUNNERS = ["auto", "rosenbrock", "sundials"]
@@ -254,13 +254,13 @@ def test_settings_are_checked_once_and_true_is_no_time() -> None:
     assert again.t.tolist() == first.t.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
     again.t[:] = 0.0
     assert sf.simulate(model, 1.0, samples=5).t[-1] == 1.0
-    assert len(model.memory["settings"]) == 1
+    assert len(model.memory["prepared"]) == 1
     with pytest.raises(ValueError, match="t_end"):
         sf.simulate(model, True, samples=5)
     assert sf.simulate(model, np.array(1.0), samples=5).t[-1] == 1.0
     for k in range(REMEMBERED + 4):
         sf.simulate(model, 0.01 * (k + 1), samples=5)
-    assert len(model.memory["settings"]) == REMEMBERED
+    assert len(model.memory["prepared"]) == REMEMBERED
 
 
 def test_every_loose_call_is_warned_of_where_it_is_made() -> None:
