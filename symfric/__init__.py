@@ -24,7 +24,8 @@ Contents; `help` describes each name:
     results     Trajectory (run["x"], run.at(times), run.at(run.step_times), run.extremes, plot,
                 animate, save, to_csv, to_dataframe), load_run, Statistics, Plant, report; Ensemble
                 (varied, extremes, plot, save, to_dataframe), load_ensemble; for_print
-    choice      select ranks laws on a machine at equal error (Choice)
+    choice      select ranks laws on a machine at equal error (Choice); work_precision measures time
+                against error of the methods (WorkPrecision of WorkPoint)
     behaviour   figure and compare show laws (FigureData); recommended finds the smoothing for a
                 required error (Recommendation)
     parameters  Parameter, parameters, with_values, symbolise
@@ -40,7 +41,10 @@ from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.choice import Choice as Choice
+    from symfric.choice import WorkPoint as WorkPoint
+    from symfric.choice import WorkPrecision as WorkPrecision
     from symfric.choice import select as select
+    from symfric.choice import work_precision as work_precision
     from symfric.drives.drive import Drive as Drive
     from symfric.drives.driven import driven as driven
     from symfric.figures import FigureData as FigureData

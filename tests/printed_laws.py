@@ -207,6 +207,13 @@ def capstan(p: Any, v: float, N: float) -> float:
     return N * (exp(p.mu_d * p.beta * sign(v, p.v_eps)) - 1)
 
 
+def mixed_lubrication(p: Any, v: float, N: float) -> float:
+    """With the load as the law rounds it, over N_eps."""
+    H = p.eta * v / (N / p.A)
+    share = (N**2 + p.N_eps**2) / N**2
+    return p.mu_b * N * tanh(v / p.v_eps) * share / (share + (H / p.H_m) ** 2) + N * H / p.h
+
+
 PRINTED: dict[str, Formula] = {
     f.__name__: f
     for f in (
@@ -214,7 +221,7 @@ PRINTED: dict[str, Formula] = {
         *(andersson, steady_state_lugre, quarter_car_simple, lorentzian, popp_stelter, capstan),
         *(leine_switch, bittencourt, threlfall, modified_threlfall, bengisu_akay, velocity_based),
         *(ambrosio, step5, hollars, exudyn, brown_mcphee, simscape_breakaway, specker),
-        *(makkar_dixon, self_tuning, brittle_self_tuning, rui_wang),
+        *(makkar_dixon, self_tuning, brittle_self_tuning, rui_wang, mixed_lubrication),
     )
 }
 """Law by name -> its equation (law, v, N)."""

@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from symfric.laws.static.exponential import SteadyStateLuGre as SteadyStateLuGre
     from symfric.laws.static.exponential import Stribeck as Stribeck
     from symfric.laws.static.exponential import Tustin as Tustin
+    from symfric.laws.static.lubrication import MixedLubrication as MixedLubrication
     from symfric.laws.static.machines import BAM as BAM
     from symfric.laws.static.machines import Bittencourt as Bittencourt
     from symfric.laws.static.machines import Capstan as Capstan

@@ -15,6 +15,7 @@ from symfric.laws.static import (
     applied_force,
     coulomb,
     exponential,
+    lubrication,
     machines,
     piecewise,
     self_tuning,
@@ -58,6 +59,7 @@ STATIC_LAWS: dict[str, type[Law]] = {
     "bittencourt": machines.Bittencourt,
     "bam": machines.BAM,
     "capstan": machines.Capstan,
+    "mixed_lubrication": lubrication.MixedLubrication,
 }
 """Memoryless laws by name, with the most widely used laws first."""
 
@@ -98,6 +100,7 @@ ALIASES = {
     "smooth_coulomb": "coulomb",
     "leine": "leine_switch",
     "simscape": "simscape_breakaway",
+    "hersey": "mixed_lubrication",
     "seven_parameter": "armstrong",
     "iwan": "maxwell_slip",
     "reset_integrator": "haessig_friedland",

@@ -48,8 +48,8 @@ from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Switch
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Variables, kinds
+from symfric.multibody.contact import Contact, places_of
 from symfric.multibody.equations import Equations
-from symfric.multibody.joint import Contact
 from symfric.multibody.joints import Floating
 from symfric.multibody.prepare import Prepared
 from symfric.multibody.spatial import GROUND, euler_e
@@ -232,10 +232,9 @@ class _Maker:
     def refuse(self, contacts: Sequence[Contact], expected: str, advice: str) -> ValueError:
         """Return the error for contacts whose laws cannot stick here."""
         law = type(contacts[0].friction.law).__name__
-        joints = ", ".join(dict.fromkeys(f"'{c.joint}'" for c in contacts))
         return ValueError(
-            f"{self.where} > joint {joints} > friction > law: expected {expected}, got {law}, "
-            f"which needs the applied force; {advice}"
+            f"{self.where} > {places_of(contacts)} > friction > law: expected {expected}, got "
+            f"{law}, which needs the applied force; {advice}"
         )
 
     def group(

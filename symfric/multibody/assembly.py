@@ -165,7 +165,7 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip]) -> Inner | N
         # inner unknowns first: their right-hand sides are zero, so they cost no stage
         groups.append(stacked(cuts.symbols[i] for i in kept if cuts.links[i] == k))
         groups.append(ca.vertcat(*(column[link.rows] for column in (eq.q, eq.qd, eq.a))))
-        own = (s for s in contacts if s.contact.joint == link.joint.name)
+        own = (s for s in contacts if s.contact.part == link.joint.name)
         groups.append(symbols_of(v for s in own for v in (*s.unknown, *s.states)))
     return Inner(cuts.symbols[kept], values[kept], f, tuple(groups))
 
@@ -179,12 +179,12 @@ def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[s
     """
     values, words, bristles = list[ca.SX](), list[str](), list[Slip]()
     for s in contacts:
-        friction, joint = s.contact.friction, s.contact.joint
+        friction = s.contact.friction
         law = type(friction.law).__name__
         given = is_symbolic(friction.normal) or is_symbolic(friction.preload)
         if s.unknown or (given and not ca.depends_on(s.N, reactive)):
             values.append(s.N / (s.unknown[0].nominal if s.unknown else 1.0))
-            words.append(f"normal force of joint '{joint}' with {law}")
+            words.append(f"normal force of {s.contact.place} with {law}")
         if s.unknown and keeps_deflection(friction.law):
             bristles.append(s)
     return stacked(values), tuple(words), _advice(bristles)
@@ -199,7 +199,7 @@ def _advice(bristles: Sequence[Slip]) -> str:
     if not bristles:
         return ""
     laws = {type(s.contact.friction.law).__name__: s.contact.friction.law for s in bristles}
-    joints, (name, law) = dict.fromkeys(s.contact.joint for s in bristles), next(iter(laws.items()))
+    joints, (name, law) = dict.fromkeys(s.contact.part for s in bristles), next(iter(laws.items()))
     least = min(float(at_start(s.unknown[0].start, ())) for s in bristles)
     load = f"{float(f'{max(least, 1.0):.2g}'):g}"
     return (

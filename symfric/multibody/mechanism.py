@@ -18,6 +18,8 @@ from symfric.model import Model, Variables
 from symfric.multibody import checks
 from symfric.multibody.assembly import assemble
 from symfric.multibody.constraints import Constraint
+from symfric.multibody.contact import places_of
+from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Force, Gravity, SpringDamper
 from symfric.multibody.joint import Joint
 from symfric.multibody.prepare import (
@@ -231,6 +233,11 @@ class Mechanism(packed.Portable, Showing):
         problems += checks.naming(bodies, self.joints, (*self.forces, *self.constraints), u)
         weights = list(checks.weights(bodies, p))
         bearings = list(checks.bearings(self.joints, symbols_of(p), symbols_of(u)))
+        rubbing = ((c, getattr(c, "friction", None)) for c in self.constraints)
+        known = symbols_of((*p, *u))
+        for c, friction in rubbing:
+            if isinstance(friction, ElementFriction):
+                bearings += checks.rubbing(f"{c.kind} '{c.name}' > friction", friction, known)
         self._refuse([*problems, *weights, *bearings] if problems else ())
         tree = spanning_tree({body.name: body for body in bodies}, self.joints)
         loose = list(checks.connected(tree))
@@ -325,7 +332,7 @@ def functions(
     if applied := [c for c in eq.contacts if c.law.inputs]:
         law = type(applied[0].friction.law).__name__
         raise ValueError(
-            f"{where} > joint '{applied[0].joint}' > friction > law: expected one that needs only "
+            f"{where} > {applied[0].place} > friction > law: expected one that needs only "
             f"v and N, got {law}, whose force in stick depends on the motion; use `build`"
         )
     contacts = slips(eq, [1.0] * len(eq.contacts))
@@ -334,10 +341,9 @@ def functions(
         if c.N is not c.normal:
             forces = ca.substitute(forces, c.N, c.normal)
     if ca.depends_on(forces, eq.F):
-        pressed = (c.contact.joint for c in contacts if ca.depends_on(c.normal, eq.F))
-        names = ", ".join(f"'{name}'" for name in dict.fromkeys(pressed))
+        names = places_of(c.contact for c in contacts if ca.depends_on(c.normal, eq.F))
         raise ValueError(
-            f"{where} > joint {names} > friction: expected a normal force that does not depend on "
+            f"{where} > {names} > friction: expected a normal force that does not depend on "
             "friction; use `build` for a model, or a constant normal force"
         )
     still = [ca.SX.zeros(x.numel()) for x in (eq.a, eq.lam, eq.F)]

@@ -146,7 +146,7 @@ def sketch(eq: Equations, scales: Mapping[str, float]) -> Sketch:
     marks: list[Mark] = []
     for joint in joints:
         slips = ((c.name, scales[c.name]) for c in eq.contacts
-                 if c.joint == joint.name and c.name in scales)  # fmt: skip
+                 if c.part == joint.name and c.name in scales)  # fmt: skip
         slips = tuple((f"{name}_slip", scale) for name, scale in slips)
         marks.append(_mark(joint.name, joint.symbol, (joint.parent, joint.child), used, slips))
     for force in springs:

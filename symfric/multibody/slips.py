@@ -15,8 +15,8 @@ from symfric.laws.base.law import FORCE
 from symfric.model import Event, Variables, kinds
 from symfric.model.contact import mode_events
 from symfric.multibody.applied import Rest, capacity_of, forward, switches_at
+from symfric.multibody.contact import Contact
 from symfric.multibody.equations import Equations
-from symfric.multibody.joint import Contact
 
 
 @final
@@ -80,7 +80,7 @@ def slips(
     for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
         law, pressed = contact.friction.law, contact.pressed
         if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(law):
-            doc = f"normal force of joint '{contact.joint}' with {type(law).__name__}"
+            doc = f"normal force of {contact.place} with {type(law).__name__}"
             size, kind = max(1.0, abs(start)), kinds.NORMAL_FORCE
             new = Variable(f"{pressed}_N", "N", start=start, nominal=size, doc=doc, kind=kind)
             normal = unknowns.setdefault(pressed, new).symbol

@@ -16,8 +16,8 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Output, Variables
 from symfric.multibody import Mechanism
+from symfric.multibody.contact import Contact, JointContact
 from symfric.multibody.equations import Equations
-from symfric.multibody.joint import Contact
 from symfric.multibody.urdf import read_urdf
 
 WHERE = "inverse dynamics"
@@ -161,8 +161,10 @@ class _Machine(NamedTuple):
 
     def along(self, contact: Contact) -> str:
         """Return the coordinate that a contact resists."""
-        joint = self.eq.kin.topology.link_of[contact.joint].joint
-        return joint.coordinate(joint.directions[contact.direction])
+        if isinstance(contact, JointContact):
+            joint = self.eq.kin.topology.link_of[contact.part].joint
+            return joint.coordinate(joint.directions[contact.direction])
+        return contact.name
 
     def label(self, coordinate: str) -> str:
         """Return the number of a leading coordinate, or the name of another coordinate."""
@@ -287,9 +289,13 @@ def _check(eq: Equations, mechanism: Mechanism) -> None:
     everything = ca.veccat(eq.balance, *eq.normals, eq.phi)
     if ca.depends_on(everything, eq.kin.t):
         raise ValueError(f"{where}: expected time-independent forces and constraints, got others")
+    if rubbing := [c.part for c in eq.contacts if not isinstance(c, JointContact)]:
+        raise ValueError(
+            f"{where}: expected couplings without friction, got friction in {', '.join(rubbing)}"
+        )
     if ca.depends_on(stacked(eq.normals), eq.F):
         pressed = [
-            c.joint for c, N in zip(eq.contacts, eq.normals, strict=True) if ca.depends_on(N, eq.F)
+            c.part for c, N in zip(eq.contacts, eq.normals, strict=True) if ca.depends_on(N, eq.F)
         ]
         raise ValueError(
             f"{where}: expected normal forces that do not depend on friction, got that of "

@@ -13,8 +13,10 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, symbols_of
 from symfric.model import Variables
 from symfric.multibody import GROUND, Body, Mechanism
+from symfric.multibody.contact import Contact
+from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Gravity
-from symfric.multibody.joint import Contact, JointFriction
+from symfric.multibody.joint import JointFriction
 from symfric.multibody.spatial import Frame, skew, vector
 
 
@@ -55,7 +57,7 @@ def contact_step(
     law, friction = contact.friction.law, contact.friction
     if law.inputs:
         raise ValueError(
-            f"inverse dynamics: joint '{contact.joint}' > friction > law: expected one that needs "
+            f"inverse dynamics: {contact.place} > friction > law: expected one that needs "
             f"only v and N, got {type(law).__name__}, which also needs "
             f"{', '.join(i.name for i in law.inputs)}"
         )
@@ -75,7 +77,7 @@ def contact_step(
     return ContactStep(along, block, force, parameters, following, *sliding or [ca.SX(0, 1)])
 
 
-def _level(friction: JointFriction) -> Variables:
+def _level(friction: JointFriction | ElementFriction) -> Variables:
     """Return the constant normal force of a joint as a parameter; () if it is not constant."""
     if friction.normal is None or not is_number(friction.normal):
         return ()
