@@ -328,12 +328,6 @@ def array(
 
 def times(where: str, value: object, first: float = -inf, last: float = inf) -> Array:
     """Return `value` as a non-empty array of increasing times [s] in [first, last]."""
-    given: Any = value
-    if type(given) is np.ndarray and given.dtype == float and given.ndim == 1 and given.size:
-        # the usual case, five times faster than below
-        inside = -inf < first <= given[0] and given[-1] <= last < inf
-        if inside and np.count_nonzero(given[1:] > given[:-1]) == given.size - 1:
-            return given.copy()
     bounded = isfinite(first) or isfinite(last)
     what = "increasing times in [{:g}, {:g}] s" if bounded else "increasing times [s]"
     found = array(where, value, what=what.format(first, last))

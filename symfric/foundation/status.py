@@ -78,9 +78,7 @@ class Status(Enum):
     @property
     def ok(self) -> bool:
         """True if the result can be used."""
-        return self in (
-            Status.SUCCESS, Status.TERMINATED, Status.SOLVED, Status.ACCEPTABLE, Status.DOUBTFUL,
-        )  # fmt: skip
+        return self.name in ("SUCCESS", "TERMINATED", "SOLVED", "ACCEPTABLE", "DOUBTFUL")
 
 
 class SolveError(RuntimeError):

@@ -23,7 +23,7 @@ from symfric.integrator.equations.inputs import Input, InputData, input_data, pa
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.doubts import doubts
 from symfric.integrator.running.integrator import Integrator, built
-from symfric.integrator.running.record import Run
+from symfric.integrator.running.record import GOOD, Run
 from symfric.integrator.running.run import Tolerances, integrate, watchful
 from symfric.integrator.stored import trajectory_of
 from symfric.model import Model
@@ -101,7 +101,9 @@ class Prepared:
             ValueError: unknown names or invalid values.
             SolveError: the integration failed; its `partial` is the trajectory so far.
         """
-        own = self if u is None else replace(self, u={**(self.u or {}), **u})
+        own = self
+        if u is not None:
+            own = replace(self, u={**(self.u or {}), **self.model.named("u", u)})
         trajectory = own.run("prepared", x0, p, self.t.copy()).trajectory
         return checked(trajectory)
 
@@ -163,9 +165,8 @@ def checked(trajectory: Trajectory) -> Trajectory:
     Raises:
         SolveError: the integration failed.
     """
-    status = trajectory.status
-    if not status.ok and status is not Status.INTERRUPTED:
-        raise SolveError(trajectory.message, status, trajectory)
+    if trajectory.status not in (*GOOD, Status.INTERRUPTED):
+        raise SolveError(trajectory.message, trajectory.status, trajectory)
     return trajectory
 
 
@@ -214,7 +215,7 @@ def prepare(
     asked = t_start, t_end, rtol, atol, samples, method, backend, *limits
     ready, looks = prepared("prepare", model, asked, t_eval)
     looks.flags.writeable = False
-    made = replace(ready, t=looks, u=None if u is None else dict(u), stops=times)
+    made = replace(ready, t=looks, u=None if u is None else model.named("u", u), stops=times)
     _ = made.integrator  # checks the inputs and builds the step
     return made
 

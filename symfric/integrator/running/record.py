@@ -209,6 +209,10 @@ second run, which gives the same bits.
 """
 
 
+GOOD = Status.SUCCESS, Status.TERMINATED
+"""Statuses of a run that ended well."""
+
+
 class Extent(NamedTuple):
     """Shortest and longest accepted step [s]."""
 

@@ -22,7 +22,7 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.diagnosis import chattering, explain
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.record import MOST_BYTES, Outputs, Run
+from symfric.integrator.running.record import GOOD, MOST_BYTES, Outputs, Run
 from symfric.integrator.step.attempt import Given, State
 
 SMALL, REST = 1e-3, 1e-12
@@ -115,10 +115,11 @@ def integrate(
     """
     scale = nominal = integrator.system.nominal
     atol = tolerances.atol
-    march = _March(integrator, inputs, y0, p, tolerances, atol, backend, progress, times)
+    settings = tolerances, atol, backend, progress, times, MOST_BYTES
+    march = _March(integrator, inputs, y0, p, *settings)
     run = march.run()
     for _ in range(ROUNDS if tolerances.follow else 0):
-        if not run.status.ok or not _ends_small(run, integrator):
+        if run.status not in GOOD or not _ends_small(run, integrator):
             break
         own = finer(scale, run.farthest[: nominal.size], nominal)
         if own is None:
@@ -126,7 +127,7 @@ def integrate(
         scale, used = own, march.integrator
         march.atol, march.progress = atol * own / nominal, None
         again = march.run()
-        if not again.status.ok and again.status is not Status.INTERRUPTED:
+        if again.status not in (*GOOD, Status.INTERRUPTED):
             run.message += f" Tiny motions were not resolved on their own scale: {again.message}"
             return run, used
         run = again
@@ -172,7 +173,7 @@ class _March:
     backend: str
     progress: Callable[[float], None] | None
     times: Array
-    most: float = MOST_BYTES
+    most: float
 
     def run(self) -> Run:
         """Run once over all input intervals; keep steps of up to `most` bytes."""
