@@ -28,8 +28,9 @@ from symfric.model import Contact, Event, Model, Output, kinds
 from symfric.model.contact import APPLIED
 from symfric.model.forces import with_forces
 from symfric.model.holonomic import Holonomic
-from symfric.multibody import joint
 from symfric.multibody.applied import Rest, forward
+from symfric.multibody.contact import JointContact
+from symfric.multibody.joint import JointFriction
 from symfric.multibody.slips import Slip, events
 
 OVERLOAD = 1e-9
@@ -200,6 +201,6 @@ def _rates(bare: Model, mechanics: Holonomic) -> tuple[Variable, ...]:
 def _slip(c: Contact) -> Slip:
     """Return a contact as `symfric.multibody` describes it, for its events."""
     law, slip, N = law_of(c), ca.SX(c.slip), ca.SX(c.N)
-    at = joint.Contact(c.name, c.name, "", joint.JointFriction(law), law, c.name, slip, c.force)
+    at = JointContact(c.name, c.name, JointFriction(law), law, c.name, slip, c.force, "")
     given = {name: ca.SX(value) for name, value in c.given.items()}
     return Slip(at, (), N, N, c.states, c.rate, c.friction, given)

@@ -6,7 +6,7 @@ Only the contacts of this module apply friction laws to bodies, with the minus s
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, final
+from typing import ClassVar, NamedTuple, final
 
 import casadi as ca
 
@@ -21,8 +21,20 @@ from symfric.multibody.joint import Joint, JointFriction
 from symfric.multibody.kinematics import Kinematics
 from symfric.multibody.topology import body_of
 
-Lever = tuple[Joint, str, Scalar]
-"""Joint, direction and l of a sliding velocity v = sum l s' [m/s]."""
+
+class End(NamedTuple):
+    """Displacement s of a joint that an element couples.
+
+    Attributes:
+        joint, direction: the joint and the direction of s.
+        share: generalised force on s per unit multiplier.
+        lever: l of the sliding velocity v = sum l s' [m/s].
+    """
+
+    joint: Joint
+    direction: str
+    share: Scalar
+    lever: Scalar
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,36 +144,45 @@ def joint_contacts(kin: Kinematics) -> Iterator[JointContact]:
 class ElementContact(Contact):
     """Friction of an element that couples displacements s_j of joints.
 
-        v = sum l_j s_j',   load on joint j: -l_j F,   N = preload + |f|
+        v = sum l_j s_j',   load on joint j: c_j lam - l_j F,   N = preload + |lam / divisor|
 
     Attributes:
-        levers: joint, direction and l_j of each displacement.
-        pressing: normal force f between the flanks [N], in terms of the multiplier of the element.
+        ends: coupled displacements, with c_j and l_j.
+        lam: multiplier of the element.
+        divisor: multiplier per unit normal force.
     """
 
     kind = "coupling"
 
     friction: ElementFriction
-    levers: tuple[Lever, ...]
-    pressing: ca.SX
+    ends: tuple[End, ...]
+    lam: ca.SX
+    divisor: Scalar
+
+    @property
+    def pressing(self) -> ca.SX:
+        """Magnitude of the normal force by the multiplier [N]."""
+        return self.friction.magnitude(self.lam / self.divisor)
+
+    def transmitted(self, end: End) -> ca.SX:
+        """Return the force [N] or moment [N m] on the child of the joint, including friction."""
+        return end.share * self.lam - end.lever * self.F
 
     def loads(self, kin: Kinematics) -> Sequence[Load | Axial]:
-        """Return the loads on the joints along their axes."""
-        own = ((joint, way, lever) for joint, way, lever in self.levers if not equals(lever, 0.0))
-        return [Axial(joint, way, -lever * self.F) for joint, way, lever in own]
+        """Return the loads of friction on the joints along their axes."""
+        own = (end for end in self.ends if not equals(end.lever, 0.0))
+        return [Axial(end.joint, end.direction, -end.lever * self.F) for end in own]
 
     def normal(self, kin: Kinematics, pressing: Mapping[str, Wrench]) -> ca.SX:
         """Return the normal force between the flanks."""
-        return self.friction.preload + self.friction.magnitude(self.pressing)
+        return self.friction.preload + self.pressing
 
 
 def element_contact(
-    name: str, kin: Kinematics, friction: ElementFriction, levers: Sequence[Lever],
-    pressing: ca.SX,
+    name: str, kin: Kinematics, friction: ElementFriction, ends: tuple[End, ...], lam: ca.SX,
+    divisor: Scalar,
 ) -> ElementContact:  # fmt: skip
     """Return the contact of the element `name`."""
-    slip = sum((lever * kin.rate(joint, way) for joint, way, lever in levers), ca.SX(0))
+    slip = sum((end.lever * kin.rate(end.joint, end.direction) for end in ends), ca.SX(0))
     F = ca.SX.sym(f"{name}_friction")
-    return ElementContact(
-        name, name, friction, friction.law, name, slip, F, tuple(levers), pressing
-    )
+    return ElementContact(name, name, friction, friction.law, name, slip, F, ends, lam, divisor)

@@ -11,8 +11,8 @@ import casadi as ca
 from symfric.foundation.checks import shown
 from symfric.foundation.numeric import Scalar, equals, is_symbolic
 from symfric.multibody.constraints import Constraint, Held, impossible, linear, wraps
-from symfric.multibody.contact import Contact, element_contact
-from symfric.multibody.element_friction import ElementFriction, MeshFriction, ThreadFriction
+from symfric.multibody.contact import Contact, End, element_contact
+from symfric.multibody.element_friction import FlankFriction, MeshFriction, ThreadFriction
 from symfric.multibody.kinematics import Kinematics
 
 TEETH = 1000
@@ -44,7 +44,7 @@ class Coupling(Constraint):
 
     ratio_field: ClassVar[str] = "ratio"
     """Name of the field that is or determines the ratio."""
-    accepts: ClassVar[tuple[type[ElementFriction], ...]] = (MeshFriction, ThreadFriction)
+    accepts: ClassVar[tuple[type[FlankFriction], ...]] = (MeshFriction, ThreadFriction)
     """Types of friction between the flanks."""
     linear: ClassVar[bool] = True
     """True if s_b is a displacement [m] where the element has friction; s_a is an angle."""
@@ -54,7 +54,7 @@ class Coupling(Constraint):
     offset: Scalar
     direction_a: str
     direction_b: str
-    friction: ElementFriction | None
+    friction: FlankFriction | None
 
     @property
     def _ends(self) -> tuple[tuple[str, str], tuple[str, str]]:
@@ -78,7 +78,8 @@ class Coupling(Constraint):
         if a == b:
             yield f"expected two displacements, got {a[1]} of {a[0]} twice"
         if isinstance(self.friction, self.accepts):
-            yield from (f"friction: {text}" for text in self.friction.problems(self.linear))
+            own = (*self.friction.problems(), *self.friction.fit(self.linear))
+            yield from (f"friction: {text}" for text in own)
         elif self.friction is not None:
             kinds = " or ".join(f"{kind.__name__}(law, ...)" for kind in self.accepts)
             yield f"friction: expected {kinds}, got {shown(self.friction)}"
@@ -114,8 +115,8 @@ class Coupling(Constraint):
             return ()
         (a, along_a), (b, along_b) = ((kin.topology.joints[name], d) for name, d in self._ends)
         lever_a, lever_b, divisor = self.friction.flank(self._ratio, self.linear)
-        levers = (a, along_a, lever_a), (b, along_b, lever_b)
-        return (element_contact(self.name, kin, self.friction, levers, lam / divisor),)
+        ends = End(a, along_a, -self._ratio, lever_a), End(b, along_b, 1.0, lever_b)
+        return (element_contact(self.name, kin, self.friction, ends, lam, divisor),)
 
 
 @final
@@ -136,7 +137,7 @@ class Gear(Coupling):
     offset: Scalar = 0.0
     direction_a: str = "turn"
     direction_b: str = "turn"
-    friction: ElementFriction | None = None
+    friction: FlankFriction | None = None
 
 
 @final
@@ -158,7 +159,7 @@ class Rolling(Coupling):
     offset: Scalar = 0.0
     direction_a: str = "turn"
     direction_b: str = "slide"
-    friction: ElementFriction | None = None
+    friction: FlankFriction | None = None
 
 
 @final
@@ -176,7 +177,7 @@ class Screw(Coupling):
     joint: str
     lead: Scalar
     offset: Scalar = 0.0
-    friction: ElementFriction | None = None
+    friction: FlankFriction | None = None
 
     @property
     def _ends(self) -> tuple[tuple[str, str], tuple[str, str]]:

@@ -55,8 +55,8 @@ class ElementFriction(Keywords, ABC):
 
     kinds: ClassVar[Mapping[str, str]] = {}
     """Kind of each number of the geometry, a key of `RANGES`."""
-    of_angle: ClassVar[str] = ""
-    """Length [m] that the friction needs if b turns, and that is known if b slides."""
+    optional: ClassVar[tuple[str, ...]] = ()
+    """Numbers that may be None."""
     turning: ClassVar[bool] = False
     normal: ClassVar[Scalar | None] = None
 
@@ -68,16 +68,12 @@ class ElementFriction(Keywords, ABC):
         require_law("friction", self.law)
         take_si("friction", self, *(item.name for item in fields(self) if item.type is Scalar))
 
-    @abstractmethod
-    def flank(self, ratio: Scalar, linear: bool) -> Flank:
-        """Return levers and divisor; `linear` is True if s_b is a displacement, not an angle."""
-
     def magnitude(self, *components: ca.SX) -> ca.SX:
         """Return the smoothed magnitude of a force with the given components [N]."""
         return ca.sqrt(sum((f * f for f in components), start=ca.SX(self.eps * self.eps)))
 
-    def problems(self, linear: bool) -> Iterator[str]:
-        """Yield messages about invalid values; `linear` is that of `flank`."""
+    def problems(self) -> Iterator[str]:
+        """Yield messages about invalid values."""
         if strange := [i.name for i in self.law.inputs if i.name != FORCE]:
             yield (
                 f"law: expected one that needs only v, N, {FORCE}, got {type(self.law).__name__}, "
@@ -86,9 +82,24 @@ class ElementFriction(Keywords, ABC):
         for name, kind in {**self.kinds, "preload": "level", "eps": "length"}.items():
             value, (good, what) = getattr(self, name), RANGES[kind]
             size = as_number(value)
-            absent = value is None and name == self.of_angle
+            absent = value is None and name in self.optional
             if not (absent or is_symbolic(value) or (size is not None and good(size))):
                 yield f"{name}: expected {what}, got {shown(value)}"
+
+
+@dataclass(frozen=True, eq=False)
+class FlankFriction(ElementFriction):
+    """Friction between the flanks of two elements with a constant ratio."""
+
+    of_angle: ClassVar[str] = ""
+    """Length [m] that the friction needs if b turns, and that is known if b slides."""
+
+    @abstractmethod
+    def flank(self, ratio: Scalar, linear: bool) -> Flank:
+        """Return levers and divisor; `linear` is True if s_b is a displacement, not an angle."""
+
+    def fit(self, linear: bool) -> Iterator[str]:
+        """Yield a message about the length `of_angle`; `linear` is that of `flank`."""
         given = getattr(self, self.of_angle) is not None
         if linear and given:
             yield f"{self.of_angle}: expected none for a screw or rack, which have it, got a value"
@@ -98,7 +109,7 @@ class ElementFriction(Keywords, ABC):
 
 @final
 @dataclass(frozen=True, eq=False)
-class ThreadFriction(ElementFriction):
+class ThreadFriction(FlankFriction):
     """Friction between the flanks of a screw and its nut, or of a worm and its wheel.
 
     With mean radius r, lead angle lambda, tan(lambda) = lead / (2 pi r), and flank angle alpha in
@@ -127,7 +138,7 @@ class ThreadFriction(ElementFriction):
     kinds: ClassVar[Mapping[str, str]] = {
         "radius": "length", "flank_angle": "angle", "lead": "length",
     }  # fmt: skip
-    of_angle = "lead"
+    optional, of_angle = ("lead",), "lead"
 
     radius: Scalar
     flank_angle: Scalar = 0.0
@@ -145,7 +156,7 @@ class ThreadFriction(ElementFriction):
 
 @final
 @dataclass(frozen=True, eq=False)
-class MeshFriction(ElementFriction):
+class MeshFriction(FlankFriction):
     """Mean friction between the teeth of two gears on parallel axes, or of a pinion and a rack.
 
     Teeth slide with the relative angular velocity times the distance of their contact from the
@@ -175,7 +186,7 @@ class MeshFriction(ElementFriction):
     kinds: ClassVar[Mapping[str, str]] = {
         "arm": "length", "radius": "length", "pressure_angle": "angle", "helix_angle": "angle",
     }  # fmt: skip
-    of_angle = "radius"
+    optional, of_angle = ("radius",), "radius"
 
     arm: Scalar
     radius: Scalar | None = None

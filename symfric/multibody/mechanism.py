@@ -21,6 +21,7 @@ from symfric.multibody.constraints import Constraint
 from symfric.multibody.contact import places_of
 from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Force, Gravity, SpringDamper
+from symfric.multibody.idle import idle
 from symfric.multibody.joint import Joint
 from symfric.multibody.prepare import (
     Prepared,
@@ -208,6 +209,7 @@ class Mechanism(packed.Portable, Showing):
         self._refuse([*made.problems, *made.misfits, *left_open(made), *loose])
         self._refuse(infinite(made))
         self._refuse(without_inertia(made))
+        self._refuse(idle(made.eq, self.constraints))
         if formulation == "absolute":
             self._refuse(inseparable(made))
             made = in_absolute_coordinates(made, self.constraints)

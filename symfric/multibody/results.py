@@ -7,9 +7,11 @@ import casadi as ca
 
 from symfric.foundation.numeric import equals
 from symfric.foundation.variable import stacked, strays
+from symfric.laws.base import smooth
 from symfric.model import Output
 from symfric.model.kinds import WORK
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
+from symfric.multibody.contact import ElementContact
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import SpringDamper
 from symfric.multibody.joint import COMPONENTS, FORCE_NAMES
@@ -32,7 +34,7 @@ def results(eq: Equations, undetermined: Sequence[str], p: ca.SX, put: Put) -> d
         put: function that rewrites expressions in the symbols of the model.
     """
     still = ca.vertcat(eq.q, eq.angles, p)
-    found = [*_reactions(eq, undetermined), *_centres(eq), *_work(eq, still)]
+    found = [*_reactions(eq, undetermined), *_elements(eq), *_centres(eq), *_work(eq, still)]
     values = put([output.expression for _, output in found])
     own = {str(eq.q[i]) for i in range(eq.n)}
     return {
@@ -61,6 +63,29 @@ def _reactions(eq: Equations, undetermined: Sequence[str]) -> Iterator[tuple[str
             relative = eq.kin.relative(joint)
             along = ca.dot(relative.R @ column[:3], relative.p)
             yield f"{name}_tension", Output(-along / joint.length, "N", "force in the rod")
+
+
+def _elements(eq: Equations) -> Iterator[tuple[str, Output]]:
+    """Yield loads, powers and the locking ratio of each element with friction.
+
+    The ratio is the static friction over the friction that holds any load on b without one on a.
+    """
+    for contact in (c for c in eq.contacts if isinstance(c, ElementContact)):
+        name, (a, b) = contact.name, contact.ends
+        for letter, end in (("a", a), ("b", b)):
+            load, rate = contact.transmitted(end), eq.kin.rate(end.joint, end.direction)
+            unit = "N" if end.joint.linear(end.direction) else "N m"
+            on = f"the child of '{end.joint.name}' in its direction {end.direction}"
+            yield f"{name}_load_{letter}", Output(load, unit, f"load by '{name}' on {on}")
+            yield f"{name}_power_{letter}", Output(load * rate, "W", f"power to {on}")
+        try:
+            held = contact.friction.law.static_level(contact.normal(eq.kin, eq.pressing))
+        except ValueError:
+            continue
+        pull = a.share * contact.divisor * contact.pressing
+        ratio = smooth.magnitude(held * a.lever / pull, 0.0)
+        doc = "static friction over that which holds a load on b; locks from 1"
+        yield f"{name}_locking", Output(ca.SX(ratio), "1", doc)
 
 
 def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
