@@ -37,6 +37,7 @@ TORQUES = (30.0, 30.0, 15.0, 2.0, 1.0, 0.2)
 FREE = ("mu_s", "mu_d", "k", "v_belt")
 START = {"v": 0.1}
 TITLE = "Processor time of short tasks"
+KNOWN = "Processor time of calls on a known model"
 
 
 def bench(quick: bool = False, progress: Progress = None) -> Report:
@@ -51,12 +52,16 @@ def bench(quick: bool = False, progress: Progress = None) -> Report:
 
 
 def _rows(
-    task: str, per: str, times: dict[str, float], errors: dict[str, float] | None = None
+    task: str,
+    per: str,
+    times: dict[str, float],
+    errors: dict[str, float] | None = None,
+    title: str = TITLE,
 ) -> Iterator[Found]:
     """Yield a row for each method from its time [s] and the relative error of its result."""
     first = next(iter(times.values()))
     for who, time in times.items():
-        yield TITLE, {
+        yield title, {
             "task": task, "method": who, "time [us]": 1e6 * time, "per": per,
             "relative error": (errors or {}).get(who, nan), "ratio to the first": time / first,
         }  # fmt: skip
@@ -159,7 +164,7 @@ def _known(quick: bool) -> Iterator[Found]:
         }
         if not model.events and find_compiler():
             calls["compiled loop alone"] = partial(loop(model, times, ("v",), rtol).solve, **start)
-        yield from _rows(task, "run", interleaved(calls, 3 if quick else 50))
+        yield from _rows(task, "run", interleaved(calls, 3 if quick else 50), title=KNOWN)
 
 
 def _blocks() -> Model:

@@ -238,6 +238,8 @@ class Run:
         most: memory limit of the accepted steps [bytes].
         kept: rows of accepted steps (`Dense.of`), batch by batch. Once the limit is exceeded, only
             the last row.
+        ends: smallest and largest unknowns at the start and at the ends of steps, shape (2, n);
+            None before the first step.
     """
 
     t: float
@@ -253,15 +255,14 @@ class Run:
     message: str = Status.SUCCESS.value
     most: float = MOST_BYTES
     kept: list[Array] = field(default_factory=list[Array])
-    _reach: Array | None = None
+    ends: Array | None = None
     _held: int = 0
     _before: Extent | None = None
 
-    def keep(self, rows: Array, reach: Array) -> None:
-        """Append rows of accepted steps, and set `reach`; both arrays belong to the run."""
+    def keep(self, rows: Array) -> None:
+        """Append rows of accepted steps; the run takes ownership of them."""
         if not len(rows):
             return
-        self._reach = reach
         self.steps += len(rows)
         self.kept.append(rows)
         self._held += rows.nbytes
@@ -334,7 +335,7 @@ class Run:
     @property
     def reach(self) -> Array:
         """Smallest and largest unknowns at the start and at the ends of steps, shape (2, n)."""
-        return np.array([self.y, self.y]) if self._reach is None else self._reach
+        return np.array([self.y, self.y]) if self.ends is None else self.ends
 
     @property
     def farthest(self) -> Array:

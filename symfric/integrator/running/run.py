@@ -240,7 +240,8 @@ class _March:
                     pairs = zip(jumps.t[rows].tolist(), which.tolist(), strict=True)
                     run.happened += [(t, model.events[i].name) for t, i in pairs]
                     run.jumps.append(jumps)
-                run.keep(records.copy(), self.work.reach.copy())
+                run.ends = self.work.reach.copy()
+                run.keep(records.copy())
                 if reason is not Stop.END:
                     self._act(reason)
             if run.status is Status.SUCCESS and self.progress is not None:
