@@ -12,7 +12,7 @@ from symfric.laws import GMS, LuGre, Stribeck
 from symfric.laws.catalogue import ALL_LAWS
 from symfric.scenes import Rabinowicz
 
-NEED_MORE = {"wojewoda", "quarter_car_general", "bam"}
+NEED_MORE = {"wojewoda", "quarter_car_general", "bam", "brush_tyre", "lugre_tyre"}
 """Laws with inputs that a drive does not offer."""
 BEYOND_ORDER = {"leuven", "rate_and_state"}
 """Laws with conditions that are no order of two parameters: the guard refuses a trial."""
