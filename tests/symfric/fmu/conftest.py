@@ -7,7 +7,6 @@ from typing import Any
 import casadi as ca
 import pytest
 from device_cases import wedge
-from shafts import brake
 from units import OK, Archive, Rates, Second
 from wires import wire
 
@@ -58,7 +57,7 @@ MACHINES = {
     "wire": wire, "gate": gate, "root": root, "wedge": wedge,
     "drive": lambda: Drive(LuGre()), "smooth drive": lambda: Drive(BrownMcPhee()),
     "sticking drive": lambda: Drive(ExactCoulomb()), "pendulum": lambda: Pendulum(BrownMcPhee()),
-    "loop": lambda: SliderCrank(BrownMcPhee()), "brake": brake,
+    "loop": lambda: SliderCrank(BrownMcPhee()),
 }  # fmt: skip
 
 

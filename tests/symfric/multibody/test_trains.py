@@ -11,13 +11,15 @@ import pytest
 from backends import needs_compiler
 from chains import attach
 from scipy.integrate import solve_ivp
-from shafts import SHOE, K, at_start, driven, drum, dry, shafts
+from shafts import SHOE, K, at_start, brake, driven, drum, dry, shafts
+from units import OK, Archive, Rates
 
 import symfric as sf
 from ocp import Phase, Problem, integral, solve
 from symfric import Variable, simulate
 from symfric import multibody as mb
 from symfric.codegen import generate, inverse_dynamics_block, verify
+from symfric.fmu import export_fmu
 from symfric.laws import ALL_LAWS, Law, law_from_text
 
 pytestmark = pytest.mark.heavy
@@ -143,6 +145,24 @@ def test_inverse_dynamics_in_c_has_the_same_bits(tmp_path: Path) -> None:
     assert [(c.real, c.warnings) for c in checks] == [("double", ()), ("float", ())]
     assert checks[0].ulp == 0
     assert checks[1].error < 1e-5
+
+
+@needs_compiler
+@pytest.mark.slow
+def test_a_functional_mock_up_unit_has_the_rates_of_the_brake(tmp_path: Path) -> None:
+    model = brake()
+    unit = export_fmu(model, tmp_path / "brake.fmu", fmi=3, t_end=1.0, kind="model-exchange")
+    opened = Rates(Archive(unit.path, tmp_path / "open"))
+    assert opened.begin() == OK
+    p, u = model.values("p"), model.values("u")
+    for x in np.random.default_rng(0).uniform(-9.0, 9.0, (20, len(model.x))):
+        found = opened.rates(0.3, x)
+        z = opened.get(*(v.name for v in model.z))
+        assert z[0] > 100.0
+        assert np.abs(model.function("alg")(0.3, x, z, u, p).full()).max() < 1e-9 * z[0]
+        expected = model.function("ode")(0.3, x, z, u, p).full().ravel()
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    opened.free()
 
 
 def moving(m: Any, rates: np.ndarray) -> mb.Mechanism:
