@@ -188,7 +188,9 @@ def _groups(model: Model, mechanics: Holonomic, contacts: Sequence[Contact]) -> 
     for i, c in enumerate(contacts):
         if i not in inside:
             force = Variable(f"{c.name}_{APPLIED}", c.unit("N"), doc="friction force in stick")
-            change, still = slip_change(model, c), (f"{c.name}_rate",)
+            change = slip_change(model, c)
+            still = tuple(v.name for v in qd if ca.depends_on(c.slip, v.symbol))
+            still = still if len(still) == 1 else ()
             group = c.name, (i,), (one,), ca.SX(c.slip), change, force, one, True, (), still
             found.append(Rest(*group))
     return sorted(found, key=lambda rest: rest.members)
