@@ -8,6 +8,12 @@ from typing import TYPE_CHECKING
 from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
+    from symfric.multibody.belts import Belt as Belt
+    from symfric.multibody.belts import CapstanDrum as CapstanDrum
+    from symfric.multibody.brakes import BandBrake as BandBrake
+    from symfric.multibody.brakes import DiscClutch as DiscClutch
+    from symfric.multibody.brakes import DrumBrake as DrumBrake
+    from symfric.multibody.brakes import shoe_arms as shoe_arms
     from symfric.multibody.cams import Cam as Cam
     from symfric.multibody.cams import CamFriction as CamFriction
     from symfric.multibody.constraints import Constraint as Constraint

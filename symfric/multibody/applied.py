@@ -48,7 +48,7 @@ from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Switch
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Variables, kinds
-from symfric.multibody.contact import Contact, places_of
+from symfric.multibody.contact import Contact, law_places
 from symfric.multibody.equations import Equations
 from symfric.multibody.joints import Floating
 from symfric.multibody.prepare import Prepared
@@ -233,8 +233,8 @@ class _Maker:
         """Return the error for contacts whose laws cannot stick here."""
         law = type(contacts[0].friction.law).__name__
         return ValueError(
-            f"{self.where} > {places_of(contacts)} > friction > law: expected {expected}, got "
-            f"{law}, which needs the applied force; {advice}"
+            f"{self.where} > {law_places(contacts)}: expected {expected}, got {law}, "
+            f"which needs the applied force; {advice}"
         )
 
     def group(
@@ -254,7 +254,7 @@ class _Maker:
             raise self.refuse(contacts, what, "use one form")
         by_modes, single = modes == {True}, columns == ()
         start = float(self.numbers(change)[0, 0]) / here
-        still = {f"{contacts[0].name}_rate"} if single else {rates[k].name for k in columns}
+        still = {contacts[0].rate} if single else {rates[k].name for k in columns}
         direction: Variables = ()
         if by_modes and not single:
             begin = ca.SX(smooth.sign(rate, 0.0))

@@ -11,6 +11,7 @@ from symfric.foundation.checks import shown
 from symfric.foundation.numeric import is_number, is_symbolic
 from symfric.foundation.variable import strays, symbols_of
 from symfric.model import Variables
+from symfric.multibody.element import FrictionElement
 from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Part
 from symfric.multibody.joint import Joint, JointFriction
@@ -115,7 +116,9 @@ def bearings(joints: Sequence[Joint], p: ca.SX, u: ca.SX) -> Iterator[str]:
             yield f"{where} > friction: {expected}, got {shown(joint.friction)}"
 
 
-def rubbing(where: str, friction: JointFriction | ElementFriction, known: ca.SX) -> Iterator[str]:
+def rubbing(
+    where: str, friction: JointFriction | ElementFriction | FrictionElement, known: ca.SX
+) -> Iterator[str]:
     """Yield messages about undeclared symbols in a friction law and its geometry."""
     law, v, N = friction.law, ca.SX.sym("v"), ca.SX.sym("N")
     z = ca.SX.sym("z", len(law.states))

@@ -71,6 +71,30 @@ class Contact(ABC):
         """Return a unit of the law; that of rotation if the law is one of moment and rate."""
         return turned(of_sliding) if self.friction.turning else of_sliding
 
+    @property
+    def law_place(self) -> str:
+        """Field of the law, for messages."""
+        return f"{self.place} > friction > law"
+
+    @property
+    def link(self) -> str:
+        """Joint after which the unknowns of the contact are eliminated."""
+        return self.part
+
+    @property
+    def rate(self) -> str:
+        """Name of the joint rate that is zero if the slip is; other names have no effect."""
+        return f"{self.name}_rate"
+
+    @property
+    def normal_symbol(self) -> ca.SX:
+        """Symbol of the normal force that `normal` contains; by default without rows."""
+        return ca.SX(0, 1)
+
+    def explicit_normal(self, normal: ca.SX, force: ca.SX, N: ca.SX) -> ca.SX:
+        """Return the normal force `normal` without F, given the friction force in terms of N."""
+        return normal
+
     @abstractmethod
     def loads(self, kin: Kinematics) -> Sequence[Load | Axial]:
         """Return the loads of the friction force on the bodies."""
@@ -78,6 +102,20 @@ class Contact(ABC):
     @abstractmethod
     def normal(self, kin: Kinematics, pressing: Mapping[str, Wrench]) -> ca.SX:
         """Return the normal force [N]; `pressing` is that of `Equations`."""
+
+
+def depends_on_load(law: Law) -> bool:
+    """Return True if the friction force or the rates of `law` depend on the normal force."""
+    N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
+    v = ca.SX.sym("v")
+    return ca.depends_on(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)), N)
+
+
+def law_places(contacts: Sequence[Contact]) -> str:
+    """Return the fields of the laws of several contacts, for messages."""
+    if len(contacts) == 1:
+        return contacts[0].law_place
+    return f"{places_of(contacts)} > friction > law"
 
 
 def places_of(contacts: Iterable[Contact]) -> str:

@@ -21,7 +21,8 @@ def efficiency(run: Trajectory, element: str) -> float:
 
     Args:
         run: result of a simulation of a mechanism.
-        element: name of a `Gear`, `Rolling`, `Screw` or `Cam` with friction.
+        element: name of a `Gear`, `Rolling`, `Screw` or `Cam` with friction, or of a brake, clutch
+            or belt. A brake of one joint delivers nothing: 0.
 
     Raises:
         ValueError: the mechanism has no element of this name with friction.
@@ -32,7 +33,8 @@ def efficiency(run: Trajectory, element: str) -> float:
             f"efficiency: expected an element with friction, got {element!r}; there are "
             f"{listed(known) or 'none'}"
         )
-    powers = ca.vertcat(*(run.model.expression(f"{element}_{end}") for end in ENDS))
+    ends = [name for end in ENDS if (name := f"{element}_{end}") in run.details]
+    powers = ca.vertcat(*(run.model.expression(name) for name in ends))
     signed = (smooth.positive(x, 0.0) for x in (powers, -powers))
     both = ca.vertcat(*(ca.sum1(x) for x in signed))
     delivered, received = integrals(run.step_times, run.of, both, run.step_times[-1:])[:, 0]

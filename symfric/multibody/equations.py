@@ -19,6 +19,7 @@ from symfric.multibody.dynamics import (
     loop_of,
     normalisations,
 )
+from symfric.multibody.element import FrictionElement
 from symfric.multibody.forces import Force, Gravity
 from symfric.multibody.kinematics import Cuts, Kinematics, Turn, kinematics
 from symfric.multibody.spatial import vector
@@ -103,6 +104,11 @@ class Equations:
         return symbols_of(turn.angle for turn in self.turns)
 
     @property
+    def N(self) -> ca.SX:
+        """Symbols of the normal forces that `normals` contain, shape (k, 1)."""
+        return stacked(c.normal_symbol for c in self.contacts)
+
+    @property
     def multipliers(self) -> dict[str, str]:
         """Unit of each multiplier by its name, including those of redundant constraints."""
         found: dict[str, str] = {}
@@ -150,7 +156,8 @@ def equations(
     own = [every[i:j, 0] for i, j in pairwise(accumulate(sizes, initial=0))]
     of_held = list(zip(held, own[len(loops) :], strict=True))
     rubbing = (c.contacts(kin, x) for c, (_, x) in zip(constraints, of_held, strict=True))
-    contacts = (*joint_contacts(kin), *chain(*rubbing))
+    elements = (f.contact(kin) for f in forces if isinstance(f, FrictionElement))
+    contacts = (*joint_contacts(kin), *chain(*rubbing), *elements)
     loads = [load for f in forces if not isinstance(f, Gravity) for load in f.loads(kin)]
     loads += [load for c in contacts for load in c.loads(kin)]
     weights = [load for f in gravity for load in f.loads(kin)]

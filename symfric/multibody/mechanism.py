@@ -19,6 +19,7 @@ from symfric.multibody import checks
 from symfric.multibody.assembly import assemble
 from symfric.multibody.constraints import Constraint
 from symfric.multibody.contact import places_of
+from symfric.multibody.element import FrictionElement
 from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Force, Gravity, SpringDamper
 from symfric.multibody.idle import idle
@@ -87,7 +88,8 @@ class Mechanism(packed.Portable, Showing):
             rows.append((j.name, type(j).__name__, f"{j.parent} - {j.child}", law))
         for part in (*self.forces, *self.constraints):
             ends = f"{part.a} - {part.b}" if isinstance(part, SpringDamper) else ""
-            rows.append((part.name, type(part).__name__, ends, ""))
+            law = type(part.law).__name__ if isinstance(part, FrictionElement) else ""
+            rows.append((part.name, type(part).__name__, ends, law))
         inputs = f"inputs: {among(v.name for v in self.inputs)}"
         return Shown(
             f"mechanism '{self.name}': {counted(len(bodies), 'body', 'bodies')}, "
@@ -240,6 +242,9 @@ class Mechanism(packed.Portable, Showing):
         for c, friction in rubbing:
             if isinstance(friction, ElementFriction):
                 bearings += checks.rubbing(f"{c.kind} '{c.name}' > friction", friction, known)
+        for f in self.forces:
+            if isinstance(f, FrictionElement):
+                bearings += checks.rubbing(f"{f.kind} '{f.name}'", f, known)
         self._refuse([*problems, *weights, *bearings] if problems else ())
         tree = spanning_tree({body.name: body for body in bodies}, self.joints)
         loose = list(checks.connected(tree))
@@ -334,14 +339,15 @@ def functions(
     if applied := [c for c in eq.contacts if c.law.inputs]:
         law = type(applied[0].friction.law).__name__
         raise ValueError(
-            f"{where} > {applied[0].place} > friction > law: expected one that needs only "
-            f"v and N, got {law}, whose force in stick depends on the motion; use `build`"
+            f"{where} > {applied[0].law_place}: expected one that needs only v and N, got {law}, "
+            "whose force in stick depends on the motion; use `build`"
         )
     contacts = slips(eq, [1.0] * len(eq.contacts))
     forces = stacked(c.force for c in contacts)
     for c in contacts:
         if c.N is not c.normal:
-            forces = ca.substitute(forces, c.N, c.normal)
+            normal = c.contact.explicit_normal(c.normal, c.force, c.N)
+            forces = ca.substitute(forces, c.N, normal)
     if ca.depends_on(forces, eq.F):
         names = places_of(c.contact for c in contacts if ca.depends_on(c.normal, eq.F))
         raise ValueError(

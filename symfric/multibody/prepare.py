@@ -313,8 +313,9 @@ def without_friction(made: Prepared) -> tuple[Array, Array, Array]:
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
     turned = ca.densify(starts_of(turn.angle for turn in eq.turns))
-    symbols = [eq.angles, eq.F, symbols_of(made.u), eq.kin.t]
+    symbols = [eq.angles, eq.F, symbols_of(made.u), eq.kin.t, eq.N]
     zero = [turned, ca.SX.zeros(eq.F.numel()), ca.SX(starts_of(made.u)), ca.SX(0)]
+    zero.append(ca.SX.ones(eq.N.numel()))
     expressions = [ca.vertcat(eq.balance, eq.phi_ddot), stacked(eq.normals)]
     rows, normals = ca.substitute(expressions, symbols, zero)
     arguments = [unknowns, eq.q, eq.qd, symbols_of(made.p)]

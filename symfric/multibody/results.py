@@ -12,6 +12,7 @@ from symfric.model import Output
 from symfric.model.kinds import WORK
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
 from symfric.multibody.contact import ElementContact
+from symfric.multibody.element import UNLOADED, PressedContact
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import SpringDamper
 from symfric.multibody.joint import COMPONENTS, FORCE_NAMES
@@ -34,7 +35,13 @@ def results(eq: Equations, undetermined: Sequence[str], p: ca.SX, put: Put) -> d
         put: function that rewrites expressions in the symbols of the model.
     """
     still = ca.vertcat(eq.q, eq.angles, p)
-    found = [*_reactions(eq, undetermined), *_elements(eq), *_centres(eq), *_work(eq, still)]
+    found = [
+        *_reactions(eq, undetermined),
+        *_elements(eq),
+        *_pressed(eq),
+        *_centres(eq),
+        *_work(eq, still),
+    ]
     values = put([output.expression for _, output in found])
     own = {str(eq.q[i]) for i in range(eq.n)}
     return {
@@ -98,6 +105,30 @@ def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
             yield f"{name}_{axis}", Output(at[i], "m", f"centre of mass of '{name}' along {axis}")
         for i, axis in enumerate("xyz"):
             yield f"{name}_v{axis}", Output(v[i], "m/s", f"its velocity along {axis}")
+
+
+def _pressed(eq: Equations) -> Iterator[tuple[str, Output]]:
+    """Yield loads, powers, tensions and the locking ratio of brakes, clutches and belts.
+
+    The ratio is the part of the normal force that friction at its static level causes.
+    """
+    for contact in (c for c in eq.contacts if isinstance(c, PressedContact)):
+        name, F = contact.name, contact.F
+        for letter, load in zip("ab", contact.loads(eq.kin), strict=False):
+            unit = "N" if load.joint.linear(load.direction) else "N m"
+            on = f"the child of '{load.joint.name}'"
+            yield f"{name}_load_{letter}", Output(load.value, unit, f"load by '{name}' on {on}")
+            yield f"{name}_power_{letter}", Output(load.power(eq.kin), "W", f"power to {on}")
+        for end, tension in contact.element.tensions(F).items():
+            yield f"{name}_{end}", Output(tension, "N", f"tension of the {end} end")
+        try:
+            held = contact.friction.law.static_level(contact.N)
+        except ValueError:
+            continue
+        m = smooth.choose(F < 0, -1.0, 1.0) * held / (contact.N + UNLOADED)
+        ratio = ca.SX(contact.element.pressing(m)[1]) * m
+        doc = "part of the normal force that static friction causes; locks from 1"
+        yield f"{name}_locking", Output(ratio, "1", doc)
 
 
 def _work(eq: Equations, still: ca.SX) -> Iterator[tuple[str, Output]]:

@@ -17,6 +17,7 @@ from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Output, Variables
 from symfric.multibody import Mechanism
 from symfric.multibody.contact import Contact, ElementContact, JointContact
+from symfric.multibody.element import PressedContact
 from symfric.multibody.equations import Equations
 from symfric.multibody.urdf import read_urdf
 
@@ -314,10 +315,9 @@ def _check(eq: Equations, mechanism: Mechanism) -> None:
     everything = ca.veccat(eq.balance, *eq.normals, eq.phi)
     if ca.depends_on(everything, eq.kin.t):
         raise ValueError(f"{where}: expected time-independent forces and constraints, got others")
-    if ca.depends_on(stacked(eq.normals), eq.F):
-        pressed = [
-            c.part for c, N in zip(eq.contacts, eq.normals, strict=True) if ca.depends_on(N, eq.F)
-        ]
+    pairs = zip(eq.contacts, eq.normals, strict=True)
+    own = [(c, N) for c, N in pairs if not isinstance(c, PressedContact)]
+    if pressed := [c.part for c, N in own if ca.depends_on(N, eq.F)]:
         raise ValueError(
             f"{where}: expected normal forces that do not depend on friction, got that of "
             f"{', '.join(dict.fromkeys(pressed))}, which depends on other friction; give it a "
