@@ -18,9 +18,9 @@ Contents; `help` describes each name:
     equations   Model of Variable, Output, Event and Monitor; contact adds a law to it (Contact)
     mechanisms  Mechanism of bodies and joints with friction, read_urdf; more in symfric.multibody
     drives      Drive: motor, gear and encoder by their nameplate; driven(model, drive) adds them
-    running     simulate, simulate_many, stepper, flow; inputs as numbers, functions of time or
-                samples, Hold and Linear (rate_of: their rate); SolveError, Status of failed runs,
-                OverloadWarning, EnergyWarning of doubtful runs
+    running     simulate, prepare for many calls, simulate_many, stepper, flow; inputs as numbers,
+                functions of time or samples, Hold and Linear (rate_of: their rate); SolveError,
+                Status of failed runs, OverloadWarning, EnergyWarning of doubtful runs
     results     Trajectory (run["x"], run.at(times), run.at(run.step_times), run.extremes, plot,
                 animate, save, to_csv, to_dataframe), load_run, Statistics, Plant, report; Ensemble
                 (varied, extremes, plot, save, to_dataframe), load_ensemble; for_print
@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from symfric.integrator import flow as flow
     from symfric.integrator import load_ensemble as load_ensemble
     from symfric.integrator import load_run as load_run
+    from symfric.integrator import prepare as prepare
     from symfric.integrator import rate_of as rate_of
     from symfric.integrator import simulate as simulate
     from symfric.integrator import simulate_many as simulate_many

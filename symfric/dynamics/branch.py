@@ -14,6 +14,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing, Shown, Table
+from symfric.integrator.equations.inputs import Input
 from symfric.model import Model
 from symfric.results.ensemble import Ensemble
 from symfric.results.stored import Format
@@ -62,11 +63,12 @@ class Branch(Showing):
         sequences: events of one period in their order, as text.
         special: special points.
         message: reason why the branch ends.
+        driven: True for orbits with a given period.
     """
 
     model: Model
     parameter: str
-    u: dict[str, float]
+    u: dict[str, Input]
     p: dict[str, float]
     values: Array
     x: Array
@@ -77,6 +79,7 @@ class Branch(Showing):
     sequences: tuple[str, ...]
     special: tuple[Special, ...]
     message: str
+    driven: bool = False
 
     @property
     def exponents(self) -> NDArray[np.complex128]:
@@ -116,7 +119,8 @@ class Branch(Showing):
         p = self.p | {self.parameter: float(self.values[k])}
         x0 = dict(zip((v.name for v in self.model.x), self.x[k].tolist(), strict=True))
         guess = guessed(self.model, x0, float(self.periods[k]), self.u, p, rtol)
-        return periodic_orbit(self.model, guess, rtol=rtol)
+        period = guess.period if self.driven else None
+        return periodic_orbit(self.model, guess, period=period, rtol=rtol)
 
     def plot(
         self, state: str, *others: "Branch", runs: Sequence[Ensemble] = (),
