@@ -66,9 +66,12 @@ def test_backward_euler_stays_bounded_where_the_step_resolves_nothing() -> None:
 
 def test_explicit_step_and_its_dense_output_are_those_of_scipy() -> None:
     h, system = 0.2, assemble(smooth_ode().model)
+
+    def rates(_: float, y: np.ndarray) -> list[float]:
+        return [-3 * y[0] + y[1] ** 2, y[0] - y[1] - y[1] ** 2]
+
     solver = RK45(
-        lambda _, y: [-3 * y[0] + y[1] ** 2, y[0] - y[1] - y[1] ** 2],
-        0.0, [1.0, 1.0], 1.0, first_step=h, max_step=h, rtol=1.0, atol=1.0,
+        rates, 0.0, [1.0, 1.0], 1.0, first_step=h, max_step=h, rtol=1.0, atol=1.0
     )  # fmt: skip
     solver.step()
     found = build_fixed(system, DOPRI5)([1.0, 1.0], h, [])
