@@ -81,7 +81,7 @@ def test_widths_follow_the_speeds_unless_the_user_chose_them() -> None:
 def test_a_drive_that_turns_has_units_that_turn() -> None:
     units = {n: u.unit for n, u in named("stribeck", turning=True).items()}
     assert units["m"] == "kg m^2" and units["v_s"] == "rad/s" and units["sigma_2"] == "N m s/rad"
-    assert subject("stribeck", turning=True).drive.turning
+    assert subject("stribeck", turning=True).drive.turning  # pyright: ignore
 
 
 def test_specs_bound_tie_and_order() -> None:
