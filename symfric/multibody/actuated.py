@@ -14,6 +14,7 @@ if B m reaches 1. A negative actuation releases the element, which cannot pull.
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
+from math import inf
 from typing import ClassVar, final
 
 import casadi as ca
@@ -48,6 +49,20 @@ def wrapped(m: ca.SX, angle: Scalar) -> tuple[ca.SX, ca.SX]:
     """
     x = smooth.clip(m * angle, -EXPONENT, EXPONENT)
     return ca.exp(x), angle * ca.SX(smooth.phi1(x))
+
+
+def overwound(law: Law, angle: Scalar) -> Iterator[str]:
+    """Yield a message if static friction would exceed the bound of `wrapped`."""
+    try:
+        m = as_number(law.static_level(1.0))
+    except ValueError:
+        return
+    size = as_number(angle)
+    if m is not None and size is not None and EXPONENT < m * size < inf:
+        yield (
+            f"angle: expected coefficient times angle <= {EXPONENT:g}, got {m * size:.3g}; the "
+            "tension would grow by more than exp(50)"
+        )
 
 
 class ActuatedElement(Force):

@@ -10,7 +10,7 @@ import casadi as ca
 from symfric.foundation.checks import as_number
 from symfric.foundation.numeric import Scalar, equals
 from symfric.laws import Law
-from symfric.multibody.actuated import ActuatedElement, wrapped
+from symfric.multibody.actuated import ActuatedElement, overwound, wrapped
 from symfric.multibody.forces import Axial, Load
 from symfric.multibody.kinematics import Kinematics
 
@@ -34,6 +34,8 @@ class _Wound(ActuatedElement):
         half = as_number(self.groove)
         if half is not None and half > pi / 2:
             yield f"groove: expected at most pi/2 rad, got {half:g}; angles are in radians"
+        elif half is None or half > 0:
+            yield from overwound(self.law, self.wrap)
 
 
 @final

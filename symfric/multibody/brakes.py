@@ -12,7 +12,7 @@ from symfric.foundation import checks
 from symfric.foundation.checks import as_number
 from symfric.foundation.numeric import Scalar, equals
 from symfric.laws import Law
-from symfric.multibody.actuated import ActuatedElement, wrapped
+from symfric.multibody.actuated import ActuatedElement, overwound, wrapped
 
 PRESSURES = ("uniform pressure", "uniform wear")
 
@@ -263,6 +263,7 @@ class BandBrake(ActuatedElement):
     def problems(self) -> Iterator[str]:
         """Yield a message about a lever that locks without friction."""
         yield from super().problems()
+        yield from overwound(self.law, self.angle)
         tight, slack = as_number(self.arm_tight), as_number(self.arm_slack)
         if tight is not None and slack is not None and inf > tight >= slack > 0:
             yield (
