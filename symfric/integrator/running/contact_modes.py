@@ -76,7 +76,7 @@ class ContactModes:
             rows.append(ca.vertcat(up, down, rate_of(ca.SX(c.slip), model), ca.SX(c.slip)))
             slope = ca.DM(ca.jacobian(ca.SX(c.slip), x).sparsity(), 1).full()[0] != 0
             still.append(STILL * max(nominal[slope], default=1.0))
-        look = of_time("contacts", ca.densify(stacked(rows)))
+        look = of_time("symfric_contacts", ca.densify(stacked(rows)))
         return ContactModes(contacts, look, np.array(still))
 
     def decided(self, t: float, before: Array, y: Array, d: Array, solve: Solve) -> Array | None:
