@@ -15,6 +15,7 @@ from symfric.laws.static import (
     applied_force,
     coulomb,
     exponential,
+    from_data,
     lubrication,
     machines,
     piecewise,
@@ -60,6 +61,7 @@ STATIC_LAWS: dict[str, type[Law]] = {
     "bam": machines.BAM,
     "capstan": machines.Capstan,
     "mixed_lubrication": lubrication.MixedLubrication,
+    "spline": from_data.Spline,
 }
 """Memoryless laws by name, with the most widely used laws first."""
 
