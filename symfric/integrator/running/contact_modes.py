@@ -14,6 +14,9 @@ All of them stick first. The most inconsistent contact changes, the equations ar
 because the forces in other contacts change with it, and so on until all modes are consistent. If
 modes repeat, all combinations are tried, those with most contacts in stick first.
 
+Compiled code repeats the decision, operation by operation, except for loops that have to be closed
+and for the trials of all combinations (`decide.c`).
+
 Limits: for mu_s > mu_d several combinations may be consistent, and one is chosen. If none is found,
 the modes remain those of the switches. Contacts of a loop of one degree of freedom stick together
 and keep their own events. A run records the events that led to the decision, not its result.
