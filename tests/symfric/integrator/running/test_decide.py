@@ -17,11 +17,16 @@ def hammered() -> Model:
     """Three blocks between springs, driven, and hit by a hammer every half second.
 
     Blows change sliding velocities, some to zero, so that the modes of all contacts are decided.
+    Each block also carries a part of the friction of the one before, so that modes affect others.
     """
     t, three = ca.SX.sym("t"), range(3)
     x = [sf.Variable(f"x{i}", "m") for i in three]
     v = [sf.Variable(f"v{i}", "m/s") for i in three]
-    names = ("k", "F", *(f"{a}{i}" for a in ("omega", "mu_s", "mu_d", "kept") for i in three))
+    names = (
+        "k",
+        "F",
+        *(f"{a}{i}" for a in ("omega", "mu_s", "mu_d", "kept", "hit") for i in three),
+    )
     p = {name: sf.Variable(name, "1", start=1.0) for name in names}
     own = {name: one.symbol for name, one in p.items()}
     q = [0, *(a.symbol for a in x), 0]
@@ -30,14 +35,17 @@ def hammered() -> Model:
         for i in three
     ]
     laws = [sf.ExactCoulomb(mu_s=own[f"mu_s{i}"], mu_d=own[f"mu_d{i}"]) for i in three]
-    rubbing = tuple(
-        sf.contact(f"c{i}", laws[i], v[i], 1.0, rest={f"v{i}": 0.0}, F_e=forces[i], bare=False)
-        for i in three
-    )
-    blows = {f"v{i}": own[f"kept{i}"] * v[i].symbol for i in three}
+    rubbing = list[sf.Contact]()
+    for i in three:
+        forces[i] += 0.8 * rubbing[-1].force if rubbing else 0.0
+        rest = {f"v{i}": 0.0}
+        rubbing.append(
+            sf.contact(f"c{i}", laws[i], v[i], 1.0, rest=rest, F_e=forces[i], bare=False)
+        )
+    blows = {f"v{i}": own[f"kept{i}"] * v[i].symbol + own[f"hit{i}"] for i in three}
     rates = [force - c.force for force, c in zip(forces, rubbing, strict=True)]
     return Model(
-        "hammered", t=t, x=(*x, *v), p=tuple(p.values()), contacts=rubbing,
+        "hammered", t=t, x=(*x, *v), p=tuple(p.values()), contacts=tuple(rubbing),
         ode=ca.vertcat(*(a.symbol for a in v), *rates),
         events=(sf.Event("blow", ca.sin(2 * np.pi * t), 0, reset=blows),),
     )  # fmt: skip
@@ -51,6 +59,7 @@ def drawn(seed: int) -> dict[str, Any]:
     for i in range(3):
         slow = float(force * sliding[i])
         p |= {f"omega{i}": rng.uniform(0.5, 5), f"kept{i}": rng.choice([0.0, 0.3, 1.0])}
+        p |= {f"hit{i}": rng.choice([0.0, 0.0, 0.2, -0.2])}
         p |= {f"mu_d{i}": slow, f"mu_s{i}": slow * rng.choice([1.0, 1.5])}
     start = {f"x{i}": rng.normal() for i in range(3)} | {
         f"v{i}": rng.integers(-1, 2) for i in range(3)
