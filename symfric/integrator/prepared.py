@@ -269,7 +269,7 @@ def _checked(
     max_step: float | None,
 ) -> Prepared:
     t_start, t_end, rtol = arguments.check_span(where, model, t_start, t_end, rtol, stacklevel=6)
-    formula = arguments.chosen(where, method, rtol)
+    formula = arguments.chosen(where, method, rtol, model)
     checks.choice(f"{where}: backend", backend, arguments.BACKENDS)
     times = arguments.result_times(where, t_start, t_end, None, samples)
     limits = model.nominal("x"), event_tolerance, max_steps, max_step
