@@ -214,6 +214,11 @@ def mixed_lubrication(p: Any, v: float, N: float) -> float:
     return p.mu_b * N * tanh(v / p.v_eps) * share / (share + (H / p.H_m) ** 2) + N * H / p.h
 
 
+def brush_tyre(p: Any, v: float, N: float, v_r: float = 0.0) -> float:
+    s = p.C * v / (3 * p.mu_d * N * sqrt(v_r**2 + p.v_eps**2))
+    return copysign(p.mu_d * N * (1 - (1 - min(abs(s), 1.0)) ** 3), v)
+
+
 def spline(p: Any, v: float, N: float) -> float:
     """By the four cubic pieces that are not zero, with repeated control points at both ends."""
     c = [level.c for level in p.levels]
@@ -236,7 +241,7 @@ PRINTED: dict[str, Formula] = {
         *(leine_switch, bittencourt, threlfall, modified_threlfall, bengisu_akay, velocity_based),
         *(ambrosio, step5, hollars, exudyn, brown_mcphee, simscape_breakaway, specker),
         *(makkar_dixon, self_tuning, brittle_self_tuning, rui_wang, mixed_lubrication),
-        spline,
+        *(spline, brush_tyre),
     )
 }
 """Law by name -> its equation (law, v, N)."""

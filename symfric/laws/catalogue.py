@@ -60,6 +60,7 @@ STATIC_LAWS: dict[str, type[Law]] = {
     "bittencourt": machines.Bittencourt,
     "bam": machines.BAM,
     "capstan": machines.Capstan,
+    "brush_tyre": machines.BrushTyre,
     "mixed_lubrication": lubrication.MixedLubrication,
     "spline": from_data.Spline,
 }
@@ -72,6 +73,7 @@ DYNAMIC_LAWS: dict[str, type[Law]] = {
     "lugre": lugre.LuGre,
     "lugre_normalised": lugre.LuGreNormalised,
     "lugre_passive": lugre.LuGrePassive,
+    "lugre_tyre": lugre.LuGreTyre,
     "elasto_plastic": lugre.ElastoPlastic,
     "leuven": maxwell_slip.Leuven,
     "maxwell_slip": maxwell_slip.MaxwellSlip,
