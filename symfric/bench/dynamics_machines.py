@@ -100,8 +100,12 @@ def pendulum(rng: np.random.Generator) -> Machine:
 
 
 def crank(rng: np.random.Generator, stiffness: float | ca.SX | None = None) -> Machine:
-    """Return a slider-crank with a spring at its crank, moved by a periodic torque."""
+    """Return a slider-crank with a spring at its crank, moved by a periodic torque.
+
+    With a symbol as its stiffness, the bearing has bristles.
+    """
     own = (BrownMcPhee(), LuGre(), ExactCoulomb())[int(rng.integers(3))]
+    own = own if stiffness is None else LuGre()
     mechanism = SliderCrank(own, omega=0.0, R=float(rng.uniform(0.01, 0.03))).mechanism()
     moment, top = mechanism.input("torque", "N m"), float(rng.uniform(2.0, 4.0))
     k = float(rng.uniform(3.0, 6.0)) if stiffness is None else stiffness
