@@ -6,7 +6,7 @@ from typing import Any
 import casadi as ca
 from chains import attach
 
-from symfric import ExactCoulomb, Trajectory, simulate
+from symfric import BrownMcPhee, ExactCoulomb, Model, Trajectory, simulate
 from symfric import multibody as mb
 from symfric.laws import Law
 
@@ -55,3 +55,10 @@ def driven(element: mb.Force, *rates: float) -> mb.Mechanism:
     m = turning(element, *rates)
     m.force(mb.JointSpringDamper("motor", "a", actuator=m.input("torque", "N m")))
     return m
+
+
+def brake() -> Model:
+    """A drum brake whose force is an input, initially 100 N."""
+    m = shafts(9.0)
+    m.force(drum(BrownMcPhee(), m.input("force", "N", start=100.0), "leading and trailing"))
+    return m.build()

@@ -27,7 +27,7 @@ from symfric.results.trajectory import Trajectory
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-METHODS = ("rodas5p", "rodas4p", "radau5")
+METHODS = ("rodas5p", "rodas4p", "radau5", "radau9")
 """Methods that are compared by default."""
 RTOLS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 """Relative tolerances by default."""

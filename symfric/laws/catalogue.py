@@ -15,6 +15,7 @@ from symfric.laws.static import (
     applied_force,
     coulomb,
     exponential,
+    from_data,
     lubrication,
     machines,
     piecewise,
@@ -59,7 +60,9 @@ STATIC_LAWS: dict[str, type[Law]] = {
     "bittencourt": machines.Bittencourt,
     "bam": machines.BAM,
     "capstan": machines.Capstan,
+    "brush_tyre": machines.BrushTyre,
     "mixed_lubrication": lubrication.MixedLubrication,
+    "spline": from_data.Spline,
 }
 """Memoryless laws by name, with the most widely used laws first."""
 
@@ -70,6 +73,7 @@ DYNAMIC_LAWS: dict[str, type[Law]] = {
     "lugre": lugre.LuGre,
     "lugre_normalised": lugre.LuGreNormalised,
     "lugre_passive": lugre.LuGrePassive,
+    "lugre_tyre": lugre.LuGreTyre,
     "elasto_plastic": lugre.ElastoPlastic,
     "leuven": maxwell_slip.Leuven,
     "maxwell_slip": maxwell_slip.MaxwellSlip,

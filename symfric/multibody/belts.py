@@ -10,12 +10,12 @@ import casadi as ca
 from symfric.foundation.checks import as_number
 from symfric.foundation.numeric import Scalar, equals
 from symfric.laws import Law
-from symfric.multibody.element import FrictionElement, wrapped
+from symfric.multibody.actuated import ActuatedElement, overwound, wrapped
 from symfric.multibody.forces import Axial, Load
 from symfric.multibody.kinematics import Kinematics
 
 
-class _Wound(FrictionElement):
+class _Wound(ActuatedElement):
     """Rope or belt in a groove."""
 
     actuator = "tension"
@@ -34,6 +34,8 @@ class _Wound(FrictionElement):
         half = as_number(self.groove)
         if half is not None and half > pi / 2:
             yield f"groove: expected at most pi/2 rad, got {half:g}; angles are in radians"
+        elif half is None or half > 0:
+            yield from overwound(self.law, self.wrap)
 
 
 @final
@@ -57,7 +59,7 @@ class CapstanDrum(_Wound):
         angle: wrap angle [rad], 2 pi for each turn.
         drum: joint of the drum; "" for a bollard, which does not turn.
         groove: half angle of the groove [rad]; pi/2 for a smooth drum.
-        preload: tension of the free end at zero actuation [N].
+        preload: tension of the free end in addition, also at zero actuation [N].
 
     Limits: |m| angle / sin(groove) is at most 50. A rope without stiffness and mass; only its load
     end moves a body.
@@ -121,7 +123,7 @@ class Belt(_Wound):
         radius_a, radius_b: radii [m]; of opposite signs for a crossed belt.
         angle: wrap angle on the pulley that slips, the smaller product of coefficient and angle.
         groove: half angle of the groove of a wedge belt [rad]; pi/2 for a flat belt.
-        preload: mean tension at zero actuation [N].
+        preload: mean tension in addition, also at zero actuation [N].
 
     Limits: |m| angle / sin(groove) is at most 50. A belt without stiffness (no creep) and without
     mass (no centrifugal force), at a constant distance of the axes.

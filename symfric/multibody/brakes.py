@@ -12,14 +12,14 @@ from symfric.foundation import checks
 from symfric.foundation.checks import as_number
 from symfric.foundation.numeric import Scalar, equals
 from symfric.laws import Law
-from symfric.multibody.element import FrictionElement, wrapped
+from symfric.multibody.actuated import ActuatedElement, overwound, wrapped
 
 PRESSURES = ("uniform pressure", "uniform wear")
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class DiscClutch(FrictionElement):
+class DiscClutch(ActuatedElement):
     """Disc or cone clutch between the children of joints a and b; without b a brake of joint a.
 
         v = r (w_a - w_b),   N = faces force / sin(half_angle)
@@ -38,7 +38,7 @@ class DiscClutch(FrictionElement):
         faces: number of faces in contact, each with the axial force.
         half_angle: half angle of the cone [rad]; pi/2 is a flat disc.
         pressure: "uniform pressure" or "uniform wear".
-        preload: axial force at zero actuation [N].
+        preload: axial force in addition, also at zero actuation [N].
 
     Limits: the sliding velocity is that at the mean radius, so a law whose coefficient depends on
     the velocity is not integrated over the ring. A cone releases without a force. For outer = inner
@@ -135,7 +135,7 @@ SHOES: Mapping[str, tuple[int, int]] = MappingProxyType(
 
 @final
 @dataclass(frozen=True, eq=False)
-class DrumBrake(FrictionElement):
+class DrumBrake(ActuatedElement):
     """Drum brake with pivoted shoes on the child of a joint.
 
         v = radius w,   torque = radius F,   k = arm_friction / arm_normal
@@ -156,7 +156,7 @@ class DrumBrake(FrictionElement):
             friction force about the pivot of the shoe [m]; see `shoe_arms` for long shoes.
         shoes: "leading", "trailing", "leading and trailing" or "two leading", as named for positive
             rotation.
-        preload: force on each shoe at zero actuation [N].
+        preload: force on each shoe in addition, also at zero actuation [N].
 
     Limits: both shoes have the same coefficient m in stick.
     Source: Shigley, Mechanical Engineering Design, chapter on clutches and brakes.
@@ -199,7 +199,7 @@ class DrumBrake(FrictionElement):
 
 @final
 @dataclass(frozen=True, eq=False)
-class BandBrake(FrictionElement):
+class BandBrake(ActuatedElement):
     """Band brake on a drum, whose ends are on one lever.
 
         v = radius w,   torque = radius F,   F = T_1 - T_2,   T_1 = T_2 exp(m angle)
@@ -221,7 +221,7 @@ class BandBrake(FrictionElement):
         arm_tight: arm of T_1, which pulls the lever on [m]; 0 for an end at the pivot (simple band
             brake), negative for an end that also releases it (both directions brake alike at
             -arm_slack).
-        preload: force on the lever at zero actuation [N].
+        preload: force on the lever in addition, also at zero actuation [N].
 
     Limits: |m| angle is at most 50. A band without stiffness and mass.
     Source: Eytelwein 1808; Shigley, Mechanical Engineering Design.
@@ -263,6 +263,7 @@ class BandBrake(FrictionElement):
     def problems(self) -> Iterator[str]:
         """Yield a message about a lever that locks without friction."""
         yield from super().problems()
+        yield from overwound(self.law, self.angle)
         tight, slack = as_number(self.arm_tight), as_number(self.arm_slack)
         if tight is not None and slack is not None and inf > tight >= slack > 0:
             yield (

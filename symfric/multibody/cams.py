@@ -122,8 +122,8 @@ class Cam(Constraint):
             lift, slope = self._profile(kin)
         except (TypeError, ValueError, ArithmeticError, RuntimeError, NotImplementedError):
             return impossible(
-                "lift: expected a function of the angle that returns one expression; use casadi "
-                "functions, not those of math"
+                "lift: expected a function of the angle that returns one expression of it; use "
+                "casadi functions, not those of math"
             )
 
         def loads(lam: ca.SX) -> Sequence[Axial]:
@@ -146,7 +146,9 @@ class Cam(Constraint):
         """Return lift and slope at the angle of the cam."""
         angle = ca.SX.sym("angle")
         lift = ca.SX(self.lift(angle))
-        slope = ca.gradient(lift, angle)  # raises an error unless there is one expression
+        if lift.numel() != 1 or not ca.depends_on(lift, angle):
+            raise ValueError
+        slope = ca.gradient(lift, angle)
         now = kin.along(kin.topology.joints[self.a], self.direction_a)[0]
         lift, slope = ca.substitute([lift, slope], [angle], [now])
         return lift, slope

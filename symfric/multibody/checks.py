@@ -11,7 +11,7 @@ from symfric.foundation.checks import shown
 from symfric.foundation.numeric import is_number, is_symbolic
 from symfric.foundation.variable import strays, symbols_of
 from symfric.model import Variables
-from symfric.multibody.element import FrictionElement
+from symfric.multibody.actuated import ActuatedElement
 from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Part
 from symfric.multibody.joint import Joint, JointFriction
@@ -117,7 +117,7 @@ def bearings(joints: Sequence[Joint], p: ca.SX, u: ca.SX) -> Iterator[str]:
 
 
 def rubbing(
-    where: str, friction: JointFriction | ElementFriction | FrictionElement, known: ca.SX
+    where: str, friction: JointFriction | ElementFriction | ActuatedElement, known: ca.SX
 ) -> Iterator[str]:
     """Yield messages about undeclared symbols in a friction law and its geometry."""
     law, v, N = friction.law, ca.SX.sym("v"), ca.SX.sym("N")

@@ -8,6 +8,8 @@ from symfric.results.quadrature import integrals
 from symfric.results.trajectory import Trajectory
 
 ENDS = ("power_a", "power_b")
+REST = 1e-9
+"""Largest sliding distance [m] of an element at rest."""
 
 
 def efficiency(run: Trajectory, element: str) -> float:
@@ -17,7 +19,7 @@ def efficiency(run: Trajectory, element: str) -> float:
 
     with the powers P = `<element>_power_a`, `<element>_power_b` [W] of the element on both coupled
     joints, by quadrature over the dense output. Between 0 and 1: the difference to 1 is lost in
-    friction. NaN if the element received no energy.
+    friction. NaN if the element slid by less than 1 nm: rest has no efficiency.
 
     Args:
         run: result of a simulation of a mechanism.
@@ -35,7 +37,8 @@ def efficiency(run: Trajectory, element: str) -> float:
         )
     ends = [name for end in ENDS if (name := f"{element}_{end}") in run.details]
     powers = ca.vertcat(*(run.model.expression(name) for name in ends))
-    signed = (smooth.positive(x, 0.0) for x in (powers, -powers))
-    both = ca.vertcat(*(ca.sum1(x) for x in signed))
-    delivered, received = integrals(run.step_times, run.of, both, run.step_times[-1:])[:, 0]
-    return float(delivered / received) if received > 0.0 else float("nan")
+    delivered, received = (ca.sum1(smooth.positive(x, 0.0)) for x in (powers, -powers))
+    speed = smooth.magnitude(run.model.expression(f"{element}_slip"), 0.0)
+    whole = ca.vertcat(delivered, received, speed)
+    out, into, path = integrals(run.step_times, run.of, whole, run.step_times[-1:])[:, 0]
+    return float(out / into) if path > REST else float("nan")

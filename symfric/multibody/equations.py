@@ -9,6 +9,7 @@ import casadi as ca
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.variable import stacked, symbols_of
+from symfric.multibody.actuated import ActuatedElement
 from symfric.multibody.constraints import Constraint, Held
 from symfric.multibody.contact import Contact, joint_contacts
 from symfric.multibody.dynamics import (
@@ -19,7 +20,6 @@ from symfric.multibody.dynamics import (
     loop_of,
     normalisations,
 )
-from symfric.multibody.element import FrictionElement
 from symfric.multibody.forces import Force, Gravity
 from symfric.multibody.kinematics import Cuts, Kinematics, Turn, kinematics
 from symfric.multibody.spatial import vector
@@ -156,7 +156,7 @@ def equations(
     own = [every[i:j, 0] for i, j in pairwise(accumulate(sizes, initial=0))]
     of_held = list(zip(held, own[len(loops) :], strict=True))
     rubbing = (c.contacts(kin, x) for c, (_, x) in zip(constraints, of_held, strict=True))
-    elements = (f.contact(kin) for f in forces if isinstance(f, FrictionElement))
+    elements = (f.contact(kin) for f in forces if isinstance(f, ActuatedElement))
     contacts = (*joint_contacts(kin), *chain(*rubbing), *elements)
     loads = [load for f in forces if not isinstance(f, Gravity) for load in f.loads(kin)]
     loads += [load for c in contacts for load in c.loads(kin)]

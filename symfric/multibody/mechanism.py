@@ -16,10 +16,10 @@ from symfric.foundation.symbolic import plain, with_symbols
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Model, Variables
 from symfric.multibody import checks
+from symfric.multibody.actuated import ActuatedElement
 from symfric.multibody.assembly import assemble
 from symfric.multibody.constraints import Constraint
 from symfric.multibody.contact import places_of
-from symfric.multibody.element import FrictionElement
 from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Force, Gravity, SpringDamper
 from symfric.multibody.idle import idle
@@ -88,7 +88,7 @@ class Mechanism(packed.Portable, Showing):
             rows.append((j.name, type(j).__name__, f"{j.parent} - {j.child}", law))
         for part in (*self.forces, *self.constraints):
             ends = f"{part.a} - {part.b}" if isinstance(part, SpringDamper) else ""
-            law = type(part.law).__name__ if isinstance(part, FrictionElement) else ""
+            law = type(part.law).__name__ if isinstance(part, ActuatedElement) else ""
             rows.append((part.name, type(part).__name__, ends, law))
         inputs = f"inputs: {among(v.name for v in self.inputs)}"
         return Shown(
@@ -243,7 +243,7 @@ class Mechanism(packed.Portable, Showing):
             if isinstance(friction, ElementFriction):
                 bearings += checks.rubbing(f"{c.kind} '{c.name}' > friction", friction, known)
         for f in self.forces:
-            if isinstance(f, FrictionElement):
+            if isinstance(f, ActuatedElement):
                 bearings += checks.rubbing(f"{f.kind} '{f.name}'", f, known)
         self._refuse([*problems, *weights, *bearings] if problems else ())
         tree = spanning_tree({body.name: body for body in bodies}, self.joints)

@@ -11,8 +11,8 @@ from symfric.laws.base import smooth
 from symfric.model import Output
 from symfric.model.kinds import WORK
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
+from symfric.multibody.actuated import UNLOADED, ActuatedContact
 from symfric.multibody.contact import ElementContact
-from symfric.multibody.element import UNLOADED, PressedContact
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import SpringDamper
 from symfric.multibody.joint import COMPONENTS, FORCE_NAMES
@@ -112,7 +112,7 @@ def _pressed(eq: Equations) -> Iterator[tuple[str, Output]]:
 
     The ratio is the part of the normal force that friction at its static level causes.
     """
-    for contact in (c for c in eq.contacts if isinstance(c, PressedContact)):
+    for contact in (c for c in eq.contacts if isinstance(c, ActuatedContact)):
         name, F = contact.name, contact.F
         for letter, load in zip("ab", contact.loads(eq.kin), strict=False):
             unit = "N" if load.joint.linear(load.direction) else "N m"

@@ -16,8 +16,8 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Output, Variables
 from symfric.multibody import Mechanism
+from symfric.multibody.actuated import ActuatedContact
 from symfric.multibody.contact import Contact, ElementContact, JointContact
-from symfric.multibody.element import PressedContact
 from symfric.multibody.equations import Equations
 from symfric.multibody.urdf import read_urdf
 
@@ -316,7 +316,7 @@ def _check(eq: Equations, mechanism: Mechanism) -> None:
     if ca.depends_on(everything, eq.kin.t):
         raise ValueError(f"{where}: expected time-independent forces and constraints, got others")
     pairs = zip(eq.contacts, eq.normals, strict=True)
-    own = [(c, N) for c, N in pairs if not isinstance(c, PressedContact)]
+    own = [(c, N) for c, N in pairs if not isinstance(c, ActuatedContact)]
     if pressed := [c.part for c, N in own if ca.depends_on(N, eq.F)]:
         raise ValueError(
             f"{where}: expected normal forces that do not depend on friction, got that of "

@@ -45,7 +45,8 @@ class Loop(ctypes.Structure):
     _fields_ = (
         *(
             (name, ctypes.c_void_p)
-            for name in ("S", "R", "rows", "times", "out", "breaks", "data", "memory", "jumps")
+            for name in ("S", "R", "rows", "times", "out", "breaks", "data", "memory", "jumps",
+                         "reach")
         ),
         ("h_min", ctypes.c_double),
         *(
@@ -63,23 +64,35 @@ class Work:
     Attributes:
         S, R: memory and unknowns of the step, and the constant data of an attempt.
         rows: buffer of records.
+        reach: smallest and largest unknowns at the start and at the ends of steps, shape (2, n).
         loop: counters, limits and addresses.
         outputs: requested values at given times.
         events: state of the event search; None for a model without events.
     """
 
-    def __init__(self, n: int, given: int, dense_rows: int, rows: int | None = None) -> None:
+    def __init__(
+        self, n: int, given: int, dense_rows: int, rows: int | None = None,
+        events: Eventful | None = None,
+    ) -> None:  # fmt: skip
         self.n, width = n, Record(n, dense_rows).width
         if rows is None:
             rows = max(LEAST_ROWS, min(MOST_ROWS, BYTES // (8 * width)))
         self.S, self.R = np.zeros(State.MEMORY + n), np.zeros(given)
-        self.rows = np.empty((rows, width))
+        self.rows, self.reach = np.empty((rows, width)), np.zeros((2, n))
         self.loop = Loop(
-            S=self.S.ctypes.data, R=self.R.ctypes.data, rows=self.rows.ctypes.data, max_rows=rows
-        )
+            S=self.S.ctypes.data, R=self.R.ctypes.data, rows=self.rows.ctypes.data, max_rows=rows,
+            reach=self.reach.ctypes.data,
+        )  # fmt: skip
         self.address = ctypes.addressof(self.loop)
         self.outputs: Outputs = Outputs.at(np.zeros(0), n)
-        self.events: Eventful | None = None
+        self.events = events
+        if events is not None:
+            self.loop.memory, self.loop.jumps, self.loop.max_jumps = events.pointers
+
+    def begin(self, t: float, h: float, y: Array) -> None:
+        """Start at time `t` [s] from the unknowns `y` with the step `h` [s]."""
+        self.S[: State.MEMORY] = State.fresh(t, h)
+        self.S[State.Y] = self.reach[:] = y
         self.breaks, self.data = np.zeros(2), np.zeros((0, 1))
 
     def over(self, breaks: Array, data: Array) -> None:
@@ -88,7 +101,7 @@ class Work:
         loop.intervals, loop.n_data = breaks.size - 1, data.shape[0]
         if breaks.size > 2:
             self.breaks, self.data = np.ascontiguousarray(breaks), np.ascontiguousarray(data)
-            loop.breaks, loop.data = self.breaks.ctypes.data, self.data.ctypes.data
+            loop.breaks, loop.data = address(self.breaks), address(self.data)
         self.enter(0)
 
     def interval(self, times: Array) -> NDArray[np.intp]:
@@ -102,13 +115,11 @@ class Work:
         if self.data.shape[0]:
             self.R[-self.data.shape[0] :] = self.data[:, interval]
 
-    def want(self, outputs: Outputs, events: Eventful | None) -> None:
-        """Set the `outputs` to fill and the `events` to carry out."""
-        loop, self.outputs, self.events = self.loop, outputs, events
+    def want(self, outputs: Outputs) -> None:
+        """Set the `outputs` to fill."""
+        loop, self.outputs = self.loop, outputs
         loop.n_times = outputs.times.size
         loop.times, loop.out = address(outputs.times), address(outputs.values)
-        if events is not None:
-            loop.memory, loop.jumps, loop.max_jumps = events.pointers
 
 
 class _Batch:
@@ -199,7 +210,10 @@ class VmEngine:
             found.append(records)
             count, made = count + records.shape[0], made + tried
             if records.shape[0]:
-                work.outputs.fill(Dense.of(records, work.n))
+                piece = Dense.of(records, work.n)
+                work.outputs.fill(piece)
+                np.minimum(work.reach[0], piece.y1.min(axis=0), out=work.reach[0])
+                np.maximum(work.reach[1], piece.y1.max(axis=0), out=work.reach[1])
             if stop is not Stop.END or loop.interval + 1 == loop.intervals:
                 break
             work.enter(loop.interval + 1)

@@ -10,7 +10,7 @@ typedef struct {
   const double *times;
   double *out;
   const double *breaks, *data;
-  double *memory, *jumps;
+  double *memory, *jumps, *reach;
   double h_min;
   long long max_rows, max_attempts, max_jumps, n_times, found, intervals, interval, n_data;
   long long count, made, jumped;
@@ -31,6 +31,16 @@ static void symfric_outputs(symfric_loop *L, const double *row, int last)
       L->out[i * L->n_times + L->found] =
           (1. - s) * row[2 + i] + s * (row[2 + N + i] + (1. - s) * bend);
     }
+  }
+}
+
+/* Widens the smallest and largest unknowns, reach[2][N], to the end of an accepted step. */
+static void symfric_reach(double *reach, const double *end)
+{
+  long long i;
+  for (i = 0; i < N; ++i) {
+    if (end[i] < reach[i]) reach[i] = end[i];
+    if (end[i] > reach[N + i]) reach[N + i] = end[i];
   }
 }
 
@@ -56,6 +66,7 @@ int symfric_march(symfric_loop *L)
 #endif
     if (counts[0]) {
       ++L->count;
+      symfric_reach(L->reach, row + 2 + N);
       symfric_outputs(L, row, stop == 0 && L->interval + 1 == L->intervals);
     }
     if (stop >= 3) return stop;

@@ -15,6 +15,7 @@ import symfric as sf
 from symfric import Variable, simulate
 from symfric import multibody as mb
 from symfric.laws import Law, law_from_text
+from symfric.scenes import Clutch
 
 pytestmark = pytest.mark.heavy
 
@@ -169,6 +170,19 @@ def test_a_clutch_locks_after_the_time_of_the_closed_form() -> None:
     assert run.energy_balance().work["friction"][-1] == pytest.approx(-heat, rel=1e-9)
     assert run.final["a_rate"] == pytest.approx(150 * 0.2 / 0.84, rel=1e-12)
     assert run.final["w_slip"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_driven_clutch_moves_as_the_scene() -> None:
+    scene = simulate(Clutch(dry(0.1)).model(), 0.6, u={"pressure": 4e5}, rtol=1e-9)
+    m = shafts(150.0, J=0.2)
+    attach(m, mb.Revolute, "b", "load", J=0.64)
+    m.force(mb.JointSpringDamper("engine", "a", actuator=100.0))
+    m.force(mb.JointSpringDamper("drag", "b", actuator=-20.0))
+    m.force(mb.DiscClutch("w", "a", dry(0.1), 4e5 * 0.008 * pi, 0.1, 0.1, "b", 2, preload=1.0))
+    run = simulate(m.build(), 0.6, rtol=1e-9)
+    assert run.happened[0][0] == pytest.approx(scene.happened[0][0], rel=1e-9)
+    assert run.final["b_rate"] == pytest.approx(scene.final["w_2"], rel=1e-9)
+    assert run["w_load_b"][-1] == pytest.approx(scene.final["torque"], rel=1e-9)
 
 
 def test_a_shoe_above_its_limit_locks_itself() -> None:

@@ -14,6 +14,7 @@ if B m reaches 1. A negative actuation releases the element, which cannot pull.
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
+from math import inf
 from typing import ClassVar, final
 
 import casadi as ca
@@ -50,7 +51,21 @@ def wrapped(m: ca.SX, angle: Scalar) -> tuple[ca.SX, ca.SX]:
     return ca.exp(x), angle * ca.SX(smooth.phi1(x))
 
 
-class FrictionElement(Force):
+def overwound(law: Law, angle: Scalar) -> Iterator[str]:
+    """Yield a message if static friction would exceed the bound of `wrapped`."""
+    try:
+        m = as_number(law.static_level(1.0))
+    except ValueError:
+        return
+    size = as_number(angle)
+    if m is not None and size is not None and EXPONENT < m * size < inf:
+        yield (
+            f"angle: expected coefficient times angle <= {EXPONENT:g}, got {m * size:.3g}; the "
+            "tension would grow by more than exp(50)"
+        )
+
+
+class ActuatedElement(Force):
     """Brake, clutch or belt whose normal force follows from an actuating force.
 
     Any law of v, N and F_e whose force depends on the normal force is possible, with bristles and
@@ -112,13 +127,13 @@ class FrictionElement(Force):
         given = getattr(self, self.actuator)
         return ca.SX(self.preload + (given if is_number(given) else smooth.positive(given, 0.0)))
 
-    def contact(self, kin: Kinematics) -> "PressedContact":
+    def contact(self, kin: Kinematics) -> "ActuatedContact":
         """Return the contact of the element."""
         pairs = zip(self.joints(), self.levers(), strict=True)
         levers = [(kin.topology.joints[name], way, c) for (name, way), c in pairs]
         slip = sum((c * kin.rate(joint, way) for joint, way, c in levers), start=ca.SX(0))
         F, N = (ca.SX.sym(f"{self.name}_{what}") for what in ("friction", "N"))
-        return PressedContact(
+        return ActuatedContact(
             self.name, self.name, JointFriction(self.law), self.law, self.name, slip, F, self,
             tuple(levers), N,
         )  # fmt: skip
@@ -162,7 +177,7 @@ class FrictionElement(Force):
 
 @final
 @dataclass(frozen=True, eq=False)
-class PressedContact(Contact):
+class ActuatedContact(Contact):
     """Friction of an element under an actuating force.
 
     Attributes:
@@ -173,7 +188,7 @@ class PressedContact(Contact):
 
     kind = "element"
 
-    element: FrictionElement
+    element: ActuatedElement
     levers: tuple[Lever, ...]
     N: ca.SX
 
