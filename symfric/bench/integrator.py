@@ -163,9 +163,13 @@ def _derivatives(case: str, law: Law) -> Iterator[Found]:
 
 
 def _repeated(call: Call) -> tuple[float, Array]:
-    """Return the shortest time [s] of calls after the first one, which builds and compiles."""
+    """Return the shortest time [s] of calls after the first one, and their result.
+
+    The calls continue for two seconds, since derivatives and signals are compiled in the background
+    during the first calls.
+    """
     call()
-    return best_time(call)
+    return best_time(call, budget=2.0, most=100)
 
 
 def _run(model: Model, engine: str, names: tuple[str, ...], rtol: float = RTOL) -> Trajectory:

@@ -98,7 +98,11 @@ class Branch(Showing):
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """True for each point at which all deviations decay, shape (n,)."""
+        """True for each point at which all deviations decay, shape (n,).
+
+        There is no neutral band: a deviation that neither grows nor decays, such as that of a
+        conserved quantity, counts by the sign of its rounding error. `exponents` shows its size.
+        """
         growth = np.abs(self.exponents) - 1 if self.of_orbits else self.exponents.real
         return np.nan_to_num(growth, nan=-1.0).max(axis=1, initial=-1.0) < 0
 
