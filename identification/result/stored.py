@@ -21,7 +21,18 @@ from identification.result.outcome import Outcome
 from symfric.foundation import checks, storable
 from symfric.foundation.files import read_json
 from symfric.foundation.parameters import Parametric
-from symfric.laws import ALL_LAWS, Asymmetric, Element, Law, Slider, Sum, Table, law_name
+from symfric.laws import (
+    ALL_LAWS,
+    Asymmetric,
+    Element,
+    Law,
+    Level,
+    Slider,
+    Sum,
+    Table,
+    Unit,
+    law_name,
+)
 from symfric.laws.catalogue import WRAPPERS
 from symfric.scenes import Drive
 
@@ -30,7 +41,7 @@ DIGITS = 6
 """Significant digits of arrays, which are used only for drawing."""
 KINDS: dict[str, type[Parametric]] = {
     **ALL_LAWS, **WRAPPERS, "sum": Sum, "asymmetric": Asymmetric, "table": Table,
-    "element": Element, "slider": Slider, "drive": Drive,
+    "element": Element, "slider": Slider, "level": Level, "unit": Unit, "drive": Drive,
 }  # fmt: skip
 """Name -> class that can be restored from a file."""
 
