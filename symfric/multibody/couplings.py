@@ -125,8 +125,9 @@ class Gear(Coupling):
     """Coupling of two angles: angle_b = ratio angle_a + offset.
 
     With z the number of teeth and axes in the same direction, `ratio` is -z_a/z_b for external
-    gears and +z_a/z_b for a belt or an internal gear. Result: `<name>_moment` [N m] on the child
-    of b.
+    gears and +z_a/z_b for a belt or an internal gear. `friction` is a `MeshFriction`, or a
+    `ThreadFriction` if a is a worm and b its wheel. Result: `<name>_moment` [N m] on the child of
+    b.
     """
 
     linear = False
@@ -148,7 +149,8 @@ class Rolling(Coupling):
     Examples are a pinion on its rack, a wheel that rolls without slipping, and a drum with its
     rope. A negative radius reverses the direction. Result: `<name>_force` [N] on the child of b.
     For a disc in a plane, angle and displacement are the directions "turn" and "x" of one `Planar`
-    joint; the result is then the force that the track must transmit without slipping.
+    joint; the result is then the force that the track must transmit without slipping. `friction` is
+    a `MeshFriction` for a rack, or a `ThreadFriction` for a spindle a that moves a guided nut b.
     """
 
     ratio_field = "radius"
@@ -167,7 +169,8 @@ class Rolling(Coupling):
 class Screw(Coupling):
     """Thread of a cylindrical joint: slide = lead / (2 pi) turn + offset.
 
-    Result: `<name>_force` [N] along the axis on the child of the joint.
+    `friction` is a `ThreadFriction`; friction of the joint itself is that of its bearing, which the
+    thread does not load. Result: `<name>_force` [N] along the axis on the child of the joint.
     """
 
     ratio_field = "lead"

@@ -88,8 +88,9 @@ class Mechanism(packed.Portable, Showing):
             rows.append((j.name, type(j).__name__, f"{j.parent} - {j.child}", law))
         for part in (*self.forces, *self.constraints):
             ends = f"{part.a} - {part.b}" if isinstance(part, SpringDamper) else ""
-            law = type(part.law).__name__ if isinstance(part, ActuatedElement) else ""
-            rows.append((part.name, type(part).__name__, ends, law))
+            law = getattr(getattr(part, "friction", part), "law", None)
+            rubs = "" if law is None else type(law).__name__
+            rows.append((part.name, type(part).__name__, ends, rubs))
         inputs = f"inputs: {among(v.name for v in self.inputs)}"
         return Shown(
             f"mechanism '{self.name}': {counted(len(bodies), 'body', 'bodies')}, "

@@ -23,6 +23,7 @@ from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import FLOOR, SURE
 from symfric.integrator.running import crossings as limits
+from symfric.integrator.running.contact_modes import TURNING, ContactModes
 from symfric.integrator.running.crossings import LOOKS, Crossings
 from symfric.integrator.running.events import Change, Eventful, Search, Stop
 from symfric.integrator.running.record import Dense, Outputs, Record
@@ -316,6 +317,7 @@ def loop_source(
     crossings: Crossings | None = None,
     follows: bool = False,
     follow: Following | None = None,
+    modes: ContactModes | None = None,
 ) -> str:
     """Return the C of the whole loop.
 
@@ -324,17 +326,30 @@ def loop_source(
         crossings: Functions of the events, if any.
         follows: True if there are algebraic unknowns, which have to follow a jump of inputs.
         follow: update of these unknowns; without it, the loop returns at each jump and each event.
+        modes: decision of the modes of several contacts; without it, the loop returns for it.
     """
     settles = follow is not None and crossings is not None and not crossings.closes
     march = filled(
         FOLDER / "march.c",
         follows=0 if not follows else 1 if follow is None else 2,
         settles=int(settles),
-        data=0 if follow is None else follow.round.numel_in(1),
+        decides=int(modes is not None),
+        decide="" if modes is None or crossings is None else decide_source(modes, crossings),
+        data=follow.round.numel_in(1) if follow else crossings.data if crossings else 0,
     )
-    if follow is None:
-        return c_source(step, dense_rows, crossings=crossings) + march
-    return c_source(step, dense_rows, follow.round, crossings=crossings) + follow.c_source + march
+    others = [*([] if follow is None else [follow.round]), *([] if modes is None else [modes.look])]
+    source = c_source(step, dense_rows, *others, crossings=crossings)
+    return source + ("" if follow is None else follow.c_source) + march
+
+
+def decide_source(modes: ContactModes, crossings: Crossings) -> str:
+    """Return the C of the decision of the modes of several contacts."""
+    return filled(
+        FOLDER / "decide.c", modes.look,
+        contacts=len(modes.contacts), at=_table(c.mode for c in modes.contacts),
+        still=", ".join(map(repr, modes.still.tolist())), turning=TURNING,
+        decided=_table(crossings.decided),
+    )  # fmt: skip
 
 
 def search_source(crossings: Crossings, given: int, *, decides: bool = True) -> str:

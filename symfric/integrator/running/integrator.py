@@ -292,7 +292,17 @@ class Integrator:
         # models without inputs and events seldom jump: not worth the compile time
         jumps = bool(self.model.u or self.model.events)
         follow = self.follow if self.follows and jumps else None
-        return loop_source(self.step, self.tableau.H.shape[0], self.crossings, self.follows, follow)
+        parts = self.crossings, self.follows, follow, self._decision
+        return loop_source(self.step, self.tableau.H.shape[0], *parts)
+
+    @property
+    def _decision(self) -> ContactModes | None:
+        """Decision for compiled code; None if it is for Python, or if there is one contact."""
+        crossings = self.crossings
+        if crossings is None or crossings.closes or not crossings.decided.any():
+            return None
+        solved = self.follow is not None or not self.follows
+        return self.contact_modes if solved and len(self.contact_modes.contacts) > 1 else None
 
     @cached_property
     def compiled(self) -> Engine:

@@ -1,9 +1,11 @@
 /* Complete loop. FOLLOWS is 0 without algebraic unknowns; 1 if it returns at each jump of inputs,
    for a search in Python; 2 if `symfric_follow` updates them. With SETTLES they are also updated
-   after events. */
+   after events. With DECIDES `symfric_decide` decides the modes of several contacts. */
 #define FOLLOWS $follows
 #define SETTLES $settles
+#define DECIDES $decides
 
+$decide
 /* Run in progress: buffers, limits and counters. */
 typedef struct {
   double *S, *R, *rows;
@@ -62,6 +64,16 @@ int symfric_march(symfric_loop *L)
       double *after = L->jumps + (L->jumped - 1) * JUMP + 3 + N;
       for (i = 0; i < N; ++i) after[i] = L->S[MEM + i];
       stop = 1;
+    }
+#endif
+#if DECIDES
+    if (stop == 8) {
+      double *jump = L->jumps + (L->jumped - 1) * JUMP;
+      if (!symfric_decide(L->S[T], jump + 3, L->S + MEM, L->R + GIVEN - $data)) {
+        for (i = 0; i < N; ++i) jump[3 + N + i] = L->S[MEM + i];
+        symfric_note(L->memory);
+        stop = 1;
+      }
     }
 #endif
     if (counts[0]) {

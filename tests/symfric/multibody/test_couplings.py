@@ -62,7 +62,7 @@ def test_screws_need_the_moments_of_the_textbook() -> None:
     m.joints = [replace(m.joints[0], rate=(lead / (2 * pi) * speed, speed))]
     m.constraint(mb.PrescribedMotion("drive", "thread", lambda t: speed * t))
     model, draw = m.build(p=p), np.random.default_rng(1)
-    for _ in range(30):
+    for _ in range(15):
         r, slope, angle = 10 ** draw.uniform(-3, 0), draw.uniform(0.01, 1.0), draw.uniform(0, 0.7)
         load, level, side = 10 ** draw.uniform(-1, 5), 10 ** draw.uniform(-3, -0.2), 1.0
         values = {"lead": 2 * pi * r * tan(slope), "radius": r, "flank": angle, "mass": load / G}
@@ -89,18 +89,20 @@ def test_threads_lock_from_the_friction_angle() -> None:
         assert (abs(run.final["thread_slide"]) < 1e-15) == holds
 
 
-def test_a_lowered_load_accelerates_as_in_closed_form() -> None:
+@pytest.mark.parametrize(
+    "options", [{}, {"index": 0}, pytest.param({"formulation": "absolute"}, marks=pytest.mark.slow)]
+)
+def test_a_lowered_load_accelerates_as_in_closed_form(options: dict[str, Any]) -> None:
     """J a / h = m (g - a) r tan(lambda - phi), in all formulations."""
     lead, r = 0.02, 0.01
     h, k = lead / (2 * pi), r * tan(atan(lead / (2 * pi * r)) - atan(0.15 / cos(0.2)))
     a = 100 * G * k / (0.05 / h + 100 * k)
-    for options in ({}, {"index": 0}, {"formulation": "absolute"}):
-        model = jack(DRY, lead, r, 0.2).build(**options)
-        run = simulate(model, 2.0, u={"torque": 0.0}, rtol=1e-10)
-        z = run["nut_z" if options.get("formulation") else "thread_slide"]
-        assert z == pytest.approx(-a * run.t**2 / 2, rel=1e-9, abs=1e-12)
-        balance = run.energy_balance()
-        assert np.abs(balance.defect).max() < 1e-9 * balance.scale
+    model = jack(DRY, lead, r, 0.2).build(**options)
+    run = simulate(model, 2.0, u={"torque": 0.0}, rtol=1e-10)
+    z = run["nut_z" if options.get("formulation") else "thread_slide"]
+    assert z == pytest.approx(-a * run.t**2 / 2, rel=1e-9, abs=1e-12)
+    balance = run.energy_balance()
+    assert np.abs(balance.defect).max() < 1e-9 * balance.scale
 
 
 def pair(coupling: Any, speed: float, load: float, slides: bool = False) -> mb.Mechanism:
@@ -221,7 +223,10 @@ def test_many_random_trains_keep_their_energy() -> None:
     check_trains(range(4, 34))
 
 
-def test_the_cheapest_lift_moves_as_in_closed_form_and_then_rests() -> None:
+@pytest.mark.parametrize(
+    ("T", "intervals"), [(1.0, 10), pytest.param(3.0, 24, marks=pytest.mark.slow)]
+)
+def test_the_cheapest_lift_moves_as_in_closed_form_and_then_rests(T: float, intervals: int) -> None:
     """Least effort of M = J a + m (g + h a) r tan(lambda + phi): a constant and a straight line.
 
     A self-locking screw needs no moment at rest, so that it stops after the best duration.
@@ -234,13 +239,12 @@ def test_the_cheapest_lift_moves_as_in_closed_form_and_then_rests() -> None:
     rest = {"thread_angle_rate": 0.0, "thread_slide_rate": 0.0}
     start = {"thread_slide": 0.0, "thread_angle": 0.0, **rest}
     end = {"thread_angle": angle, "thread_angle_rate": 0.0}
-    for T, intervals in ((1.0, 10), (3.0, 24)):
-        lift = Phase(model, T=T, start=start, end=end)
-        problem = Problem(lift, effort("torque"), inputs={"torque": "linear"})
-        move, moving = solve(problem, intervals=intervals), min(T, best)
-        cost = weight**2 * moving + 12 * (inertia * angle) ** 2 / moving**3
-        assert move.cost == pytest.approx(cost, rel=1e-8)
-        assert move.verified
+    lift = Phase(model, T=T, start=start, end=end)
+    problem = Problem(lift, effort("torque"), inputs={"torque": "linear"})
+    move, moving = solve(problem, intervals=intervals), min(T, best)
+    cost = weight**2 * moving + 12 * (inertia * angle) ** 2 / moving**3
+    assert move.cost == pytest.approx(cost, rel=1e-8)
+    assert move.verified
 
 
 def torque(t: Any) -> Any:
