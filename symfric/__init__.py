@@ -11,20 +11,21 @@ Contents; `help` describes each name:
 
     laws        LuGre, BrownMcPhee, GMS, ... (ALL_LAWS by name, POPULATIONS of random contacts);
                 Law, StaticLaw, State, Input, Switch, Facts (PHENOMENA), parametric, param, smooth
-                to write laws, check_law (LawReport) to check them, Element and Slider to compose
-                them; law_from_text and any_from_text (AnyLaw), law_name; steady_force,
+                to write laws, check_law (LawReport) to check them, Element, Slider and Level to
+                compose them; law_from_text and any_from_text (AnyLaw), law_name; steady_force,
                 steady_inputs; PlanarSlip and SpatialSlip in a plane and in space
     machines    rabinowicz, drive; more in symfric.scenes (ALL_SCENES by name)
     equations   Model of Variable, Output, Event and Monitor; contact adds a law to it (Contact)
     mechanisms  Mechanism of bodies and joints with friction, read_urdf; more in symfric.multibody
     drives      Drive: motor, gear and encoder by their nameplate; driven(model, drive) adds them
-    running     simulate, simulate_many, stepper, flow; inputs as numbers, functions of time or
-                samples, Hold and Linear (rate_of: their rate); SolveError, Status of failed runs,
-                OverloadWarning, EnergyWarning of doubtful runs
+    running     simulate, prepare for many calls, simulate_many, stepper, flow; inputs as numbers,
+                functions of time or samples, Hold and Linear (rate_of: their rate); SolveError,
+                Status of failed runs, OverloadWarning, EnergyWarning of doubtful runs
     results     Trajectory (run["x"], run.at(times), run.at(run.step_times), run.extremes, plot,
                 animate, save, to_csv, to_dataframe), load_run, Statistics, Plant, report; Ensemble
                 (varied, extremes, plot, save, to_dataframe), load_ensemble; for_print
-    choice      select ranks laws on a machine at equal error (Choice)
+    choice      select ranks laws on a machine at equal error (Choice); work_precision measures time
+                against error of the methods (WorkPrecision of WorkPoint)
     behaviour   figure and compare show laws (FigureData); recommended finds the smoothing for a
                 required error (Recommendation)
     parameters  Parameter, parameters, with_values, symbolise
@@ -40,7 +41,10 @@ from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
     from symfric.choice import Choice as Choice
+    from symfric.choice import WorkPoint as WorkPoint
+    from symfric.choice import WorkPrecision as WorkPrecision
     from symfric.choice import select as select
+    from symfric.choice import work_precision as work_precision
     from symfric.drives.drive import Drive as Drive
     from symfric.drives.driven import driven as driven
     from symfric.figures import FigureData as FigureData
@@ -69,6 +73,7 @@ if TYPE_CHECKING:
     from symfric.integrator import flow as flow
     from symfric.integrator import load_ensemble as load_ensemble
     from symfric.integrator import load_run as load_run
+    from symfric.integrator import prepare as prepare
     from symfric.integrator import rate_of as rate_of
     from symfric.integrator import simulate as simulate
     from symfric.integrator import simulate_many as simulate_many

@@ -45,7 +45,15 @@ NO_STEP = {
 """Cases that cannot be C, see the tests of `law_block`."""
 
 
-EXAMPLE_INPUTS = {"F_e": 0.6, "dv": 0.3, "tau_m": 0.4, "tau_e": -0.3, "x_rel": 1e-3, "v_rel": 0.05}
+EXAMPLE_INPUTS = {
+    "F_e": 0.6,
+    "dv": 0.3,
+    "tau_m": 0.4,
+    "tau_e": -0.3,
+    "x_rel": 1e-3,
+    "v_rel": 0.05,
+    "v_r": 0.0,
+}
 """A value for every further input that some law takes."""
 
 

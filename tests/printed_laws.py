@@ -5,7 +5,7 @@ read. Equations hold for v > 0, those of laws with further inputs for either sig
 """
 
 from collections.abc import Callable
-from math import asin, atan, copysign, cos, e, erf, exp, pi, sin, sqrt, tan, tanh
+from math import asin, atan, copysign, cos, e, erf, exp, log, pi, sin, sqrt, tan, tanh
 from types import SimpleNamespace
 from typing import Any
 
@@ -207,6 +207,32 @@ def capstan(p: Any, v: float, N: float) -> float:
     return N * (exp(p.mu_d * p.beta * sign(v, p.v_eps)) - 1)
 
 
+def mixed_lubrication(p: Any, v: float, N: float) -> float:
+    """With the load as the law rounds it, over N_eps."""
+    H = p.eta * v / (N / p.A)
+    share = (N**2 + p.N_eps**2) / N**2
+    return p.mu_b * N * tanh(v / p.v_eps) * share / (share + (H / p.H_m) ** 2) + N * H / p.h
+
+
+def brush_tyre(p: Any, v: float, N: float, v_r: float = 0.0) -> float:
+    s = p.C * v / (3 * p.mu_d * N * sqrt(v_r**2 + p.v_eps**2))
+    return copysign(p.mu_d * N * (1 - (1 - min(abs(s), 1.0)) ** 3), v)
+
+
+def spline(p: Any, v: float, N: float) -> float:
+    """By the four cubic pieces that are not zero, with repeated control points at both ends."""
+    c = [level.c for level in p.levels]
+    if p.shape == "falling":
+        c = [sum(c[i:]) for i in range(len(c))]
+    last = len(c) - 1
+    x = last * log(1 + (v / p.v_first) ** 2) / log(1 + (p.v_last / p.v_first) ** 2)
+    i = int(x)
+    t = x - i
+    weights = ((1 - t) ** 3, 4 - 6 * t**2 + 3 * t**3, 1 + 3 * t + 3 * t**2 - 3 * t**3, t**3)
+    points = [c[min(max(i + k, 0), last)] for k in (-1, 0, 1, 2)]
+    return N * tanh(v / p.v_eps) * sum(a * b / 6 for a, b in zip(weights, points, strict=True))
+
+
 PRINTED: dict[str, Formula] = {
     f.__name__: f
     for f in (
@@ -214,7 +240,8 @@ PRINTED: dict[str, Formula] = {
         *(andersson, steady_state_lugre, quarter_car_simple, lorentzian, popp_stelter, capstan),
         *(leine_switch, bittencourt, threlfall, modified_threlfall, bengisu_akay, velocity_based),
         *(ambrosio, step5, hollars, exudyn, brown_mcphee, simscape_breakaway, specker),
-        *(makkar_dixon, self_tuning, brittle_self_tuning, rui_wang),
+        *(makkar_dixon, self_tuning, brittle_self_tuning, rui_wang, mixed_lubrication),
+        *(spline, brush_tyre),
     )
 }
 """Law by name -> its equation (law, v, N)."""

@@ -28,8 +28,9 @@ from symfric.model import Contact, Event, Model, Output, kinds
 from symfric.model.contact import APPLIED
 from symfric.model.forces import with_forces
 from symfric.model.holonomic import Holonomic
-from symfric.multibody import joint
 from symfric.multibody.applied import Rest, forward
+from symfric.multibody.contact import JointContact
+from symfric.multibody.joint import JointFriction
 from symfric.multibody.slips import Slip, events
 
 OVERLOAD = 1e-9
@@ -187,7 +188,9 @@ def _groups(model: Model, mechanics: Holonomic, contacts: Sequence[Contact]) -> 
     for i, c in enumerate(contacts):
         if i not in inside:
             force = Variable(f"{c.name}_{APPLIED}", c.unit("N"), doc="friction force in stick")
-            change, still = slip_change(model, c), (f"{c.name}_rate",)
+            change = slip_change(model, c)
+            still = tuple(v.name for v in qd if ca.depends_on(c.slip, v.symbol))
+            still = still if len(still) == 1 else ()
             group = c.name, (i,), (one,), ca.SX(c.slip), change, force, one, True, (), still
             found.append(Rest(*group))
     return sorted(found, key=lambda rest: rest.members)
@@ -200,6 +203,6 @@ def _rates(bare: Model, mechanics: Holonomic) -> tuple[Variable, ...]:
 def _slip(c: Contact) -> Slip:
     """Return a contact as `symfric.multibody` describes it, for its events."""
     law, slip, N = law_of(c), ca.SX(c.slip), ca.SX(c.N)
-    at = joint.Contact(c.name, c.name, "", joint.JointFriction(law), law, c.name, slip, c.force)
+    at = JointContact(c.name, c.name, JointFriction(law), law, c.name, slip, c.force, "")
     given = {name: ca.SX(value) for name, value in c.given.items()}
     return Slip(at, (), N, N, c.states, c.rate, c.friction, given)

@@ -19,6 +19,7 @@ from symfric.foundation.variable import at_start, stacked, strays
 from symfric.laws import Exact, ExactCoulomb, Law
 from symfric.laws.base import smooth
 from symfric.model import Contact, Model, Monitor
+from symfric.model.kinds import MODE
 
 WIDTH = 1e-3
 """Default smoothing width [m/s] of a substitute for a law without a velocity scale."""
@@ -311,9 +312,10 @@ def is_exact(problem: Problem) -> bool:
 
 
 def law_states(problem: Problem) -> set[str]:
-    """Return the names of the states of laws, which a motion by modes does not contain."""
-    contacts = [c for phase in problem.chain for c in phase.model.contacts]
-    return {v.name for c in contacts for v in c.states}
+    """Return the names of states of laws and loops, which a motion by modes does not contain."""
+    models = [phase.model for phase in problem.chain]
+    of_laws = {v.name for model in models for c in model.contacts for v in c.states}
+    return of_laws | {v.name for model in models for v in model.x if v.kind == MODE}
 
 
 def bristles(problem: Problem) -> bool:

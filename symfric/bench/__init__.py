@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 
 PICTURES = ("integrator", "multibody", "ivp", "regularisation", "ocp", "identification")
 """Subjects with a picture."""
-TABLES = ("codegen", "calls", "ensemble", "embedded", "interop", "starts")
+TABLES = ("codegen", "calls", "dynamics", "ensemble", "embedded", "interop", "starts")
 """Subjects without a picture."""
 SUBJECTS = (*PICTURES, *TABLES)
 """Names of modules of this package that have a function `bench`."""

@@ -9,30 +9,35 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from math import nan
 from subprocess import run
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from symfric.bench.contenders import buffered, compiled, tolerances
+from symfric.bench.contenders import buffered, compiled, loop, tolerances
 from symfric.bench.report import Found, Progress, Report, backend, interleaved, unwarned
 from symfric.foundation.numeric import Array
 from symfric.foundation.programs import find_compiler
+from symfric.foundation.variable import Variable
 from symfric.integrator.by_peer import peer
 from symfric.integrator.equations.inputs import Hold, input_data
 from symfric.integrator.equations.system import system
+from symfric.integrator.prepared import prepare
 from symfric.integrator.simulate import simulate
 from symfric.integrator.stepper import stepper
-from symfric.laws import GMS, BrownMcPhee, Law, LuGre, MaxwellSlip
+from symfric.laws import GMS, BrownMcPhee, ExactCoulomb, Law, LuGre, MaxwellSlip
 from symfric.laws.dynamic.maxwell_slip import Element
 from symfric.model import Model
-from symfric.scenes import Arm, Drive, Rabinowicz
+from symfric.scenes import Arm, Drive, Rabinowicz, contact
 
 Calls = dict[str, Callable[[], object]]
 SEED, RTOL = 10, 1e-6
 TORQUES = (30.0, 30.0, 15.0, 2.0, 1.0, 0.2)
 """Largest torques [N m] of the joints of the arm, starting at the base."""
 FREE = ("mu_s", "mu_d", "k", "v_belt")
+START = {"v": 0.1}
 TITLE = "Processor time of short tasks"
+KNOWN = "Processor time of calls on a known model"
 
 
 def bench(quick: bool = False, progress: Progress = None) -> Report:
@@ -47,12 +52,16 @@ def bench(quick: bool = False, progress: Progress = None) -> Report:
 
 
 def _rows(
-    task: str, per: str, times: dict[str, float], errors: dict[str, float] | None = None
+    task: str,
+    per: str,
+    times: dict[str, float],
+    errors: dict[str, float] | None = None,
+    title: str = TITLE,
 ) -> Iterator[Found]:
     """Yield a row for each method from its time [s] and the relative error of its result."""
     first = next(iter(times.values()))
     for who, time in times.items():
-        yield TITLE, {
+        yield title, {
             "task": task, "method": who, "time [us]": 1e6 * time, "per": per,
             "relative error": (errors or {}).get(who, nan), "ratio to the first": time / first,
         }  # fmt: skip
@@ -136,6 +145,49 @@ def _stepping_peer(model: Model, dt: float, u: Array) -> Callable[[], Array]:
     return solve
 
 
+def _known(quick: bool) -> Iterator[Found]:
+    """Measure calls on a known model: a run, a tiny one, and one with several set-valued laws."""
+    whole, tiny = np.linspace(0.0, 20.0, 401), np.array([1e-6])
+    cases: dict[str, tuple[Model, Array, float]] = {
+        "rabinowicz brown_mcphee, 20 s": (Rabinowicz(BrownMcPhee()).model(), whole, 1e-5),
+        "rabinowicz lugre, 20 s": (Rabinowicz(LuGre()).model(), whole, 1e-5),
+        "rabinowicz brown_mcphee, 1 us": (Rabinowicz(BrownMcPhee()).model(), tiny, RTOL),
+        "three blocks, exact_coulomb, 5 s": (_blocks(), np.linspace(0.0, 5.0, 2001), RTOL),
+    }
+    for task, (model, times, rtol) in cases.items():
+        start = {} if model.events else START
+        fixed: dict[str, Any] = {"t_eval": times, "rtol": rtol, "backend": backend()}
+        prepared = prepare(model, float(times[-1]), **fixed)
+        calls: Calls = {
+            "simulate": partial(simulate, model, float(times[-1]), x0=start, **fixed),
+            "prepared": partial(prepared, start),
+        }
+        if not model.events and find_compiler():
+            calls["compiled loop alone"] = partial(loop(model, times, ("v",), rtol).solve, **start)
+        yield from _rows(task, "run", interleaved(calls, 3 if quick else 50), title=KNOWN)
+
+
+def _blocks() -> Model:
+    """Return three blocks between springs, with exact Coulomb friction and a driving force.
+
+    Source: Stewart, Numerical methods for friction problems with multiple contacts, J. Austral.
+    Math. Soc. B 37, 1996.
+    """
+    t, starts = ca.SX.sym("t"), ((-1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+    q = [Variable(f"q{i}", "m", start=x) for i, (x, _) in enumerate(starts)]
+    v = [Variable(f"v{i}", "m/s", start=x) for i, (_, x) in enumerate(starts)]
+    (a, b, c), (va, vb, vc) = ([w.symbol for w in group] for group in (q, v))
+    forces = [b - 2 * a - va, a - 2 * b + c - vb, b - c - vc + 10 * ca.cos(np.pi * t)]
+    law = ExactCoulomb(mu_s=0.3, mu_d=0.3)
+    rubbing = tuple(
+        contact(f"c{i}", law, v[i], 1.0, rest={v[i].name: 0.0}, F_e=force, bare=False)
+        for i, force in enumerate(forces)
+    )
+    rates = [force - own.force for force, own in zip(forces, rubbing, strict=True)]
+    ode = ca.vertcat(va, vb, vc, *rates)
+    return Model("three_blocks", t=t, x=(*q, *v), ode=ode, contacts=rubbing)
+
+
 def _events(quick: bool) -> Iterator[Found]:
     """Measure exact Maxwell-slip elements with events, and their smooth form."""
     elements = 4 if quick else 30
@@ -183,4 +235,4 @@ def _imports(quick: bool) -> Iterator[Found]:
     yield from _rows("import", "import", times)
 
 
-TASKS = (_drive, _arm, _events, _imports)
+TASKS = (_known, _drive, _arm, _events, _imports)

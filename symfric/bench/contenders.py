@@ -84,7 +84,7 @@ def loop(model: Model, times: Array, watched: Watched, rtol: float) -> Contender
         work.R[:] = Given.of(end, rtol, end, 0.1 * rtol * whole.nominal, inputs.values[:, 0])
         outputs, steps, reason = Outputs.at(times, whole.n), 0, Stop.FULL
         work.loop.h_min = smallest_step(end)
-        work.want(outputs, None)
+        work.want(outputs)
         work.over(inputs.breaks, inputs.values)
         while reason in (Stop.FULL, Stop.ATTEMPTS):
             records, _, reason = engine.march(work, ATTEMPTS["compiled"])

@@ -7,13 +7,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
-from math import exp, inf, isfinite, log, nan
+from math import inf, isfinite, nan
 from pathlib import Path
 from time import perf_counter, process_time
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self, TypeVar, final
 
-import numpy as np
-
+from symfric.choice.work_precision import time_at as interpolated
 from symfric.foundation.files import write_table
 from symfric.foundation.programs import find_compiler, needed_compiler
 from symfric.foundation.status import SolveError, Status
@@ -203,18 +202,8 @@ def ratios(rows: Sequence[Row], reference: str, errors: Sequence[float]) -> Iter
 
 def time_at(rows: Sequence[Row], error: float) -> float:
     """Return the time [ms] to reach `error`, interpolated log-log; NaN if no row reaches it."""
-    points = sorted((float(r["relative error"]), float(r["time per run [ms]"])) for r in rows)
-    best: list[tuple[float, float]] = []
-    for e, t in points:  # from the smallest error; keep rows that are faster than all before
-        if e > 0 and t < (best[-1][1] if best else inf):
-            best.append((e, t))
-    below, above = ([p for p in best if (p[0] > error) is side] for side in (False, True))
-    if not below:
-        return nan
-    if not above:
-        return below[-1][1]
-    at, times = np.log([below[-1], above[0]]).T
-    return exp(np.interp(log(error), at, times))
+    points = ((float(r["relative error"]), float(r["time per run [ms]"])) for r in rows)
+    return interpolated(points, error)
 
 
 # ---- curves ----

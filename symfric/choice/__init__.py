@@ -1,4 +1,4 @@
-"""Choice of a law: laws in the user's machine, ranked by work at equal error."""
+"""Choice of a law or a method: run time at equal error in the user's machine."""
 
 from typing import TYPE_CHECKING
 
@@ -10,5 +10,8 @@ if TYPE_CHECKING:
     from symfric.choice.ranking import Row as Row
     from symfric.choice.select import Choice as Choice
     from symfric.choice.select import select as select
+    from symfric.choice.work_precision import WorkPoint as WorkPoint
+    from symfric.choice.work_precision import WorkPrecision as WorkPrecision
+    from symfric.choice.work_precision import work_precision as work_precision
 
 load_lazily(__name__)

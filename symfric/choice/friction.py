@@ -24,9 +24,11 @@ from symfric.laws import (
     Leuven,
     MakkarDixon,
     MaxwellSlip,
+    MixedLubrication,
     PoppStelter,
     QuarterCarSimple,
     RuiWang,
+    Spline,
     SteadyStateLuGre,
     StickSlip,
     VelocityBased,
@@ -145,6 +147,8 @@ LEVELS: dict[type[Law], Levels] = {
     Leuven: _shared(Leuven, "mu_s"),
     SteadyStateLuGre: lambda f, N: {"F_S": f.mu_s * N, "F_C": f.mu_d * N, "sigma_2": 0.0},
     RuiWang: lambda f, N: {"D": f.mu_s * N, "C": 2 - 2 / pi * asin(f.mu_d / f.mu_s)},
+    Spline: lambda f, _: {n: f.mu_d for n in parameters(Spline()) if n[:2] == "c_"},
+    MixedLubrication: lambda f, _: {"mu_b": f.mu_d, "eta": 0.0},
     MakkarDixon: lambda f, N: {"gamma_1": (f.mu_s - f.mu_d) * N, "gamma_4": f.mu_d * N},
 }
 """Functions (friction, load) -> levels by law, for laws whose levels are not mu_s and mu_d."""

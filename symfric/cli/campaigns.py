@@ -49,7 +49,8 @@ def bench(
     integrator: stick-slip of one mass, and derivatives. calls: many short steps, and events.
     ensemble: ensembles, and the same runs one by one on one core. multibody: mechanisms, the cost
     and size of their equations, and energy. ivp: correct digits on problems with published
-    solutions (Test Set for IVP Solvers). regularisation: error of smooth laws relative to dry
+    solutions (Test Set for IVP Solvers). dynamics: periodic orbits and branches, with closed forms,
+    long runs and AUTO-07p. regularisation: error of smooth laws relative to dry
     friction, over their width or stiffness. ocp: optimal control with dry friction in symfric,
     CasADi's Opti, rockit, nosnoc, do-mpc, opty and Dymos, judged by an independent simulation.
     starts: optimal control from random starts. interop: laws in Opti, rockit, do-mpc and CasADi's

@@ -25,5 +25,7 @@ if TYPE_CHECKING:
     from symfric.compensation.result import step as step
     from symfric.compensation.settings import Compensation as Compensation
     from symfric.compensation.settings import settings_from_text as settings_from_text
+    from symfric.compensation.valves import valve_describing_function as valve_describing_function
+    from symfric.compensation.valves import valve_stiction as valve_stiction
 
 load_lazily(__name__)

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
+    from symfric.dynamics.boundary import Boundary as Boundary
+    from symfric.dynamics.boundary import boundary as boundary
     from symfric.dynamics.branch import Branch as Branch
     from symfric.dynamics.branch import Special as Special
     from symfric.dynamics.branch import load_branch as load_branch

@@ -14,6 +14,7 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
 from symfric.foundation.shown import Showing, Shown, Table
+from symfric.integrator.equations.inputs import Input
 from symfric.model import Model
 from symfric.results.ensemble import Ensemble
 from symfric.results.stored import Format
@@ -62,11 +63,12 @@ class Branch(Showing):
         sequences: events of one period in their order, as text.
         special: special points.
         message: reason why the branch ends.
+        driven: True for orbits with a given period.
     """
 
     model: Model
     parameter: str
-    u: dict[str, float]
+    u: dict[str, Input]
     p: dict[str, float]
     values: Array
     x: Array
@@ -77,6 +79,7 @@ class Branch(Showing):
     sequences: tuple[str, ...]
     special: tuple[Special, ...]
     message: str
+    driven: bool = False
 
     @property
     def exponents(self) -> NDArray[np.complex128]:
@@ -95,7 +98,11 @@ class Branch(Showing):
 
     @property
     def stable(self) -> NDArray[np.bool_]:
-        """True for each point at which all deviations decay, shape (n,)."""
+        """True for each point at which all deviations decay, shape (n,).
+
+        There is no neutral band: a deviation that neither grows nor decays, such as that of a
+        conserved quantity, counts by the sign of its rounding error. `exponents` shows its size.
+        """
         growth = np.abs(self.exponents) - 1 if self.of_orbits else self.exponents.real
         return np.nan_to_num(growth, nan=-1.0).max(axis=1, initial=-1.0) < 0
 
@@ -116,7 +123,8 @@ class Branch(Showing):
         p = self.p | {self.parameter: float(self.values[k])}
         x0 = dict(zip((v.name for v in self.model.x), self.x[k].tolist(), strict=True))
         guess = guessed(self.model, x0, float(self.periods[k]), self.u, p, rtol)
-        return periodic_orbit(self.model, guess, rtol=rtol)
+        period = guess.period if self.driven else None
+        return periodic_orbit(self.model, guess, period=period, rtol=rtol)
 
     def plot(
         self, state: str, *others: "Branch", runs: Sequence[Ensemble] = (),

@@ -12,10 +12,11 @@ from symfric.dynamics.families import Equilibria, Orbits
 from symfric.dynamics.orbit import PeriodicOrbit
 from symfric.dynamics.shooting import Shooting
 from symfric.dynamics.sticking import Near, restarted, same_sequence
-from symfric.dynamics.trace import Family, Point, Trace, note, point, sequence, vanishing
+from symfric.dynamics.trace import Family, Point, Trace, kind_of, note, point, vanishing
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
+from symfric.integrator.equations.inputs import Input
 from symfric.model import Model
 
 INTERRUPTED = "interrupted by the user"
@@ -42,8 +43,8 @@ def continuation(
     1e-5. `Branch.message` names those that were located to a step only, such as very sharp folds.
 
     Args:
-        start: isolated equilibrium, or a periodic orbit whose period is not given. Neither is
-            symmetric.
+        start: isolated equilibrium, or a periodic orbit that is not `symmetric`. A given period
+            does not change.
         parameter: name of a free parameter of the model.
         between: smallest and largest value of the parameter, within its bounds.
         points: largest number of points.
@@ -66,10 +67,10 @@ def continuation(
     checks.count(f"{where}: points", points, least=2)
     checks.number(f"{where}: step", step, above=0.0, upper=1.0)
     if isinstance(start, PeriodicOrbit):
-        if start.driven or start.symmetric:
+        if start.symmetric:
             raise checks.refused(
-                f"{where}: start", "an orbit without given period or symmetry", start,
-                "periodic_orbit(...) without period= and symmetric=",
+                f"{where}: start", "an orbit without symmetry", start,
+                "periodic_orbit(...) without symmetric=",
             )  # fmt: skip
         curve, z = _orbits(start, parameter, span, rtol)
     elif start.free:
@@ -85,8 +86,8 @@ def continuation(
     on = Trace([back.points[0]])
     if back.message != INTERRUPTED:
         on = _traced(curve, node, up, span, points + 1 - len(back.points), step)
-    u = {name: float(value) for name, value in start.u.items()}  # pyright: ignore
-    return _joined(model, parameter, u, dict(start.p), [back, on])
+    driven = isinstance(start, PeriodicOrbit) and start.driven
+    return _joined(model, parameter, start.u, dict(start.p), [back, on], driven=driven)
 
 
 def orbits_from(
@@ -121,7 +122,7 @@ def orbits_from(
     node, _ = corrected(curve, z + SMALL * along * scale, along)
     tau = tangent(curve, node, along)
     part = _traced(curve, node, tau, span, points, step)
-    return _joined(model, branch.parameter, branch.u, branch.p, [Trace(), part])
+    return _joined(model, branch.parameter, branch.u, branch.p, [Trace(), part], driven=False)
 
 
 def _span(
@@ -155,7 +156,8 @@ def _orbits(
     model = start.model
     reach = [start.run.extremes[v.name] for v in model.x]
     scale = np.maximum([high - low for low, high in reach], 1e-9 * model.nominal("x"))
-    problem = Shooting(model, start.u, (name,), scale, np.ones(scale.size), rtol, driven=False)
+    signs = np.ones(scale.size)
+    problem = Shooting(model, start.u, (name,), scale, signs, rtol, driven=start.driven)
     z = np.array([*start.x.values(), start.period, start.p[name]])
     every = np.concatenate([scale, [start.period, span[1] - span[0]]])
     return Orbits(problem, start.p, every, 10 * rtol), z
@@ -206,33 +208,50 @@ def _steps(
     curve: Family, node: Node, tau: Array, span: tuple[float, float], step: float, trace: Trace
 ) -> Iterator[Step]:
     """Yield steps along the curve, also across changes of stick and slip."""
-    known = {sequence(node)}
+    known = {kind_of(curve, node)}
     while True:
         near = Near(curve)
         for found in followed(curve, node, tau, step, same_sequence, near.most):
             node, tau = found.node, found.tau
+            known.add(kind_of(curve, node))
             yield found
         if isinstance(curve, Equilibria) and curve.turns(node.z + step * tau * curve.scale):
             trace.message = "ends where a sliding contact comes to rest"
             return
-        if not isinstance(curve, Orbits) or not curve.problem.eq.switching:
-            trace.message = "ends where no further step was possible; try a smaller step or rtol"
-            return
-        kind, value = near.boundary(node)
-        trace.add(kind, curve, node, value)
-        other = restarted(curve, node, span, known)
+        other = _other(curve, node, near, span, known, trace)
         if other is None:
-            trace.message = f"ends where the sequence of stick and slip changes ({kind})"
             return
         node, away = other
-        known.add(sequence(node))
+        known.add(kind_of(curve, node))
         trace.points.append(point(curve, node))
         tau = tangent(curve, node, away * _unit(node.z.size))
 
 
+def _other(
+    curve: Family, node: Node, near: Near, span: tuple[float, float], known: set[str], trace: Trace
+) -> tuple[Node, float] | None:
+    """Return the orbit beyond the end of a smooth part, and the direction away from `node`.
+
+    The part ends at a change of stick and slip, or at a fold that is too sharp to be followed.
+    """
+    trace.message = "ends where no further step was possible; try a smaller step or rtol"
+    if not isinstance(curve, Orbits):
+        return None
+    if curve.problem.eq.switching:
+        kind, value = near.boundary(node)
+        trace.add(kind, curve, node, value)
+        trace.message = f"ends where the sequence of stick and slip changes ({kind})"
+    other = restarted(curve, node, span, lambda new: kind_of(curve, new) not in known)
+    if other is not None and not curve.problem.eq.switching:
+        trace.add("fold", curve, node)
+        trace.rough("fold", float(node.z[-1]))
+    return other
+
+
 def _joined(
-    model: Model, name: str, u: Mapping[str, float], p: Mapping[str, float], parts: list[Trace]
-) -> Branch:
+    model: Model, name: str, u: Mapping[str, Input], p: Mapping[str, float], parts: list[Trace],
+    *, driven: bool,
+) -> Branch:  # fmt: skip
     """Return the branch of a backward and a forward part."""
     back, on = parts
     points = [*reversed(back.points[1:]), *on.points]
@@ -254,4 +273,5 @@ def _joined(
         model, name, dict(u), dict(p), column["value"], column["x"], column["period"], exponents,
         np.array([pt.low for pt in points]), np.array([pt.high for pt in points]),
         tuple(pt.sequence for pt in points), tuple(special), message,
+        driven,
     )  # fmt: skip

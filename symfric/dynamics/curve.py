@@ -2,16 +2,18 @@
 
     r(z) = 0,   one unknown more than equations
 
-A step predicts z + ds tau along the unit tangent tau, and Newton's method corrects it in the plane
-orthogonal to tau. Coordinates are scaled. The step length follows the number of corrections.
+A step extrapolates the last points and their unit tangents tau by Hermite's polynomial. Newton's
+method corrects the prediction in the plane orthogonal to tau. Coordinates are scaled. The step
+length follows the number of corrections.
 Source: Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, 1977.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from scipy.interpolate import KroghInterpolator
 from scipy.optimize import brentq
 
 from symfric.dynamics.equations import Indices
@@ -28,6 +30,10 @@ FARTHEST = 0.5
 SHARP = 1e-3
 """Step, relative to the longest one, below which a turn is too sharp to be resolved."""
 DEPENDENT = 1e-12
+BEHIND = 3
+"""Largest number of points that predict the next one."""
+POLISHED = 100.0
+"""Largest correction without another evaluation, in multiples of the tolerance."""
 NEAR = 1e-6
 """Change of sign of a test that counts as located, relative to its values at the ends of a step."""
 
@@ -71,6 +77,13 @@ class Equations(ABC):
             ValueError: the equations have no values there.
         """
 
+    def anchored(self, node: Node) -> tuple[Self, Node]:
+        """Return equations whose free choices, such as a phase, suit `node`, and the node there.
+
+        All nodes of the same equations are on one smooth curve.
+        """
+        return self, node
+
 
 def tangent(curve: Equations, node: Node, along: Array) -> Array:
     """Return the unit tangent at `node` in the direction of `along`, scaled, shape (n,)."""
@@ -97,13 +110,14 @@ def corrected(curve: Equations, z: Array, tau: Array) -> tuple[Node, int]:
         rows = np.vstack([node.J * s, tau[node.chosen]])
         right = np.append(-node.r, -off)
         size = float(np.abs(node.r).max(initial=0.0))
-        if size <= curve.tolerance:
-            return node, count
-        if size > before:
+        if size > max(before, curve.tolerance):
             break
         before = size
         step = np.linalg.lstsq(rows, right, rcond=DEPENDENT)[0]
         z = node.z + node.D @ (s * step)
+        if size <= curve.tolerance:
+            small = np.abs(step).max(initial=0.0) <= POLISHED * curve.tolerance
+            return (node._replace(z=z) if small else node), count
     raise ValueError("the correction does not converge")
 
 
@@ -131,8 +145,6 @@ def followed(
 ) -> Iterator[Step]:  # fmt: skip
     """Yield steps along the curve until no step is possible.
 
-    The prediction has order 2 from the second step on.
-
     Args:
         curve: the equations.
         node, tau: start and its tangent.
@@ -140,9 +152,12 @@ def followed(
         accept: function of the last and a new node that raises a ValueError to refuse the new one.
         most: function of a step that returns the largest length of the next one; 0 ends the curve.
     """
-    length, bend, turn = longest / 10, np.zeros_like(tau), _turn(curve, node, tau)
+    curve, node = curve.anchored(node)
+    tau = tangent(curve, node, tau)
+    length, turn = longest / 10, _turn(curve, node, tau)
+    past = [(0.0, node, tau)]
     while length >= SHORTEST * longest:
-        move = length * tau + length**2 / 2 * bend
+        move = _predicted(past, length, curve.scale)
         try:
             new, count = corrected(curve, node.z + move * curve.scale, tau)
             off = float(np.linalg.norm(((new.z - node.z) / curve.scale - move)[new.chosen]))
@@ -155,7 +170,7 @@ def followed(
                 raise ValueError("the orientation of the curve changes within the step")
             sharp = other and turn * _turn_before(curve, new, after, length) < 0
         except ValueError:
-            length *= SHRINKAGE
+            length, past = length * SHRINKAGE, past[-2:] if len(past) > 2 else past[-1:]
             continue
         if sharp:
             after = -after
@@ -163,9 +178,37 @@ def followed(
             turn = -turn  # a branch point
         step = Step(new, after, node, tau, length, sharp)
         yield step
-        node, bend = new, np.zeros_like(tau) if sharp else (after - tau) / length
+        past = _behind(past, step, curve.scale)
+        same, (curve, node) = curve, curve.anchored(new)
+        if curve is not same:
+            after = tangent(curve, node, after)
+            past = [(0.0, node, after)]
         tau, longer = after, length * GROWTH if count <= FEW else length
         length = min(longest, longer, most(step))
+
+
+Past = Sequence[tuple[float, Node, Array]]
+"""Arc length, node and tangent of the last points."""
+
+
+def _predicted(past: Past, length: float, scale: Array) -> Array:
+    """Return the scaled change of z over the next `length` by Hermite's polynomial."""
+    at = np.repeat([s for s, _, _ in past], 2)
+    rows = [part for _, node, tau in past for part in (node.z / scale, tau)]
+    ahead: Array = KroghInterpolator(at, rows)(at[-1] + length)
+    return ahead - past[-1][1].z / scale
+
+
+def _behind(past: Past, step: Step, scale: Array) -> Past:
+    """Return the points that predict the step after `step`."""
+    new = (0.0, step.node, step.tau)
+    if step.sharp or not np.array_equal(step.node.chosen, step.start.chosen):
+        return [new]
+    chord = float(np.linalg.norm(((step.node.z - step.start.z) / scale)[step.node.chosen]))
+    bend = float(np.linalg.norm((step.tau - step.along)[step.node.chosen]))
+    arc = chord * (1 + bend**2 / 24)
+    shift = past[-1][0] + arc
+    return [*((s - shift, node, tau) for s, node, tau in past[1 - BEHIND :]), new]
 
 
 def _turn_before(curve: Equations, node: Node, tau: Array, length: float) -> float:

@@ -1,8 +1,8 @@
 """Equations of a family of periodic orbits over one parameter, and of a family of equilibria."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple, final
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,13 @@ from symfric.dynamics.balance import rows_at_rest
 from symfric.dynamics.curve import Equations as Curve
 from symfric.dynamics.curve import Node
 from symfric.dynamics.equations import Equations
-from symfric.dynamics.shooting import Shooting
+from symfric.dynamics.shooting import Linear, Shooting
 from symfric.dynamics.tangent import tangent
 from symfric.foundation.numeric import Array
 
 TINY = 1e-300
+CROSSES = 0.9
+"""Cosine of the angle between rate and normal of a section below which a section is replaced."""
 
 
 @final
@@ -27,23 +29,20 @@ class Orbits(Curve):
         problem: shooting equations with the derivatives by the parameter.
         p: values of all free parameters.
         scale, tolerance: see `Curve`.
+        section: a state and the rate there: the start of each orbit is in the plane through the
+            state that is orthogonal to the rate. By default, the phase is that of the prediction.
     """
 
     problem: Shooting
     p: Mapping[str, float]
     scale: Array
     tolerance: float
+    section: tuple[Array, Array] | None = None
 
     @property
     def name(self) -> str:
         """Name of the parameter."""
         return self.problem.names[0]
-
-    @property
-    def u(self) -> Array:
-        """Values of the inputs, which are constant."""
-        known: Any = self.problem.u
-        return self.problem.model.values("u", known)
 
     def at(self, z: Array) -> Node:
         """Return the linearised shooting equations; see `Curve.at`."""
@@ -51,17 +50,38 @@ class Orbits(Curve):
         if not z[nx] > 0:
             raise ValueError("the period falls to zero")
         p = {**self.p, self.name: float(z[-1])}
-        found = self.problem.linear(z[None, :nx], float(z[nx]), p)
-        chosen, basis = found.bases[0]
-        k = chosen.size
-        D = np.zeros((z.size, k + 2))
-        D[:nx, :k], D[nx, k], D[-1, k + 1] = basis, 1.0, 1.0
-        s = self.scale[chosen]
-        phase = found.phase * self.scale[[*chosen, nx, nx + 1]]
-        phase = found.phase / max(float(np.abs(phase).max()), TINY)
-        r, J = np.append(found.r / s, 0.0), np.vstack([found.J / s[:, None], phase])
-        z = np.concatenate([found.segments[0].start, z[nx:]])
-        return Node(z, r, J, np.array([*chosen, nx, nx + 1]), D, found)
+        return self._node(z, self.problem.linear(z[None, :nx], float(z[nx]), p))
+
+    def _node(self, z: Array, found: Linear) -> Node:
+        """Return the node of linearised shooting equations at z."""
+        nx, (chosen, basis), part = z.size - 2, found.bases[0], found.segments[0]
+        z, s = np.concatenate([part.start, z[nx:]]), self.scale[chosen]
+        free = [nx + 1] if self.problem.driven else [nx, nx + 1]
+        every = np.append(chosen, free)
+        D = np.zeros((z.size, every.size))
+        D[:nx, : chosen.size], D[free, range(chosen.size, every.size)] = basis, 1.0
+        rows, slopes = [found.r / s], [found.J / s[:, None]]
+        if not self.problem.driven:
+            state, rate = (part.start, part.rates[0]) if self.section is None else self.section
+            normal = rate / self.problem.scale**2
+            phase = normal @ basis
+            size = max(float(np.abs(phase * s).max()), TINY)
+            rows.append(np.array([normal @ (part.start - state) / size]))
+            slopes.append(np.append(phase, [0.0, 0.0])[None, :] / size)
+        return Node(z, np.concatenate(rows), np.vstack(slopes), every, D, found)
+
+    def anchored(self, node: Node) -> tuple[Self, Node]:
+        """Return the equations with a section that the orbit of `node` crosses; see `Curve`."""
+        if self.problem.driven:
+            return self, node
+        part, size = node.content.segments[0], self.problem.scale
+        own = part.rates[0] / size
+        if self.section is not None:
+            normal = self.section[1] / size
+            if own @ normal > CROSSES * np.linalg.norm(own) * np.linalg.norm(normal):
+                return self, node
+        curve = replace(self, section=(part.start, part.rates[0]))
+        return curve, curve._node(node.z, node.content)
 
 
 class State(NamedTuple):

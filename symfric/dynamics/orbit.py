@@ -132,7 +132,7 @@ class PeriodicOrbit(Showing):
 
 
 def guessed(
-    model: Model, x: Mapping[str, float], period: float, u: Mapping[str, float],
+    model: Model, x: Mapping[str, float], period: float, u: Mapping[str, Input],
     p: Mapping[str, float], rtol: float,
 ) -> PeriodicOrbit:  # fmt: skip
     """Return a guess of an orbit for `periodic_orbit`, from its start and its period."""

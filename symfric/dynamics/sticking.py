@@ -1,6 +1,6 @@
 """Change of the sequence of stick and slip along a branch of periodic orbits."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
@@ -12,6 +12,7 @@ from symfric.dynamics.families import Orbits
 from symfric.dynamics.orbit import periodic_orbit
 from symfric.dynamics.trace import Family, finer, sequence
 from symfric.foundation.numeric import Array
+from symfric.foundation.status import SolveError
 from symfric.integrator.simulate import simulate
 from symfric.model import Contact
 from symfric.results.quadrature import extremes
@@ -23,6 +24,8 @@ to which its end is a grazing."""
 CLOSER, HALF = 0.9, 0.4
 """Share of the way to a predicted grazing that a step may take, and longest step relative to the
 size of an orbit."""
+GRAZINGS = 4
+"""Number of orbits that approach a grazing."""
 MOMENT = 1e-6
 """Time, relative to the period, over which a rate is measured."""
 NEAR = (1e-3, 1e-2)
@@ -50,13 +53,16 @@ class Gap(NamedTuple):
 def gap(curve: Orbits, node: Node) -> Gap:
     """Return the smallest distance of an orbit from sticking."""
     run, eq, model = node.content.segments[0].run, curve.problem.eq, curve.problem.model
-    best, d = Gap(-1, 0.0, 0.0, np.inf), np.concatenate([curve.u, node.content.p])
+    best = Gap(-1, 0.0, 0.0, np.inf)
     happened = {name for _, name in run.happened}
 
     def sizes(at: Array) -> dict[str, Array]:
         y = np.zeros((eq.y.numel(), at.size))
         y[: len(model.x)] = [*run.states(at).values()]
-        return {str(k): row for k, row in enumerate(np.abs(eq.sliding(y, d).full()))}
+        known = run.at(at) if model.u else {}
+        d = [*(known[v.name] for v in model.u), *np.outer(node.content.p, np.ones(at.size))]
+        slips = eq.sliding(y, np.array(d).reshape(-1, at.size)).full()
+        return {str(k): row for k, row in enumerate(np.abs(slips))}
 
     free = {str(k) for k, (c, _) in enumerate(eq.switching) if c.called("stick") not in happened}
     if not free:
@@ -115,16 +121,18 @@ class Near:
             return "change of stick and slip", value
         if self.gaps[-1].share > NEARLY:
             return _stopping(last)
-        way, found = self._way(), list[tuple[float, float]]()
-        for share in (0.0, CLOSER, CLOSER**0.1):
-            z = last.node.z + share * way * last.tau * curve.scale
+        way, found = CLOSER * self._way(), [(0.0, self.gaps[-1].least, value)]
+        for _ in range(GRAZINGS):
+            z = last.node.z + way * last.tau * curve.scale
             try:
                 new, _ = corrected(curve, z, last.tau)
                 same_sequence(node, new)
             except ValueError:
                 break
-            found = [*found[-1:], (float(new.z[-1]), gap(curve, new).least)]
-        return "grazing", _zero(found, value)
+            found = [*found[-1:], (way, gap(curve, new).least, float(new.z[-1]))]
+            end = _zero([(w, g) for w, g, _ in found], way)
+            way += CLOSER * (end - way)
+        return "grazing", _zero([(v, g) for _, g, v in found], value)
 
 
 def _zero(points: Sequence[tuple[float, float]], otherwise: float) -> float:
@@ -167,16 +175,17 @@ def _slowest(run: Trajectory) -> tuple[float, float]:
 
 
 def restarted(
-    curve: Orbits, node: Node, span: tuple[float, float], known: Collection[str]
+    curve: Orbits, node: Node, span: tuple[float, float], accept: Callable[[Node], bool]
 ) -> tuple[Node, float] | None:
-    """Return an orbit with a sequence that is not `known`, and the direction away from `node`.
+    """Return an orbit next to `node` that is accepted, and the direction away from `node`.
 
     The contact that is nearest to sticking is put into stick where it is nearest, and a run leads
     to the other orbit. Without such a contact, the run starts from the orbit itself.
     """
     problem, name = curve.problem, curve.name
     model, run = problem.model, node.content.segments[0].run
-    nearest, value = gap(curve, node), float(node.z[-1])
+    nearest, value, T = gap(curve, node), float(node.z[-1]), float(node.z[-2])
+    first, given = (nearest.time, T) if problem.driven else (0.0, None)
     for share in NEAR:
         for side in (-1.0, 1.0):
             p = {**curve.p, name: value + side * share * (span[1] - span[0])}
@@ -186,28 +195,31 @@ def restarted(
             if nearest.contact >= 0:
                 c, mode = problem.eq.switching[nearest.contact]
                 x[model.x[mode].name] = 0.0
-                x |= _at_rest(curve, c, x, p)
+                x |= _at_rest(run, nearest.time, c, x, p)
             try:
                 settled = simulate(
-                    model, PERIODS * float(node.z[-2]), x0=x, u=problem.u, p=p, rtol=1e-7
+                    model, first + PERIODS * T, t_start=first, x0=x, u=problem.u, p=p, rtol=1e-7
                 )
-                orbit = periodic_orbit(model, settled, u=problem.u, p=p, rtol=problem.rtol)
+                orbit = periodic_orbit(
+                    model, settled, u=problem.u, p=p, period=given, rtol=problem.rtol
+                )
                 z = np.array([*orbit.x.values(), orbit.period, p[name]])
                 found = curve.at(z)
-            except ValueError:
+            except (ValueError, SolveError):
                 continue
-            if sequence(found) not in known:
+            if accept(found):
                 return found, side
     return None
 
 
 def _at_rest(
-    curve: Orbits, c: Contact, x: Mapping[str, float], p: Mapping[str, float]
+    run: Trajectory, time: float, c: Contact, x: Mapping[str, float], p: Mapping[str, float]
 ) -> dict[str, float]:
     """Return the states by name that a contact sets where its slip becomes zero."""
-    model = curve.problem.model
+    model = run.model
     symbols = [model.vector(group) for group in ("x", "u", "p")]
-    known = [*x.values()], curve.u, model.values("p", p)
+    u = [float(run.at(time)[v.name][0]) for v in model.u]
+    known = [*x.values()], u, model.values("p", p)
     return {
         name: float(ca.Function("rest", symbols, [ca.SX(value)])(*known))
         for name, value in c.rest.items()

@@ -67,7 +67,7 @@ def vanishing(curve: Family, points: list[Point]) -> float | None:
 
     The square of their size is linear in the parameter near a Hopf point.
     """
-    if not isinstance(curve, Orbits) or len(points) < 2:
+    if not isinstance(curve, Orbits) or curve.problem.driven or len(points) < 2:
         return None
     one, other = points[-2:]
     a, b = size(curve, one) ** 2, size(curve, other) ** 2
@@ -101,7 +101,7 @@ def state(curve: Family, node: Node) -> tuple[Array, float]:
 def exponents(curve: Family, node: Node) -> NDArray[np.complex128]:
     """Return the eigenvalues of an equilibrium, or the multipliers of an orbit."""
     if isinstance(curve, Orbits):
-        return node.content.multipliers(driven=False)
+        return node.content.multipliers(driven=curve.problem.driven)
     return curve.state(node).eigenvalues
 
 
@@ -140,6 +140,16 @@ def note(curve: Family, step: Step, trace: Trace) -> None:
             if node is step.node:
                 trace.rough(trace.special[-1].kind, float(node.z[-1]))
             return
+
+
+def kind_of(curve: Family, node: Node) -> str:
+    """Return the events of an orbit, or without events the side of a fold on which it is.
+
+    The parity of the number of real multipliers above 1 changes at a fold.
+    """
+    found = exponents(curve, node)
+    above = (np.abs(found.imag) < REAL * np.abs(found)) & (found.real > 1)
+    return sequence(node) or ("odd" if above.sum() % 2 else "even")
 
 
 def growths(curve: Family, node: Node) -> Array:

@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation.symbolic import Symbolic
 from symfric.foundation.vector import Rows, Vector
@@ -167,10 +167,37 @@ def bound(
     return run
 
 
+class Buffered:
+    """Calls of a Function with dense results, in buffers that are kept between calls.
+
+    Threads and nested calls use separate buffers.
+    """
+
+    def __init__(self, function: ca.Function) -> None:
+        self._function, self._spare = function, list[tuple[Any, list[Array], list[Array]]]()
+
+    def __call__(self, *arguments: ArrayLike) -> list[Array]:
+        """Return all results as flat arrays, matrices column by column."""
+        try:
+            call, given, results = self._spare.pop()
+        except IndexError:
+            f = self._function
+            given = [np.zeros(f.numel_in(i)) for i in range(f.n_in())]
+            results = [np.zeros(f.numel_out(i)) for i in range(f.n_out())]
+            call = bound(f, given, results)
+        for place, value in zip(given, arguments, strict=True):
+            place[:] = value
+        call()
+        found = [result.copy() for result in results]
+        self._spare.append((call, given, results))
+        return found
+
+
 def address(array: Array) -> int:
     """Return the memory address of the data of a contiguous array, for compiled code."""
-    if array.flags.writeable and array.size:  # three times faster than below
-        return ctypes.addressof(ctypes.c_char.from_buffer(cast(Any, array)))
+    buffer: Any = array
+    if buffer.flags.writeable and buffer.size:  # three times faster than below
+        return ctypes.addressof(ctypes.c_char.from_buffer(buffer))
     return array.ctypes.data
 
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from symfric.integrator.equations.inputs import Linear as Linear
     from symfric.integrator.equations.inputs import rate_of as rate_of
     from symfric.integrator.plant import Plant as Plant
+    from symfric.integrator.prepared import prepare as prepare
     from symfric.integrator.simulate import simulate as simulate
     from symfric.integrator.stepper import flow as flow
     from symfric.integrator.stepper import stepper as stepper

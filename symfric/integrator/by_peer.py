@@ -236,6 +236,8 @@ def integrate_by_peer(
         for name, keys in COUNTS.items():
             counts[name] += next((int(stats[key]) for key in keys if key in stats), 0)
     dense = _dense(system, inputs, p, grid[: found.shape[1]], found[: system.n])
+    known = found[: system.n]
+    run.ends = np.array([known.min(axis=1), known.max(axis=1)])
     run.keep(dense.rows)
     outputs.fill(dense, last=True)
     return run, counts

@@ -1,108 +1,25 @@
-"""Simulation of a model: one function for every method and engine.
-
-Checked settings are cached per model, because checking them takes longer than a short run.
-"""
+"""Simulation of a model: one function for every method and engine."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
-from time import perf_counter
-from typing import Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.memory import remember
-from symfric.foundation.numeric import Array
-from symfric.foundation.status import SolveError, Status
 from symfric.integrator import arguments
 from symfric.integrator.derivatives.path import Path, seeds
 from symfric.integrator.derivatives.sensitivity import Differentiated
-from symfric.integrator.equations.initial import first_guess
-from symfric.integrator.equations.inputs import Input, input_data, paced
-from symfric.integrator.methods.method import Method
+from symfric.integrator.equations.inputs import Input
 from symfric.integrator.methods.tableaux import FOR_DERIVATIVES
-from symfric.integrator.running.doubts import doubts
-from symfric.integrator.running.integrator import Integrator, built
-from symfric.integrator.running.record import Run
-from symfric.integrator.running.run import Tolerances, integrate, own_scale
-from symfric.integrator.stored import Basis, Stored, trajectory_of
+from symfric.integrator.prepared import checked, prepared
+from symfric.integrator.running.run import own_scale
+from symfric.integrator.stored import Basis, Stored
 from symfric.model import Model
-from symfric.results.stored import Statistics
 from symfric.results.trajectory import Trajectory
-
-PLAIN: frozenset[type] = frozenset((float, int, bool, str, type(None)))
-REMEMBERED, MOST_TIMES = 16, 10_000
-"""Number of settings cached per model (the oldest is removed first), and largest cached grid."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Settings:
-    """Checked settings of a model.
-
-    Attributes:
-        t_start, t_end: time span [s].
-        formula: the method.
-        allowed: tolerances; `atol` has one entry per state of the model.
-        times: times of the result [s]; shared between runs, so callers must copy them.
-    """
-
-    t_start: float
-    t_end: float
-    formula: Method
-    allowed: Tolerances
-    times: Array
-
-
-def settings(model: Model, asked: tuple[Any, ...]) -> Settings:
-    """Return the checked settings of `simulate`, the arguments of `_checked`, with a cache.
-
-    Raises:
-        ValueError: bad input.
-
-    Warns:
-        UserWarning: a loose tolerance.
-    """
-    known: dict[Hashable, Settings] = model.memory.setdefault("settings", {})
-    # 1.0 and True are equal keys, but only 1.0 is a valid time
-    key = (*asked, *map(type, asked))
-    if not PLAIN.issuperset(key[len(asked) :]):
-        return _checked(model, *asked)  # scalar arrays and expressions are numbers but not keys
-    found = known.get(key)
-    if found is not None:
-        arguments.warn_of_loose("simulate", found.allowed.rtol, stacklevel=4)
-        return found
-    found = _checked(model, *asked)
-    if found.times.size <= MOST_TIMES:
-        remember(known, key, found, REMEMBERED)
-    return found
-
-
-def _checked(
-    model: Model,
-    t_start: float,
-    t_end: float,
-    rtol: float,
-    atol: float | None,
-    samples: int,
-    method: str,
-    event_tolerance: float,
-    max_steps: int | None,
-    max_step: float | None,
-) -> Settings:
-    where = "simulate"
-    t_start, t_end, rtol = arguments.check_span(where, model, t_start, t_end, rtol, stacklevel=6)
-    formula = arguments.chosen(where, method, rtol)
-    times = arguments.result_times(where, t_start, t_end, None, samples)
-    limits = model.nominal("x"), event_tolerance, max_steps, max_step
-    allowed = arguments.tolerances(where, rtol, atol, *limits)
-    return Settings(t_start, t_end, formula, allowed, times)
-
 
 NOTHING = 1e-9
 """Derivatives below this multiple of their nominal value are treated as rounding errors."""
@@ -209,7 +126,8 @@ def simulate(
         samples: number of equally spaced times.
         method: the formula; the numbers below refer to Rabinowicz's stick-slip over 20 s.
             "auto": rodas5p, or radau5 if rtol > 1e-5 or if derivatives are requested; steps are
-            then at most half a law's width where it slides slowly.
+            then at most half a law's width where it slides slowly. An ODE without events and
+            bristles is integrated by radau9 if rtol <= 1e-8.
             "rodas5p": order 5, the fewest steps at 1e-6 and below; error about rtol.
             "rodas4p": order 4; a step costs 2/3 of one of rodas5p, but the number of steps grows
             faster with tighter rtol.
@@ -217,6 +135,9 @@ def simulate(
             "radau5": order 5, the most robust method: its iteration fails if a contact changes
             within a step, so no slip is missed even at rtol = 1e-3. The error is a tenth of rtol,
             for 1.5 to 2 times the steps; between steps the order is 4.
+            "radau9": order 9, five stages, for errors below 1e-7: half the time of rodas5p at 1e-8
+            and a quarter at 1e-10 with Brown-McPhee friction, but only 0.8 and 0.7 times with
+            LuGre, whose corners limit the steps, and no gain with a few algebraic unknowns.
             "dopri5": order 5, explicit, for non-stiff ODEs: orbits, pendulums, contacts that only
             slide, and mechanisms without friction from reactions (their multipliers have no error
             estimate). With bristles and sticking it needs 20 to 100 times the steps. "auto" never
@@ -262,39 +183,19 @@ def simulate(
     arguments.check_model("simulate", model)
     arguments.check_flags("simulate", progress, measure_error=measure_error, throw=throw)
     limits = event_tolerance, max_steps, max_step
-    asked = settings(model, (t_start, t_end, rtol, atol, samples, method, *limits))
-    t_start, t_end, formula, allowed = asked.t_start, asked.t_end, asked.formula, asked.allowed
-    checks.choice("simulate: backend", backend, arguments.BACKENDS)
+    asked = t_start, t_end, rtol, atol, samples, method, backend, *limits
+    ready, looks = prepared("simulate", model, asked, t_eval)
     if sensitivities != ():
         sensitivities = checks.names("simulate: sensitivities", sensitivities)
-        if method == "auto":
-            formula = FOR_DERIVATIVES
-    if t_eval is None:
-        looks = asked.times.copy()
-    else:
-        looks = arguments.check_times("simulate", t_start, t_end, t_eval)
-    begin = perf_counter()
-    inputs = paced(input_data(model, u, t_start, t_end), model)
-    inputs = arguments.stopping("simulate", inputs, times, t_start, t_end)
-    integrator, fresh = built(model, inputs, formula)
-    build_time = perf_counter() - begin if fresh else 0.0
-    which = seeds(model, sensitivities, x0, p, t_start) if sensitivities else None
-    y0 = first_guess(integrator.system, model, model.initial_state(x0, p, t_start), t_start)
-    values = model.values("p", p)
-    if integrator.system.has_pivots:
-        at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))
-        integrator = integrator.suited([at_start], t_end - t_start)
-    compiled_before, begin = integrator.compile_time, perf_counter()
-    run, own = integrate(integrator, inputs, y0, values, allowed, backend, progress, looks)
-    compile_time = integrator.compile_time - compiled_before
-    run_time = perf_counter() - begin - compile_time
-    count = partial(_statistics, integrator, run, build_time, compile_time, run_time)
-    for said in doubts(own, inputs, run, values):
-        run.message += f" {said}"
-        warnings.warn(type(said)(f"simulate '{model.name}': {said}"), stacklevel=2)
-    trajectory = trajectory_of(model, lambda: integrator, inputs, run, values, count, backend)
-    if throw and not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
-        raise SolveError(trajectory.message, trajectory.status, trajectory)
+        formula = FOR_DERIVATIVES if method == "auto" else ready.method
+        ready = replace(ready, method=formula, u=u, stops=times)
+    elif u is not None or not (isinstance(times, tuple) and not times):
+        ready = replace(ready, u=u, stops=times)
+    which = seeds(model, sensitivities, x0, p, ready.t_start) if sensitivities else None
+    trajectory, run, own, y0, values = ready.run("simulate", x0, p, looks, progress)
+    if throw:
+        checked(trajectory)
+    allowed, inputs = ready.tolerances, ready.inputs
     if which is not None and run.steps:
         basis = Basis(which, y0, tuple(run.jumps), allowed.event)
         known = trajectory.t, run.outputs.reached
@@ -303,13 +204,13 @@ def simulate(
         found = Differentiated(path, which, tuple(trajectory.units), trajectory.t)
         trajectory = replace(
             trajectory, differentiate=found.at, pull_back=found.pull_back, delays=found.delays,
-            keep=partial(Stored.of, integrator, inputs, run, values, backend, basis=basis),
+            keep=partial(Stored.of, ready.integrator, inputs, run, values, backend, basis=basis),
         )  # fmt: skip
     if measure_error and trajectory.status.ok:
         finer = simulate(
             model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=max(allowed.rtol / 100, 1e-13),
             atol=None if atol is None else atol / 100, event_tolerance=event_tolerance,
-            t_eval=trajectory.t, method=arguments.another(formula), backend=backend,
+            t_eval=trajectory.t, method=arguments.another(ready.method), backend=backend,
             max_step=run.extent.longest / 2, times=times, sensitivities=sensitivities,
         )  # fmt: skip
         off = difference(model, trajectory, finer)
@@ -317,24 +218,3 @@ def simulate(
         measured = replace(trajectory.statistics, error=off, sensitivity_errors=slopes)
         trajectory = replace(trajectory, count=lambda: measured)
     return trajectory
-
-
-def _statistics(
-    integrator: Integrator, run: Run, build_time: float, compile_time: float, run_time: float
-) -> Statistics:
-    """Return the statistics of a run; the arguments are times [s]."""
-    evaluations, jacobians, factorisations = integrator.tableau.work(integrator.system)
-    return Statistics(
-        backend=run.engine,
-        method=integrator.tableau.name,
-        steps=run.steps,
-        rejections=run.attempts - run.steps,
-        evaluations=run.attempts * evaluations,
-        jacobians=run.attempts * jacobians,
-        factorisations=run.attempts * factorisations,
-        events=len(run.happened),
-        smallest_step=run.extent.shortest,
-        build_time=build_time,
-        compile_time=compile_time,
-        run_time=run_time,
-    )

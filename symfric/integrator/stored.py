@@ -21,6 +21,7 @@ from symfric.integrator.methods.tableaux import METHODS, key_of
 from symfric.integrator.running.integrator import Integrator, built, in_results
 from symfric.integrator.running.record import Dense, Jumps, Outputs, Run
 from symfric.model import Model
+from symfric.model.kinds import MODE
 from symfric.results.stored import Format, Statistics
 from symfric.results.trajectory import Trajectory
 
@@ -276,7 +277,8 @@ def trajectory_of(
         y, columns = unknowns(at), None if drifts else integrator().states
         if columns is not None:
             y = columns([y.T, data(at)], backend=engine)[0].T
-        return {v.name: in_results(v.kind, row) for v, row in zip(model.x, y, strict=False)}
+        pairs = zip(model.x, y, strict=False)
+        return {v.name: row if v.kind != MODE else in_results(MODE, row) for v, row in pairs}
 
     def data(at: Array) -> Array:
         return np.hstack([np.tile(p, (at.size, 1)), inputs.values[:, inputs.interval(at)].T])

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from symfric.laws.dynamic.lugre import LuGre as LuGre
     from symfric.laws.dynamic.lugre import LuGreNormalised as LuGreNormalised
     from symfric.laws.dynamic.lugre import LuGrePassive as LuGrePassive
+    from symfric.laws.dynamic.lugre import LuGreTyre as LuGreTyre
     from symfric.laws.dynamic.maxwell_slip import GMS as GMS
     from symfric.laws.dynamic.maxwell_slip import Element as Element
     from symfric.laws.dynamic.maxwell_slip import Leuven as Leuven
@@ -72,8 +73,12 @@ if TYPE_CHECKING:
     from symfric.laws.static.exponential import SteadyStateLuGre as SteadyStateLuGre
     from symfric.laws.static.exponential import Stribeck as Stribeck
     from symfric.laws.static.exponential import Tustin as Tustin
+    from symfric.laws.static.from_data import Level as Level
+    from symfric.laws.static.from_data import Spline as Spline
+    from symfric.laws.static.lubrication import MixedLubrication as MixedLubrication
     from symfric.laws.static.machines import BAM as BAM
     from symfric.laws.static.machines import Bittencourt as Bittencourt
+    from symfric.laws.static.machines import BrushTyre as BrushTyre
     from symfric.laws.static.machines import Capstan as Capstan
     from symfric.laws.static.machines import QuarterCarGeneral as QuarterCarGeneral
     from symfric.laws.static.machines import QuarterCarSimple as QuarterCarSimple

@@ -15,6 +15,8 @@ from symfric.laws.static import (
     applied_force,
     coulomb,
     exponential,
+    from_data,
+    lubrication,
     machines,
     piecewise,
     self_tuning,
@@ -58,6 +60,9 @@ STATIC_LAWS: dict[str, type[Law]] = {
     "bittencourt": machines.Bittencourt,
     "bam": machines.BAM,
     "capstan": machines.Capstan,
+    "brush_tyre": machines.BrushTyre,
+    "mixed_lubrication": lubrication.MixedLubrication,
+    "spline": from_data.Spline,
 }
 """Memoryless laws by name, with the most widely used laws first."""
 
@@ -68,6 +73,7 @@ DYNAMIC_LAWS: dict[str, type[Law]] = {
     "lugre": lugre.LuGre,
     "lugre_normalised": lugre.LuGreNormalised,
     "lugre_passive": lugre.LuGrePassive,
+    "lugre_tyre": lugre.LuGreTyre,
     "elasto_plastic": lugre.ElastoPlastic,
     "leuven": maxwell_slip.Leuven,
     "maxwell_slip": maxwell_slip.MaxwellSlip,
@@ -98,6 +104,7 @@ ALIASES = {
     "smooth_coulomb": "coulomb",
     "leine": "leine_switch",
     "simscape": "simscape_breakaway",
+    "hersey": "mixed_lubrication",
     "seven_parameter": "armstrong",
     "iwan": "maxwell_slip",
     "reset_integrator": "haessig_friedland",

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from math import isfinite
 from typing import Any, NamedTuple, final
 
 import casadi as ca
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, evaluate, evaluate_all
+from symfric.foundation.numeric import Buffered, Scalar, evaluate_all
 from symfric.foundation.parameters import Variable
 from symfric.foundation.units import per_second
 from symfric.foundation.variable import stacked, starts_of, symbols_of
@@ -76,7 +77,9 @@ class System:
         """
         if given is None:
             return {}
-        known = [v.name for v in getattr(self, what[0])]
+        known = self._names[what[0]]
+        if type(given) is dict and given.keys() <= known.keys():
+            return given.copy()  # the usual case
         values = checks.named(f"model '{self.name}' {what}", given)
         fixed = ", ".join(f'"{name}"' for name in values if name not in known)
         ways = {
@@ -100,9 +103,17 @@ class System:
         velocity. It is evaluated with the given values of the other states and the parameters, and
         with the start values of the algebraic variables. The result has the shape (nx,).
         """
-        start = evaluate(self._start, *self._start_arguments(given, p, t))
-        for v, x in zip(self.x, start.tolist(), strict=True):
-            checks.number(f"{self.name}.{v.name}", x)
+        return self.started(given, self.values("p", p), t)
+
+    def started(
+        self, given: Mapping[str, float] | None, p: NDArray[np.float64], t: float
+    ) -> NDArray[np.float64]:
+        """Return `initial_state` for the values of all parameters."""
+        known, chosen = self._chosen(given)
+        (start,) = self._starting(known, chosen, self._inputs_at_start, p, t)
+        if not isfinite(sum(start.tolist())):
+            for v, x in zip(self.x, start.tolist(), strict=True):
+                checks.number(f"{self.name}.{v.name}", x)
         return start
 
     def initial_states(
@@ -136,17 +147,33 @@ class System:
         t: float = 0.0,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
         """Return the derivatives of `initial_state` with respect to p and to values in `given`."""
-        by_p, by_start = evaluate_all(self._start_slopes, *self._start_arguments(given, p, t))
+        rows = *self._chosen(given), self.values("u"), self.values("p", p), [t]
+        by_p, by_start = evaluate_all(self._start_slopes, *map(np.array, rows))
         return by_p, by_start
 
-    def _start_arguments(
-        self, given: Mapping[str, float] | None, p: Mapping[str, float] | None, t: float
-    ) -> tuple[NDArray[np.float64], ...]:
-        numbers = self.named("x0", given)
-        given = {name: checks.number(f"{self.name}.{name}", x) for name, x in numbers.items()}
-        known = np.array([given.get(v.name, 0.0) for v in self.x])
-        chosen = np.array([float(v.name in given) for v in self.x])
-        return known, chosen, self.values("u"), self.values("p", p), np.array([t])
+    def _chosen(self, given: Mapping[str, float] | None) -> tuple[list[float], list[float]]:
+        """Return the given start values of all states, else 0, and 1 for each given one, else 0."""
+        known, chosen = [0.0] * len(self.x), [0.0] * len(self.x)
+        for name, x in self.named("x0", given).items():
+            i = self._names["x"][name]
+            usual = type(x) is float and isfinite(x)
+            known[i] = x if usual else checks.number(f"{self.name}.{name}", x)
+            chosen[i] = 1.0
+        return known, chosen
+
+    @cached_property
+    def _names(self) -> dict[str, dict[str, int]]:
+        """Position of each variable by name, for each group."""
+        groups = {letter: getattr(self, letter) for letter in "xup"}
+        return {a: {v.name: i for i, v in enumerate(group)} for a, group in groups.items()}
+
+    @cached_property
+    def _inputs_at_start(self) -> NDArray[np.float64]:
+        return self.values("u")
+
+    @cached_property
+    def _starting(self) -> Buffered:
+        return Buffered(self._start)
 
     @cached_property
     def _start(self) -> ca.Function:

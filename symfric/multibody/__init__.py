@@ -8,12 +8,25 @@ from typing import TYPE_CHECKING
 from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
+    from symfric.multibody.belts import Belt as Belt
+    from symfric.multibody.belts import CapstanDrum as CapstanDrum
+    from symfric.multibody.brakes import BandBrake as BandBrake
+    from symfric.multibody.brakes import DiscClutch as DiscClutch
+    from symfric.multibody.brakes import DrumBrake as DrumBrake
+    from symfric.multibody.brakes import shoe_arms as shoe_arms
+    from symfric.multibody.cams import Cam as Cam
+    from symfric.multibody.cams import CamFriction as CamFriction
     from symfric.multibody.constraints import Constraint as Constraint
-    from symfric.multibody.constraints import Gear as Gear
     from symfric.multibody.constraints import PrescribedMotion as PrescribedMotion
-    from symfric.multibody.constraints import Rolling as Rolling
-    from symfric.multibody.constraints import Screw as Screw
     from symfric.multibody.constraints import UserConstraint as UserConstraint
+    from symfric.multibody.couplings import Gear as Gear
+    from symfric.multibody.couplings import Rolling as Rolling
+    from symfric.multibody.couplings import Screw as Screw
+    from symfric.multibody.efficiency import efficiency as efficiency
+    from symfric.multibody.element_friction import ElementFriction as ElementFriction
+    from symfric.multibody.element_friction import MeshFriction as MeshFriction
+    from symfric.multibody.element_friction import ThreadFriction as ThreadFriction
+    from symfric.multibody.element_friction import mesh_arm as mesh_arm
     from symfric.multibody.forces import Force as Force
     from symfric.multibody.forces import Gravity as Gravity
     from symfric.multibody.forces import JointSpringDamper as JointSpringDamper

@@ -48,8 +48,8 @@ from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Switch
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Variables, kinds
+from symfric.multibody.contact import Contact, law_places
 from symfric.multibody.equations import Equations
-from symfric.multibody.joint import Contact
 from symfric.multibody.joints import Floating
 from symfric.multibody.prepare import Prepared
 from symfric.multibody.spatial import GROUND, euler_e
@@ -232,9 +232,8 @@ class _Maker:
     def refuse(self, contacts: Sequence[Contact], expected: str, advice: str) -> ValueError:
         """Return the error for contacts whose laws cannot stick here."""
         law = type(contacts[0].friction.law).__name__
-        joints = ", ".join(dict.fromkeys(f"'{c.joint}'" for c in contacts))
         return ValueError(
-            f"{self.where} > joint {joints} > friction > law: expected {expected}, got {law}, "
+            f"{self.where} > {law_places(contacts)}: expected {expected}, got {law}, "
             f"which needs the applied force; {advice}"
         )
 
@@ -255,7 +254,7 @@ class _Maker:
             raise self.refuse(contacts, what, "use one form")
         by_modes, single = modes == {True}, columns == ()
         start = float(self.numbers(change)[0, 0]) / here
-        still = {f"{contacts[0].name}_rate"} if single else {rates[k].name for k in columns}
+        still = {contacts[0].rate} if single else {rates[k].name for k in columns}
         direction: Variables = ()
         if by_modes and not single:
             begin = ca.SX(smooth.sign(rate, 0.0))

@@ -26,10 +26,11 @@ from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Contact, Model, Monitor, Output, Variables, kinds
 from symfric.model.holonomic import Holonomic, Inner
 from symfric.multibody.applied import Rest, rests, solve_mass
+from symfric.multibody.contact import depends_on_load
 from symfric.multibody.equations import Equations, normals_with
 from symfric.multibody.prepare import Prepared, with_cuts, without_friction
 from symfric.multibody.results import Put, constraint_units, results, sketch
-from symfric.multibody.slips import Slip, depends_on_load, events, keeps_deflection, slips
+from symfric.multibody.slips import Slip, events, keeps_deflection, slips
 
 AT_REST = 1e-9
 """Sliding velocity [m/s] below which figures show a law with modes as sticking.
@@ -121,7 +122,7 @@ def _contact(s: Slip) -> Contact:
     return Contact(
         contact.name, contact.slip, s.N if known else ca.SX(np.nan), contact.friction.law,
         given=s.inputs, states=s.states, force=contact.F, turning=contact.friction.turning,
-        widths={"eps": width} if s.N is not s.normal else {},
+        widths={"eps": width} if s.N is not s.normal and contact.normal_symbol.is_empty() else {},
     )  # fmt: skip
 
 
@@ -136,7 +137,8 @@ def _opened(
     names = {c.name for c in frictional}
     free: list[Slip] = []
     for s, normal in zip(contacts, normals_with(made.eq, eps), strict=True):
-        own = s if s.N is s.normal else replace(s, normal=normal)
+        given = s.N is s.normal or not s.contact.normal_symbol.is_empty()
+        own = s if given else replace(s, normal=normal)
         if s.contact.name in names:
             own = replace(own, states=(), rate=ca.SX(0, 1), force=s.contact.F, inputs={})
         free.append(own)
@@ -156,8 +158,8 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip]) -> Inner | N
     normals = (normal - s.N for s, normal in pairs if s.unknown)
     f, values = ca.substitute(
         [ca.vertcat(cut.balance, *normals), cuts.values],
-        [ca.vertcat(cut.a, cut.F)],
-        [ca.vertcat(eq.a, stacked(s.force for s in contacts))],
+        [ca.vertcat(cut.a, cut.F, cut.N)],
+        [ca.vertcat(eq.a, stacked(s.force for s in contacts), eq.N)],
     )
     kept = cuts.needed(f)
     groups: list[ca.SX] = []
@@ -165,7 +167,7 @@ def _inner(cut: Equations, eq: Equations, contacts: Sequence[Slip]) -> Inner | N
         # inner unknowns first: their right-hand sides are zero, so they cost no stage
         groups.append(stacked(cuts.symbols[i] for i in kept if cuts.links[i] == k))
         groups.append(ca.vertcat(*(column[link.rows] for column in (eq.q, eq.qd, eq.a))))
-        own = (s for s in contacts if s.contact.joint == link.joint.name)
+        own = (s for s in contacts if s.contact.link == link.joint.name)
         groups.append(symbols_of(v for s in own for v in (*s.unknown, *s.states)))
     return Inner(cuts.symbols[kept], values[kept], f, tuple(groups))
 
@@ -179,12 +181,12 @@ def _pressing(contacts: Sequence[Slip], reactive: ca.SX) -> tuple[ca.SX, tuple[s
     """
     values, words, bristles = list[ca.SX](), list[str](), list[Slip]()
     for s in contacts:
-        friction, joint = s.contact.friction, s.contact.joint
+        friction = s.contact.friction
         law = type(friction.law).__name__
         given = is_symbolic(friction.normal) or is_symbolic(friction.preload)
         if s.unknown or (given and not ca.depends_on(s.N, reactive)):
             values.append(s.N / (s.unknown[0].nominal if s.unknown else 1.0))
-            words.append(f"normal force of joint '{joint}' with {law}")
+            words.append(f"normal force of {s.contact.place} with {law}")
         if s.unknown and keeps_deflection(friction.law):
             bristles.append(s)
     return stacked(values), tuple(words), _advice(bristles)
@@ -199,7 +201,7 @@ def _advice(bristles: Sequence[Slip]) -> str:
     if not bristles:
         return ""
     laws = {type(s.contact.friction.law).__name__: s.contact.friction.law for s in bristles}
-    joints, (name, law) = dict.fromkeys(s.contact.joint for s in bristles), next(iter(laws.items()))
+    joints, (name, law) = dict.fromkeys(s.contact.part for s in bristles), next(iter(laws.items()))
     least = min(float(at_start(s.unknown[0].start, ())) for s in bristles)
     load = f"{float(f'{max(least, 1.0):.2g}'):g}"
     return (

@@ -11,6 +11,8 @@ from symfric.foundation.checks import shown
 from symfric.foundation.numeric import is_number, is_symbolic
 from symfric.foundation.variable import strays, symbols_of
 from symfric.model import Variables
+from symfric.multibody.actuated import ActuatedElement
+from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Part
 from symfric.multibody.joint import Joint, JointFriction
 from symfric.multibody.spatial import GROUND, Body
@@ -105,15 +107,19 @@ def bearings(joints: Sequence[Joint], p: ca.SX, u: ca.SX) -> Iterator[str]:
                 if not is_symbolic(x) and not (is_number(x) and np.isfinite(float(x))):
                     yield f"{where} > {what}: expected finite numbers, got {x!r}"
                     break
-        if joint.friction is not None:
-            yield from _rubbing(f"{where} > friction", joint, joint.friction, ca.vertcat(p, u))
+        if isinstance(joint.friction, JointFriction):
+            own = joint.friction
+            yield from (f"{where} > friction: {text}" for text in own.problems(joint.rubs))
+            yield from rubbing(f"{where} > friction", own, ca.vertcat(p, u))
+        elif joint.friction is not None:
+            expected = "expected JointFriction(law, radius=...)"
+            yield f"{where} > friction: {expected}, got {shown(joint.friction)}"
 
 
-def _rubbing(where: str, joint: Joint, friction: object, known: ca.SX) -> Iterator[str]:
-    if not isinstance(friction, JointFriction):
-        yield f"{where}: expected JointFriction(law, radius=...), got {shown(friction)}"
-        return
-    yield from (f"{where}: {text}" for text in friction.problems(joint.rubs))
+def rubbing(
+    where: str, friction: JointFriction | ElementFriction | ActuatedElement, known: ca.SX
+) -> Iterator[str]:
+    """Yield messages about undeclared symbols in a friction law and its geometry."""
     law, v, N = friction.law, ca.SX.sym("v"), ca.SX.sym("N")
     z = ca.SX.sym("z", len(law.states))
     offered = {i.name: ca.SX.sym(i.name) for i in law.inputs}

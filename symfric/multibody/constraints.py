@@ -1,4 +1,4 @@
-"""Constraints other than joints: prescribed motion, couplings, expressions of positions.
+"""Constraints other than joints: prescribed motion, expressions of positions.
 
     phi(q, t) = 0,   phi_q q' + phi_t = 0,   phi_q a + (phi_q q')_q q' + 2 phi_qt q' + phi_tt = 0
 
@@ -9,16 +9,16 @@ pi. In this case phi is taken modulo its period, so that full turns are possible
 """
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from math import pi
 from typing import Any, ClassVar, NamedTuple, final
 
 import casadi as ca
 
 from symfric.foundation.checks import expression
-from symfric.foundation.numeric import Scalar, equals, is_symbolic
+from symfric.foundation.numeric import Scalar
+from symfric.multibody.contact import Contact
 from symfric.multibody.dynamics import numbered, twist_jacobian
 from symfric.multibody.forces import Axial, Load, Part
 from symfric.multibody.joint import Joint
@@ -65,6 +65,10 @@ class Constraint(Part):
     @abstractmethod
     def held(self, kin: Kinematics) -> Held:
         """Return the equations of the constraint and the loads of its multipliers."""
+
+    def contacts(self, kin: Kinematics, lam: ca.SX) -> Sequence[Contact]:
+        """Return the contacts whose friction depends on the multipliers `lam`; none by default."""
+        return ()
 
 
 Term = tuple[Joint, str, Scalar]
@@ -204,141 +208,3 @@ class UserConstraint(Constraint):
             return found
 
         return Held(ca.densify(value), numbered(self.name, value.numel()), loads)
-
-
-TEETH = 1000
-"""Largest denominator of a ratio if both angles are known modulo 2 pi."""
-
-
-class Coupling(Constraint):
-    """Coupling of the displacements of two joints: gears, rolling without slipping, screws.
-
-        s_b = ratio s_a + offset
-
-    where s_a and s_b are displacements [m] or angles [rad] relative to the parents of the joints. A
-    planetary gear is described by gears between joints on its carrier. The multiplier is the force
-    or moment on the child of b; minus ratio times the multiplier acts on the child of a.
-
-    Joint coordinates count full turns. The angle of a joint that closes a loop, and of every joint
-    in absolute coordinates, is known modulo 2 pi. The coupling still allows full turns: for any
-    ratio if one of the two angles is known modulo 2 pi, for ratios of integers if both are.
-
-    Limits: the coupling loads the joints with forces and moments along their axes only, not with
-    the pressure between teeth; use a `UserConstraint` for that. There is no backlash and no
-    friction between teeth.
-    """
-
-    kind: ClassVar[str] = "coupling"
-
-    ratio_field: ClassVar[str] = "ratio"
-    """Name of the field that is or determines the ratio."""
-
-    a: str
-    b: str
-    offset: Scalar
-    direction_a: str
-    direction_b: str
-
-    @property
-    def _ends(self) -> tuple[tuple[str, str], tuple[str, str]]:
-        """Joint and direction of a and of b."""
-        return (self.a, self.direction_a), (self.b, self.direction_b)
-
-    @property
-    def _ratio(self) -> Scalar:
-        return getattr(self, self.ratio_field)
-
-    def joints(self) -> Iterable[tuple[str, str]]:
-        """Return both coupled joints with their directions."""
-        return self._ends
-
-    def problems(self) -> Iterator[str]:
-        """Yield messages about invalid numbers, a zero ratio, or identical displacements."""
-        yield from super().problems()
-        if equals(self._ratio, 0.0):
-            yield f"{self.ratio_field}: expected a finite number other than 0, got {self._ratio!r}"
-        a, b = self._ends
-        if a == b:
-            yield f"expected two displacements, got {a[1]} of {a[0]} twice"
-
-    def held(self, kin: Kinematics) -> Held:
-        """Return offset + ratio s_a - s_b = 0."""
-        (a, along_a), (b, along_b) = ((kin.topology.joints[name], d) for name, d in self._ends)
-        ratio, offset, period = self._ratio, self.offset, None
-        cyclic = wraps(kin, a, along_a), wraps(kin, b, along_b)
-        if all(cyclic):
-            fraction = Fraction(0.0 if is_symbolic(ratio) else float(ratio)).limit_denominator(
-                TEETH
-            )
-            if is_symbolic(ratio) or abs(float(fraction) - ratio) > 1e-14 * abs(ratio):
-                return impossible(
-                    f"{self.ratio_field}: expected a ratio of integers up to {TEETH}, as the "
-                    f"angles of {a.name} and {b.name} are known modulo 2 pi only, got {ratio}; in "
-                    "joint coordinates, joints outside loops allow any number"
-                )
-            ratio, period = float(fraction), 2 * pi / fraction.denominator
-        elif any(cyclic):
-            period = 2 * pi * ratio if cyclic[0] else 2 * pi
-        return linear(kin, self.name, [(a, along_a, -ratio), (b, along_b, 1.0)], offset, period)
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Gear(Coupling):
-    """Coupling of two angles: angle_b = ratio angle_a + offset.
-
-    With z the number of teeth and axes in the same direction, `ratio` is -z_a/z_b for external
-    gears and +z_a/z_b for a belt or an internal gear. Result: `<name>_moment` [N m] on the child
-    of b.
-    """
-
-    a: str
-    b: str
-    ratio: Scalar
-    offset: Scalar = 0.0
-    direction_a: str = "turn"
-    direction_b: str = "turn"
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Rolling(Coupling):
-    """Coupling of an angle and a displacement: s_b = radius angle_a + offset.
-
-    Examples are a pinion on its rack, a wheel that rolls without slipping, and a drum with its
-    rope. A negative radius reverses the direction. Result: `<name>_force` [N] on the child of b.
-    For a disc in a plane, angle and displacement are the directions "turn" and "x" of one `Planar`
-    joint; the result is then the force that the track must transmit without slipping.
-    """
-
-    ratio_field = "radius"
-
-    a: str
-    b: str
-    radius: Scalar
-    offset: Scalar = 0.0
-    direction_a: str = "turn"
-    direction_b: str = "slide"
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Screw(Coupling):
-    """Thread of a cylindrical joint: slide = lead / (2 pi) turn + offset.
-
-    Result: `<name>_force` [N] along the axis on the child of the joint.
-    """
-
-    ratio_field = "lead"
-
-    joint: str
-    lead: Scalar
-    offset: Scalar = 0.0
-
-    @property
-    def _ends(self) -> tuple[tuple[str, str], tuple[str, str]]:
-        return (self.joint, "turn"), (self.joint, "slide")
-
-    @property
-    def _ratio(self) -> Scalar:
-        return self.lead / (2 * pi)

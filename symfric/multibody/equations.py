@@ -1,16 +1,17 @@
 """Equations of motion of a mechanism in given coordinates, as CasADi expressions."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate, pairwise
+from itertools import accumulate, chain, pairwise
 from typing import final
 
 import casadi as ca
 
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.variable import stacked, symbols_of
-from symfric.laws.composed.isotropic import SpatialSlip
+from symfric.multibody.actuated import ActuatedElement
 from symfric.multibody.constraints import Constraint, Held
+from symfric.multibody.contact import Contact, joint_contacts
 from symfric.multibody.dynamics import (
     Loop,
     Wrench,
@@ -19,11 +20,10 @@ from symfric.multibody.dynamics import (
     loop_of,
     normalisations,
 )
-from symfric.multibody.forces import ZERO, Axial, Force, Gravity, Load
-from symfric.multibody.joint import Contact
+from symfric.multibody.forces import Force, Gravity
 from symfric.multibody.kinematics import Cuts, Kinematics, Turn, kinematics
 from symfric.multibody.spatial import vector
-from symfric.multibody.topology import Topology, body_of
+from symfric.multibody.topology import Topology
 
 
 @final
@@ -41,7 +41,7 @@ class Equations:
         F: friction forces of the contacts [N].
         phi, phi_dot, phi_ddot: constraints and their time derivatives, shape (m, 1).
         balance: M a + Phi_q' lam - Q, shape (n, 1), affine in a, lam and F.
-        contacts: contacts of all joints with friction.
+        contacts: contacts of all joints and elements with friction.
         normals: normal force of each contact [N], in terms of q, qd, a, lam.
         kinetic, potential: energies [J].
         power: power of all applied forces, of friction and of drives on the bodies [W].
@@ -104,6 +104,11 @@ class Equations:
         return symbols_of(turn.angle for turn in self.turns)
 
     @property
+    def N(self) -> ca.SX:
+        """Symbols of the normal forces that `normals` contain, shape (k, 1)."""
+        return stacked(c.normal_symbol for c in self.contacts)
+
+    @property
     def multipliers(self) -> dict[str, str]:
         """Unit of each multiplier by its name, including those of redundant constraints."""
         found: dict[str, str] = {}
@@ -149,13 +154,15 @@ def equations(
     every[independent] = lam
     sizes = (part.phi.numel() for part in (*loops, *held))
     own = [every[i:j, 0] for i, j in pairwise(accumulate(sizes, initial=0))]
-    contacts = tuple(_contacts(kin))
+    of_held = list(zip(held, own[len(loops) :], strict=True))
+    rubbing = (c.contacts(kin, x) for c, (_, x) in zip(constraints, of_held, strict=True))
+    elements = (f.contact(kin) for f in forces if isinstance(f, ActuatedElement))
+    contacts = (*joint_contacts(kin), *chain(*rubbing), *elements)
     loads = [load for f in forces if not isinstance(f, Gravity) for load in f.loads(kin)]
-    loads += [load for c in contacts for load in _rubbing(kin, c)]
+    loads += [load for c in contacts for load in c.loads(kin)]
     weights = [load for f in gravity for load in f.loads(kin)]
     power = sum((load.power(kin) for load in (*loads, *weights)), ca.SX(0))
     power += ca.dot(every, ca.jacobian(phi, t))
-    of_held = zip(held, own[len(loops) :], strict=True)
     in_parent = [loop.reaction(x) for loop, x in zip(loops, own, strict=False)]
     loads += [load for part, x in of_held for load in part.loads(x)]
     of_loops = list(zip(loops, in_parent, strict=True))
@@ -173,7 +180,7 @@ def equations(
     phi = phi[independent, 0]
     phi_dot = ca.jtimes(phi, q, qd) + ca.jacobian(phi, t)
     phi_ddot = ca.jtimes(phi, q, a) + ca.jtimes(phi_dot, q, qd) + ca.jacobian(phi_dot, t)
-    normals = tuple(_normal(kin, c, pressing) for c in contacts)
+    normals = tuple(c.normal(kin, pressing) for c in contacts)
     potential = sum((f.energy(kin) for f in forces), ca.SX(0))
     return Equations(
         kin, tuple(forces), loops, held, tuple(turns.values()), norms.numel(), q, qd, a, lam,
@@ -185,41 +192,4 @@ def equations(
 def normals_with(eq: Equations, eps: Mapping[str, Scalar]) -> tuple[ca.SX, ...]:
     """Return the normal force of each contact, smoothed with the widths `eps` by `pressed` name."""
     rounded = (replace(c, friction=replace(c.friction, eps=eps[c.pressed])) for c in eq.contacts)
-    return tuple(_normal(eq.kin, contact, eq.pressing) for contact in rounded)
-
-
-def _contacts(kin: Kinematics) -> Iterator[Contact]:
-    """Yield the contacts of all joints with friction."""
-    for joint in kin.topology.joints.values():
-        if (friction := joint.friction) is None:
-            continue
-        for direction in joint.rubs:
-            name = joint.name if len(joint.rubs) == 1 else f"{joint.name}_{direction}"
-            rate = kin.spin(joint) if direction == "ball" else kin.rate(joint, direction)
-            slip = rate if direction == "slide" else friction.arm * rate
-            law = SpatialSlip(friction.law) if direction == "ball" else friction.law
-            pressed = name if direction in ("x", "y") else joint.name
-            F = ca.SX.sym(f"{name}_friction", slip.numel())
-            yield Contact(name, joint.name, direction, friction, law, pressed, slip, F)
-
-
-def _rubbing(kin: Kinematics, contact: Contact) -> list[Load | Axial]:
-    """Return the loads of a friction force on the child and the parent of its joint."""
-    joint = kin.topology.joints[contact.joint]
-    if contact.direction != "ball":
-        return [Axial(joint, contact.direction, contact.load)]
-    parent, child = body_of(joint.parent), body_of(joint.child)
-    moment = kin.motion[parent].R @ kin.frame(joint.parent).R @ contact.load
-    return [
-        Load(body, ZERO, kin.motion[body].p, sign * moment, ZERO)
-        for body, sign in ((child, 1), (parent, -1))
-    ]
-
-
-def _normal(kin: Kinematics, contact: Contact, pressing: Mapping[str, Wrench]) -> ca.SX:
-    """Return the normal force of a contact [N]."""
-    joint, (F, T) = kin.topology.joints[contact.joint], pressing[contact.joint]
-    if contact.direction not in ("x", "y"):
-        return joint.normal_force(contact.friction, F, T)
-    R = joint.bearing(contact.direction, kin.rotation(joint))
-    return contact.friction.normal_force(("turn",), R @ F, R @ T)
+    return tuple(contact.normal(eq.kin, eq.pressing) for contact in rounded)

@@ -72,7 +72,11 @@ class Axial(NamedTuple):
         )
 
 
-FUNCTION_OF = {"motion": ("time", "t"), "expression": ("the kinematics", "kin")}
+FUNCTION_OF = {
+    "motion": ("time", "t"),
+    "expression": ("the kinematics", "kin"),
+    "lift": ("the angle", "angle"),
+}
 """Argument of the functions in parts, in words and as a name, by field."""
 
 

@@ -7,8 +7,6 @@ and the velocity p_PC' = H_v q' in components of P. The constraints are expressi
 vanish for every q; they replace the coordinates of a joint that closes a loop. The axis of a joint
 is z of both frames.
 
-Only this module applies friction laws to bodies, with the minus sign of `Contact.load`.
-
 The reaction of a joint on its child, force F and moment T about the joint point in the axes of the
 child's frame, loads the bearing at two stations at distance a on z:
 
@@ -39,11 +37,10 @@ import numpy as np
 
 from symfric.foundation.checks import as_number
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
-from symfric.foundation.units import turned
 from symfric.foundation.variable import take_si
 from symfric.laws import Law
 from symfric.laws.base.law import FORCE, require_law
-from symfric.laws.composed.isotropic import SpatialSlip, anisotropy
+from symfric.laws.composed.isotropic import anisotropy
 from symfric.model.sketch import Symbol
 
 OFFERED = (FORCE,)
@@ -171,41 +168,6 @@ class JointFriction:
             forces = [(fx1 + f3,), (fy1,), (fx2,), (fy2,), (f3,)]
         pressing = [f for f in forces if not ca.vertcat(*f).is_zero()]
         return sum((self.magnitude(*f) for f in pressing), start=ca.SX(self.preload))
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Contact:
-    """Friction of a joint in one direction.
-
-    Attributes:
-        name: prefix of the results of the contact.
-        joint: name of the joint.
-        direction: "slide", "turn", "x", "y" or "ball".
-        friction: law and geometry.
-        law: the law; for a ball its vector form.
-        pressed: name of the normal force, which directions of one bearing share.
-        slip: sliding velocity [m/s], shape (1, 1); for a ball (3, 1).
-        F: symbols of the friction force [N], of the same shape.
-    """
-
-    name: str
-    joint: str
-    direction: str
-    friction: JointFriction
-    law: Law | SpatialSlip
-    pressed: str
-    slip: ca.SX
-    F: ca.SX
-
-    def unit(self, of_sliding: str) -> str:
-        """Return a unit of the law; that of rotation if the law is one of moment and rate."""
-        return turned(of_sliding) if self.friction.turning else of_sliding
-
-    @property
-    def load(self) -> ca.SX:
-        """Force [N] along or moment [N m] about the axis on the child; a vector for a ball."""
-        return -self.F if self.direction == "slide" else -self.friction.arm * self.F
 
 
 HINTS = {

@@ -16,9 +16,13 @@ from symfric.foundation.symbolic import plain, with_symbols
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Model, Variables
 from symfric.multibody import checks
+from symfric.multibody.actuated import ActuatedElement
 from symfric.multibody.assembly import assemble
 from symfric.multibody.constraints import Constraint
+from symfric.multibody.contact import places_of
+from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Force, Gravity, SpringDamper
+from symfric.multibody.idle import idle
 from symfric.multibody.joint import Joint
 from symfric.multibody.prepare import (
     Prepared,
@@ -84,7 +88,9 @@ class Mechanism(packed.Portable, Showing):
             rows.append((j.name, type(j).__name__, f"{j.parent} - {j.child}", law))
         for part in (*self.forces, *self.constraints):
             ends = f"{part.a} - {part.b}" if isinstance(part, SpringDamper) else ""
-            rows.append((part.name, type(part).__name__, ends, ""))
+            law = getattr(getattr(part, "friction", part), "law", None)
+            rubs = "" if law is None else type(law).__name__
+            rows.append((part.name, type(part).__name__, ends, rubs))
         inputs = f"inputs: {among(v.name for v in self.inputs)}"
         return Shown(
             f"mechanism '{self.name}': {counted(len(bodies), 'body', 'bodies')}, "
@@ -206,6 +212,7 @@ class Mechanism(packed.Portable, Showing):
         self._refuse([*made.problems, *made.misfits, *left_open(made), *loose])
         self._refuse(infinite(made))
         self._refuse(without_inertia(made))
+        self._refuse(idle(made.eq, self.constraints))
         if formulation == "absolute":
             self._refuse(inseparable(made))
             made = in_absolute_coordinates(made, self.constraints)
@@ -231,6 +238,14 @@ class Mechanism(packed.Portable, Showing):
         problems += checks.naming(bodies, self.joints, (*self.forces, *self.constraints), u)
         weights = list(checks.weights(bodies, p))
         bearings = list(checks.bearings(self.joints, symbols_of(p), symbols_of(u)))
+        rubbing = ((c, getattr(c, "friction", None)) for c in self.constraints)
+        known = symbols_of((*p, *u))
+        for c, friction in rubbing:
+            if isinstance(friction, ElementFriction):
+                bearings += checks.rubbing(f"{c.kind} '{c.name}' > friction", friction, known)
+        for f in self.forces:
+            if isinstance(f, ActuatedElement):
+                bearings += checks.rubbing(f"{f.kind} '{f.name}'", f, known)
         self._refuse([*problems, *weights, *bearings] if problems else ())
         tree = spanning_tree({body.name: body for body in bodies}, self.joints)
         loose = list(checks.connected(tree))
@@ -325,19 +340,19 @@ def functions(
     if applied := [c for c in eq.contacts if c.law.inputs]:
         law = type(applied[0].friction.law).__name__
         raise ValueError(
-            f"{where} > joint '{applied[0].joint}' > friction > law: expected one that needs only "
-            f"v and N, got {law}, whose force in stick depends on the motion; use `build`"
+            f"{where} > {applied[0].law_place}: expected one that needs only v and N, got {law}, "
+            "whose force in stick depends on the motion; use `build`"
         )
     contacts = slips(eq, [1.0] * len(eq.contacts))
     forces = stacked(c.force for c in contacts)
     for c in contacts:
         if c.N is not c.normal:
-            forces = ca.substitute(forces, c.N, c.normal)
+            normal = c.contact.explicit_normal(c.normal, c.force, c.N)
+            forces = ca.substitute(forces, c.N, normal)
     if ca.depends_on(forces, eq.F):
-        pressed = (c.contact.joint for c in contacts if ca.depends_on(c.normal, eq.F))
-        names = ", ".join(f"'{name}'" for name in dict.fromkeys(pressed))
+        names = places_of(c.contact for c in contacts if ca.depends_on(c.normal, eq.F))
         raise ValueError(
-            f"{where} > joint {names} > friction: expected a normal force that does not depend on "
+            f"{where} > {names} > friction: expected a normal force that does not depend on "
             "friction; use `build` for a model, or a constant normal force"
         )
     still = [ca.SX.zeros(x.numel()) for x in (eq.a, eq.lam, eq.F)]

@@ -39,7 +39,8 @@ class Prepared:
         q0, qd0: start values of q and qd as numbers.
         labels: names of the multipliers.
         redundant: names of the multipliers of omitted constraints.
-        undetermined: joints whose normal force is undetermined because of redundant constraints.
+        undetermined: joints and elements whose normal force is undetermined because of redundant
+            constraints, as messages name them.
         open_reactions: joints whose reactions are undetermined.
         singular: True if constraints are dependent at the start but independent near it.
         problems: messages about invalid constraints.
@@ -129,7 +130,7 @@ def written(
     found = start.rank(at, q0, range(eq.m - eq.norms, eq.m))
     if not found.redundant:
         return replace(made, singular=found.singular)
-    normals = zip((c.joint for c in eq.contacts), eq.normals, strict=True)
+    normals = zip((c.place for c in eq.contacts), eq.normals, strict=True)
     reactions = ((name, ca.vertcat(*wrench)) for name, wrench in eq.reactions.items())
     return replace(
         made,
@@ -247,7 +248,7 @@ def left_open(made: Prepared) -> Iterator[str]:
     """Yield messages about friction that depends on undetermined reactions."""
     for name in made.undetermined:
         yield (
-            f"joint '{name}' > friction: expected reactions that the motion determines, got a "
+            f"{name} > friction: expected reactions that the motion determines, got a "
             f"normal force that the redundant constraints {', '.join(made.redundant)} leave open; "
             "close the loop with a joint of fewer constraints: PlanarRevolute, PlanarPrismatic or "
             "PinInSlot in a planar mechanism, a ball or a PointOnLine in space"
@@ -312,8 +313,9 @@ def without_friction(made: Prepared) -> tuple[Array, Array, Array]:
     eq = made.eq
     unknowns = ca.vertcat(eq.a, eq.lam)
     turned = ca.densify(starts_of(turn.angle for turn in eq.turns))
-    symbols = [eq.angles, eq.F, symbols_of(made.u), eq.kin.t]
+    symbols = [eq.angles, eq.F, symbols_of(made.u), eq.kin.t, eq.N]
     zero = [turned, ca.SX.zeros(eq.F.numel()), ca.SX(starts_of(made.u)), ca.SX(0)]
+    zero.append(ca.SX.ones(eq.N.numel()))
     expressions = [ca.vertcat(eq.balance, eq.phi_ddot), stacked(eq.normals)]
     rows, normals = ca.substitute(expressions, symbols, zero)
     arguments = [unknowns, eq.q, eq.qd, symbols_of(made.p)]

@@ -15,8 +15,8 @@ from symfric.laws.base.law import FORCE
 from symfric.model import Event, Variables, kinds
 from symfric.model.contact import mode_events
 from symfric.multibody.applied import Rest, capacity_of, forward, switches_at
+from symfric.multibody.contact import Contact, depends_on_load
 from symfric.multibody.equations import Equations
-from symfric.multibody.joint import Contact
 
 
 @final
@@ -43,13 +43,6 @@ class Slip:
     rate: ca.SX
     force: ca.SX
     inputs: dict[str, ca.SX]
-
-
-def depends_on_load(law: Law) -> bool:
-    """Return True if the friction force or the rates of `law` depend on the normal force."""
-    N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
-    v = ca.SX.sym("v")
-    return ca.depends_on(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)), N)
 
 
 def keeps_deflection(law: Law) -> bool:
@@ -80,9 +73,12 @@ def slips(
     for contact, normal, start in zip(eq.contacts, eq.normals, normal_at_start, strict=True):
         law, pressed = contact.friction.law, contact.pressed
         if ca.depends_on(normal, ca.vertcat(eq.a, eq.lam, eq.F)) and depends_on_load(law):
-            doc = f"normal force of joint '{contact.joint}' with {type(law).__name__}"
+            doc = f"normal force of {contact.place} with {type(law).__name__}"
             size, kind = max(1.0, abs(start)), kinds.NORMAL_FORCE
-            new = Variable(f"{pressed}_N", "N", start=start, nominal=size, doc=doc, kind=kind)
+            symbol = ca.SX(0, 0) if contact.normal_symbol.is_empty() else contact.normal_symbol
+            new = Variable(
+                f"{pressed}_N", "N", start=start, nominal=size, doc=doc, symbol=symbol, kind=kind
+            )
             normal = unknowns.setdefault(pressed, new).symbol
         pressing.append(normal)
     levels = [capacity_of(c.law, N) if groups else N
@@ -128,7 +124,7 @@ def events(contacts: Sequence[Slip], groups: Sequence[Rest], rates: Variables) -
     found: list[Event] = []
     for i, slip in enumerate(contacts):
         if i not in in_loops:
-            own = f"{slip.contact.name}_rate"
+            own = slip.contact.rate
             halted = still.get(i, (own,) if own in names else ())
             found += _of_contact(slip, dict.fromkeys(halted, 0.0))
     for rest in groups:

@@ -14,7 +14,7 @@ from symfric.foundation.numeric import Scalar, equals, is_number, is_symbolic
 from symfric.foundation.parameters import check_names, parameters, with_values
 from symfric.laws import Coulomb, Law, Sum, Viscous
 from symfric.laws.base.law import require_law
-from symfric.multibody.constraints import Gear
+from symfric.multibody.couplings import Gear
 from symfric.multibody.forces import JointSpringDamper
 from symfric.multibody.joint import Joint, JointFriction
 from symfric.multibody.joints import Floating, Planar, Prismatic, Revolute

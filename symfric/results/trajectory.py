@@ -133,7 +133,7 @@ class Trajectory(packed.Portable, Signals):
         lines = [
             *([f"friction: {laws}"] if laws else []),
             f"{self.status.name}: {self.message}",
-            f"{counted(counts.steps, 'step')} of {counts.method}{happened}, "
+            f"{counted(counts.steps, 'step')} of {counts.method} ({counts.backend}){happened}, "
             f"{counted(self.t.size, 'time')} in t",
         ]
         if isfinite(counts.error):

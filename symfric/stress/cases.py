@@ -36,7 +36,7 @@ OFFERED: dict[str, set[str]] = {
 
 WRAPPED = ("{}+viscous", "asymmetric({})", "lagged({})", "load_dependent({})",
            "temperature_dependent({})")  # fmt: skip
-METHODS = ("auto",) * 3 + ("rodas5p", "radau5") * 2 + ("rodas4p", "rodas3", "dopri5")
+METHODS = ("auto",) * 3 + ("rodas5p", "radau5") * 2 + ("rodas4p", "radau9", "rodas3", "dopri5")
 ADAPTED = METHODS[:-1]
 """Methods for mechanisms; dopri5 does not support their algebraic unknowns."""
 LOOPS = ("four_mass", "slider_crank", "four_bar")

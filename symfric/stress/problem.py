@@ -14,7 +14,7 @@ from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import parameters, with_values
 from symfric.foundation.status import SolveError
 from symfric.integrator import Hold, Input, Linear, simulate
-from symfric.integrator.arguments import chosen
+from symfric.integrator.arguments import another, chosen
 from symfric.laws import law_from_text
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory
@@ -240,7 +240,7 @@ def attempt(
 
 def other_method(case: Case) -> str:
     """Return the name of a method of another family than that of the case."""
-    return "rodas5p" if chosen("case", case.method, case.rtol).name == "radau5" else "radau5"
+    return another(chosen("case", case.method, case.rtol))
 
 
 def third_method(case: Case) -> str:

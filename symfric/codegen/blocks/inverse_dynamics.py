@@ -16,13 +16,16 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.model import Output, Variables
 from symfric.multibody import Mechanism
+from symfric.multibody.actuated import ActuatedContact
+from symfric.multibody.contact import Contact, ElementContact, JointContact
 from symfric.multibody.equations import Equations
-from symfric.multibody.joint import Contact
 from symfric.multibody.urdf import read_urdf
 
 WHERE = "inverse dynamics"
 
 SAID = SHEET["mechanism"]
+NEWTON = 4
+"""Number of Newton steps for the multipliers of couplings with friction."""
 
 
 def inverse_dynamics_block(
@@ -52,7 +55,9 @@ def inverse_dynamics_block(
     run time. Inputs of the mechanism keep their start values; those of motors are zero.
 
     Couplings of constant ratio, such as fingers that mimic another one in URDF files, reduce the
-    coordinates to those of the leading joints; tau includes the forces that move the others.
+    coordinates to those of the leading joints; tau includes the forces that move the others. In a
+    coupling with friction, a leads b: the forces tau act on a. Its normal force depends on its own
+    friction and follows from four Newton steps, which are exact for friction proportional to N.
 
     Args:
         mechanism: a mechanism, a URDF file or its text; `read_urdf(file, law=..., bearings=...)`
@@ -81,6 +86,7 @@ def inverse_dynamics_block(
         contact_step(contact, machine.along(contact), normal, ca.SX(size.h), fold=fold)
         for contact, normal in zip(eq.contacts, eq.normals, strict=True)
     ]
+    machine = machine.loaded(stacked(part.force for part in parts))
     labels = [machine.label(part.along) for part in parts]
     states, order = numbered([part.law.states for part in parts], labels)
     if h is not None and not states:
@@ -143,6 +149,7 @@ class _Machine(NamedTuple):
         inputs: q, qd, qdd of the leading coordinates.
         symbols, values: symbols in the equations, and their values in terms of the inputs.
         T: matrix of the rates of all coordinates by the leading rates, shape (n, k).
+        follows: indices of the other coordinates.
     """
 
     name: str
@@ -153,6 +160,7 @@ class _Machine(NamedTuple):
     symbols: Sequence[ca.SX]
     values: Sequence[ca.SX]
     T: ca.DM
+    follows: Sequence[int]
 
     @property
     def identifier(self) -> str:
@@ -161,8 +169,10 @@ class _Machine(NamedTuple):
 
     def along(self, contact: Contact) -> str:
         """Return the coordinate that a contact resists."""
-        joint = self.eq.kin.topology.link_of[contact.joint].joint
-        return joint.coordinate(joint.directions[contact.direction])
+        if isinstance(contact, JointContact):
+            joint = self.eq.kin.topology.link_of[contact.part].joint
+            return joint.coordinate(joint.directions[contact.direction])
+        return contact.name
 
     def label(self, coordinate: str) -> str:
         """Return the number of a leading coordinate, or the name of another coordinate."""
@@ -172,6 +182,23 @@ class _Machine(NamedTuple):
     def moved(self, expression: ca.SX) -> ca.SX:
         """Return an expression of all coordinates in terms of the leading coordinates."""
         return ca.substitute([expression], list(self.symbols), list(self.values))[0]
+
+    def loaded(self, F: ca.SX) -> "_Machine":
+        """Return the machine with the multipliers of couplings under the friction forces `F`.
+
+        Without forces on the coordinates that follow, their rows of the balance vanish.
+        """
+        eq = self.eq
+        if not ca.depends_on(F, eq.lam):
+            return self
+        pairs = [(s, v) for s, v in zip(self.symbols, self.values, strict=True) if s is not eq.lam]
+        rows = ca.substitute(eq.balance, eq.F, F)[list(self.follows), 0]
+        (rows,) = ca.substitute([rows], [s for s, _ in pairs], [v for _, v in pairs])
+        following, lam = eq.lam - ca.solve(ca.jacobian(rows, eq.lam), rows), ca.SX.zeros(eq.m)
+        for _ in range(NEWTON):
+            lam = ca.substitute(following, eq.lam, lam)
+        values = [lam if s is eq.lam else v for s, v in zip(self.symbols, self.values, strict=True)]
+        return self._replace(values=values)
 
     def leading(self, forces: ca.SX) -> ca.SX:
         """Return forces along all coordinates as forces along the leading coordinates."""
@@ -261,6 +288,7 @@ def _machine(
         symbols=[eq.q, eq.qd, eq.a, eq.lam, symbols_of(u)],
         values=[T_sx @ y + offset, T_sx @ yd, T_sx @ ydd, ca.SX.zeros(eq.m), ca.SX(starts_of(u))],
         T=T,
+        follows=[i for i in range(eq.n) if i not in leads],
     )
 
 
@@ -287,10 +315,9 @@ def _check(eq: Equations, mechanism: Mechanism) -> None:
     everything = ca.veccat(eq.balance, *eq.normals, eq.phi)
     if ca.depends_on(everything, eq.kin.t):
         raise ValueError(f"{where}: expected time-independent forces and constraints, got others")
-    if ca.depends_on(stacked(eq.normals), eq.F):
-        pressed = [
-            c.joint for c, N in zip(eq.contacts, eq.normals, strict=True) if ca.depends_on(N, eq.F)
-        ]
+    pairs = zip(eq.contacts, eq.normals, strict=True)
+    own = [(c, N) for c, N in pairs if not isinstance(c, ActuatedContact)]
+    if pressed := [c.part for c, N in own if ca.depends_on(N, eq.F)]:
         raise ValueError(
             f"{where}: expected normal forces that do not depend on friction, got that of "
             f"{', '.join(dict.fromkeys(pressed))}, which depends on other friction; give it a "
@@ -312,9 +339,13 @@ def couplings(eq: Equations) -> tuple[ca.DM, ca.DM, list[int]]:
             "out, or use `plant_block`"
         )
     matrix, constant = ca.DM(ca.densify(J)).full(), ca.DM(at_zero).full()
+    elements = (c.ends[1] for c in eq.contacts if isinstance(c, ElementContact))
+    links = eq.kin.topology.link_of
+    driven = {links[b.joint.name].first + b.joint.directions[b.direction] for b in elements}
     follows: list[int] = []
     for row in matrix:
-        follows.append(max(i for i in range(eq.n) if row[i] != 0.0 and i not in follows))
+        free = (i for i in range(eq.n) if row[i] != 0.0 and i not in follows)
+        follows.append(max(free, key=lambda i: (i in driven, i)))
     leads = [i for i in range(eq.n) if i not in follows]
     T, c = np.zeros((eq.n, len(leads))), np.zeros((eq.n, 1))
     T[leads, range(len(leads))] = 1.0

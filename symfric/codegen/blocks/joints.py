@@ -13,8 +13,10 @@ from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked, symbols_of
 from symfric.model import Variables
 from symfric.multibody import GROUND, Body, Mechanism
+from symfric.multibody.contact import Contact
+from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Gravity
-from symfric.multibody.joint import Contact, JointFriction
+from symfric.multibody.joint import JointFriction
 from symfric.multibody.spatial import Frame, skew, vector
 
 
@@ -55,9 +57,8 @@ def contact_step(
     law, friction = contact.friction.law, contact.friction
     if law.inputs:
         raise ValueError(
-            f"inverse dynamics: joint '{contact.joint}' > friction > law: expected one that needs "
-            f"only v and N, got {type(law).__name__}, which also needs "
-            f"{', '.join(i.name for i in law.inputs)}"
+            f"inverse dynamics: {contact.law_place}: expected one that needs only v and N, got "
+            f"{type(law).__name__}, which also needs {', '.join(i.name for i in law.inputs)}"
         )
     block = law_block(law, free=() if fold else None, turning=friction.turning)
     v, N = block.inputs
@@ -65,17 +66,22 @@ def contact_step(
     if level:
         normal = level[0].symbol
     sizes = [variable for variable in block.parameters if variable.name == "h"]
+    symbols, values = [v.symbol, symbols_of(sizes)], [contact.slip, h if sizes else ca.SX(0, 1)]
     parts = (block.outputs["F"].expression, block.next, *(s for s, _ in block.resets.values()))
-    force, following, *sliding = ca.substitute(
-        [ca.SX(part) for part in parts],
-        [v.symbol, N.symbol, symbols_of(sizes)],
-        [contact.slip, normal, h if sizes else ca.SX(0, 1)],
-    )
+    parts = ca.substitute([ca.SX(part) for part in parts], symbols, values)
+    normal = contact.explicit_normal(normal, parts[0], N.symbol)
+    if ca.depends_on(normal, contact.F):
+        raise ValueError(
+            f"inverse dynamics: {contact.law_place}: expected one whose force is proportional to "
+            f"the normal force, got {type(law).__name__}; friction presses this element, and no "
+            "equation is solved"
+        )
+    force, following, *sliding = ca.substitute(parts, [N.symbol], [normal])
     parameters = (*(v for v in block.parameters if v not in sizes), *level)
     return ContactStep(along, block, force, parameters, following, *sliding or [ca.SX(0, 1)])
 
 
-def _level(friction: JointFriction) -> Variables:
+def _level(friction: JointFriction | ElementFriction) -> Variables:
     """Return the constant normal force of a joint as a parameter; () if it is not constant."""
     if friction.normal is None or not is_number(friction.normal):
         return ()

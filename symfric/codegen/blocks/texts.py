@@ -10,8 +10,9 @@ from textwrap import dedent
 from typing import NamedTuple
 
 from symfric.foundation.parameters import Option, Parametric, options
-from symfric.integrator.methods.families import BackwardEuler, Exponential, Radau, Rosenbrock
+from symfric.integrator.methods.families import BackwardEuler, Exponential, Rosenbrock
 from symfric.integrator.methods.method import Method
+from symfric.integrator.methods.radau import Radau
 
 SHEET = tomllib.loads(Path(__file__).with_name("sheet.toml").read_text(encoding="utf-8"))
 """Fixed texts of data sheets."""
@@ -132,7 +133,8 @@ def _formula(method: Method) -> str:
             return f"    x+ = x + h f(x+, u)    by {method.iterations} Newton iterations from x"
         case Radau():
             return (
-                "    X_i = x + h (a_i1 f(X_1, u) + a_i2 f(X_2, u) + a_i3 f(X_3, u)),   x+ = X_3\n"
+                f"    X_i = x + h sum a_ij f(X_j, u),   i, j = 1 ... {len(method.A)},   "
+                f"x+ = X_{len(method.A)}\n"
                 f"    by {method.iterations} simplified Newton iterations"
             )
         case Rosenbrock():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from hashlib import sha256
 from typing import Any, NamedTuple, final
 
@@ -122,7 +122,7 @@ class InputData:
     key: tuple[str, ...]
     pace: float = np.inf
 
-    @property
+    @cached_property
     def span(self) -> tuple[float, float]:
         """First and last time [s]."""
         return float(self.breaks[0]), float(self.breaks[-1])

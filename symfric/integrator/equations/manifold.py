@@ -207,8 +207,8 @@ def grows(manifold: Manifold, names: tuple[str, ...], y: Array, d: Array, margin
     return (
         f"friction jams, most of all through {names[manifold.first + k + worst]}: the reactions "
         f"grow with the friction that they cause (det(I - dN/dN) = {determinant:.3g}, 1 without "
-        "friction), a tangential shock where it slides, and impacts are excluded; less friction or "
-        "a longer bearing would let it move"
+        "friction), a tangential shock where it slides, and impacts are excluded; less friction, "
+        "a longer bearing or a brake that does not lock itself would let it move"
     )
 
 

@@ -19,7 +19,7 @@ from symfric.integrator.many.members import Program, Runner, Stretch, with_code
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator, built
-from symfric.integrator.running.run import ROUNDS, Tolerances, integrate, own_scale
+from symfric.integrator.running.run import ROUNDS, Tolerances, integrate, own_scale, watchful
 from symfric.integrator.step.attempt import Given, State
 from symfric.model import Model
 
@@ -286,9 +286,8 @@ class SingleJob:
             looks = times[times <= end] if times.size else chunk.ends[m : m + 1]
             y0, p = chunk.S[m, State.Y].copy(), chunk.R[m, Given.d(nx)][: len(self.model.p)].copy()
             try:
-                run, _ = integrate(
-                    integrator, own, y0, p, self.tolerances, self.backend, None, looks
-                )
+                allowed = watchful(self.tolerances, integrator, own)
+                run, _ = integrate(integrator, own, y0, p, allowed, self.backend, None, looks)
             except ValueError as error:  # no consistent start
                 failed[m], reached[m] = str(error), self.inputs.breaks[0]
                 continue

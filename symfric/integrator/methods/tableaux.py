@@ -12,10 +12,10 @@ from symfric.integrator.methods.families import (
     BackwardEuler,
     Explicit,
     Exponential,
-    Radau,
     Rosenbrock,
 )
 from symfric.integrator.methods.method import Array, Method
+from symfric.integrator.methods.radau import Radau, collocation, error_weights, nodes
 
 
 def _array(rows: list[Any]) -> Array:
@@ -41,7 +41,10 @@ def shampine(b: Array, D: Array) -> Array:
 
 
 def through(c: Array) -> Array:
-    """Return the coefficients H of the cubic through 0 and the increments at nodes c; c_s = 1."""
+    """Return the coefficients H of the polynomial through 0 and the increments at nodes c.
+
+    The last node is 1.
+    """
     inner, rows = c[:-1], np.eye(c.size)
     values = (rows[:-1] - inner[:, None] * rows[-1]) / (inner * (1 - inner))[:, None]
     vandermonde: Array = np.vander(inner, increasing=True)
@@ -61,20 +64,38 @@ def _read(family: Any, key: str) -> Any:
 
 _TABLEAUX = tomllib.loads(Path(__file__).with_name("tableaux.toml").read_text("utf-8"))
 _NODES = np.array([(4 - np.sqrt(6.0)) / 10, (4 + np.sqrt(6.0)) / 10, 1.0])
+_POWERS = _NODES[:, None] ** np.arange(1, 4) / np.arange(1, 4)
 
 RODAS5P: Rosenbrock = _read(Rosenbrock, "rodas5p")
 DOPRI5: Explicit = _read(_explicit, "dopri5")
 RADAU5 = Radau(
     name="Radau5",
-    c=_NODES,
+    A=_POWERS @ np.linalg.inv(np.vander(_NODES, increasing=True)),
     E=np.array([-(13 + 7 * np.sqrt(6.0)) / 3, (-13 + 7 * np.sqrt(6.0)) / 3, -1 / 3]),
     H=through(_NODES),
     iterations=3,
+    more=1,
     order=5,
     embedded=3,
     dense=4,
     dense_dae=4,
     source="Hairer and Wanner, Solving Ordinary Differential Equations II, IV.5 and IV.8, 1996",
+)
+_NODES_9 = nodes(5)
+_MATRIX_9 = collocation(_NODES_9)
+RADAU9 = Radau(
+    name="Radau9",
+    A=_MATRIX_9,
+    E=error_weights(_NODES_9, _MATRIX_9),
+    H=through(_NODES_9),
+    iterations=5,
+    more=3,
+    order=9,
+    embedded=5,
+    dense=6,
+    dense_dae=6,
+    source="Hairer and Wanner, Stiff differential equations solved by Radau methods, "
+    "J. Comp. Appl. Math. 111, 1999",
 )
 FOR_DERIVATIVES = replace(RADAU5, finer=8.0)
 """Method for derivatives of runs.
@@ -101,6 +122,7 @@ METHODS: dict[str, Method] = {
     "rodas4p": _read(Rosenbrock, "rodas4p"),
     "rodas3": _read(Rosenbrock, "rodas3"),
     "radau5": RADAU5,
+    "radau9": RADAU9,
     "dopri5": DOPRI5,
     "backward_euler": BACKWARD_EULER,
     "exponential": EXPONENTIAL,

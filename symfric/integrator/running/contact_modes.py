@@ -14,6 +14,9 @@ All of them stick first. The most inconsistent contact changes, the equations ar
 because the forces in other contacts change with it, and so on until all modes are consistent. If
 modes repeat, all combinations are tried, those with most contacts in stick first.
 
+Compiled code repeats the decision, operation by operation, except for loops that have to be closed
+and for the trials of all combinations (`decide.c`).
+
 Limits: for mu_s > mu_d several combinations may be consistent, and one is chosen. If none is found,
 the modes remain those of the switches. Contacts of a loop of one degree of freedom stick together
 and keep their own events. A run records the events that led to the decision, not its result.
@@ -33,6 +36,7 @@ from symfric.foundation.numeric import Array, evaluate
 from symfric.foundation.variable import stacked
 from symfric.model import Model
 from symfric.model.contact import APPLIED, Switching, switching
+from symfric.model.forces import by_laws
 from symfric.model.start import rate_of
 
 Solve = Callable[[Array], Array]
@@ -76,7 +80,8 @@ class ContactModes:
             rows.append(ca.vertcat(up, down, rate_of(ca.SX(c.slip), model), ca.SX(c.slip)))
             slope = ca.DM(ca.jacobian(ca.SX(c.slip), x).sparsity(), 1).full()[0] != 0
             still.append(STILL * max(nominal[slope], default=1.0))
-        look = of_time("contacts", ca.densify(stacked(rows)))
+        every = stacked(rows) if model.holonomic else by_laws(model, stacked(rows))
+        look = of_time("symfric_contacts", ca.densify(every))
         return ContactModes(contacts, look, np.array(still))
 
     def decided(self, t: float, before: Array, y: Array, d: Array, solve: Solve) -> Array | None:

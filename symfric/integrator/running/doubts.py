@@ -41,7 +41,7 @@ from symfric.foundation.variable import strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.record import Run
+from symfric.integrator.running.record import GOOD, Run
 from symfric.model import Model
 from symfric.model.contact import APPLIED, Contact
 from symfric.model.forces import by_laws
@@ -64,10 +64,17 @@ LOOKS = 200
 
 def doubts(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> list[UserWarning]:
     """Return the warnings about a run that ended well; empty if there are none."""
-    if not run.status.ok:
+    if run.status not in GOOD:
         return []
-    overloads = [OverloadWarning(text) for text in _overloads(integrator, inputs, run, p)]
-    return [*overloads, *(EnergyWarning(text) for text in gains(integrator, inputs, run, p))]
+    found = list[UserWarning]()
+    for held in places(integrator.model):
+        if (most := held.bound(run, p)) > 1 + MARGIN:
+            texts = _overloads(held, most, integrator, inputs, run, p)
+            found += [OverloadWarning(text) for text in texts]
+    for sliding in sliding_places(integrator.model):
+        if sliding.suspect(p):
+            found += [EnergyWarning(text) for text in _gains(sliding, integrator, inputs, run, p)]
+    return found
 
 
 def _over_time(
@@ -125,22 +132,21 @@ class Sliding:
         return self._checked[key]
 
 
-def gains(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> Iterator[str]:
-    """Yield messages about contacts whose friction adds energy to the motion."""
-    for sliding in sliding_places(integrator.model):
-        if not sliding.suspect(p):
-            continue
-        (t, y), contact = run.seen, sliding.contact
-        name, unit = f"sliding '{contact.name}'", contact.unit
-        slip, force, steady = _over_time(integrator, inputs, name, sliding.rows, t, y, p)
-        power, worst = force * slip, int(np.argmin(steady * slip))
-        work, turnover = (np.diff(t) @ (w[1:] + w[:-1]) / 2 for w in (power, np.abs(power)))
-        if steady[worst] * slip[worst] < 0 and work < -SHARE * turnover:
-            yield (
-                f"In contact '{contact.name}' friction by {type(contact.law).__name__} adds "
-                f"{-work:.3g} J to the motion: at a slip of {slip[worst]:.3g} {unit('m/s')} its "
-                f"steady force is {steady[worst]:.3g} {unit('N')}, along the slip; check its sign."
-            )
+def _gains(
+    sliding: Sliding, integrator: Integrator, inputs: InputData, run: Run, p: Array
+) -> Iterator[str]:
+    """Yield a message about a contact whose friction adds energy to the motion."""
+    (t, y), contact = run.seen, sliding.contact
+    name, unit = f"sliding '{contact.name}'", contact.unit
+    slip, force, steady = _over_time(integrator, inputs, name, sliding.rows, t, y, p)
+    power, worst = force * slip, int(np.argmin(steady * slip))
+    work, turnover = (np.diff(t) @ (w[1:] + w[:-1]) / 2 for w in (power, np.abs(power)))
+    if steady[worst] * slip[worst] < 0 and work < -SHARE * turnover:
+        yield (
+            f"In contact '{contact.name}' friction by {type(contact.law).__name__} adds "
+            f"{-work:.3g} J to the motion: at a slip of {slip[worst]:.3g} {unit('m/s')} its "
+            f"steady force is {steady[worst]:.3g} {unit('N')}, along the slip; check its sign."
+        )
 
 
 def sliding_places(model: Model) -> tuple[Sliding, ...]:
@@ -224,26 +230,25 @@ class Held:
         return float(self.ratios(self.screen, every, np.tile(p[:, None], (1, 2))).max())
 
 
-def _overloads(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> Iterator[str]:
-    for held in places(integrator.model):
-        most, fixed = held.bound(run, p), held.screen is not None
-        if most <= 1 + MARGIN:
-            continue
-        t, y = run.seen
-        if not fixed:
-            k = _peaks(y[:, held.rows])
-            t, y = t[k], y[k]
-        name = f"held '{held.contact.name}'"
-        force, level, growth = _over_time(integrator, inputs, name, held.watched, t, y, p)
-        ratio = np.abs(force) / np.where(level > 0, level, np.inf)
-        start = max(1.0, ratio[0])  # the start value may exceed the level
-        allowed = (1 + (MARGIN if fixed else WIDE)) * start
-        ratio = ratio if fixed else np.where(growth > 0, ratio, 0.0)
-        k = int(ratio.argmax())
-        if ratio[k] > allowed:
-            yield overload(held, ratio[k], f" at t = {t[k]:.6g} s")
-        elif fixed and most > allowed and not run.complete:  # overload between result times
-            yield overload(held, most)
+def _overloads(
+    held: Held, most: float, integrator: Integrator, inputs: InputData, run: Run, p: Array
+) -> Iterator[str]:
+    """Yield a message about a contact whose force exceeds its level, by `most` at most."""
+    (t, y), fixed = run.seen, held.screen is not None
+    if not fixed:
+        k = _peaks(y[:, held.rows])
+        t, y = t[k], y[k]
+    name = f"held '{held.contact.name}'"
+    force, level, growth = _over_time(integrator, inputs, name, held.watched, t, y, p)
+    ratio = np.abs(force) / np.where(level > 0, level, np.inf)
+    start = max(1.0, ratio[0])  # the start value may exceed the level
+    allowed = (1 + (MARGIN if fixed else WIDE)) * start
+    ratio = ratio if fixed else np.where(growth > 0, ratio, 0.0)
+    k = int(ratio.argmax())
+    if ratio[k] > allowed:
+        yield overload(held, ratio[k], f" at t = {t[k]:.6g} s")
+    elif fixed and most > allowed and not run.complete:  # overload between result times
+        yield overload(held, most)
 
 
 def overload(held: Held, ratio: float, when: str = "") -> str:

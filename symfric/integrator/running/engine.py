@@ -23,6 +23,7 @@ from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import FLOOR, SURE
 from symfric.integrator.running import crossings as limits
+from symfric.integrator.running.contact_modes import TURNING, ContactModes
 from symfric.integrator.running.crossings import LOOKS, Crossings
 from symfric.integrator.running.events import Change, Eventful, Search, Stop
 from symfric.integrator.running.record import Dense, Outputs, Record
@@ -45,7 +46,8 @@ class Loop(ctypes.Structure):
     _fields_ = (
         *(
             (name, ctypes.c_void_p)
-            for name in ("S", "R", "rows", "times", "out", "breaks", "data", "memory", "jumps")
+            for name in ("S", "R", "rows", "times", "out", "breaks", "data", "memory", "jumps",
+                         "reach")
         ),
         ("h_min", ctypes.c_double),
         *(
@@ -63,23 +65,35 @@ class Work:
     Attributes:
         S, R: memory and unknowns of the step, and the constant data of an attempt.
         rows: buffer of records.
+        reach: smallest and largest unknowns at the start and at the ends of steps, shape (2, n).
         loop: counters, limits and addresses.
         outputs: requested values at given times.
         events: state of the event search; None for a model without events.
     """
 
-    def __init__(self, n: int, given: int, dense_rows: int, rows: int | None = None) -> None:
+    def __init__(
+        self, n: int, given: int, dense_rows: int, rows: int | None = None,
+        events: Eventful | None = None,
+    ) -> None:  # fmt: skip
         self.n, width = n, Record(n, dense_rows).width
         if rows is None:
             rows = max(LEAST_ROWS, min(MOST_ROWS, BYTES // (8 * width)))
         self.S, self.R = np.zeros(State.MEMORY + n), np.zeros(given)
-        self.rows = np.empty((rows, width))
+        self.rows, self.reach = np.empty((rows, width)), np.zeros((2, n))
         self.loop = Loop(
-            S=self.S.ctypes.data, R=self.R.ctypes.data, rows=self.rows.ctypes.data, max_rows=rows
-        )
+            S=self.S.ctypes.data, R=self.R.ctypes.data, rows=self.rows.ctypes.data, max_rows=rows,
+            reach=self.reach.ctypes.data,
+        )  # fmt: skip
         self.address = ctypes.addressof(self.loop)
         self.outputs: Outputs = Outputs.at(np.zeros(0), n)
-        self.events: Eventful | None = None
+        self.events = events
+        if events is not None:
+            self.loop.memory, self.loop.jumps, self.loop.max_jumps = events.pointers
+
+    def begin(self, t: float, h: float, y: Array) -> None:
+        """Start at time `t` [s] from the unknowns `y` with the step `h` [s]."""
+        self.S[: State.MEMORY] = State.fresh(t, h)
+        self.S[State.Y] = self.reach[:] = y
         self.breaks, self.data = np.zeros(2), np.zeros((0, 1))
 
     def over(self, breaks: Array, data: Array) -> None:
@@ -88,7 +102,7 @@ class Work:
         loop.intervals, loop.n_data = breaks.size - 1, data.shape[0]
         if breaks.size > 2:
             self.breaks, self.data = np.ascontiguousarray(breaks), np.ascontiguousarray(data)
-            loop.breaks, loop.data = self.breaks.ctypes.data, self.data.ctypes.data
+            loop.breaks, loop.data = address(self.breaks), address(self.data)
         self.enter(0)
 
     def interval(self, times: Array) -> NDArray[np.intp]:
@@ -102,13 +116,11 @@ class Work:
         if self.data.shape[0]:
             self.R[-self.data.shape[0] :] = self.data[:, interval]
 
-    def want(self, outputs: Outputs, events: Eventful | None) -> None:
-        """Set the `outputs` to fill and the `events` to carry out."""
-        loop, self.outputs, self.events = self.loop, outputs, events
+    def want(self, outputs: Outputs) -> None:
+        """Set the `outputs` to fill."""
+        loop, self.outputs = self.loop, outputs
         loop.n_times = outputs.times.size
         loop.times, loop.out = address(outputs.times), address(outputs.values)
-        if events is not None:
-            loop.memory, loop.jumps, loop.max_jumps = events.pointers
 
 
 class _Batch:
@@ -199,7 +211,10 @@ class VmEngine:
             found.append(records)
             count, made = count + records.shape[0], made + tried
             if records.shape[0]:
-                work.outputs.fill(Dense.of(records, work.n))
+                piece = Dense.of(records, work.n)
+                work.outputs.fill(piece)
+                np.minimum(work.reach[0], piece.y1.min(axis=0), out=work.reach[0])
+                np.maximum(work.reach[1], piece.y1.max(axis=0), out=work.reach[1])
             if stop is not Stop.END or loop.interval + 1 == loop.intervals:
                 break
             work.enter(loop.interval + 1)
@@ -302,6 +317,7 @@ def loop_source(
     crossings: Crossings | None = None,
     follows: bool = False,
     follow: Following | None = None,
+    modes: ContactModes | None = None,
 ) -> str:
     """Return the C of the whole loop.
 
@@ -310,17 +326,30 @@ def loop_source(
         crossings: Functions of the events, if any.
         follows: True if there are algebraic unknowns, which have to follow a jump of inputs.
         follow: update of these unknowns; without it, the loop returns at each jump and each event.
+        modes: decision of the modes of several contacts; without it, the loop returns for it.
     """
     settles = follow is not None and crossings is not None and not crossings.closes
     march = filled(
         FOLDER / "march.c",
         follows=0 if not follows else 1 if follow is None else 2,
         settles=int(settles),
-        data=0 if follow is None else follow.round.numel_in(1),
+        decides=int(modes is not None),
+        decide="" if modes is None or crossings is None else decide_source(modes, crossings),
+        data=follow.round.numel_in(1) if follow else crossings.data if crossings else 0,
     )
-    if follow is None:
-        return c_source(step, dense_rows, crossings=crossings) + march
-    return c_source(step, dense_rows, follow.round, crossings=crossings) + follow.c_source + march
+    others = [*([] if follow is None else [follow.round]), *([] if modes is None else [modes.look])]
+    source = c_source(step, dense_rows, *others, crossings=crossings)
+    return source + ("" if follow is None else follow.c_source) + march
+
+
+def decide_source(modes: ContactModes, crossings: Crossings) -> str:
+    """Return the C of the decision of the modes of several contacts."""
+    return filled(
+        FOLDER / "decide.c", modes.look,
+        contacts=len(modes.contacts), at=_table(c.mode for c in modes.contacts),
+        still=", ".join(map(repr, modes.still.tolist())), turning=TURNING,
+        decided=_table(crossings.decided),
+    )  # fmt: skip
 
 
 def search_source(crossings: Crossings, given: int, *, decides: bool = True) -> str:

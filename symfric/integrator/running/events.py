@@ -65,17 +65,26 @@ class Eventful:
 
     Attributes:
         crossings: Functions of the events of the model.
-        tolerance: tolerance of event times [s].
         steps: number of accepted steps in the current engine call.
         memory: see `Memory`.
         rows: records of jumps; the first `count` rows are in use.
     """
 
-    def __init__(self, crossings: Crossings, tolerance: float) -> None:
-        self.crossings, self.tolerance = crossings, tolerance
+    def __init__(self, crossings: Crossings, tolerance: float = 0.0) -> None:
+        self.crossings, self.memory = crossings, Memory.new(crossings.count, tolerance)
         self.count = self.steps = 0
-        self.memory = Memory.new(crossings.count, tolerance)
         self.rows = np.empty((JUMPS, crossings.width))
+
+    def begin(self, tolerance: float) -> None:
+        """Forget the last run; events have this `tolerance` [s] of their times."""
+        self.memory[:] = 0.0
+        self.memory[Memory.TOLERANCE] = tolerance
+        self.count = self.steps = 0
+
+    @property
+    def tolerance(self) -> float:
+        """Tolerance of event times [s]."""
+        return float(self.memory[Memory.TOLERANCE])
 
     @cached_property
     def search(self) -> "Search":
@@ -128,7 +137,7 @@ class Search:
 
     def __init__(self, eventful: Eventful) -> None:
         self.eventful, self.crossings = eventful, eventful.crossings
-        self.memory, self.tolerance = eventful.memory, eventful.tolerance
+        self.memory = eventful.memory
         self._before = self.memory[Memory.before(self.crossings.count)]
         functions = map(_called, self.crossings.functions)
         self._looks, self._noise, _, self._values, self._cut, self._jump = functions
@@ -200,7 +209,9 @@ class Search:
         self.eventful.count += 1
         # the step size after an event is a guess: earlier steps are no guide, since the dynamics
         # may be faster
-        again = max(min(h, limits.RESTART * self.tolerance), limits.LEAST * h, SURE * abs(t))
+        again = max(
+            min(h, limits.RESTART * self.eventful.tolerance), limits.LEAST * h, SURE * abs(t)
+        )
         S[:] = State.at(t, again, after)
         return (Change.CUT if kept else Change.DROPPED), self._request(t, which)
 
@@ -222,6 +233,7 @@ class Search:
         carried through zero, not just to zero, is an event at the very start.
         """
         memory, count = self.memory, self.crossings.count
+        tolerance = self.eventful.tolerance
         h, low = float(row[Record.T1] - row[Record.T0]), 0.0
         g = np.empty((len(LOOKS), count))
         jumped = np.zeros(count, dtype=bool)
@@ -230,7 +242,7 @@ class Search:
         elif memory[Memory.PHASE] == Memory.FRESH:
             g[0] = self._inside(row, d, 0.0)
         else:
-            low = min(limits.SOON * self.tolerance / h, 0.1)
+            low = min(limits.SOON * tolerance / h, 0.1)
             g[0] = self._inside(row, d, low)
             jumped = passed(self._before, g[0], self._directions) & (g[0] != 0)
         g[1:] = self._looks(np.array([low]), row, d)[0].reshape(-1, count)
@@ -238,11 +250,11 @@ class Search:
         if doubts.any() or passed(g[:-1], g[1:], self._directions).any() or jumped.any():
             noise = self._noise(row, d)[0] if doubts.any() else self._none
             doubted, inside = partial(self._doubted, noise), partial(self._inside, row, d)
-            found = Isolation(inside, doubted, self._directions, self.tolerance / h)
+            found = Isolation(inside, doubted, self._directions, tolerance / h)
             found.roots[jumped] = 0.0
             theta = found.first([low + s * (1 - low) for s in LOOKS], g, doubted(g))
             if theta <= 1:
-                return theta, (found.roots - theta) * h <= self.tolerance
+                return theta, (found.roots - theta) * h <= tolerance
         self._before[:] = g[-1]
         memory[Memory.PHASE] = Memory.ON
         return None

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from symfric.foundation.memory import remember
-from symfric.foundation.numeric import Array, Scalar, is_casadi
+from symfric.foundation.numeric import Array, Buffered, Scalar, is_casadi
 from symfric.foundation.programs import CompileError
 from symfric.foundation.variable import stacked
 from symfric.integrator.compiled.background import Prospect
@@ -30,6 +30,7 @@ from symfric.integrator.running.engine import (
     Work,
     loop_source,
 )
+from symfric.integrator.running.events import Eventful
 from symfric.integrator.step.attempt import written
 from symfric.model import Model
 from symfric.model.kinds import MODE
@@ -119,6 +120,11 @@ class Integrator:
             solved = events(t, corrected(s)(s.y, s.d), s.d)
             events = ca.Function("events", [t, s.y, s.d], [solved], {"cse": True})
         return events, sizes
+
+    @cached_property
+    def events_at(self) -> Buffered:
+        """Event expressions at (t, y, d), for single calls."""
+        return Buffered(self.events)
 
     @cached_property
     def schedules(self) -> tuple[str, ...]:
@@ -266,7 +272,9 @@ class Integrator:
         try:
             return self._spare.pop()
         except IndexError:
-            return Work(self.system.n, self.step.numel_in(1), self.tableau.H.shape[0])
+            events = None if self.crossings is None else Eventful(self.crossings)
+            sizes = self.system.n, self.step.numel_in(1), self.tableau.H.shape[0]
+            return Work(*sizes, events=events)
 
     def give_back(self, work: Work) -> None:
         """Return buffers after a run; a few are kept for the next one."""
@@ -284,7 +292,17 @@ class Integrator:
         # models without inputs and events seldom jump: not worth the compile time
         jumps = bool(self.model.u or self.model.events)
         follow = self.follow if self.follows and jumps else None
-        return loop_source(self.step, self.tableau.H.shape[0], self.crossings, self.follows, follow)
+        parts = self.crossings, self.follows, follow, self._decision
+        return loop_source(self.step, self.tableau.H.shape[0], *parts)
+
+    @property
+    def _decision(self) -> ContactModes | None:
+        """Decision for compiled code; None if it is for Python, or if there is one contact."""
+        crossings = self.crossings
+        if crossings is None or crossings.closes or not crossings.decided.any():
+            return None
+        solved = self.follow is not None or not self.follows
+        return self.contact_modes if solved and len(self.contact_modes.contacts) > 1 else None
 
     @cached_property
     def compiled(self) -> Engine:

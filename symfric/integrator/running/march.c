@@ -1,16 +1,18 @@
 /* Complete loop. FOLLOWS is 0 without algebraic unknowns; 1 if it returns at each jump of inputs,
    for a search in Python; 2 if `symfric_follow` updates them. With SETTLES they are also updated
-   after events. */
+   after events. With DECIDES `symfric_decide` decides the modes of several contacts. */
 #define FOLLOWS $follows
 #define SETTLES $settles
+#define DECIDES $decides
 
+$decide
 /* Run in progress: buffers, limits and counters. */
 typedef struct {
   double *S, *R, *rows;
   const double *times;
   double *out;
   const double *breaks, *data;
-  double *memory, *jumps;
+  double *memory, *jumps, *reach;
   double h_min;
   long long max_rows, max_attempts, max_jumps, n_times, found, intervals, interval, n_data;
   long long count, made, jumped;
@@ -34,6 +36,16 @@ static void symfric_outputs(symfric_loop *L, const double *row, int last)
   }
 }
 
+/* Widens the smallest and largest unknowns, reach[2][N], to the end of an accepted step. */
+static void symfric_reach(double *reach, const double *end)
+{
+  long long i;
+  for (i = 0; i < N; ++i) {
+    if (end[i] < reach[i]) reach[i] = end[i];
+    if (end[i] > reach[N + i]) reach[N + i] = end[i];
+  }
+}
+
 /* Makes steps over all input intervals, up to a full record, an attempt limit, a tiny step, or a
    request of events. Returns 7 if algebraic unknowns need a full search after a jump of inputs. */
 int symfric_march(symfric_loop *L)
@@ -54,8 +66,19 @@ int symfric_march(symfric_loop *L)
       stop = 1;
     }
 #endif
+#if DECIDES
+    if (stop == 8) {
+      double *jump = L->jumps + (L->jumped - 1) * JUMP;
+      if (!symfric_decide(L->S[T], jump + 3, L->S + MEM, L->R + GIVEN - $data)) {
+        for (i = 0; i < N; ++i) jump[3 + N + i] = L->S[MEM + i];
+        symfric_note(L->memory);
+        stop = 1;
+      }
+    }
+#endif
     if (counts[0]) {
       ++L->count;
+      symfric_reach(L->reach, row + 2 + N);
       symfric_outputs(L, row, stop == 0 && L->interval + 1 == L->intervals);
     }
     if (stop >= 3) return stop;

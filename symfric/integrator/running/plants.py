@@ -176,11 +176,12 @@ class InPython:
     ) -> None:
         self.integrator, self.plants, self.engine = integrator, plants, engine
         system, step, rows = integrator.system, integrator.step, integrator.tableau.H.shape[0]
-        self.work, self.after = Work(system.n, step.numel_in(1), rows), np.zeros(step.numel_in(0))
         self.events, self.data = None, Given.d(system.nx)
         if integrator.crossings is not None:
             self.events = Eventful(integrator.crossings, tolerance)
-        self.work.want(Outputs.at(np.zeros(0), system.n), self.events)
+        self.work = Work(system.n, step.numel_in(1), rows, events=self.events)
+        self.after = np.zeros(step.numel_in(0))
+        self.work.want(Outputs.at(np.zeros(0), system.n))
         self.work.over(np.zeros(2), np.zeros((0, 1)))
         self.work.loop.h_min = plants.h_min
         self.attempt = bound(step, (self.work.S, self.work.R), (self.after,))

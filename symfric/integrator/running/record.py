@@ -209,12 +209,15 @@ second run, which gives the same bits.
 """
 
 
+GOOD = Status.SUCCESS, Status.TERMINATED
+"""Statuses of a run that ended well."""
+
+
 class Extent(NamedTuple):
-    """Shortest and longest accepted step [s], smallest and largest unknowns (2, n)."""
+    """Shortest and longest accepted step [s]."""
 
     shortest: float
     longest: float
-    reach: Array
 
 
 @final
@@ -235,6 +238,8 @@ class Run:
         most: memory limit of the accepted steps [bytes].
         kept: rows of accepted steps (`Dense.of`), batch by batch. Once the limit is exceeded, only
             the last row.
+        ends: smallest and largest unknowns at the start and at the ends of steps, shape (2, n);
+            None before the first step.
     """
 
     t: float
@@ -250,6 +255,7 @@ class Run:
     message: str = Status.SUCCESS.value
     most: float = MOST_BYTES
     kept: list[Array] = field(default_factory=list[Array])
+    ends: Array | None = None
     _held: int = 0
     _before: Extent | None = None
 
@@ -306,24 +312,17 @@ class Run:
     @property
     def end(self) -> Array:
         """Unknowns at the end of the last accepted step, shape (n,)."""
-        return self._ends[-1][-1]
+        n = self.y.size
+        return self.kept[-1][-1, 2 + n : 2 + 2 * n] if self.kept else self.y
 
     @property
     def extent(self) -> Extent:
         """Range of the step lengths and of the unknowns."""
         lengths = [rows[:, 1] - rows[:, 0] for rows in self._rows]
         if self._before is not None:
-            lengths.append(np.array(self._before[:2]))
+            lengths.append(np.array(self._before))
         every = np.concatenate(lengths)
-        return Extent(float(every.min()), float(every.max()), self.reach)
-
-    @property
-    def reach(self) -> Array:
-        """Smallest and largest unknowns at the start and at the ends of steps, shape (2, n)."""
-        first = self._rows[0][:1, 2 : 2 + self.y.size]
-        ends = [first if self._before is None else self._before.reach, *self._ends]
-        least, most = ([f(y, axis=0) for y in ends] for f in (np.min, np.max))
-        return np.array([np.min(least, axis=0), np.max(most, axis=0)])
+        return Extent(float(every.min()), float(every.max()))
 
     @property
     def seen(self) -> tuple[Array, Array]:
@@ -334,9 +333,15 @@ class Run:
         return np.concatenate(times), np.concatenate([self.y[None], *self._ends])
 
     @property
+    def reach(self) -> Array:
+        """Smallest and largest unknowns at the start and at the ends of steps, shape (2, n)."""
+        return np.array([self.y, self.y]) if self.ends is None else self.ends
+
+    @property
     def farthest(self) -> Array:
         """Largest magnitudes of the unknowns at the start and at the ends of steps, shape (n,)."""
-        return np.abs(self.reach).max(axis=0)
+        low, high = np.abs(self.reach)
+        return np.maximum(low, high)
 
     def at(self, times: Array) -> Array:
         """Return unknowns at `times` [s], shape (n, times); for a long run by recomputation."""

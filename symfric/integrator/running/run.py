@@ -8,20 +8,21 @@ therefore repeated with tolerances on the scale of the motion.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from time import perf_counter
 from typing import final
 
 import numpy as np
 
-from symfric.foundation.numeric import Array, evaluate
+from symfric.foundation.numeric import Array
 from symfric.foundation.status import Status
 from symfric.integrator.equations.expressions import pieces
 from symfric.integrator.equations.initial import JammedError, consistent, first_step, smallest_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.diagnosis import chattering, explain
-from symfric.integrator.running.events import Eventful, Stop
+from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.record import MOST_BYTES, Outputs, Run
+from symfric.integrator.running.record import GOOD, MOST_BYTES, Outputs, Run
 from symfric.integrator.step.attempt import Given, State
 
 SMALL, REST = 1e-3, 1e-12
@@ -40,9 +41,15 @@ def own_scale(size: Array, nominal: Array) -> Array:
 
 
 def finer(scale: Array, size: Array, nominal: Array) -> Array | None:
-    """Return the scale for another run of a motion of `size`; None if `scale` is fine enough."""
-    own = np.minimum(scale, own_scale(size, nominal))
-    return own if (own < 0.1 * scale).any() else None
+    """Return the scale for another run of a motion of `size`; None if `scale` is fine enough.
+
+    It uses `own_scale`, in a form that is fast for few states.
+    """
+    used = scale.tolist()
+    each = zip(used, size.tolist(), nominal.tolist(), strict=True)
+    own = [min(old, x if REST * usual < x < SMALL * usual else usual) for old, x, usual in each]
+    smaller = [new < 0.1 * old for new, old in zip(own, used, strict=True)]
+    return np.array(own) if any(smaller) else None
 
 
 PACES = 8
@@ -106,30 +113,50 @@ def integrate(
     Returns:
         The run, and the last integrator used: pivots that fail during the run are replaced.
     """
-    nominal = integrator.system.nominal
-    if integrator.model.events:
-        # at equilibrium only the events show that an input has become large enough to start motion
-        paces = (pieces(f, *inputs.span).pace for f in integrator.schedules)
-        longest = min(tolerances.max_step, PACES * min(inputs.pace, *paces, np.inf))
-        tolerances = replace(tolerances, max_step=longest)
-    settings = tolerances, backend, progress, times, MOST_BYTES
-    march, scale = _March(integrator, inputs, y0, p, *settings), nominal
+    scale = nominal = integrator.system.nominal
+    atol = tolerances.atol
+    settings = tolerances, atol, backend, progress, times, MOST_BYTES
+    march = _March(integrator, inputs, y0, p, *settings)
     run = march.run()
     for _ in range(ROUNDS if tolerances.follow else 0):
-        # most states are not even small at the end
-        if (np.abs(run.end[: nominal.size]) >= SMALL * nominal).all() or not run.status.ok:
+        if run.status not in GOOD or not _ends_small(run, integrator):
             break
         own = finer(scale, run.farthest[: nominal.size], nominal)
         if own is None:
             break
-        scale, allowed = own, replace(tolerances, atol=tolerances.atol * own / nominal)
-        other = replace(march, tolerances=allowed, progress=None)
-        again = other.run()
-        if not again.status.ok and again.status is not Status.INTERRUPTED:
+        scale, used = own, march.integrator
+        march.atol, march.progress = atol * own / nominal, None
+        again = march.run()
+        if again.status not in (*GOOD, Status.INTERRUPTED):
             run.message += f" Tiny motions were not resolved on their own scale: {again.message}"
-            break
-        run, march = again, other
+            return run, used
+        run = again
     return run, march.integrator
+
+
+def _ends_small(run: Run, integrator: Integrator) -> bool:
+    """Return True if a state is small at the end, as few are, in a form that is fast for few."""
+    sizes = integrator.memory.get("small")
+    if sizes is None:
+        sizes = integrator.memory["small"] = (SMALL * integrator.system.nominal).tolist()
+    return any([not abs(x) >= size for x, size in zip(run.end.tolist(), sizes, strict=False)])
+
+
+@lru_cache
+def _first_and_smallest(t_start: float, t_end: float) -> tuple[float, float]:
+    return first_step(t_end - t_start, t_start), smallest_step(t_end - t_start)
+
+
+def watchful(tolerances: Tolerances, integrator: Integrator, inputs: InputData) -> Tolerances:
+    """Return tolerances for models with events: no step passes over a pulse of an input.
+
+    At equilibrium only the events show that an input has become large enough to start motion.
+    """
+    if not integrator.model.events:
+        return tolerances
+    paces = (pieces(f, *inputs.span).pace for f in integrator.schedules)
+    longest = min(tolerances.max_step, PACES * min(inputs.pace, *paces, np.inf))
+    return replace(tolerances, max_step=longest)
 
 
 @final
@@ -142,6 +169,7 @@ class _March:
     y0: Array
     p: Array
     tolerances: Tolerances
+    atol: Array
     backend: str
     progress: Callable[[float], None] | None
     times: Array
@@ -149,18 +177,22 @@ class _March:
 
     def run(self) -> Run:
         """Run once over all input intervals; keep steps of up to `most` bytes."""
-        integrator, allowed, crossings = self.integrator, self.tolerances, self.integrator.crossings
-        (t_start, t_end), d = self.inputs.span, np.concatenate([self.p, self.inputs.values[:, 0]])
+        integrator, allowed, inputs = self.integrator, self.tolerances, self.inputs
+        (t_start, t_end), d = inputs.span, self.p
+        if inputs.values.size:
+            d = np.concatenate([d, inputs.values[:, 0]])
         y = integrator.start(self.y0, d)
         work = self.work = integrator.borrow()
-        self.events = None if crossings is None else Eventful(crossings, allowed.event)
-        h = min(first_step(t_end - t_start, t_start), allowed.max_step)
-        work.S[:], work.R[:] = State.at(t_start, h, y), allowed.given(t_end, d)
-        work.loop.h_min = smallest_step(t_end - t_start)
+        self.events = work.events
+        if work.events is not None:
+            work.events.begin(allowed.event)
+        first, work.loop.h_min = _first_and_smallest(t_start, t_end)
+        work.begin(t_start, min(first, allowed.max_step), y)
+        Given.fill(work.R, t_end, allowed.rtol, allowed.max_step, self.atol, d)
         outputs = Outputs.at(self.times, y.size)
-        work.want(outputs, self.events)
-        work.over(self.inputs.breaks, self.inputs.values)
-        run = self.made = Run(t_start, y, outputs, most=self.most)
+        work.want(outputs)
+        work.over(inputs.breaks, inputs.values)
+        run = self.made = Run(t_start, y, outputs, [], [], kept=[], most=self.most)
         self.places, self.limit, self.limit_set_at = [y], allowed.max_steps, t_start
         try:
             self._march(t_start, t_end)
@@ -196,19 +228,22 @@ class _March:
         """Integrate over all input intervals."""
         run, model = self.made, self.integrator.model
         if self.events is not None:
-            t = self.work.S[State.T : State.T + 1]
-            self.events.started(model.events, evaluate(self.integrator.events, t, self.y, self.d))
+            t, d = self.work.S[State.T], self.work.R[Given.d(self.integrator.system.nx)]
+            self.events.started(model.events, self.integrator.events_at(t, self.y, d)[0])
         left, reason = 0.0, Stop.FULL
         while reason is not Stop.END and run.status is Status.SUCCESS:
             records, reason, left = self._attempts(left, t_end)
             if run.status is Status.SUCCESS:
                 if self.events is not None and self.events.count:
                     jumps = self.events.jumps(run.steps)
-                    for t, which in zip(jumps.t.tolist(), jumps.which, strict=True):
-                        run.happened += [(t, model.events[i].name) for i in np.flatnonzero(which)]
+                    rows, which = jumps.which.nonzero()
+                    pairs = zip(jumps.t[rows].tolist(), which.tolist(), strict=True)
+                    run.happened += [(t, model.events[i].name) for t, i in pairs]
                     run.jumps.append(jumps)
+                run.ends = self.work.reach.copy()
                 run.keep(records.copy())
-                self._act(reason)
+                if reason is not Stop.END:
+                    self._act(reason)
             if run.status is Status.SUCCESS and self.progress is not None:
                 self.progress((self.t - t_start) / (t_end - t_start))
 
@@ -227,12 +262,13 @@ class _March:
             message = f"{Status.MAX_STEPS.value} Stopped at t = {self.t:g} s.{hint}"
             run.stop(Status.MAX_STEPS, message)
             return self.work.rows[:0], Stop.ATTEMPTS, left
-        began, from_t = perf_counter(), self.t
+        vm = engine.name == "vm"
+        began, from_t = (perf_counter(), self.t) if vm else (0.0, 0.0)
         records, made, reason = engine.march(self.work, allowed)
         run.attempts += made
         if reason is Stop.STEP_TOO_SMALL and self._found_pivots():
             reason = Stop.ATTEMPTS
-        if engine.name == "vm":
+        if vm:
             spent, advance = perf_counter() - began, self.t - from_t
             self.integrator.vm_time += spent
             left = spent * (t_end - self.t) / advance if advance > 0 else left

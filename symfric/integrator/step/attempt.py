@@ -55,7 +55,12 @@ class State:
     @staticmethod
     def at(t: float, h: float, y: ArrayLike) -> Array:
         """Return S at time `t` without history, with the step `h` to try; y has shape (..., n)."""
-        return _joined([t, h, h, GROWTH_MEMORY, 0.0], np.asarray(y, dtype=float))
+        return _joined(State.fresh(t, h), np.asarray(y, dtype=float))
+
+    @staticmethod
+    def fresh(t: float, h: float) -> list[float]:
+        """Return the rows of S before the unknowns, without history."""
+        return [t, h, h, GROWTH_MEMORY, 0.0]
 
 
 @final
@@ -69,6 +74,13 @@ class Given:
     def of(t_end: float, rtol: float, h_max: float, atol: ArrayLike, d: ArrayLike) -> Array:
         """Return R for run data d (..., n_d) and atol (nx,)."""
         return _joined([t_end, rtol, h_max, *np.asarray(atol, dtype=float)], np.asarray(d))
+
+    @staticmethod
+    def fill(R: Array, t_end: float, rtol: float, h_max: float, atol: Array, d: Array) -> None:
+        """Fill R in place, as `of` does."""
+        R[: Given.FIXED] = t_end, rtol, h_max
+        first = Given.FIXED + atol.size
+        R[Given.FIXED : first], R[first:] = atol, d
 
     @staticmethod
     def atol(nx: int) -> slice:

@@ -142,6 +142,27 @@ def step5(x: Scalar) -> Scalar:
     return t * t * t * (10 - t * (15 - 6 * t))
 
 
+def bumps(x: Scalar, centres: range) -> list[Scalar]:
+    """Return the cubic B-splines of x with their centres at consecutive integers, C2.
+
+        max(left, right) / 6,   left = (x - c + 2)+^3 - 4 (x - c + 1)+^3,   right = left(-x)
+
+    Each is 2/3 at its centre c, positive for |x - c| < 2 and exactly 0 beyond; y+ = max(y, 0).
+    Where terms of the maxima are equal, they agree to second order, so that derivatives up to the
+    second are exact there, unlike with |x|.
+    """
+
+    def cubes(sign: int, knots: range) -> dict[int, Scalar]:
+        rises = {k: positive(sign * (x - k), 0.0) for k in knots}
+        return {k: rise * rise * rise for k, rise in rises.items()}
+
+    first, last = centres[0], centres[-1]
+    left, right = cubes(1, range(first - 2, last)), cubes(-1, range(first + 1, last + 3))
+    largest = ca.fmax if is_casadi(x) else np.maximum
+    sides = ((left[c - 2] - 4 * left[c - 1], right[c + 2] - 4 * right[c + 1]) for c in centres)
+    return [largest(*pair) / 6 for pair in sides]
+
+
 def fraction(x: Scalar) -> Scalar:
     """Return `x` modulo 1, in [0, 1)."""
     no_vector("counts", x)

@@ -1,11 +1,11 @@
-"""Bristle laws that slide at a Stribeck level: three forms of LuGre, and elasto-plastic."""
+"""Bristle laws that slide at a Stribeck level: four forms of LuGre, and elasto-plastic."""
 
 from math import pi
 
 from symfric.foundation.numeric import Scalar, column, equals, exp, is_number, sin
 from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.law import Facts, State
+from symfric.laws.base.law import Facts, Input, State, Switch, one_sided
 from symfric.laws.dynamic.element import StribeckLevel, ahead, deflection
 
 
@@ -159,6 +159,69 @@ class LuGrePassive(Bristle):
     def warnings(self) -> tuple[str, ...]:
         """Return an empty tuple, since the damping makes the condition of `LuGre` unnecessary."""
         return ()
+
+
+@parametric
+class LuGreTyre(LuGreNormalised):
+    """LuGre tyre with its mean bristle deflection as state (one state).
+
+        g     = mu_d + (mu_s - mu_d) exp(-|v/v_s|^delta)
+        dz/dt = v - sigma_0 |v| z / g - kappa |v_r| z
+        F     = N (sigma_0 z + sigma_1 dz/dt + sigma_2 v)
+
+    v is the slip velocity of the tyre at the contact, and the input v_r = r omega the rolling speed
+    of the wheel, which carries deflected bristles out of the contact. kappa is between 1/L and 2/L
+    for a contact of length L; 7/(6 L) is usual, and 2/L gives the stiffness at small slip of a
+    contact with even pressure. |v| and |v_r| are smooth as in `LuGre`, as is the passivity.
+    Limits: v_r = 0, a locked wheel, is `LuGreNormalised`, to which `steady_state` refers. In steady
+    rolling z = v / (sigma_0 |v|/g + kappa |v_r|), so that F = N (sigma_0/kappa) v/v_r for small
+    slip; the relaxation length is about 1/kappa.
+    Source: Canudas de Wit, Tsiotras, Velenis, Basset, Gissinger, Vehicle System Dynamics 39(3),
+    2003 (from memory).
+    Checked: integration of the bristles over the contact.
+    """
+
+    facts = Facts(
+        ("D", "S", "St", "V", "P", "L", "B"), "C∞ (C0 at v = 0 as v_eps -> 0)", "unverified"
+    )
+
+    mu_s: Scalar = fields.MU_S(1.2)
+    mu_d: Scalar = fields.MU_D(0.8, lower=1e-12)
+    v_s: Scalar = fields.V_S(5.0)
+    sigma_0: Scalar = fields.SIGMA_0(180.0, unit="1/m", doc="bristle stiffness over load")
+    sigma_1: Scalar = fields.SIGMA_1(1.0, unit="s/m", doc="bristle damping over load")
+    kappa: Scalar = fields.ANGLE(6.0, unit="1/m", doc="inverse length of the contact", lower=0.0)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Rolling speed v_r [m/s]."""
+        return (Input("v_r", "m/s", "rolling speed of the wheel", nominal=10.0),)
+
+    def outside(self, speed: Scalar, N: Scalar, *, v_r: Scalar = 0.0) -> Scalar:
+        """Return the steady sliding force [N] of a locked wheel; raise an error for others."""
+        if not equals(v_r, 0.0):
+            raise one_sided(self, "the force of a rolling tyre does not jump at v = 0")
+        return super().outside(speed, N)
+
+    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+        """Return the break-away force of a locked wheel [N], a bound for a rolling one."""
+        return self.mu_s * N
+
+    def switches(
+        self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar
+    ) -> tuple[Switch, ...]:
+        """Return an empty tuple, since the law has no modes."""
+        return ()
+
+    def rate(self, v: Scalar, N: Scalar, z: Scalar = (), *, v_r: Scalar = 0.0) -> Scalar:
+        """Return the rate of the bristle deflection [m/s], shape (1, 1)."""
+        carried = self.kappa * smooth.magnitude(v_r, self.v_eps)
+        return column(v - (self.relaxation(v, 1.0) + carried) * z[0])
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, v_r: Scalar = 0.0) -> Scalar:
+        """Return the friction force [N]."""
+        damping = self.sigma_1 * self.rate(v, N, z, v_r=v_r)[0]
+        return N * (self.sigma_0 * z[0] + damping + self.sigma_2 * v)
 
 
 @parametric

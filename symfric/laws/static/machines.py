@@ -1,4 +1,4 @@
-"""Laws of specific machines: robot joints, servo drives, belts, and a quarter-car rig."""
+"""Laws of specific machines: robot joints, servo drives, belts, tyres, and a quarter-car rig."""
 
 from math import inf, pi
 
@@ -184,6 +184,54 @@ class Capstan(StaticLaw):
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
         """Return the friction force [N]."""
         return N * expm1(self.mu_d * self.beta * smooth.sign(v, self.v_eps))
+
+
+@parametric
+class BrushTyre(StaticLaw):
+    """Brush tyre with parabolic pressure: force over the slip, in steady rolling.
+
+        s = C v / (3 mu_d N w),   w = sqrt(v_r^2 + v_eps^2)
+        F = mu_d N [1 - (1 - |s|)^3] sign(v) for |s| < 1, else mu_d N sign(v)
+
+    v is the slip velocity of the tyre at the contact, and the input v_r = r omega the rolling speed
+    of the wheel. v / v_r is the theoretical slip: tan(alpha) of the slip angle alpha in free
+    rolling. Like other laws, it opposes v and is odd. `PlanarSlip` of this law is the brush tyre
+    with equal stiffnesses in combined slip.
+    Limits: F = C tan(alpha) for small alpha; the whole contact slides from tan(alpha) =
+    3 mu_d N / C on. v_r = 0 is Coulomb friction that is smooth over 3 mu_d N v_eps / C; it creeps
+    at rest. No relaxation length, aligning moment or camber. Not valid for N = 0.
+    Source: Pacejka, Tire and Vehicle Dynamics, 3.2.1 and 3.2.3 (from memory).
+    Checked: integration of the bristles over the contact.
+    """
+
+    facts = Facts(
+        ("D",), "C1 at v = 0, C2 where the whole contact slides", "unverified", load="by the slip"
+    )
+
+    mu_d: Scalar = fields.MU_D(1.0, lower=1e-9)
+    C: Scalar = fields.SHAPE(8e4, unit="N", doc="cornering stiffness", lower=1e-9)
+    v_eps: Scalar = fields.REST_EPS(0.1, doc="smallest rolling speed", lower=1e-9)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Rolling speed v_r [m/s]."""
+        return (Input("v_r", "m/s", "rolling speed of the wheel", nominal=10.0),)
+
+    @property
+    def velocity_scale(self) -> Scalar:
+        """Slip velocity at which the whole contact slides at rest under 1 N [m/s]."""
+        return 3 * self.mu_d * self.v_eps / self.C
+
+    def outside(self, speed: Scalar, N: Scalar, *, v_r: Scalar = 0.0) -> Scalar:
+        """Return the force of the law [N], since it does not jump at rest."""
+        return self.force(speed, N, v_r=v_r)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = (), *, v_r: Scalar = 0.0) -> Scalar:
+        """Return the friction force [N]."""
+        most = self.mu_d * N
+        s = self.C * v / (3 * most * sqrt(v_r * v_r + self.v_eps * self.v_eps))
+        s = smooth.hold(s, 1.0, 0.0)
+        return most * s * (3 - 3 * smooth.magnitude(s, 0.0) + s * s)
 
 
 def tilt(x_rel: Scalar, theta: Scalar, L_d: Scalar) -> Scalar:

@@ -12,7 +12,7 @@ from symfric.laws import GMS, LuGre, Stribeck
 from symfric.laws.catalogue import ALL_LAWS
 from symfric.scenes import Rabinowicz
 
-NEED_MORE = {"wojewoda", "quarter_car_general", "bam"}
+NEED_MORE = {"wojewoda", "quarter_car_general", "bam", "brush_tyre", "lugre_tyre"}
 """Laws with inputs that a drive does not offer."""
 BEYOND_ORDER = {"leuven", "rate_and_state"}
 """Laws with conditions that are no order of two parameters: the guard refuses a trial."""
@@ -81,7 +81,7 @@ def test_widths_follow_the_speeds_unless_the_user_chose_them() -> None:
 def test_a_drive_that_turns_has_units_that_turn() -> None:
     units = {n: u.unit for n, u in named("stribeck", turning=True).items()}
     assert units["m"] == "kg m^2" and units["v_s"] == "rad/s" and units["sigma_2"] == "N m s/rad"
-    assert subject("stribeck", turning=True).drive.turning
+    assert subject("stribeck", turning=True).drive.turning  # pyright: ignore
 
 
 def test_specs_bound_tie_and_order() -> None:

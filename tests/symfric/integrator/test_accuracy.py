@@ -114,8 +114,8 @@ def test_no_break_away_is_missed(name: str, rtol: float, method: str, count: int
     At rtol = 1e-4, nearly every other integrator loses whole slips.
     """
     velocities = np.linspace(-0.1, 0.1, count)
-    given = {} if rtol > 1e-5 else {"method": method}
-    error = worst_break_away(MODELS[name], velocities, rtol=rtol, **given)
+    method = "auto" if rtol > 1e-5 else method
+    error = worst_break_away(MODELS[name], velocities, rtol=rtol, method=method)
     assert error < (0.02 if rtol > 1e-5 else 1e-3)
 
 
@@ -297,7 +297,8 @@ def test_methods_agree_on_stick_slip_and_count_their_work(method: str, law: sf.L
     run, tableau = sf.simulate(model, 12.0, rtol=1e-7, t_eval=TIMES, method=method), METHODS[method]
     assert run["x"] == pytest.approx(reference["x"], abs=2e-6)
     s = run.statistics
-    attempts, work = s.steps + s.rejections, (7, 1, 2)  # Radau: two Newton iterations
+    # Radau: the first iteration takes one evaluation, 2 others of 3 stages or 4 others of 5
+    attempts, work = s.steps + s.rejections, (21, 1, 3) if method == "radau9" else (7, 1, 2)
     if isinstance(tableau, Explicit | Rosenbrock):
         work = tableau.A.shape[0], *[int(isinstance(tableau, Rosenbrock))] * 2
     assert s.method == tableau.name

@@ -19,11 +19,13 @@ from oracles import viscous_ramp, viscous_sine
 from refusing import not_refused
 
 import symfric as sf
+from symfric import integrator
 from symfric.integrator import arguments, simulate_by_peer
-from symfric.integrator.arguments import LOOSE, check_span, chosen
-from symfric.integrator.methods.tableaux import RADAU5, RODAS5P
+from symfric.integrator.arguments import LOOSE, TIGHT, check_span, chosen
+from symfric.integrator.methods.tableaux import METHODS, RADAU5, RADAU9, RODAS5P
+from symfric.integrator.prepared import REMEMBERED
 from symfric.integrator.running import run as running
-from symfric.integrator.simulate import REMEMBERED
+from symfric.scenes import Pendulum
 
 M, C = 0.8, 2.0
 RUNNERS = ["auto", "rosenbrock", "sundials"]
@@ -79,7 +81,7 @@ def test_no_step_is_longer_than_allowed_and_one_ends_at_each_time(backend: str) 
     free = sf.simulate(model, 2.0, backend=backend)
     assert np.diff(free.step_times).max() > 0.02
     assert run.final["x"] == pytest.approx(free.final["x"], rel=1e-6)
-    first = {"max_step": 1e-18, "times": [1e-17], "max_steps": 100, "throw": False}
+    first = dict[str, Any](max_step=1e-18, times=[1e-17], max_steps=100, throw=False)
     run = sf.simulate(cart(), 1e-9, backend=backend, **first)  # shorter than the default first step
     assert np.diff(run.step_times).max() <= 1.01e-18
 
@@ -114,8 +116,10 @@ def test_inputs_jump_and_bend_exactly_at_their_samples(runner: str, kind: str) -
 
 @each_runner
 def test_functions_of_time_are_inputs(runner: str) -> None:
-    force = {"force": lambda t: 2.0 * ca.sin(5.0 * t)}
-    run = by(runner, cart(), 3.0, u=force, rtol=1e-8)
+    def force(t: Any) -> Any:
+        return 2.0 * ca.sin(5.0 * t)
+
+    run = by(runner, cart(), 3.0, u={"force": force}, rtol=1e-8)
     assert run["v"] == pytest.approx([viscous_sine(t, M, C, 2.0, 5.0) for t in run.t], abs=1e-6)
 
 
@@ -225,6 +229,8 @@ def test_nominal_values_scale_the_absolute_tolerance() -> None:
 
 
 MODEL = sf.drive(sf.Viscous())
+PENDULUM = Pendulum(sf.BrownMcPhee()).model()
+"""Its reactions are algebraic unknowns."""
 
 
 def test_tolerance_is_that_of_the_events_at_most_and_then_no_loose_one() -> None:
@@ -238,6 +244,12 @@ def test_tolerance_is_that_of_the_events_at_most_and_then_no_loose_one() -> None
 def test_methods_by_name_and_by_tolerance() -> None:
     for rtol, method in ((1e-13, RODAS5P), (1e-6, RODAS5P), (LOOSE, RODAS5P), (2e-5, RADAU5)):
         assert chosen("here", "auto", rtol) is method
+    assert chosen("here", "auto", TIGHT, MODEL) is RADAU9
+    assert chosen("here", "auto", 1.01 * TIGHT, MODEL) is RODAS5P
+    assert chosen("here", "auto", 2e-5, MODEL) is RADAU5
+    assert chosen("here", "rodas4p", TIGHT, MODEL) is METHODS["rodas4p"]
+    others = (sf.rabinowicz(sf.LuGre()), sf.rabinowicz(sf.ExactCoulomb()), PENDULUM)
+    assert all(chosen("here", "auto", TIGHT, model) is RODAS5P for model in others)
     for name, message in (
         ("rodas5", "here: method: expected one of auto, rodas5p.* did you mean rodas5p"),
         ("backward_euler", "here: method: expected one with error control.* which has fixed steps"),
@@ -254,13 +266,14 @@ def test_settings_are_checked_once_and_true_is_no_time() -> None:
     assert again.t.tolist() == first.t.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
     again.t[:] = 0.0
     assert sf.simulate(model, 1.0, samples=5).t[-1] == 1.0
-    assert len(model.memory["settings"]) == 1
+    assert len(model.memory["prepared"]) == 1
     with pytest.raises(ValueError, match="t_end"):
         sf.simulate(model, True, samples=5)
-    assert sf.simulate(model, np.array(1.0), samples=5).t[-1] == 1.0
+    end: Any = np.array(1.0)
+    assert sf.simulate(model, end, samples=5).t[-1] == 1.0
     for k in range(REMEMBERED + 4):
         sf.simulate(model, 0.01 * (k + 1), samples=5)
-    assert len(model.memory["settings"]) == REMEMBERED
+    assert len(model.memory["prepared"]) == REMEMBERED
 
 
 def test_every_loose_call_is_warned_of_where_it_is_made() -> None:
@@ -293,7 +306,7 @@ def test_bad_arguments_are_refused_in_a_sentence() -> None:
         return sf.simulate(cart, 1.0, u={"force": force}, backend="vm")
 
     wrong = not_refused(
-        Path(__file__).with_name("refusals.toml"), sf, sf.integrator, cart=cart, swing=swing,
+        Path(__file__).with_name("refusals.toml"), sf, integrator, cart=cart, swing=swing,
         belt=sf.rabinowicz(sf.Viscous(), free=["m"]), falling=FALLING, plain=plain, run=run,
         pushed=pushed, Source=Source, math=math,
     )  # fmt: skip
@@ -304,5 +317,5 @@ def test_bounds_of_a_parameter_are_allowed_themselves() -> None:
     k = sf.Variable("k", "1/s", start=0.5, lower=0.0, upper=1.0)
     model = sf.Model("bounded", x=(X,), p=(k,), ode=-k.symbol * X.symbol)
     assert sf.simulate(model, 1.0, p={"k": 0.0}).final["x"] == 1.0
-    many = sf.integrator.simulate_many(model, 1.0, p={"k": np.array([0.0, 1.0])})
+    many = sf.simulate_many(model, 1.0, p={"k": np.array([0.0, 1.0])})
     assert many["x"][0, -1] == 1.0

@@ -159,8 +159,10 @@ def test_modes_of_a_run_are_whole_numbers_everywhere(name: str, tmp_path: Path) 
 
 @pytest.mark.parametrize("times", [None, np.linspace(0.0, 8.0, 41)])
 def test_modes_of_an_ensemble_are_whole_numbers(times: np.ndarray | None) -> None:
-    starts, how = {"x": np.linspace(0.0, 0.3, 3)}, {"method": "dopri5", "backend": "vm"}
-    study = sf.simulate_many(MODEL["exact"], 8.0, t_eval=times, x0=starts, **how)
+    study = sf.simulate_many(
+        MODEL["exact"], 8.0, t_eval=times, x0={"x": np.linspace(0.0, 0.3, 3)}, method="dopri5",
+        backend="vm",
+    )  # fmt: skip
     assert whole(study.signals["mode"])
     assert whole(study.extremes["mode"])
 
@@ -176,8 +178,9 @@ def test_a_run_prints_how_it_ended_and_the_ranges_of_its_signals(sticking: sf.Tr
     assert text.startswith(
         "run of 'rabinowicz' from 0 to 6 s\nfriction: belt by ExactCoulomb\nSUCC"
     )
+    assert f"), {len(run.happened)} event" in text
     assert "further" not in text, "details are not evaluated for it"
-    assert f"{run.statistics.steps} steps of Rodas5P, {len(run.happened)} event" in text
+    assert f"{run.statistics.steps} steps of Rodas5P ({run.statistics.backend}), " in text
     row = next(line.split() for line in text.splitlines() if line.startswith("  friction"))
     low, high = run.extremes["friction"]
     numbers = (run["friction"][0], run["friction"][-1], low, high)

@@ -9,20 +9,14 @@ import casadi as ca
 import numpy as np
 import pytest
 from backends import needs_compiler
-from closed_forms import ClosedForm, assemble, observed_order, smooth_dae, smooth_ode
+from closed_forms import assemble, smooth_dae, smooth_ode
 from scipy.integrate import RK45
 
 import symfric as sf
 from symfric import Model, SolveError, Status, Variable, flow, simulate, simulate_many
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
-from symfric.integrator.methods.families import (
-    SMALL,
-    eigenbasis,
-    eliminated,
-    exp_phi1_phi2,
-    need_ode,
-)
+from symfric.integrator.methods.families import SMALL, eliminated, exp_phi1_phi2, need_ode
 from symfric.integrator.methods.method import combination
 from symfric.integrator.methods.tableaux import (
     BACKWARD_EULER,
@@ -72,9 +66,12 @@ def test_backward_euler_stays_bounded_where_the_step_resolves_nothing() -> None:
 
 def test_explicit_step_and_its_dense_output_are_those_of_scipy() -> None:
     h, system = 0.2, assemble(smooth_ode().model)
+
+    def rates(_: float, y: np.ndarray) -> list[float]:
+        return [-3 * y[0] + y[1] ** 2, y[0] - y[1] - y[1] ** 2]
+
     solver = RK45(
-        lambda _, y: [-3 * y[0] + y[1] ** 2, y[0] - y[1] - y[1] ** 2],
-        0.0, [1.0, 1.0], 1.0, first_step=h, max_step=h, rtol=1.0, atol=1.0,
+        rates, 0.0, [1.0, 1.0], 1.0, first_step=h, max_step=h, rtol=1.0, atol=1.0
     )  # fmt: skip
     solver.step()
     found = build_fixed(system, DOPRI5)([1.0, 1.0], h, [])
@@ -150,33 +147,6 @@ def test_attempt_costs_no_more_instructions_than_it_did(
     assert len(operations) <= attempt
     assert operations.count(ca.OP_DIV) <= divisions
     assert build_fixed(system, RODAS5P).n_instructions() <= step
-
-
-def test_eigenbasis_makes_blocks_of_the_inverse_matrix_of_radau() -> None:
-    """Its eigenvalues are the roots of z^3 - 9 z^2 + 36 z - 60 (Hairer and Wanner)."""
-    basis = eigenbasis(RADAU5.A)
-    expected = [[basis.gamma, 0, 0], [0, basis.alpha, basis.beta], [0, -basis.beta, basis.alpha]]
-    blocks = np.linalg.inv(basis.T) @ np.linalg.inv(RADAU5.A) @ basis.T
-    assert blocks == pytest.approx(np.array(expected), abs=1e-13)
-    assert np.poly(blocks) == pytest.approx([1.0, -9.0, 36.0, -60.0])
-
-
-def test_linear_equations_need_one_iteration_of_radau() -> None:
-    """exp(-z) is then Pade's (1 + 2z/5 + z^2/20) / (1 - 3z/5 + 3z^2/20 - z^3/60) at -z."""
-    once = replace(RADAU5, iterations=1)
-    step = build_fixed(assemble(sf.Model("decay", x=(x,), ode=-x.symbol)), once)
-    z = -0.7
-    pade = (1 + 2 * z / 5 + z**2 / 20) / (1 - 3 * z / 5 + 3 * z**2 / 20 - z**3 / 60)
-    assert float(step(1.0, 0.7, [])) == pytest.approx(pade, rel=1e-14)
-
-
-@pytest.mark.parametrize(("case", "order"), [(smooth_ode(), 7), (smooth_dae(), 5)])
-def test_enough_iterations_solve_the_collocation_equations(case: ClosedForm, order: int) -> None:
-    """The gap to many iterations shrinks by h^2 an iteration, h in algebraic unknowns."""
-    system, y = assemble(case.model), case.exact(0.0)
-    few, many = (build_fixed(system, replace(RADAU5, iterations=k)) for k in (3, 12))
-    gaps = [float(ca.norm_inf(few(y, 1 / n, []) - many(y, 1 / n, []))) for n in (4, 8, 16)]
-    assert observed_order([4, 8, 16], gaps) == pytest.approx(order, abs=0.5)
 
 
 def test_newton_is_done_when_what_is_to_come_is_small() -> None:

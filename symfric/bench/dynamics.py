@@ -1,0 +1,235 @@
+"""Long-run behaviour: closed forms, branches of a belt and a mechanism, AUTO-07p, long runs.
+
+The belt is that of `dynamics_auto`: 1 kg, 1 N/m, 1 N and a force that falls from 1.5 N to 1 N over
+0.2 m/s, with 0.1 N s/m. Exact friction is the limit v_t -> 0 of the smooth one.
+"""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from time import process_time
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import lambertw
+
+from symfric.bench import dynamics_auto as auto
+from symfric.bench.dynamics_machines import KINDS, compared, crank
+from symfric.bench.report import Found, Progress, Report, Row, goal
+from symfric.dynamics import (
+    Branch,
+    continuation,
+    describing_function,
+    equilibrium,
+    linearize,
+    orbits_from,
+    periodic_orbit,
+)
+from symfric.foundation.parameters import Variable
+from symfric.integrator import simulate, simulate_many
+from symfric.laws import Coulomb, ExactCoulomb, Law, LuGre, Stribeck
+from symfric.model import Model
+from symfric.scenes import contact, rabinowicz
+
+BRANCHES = "Branch of the belt from the Hopf point through the fold or grazing"
+LEVELS = {"mu_s": 1.5, "mu_d": 1.0, "v_s": 0.2, "sigma_2": 0.1}
+EXACT = ExactCoulomb(form="stribeck", **LEVELS)
+GRAZING = 1.43549791
+"""Speed of the belt [m/s] at which the sliding orbit with exact friction touches it."""
+WIDTHS = (1e-2, 1e-3, 1e-4)
+STEPS = {"exact": 0.028, "v_t = 0.01 m/s": 0.032, "v_t = 0.001 m/s": 0.033}
+"""Longest steps with which a branch has about 200 points."""
+G = 9.81
+
+
+def bench(quick: bool = False, progress: Progress = None) -> Report:
+    """Measure all; with `quick`, two machines of each kind and the exact branch only."""
+    tasks: dict[str, Callable[[], Iterator[Found]]] = {
+        "stick-slip": partial(stick_slip, 2 if quick else 8),
+        "Hopf speed": partial(hopf_speed, 2 if quick else 8),
+        "grazing": grazing,
+        "linear": linear,
+        "belt, exact": partial(belt_branch, "exact", EXACT),
+    }
+    for w in () if quick else WIDTHS:
+        tasks[f"belt, {w:g}"] = partial(smooth_branch, w)
+    if not quick:
+        tasks |= {"belt, LuGre": partial(belt_branch, "LuGre", LuGre(**LEVELS))}
+        tasks |= {"slider-crank": mechanism_branch}
+    for kind in KINDS:
+        tasks[f"runs, {kind}"] = partial(compared, kind, range(2 if quick else 8))
+    return Report().collect(tasks, progress)
+
+
+# ---- closed forms ----
+
+
+def stick_slip(seeds: int) -> Iterator[Found]:
+    """Compare period and multipliers of the stick-slip of one mass without damping."""
+    began, off, size = process_time(), 0.0, 0.0
+    for seed in range(seeds):
+        rng = np.random.default_rng(seed)
+        m, k, v = rng.uniform(0.3, 3.0), rng.uniform(1.0, 30.0), rng.uniform(0.02, 0.3)
+        mu_d = rng.uniform(0.05, 0.3)
+        mu_s = mu_d * rng.uniform(1.2, 2.0)
+        belt = rabinowicz(ExactCoulomb(mu_s=mu_s, mu_d=mu_d), m=m, k=k, v_belt=v)
+        w, rise = np.sqrt(k / m), (mu_s - mu_d) * m * G
+        period = 2 * rise / (k * v) + 2 / w * (np.pi - np.arctan(rise * w / (k * v)))
+        run = simulate(belt, 5 * period, x0={"v": v, "x": 0.0})
+        orbit = periodic_orbit(belt, run, rtol=1e-11)
+        off = max(off, abs(orbit.period / period - 1))
+        size = max(size, float(np.abs(orbit.multipliers).max()))
+    seconds = process_time() - began
+    yield goal("period of stick-slip, relative error", off, 1e-9, seconds=seconds)
+    yield goal("multiplier of stick-slip next to 1, size", size, 1e-8)
+
+
+def hopf_speed(seeds: int) -> Iterator[Found]:
+    """Compare the Hopf speeds of a belt with falling friction: w exp(-2 w) = c^2, w = (v/v_s)^2."""
+    began, off = process_time(), 0.0
+    for seed in range(seeds):
+        rng = np.random.default_rng(seed)
+        v_s, drop = float(rng.uniform(0.05, 0.5)), float(rng.uniform(0.05, 0.2))
+        # c = sigma_2 v_s / (2 drop N) < 0.43 for two speeds
+        N, share = 2.0 * G, float(rng.uniform(0.05, 0.35))
+        sigma = 2 * share * drop * N / v_s
+        law = ExactCoulomb(mu_s=0.1 + drop, mu_d=0.1, v_s=v_s, sigma_2=sigma, form="stribeck")
+        model = rabinowicz(law, m=2.0, k=float(rng.uniform(1, 50)), v_belt=v_s, free=["v_belt"])
+        rest = continuation(equilibrium(model), "v_belt", (1e-3 * v_s, 4 * v_s))
+        found = sorted(h.value for h in rest.located("Hopf"))
+        w = [-0.5 * lambertw(-2 * share**2, branch).real for branch in (0, -1)]
+        expected = v_s * np.sqrt(w)
+        off = max(off, float(np.abs(np.array(found) / expected - 1).max()))
+    seconds = process_time() - began
+    yield goal("two Hopf speeds of the Stribeck belt, relative error", off, 1e-9, seconds=seconds)
+
+
+def grazing() -> Iterator[Found]:
+    """Compare the grazing of a belt with viscous friction, whose sliding motion is linear."""
+    began, N, m, k, c = process_time(), 0.8 * G, 0.8, 2.1, 0.1
+    model = rabinowicz(ExactCoulomb(sigma_2=c), free=["v_belt"])
+    branch = continuation(periodic_orbit(model, simulate(model, 30.0)), "v_belt", (0.1, 0.6))
+    decay = c / (2 * m)
+    w = np.sqrt(k / m - decay**2)
+
+    def miss(speed: float) -> float:
+        """Return the next largest velocity of a motion that leaves the belt, minus its speed."""
+        slope = (0.1 * N - 0.15 * N) / m
+        b = (slope + decay * speed) / w
+        angle = np.arctan2(w * b - decay * speed, w * speed + decay * b) + 2 * np.pi
+        top = np.exp(-decay * angle / w) * (speed * np.cos(angle) + b * np.sin(angle))
+        return float(top - speed)
+
+    root: Any = brentq(miss, 0.3, 0.5, xtol=1e-13)
+    off = abs(branch.located("grazing")[0].value - root)
+    yield goal(
+        "grazing of the viscous belt, error [m/s]", off, 1e-7, seconds=process_time() - began
+    )
+
+
+def linear() -> Iterator[Found]:
+    """Compare the describing function of Coulomb and the eigenvalues of a quarter car."""
+    V = np.geomspace(1e-6, 1e3, 10)
+    found = describing_function(Coulomb(mu_d=0.3, v_eps=0.0), V, [1.0], N=50.0)
+    off = float(np.abs(found.values[:, 0] * np.pi * V / (4 * 15.0) - 1).max())
+    yield goal("describing function of Coulomb, relative error", off, 1e-10)
+    a, b, c, d = (
+        Variable(n, unit) for n, unit in zip("abcd", ("m", "m", "m/s", "m/s"), strict=True)
+    )
+    strut, tyre = 28900.0 * (b - a) + 2600.0 * (d - c), -920000.0 * b
+    ode = ca.vertcat(c.symbol, d.symbol, strut / 240.0, (tyre - strut) / 40.0)
+    car = Model("car", x=(a, b, c, d), ode=ode)
+    A = np.zeros((4, 4))
+    A[:2, 2:], pull = np.eye(2), np.array([-28900.0, 28900.0, -2600.0, 2600.0])
+    A[2:] = pull / 240.0, -pull / 40.0 - np.array([0.0, 23000.0, 0.0, 0.0])
+    own, expected = linearize(car, equilibrium(car)).eigenvalues, np.linalg.eigvals(A)
+    off = max(float(np.abs(expected - s).min() / abs(s)) for s in own)
+    yield goal("eigenvalues of the quarter car, relative error", off, 1e-12)
+
+
+# ---- branches ----
+
+
+def belt(law: Law) -> Model:
+    """Return the belt with its speed as free parameter."""
+    x, v = Variable("x", "m", start=1.2), Variable("v", "m/s")
+    speed = Variable("v_b", "m/s", start=0.8)
+    slip = contact("belt", law, v - speed, 1.0, {"v": speed.symbol}, F_e=-x.symbol)
+    rates = ca.vertcat(v.symbol, -x - slip.force)
+    return Model("belt", x=(x, v), p=(speed,), ode=rates, contacts=(slip,))
+
+
+def followed(model: Model, step: float) -> tuple[Branch, float]:
+    """Return the orbits from the upper Hopf point to v_b = 0.05 m/s, and their processor time [s].
+
+    Code is compiled before.
+    """
+    rest = continuation(equilibrium(model), "v_b", (0.05, 0.9))
+    hopf = rest.located("Hopf")[-1]
+    orbits_from(rest, hopf, (0.3, 2.0), step=step)
+    began = process_time()
+    branch = orbits_from(rest, hopf, (0.05, 2.0), points=400, step=step)
+    return branch, process_time() - began
+
+
+def belt_branch(name: str, law: Law) -> Iterator[Found]:
+    """Measure the branch of one law and compare its time with that of an ensemble."""
+    model = belt(law)
+    branch, seconds = followed(model, STEPS.get(name, 0.03))
+    end = next(iter(branch.special))
+    yield BRANCHES, _row("symfric", name, branch.values.size, end.value, branch.values[-1], seconds)
+    for_200 = seconds * 200 / branch.values.size
+    note = f"{branch.values.size} points in {seconds:.2g} s"
+    yield goal(f"belt, {name}: time of 200 points [s]", for_200, 2.0, seconds=seconds, note=note)
+    if name == "exact":
+        off = abs(end.value - GRAZING)
+        yield goal("belt, exact: grazing, error [m/s]", off, 1e-7)
+    began, speeds = process_time(), np.linspace(0.05, 1.4, 200)
+    for start in ({"x": 1.05, "v": 0.0}, {"x": 0.0, "v": speeds}):
+        simulate_many(model, 200.0, p={"v_b": speeds}, x0=start, rtol=1e-8, workers=1)
+    spent = process_time() - began
+    note = "2 runs of 200 s at 200 speeds, rtol = 1e-8; without unstable orbits"
+    yield goal(
+        f"belt, {name}: time relative to runs", for_200 / spent, 0.1, seconds=spent, note=note
+    )
+
+
+def smooth_branch(width: float) -> Iterator[Found]:
+    """Measure the branch of a smooth law in symfric and in AUTO-07p."""
+    name = f"v_t = {width:g} m/s"
+    branch, seconds = followed(belt(Stribeck(v_eps=width, **LEVELS)), STEPS.get(name, 0.034))
+    (fold,) = branch.located("fold")
+    size = branch.values.size
+    yield BRANCHES, _row("symfric", name, size, fold.value, branch.values[-1], seconds)
+    note = f"{size} points in {seconds:.2g} s"
+    time = seconds * 200 / size
+    yield goal(f"belt, {name}: time of 200 points [s]", time, 2.0, seconds=seconds, note=note)
+    if not auto.installed():
+        yield "AUTO-07p or gfortran is not installed: no rows of AUTO-07p"
+        return
+    other = auto.belt(width, 600, 100 if width > 2e-4 else 200)
+    yield BRANCHES, _row("AUTO-07p", name, other.points, other.fold, other.last, other.seconds)
+    yield goal(f"belt, {name}: fold, difference from AUTO-07p [m/s]",
+               abs(fold.value - other.fold), 1e-7)  # fmt: skip
+
+
+def _row(tool: str, law: str, points: int, turn: float, last: float, seconds: float) -> Row:
+    return {
+        "tool": tool, "friction": law, "points": float(points),
+        "fold or grazing [m/s]": f"{turn:.10f}", "last speed [m/s]": f"{last:.4f}",
+        "processor time [s]": seconds,
+    }  # fmt: skip
+
+
+def mechanism_branch() -> Iterator[Found]:
+    """Measure 200 orbits of a driven slider-crank over the stiffness of its spring."""
+    k = ca.SX.sym("k")
+    machine = crank(np.random.default_rng(0), k)
+    run = simulate(machine.model, machine.t_end, u=machine.u, rtol=1e-7)
+    orbit = periodic_orbit(machine.model, run, u=machine.u, period=machine.period)
+    began = process_time()
+    branch = continuation(orbit, "k", (3.0, 6.0), points=200, step=0.01)
+    seconds, size = process_time() - began, branch.values.size
+    note = f"{size} points in {seconds:.2g} s"
+    yield goal("slider-crank: time of 200 points [s]", seconds * 200 / size, 20.0, note=note)

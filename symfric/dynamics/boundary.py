@@ -1,0 +1,238 @@
+"""Curves of Hopf points and folds of equilibria in the plane of two parameters.
+
+    equilibrium at (p_1, p_2),   Re s(p_1, p_2) = 0
+
+s is the eigenvalue of the linearised equations that is next to the imaginary axis: complex at a
+Hopf point, real at a fold.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, cast, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from symfric.dynamics.balance import rows_at_rest
+from symfric.dynamics.branch import Branch, Special
+from symfric.dynamics.curve import Equations as Curve
+from symfric.dynamics.curve import Node, corrected, followed, located
+from symfric.dynamics.curve import tangent as direction
+from symfric.dynamics.equations import equations
+from symfric.dynamics.families import TINY, Equilibria
+from symfric.dynamics.tangent import tangent
+from symfric.dynamics.trace import REAL
+from symfric.foundation import checks
+from symfric.foundation.numeric import Array
+from symfric.foundation.parameters import check_names
+from symfric.foundation.shown import Showing, Shown
+from symfric.model import Model
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+KINDS = ("Hopf", "fold")
+CHANGE = 1e-5
+"""Change of the unknowns, relative to their magnitudes, in differences of the eigenvalue."""
+
+
+@final
+@dataclass(frozen=True, eq=False, repr=False)
+class Boundary(Showing):
+    """Curve of Hopf points or folds of equilibria in two parameters.
+
+    Attributes:
+        model: the model.
+        kind: "Hopf" or "fold".
+        parameters: names of both parameters.
+        values: their values, shape (n, 2), in the order of the curve.
+        x: states, shape (n, nx).
+        periods: periods [s] of the oscillation at Hopf points, shape (n,); 0 at folds.
+        message: reasons why the curve ends.
+    """
+
+    model: Model
+    kind: str
+    parameters: tuple[str, str]
+    values: Array
+    x: Array
+    periods: Array
+    message: str
+
+    def plot(self, path: str | Path | None = None) -> "Figure":
+        """Plot the first parameter over the second one.
+
+        Args:
+            path: image file.
+        """
+        from symfric.dynamics.pictures import boundary_line  # noqa: PLC0415  (slow to import)
+
+        units = {v.name: v.unit for v in self.model.p}
+        first, second = (f"{name} [{units[name]}]" for name in self.parameters)
+        return boundary_line(self.values[:, 1], self.values[:, 0], (second, first), self.kind, path)
+
+    def shown(self) -> Shown:
+        """Return the ranges of both parameters."""
+        low, high = self.values.min(axis=0), self.values.max(axis=0)
+        ranges = ", ".join(
+            f"{name} from {a:.6g} to {b:.6g}"
+            for name, a, b in zip(self.parameters, low, high, strict=True)
+        )
+        title = f"{self.kind} points of '{self.model.name}'"
+        return Shown(title, (f"{len(self.values)} points, {ranges}", self.message))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Points(Curve):
+    """Equations of a boundary; z = (y, first parameter, second parameter)."""
+
+    rest: Equilibria
+    second: int
+    hopf: bool
+    scale: Array
+    tolerance: float
+
+    def split(self, z: Array) -> tuple[Array, Array]:
+        """Return the unknowns of the equilibrium, and inputs and parameters."""
+        d = self.rest.d.copy()
+        d[[self.rest.index, self.second]] = z[-2:]
+        return z[:-2], d
+
+    def critical(self, z: Array) -> complex:
+        """Return the eigenvalue next to the imaginary axis, relative to the largest one [1/s]."""
+        A = tangent(self.rest.eq, *self.split(z)).A
+        found: NDArray[np.complex128] = np.linalg.eigvals(A).astype(complex)
+        size = float(np.abs(found).max(initial=TINY))
+        other = (found.imag > REAL * size) != self.hopf
+        if other.all():
+            raise ValueError("the eigenvalues on the imaginary axis meet")
+        return complex(found[int(np.argmin(np.abs(found.real) + 2 * size * other))])
+
+    def growth(self, z: Array) -> float:
+        """Return the test whose zero is the boundary, without unit."""
+        found = self.critical(z)
+        return found.real / abs(found) if self.hopf else found.real * float(self.scale[-1])
+
+    def at(self, z: Array) -> Node:
+        """Return the linearised equations; see `Curve.at`."""
+        eq, (y, d) = self.rest.eq, self.split(z)
+        modes = y[[mode for _, mode in eq.switching]]
+        if (modes * eq.sliding(y, d).full().ravel() < 0).any():
+            raise ValueError("a sliding contact comes to rest")
+        r, slopes = rows_at_rest(eq, y, d)
+        own = np.setdiff1d(np.arange(y.size), np.union1d(eq.modes, eq.cyclic))
+        chosen = np.array([*own, y.size, y.size + 1])
+        columns = np.array([*own, y.size + self.rest.index, y.size + self.second])
+        size = np.maximum((np.abs(slopes[:, columns]) * self.scale[chosen]).max(axis=1), TINY)
+        D, h = np.eye(z.size)[:, chosen], CHANGE * self.scale[chosen]
+        row = [
+            (self.growth(z + a * e) - self.growth(z - a * e)) / (2 * a)
+            for a, e in zip(h, D.T, strict=True)
+        ]
+        J = np.vstack([slopes[:, columns] / size[:, None], row])
+        return Node(z, np.append(r / size, self.growth(z)), J, chosen, D, None)
+
+
+def boundary(
+    branch: Branch,
+    special: Special,
+    parameter: str,
+    between: tuple[float, float],
+    *,
+    points: int = 100,
+    step: float = 0.05,
+) -> Boundary:
+    """Return the curve of Hopf points or folds over a second parameter, in both directions.
+
+    Limits: special points of equilibria only. The curve ends where the frequency of a Hopf point
+    vanishes (Bogdanov-Takens point).
+
+    Args:
+        branch: branch of equilibria.
+        special: one of its Hopf points or folds, such as `branch.located("Hopf")[0]`.
+        parameter: name of the second free parameter.
+        between: smallest and largest value of the second parameter.
+        points: largest number of points.
+        step: longest step, relative to the magnitudes of states and the ranges of the parameters.
+
+    Raises:
+        ValueError: bad input, or a point of another kind.
+    """
+    where, model = "boundary", branch.model
+    if branch.of_orbits or special not in branch.special or special.kind not in KINDS:
+        raise checks.refused(
+            f"{where}: special", "a Hopf point or a fold of the branch of equilibria", special.kind,
+            "branch.located('Hopf')[0]",
+        )  # fmt: skip
+    names = [v.name for v in model.p if v.name != branch.parameter]
+    check_names(f"{where}: parameter", [parameter], names)
+    low, high = checks.array(f"{where}: between", between, what="two numbers").tolist()
+    if not low <= branch.p[parameter] <= high or not low < high:
+        raise ValueError(
+            f"{where}: between: expected a range that contains the start, {parameter} = "
+            f"{branch.p[parameter]:g}, got {low:g} ... {high:g}"
+        )
+    checks.count(f"{where}: points", points, least=2)
+    curve, node = _start(branch, special, parameter, (low, high))
+    tau = direction(curve, node, np.eye(node.z.size)[-1])
+    ends = [
+        [n.z for n in _within(curve, node, side * tau, (low, high), step, points // 2)]
+        for side in (-1, 1)
+    ]
+    rows = np.array([*reversed(ends[0]), node.z, *ends[1]])
+    rates = np.array([curve.critical(row).imag for row in rows])
+    periods = 2 * np.pi / rates if curve.hopf else np.zeros(len(rows))
+    message = "; ".join(_reason(end, (low, high), points // 2) for end in ends)
+    return Boundary(
+        model, special.kind, (branch.parameter, parameter), rows[:, -2:],
+        rows[:, : len(model.x)], periods, message,
+    )  # fmt: skip
+
+
+def _reason(end: list[Array], span: tuple[float, float], points: int) -> str:
+    """Return the reason why one end of a boundary was reached."""
+    if end and np.abs(end[-1][-1] - np.array(span)).min() <= 1e-9 * (span[1] - span[0]):
+        return "ends at the given range"
+    if len(end) >= points:
+        return f"ends after {points} points"
+    return "ends where no further step was possible"
+
+
+def _start(
+    branch: Branch, special: Special, parameter: str, span: tuple[float, float]
+) -> tuple[Points, Node]:
+    """Return the equations of a boundary and the node at a special point."""
+    model, u = branch.model, branch.u
+    eq, p = equations("boundary", model), branch.p | {branch.parameter: special.value}
+    y = np.zeros(eq.y.numel())
+    y[: special.x.size] = special.x
+    scale, order = np.maximum(eq.scale, np.abs(y)), [*u, *p]
+    reach, width = max(float(np.ptp(branch.values)), TINY), span[1] - span[0]
+    d = np.concatenate([model.values("u", cast("dict[str, float]", u)), model.values("p", p)])
+    first, second = order.index(branch.parameter), order.index(parameter)
+    rest = Equilibria(eq, d, first, np.append(scale, reach), 1e-11)
+    every = np.concatenate([scale, [reach, width]])
+    curve = Points(rest, second, special.kind == "Hopf", every, 1e-10)
+    z = np.concatenate([y, [special.value, p[parameter]]])
+    return curve, corrected(curve, z, np.eye(z.size)[-1])[0]
+
+
+def _within(
+    curve: Points, node: Node, tau: Array, span: tuple[float, float], step: float, points: int
+) -> Iterator[Node]:
+    """Yield the nodes of a curve up to the end of the range of the second parameter."""
+
+    def any_node(_: Node, __: Node) -> None:
+        return
+
+    for k, found in enumerate(followed(curve, node, tau, step, any_node, lambda _: np.inf)):
+        value = float(found.node.z[-1])
+        if not span[0] < value < span[1]:
+            edge = span[0] if value <= span[0] else span[1]
+            yield located(curve, found, lambda n, _, edge=edge: float(n.z[-1]) - edge)[0]
+            return
+        yield found.node
+        if k + 2 > points:
+            return

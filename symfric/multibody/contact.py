@@ -1,0 +1,226 @@
+"""Contacts with friction of a mechanism: sliding velocity, normal force, loads on the bodies.
+
+Only the contacts of this module apply friction laws to bodies, with the minus sign of their loads.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, final
+
+import casadi as ca
+
+from symfric.foundation.numeric import Scalar, equals
+from symfric.foundation.units import turned
+from symfric.laws import Law
+from symfric.laws.composed.isotropic import SpatialSlip
+from symfric.multibody.dynamics import Wrench
+from symfric.multibody.element_friction import ElementFriction
+from symfric.multibody.forces import ZERO, Axial, Load
+from symfric.multibody.joint import Joint, JointFriction
+from symfric.multibody.kinematics import Kinematics
+from symfric.multibody.topology import body_of
+
+
+class End(NamedTuple):
+    """Displacement s of a joint that an element couples.
+
+    Attributes:
+        joint, direction: the joint and the direction of s.
+        share: generalised force on s per unit multiplier.
+        lever: l of the sliding velocity v = sum l s' [m/s].
+    """
+
+    joint: Joint
+    direction: str
+    share: Scalar
+    lever: Scalar
+
+
+@dataclass(frozen=True, eq=False)
+class Contact(ABC):
+    """Place in a mechanism where a friction law acts.
+
+    Attributes:
+        name: prefix of the results of the contact.
+        part: name of the joint or of the element.
+        friction: law and geometry.
+        law: the law; for a ball its vector form.
+        pressed: name of the normal force, which directions of one bearing share.
+        slip: sliding velocity [m/s], shape (1, 1); for a ball (3, 1).
+        F: symbols of the friction force [N], of the same shape.
+    """
+
+    kind: ClassVar[str]
+    """Type of the part in messages."""
+
+    name: str
+    part: str
+    friction: JointFriction | ElementFriction
+    law: Law | SpatialSlip
+    pressed: str
+    slip: ca.SX
+    F: ca.SX
+
+    @property
+    def place(self) -> str:
+        """Type and name of the part, for messages."""
+        return f"{self.kind} '{self.part}'"
+
+    def unit(self, of_sliding: str) -> str:
+        """Return a unit of the law; that of rotation if the law is one of moment and rate."""
+        return turned(of_sliding) if self.friction.turning else of_sliding
+
+    @property
+    def law_place(self) -> str:
+        """Field of the law, for messages."""
+        return f"{self.place} > friction > law"
+
+    @property
+    def link(self) -> str:
+        """Joint after which the unknowns of the contact are eliminated."""
+        return self.part
+
+    @property
+    def rate(self) -> str:
+        """Name of the joint rate that is zero if the slip is; other names have no effect."""
+        return f"{self.name}_rate"
+
+    @property
+    def normal_symbol(self) -> ca.SX:
+        """Symbol of the normal force that `normal` contains; by default without rows."""
+        return ca.SX(0, 1)
+
+    def explicit_normal(self, normal: ca.SX, force: ca.SX, N: ca.SX) -> ca.SX:
+        """Return the normal force `normal` without F, given the friction force in terms of N."""
+        return normal
+
+    @abstractmethod
+    def loads(self, kin: Kinematics) -> Sequence[Load | Axial]:
+        """Return the loads of the friction force on the bodies."""
+
+    @abstractmethod
+    def normal(self, kin: Kinematics, pressing: Mapping[str, Wrench]) -> ca.SX:
+        """Return the normal force [N]; `pressing` is that of `Equations`."""
+
+
+def depends_on_load(law: Law) -> bool:
+    """Return True if the friction force or the rates of `law` depend on the normal force."""
+    N, z = ca.SX.sym("N"), ca.SX.sym("z", len(law.states))
+    v = ca.SX.sym("v")
+    return ca.depends_on(ca.vertcat(law.force(v, N, z), law.rate(v, N, z)), N)
+
+
+def law_places(contacts: Sequence[Contact]) -> str:
+    """Return the fields of the laws of several contacts, for messages."""
+    if len(contacts) == 1:
+        return contacts[0].law_place
+    return f"{places_of(contacts)} > friction > law"
+
+
+def places_of(contacts: Iterable[Contact]) -> str:
+    """Return the types and names of the parts of several contacts, for messages."""
+    parts: dict[str, dict[str, None]] = {}
+    for contact in contacts:
+        parts.setdefault(contact.kind, {})[f"'{contact.part}'"] = None
+    return " and ".join(f"{kind} {', '.join(names)}" for kind, names in parts.items())
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class JointContact(Contact):
+    """Friction of a joint in one direction: "slide", "turn", "x", "y" or "ball"."""
+
+    kind = "joint"
+
+    friction: JointFriction
+    direction: str
+
+    @property
+    def load(self) -> ca.SX:
+        """Force [N] along or moment [N m] about the axis on the child; a vector for a ball."""
+        return -self.F if self.direction == "slide" else -self.friction.arm * self.F
+
+    def loads(self, kin: Kinematics) -> Sequence[Load | Axial]:
+        """Return the loads on the child and the parent of the joint."""
+        joint = kin.topology.joints[self.part]
+        if self.direction != "ball":
+            return [Axial(joint, self.direction, self.load)]
+        parent, child = body_of(joint.parent), body_of(joint.child)
+        moment = kin.motion[parent].R @ kin.frame(joint.parent).R @ self.load
+        return [
+            Load(body, ZERO, kin.motion[body].p, sign * moment, ZERO)
+            for body, sign in ((child, 1), (parent, -1))
+        ]
+
+    def normal(self, kin: Kinematics, pressing: Mapping[str, Wrench]) -> ca.SX:
+        """Return the normal force of the bearing under the reaction of the joint."""
+        joint, (F, T) = kin.topology.joints[self.part], pressing[self.part]
+        if self.direction not in ("x", "y"):
+            return joint.normal_force(self.friction, F, T)
+        R = joint.bearing(self.direction, kin.rotation(joint))
+        return self.friction.normal_force(("turn",), R @ F, R @ T)
+
+
+def joint_contacts(kin: Kinematics) -> Iterator[JointContact]:
+    """Yield the contacts of all joints with friction."""
+    for joint in kin.topology.joints.values():
+        if (friction := joint.friction) is None:
+            continue
+        for direction in joint.rubs:
+            name = joint.name if len(joint.rubs) == 1 else f"{joint.name}_{direction}"
+            rate = kin.spin(joint) if direction == "ball" else kin.rate(joint, direction)
+            slip = rate if direction == "slide" else friction.arm * rate
+            law = SpatialSlip(friction.law) if direction == "ball" else friction.law
+            pressed = name if direction in ("x", "y") else joint.name
+            F = ca.SX.sym(f"{name}_friction", slip.numel())
+            yield JointContact(name, joint.name, friction, law, pressed, slip, F, direction)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ElementContact(Contact):
+    """Friction of an element that couples displacements s_j of joints.
+
+        v = sum l_j s_j',   load on joint j: c_j lam - l_j F,   N = preload + |lam / divisor|
+
+    Attributes:
+        ends: coupled displacements, with c_j and l_j.
+        lam: multiplier of the element.
+        divisor: multiplier per unit normal force.
+    """
+
+    kind = "coupling"
+
+    friction: ElementFriction
+    ends: tuple[End, ...]
+    lam: ca.SX
+    divisor: Scalar
+
+    @property
+    def pressing(self) -> ca.SX:
+        """Magnitude of the normal force by the multiplier [N]."""
+        return self.friction.magnitude(self.lam / self.divisor)
+
+    def transmitted(self, end: End) -> ca.SX:
+        """Return the force [N] or moment [N m] on the child of the joint, including friction."""
+        return end.share * self.lam - end.lever * self.F
+
+    def loads(self, kin: Kinematics) -> Sequence[Load | Axial]:
+        """Return the loads of friction on the joints along their axes."""
+        own = (end for end in self.ends if not equals(end.lever, 0.0))
+        return [Axial(end.joint, end.direction, -end.lever * self.F) for end in own]
+
+    def normal(self, kin: Kinematics, pressing: Mapping[str, Wrench]) -> ca.SX:
+        """Return the normal force between the flanks."""
+        return self.friction.preload + self.pressing
+
+
+def element_contact(
+    name: str, kin: Kinematics, friction: ElementFriction, ends: tuple[End, ...], lam: ca.SX,
+    divisor: Scalar,
+) -> ElementContact:  # fmt: skip
+    """Return the contact of the element `name`."""
+    slip = sum((end.lever * kin.rate(end.joint, end.direction) for end in ends), ca.SX(0))
+    F = ca.SX.sym(f"{name}_friction")
+    return ElementContact(name, name, friction, friction.law, name, slip, F, ends, lam, divisor)

@@ -1,0 +1,191 @@
+"""Couplings of the displacements of two joints: gears, racks, screws."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import pi
+from typing import ClassVar, final
+
+import casadi as ca
+
+from symfric.foundation.checks import shown
+from symfric.foundation.numeric import Scalar, equals, is_symbolic
+from symfric.multibody.constraints import Constraint, Held, impossible, linear, wraps
+from symfric.multibody.contact import Contact, End, element_contact
+from symfric.multibody.element_friction import FlankFriction, MeshFriction, ThreadFriction
+from symfric.multibody.kinematics import Kinematics
+
+TEETH = 1000
+"""Largest denominator of a ratio if both angles are known modulo 2 pi."""
+
+
+class Coupling(Constraint):
+    """Coupling of the displacements of two joints: gears, rolling without slipping, screws.
+
+        s_b = ratio s_a + offset
+
+    where s_a and s_b are displacements [m] or angles [rad] relative to the parents of the joints. A
+    planetary gear is described by gears between joints on its carrier. The multiplier is the force
+    or moment on the child of b; minus ratio times the multiplier acts on the child of a.
+
+    Joint coordinates count full turns. The angle of a joint that closes a loop, and of every joint
+    in absolute coordinates, is known modulo 2 pi. The coupling still allows full turns: for any
+    ratio if one of the two angles is known modulo 2 pi, for ratios of integers if both are.
+
+    With `friction`, the flanks rub under the force that the coupling transmits, see
+    `ThreadFriction` and `MeshFriction`. The multiplier then does not contain the friction; the
+    results of the friction have the names of those of a joint, `<name>_N`, `<name>_slip`, ...
+
+    Limits: the coupling loads the joints with forces and moments along their axes only, not with
+    the pressure between teeth; use a `UserConstraint` for that. There is no backlash.
+    """
+
+    kind: ClassVar[str] = "coupling"
+
+    ratio_field: ClassVar[str] = "ratio"
+    """Name of the field that is or determines the ratio."""
+    accepts: ClassVar[tuple[type[FlankFriction], ...]] = (MeshFriction, ThreadFriction)
+    """Types of friction between the flanks."""
+    linear: ClassVar[bool] = True
+    """True if s_b is a displacement [m] where the element has friction; s_a is an angle."""
+
+    a: str
+    b: str
+    offset: Scalar
+    direction_a: str
+    direction_b: str
+    friction: FlankFriction | None
+
+    @property
+    def _ends(self) -> tuple[tuple[str, str], tuple[str, str]]:
+        """Joint and direction of a and of b."""
+        return (self.a, self.direction_a), (self.b, self.direction_b)
+
+    @property
+    def _ratio(self) -> Scalar:
+        return getattr(self, self.ratio_field)
+
+    def joints(self) -> Iterable[tuple[str, str]]:
+        """Return both coupled joints with their directions."""
+        return self._ends
+
+    def problems(self) -> Iterator[str]:
+        """Yield messages about invalid numbers, a zero ratio, or identical displacements."""
+        yield from super().problems()
+        if equals(self._ratio, 0.0):
+            yield f"{self.ratio_field}: expected a finite number other than 0, got {self._ratio!r}"
+        a, b = self._ends
+        if a == b:
+            yield f"expected two displacements, got {a[1]} of {a[0]} twice"
+        if isinstance(self.friction, self.accepts):
+            own = (*self.friction.problems(), *self.friction.fit(self.linear))
+            yield from (f"friction: {text}" for text in own)
+        elif self.friction is not None:
+            kinds = " or ".join(f"{kind.__name__}(law, ...)" for kind in self.accepts)
+            yield f"friction: expected {kinds}, got {shown(self.friction)}"
+
+    def held(self, kin: Kinematics) -> Held:
+        """Return offset + ratio s_a - s_b = 0."""
+        (a, along_a), (b, along_b) = ((kin.topology.joints[name], d) for name, d in self._ends)
+        ratio, offset, period = self._ratio, self.offset, None
+        cyclic = wraps(kin, a, along_a), wraps(kin, b, along_b)
+        ways = a.linear(along_a), b.linear(along_b)
+        if self.friction is not None and ways != (False, self.linear):
+            found = " and ".join("a displacement" if way else "an angle" for way in ways)
+            wanted = "a displacement" if self.linear else "an angle"
+            return impossible(f"friction: expected an angle a and {wanted} b, got {found}")
+        if all(cyclic):
+            fraction = Fraction(0.0 if is_symbolic(ratio) else float(ratio)).limit_denominator(
+                TEETH
+            )
+            if is_symbolic(ratio) or abs(float(fraction) - ratio) > 1e-14 * abs(ratio):
+                return impossible(
+                    f"{self.ratio_field}: expected a ratio of integers up to {TEETH}, as the "
+                    f"angles of {a.name} and {b.name} are known modulo 2 pi only, got {ratio}; in "
+                    "joint coordinates, joints outside loops allow any number"
+                )
+            ratio, period = float(fraction), 2 * pi / fraction.denominator
+        elif any(cyclic):
+            period = 2 * pi * ratio if cyclic[0] else 2 * pi
+        return linear(kin, self.name, [(a, along_a, -ratio), (b, along_b, 1.0)], offset, period)
+
+    def contacts(self, kin: Kinematics, lam: ca.SX) -> Sequence[Contact]:
+        """Return the contact between the flanks."""
+        if self.friction is None or lam.is_empty():
+            return ()
+        (a, along_a), (b, along_b) = ((kin.topology.joints[name], d) for name, d in self._ends)
+        lever_a, lever_b, divisor = self.friction.flank(self._ratio, self.linear)
+        ends = End(a, along_a, -self._ratio, lever_a), End(b, along_b, 1.0, lever_b)
+        return (element_contact(self.name, kin, self.friction, ends, lam, divisor),)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Gear(Coupling):
+    """Coupling of two angles: angle_b = ratio angle_a + offset.
+
+    With z the number of teeth and axes in the same direction, `ratio` is -z_a/z_b for external
+    gears and +z_a/z_b for a belt or an internal gear. `friction` is a `MeshFriction`, or a
+    `ThreadFriction` if a is a worm and b its wheel. Result: `<name>_moment` [N m] on the child of
+    b.
+    """
+
+    linear = False
+
+    a: str
+    b: str
+    ratio: Scalar
+    offset: Scalar = 0.0
+    direction_a: str = "turn"
+    direction_b: str = "turn"
+    friction: FlankFriction | None = None
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Rolling(Coupling):
+    """Coupling of an angle and a displacement: s_b = radius angle_a + offset.
+
+    Examples are a pinion on its rack, a wheel that rolls without slipping, and a drum with its
+    rope. A negative radius reverses the direction. Result: `<name>_force` [N] on the child of b.
+    For a disc in a plane, angle and displacement are the directions "turn" and "x" of one `Planar`
+    joint; the result is then the force that the track must transmit without slipping. `friction` is
+    a `MeshFriction` for a rack, or a `ThreadFriction` for a spindle a that moves a guided nut b.
+    """
+
+    ratio_field = "radius"
+
+    a: str
+    b: str
+    radius: Scalar
+    offset: Scalar = 0.0
+    direction_a: str = "turn"
+    direction_b: str = "slide"
+    friction: FlankFriction | None = None
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Screw(Coupling):
+    """Thread of a cylindrical joint: slide = lead / (2 pi) turn + offset.
+
+    `friction` is a `ThreadFriction`; friction of the joint itself is that of its bearing, which the
+    thread does not load. Result: `<name>_force` [N] along the axis on the child of the joint.
+    """
+
+    ratio_field = "lead"
+
+    accepts = (ThreadFriction,)
+
+    joint: str
+    lead: Scalar
+    offset: Scalar = 0.0
+    friction: FlankFriction | None = None
+
+    @property
+    def _ends(self) -> tuple[tuple[str, str], tuple[str, str]]:
+        return (self.joint, "turn"), (self.joint, "slide")
+
+    @property
+    def _ratio(self) -> Scalar:
+        return self.lead / (2 * pi)

@@ -1,0 +1,102 @@
+"""Modes of several contacts decided in compiled code: the bits of the decision in Python."""
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from backends import needs_compiler
+
+import symfric as sf
+from symfric.integrator.running.contact_modes import ContactModes
+from symfric.model import Model
+from symfric.scenes import Arm, DoublePendulum
+
+
+def hammered() -> Model:
+    """Three blocks between springs, driven, and hit by a hammer every half second.
+
+    Blows change sliding velocities, some to zero, so that the modes of all contacts are decided.
+    Each block also carries a part of the friction of the one before, so that modes affect others.
+    """
+    t, three = ca.SX.sym("t"), range(3)
+    x = [sf.Variable(f"x{i}", "m") for i in three]
+    v = [sf.Variable(f"v{i}", "m/s") for i in three]
+    names = (
+        "k",
+        "F",
+        *(f"{a}{i}" for a in ("omega", "mu_s", "mu_d", "kept", "hit") for i in three),
+    )
+    p = {name: sf.Variable(name, "1", start=1.0) for name in names}
+    own = {name: one.symbol for name, one in p.items()}
+    q = [0, *(a.symbol for a in x), 0]
+    forces = [
+        own["k"] * (q[i] - 2 * q[i + 1] + q[i + 2]) + own["F"] * ca.cos(own[f"omega{i}"] * t)
+        for i in three
+    ]
+    laws = [sf.ExactCoulomb(mu_s=own[f"mu_s{i}"], mu_d=own[f"mu_d{i}"]) for i in three]
+    rubbing = list[sf.Contact]()
+    for i in three:
+        forces[i] += 0.8 * rubbing[-1].force if rubbing else 0.0
+        rest = {f"v{i}": 0.0}
+        rubbing.append(
+            sf.contact(f"c{i}", laws[i], v[i], 1.0, rest=rest, F_e=forces[i], bare=False)
+        )
+    blows = {f"v{i}": own[f"kept{i}"] * v[i].symbol + own[f"hit{i}"] for i in three}
+    rates = [force - c.force for force, c in zip(forces, rubbing, strict=True)]
+    return Model(
+        "hammered", t=t, x=(*x, *v), p=tuple(p.values()), contacts=tuple(rubbing),
+        ode=ca.vertcat(*(a.symbol for a in v), *rates),
+        events=(sf.Event("blow", ca.sin(2 * np.pi * t), 0, reset=blows),),
+    )  # fmt: skip
+
+
+def drawn(seed: int) -> dict[str, Any]:
+    """Parameters over two decades; the blocks start from rest or with equal speeds."""
+    rng = np.random.default_rng(seed)
+    force, sliding = 10 ** rng.uniform(-1, 1), rng.uniform(0.1, 1.0, 3)
+    p = {"k": 10 ** rng.uniform(-1, 2), "F": force}
+    for i in range(3):
+        slow = float(force * sliding[i])
+        p |= {f"omega{i}": rng.uniform(0.5, 5), f"kept{i}": rng.choice([0.0, 0.3, 1.0])}
+        p |= {f"hit{i}": rng.choice([0.0, 0.0, 0.2, -0.2])}
+        p |= {f"mu_d{i}": slow, f"mu_s{i}": slow * rng.choice([1.0, 1.5])}
+    start = {f"x{i}": rng.normal() for i in range(3)} | {
+        f"v{i}": rng.integers(-1, 2) for i in range(3)
+    }
+    return {"p": {n: float(x) for n, x in p.items()}, "x0": {n: float(x) for n, x in start.items()}}
+
+
+def numbers(run: sf.Trajectory) -> list[bytes]:
+    said = f"{run.message} {run.happened} {run.statistics.steps} {run.statistics.rejections}"
+    return [said.encode(), run.step_times.tobytes(), *(run[v.name].tobytes() for v in run.model.x)]
+
+
+MODELS: dict[str, tuple[Any, float, int, list[dict[str, Any]]]] = {
+    "hammered": (hammered, 4.0, 7, [drawn(seed) for seed in range(20)]),
+    "pendulum": (lambda: DoublePendulum(sf.ExactCoulomb()).model(), 3.0, 5, [{}]),
+    "arm": (lambda: Arm(sf.ExactCoulomb(mu_s=0.3, mu_d=0.3)).model(), 0.2, 2, [{}]),
+}
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", MODELS)
+def test_compiled_code_decides_as_python_does(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    make, t_end, least, cases = MODELS[name]
+    model, calls, decided = make(), list[float](), ContactModes.decided
+
+    def counted(self: ContactModes, t: float, *arguments: Any) -> Any:
+        calls.append(t)
+        return decided(self, t, *arguments)
+
+    monkeypatch.setattr(ContactModes, "decided", counted)
+    in_python = 0
+    for case in cases:
+        runs: list[sf.Trajectory] = []
+        for backend in ("vm", "compiled"):
+            calls.clear()
+            runs.append(sf.simulate(model, t_end, backend=backend, samples=101, **case))
+            assert backend == "compiled" or len(calls) >= least  # there is something to decide
+        in_python += len(calls)
+        assert numbers(runs[0]) == numbers(runs[1])
+    assert in_python <= len(cases) // 4  # those for which all combinations are tried
