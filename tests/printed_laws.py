@@ -233,6 +233,12 @@ def spline(p: Any, v: float, N: float) -> float:
     return N * tanh(v / p.v_eps) * sum(a * b / 6 for a, b in zip(weights, points, strict=True))
 
 
+def network(p: Any, v: float, N: float) -> float:
+    x = log(1 + (v / p.v_first) ** 2) / log(1 + (p.v_last / p.v_first) ** 2)
+    steps = [k.w / (1 + exp(-2 * k.a * (x - k.s))) for k in p.units]
+    return N * tanh(v / p.v_eps) * (p.b + sum(steps))
+
+
 PRINTED: dict[str, Formula] = {
     f.__name__: f
     for f in (
@@ -241,7 +247,7 @@ PRINTED: dict[str, Formula] = {
         *(leine_switch, bittencourt, threlfall, modified_threlfall, bengisu_akay, velocity_based),
         *(ambrosio, step5, hollars, exudyn, brown_mcphee, simscape_breakaway, specker),
         *(makkar_dixon, self_tuning, brittle_self_tuning, rui_wang, mixed_lubrication),
-        *(spline, brush_tyre),
+        *(spline, network, brush_tyre),
     )
 }
 """Law by name -> its equation (law, v, N)."""

@@ -25,6 +25,7 @@ from symfric.laws import (
     MakkarDixon,
     MaxwellSlip,
     MixedLubrication,
+    Network,
     PoppStelter,
     QuarterCarSimple,
     RuiWang,
@@ -148,6 +149,7 @@ LEVELS: dict[type[Law], Levels] = {
     SteadyStateLuGre: lambda f, N: {"F_S": f.mu_s * N, "F_C": f.mu_d * N, "sigma_2": 0.0},
     RuiWang: lambda f, N: {"D": f.mu_s * N, "C": 2 - 2 / pi * asin(f.mu_d / f.mu_s)},
     Spline: lambda f, _: {n: f.mu_d for n in parameters(Spline()) if n[:2] == "c_"},
+    Network: lambda f, _: {n: 0.0 for n in parameters(Network()) if n[:2] == "w_"} | {"b": f.mu_d},
     MixedLubrication: lambda f, _: {"mu_b": f.mu_d, "eta": 0.0},
     MakkarDixon: lambda f, N: {"gamma_1": (f.mu_s - f.mu_d) * N, "gamma_4": f.mu_d * N},
 }

@@ -63,6 +63,7 @@ STATIC_LAWS: dict[str, type[Law]] = {
     "brush_tyre": machines.BrushTyre,
     "mixed_lubrication": lubrication.MixedLubrication,
     "spline": from_data.Spline,
+    "network": from_data.Network,
 }
 """Memoryless laws by name, with the most widely used laws first."""
 

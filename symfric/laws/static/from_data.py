@@ -4,8 +4,8 @@ from functools import partial
 from itertools import accumulate
 
 from symfric.foundation import checks
-from symfric.foundation.numeric import Scalar, log, total
-from symfric.foundation.parameters import Parametric, option, param, parametric
+from symfric.foundation.numeric import Scalar, log, tanh, total
+from symfric.foundation.parameters import Parametric, option, param, parameters, parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, StaticLaw
 
@@ -91,3 +91,80 @@ class Spline(StaticLaw):
         if self.shape == "falling":
             c = list(accumulate(reversed(c)))[::-1]
         return total(a * part for a, part in zip(c, [*parts, rest], strict=True))
+
+
+@parametric
+class Unit(Parametric):
+    """Smooth step of a friction curve over the logarithm of the speed: one unit of a network."""
+
+    w: Scalar = fields.COEFFICIENT(0.05, doc="height of the step")
+    a: Scalar = fields.SHAPE(-7.0, doc="steepness of the step", lower=-30.0, upper=30.0)
+    s: Scalar = fields.SHAPE(0.4, doc="place of the step", lower=-0.2, upper=1.2)
+
+
+UNITS = (Unit(0.05, -7.0, 0.3), Unit(0.02, -7.0, 0.5), Unit(0.02, 4.0, 1.0))
+"""Units of a curve that falls and rises."""
+
+
+@parametric
+class Network(StaticLaw):
+    """Friction curve as a small network of tanh units over the logarithm of the speed.
+
+        x = log(1 + (v/v_first)^2) / log(1 + (v_last/v_first)^2)
+        F = N mu(x) tanh(v / v_eps),   mu = b + sum of w_k [1 + tanh(a_k (x - s_k))] / 2
+
+    Each unit is a step of the height w_k near x = s_k, falling for a_k < 0, where x is 0 at rest
+    and 1 at v_last. The force opposes the velocity for all b, w_k >= 0 and all a_k, s_k. By
+    default, `Fit` finds b and w_k, in which mu is linear; `free=law.weights` also fits a_k and s_k,
+    from several starts. The units may be exchanged, so only the curve has a meaning, not a weight
+    or its interval. With few units the law costs less than a `Spline`.
+    Limits: w_k = 0 is `Coulomb`. At high speeds mu is constant. Creeps under load.
+    Source: Cybenko, Math. Control Signals Systems 2, 1989; constructed here as a law.
+    """
+
+    facts = Facts(("D", "S", "St", "V"), "C∞", "constructed")
+
+    units: tuple[Unit, ...] = UNITS
+    b: Scalar = fields.COEFFICIENT(0.1, doc="lowest level of the curve")
+    v_first: Scalar = SPEED(1e-3, doc="lowest speed that is resolved")
+    v_last: Scalar = SPEED(1.0, doc="highest speed that is resolved")
+    v_eps: Scalar = fields.V_EPS(1e-4, lower=1e-12)
+
+    strictly_ordered = (("v_first", "v_last"),)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        units = checks.many("Network: units", self.units, "units, such as (Unit(), ...)")
+        if not units or not all(isinstance(item, Unit) for item in units):
+            raise checks.refused("Network: units", "one or more, all Unit", self.units)
+
+    @classmethod
+    def over(cls, v_first: float, v_last: float, count: int, **more: Scalar) -> "Network":
+        """Return a network of `count` falling and `count` rising units between two speeds [m/s].
+
+        Raises:
+            ValueError: bad input.
+        """
+        checks.count("Network.over: count", count)
+        places = [(k + 0.5) / count for k in range(count)]
+        units = (Unit(0.01, a * count, s) for s in places for a in (-4.0, 4.0))
+        return cls(tuple(units), 0.1, v_first, v_last, **more)
+
+    @property
+    def weights(self) -> tuple[str, ...]:
+        """Names of all weights a_k and s_k, as the argument `free` of `Fit`."""
+        return tuple(n for n, p in parameters(self).items() if p.field in ("a", "s"))
+
+    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
+        """Return the sliding force [N] at a speed >= 0 for zero widths."""
+        return N * self.coefficient(speed)
+
+    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
+        """Return the friction force [N]."""
+        return N * self.coefficient(v) * smooth.sign(v, self.v_eps)
+
+    def coefficient(self, v: Scalar) -> Scalar:
+        """Return mu at a velocity [m/s]."""
+        u, top = v / self.v_first, self.v_last / self.v_first
+        x = log(1 + u * u) / log(1 + top * top)
+        return self.b + total(k.w * (1 + tanh(k.a * (x - k.s))) for k in self.units) / 2

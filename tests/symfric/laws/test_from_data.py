@@ -66,11 +66,29 @@ def test_equal_coefficients_are_coulomb_and_the_force_is_linear_in_them() -> Non
     assert sf.Spline().static_level(7.0) == pytest.approx(7.0 * (5 * 0.15 + 0.14) / 6)
 
 
+def test_network_never_drives_and_saturates() -> None:
+    """For any weights within the bounds; mu is between b and b + sum of w_k."""
+    rng = np.random.default_rng(3)
+    v = np.concatenate([[0.0], np.geomspace(1e-12, 1e9, 2000)])
+    for _ in range(60):
+        w = rng.choice([0.0, 1.0], 4) * 10 ** rng.uniform(-9, 3, 4)
+        a, s, b = rng.uniform(-30, 30, 4), rng.uniform(-0.2, 1.2, 4), rng.choice([0.0, 0.1])
+        units = tuple(sf.Unit(*row) for row in np.column_stack([w, a, s]).tolist())
+        mu = np.asarray(sf.Network(units, b).coefficient(v))
+        assert (mu >= 0).all()
+        assert (mu >= b * (1 - 1e-12)).all()
+        assert (mu <= (b + w.sum()) * (1 + 1e-12)).all()
+    one = sf.Network.over(2e-3, 0.5, 1)
+    assert one.coefficient(0.5) == pytest.approx(0.1 + 0.01)  # a pair of opposite steps
+    assert one.weights == ("a_1", "s_1", "a_2", "s_2")
+
+
 @pytest.mark.heavy
-def test_c_of_a_spline_is_the_same(tmp_path: Path) -> None:
-    for real in ("double", "float"):
-        report = verify(generate(sf.Spline(), tmp_path / real, real=real))
-        assert report.status == "verified"
+def test_c_of_a_curve_is_the_same(tmp_path: Path) -> None:
+    for law in (sf.Spline(), sf.Network()):
+        for real in ("double", "float"):
+            folder = tmp_path / type(law).__name__ / real
+            assert verify(generate(law, folder, real=real)).status == "verified"
 
 
 def test_an_optimal_move_with_a_fitted_curve_is_verified() -> None:
@@ -90,6 +108,14 @@ BAD = [
     (lambda: spline([0.1] * 3, shape="rising"), "shape: expected one of free, falling"),
     (lambda: sf.Spline.over(1e-3, 1.0, 2), "Spline.over: count: expected"),
     (lambda: sf.Spline.over(1e-3, 1.0, 6, v_epz=1.0), "v_epz"),
+    (lambda: sf.Network(()), "Network: units: expected one or more, all Unit"),
+    (lambda: sf.Network((0.1,)), "Network: units: expected one or more, all Unit"),  # type: ignore[arg-type]
+    (lambda: sf.Network(sf.Unit()), "Network: units: expected a sequence of units"),  # type: ignore[arg-type]
+    (lambda: sf.Network.over(1e-3, 1.0, 0), "Network.over: count: expected"),
+    (lambda: sf.Network.over(1.0, 1e-3, 2), "expected v_first < v_last, got v_first = 1"),
+    (lambda: sf.Unit(w=-1.0), "Unit: w: expected 0 <= w <= inf"),
+    (lambda: sf.Unit(a=31.0), "Unit: a: expected -30 <= a <= 30"),
+    (lambda: sf.Unit(s=2.0), "Unit: s: expected -0.2 <= s <= 1.2"),
 ]  # fmt: skip
 
 
