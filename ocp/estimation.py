@@ -4,11 +4,10 @@ At each sample the states x_s ... x_k of the last M samples minimise
 
     |x_s - m|^2_P + sum |x_i+1 - flow(x_i, u_i)|^2_Q + sum |y_i - h(x_i, u_i)|^2_R
 
-with |e|^2_P = e' inv(P) e. Unknown loads are further states whose change per step is noise.
-Gauss-Newton steps solve the problem: each one is a Kalman filter and a Rauch-Tung-Striebel smoother
-of the linearised model, so that Q may be singular. The arrival cost (m, P) is the prediction from
-the sample that left the horizon, linearised at its last estimate. For linear models, every horizon
-gives the Kalman filter.
+with |e|^2_P = e' inv(P) e. Unknown loads are further states whose change per step is noise. Q
+contains the noise of the model, and the errors of its integration and linearisation over the last
+deviations. The arrival cost (m, P) is the prediction from the sample that left the horizon,
+linearised at its last estimate. For linear models, every horizon gives the Kalman filter.
 
 Bounds on states and loads: a value outside its bound is measured at the bound with a very small
 deviation, which leaves it slightly outside as long as the data press it there. The covariances
@@ -22,19 +21,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import TYPE_CHECKING, Any, final
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eigh
+from scipy.linalg import eigh, pinvh
+from scipy.stats import chi2
 
 from ocp.formulation.phase import Ranges, as_box, is_range
+from ocp.horizon import Machine, Window
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
 from symfric.foundation.parameters import Variable, check_names
 from symfric.foundation.shown import brief, combination
-from symfric.foundation.status import SolveError, Status
 from symfric.integrator import flow
 from symfric.model import Model, check_model
 
@@ -43,16 +43,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-ITERATIONS, TOLERANCE = 20, 1e-6
-"""Largest number of Gauss-Newton steps, and the last step in units of the spread."""
 INFORMED = 0.25
 """Ratio of variances with and without measurements below which a combination is observable."""
-DIVERGED = (
-    "estimate: the motion became infinite; take more `steps`, a smaller `spread` at the start, or "
-    "less noise of states"
-)
-PINNED = 1e-4
-"""Deviation of a value that is held at its bound, in units of the spread."""
+CHANCE = 0.01
+"""Probability of innovations by chance below which the model does not agree with the data."""
+UNSEEN = 1e12
+"""Largest variance without measurements, in units of the squared spread."""
 KNOWN = 0.1
 """Deviation without measurements, in units of the spread, below which the model determines it."""
 
@@ -71,6 +67,13 @@ class Estimate:
         unobservable: combinations of states and loads, in units of their spread, that the
             measurements do not determine: without them the variance is at most 4 times as large.
         unconverged: number of samples at which the Gauss-Newton method did not converge.
+        innovations: square of each innovation (measured minus predicted signals), relative to its
+            covariance, shape (n,); on average the number of signals if the model holds.
+        inconsistent: first and last time of the interval of one horizon whose innovations are least
+            likely [s], shape (2,), if their p-value times the number of such intervals is below
+            1 %; otherwise shape (0,).
+        step_errors: state or load -> largest error of the integration and of the linearised model
+            over one sampling interval; deviations contain it.
     """
 
     t: Array
@@ -80,8 +83,24 @@ class Estimate:
     units: Mapping[str, str]
     unobservable: tuple[str, ...]
     unconverged: int
+    innovations: Array
+    inconsistent: Array
+    step_errors: Mapping[str, float]
 
     __repr__ = brief
+
+    @property
+    def verdict(self) -> str:
+        """Sentence about the deviations: they hold only if the model agrees with the data."""
+        if self.inconsistent.size:
+            return (
+                "The deviations do not hold: from t = {:.4g} to {:.4g} s the innovations exceed "
+                "those of the noise; the model, `noise` or `spread` does not describe the data "
+                "there".format(*self.inconsistent)
+            )
+        if self.unobservable:
+            return f"The data do not determine {'; '.join(self.unobservable)}"
+        return "The innovations agree with the noise"
 
     def __getitem__(self, name: str) -> Array:
         check_names("estimate", [name], self.signals)
@@ -103,6 +122,10 @@ class Estimate:
             axis.plot(self.t, value, linewidth=1.2)
             axis.set_ylabel(f"{name} [{self.units[name]}]")
         axes[-1].set_xlabel("t [s]")
+        for begin, end in self.inconsistent.reshape(-1, 2):
+            for axis in axes:
+                axis.axvspan(begin, end, color="tab:red", alpha=0.2, label="innovations too large")
+            axes[0].legend()
         return save(figure, path)
 
 
@@ -138,15 +161,17 @@ def estimate(
         bounds: state or unknown -> (lower, upper), None for no bound; they hold at all
             samples. Deviations ignore them, so they are too large near a bound.
         p: parameter -> value.
-        steps: number of integration steps in each sampling interval.
+        steps: number of integration steps in each sampling interval. The difference from twice as
+            many steps is an additional noise of the states.
 
     Raises:
         ValueError: bad input.
         SolveError: the motion becomes infinite.
 
-    Limits: Gauss-Newton steps have no line search; `unconverged` counts the samples without
-    convergence. Deviations are those of the linearised model: they hold if it is nearly linear over
-    them, which a contact that starts to slip is not.
+    Limits: the method finds a local minimum; `unconverged` counts the samples at which it does not
+    converge. Deviations contain the mean square of the error of the linearised model. Single
+    errors of bristles that start to slip within a deviation are larger; the load and the velocity
+    are not affected.
     """
     check_model("estimate", model)
     step = checks.number("estimate: step", step, above=0.0)
@@ -174,7 +199,7 @@ def estimate(
     first = np.nan_to_num(first) / scale  # states of laws have no start
     walk = np.array([noise.get(v.name, 0.0) for v in states]) / scale
     loads = states[len(model.x) :]
-    machine = _Machine(
+    machine = Machine(
         *_functions(model, loads, measured, step, steps),
         fixed=(scale, np.array([*values.values()], dtype=float)),
         Q=np.diag(walk**2 * step),
@@ -224,12 +249,9 @@ def _checked(
 
 def _functions(
     model: Model, loads: Sequence[Variable], measured: Sequence[str], step: float, steps: int
-) -> tuple[ca.Function, ca.Function]:
-    """Return (xi, u, scale, p) -> next xi and its Jacobian, and -> measured signals and theirs.
-
-    xi are states, loads and drifting parameters in units of their `scale`, u the measured inputs.
-    """
-    kept: dict[Any, tuple[ca.Function, ca.Function]] = model.memory.setdefault("ocp estimate", {})
+) -> tuple[ca.Function, ...]:
+    """Return the functions of (xi, u, scale, p) of a `Machine`; u are the measured inputs."""
+    kept: dict[Any, tuple[ca.Function, ...]] = model.memory.setdefault("ocp estimate", {})
     key = tuple(v.name for v in loads), tuple(measured), step, steps
     if key in kept:
         return kept[key]
@@ -243,124 +265,51 @@ def _functions(
     places |= own
     p = ca.vertcat(ca.MX(0, 1), *(own.get(v.name, values[i]) for i, v in enumerate(model.p)))
     inputs = ca.vertcat(ca.MX(0, 1), *(places[v.name] for v in model.u))
-    after = flow(model, steps=steps)(x[:nx], inputs, p, step)
-    after = ca.vertcat(after, x[nx:, 0]) / scale
+    coarse, fine = (flow(model, steps=n)(x[:nx], inputs, p, step) for n in (steps, 2 * steps))
+    after, finer = (ca.vertcat(state, x[nx:, 0]) / scale for state in (coarse, fine))
     symbols = [model.vector("x"), model.vector("u"), model.vector("p")]
     seen = ca.vertcat(*(model.expression(name) for name in measured))
     y = ca.Function("seen", symbols, [seen])(x[:nx], inputs, p)
     arguments = [xi, u, scale, values]
     kept[key] = (
         ca.Function("next", arguments, [after, ca.jacobian(after, xi)]),
+        *(ca.Function("ahead", arguments, [state]) for state in (after, finer)),
         ca.Function("measured", arguments, [y, ca.jacobian(y, xi)]),
     )
     return kept[key]
 
 
-class _Machine(NamedTuple):
-    """Functions of `_functions` with their last arguments; covariances, variances, bounds."""
-
-    after: ca.Function
-    seen: ca.Function
-    fixed: tuple[Array, Array]
-    Q: Array
-    R: Array
-    lower: Array
-    upper: Array
-
-    def inside(self, xi: Array) -> Array:
-        """Return values in columns, moved to their bounds if they are outside."""
-        return np.clip(xi, self.lower[:, None], self.upper[:, None])
-
-
-class _Pass(NamedTuple):
-    """Result of a filter and smoother: means in columns, covariances of each sample."""
-
-    smooth: Array
-    filtered: list[Array]
-    predicted: list[tuple[Array, Array]]
-    slopes: list[Array]
-
-
-def _evaluated(
-    f: ca.Function, xi: Array, u: Array, fixed: Sequence[Array]
-) -> tuple[Array, list[Array]]:
-    """Return values in columns and Jacobians of a function at each sample."""
-    count = xi.shape[1]
-    value, slopes = f.map(count)(xi, u, *(np.tile(row[:, None], count) for row in fixed))
-    return value.full(), np.split(slopes.full(), count, axis=1)
-
-
-def _passed(
-    machine: _Machine, xi: Array, y: Array, u: Array, prior: tuple[Array, Array], pins: Bools
-) -> _Pass:
-    """Filter and smooth the model that is linearised at the columns of `xi`.
-
-    Values with `pins`, a mask of the shape of `xi`, are held at the nearest bound.
-    """
-    limits, every = machine.inside(xi), np.eye(xi.shape[0])
-    after, A = _evaluated(machine.after, xi, u, machine.fixed)
-    seen, C = _evaluated(machine.seen, xi, u, machine.fixed)
-    if not np.isfinite([*after.flat, *seen.flat]).all():
-        raise SolveError(DIVERGED, Status.NOT_FINITE)
-    predicted, means, covariances = [prior], list[Array](), list[Array]()
-    for k in range(xi.shape[1]):
-        m, spread = predicted[-1]
-        there, pinned = np.isfinite(y[:, k]), pins[:, k]
-        H = np.vstack([C[k][there], every[pinned]])
-        R = np.diag([*machine.R[there], *np.full(pinned.sum(), PINNED**2)])
-        gain = np.linalg.solve(H @ spread @ H.T + R, H @ spread).T
-        rest = [*(y[there, k] - seen[there, k]), *(limits[pinned, k] - xi[pinned, k])]
-        m = m + gain @ (rest - H @ (m - xi[:, k]))
-        keep = np.eye(m.size) - gain @ H
-        P = keep @ spread @ keep.T + gain @ R @ gain.T
-        means.append(m)
-        covariances.append(P)
-        ahead = after[:, k] + A[k] @ (m - xi[:, k])
-        predicted.append((ahead, A[k] @ P @ A[k].T + machine.Q))
-    smooth = [means[-1]]
-    for k in range(xi.shape[1] - 2, -1, -1):
-        expected, spread = predicted[k + 1]
-        back = covariances[k] @ A[k].T @ np.linalg.pinv(spread, hermitian=True)
-        smooth.append(means[k] + back @ (smooth[-1] - expected))
-    return _Pass(np.array(smooth[::-1]).T, covariances, predicted, A)
-
-
 def _moved(
-    machine: _Machine, y: Array, u: Array, first: Array, horizon: int,
+    machine: Machine, y: Array, u: Array, first: Array, horizon: int,
     states: Sequence[Variable], scale: Array, step: float,
 ) -> Estimate:  # fmt: skip
     """Move the horizon over all samples."""
     count, names = y.shape[1], [v.name for v in states]
-    xi, prior, unconverged = first[:, None], (first, np.eye(first.size)), 0
+    prior, unconverged = (first, np.eye(first.size)), 0
     free = prior[1]  # covariance at the first sample of the horizon without measurements
     means, deviations = np.empty((first.size, count)), np.empty((first.size, count))
-    pins = np.zeros(xi.shape, bool)
-    found = _passed(machine, xi, y[:, :1], u[:, :1], prior, pins)
+    errors, innovations = np.zeros((count, first.size, first.size)), np.empty(count)
+    still = 0.0 * first[:, None]
+    window = Window(machine, y[:, :1], u[:, :1], errors[:1], prior)
+    found = window.solved(still)
     for k in range(count):
-        begin = max(0, k + 1 - horizon)
         if k:
-            xi = np.column_stack([found.smooth, found.predicted[-1][0]])
-        if begin > max(0, k - horizon):
-            xi, prior = xi[:, 1:], found.predicted[1]
-            free = found.slopes[0] @ free @ found.slopes[0].T + machine.Q
-        here = slice(begin, k + 1)
-        for _ in range(ITERATIONS):
-            pins = xi != machine.inside(xi)
-            found = _passed(machine, xi, y[:, here], u[:, here], prior, pins)
-            change, xi = float(np.abs(found.smooth - xi).max()), found.smooth
-            if change <= TOLERANCE and np.array_equal(pins, xi != machine.inside(xi)):
-                break
-        else:
-            unconverged += 1
-        if pins.any():  # covariances ignore bounds
-            free_of = _passed(machine, xi, y[:, here], u[:, here], prior, np.zeros_like(pins))
-            pairs = zip(found.predicted, free_of.predicted, strict=True)
-            predicted = [(mean, spread) for (mean, _), (_, spread) in pairs]
-            found = found._replace(filtered=free_of.filtered, predicted=predicted)
+            begin = max(0, k + 1 - horizon)
+            weights = np.hstack([found.weights, still])
+            if k >= horizon:
+                prior, weights = found.predicted[1], weights[:, 1:]
+                weights[:, 0] = pinvh(prior[1]) @ (found.smooth[:, 1] - prior[0])
+                free = _grown(free, found.slopes[0], machine.Q)
+            here = slice(begin, k + 1)
+            window = Window(machine, y[:, here], u[:, here], errors[here], prior)
+            found = window.solved(weights)
+        unconverged += not found.converged
         means[:, k] = machine.inside(found.smooth)[:, -1]
-        deviations[:, k] = np.sqrt(np.diag(found.filtered[-1]))
+        errors[k] = window.step_error(found)
+        innovations[k] = found.innovations[-1]
+        deviations[:, k] = np.sqrt(np.maximum(np.diag(found.filtered[-1]), 0.0))
     for slope in found.slopes[:-1]:
-        free = slope @ free @ slope.T + machine.Q
+        free = _grown(free, slope, machine.Q)
     smooth = machine.inside(found.smooth) * scale[:, None]
     return Estimate(
         t=step * np.arange(count),
@@ -370,12 +319,33 @@ def _moved(
         units={v.name: v.unit for v in states},
         unobservable=_unobservable(found.filtered[-1], free, names),
         unconverged=unconverged,
+        innovations=innovations,
+        inconsistent=_inconsistent(innovations, np.isfinite(y).sum(axis=0), horizon) * step,
+        step_errors=dict(zip(names, np.sqrt(errors.max(axis=0).diagonal()) * scale, strict=True)),
     )
+
+
+def _grown(P: Array, slope: Array, noise: Array) -> Array:
+    """Return a covariance after a step, reduced to `UNSEEN`: unstable models let it overflow."""
+    after = slope @ P @ slope.T + noise
+    return after * min(1.0, UNSEEN / max(after.max(), 1.0))
+
+
+def _inconsistent(innovations: Array, sizes: Array, horizon: int) -> Array:
+    """Return first and last sample of the least likely interval, or nothing if it may be chance."""
+    length = min(horizon, innovations.size)
+    sums, degrees = (
+        np.convolve(row, np.ones(length), mode="valid") for row in (innovations, sizes)
+    )
+    p = chi2.sf(sums, np.maximum(degrees, 1))
+    worst = int(np.argmin(p))
+    by_chance = p[worst] * innovations.size / length > CHANCE
+    return np.array([] if by_chance else [worst, worst + length - 1], dtype=float)
 
 
 def _unobservable(P: Array, free: Array, names: Sequence[str]) -> tuple[str, ...]:
     """Return combinations whose variance the measurements reduce by less than `INFORMED`."""
-    ratios, vectors = eigh(P, free + 1e-12 * np.eye(len(names)))
+    ratios, vectors = eigh(P, free + 1e-12 * max(1.0, free.max()) * np.eye(len(names)))
     return tuple(
         combination(v, names)
         for ratio, v in zip(ratios, vectors.T, strict=True)

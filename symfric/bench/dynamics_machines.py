@@ -171,4 +171,4 @@ def _time(machine: Machine, orbit: PeriodicOrbit) -> float:
     """Return the time [s] after which deviations have decayed to 1e-10 by the multipliers."""
     largest = min(float(np.abs(orbit.multipliers).max(initial=0.0)), 1 - 1e-9)
     periods = np.log(1e-10) / np.log(max(largest, 1e-10))
-    return machine.t_end + float(np.clip(periods, LEAST, MOST)) * orbit.period
+    return 2 * machine.t_end + float(np.clip(periods, LEAST, MOST)) * orbit.period

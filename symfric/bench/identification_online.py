@@ -147,7 +147,10 @@ class Axis:
             },
             spread={"N": 1.0, "offset": level, "x": 1e-3, "v": 1e-2},
         )  # fmt: skip
-        return {"value": found["N"], "sd": found.deviations["N"], "true": self.scale[:size:EVERY]}
+        return {
+            "value": found["N"], "sd": found.deviations["N"], "true": self.scale[:size:EVERY],
+            "inconsistent": found.inconsistent,
+        }  # fmt: skip
 
 
 def judged(value: Array, deviation: Array, true: Array, h: float) -> dict[str, float]:
@@ -204,6 +207,8 @@ def horizons(axes: Sequence[Axis]) -> Iterator[Found]:
     h, begin = EVERY * axes[0].controller.h, 100
     rows = [judged(f["value"][begin:], f["sd"][begin:], f["true"][begin:], h) for f in found]
     yield from _rows("moving horizon, 100 Hz", rows)
+    doubts = sum(f["inconsistent"].size > 0 for f in found)
+    yield f"moving horizon: {doubts} of {len(found)} verdicts say that the deviations do not hold"
     steps = sum(f["true"].size for f in found)
     yield f"moving horizon: {1e3 * seconds / steps:.3g} ms of processor time per sample"
 
