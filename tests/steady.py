@@ -109,12 +109,15 @@ class _Listening(ast.NodeTransformer):
 @contextmanager
 def nudged(factor: float) -> Generator[None]:
     """Every simulation at tolerances that are `factor` times the requested ones."""
-    of = Given.of
+    of, fill = Given.of, Given.fill
 
     def other(t_end: float, rtol: float, h_max: float, atol: Any, d: Any) -> NDArray[np.float64]:
         return of(t_end, rtol * factor, h_max, np.asarray(atol) * factor, d)
 
-    with patch.object(Given, "of", other):
+    def filled(R: Any, t_end: float, rtol: float, h_max: float, atol: Any, d: Any) -> None:
+        fill(R, t_end, rtol * factor, h_max, atol * factor, d)
+
+    with patch.object(Given, "of", other), patch.object(Given, "fill", filled):
         yield
 
 

@@ -20,6 +20,7 @@ def damped_belt(scale: float) -> Model:
     return Model("belt", x=(x, v), p=(v_b, c), ode=ode, contacts=(slip,))
 
 
+@pytest.mark.slow
 def test_hopf_points_are_where_damping_equals_the_slope_of_friction() -> None:
     for scale in (1e-6, 1e3):
         model = damped_belt(scale)
