@@ -45,7 +45,10 @@ class Holding:
 
     @property
     def margin(self) -> float:
-        """Static level minus |F| [N]; negative above the level."""
+        """Static level minus |F| [N] at the present normal force; negative above the level.
+
+        The load of a self-energising brake raises its level: `survives` includes this.
+        """
         return self.level - abs(self.force)
 
 
@@ -129,7 +132,7 @@ class Equilibrium(Showing):
             (f"{name}'", f"{rate:.6g}", "", "drifts") for name, rate in self.drift.items() if rate
         ]
         for c in self.contacts:
-            level = "" if isnan(c.level) else f", at most {c.level:.6g} at rest"
+            level = "" if isnan(c.level) else f", level {c.level:.6g} at this normal force"
             rows.append((c.name, f"{c.force:.6g}", "N", f"{c.state}s{level}"))
         lines = (f"one of a set of equilibria of dimension {self.free}",) * bool(self.free)
         table = Table(("", "value", "unit", ""), tuple(rows), numbers=(1,))

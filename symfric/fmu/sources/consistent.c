@@ -133,7 +133,8 @@ static const char *consistent(double *y, const double *d, int moved)
 #if EQUATIONS
     if (jams(y, d)) {
         return "friction jams: reactions grow with the friction that they cause, or a bearing "
-               "would pull; less friction or a longer bearing would let it move";
+               "would pull; less friction, a longer bearing or a brake that does not lock itself "
+               "would let it move";
     }
 #endif
     (void)y;

@@ -261,7 +261,8 @@ static void explain(Instance *unit, int why)
 #if EQUATIONS
     } else if (jams(y, m->R + DATA)) {
         snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: friction jams or a bearing would pull; "
-                 "less friction or a longer bearing would let it move", MODEL_NAME, t);
+                 "less friction, a longer bearing or a brake that does not lock itself would let it "
+                 "move", MODEL_NAME, t);
 #endif
     } else {
         snprintf(unit->said, SAID, "%s: stopped at t = %.9g s: the step fell to %.1e s, fastest "
