@@ -55,7 +55,7 @@ class CamFriction(ElementFriction):
     def problems(self) -> Iterator[str]:
         """Yield messages about invalid values."""
         yield from super().problems()
-        if self.follower not in FOLLOWERS:
+        if not (isinstance(self.follower, str) and self.follower in FOLLOWERS):
             yield f"follower: expected {', '.join(FOLLOWERS)}, got {shown(self.follower)}"
             return
         for name in self.optional:
