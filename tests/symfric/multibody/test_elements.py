@@ -13,6 +13,7 @@ from shafts import SHOE, K, at_start, driven, drum, dry, ramp, shafts, turning
 from tables import Names, table
 
 import symfric as sf
+from ocp.friction.mode_models import restless
 from symfric import Variable, simulate
 from symfric import multibody as mb
 from symfric.laws import Law, law_from_text
@@ -182,6 +183,7 @@ def test_brakes_and_a_bearing_on_one_shaft_stop_and_hold_it_together(s: int, R: 
     assert run.happened[0][0] == pytest.approx(stop, rel=1e-8)
     balance = run.energy_balance()
     assert np.abs(balance.defect).max() < 1e-9 * balance.scale
+    assert "stick one by one, got a, x, y, w" in restless(m.build())
     m.joints[0] = replace(m.joints[0], rate=0.0)
     run = simulate(m.build(), 1.2, u={"torque": ramp(s * hold)}, rtol=1e-8)
     assert run.happened[0] == (pytest.approx(1.0, rel=1e-9), "a_loop_slip")
@@ -258,7 +260,7 @@ def test_a_released_element_has_no_friction_and_never_pulls(law: str) -> None:
 
 
 ELEMENTS = ("DrumBrake", "DiscClutch", "BandBrake", "CapstanDrum", "Belt", "shoe_arms")
-VALUES = {"np": np, "ca": ca, "LAW": sf.BrownMcPhee(), "SHOE": SHOE, "kN": Variable("P", "kN")}
+VALUES = {"np": np, "ca": ca, "sf": sf, "DRY": dry(0.3), "LAW": sf.BrownMcPhee(), "SHOE": SHOE, "kN": Variable("P", "kN")}
 NAMES = Names({name: getattr(mb, name) for name in ELEMENTS} | VALUES)
 
 
@@ -266,7 +268,10 @@ def test_mistakes_are_described_in_one_sentence() -> None:
     """Elements in elements.toml, in a mechanism with the shafts a, b and the joint rope."""
     for text, message in table(__file__, "elements").items():
         with pytest.raises(ValueError) as caught:
-            turning(NAMES.value(text), 1.0, 2.0, rope=True).build()
+            first, *more = NAMES.value(f"[{text}]")
+            m = turning(first, 1.0, 2.0, rope=True)
+            m.forces += more
+            m.build()
         found = str(caught.value)
         assert message in found, (text, found)
         assert "\n" not in found, found
