@@ -100,6 +100,8 @@ def read_urdf(
     for what, value in given.items():
         if not is_symbolic(value):
             checks.number(f"urdf: {what}", value, lower=0.0)
+    if equals(stop_stiffness, 0.0) and is_number(stop_dissipation) and stop_dissipation > 0:
+        raise checks.refused("urdf: stop_stiffness", "> 0 with stop_dissipation", stop_stiffness)
     for name, bearing in bearings.items():
         what = "JointFriction(law, radius=...)"
         checks.kind(f"urdf: bearing '{name}'", bearing, JointFriction, what)

@@ -174,6 +174,10 @@ def test_joints_stop_at_the_limits_of_the_file_on_request() -> None:
         assert not [f for f in read_urdf(text, stop_stiffness=1.0).forces if f.kind == "stop"]
     with pytest.raises(ValueError, match="urdf: stop_stiffness: expected a number >= 0, got -1"):
         read_urdf(SMALL, stop_stiffness=-1.0)
+    with pytest.raises(
+        ValueError, match="stop_stiffness: expected > 0 with stop_dissipation, got 0"
+    ):
+        read_urdf(SMALL, stop_dissipation=1.0)
 
 
 def test_names_are_kept_apart() -> None:
