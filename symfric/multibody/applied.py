@@ -331,8 +331,9 @@ def rests(where: str, made: Prepared, a0: Array) -> tuple[Rest, ...]:
     if alone and np.linalg.matrix_rank(make.numbers(rows)) < rows.size1():
         raise make.refuse(
             [eq.contacts[i] for i in held],
-            "no more of them in a loop than it has degrees of freedom" if eq.m else
-            "no more of them between joints than independent sliding velocities",
+            "no more of them in a loop than it has degrees of freedom"
+            if eq.m
+            else "no more of them between joints than independent sliding velocities",
             "the distribution of their forces is undetermined; use smooth laws in the others",
         )
     return tuple(sorted(found, key=lambda rest: rest.members))

@@ -260,7 +260,8 @@ def test_a_released_element_has_no_friction_and_never_pulls(law: str) -> None:
 
 
 ELEMENTS = ("DrumBrake", "DiscClutch", "BandBrake", "CapstanDrum", "Belt", "shoe_arms")
-VALUES = {"np": np, "ca": ca, "sf": sf, "DRY": dry(0.3), "LAW": sf.BrownMcPhee(), "SHOE": SHOE, "kN": Variable("P", "kN")}
+VALUES = {"np": np, "ca": ca, "sf": sf, "DRY": dry(0.3), "SHOE": SHOE}
+VALUES |= {"LAW": sf.BrownMcPhee(), "kN": Variable("P", "kN")}
 NAMES = Names({name: getattr(mb, name) for name in ELEMENTS} | VALUES)
 
 
