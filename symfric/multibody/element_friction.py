@@ -200,8 +200,9 @@ class MeshFriction(FlankFriction):
     def problems(self) -> Iterator[str]:
         """Yield messages about invalid values."""
         yield from super().problems()
-        if not isinstance(self.internal, bool):
-            yield f"internal: expected True or False, got {shown(self.internal)}"
+        internal = vars(self)["internal"]
+        if not isinstance(internal, bool):
+            yield f"internal: expected True or False, got {shown(internal)}"
 
     def flank(self, ratio: Scalar, linear: bool) -> Flank:
         """Return levers of the relative angular velocity, and the divisor of the tooth force."""

@@ -142,8 +142,7 @@ class Block:
     def _problems(self) -> Iterator[str]:
         names = [v.name for v in self.variables] + [*self.outputs]
         for name in (self.name, *names, *self.resets):
-            text = isinstance(name, str)
-            if not text or not fullmatch(r"[A-Za-z]\w*", name, ASCII) or name in RESERVED:
+            if not fullmatch(r"[A-Za-z]\w*", name, ASCII) or name in RESERVED:
                 yield f"expected a free C identifier, got {name!r}"
         for name, count in Counter(names).items():
             if count > 1:
