@@ -318,7 +318,7 @@ def rests(where: str, made: Prepared, a0: Array) -> tuple[Rest, ...]:
         if moves <= {*columns} and len(columns) == len(rows) + 1:
             of_loop.setdefault(touched[0], []).append(i)
         elif len(moves) == 1 and not touched:
-            of_rate.setdefault(*moves, []).append(i)
+            of_rate.setdefault(moves.pop(), []).append(i)
         else:
             alone.append(i)
     found = [make.loop(*loops[k], members) for k, members in of_loop.items()]
