@@ -49,6 +49,8 @@ CHANCE = 0.01
 """Probability of innovations by chance below which the model does not agree with the data."""
 UNSEEN = 1e12
 """Largest variance without measurements, in units of the squared spread."""
+SMALLEST = 1e-100
+"""Smallest deviation; the largest is its reciprocal. Their squares are finite and positive."""
 KNOWN = 0.1
 """Deviation without measurements, in units of the spread, below which the model determines it."""
 
@@ -69,6 +71,7 @@ class Estimate:
         unconverged: number of samples at which the Gauss-Newton method did not converge.
         innovations: square of each innovation (measured minus predicted signals), relative to its
             covariance, shape (n,); on average the number of signals if the model holds.
+        samples: number of measured samples of all signals, without missing ones.
         inconsistent: first and last time of the interval of one horizon whose innovations are least
             likely [s], shape (2,), if their p-value times the number of such intervals is below
             1 %; otherwise shape (0,).
@@ -84,6 +87,7 @@ class Estimate:
     unobservable: tuple[str, ...]
     unconverged: int
     innovations: Array
+    samples: int
     inconsistent: Array
     step_errors: Mapping[str, float]
 
@@ -98,9 +102,14 @@ class Estimate:
                 "those of the noise; the model, `noise` or `spread` does not describe the data "
                 "there".format(*self.inconsistent)
             )
-        if self.unobservable:
-            return f"The data do not determine {'; '.join(self.unobservable)}"
-        return "The innovations agree with the noise"
+        if not self.samples:
+            return "There is no sample to compare with the model"
+        said = f"The data do not determine {'; '.join(self.unobservable)}"
+        if not self.unobservable:
+            said = "The innovations do not exceed those of the noise"
+        if self.unconverged:
+            said += f"; at {self.unconverged} of {self.t.size} samples the method did not converge"
+        return said
 
     def __getitem__(self, name: str) -> Array:
         check_names("estimate", [name], self.signals)
@@ -189,6 +198,9 @@ def estimate(
     wrong = [f"spread of '{n}' above 0" for n, x in spread.items() if not x > 0.0]
     wrong += [f"noise of '{n}' above 0" for n in measured if not noise.get(n, 0.0) > 0.0]
     wrong += [f"noise of '{n}' of at least 0" for n in names if noise.get(n, 0.0) < 0.0]
+    for what, sizes in (("spread", spread), ("noise", noise)):
+        far = [n for n, x in sizes.items() if x > 0.0 and not SMALLEST < x < 1.0 / SMALLEST]
+        wrong += [f"{what} of '{n}' from {SMALLEST:g} to {1.0 / SMALLEST:g}" for n in far]
     boxes = checks.named("estimate: bounds", bounds, names)
     wrong += [f"bounds of '{n}' as (lower, upper)" for n, box in boxes.items() if not is_range(box)]
     if wrong:
@@ -320,6 +332,7 @@ def _moved(
         unobservable=_unobservable(found.filtered[-1], free, names),
         unconverged=unconverged,
         innovations=innovations,
+        samples=int(np.isfinite(y).sum()),
         inconsistent=_inconsistent(innovations, np.isfinite(y).sum(axis=0), horizon) * step,
         step_errors=dict(zip(names, np.sqrt(errors.max(axis=0).diagonal()) * scale, strict=True)),
     )

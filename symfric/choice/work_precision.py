@@ -16,7 +16,7 @@ from symfric.foundation import checks
 from symfric.foundation.files import write_table
 from symfric.foundation.programs import find_compiler
 from symfric.foundation.shown import Showing, Shown, Table, among
-from symfric.foundation.status import SolveError
+from symfric.foundation.status import SolveError, Status
 from symfric.integrator.arguments import check_model
 from symfric.integrator.equations.inputs import Input
 from symfric.integrator.methods.tableaux import ADAPTIVE
@@ -42,7 +42,7 @@ class WorkPoint(NamedTuple):
 
     Attributes:
         method: name of the method.
-        rtol: relative tolerance.
+        rtol: relative tolerance; a model with events is integrated at most at that of its events.
         error: largest relative error of a compared signal.
         time_s: shortest processor time of a complete call [s].
         steps, rejections: numbers of accepted and rejected steps.
@@ -110,6 +110,7 @@ class WorkPrecision(Showing):
         are more accurate, it is the time of the fastest point.
         """
         checks.choice("time_at: method", method, self.methods)
+        error = checks.number("time_at: error", error, above=0.0)
         return time_at([(p.error, p.time_s) for p in self._line(method)], error)
 
     def _line(self, method: str) -> list[WorkPoint]:
@@ -126,7 +127,13 @@ class WorkPrecision(Showing):
             if any(time == time for time in times):
                 cells = (f"{time:.3g}" if time == time else "-" for time in times)
                 rows.append((f"{error:.0e}", *cells))
-        start, end = self.span
+        start, end, hidden = *self.span, sum(not p.resolved for p in self.points)
+        said = [f"{name}: {reason}" for name, reason in self.failed.items()]
+        if hidden:
+            said.append(
+                f"{hidden} of {len(self.points)} points are not shown: their error is below "
+                f"{RESOLVED:g} times that of the reference"
+            )
         header = ("error", *(f"{method} [ms]" for method in self.methods))
         return Shown(
             f"work and precision of '{self.model}' from {start:g} to {end:g} s, {self.engine}",
@@ -137,7 +144,7 @@ class WorkPrecision(Showing):
                 f"reference: {self.reference}, with an error of {self.reference_error:.0e}",
             ),
             Table(header, tuple(rows), numbers=tuple(range(1, len(header)))),
-            tuple(f"{name}: {reason}" for name, reason in self.failed.items()),
+            tuple(said),
         )
 
     def plot(self, path: str | Path | None = None) -> "Figure":
@@ -227,7 +234,7 @@ def work_precision(
     Args:
         model, t_end, t_start, x0, u, p, t_eval, samples: as in `simulate`.
         methods: names of methods with error control, or "auto".
-        rtols: relative tolerances.
+        rtols: relative tolerances, in any order.
         signals: names of compared signals; by default all states. The error of a bristle that slips
             within microseconds is much larger than that of the motion.
         backend: "compiled" or "vm"; by default "compiled" if there is a C compiler.
@@ -240,6 +247,7 @@ def work_precision(
     Raises:
         ValueError: bad input.
         SolveError: the reference failed.
+        KeyboardInterrupt: a run was interrupted (Ctrl-C).
 
     Limits: an error is meaningless if the motion is chaotic over the span. A method that fails at a
     tolerance, or cannot integrate the model, is listed in `failed`.
@@ -247,10 +255,11 @@ def work_precision(
     where = "work_precision"
     check_model(where, model)
     methods = checks.names(f"{where}: methods", methods, ["auto", *ADAPTIVE])
-    tolerances = tuple(
+    given = {
         checks.number(f"{where}: rtols", rtol, lower=1e-12, upper=0.1)
         for rtol in checks.many(f"{where}: rtols", rtols, "relative tolerances")
-    )
+    }
+    tolerances = sorted(given, reverse=True)  # the curves are drawn in this order
     if not methods or not tolerances:
         raise ValueError(f"{where}: expected at least one method and one tolerance, got none")
     engine = "compiled" if find_compiler() else "vm"
@@ -261,10 +270,13 @@ def work_precision(
         checks.function(f"{where}: progress", progress, "a function of the fraction done")
 
     def run(method: str, rtol: float) -> Trajectory:
-        return simulate(
+        made = simulate(
             model, t_end, t_start=t_start, x0=x0, u=u, p=p, rtol=rtol, t_eval=t_eval,
             samples=samples, method=method, backend=engine,
         )  # fmt: skip
+        if made.status is Status.INTERRUPTED:  # its time is not that of a run
+            raise KeyboardInterrupt
+        return made
 
     finest = max(FINEST, min(tolerances) / 100)
     exact, other = run("radau5", finest), run("rodas5p", finest)

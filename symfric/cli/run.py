@@ -20,9 +20,9 @@ from symfric.foundation import checks
 from symfric.integrator import simulate_by_peer
 from symfric.integrator.methods.tableaux import ADAPTIVE as ADAPTIVE  # for options.toml
 from symfric.model import Model
-from symfric.results.kinds import is_mechanism, kinds, norms
+from symfric.results.kinds import friction_laws, is_mechanism, kinds, norms
 from symfric.scenes import ALL_SCENES as ALL_SCENES  # for options.toml
-from symfric.scenes import MECHANISMS, Scene
+from symfric.scenes import MECHANISMS, Robot, Scene
 
 
 def run(
@@ -34,6 +34,7 @@ def run(
     inputs: Strings = None,
     x0: Strings = None,
     t_end: float | None = None,
+    friction_level: float | None = None,
     rtol: float = 1e-6,
     method: str = "auto",
     backend: str = "auto",
@@ -50,8 +51,8 @@ def run(
     """Simulate SCENE with a friction law.
 
     --set accepts parameters of the scene and of the law. For a robot, the coefficients of the law
-    are relative: its break-away friction is the friction tag of each joint (--set level=0.5 for
-    joints without a tag).
+    are relative: its break-away friction is the friction tag of each joint, or --friction-level.
+    --set stop_stiffness=1e4 lets joints stop at their limits.
 
     Example: symfric run rabinowicz --law lugre --set mu_s=0.2 --plot stick_slip.png
 
@@ -73,6 +74,7 @@ def run(
     checks.choice("--panels", panels, ("main", "all"))
     ends = [] if times is None else times.split(",")
     stops = [checks.parsed("--times", end.strip()) for end in ends]
+    settings = with_level(scene, settings, friction_level)
     machines, models, given = prepared(scene, laws, settings, preset, law_of, inputs, x0, t_end)
     chosen = next(iter(laws))
     check_movie(movie, scene, models[chosen])
@@ -93,7 +95,9 @@ def run(
     if plot:
         from symfric.results.pictures import plot_trajectories  # noqa: PLC0415  (slow to import)
 
-        plot_trajectories(found, path=plot, panels=panels)
+        # one run has no legend: its title names the laws that act
+        shown = found if len(found) > 1 else {first.scene: first}
+        plot_trajectories(shown, path=plot, panels=panels)
     if movie:
         with output.progress(f"{movie}") as tell:
             first.animate(movie, progress=tell)
@@ -113,6 +117,7 @@ def report(
     inputs: Strings = None,
     x0: Strings = None,
     t_end: float | None = None,
+    friction_level: float | None = None,
     rtol: float = 1e-6,
 ) -> None:
     """Simulate SCENE and write a report of signals, friction, errors and laws.
@@ -126,6 +131,7 @@ def report(
 
     opt.check_outputs(html)
     laws = opt.laws_of(law)
+    settings = with_level(scene, settings, friction_level)
     machines, models, given = prepared(scene, laws, settings, preset, law_of, inputs, x0, t_end)
     found = simulated(
         scene,
@@ -141,6 +147,19 @@ def report(
     write_report(found, html, settings=values, command=command)
     output.say_written(html)
     refuse_failed(found.values())
+
+
+def with_level(scene: str, settings: Strings, level: float | None) -> Strings:
+    """Return the texts of --set, with the value of --friction-level.
+
+    Raises:
+        ValueError: a level for a scene that is not a robot.
+    """
+    if level is None:
+        return settings
+    if not scene.endswith(".urdf"):
+        raise ValueError(f"--friction-level: expected with a robot's FILE.urdf, got {scene}")
+    return [*(settings or ()), f"level={level!r}"]
 
 
 def prepared(
@@ -230,7 +249,9 @@ def show_runs(found: Mapping[str, Trajectory], machines: Mapping[str, Scene]) ->
     `symfric laws` prints the warnings about default values.
     """
     for name, trajectory in found.items():
-        show_trajectory(name, trajectory)
+        acting, machine = friction_laws(trajectory.model), machines[name]
+        acts = not isinstance(machine, Robot) or type(machine.law).__name__ in acting
+        show_trajectory(name if acts else acting or "no friction", trajectory)
         for held in (getattr(machines[name], item.name) for item in fields(machines[name])):
             if isinstance(held, Law) and any(
                 p.value != p.default for p in parameters(held).values()

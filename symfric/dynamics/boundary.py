@@ -160,31 +160,42 @@ def boundary(
     Raises:
         ValueError: bad input, or a point of another kind.
     """
-    where, model = "boundary", branch.model
+    where = "boundary"
+    if not isinstance(branch, Branch):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise checks.refused(f"{where}: branch", "a branch of `continuation`", branch)
+    model = branch.model
     if branch.of_orbits or special not in branch.special or special.kind not in KINDS:
         raise checks.refused(
-            f"{where}: special", "a Hopf point or a fold of the branch of equilibria", special.kind,
-            "branch.located('Hopf')[0]",
+            f"{where}: special", "a Hopf point or a fold of the branch of equilibria",
+            getattr(special, "kind", special), "branch.located('Hopf')[0]",
         )  # fmt: skip
     names = [v.name for v in model.p if v.name != branch.parameter]
     check_names(f"{where}: parameter", [parameter], names)
-    low, high = checks.array(f"{where}: between", between, what="two numbers").tolist()
+    ends = checks.array(f"{where}: between", between, what="two numbers")
+    if ends.size != 2:
+        raise checks.refused(f"{where}: between", "two numbers", between)
+    low, high = ends.tolist()
     if not low <= branch.p[parameter] <= high or not low < high:
         raise ValueError(
             f"{where}: between: expected a range that contains the start, {parameter} = "
             f"{branch.p[parameter]:g}, got {low:g} ... {high:g}"
         )
     checks.count(f"{where}: points", points, least=2)
-    curve, node = _start(branch, special, parameter, (low, high))
+    checks.number(f"{where}: step", step, above=0.0, upper=1.0)
+    try:
+        curve, node = _start(branch, special, parameter, (low, high))
+    except ValueError as error:
+        hint = "take a range near the magnitude of the parameter"
+        raise ValueError(f"{where}: no curve at the start: {error}; {hint}") from error
     tau = direction(curve, node, np.eye(node.z.size)[-1])
-    ends = [
+    sides = [
         [n.z for n in _within(curve, node, side * tau, (low, high), step, points // 2)]
         for side in (-1, 1)
     ]
-    rows = np.array([*reversed(ends[0]), node.z, *ends[1]])
+    rows = np.array([*reversed(sides[0]), node.z, *sides[1]])
     rates = np.array([curve.critical(row).imag for row in rows])
     periods = 2 * np.pi / rates if curve.hopf else np.zeros(len(rows))
-    message = "; ".join(_reason(end, (low, high), points // 2) for end in ends)
+    message = "; ".join(_reason(side, (low, high), points // 2) for side in sides)
     return Boundary(
         model, special.kind, (branch.parameter, parameter), rows[:, -2:],
         rows[:, : len(model.x)], periods, message,

@@ -215,6 +215,8 @@ def prepare(
     asked = t_start, t_end, rtol, atol, samples, method, backend, *limits
     ready, looks = prepared("prepare", model, asked, t_eval)
     looks.flags.writeable = False
+    if np.size(times):  # a copy, which the caller cannot change
+        times = tuple(checks.times("prepare: times", times, ready.t_start, ready.t_end))
     made = replace(ready, t=looks, u=None if u is None else model.named("u", u), stops=times)
     _ = made.integrator  # checks the inputs and builds the step
     return made

@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from symfric.multibody.spatial import GROUND as GROUND
     from symfric.multibody.spatial import Body as Body
     from symfric.multibody.spatial import Frame as Frame
+    from symfric.multibody.stops import JointStop as JointStop
     from symfric.multibody.urdf import read_urdf as read_urdf
 
 load_lazily(__name__)

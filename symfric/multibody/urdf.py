@@ -20,6 +20,7 @@ from symfric.multibody.joint import Joint, JointFriction
 from symfric.multibody.joints import Floating, Planar, Prismatic, Revolute
 from symfric.multibody.mechanism import Mechanism
 from symfric.multibody.spatial import GROUND, Vector, unphysical
+from symfric.multibody.stops import JointStop
 from symfric.multibody.urdf_file import Array, Inertial, Urdf, UrdfJoint, parse
 
 KINDS: dict[str, type[Joint]] = {
@@ -37,6 +38,8 @@ def read_urdf(
     laws: Mapping[str, Law] | None = None,
     level: Scalar = 0.0,
     bearings: Mapping[str, JointFriction] | None = None,
+    stop_stiffness: Scalar = 0.0,
+    stop_dissipation: Scalar = 0.0,
     floating: bool = False,
     gravity: Vector = (0.0, 0.0, -9.81),
     strict: bool = False,
@@ -52,7 +55,9 @@ def read_urdf(
     `<dynamics damping="d" friction="f">` becomes the friction d w + f tanh(w / v_eps) for a joint
     rate w: `Viscous` with sigma_2 = d, and `Coulomb` with mu_d = 1 under the normal force f. This
     friction is independent of the reactions and adds no unknown; for a joint that turns, read N m
-    and rad/s. Use `bearings` for friction caused by reactions.
+    and rad/s. Use `bearings` for friction caused by reactions. Tags inside `<dynamics>`, as in SDF,
+    are read like attributes. If damping or friction is missing, mu_viscous or mu_coulomb of
+    Franka's files has the same meaning.
 
     Args:
         source: path of the file, or its content.
@@ -61,6 +66,9 @@ def read_urdf(
         laws: laws by joint name; they take precedence over `law`.
         level: f of the joints whose tag does not define it [N m, N].
         bearings: friction by joint name; it replaces the friction of the file.
+        stop_stiffness: stiffness of a `JointStop`, named stop_<joint>, at the limits of each joint
+            with lower < upper [N m/rad, N/m]; 0 for no stops.
+        stop_dissipation: dissipation of these stops [s/rad, s/m].
         floating: True if the root link moves freely (joint `floating_base`); otherwise it is the
             ground, regardless of its mass. A massless root is always the ground.
         gravity: gravitational acceleration [m/s^2] in the axes of the root link.
@@ -75,8 +83,10 @@ def read_urdf(
     Warns:
         UserWarning: once, about implausible values that are accepted (see `strict`), about all
             omitted parts other than visual, collision and material, and about names that are
-            changed because they are not C identifiers. The omitted parts include `<limit>`: joints
-            do not stop at their limits, but `parse` returns them.
+            changed because they are not C identifiers. The omitted parts include `<limit>`: effort
+            and velocity are not limited, and joints stop at their limits only with
+            `stop_stiffness`. A separate warning names a law that has no effect, because no joint
+            has friction.
 
     Limits: an unphysical inertia can increase the energy of the motion; `build` rejects it if the
     mass matrix at the start is not positive definite.
@@ -86,8 +96,12 @@ def read_urdf(
     laws, bearings = checks.named("urdf: laws", laws), checks.named("urdf: bearings", bearings)
     for name, own in laws.items():
         require_law(f"urdf: law of '{name}'", own)
-    if not is_symbolic(level):
-        checks.number("urdf: level", level, lower=0.0)
+    given = {"level": level, "stop_stiffness": stop_stiffness, "stop_dissipation": stop_dissipation}
+    for what, value in given.items():
+        if not is_symbolic(value):
+            checks.number(f"urdf: {what}", value, lower=0.0)
+    if equals(stop_stiffness, 0.0) and is_number(stop_dissipation) and stop_dissipation > 0:
+        raise checks.refused("urdf: stop_stiffness", "> 0 with stop_dissipation", stop_stiffness)
     for name, bearing in bearings.items():
         what = "JointFriction(law, radius=...)"
         checks.kind(f"urdf: bearing '{name}'", bearing, JointFriction, what)
@@ -102,8 +116,8 @@ def read_urdf(
     problems = [*names.problems, *_massless(moved, held, strict or (grounded and not moved))]
     if problems:
         raise ValueError("\n".join(f"urdf '{urdf.name}' > {text}" for text in problems))
-    for what, given in (("bearings", bearings), ("laws", laws)):
-        check_names(f"urdf '{urdf.name}' {what}", given, [j.name for j in moved])
+    for what, own in (("bearings", bearings), ("laws", laws)):
+        check_names(f"urdf '{urdf.name}' {what}", own, [j.name for j in moved])
     m = Mechanism(_identifier(urdf.name), gravity)
     _add_bodies(m, places, weights, names)
     if not grounded:
@@ -114,8 +128,16 @@ def read_urdf(
         friction = bearings.get(joint.name) or tag_friction(joint, own, level)
         left += _hang(m, joint, names, places, friction, urdf.zero(joint))
     _couple(m, moved, names)
+    if not equals(stop_stiffness, 0.0):
+        _add_stops(m, moved, names, stop_stiffness, stop_dissipation)
+        left = [text.replace("<limit>", "<limit effort, velocity>") for text in left]
     if law is not None and equals(level, 0.0) and not any(joint.friction for joint in moved):
-        left.append(f"{type(law).__name__}, because no joint has <dynamics friction>")
+        warnings.warn(
+            f"urdf '{urdf.name}': {type(law).__name__} has no effect, because no joint has "
+            '<dynamics friction="...">; add this tag, or set a level for all joints, as '
+            "level=0.5 or --friction-level 0.5",
+            stacklevel=2,
+        )
     still = grounded and not moved and weights[urdf.root].mass > 0
     texts = [
         ("nothing moves", [f"floating=True frees the root '{urdf.root}'"] if still else []),
@@ -304,6 +326,17 @@ def _hang(
         m.force(JointSpringDamper(f"motor_{name}", name, actuator=torque))
     elif not single and (joint.damping or joint.friction):
         yield f"<dynamics> of {joint.kind} joint '{joint.name}'"
+
+
+def _add_stops(
+    m: Mechanism, moved: Iterable[UrdfJoint], names: _Names, k: Scalar, e: Scalar
+) -> None:
+    """Add stops of stiffness k and dissipation e; limits that are missing in the file are zero."""
+    for joint in moved:
+        lower, upper = (joint.limits.get(end, 0.0) for end in ("lower", "upper"))
+        if joint.kind in ("revolute", "prismatic") and lower < upper:
+            name = names.joints[joint.name]
+            m.force(JointStop(f"stop_{name}", name, lower, upper, k, e))
 
 
 def _couple(m: Mechanism, moved: Iterable[UrdfJoint], names: _Names) -> None:

@@ -19,6 +19,8 @@ KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 SINGLE = KINDS[:3]
 """Kinds of joints with one coordinate."""
 LIMITS = ("lower", "upper", "effort", "velocity")
+DYNAMICS = (("damping", "mu_viscous"), ("friction", "mu_coulomb"))
+"""Names in <dynamics> of damping and friction: of the specification, and of Franka's files."""
 POINT = 1e-15
 """Inertia per mass [m^2] below which an inertia is zero: a radius of gyration of 30 nm."""
 APPEARANCE = {"visual", "collision", "material"}
@@ -278,10 +280,8 @@ def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
     notes.others(where, tag, known)
     if kind not in KINDS:
         notes.problems.append(f"{where} > type: expected one of {', '.join(KINDS)}, got '{kind}'")
-    dynamics, limit = tag.find("dynamics"), tag.find("limit")
-    for key in () if dynamics is None else dynamics.keys():
-        if key not in ("damping", "friction"):
-            notes.left(f"dynamics {key}", where)
+    damping, friction = _dynamics(where, tag.find("dynamics"), notes)
+    limit = tag.find("limit")
     if limit is not None and kind != "fixed":
         notes.left("limit", where)
     # exporters write zero axes for joints without an axis
@@ -294,18 +294,13 @@ def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
     length = float(np.linalg.norm(axis))
     if not length > 1e-12:
         notes.problems.append(f"{where} > axis: expected a direction, got '0 0 0'")
-    levels: list[float] = []
-    for key in ("damping", "friction"):
-        levels.append(notes.number(f"{where} > dynamics", dynamics, key))
-        if levels[-1] < 0:
-            notes.problems.append(f"{where} > dynamics > {key}: expected >= 0, got {levels[-1]:g}")
     ends: list[str] = []
     for key in ("parent", "child"):
         end = tag.find(key)
         ends.append("" if end is None else end.get("link", ""))
         if not ends[-1]:
             notes.problems.append(f"{where} > {key}: expected the name of a link, found none")
-    (parent, child), (R, p), (damping, friction) = ends, notes.pose(where, tag), levels
+    (parent, child), (R, p) = ends, notes.pose(where, tag)
     leader = None
     if mimic is not None:
         numbers = (("multiplier", "1"), ("offset", "0"))
@@ -315,6 +310,31 @@ def _joint(tag: ET.Element, notes: Notes) -> UrdfJoint:
     limits = {k: notes.number(f"{where} > limit", limit, k) for k in LIMITS if k in given}
     axis = axis / (length or 1.0)
     return UrdfJoint(name, kind, parent, child, R, p, axis, damping, friction, limits, leader)
+
+
+def _dynamics(where: str, tag: ET.Element | None, notes: Notes) -> tuple[float, float]:
+    """Return damping and friction, given as attributes or, as in SDF, as tags.
+
+    A name of the specification takes precedence, even with the value zero.
+    """
+    inside = {} if tag is None else {one.tag: (one.text or "").strip() for one in tag} | tag.attrib
+    both = ET.Element("dynamics", inside)
+    for key in inside:
+        if not any(key in names for names in DYNAMICS):
+            notes.left(f"dynamics {key}", where)
+    levels: list[float] = []
+    for names in DYNAMICS:
+        found = {
+            key: notes.number(f"{where} > dynamics", both, key) for key in names if key in inside
+        }
+        for key, value in found.items():
+            if value < 0:
+                notes.problems.append(f"{where} > dynamics > {key}: expected >= 0, got {value:g}")
+        levels.append(next(iter(found.values()), 0.0))
+        for key, value in found.items():
+            if value not in (0.0, levels[-1]):
+                notes.left(f"dynamics {key}", where)
+    return levels[0], levels[1]
 
 
 def _check_names(robot: ET.Element, notes: Notes) -> None:

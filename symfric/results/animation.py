@@ -21,6 +21,7 @@ from symfric.foundation.style import EDGE, colour
 from symfric.foundation.units import readable
 from symfric.foundation.variable import stacked
 from symfric.model.sketch import Sketch
+from symfric.results.kinds import friction_laws
 from symfric.results.signals import Signals
 from symfric.results.strokes import AZIMUTH, ELEVATION, Poses, Stroke, View, look, strokes
 
@@ -28,6 +29,8 @@ ENDINGS = (".gif", ".html", ".mp4")
 Flags = NDArray[np.bool_]
 BRIEF, LONG, SHOWN = 2.0, 12.0, 6.0
 """Motions between BRIEF and LONG [s] are shown in real time, other motions in SHOWN [s]."""
+INSIDE = np.array([[0.01, 0.01], [0.99, 0.94]])
+"""Corners of the part of a figure that contains spatial axes and their labels."""
 SIZE, SMALL = 6.4, 3.2
 """Larger side of the panel of an animation and of a small figure [inch]."""
 PATH = 1001
@@ -137,6 +140,8 @@ def picture(
     sticks = _sticks(trajectory, sketch, times)
     figure, drawn = _drawn(sketch, columns, paths, sticks)
     title = figure.axes[0].set_title("", loc="left", fontsize="medium")
+    laws = friction_laws(model)
+    named = f"{trajectory.scene} with {laws}\n" if laws else f"{trajectory.scene}   "
     factor = "" if abs(speed - 1) < 1e-9 else f"  ({speed:.3g} x)"
     if sticks:
         entries = [
@@ -150,7 +155,7 @@ def picture(
     def show(k: int) -> None:
         for put in drawn:
             put(k)
-        title.set_text(f"{trajectory.scene}   t = {times[k]:.3f} s{factor}")
+        title.set_text(f"{named}t = {times[k]:.3f} s{factor}")
 
     show(0)
     for _ in range(PASSES):
@@ -235,7 +240,20 @@ def _spatial(view: View, size: float) -> tuple[Figure, Array]:
     ax.set_box_aspect(extent, zoom=1.12)
     figure.subplots_adjust(left=0.0, right=0.95, bottom=0.04, top=0.93)
     ax.view_init(ELEVATION, AZIMUTH)
+    _fit(figure, ax)
     return figure, np.eye(3)
+
+
+def _fit(figure: Figure, ax: Any) -> None:
+    """Shrink and move axes until their labels are inside the figure, below the title."""
+    for _ in range(PASSES):
+        figure.draw_without_rendering()
+        box = ax.get_tightbbox().transformed(figure.transFigure.inverted())
+        place = ax.get_position()
+        share = min(1.0, *((INSIDE[1] - INSIDE[0]) / box.size))
+        low, high = box.min * share, box.max * share
+        shift = np.maximum(INSIDE[0] - low, 0) + np.minimum(INSIDE[1] - high, 0)
+        ax.set_position([*(share * place.min + shift), *(share * place.size)])
 
 
 def _added(figure: Figure, axes: Array, stroke: Stroke) -> Callable[[int], None]:

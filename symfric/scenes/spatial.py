@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar
-from symfric.foundation.parameters import parametric
+from symfric.foundation.parameters import param, parametric
 from symfric.laws import Law
 from symfric.laws.base.law import require_law
 from symfric.multibody import (
@@ -136,6 +136,7 @@ class Robot(MechanismScene):
     `source` is the path of the file or its text. The normal force of the law is the
     `<dynamics friction>` of the joint, by default `level`; the law `relative(LuGre())` breaks away
     at this value. `<dynamics damping>` is added. See `read_urdf` for names, inputs and limits.
+    With `stop_stiffness`, joints stop at the limits of the file, see `JointStop`.
     `laws` are the laws of `joints`, by default `law`; parameters with the same name get suffixes.
     """
 
@@ -147,6 +148,13 @@ class Robot(MechanismScene):
     level: Scalar = fields.LOAD(
         0.0, unit="N m", doc="friction of joints without a tag; [N] of those that slide"
     )
+    stop_stiffness: Scalar = fields.SHAFT(
+        0.0, doc="stiffness of the stops at joint limits, 0 for none; [N/m] of joints that slide"
+    )
+    stop_dissipation: Scalar = param(
+        0.0, unit="s/rad", role="damping", lower=0.0,
+        doc="dissipation of the stops, see JointStop; [s/m] of joints that slide",
+    )  # fmt: skip
     g: Scalar = fields.GRAVITY(9.81)
 
     def __post_init__(self) -> None:
@@ -163,4 +171,7 @@ class Robot(MechanismScene):
         """Return bodies, joints and motors."""
         gravity = (0.0, 0.0, -self.g)
         laws = dict(zip(self.joints, self.laws, strict=True))
-        return read_urdf(self.source, law=self.law, laws=laws, level=self.level, gravity=gravity)
+        return read_urdf(
+            self.source, law=self.law, laws=laws, level=self.level, gravity=gravity,
+            stop_stiffness=self.stop_stiffness, stop_dissipation=self.stop_dissipation,
+        )  # fmt: skip

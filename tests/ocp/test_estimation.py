@@ -223,6 +223,19 @@ def test_combinations_that_data_do_not_determine_are_reported() -> None:
     assert sum_of_both.unobservable == ()
 
 
+def test_the_verdict_claims_no_more_than_the_samples_show() -> None:
+    given: dict[str, Any] = {"step": STEP, "horizon": 3, "unknown": ["load"]}
+    given |= {"noise": {"x": 0.1, "load": 0.5}}
+    zero, none = np.zeros(9), np.full(9, np.nan)
+    missing = estimate(oscillator(), {"f": zero, "x": none}, **given)
+    assert (missing.samples, missing.verdict) == (0, "There is no sample to compare with the model")
+    exact = estimate(oscillator(), {"f": zero, "x": zero}, **given)
+    assert exact.samples == 9 and "no sample" not in exact.verdict
+    assert "at 2 of 9 samples" in replace(exact, unconverged=2).verdict
+    quiet = replace(exact, unobservable=())
+    assert quiet.verdict == "The innovations do not exceed those of the noise"
+
+
 def test_a_motion_that_becomes_infinite_is_an_error() -> None:
     x = Variable("x", "m")
     model = Model("runaway", x=(x,), ode=x.symbol**3)
@@ -252,6 +265,8 @@ def test_bad_input_is_described_at_once() -> None:
         "noise of 'x' above 0; noise of 'v' of at least 0": {"noise": {"v": -1.0}},
         "noise of 'x': expected a finite number, got 'a'": {"noise": {"x": "a"}},
         "unknown: expected a sequence of names": {"unknown": "load"},
+        "noise of 'x' from 1e-100 to 1e\\+100": {"noise": {"x": 1e300}},
+        "spread of 'v' from 1e-100": {"spread": {"v": 1e-300}},
         "steps: expected a whole number >= 1": {"steps": 0},
     }
     for text, change in changes.items():

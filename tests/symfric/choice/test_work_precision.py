@@ -49,6 +49,7 @@ def test_errors_are_those_from_the_closed_form(rate: float) -> None:
 def test_calls_alternate_between_all_points_with_one_engine(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """From loose to tight, whatever the order of the given tolerances."""
     calls = list[tuple[str, float, str]]()
 
     def recorded(*args: Any, **more: Any) -> Any:
@@ -58,7 +59,7 @@ def test_calls_alternate_between_all_points_with_one_engine(
     monkeypatch.setattr(sys.modules[work_precision.__module__], "simulate", recorded)
     done = list[float]()
     found = work_precision(
-        rabinowicz(LuGre()), 0.5, methods=("auto", "dopri5"), rtols=(1e-5, 1e-7), rounds=3,
+        rabinowicz(LuGre()), 0.5, methods=("auto", "dopri5"), rtols=(1e-7, 1e-5, 1e-7), rounds=3,
         backend="vm", signals=("x",), progress=done.append,
     )  # fmt: skip
     points = [(m, r, "vm") for m in ("auto", "dopri5") for r in (1e-5, 1e-7)]
@@ -77,6 +78,20 @@ def test_a_method_that_cannot_integrate_the_model_is_listed() -> None:
     assert found.methods == ("rodas4p",)
     assert "expected an ODE" in found.failed["dopri5 at 1e-04"]
     assert "dopri5 at 1e-04: method DOPRI5" in repr(found)
+
+
+def test_an_interrupt_ends_the_comparison(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time of an interrupted run is not the time of a point."""
+
+    def stop(_: float) -> None:
+        raise KeyboardInterrupt
+
+    def interrupted(*args: Any, **more: Any) -> Any:
+        return simulate(*args, **more | {"progress": stop})
+
+    monkeypatch.setattr(sys.modules[work_precision.__module__], "simulate", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        work_precision(rabinowicz(LuGre()), 20.0, rtols=(1e-6,), backend="vm")
 
 
 def made(*rows: tuple[str, float, float, bool]) -> WorkPrecision:
@@ -99,8 +114,12 @@ def test_times_at_equal_error_use_resolved_points_only() -> None:
     assert found.time_at("b", 1e-4) == 4e-3, "a slower point with a larger error is not used"
     with pytest.raises(ValueError, match="expected one of a, b, got c"):
         found.time_at("c", 1e-4)
+    with pytest.raises(ValueError, match="error: expected a number > 0, got 'a'"):
+        found.time_at("a", "a")  # pyright: ignore[reportArgumentType]
     text = repr(found).splitlines()
     assert text[0] == "work and precision of 'machine' from 0 to 2 s, compiled"
+    hidden = "1 of 5 points are not shown: their error is below 3 times that of the reference"
+    assert text.pop() == hidden
     assert [line.split() for line in text[4:]] == [
         ["error", "a", "[ms]", "b", "[ms]"], ["1e-03", "1", "4"], ["1e-04", "3.16", "4"],
         ["1e-05", "10", "4"], ["1e-06", "-", "4"],

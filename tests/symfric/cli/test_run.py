@@ -114,6 +114,20 @@ def test_ignored_parts_of_a_robot_are_warned_about(symfric) -> None:
     assert printed.err == "symfric: warning: urdf 'small': left out: <limit> of joint 'hinge'\n"
 
 
+@pytest.mark.filterwarnings("default")
+def test_a_robot_without_friction_says_what_to_add_and_does_so(symfric) -> None:
+    Path("bare.urdf").write_text(SMALL.replace(' friction="0.2"', ""))
+    line = "run bare.urdf --law lugre --t-end 0.1 --backend vm"
+    printed = symfric(f"{line} --plot a.png")
+    assert printed.err.count("\n") == 2
+    assert "LuGre has no effect, because no joint has <dynamics friction" in printed.err
+    assert "small with Viscous, 0" in printed.out
+    printed = symfric(f"{line} --friction-level 0.5 --json a.json")
+    assert "warning" not in printed.err
+    result = json.loads(Path("a.json").read_text())
+    assert (result["parameters"]["level"], result["final"]["hinge_N"]) == (0.5, 0.5)
+
+
 def test_a_mechanism_shows_its_main_signals_constraints_and_energy(symfric) -> None:
     line = "run slider_crank --law brown_mcphee --t-end 0.2 --rtol 1e-8 --backend vm"
     printed = symfric(f"{line} --json x.json")

@@ -1,5 +1,7 @@
 """Curves of special points in two parameters against closed forms."""
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -54,12 +56,25 @@ def test_what_has_no_boundary_is_refused() -> None:
     model = damped_belt(1.0)
     rest = continuation(equilibrium(model), "v_b", (0.1, 0.6))
     (hopf,) = rest.located("Hopf")
-    for arguments, text in (
-        ((hopf, "v_b", (0.1, 1.0)), "expected one of c, got v_b"),
-        ((hopf, "c", (0.5, 1.0)), "contains the start, c = 0.3"),
-        ((hopf, "c", (0.5, -1.0)), "contains the start"),
-    ):
+    good: dict[str, Any] = {
+        "branch": rest,
+        "special": hopf,
+        "parameter": "c",
+        "between": (0.1, 1.0),
+    }
+    bad: list[tuple[dict[str, Any], str]] = [
+        ({"branch": None}, "branch: expected a branch of `continuation`, got None"),
+        ({"special": 0}, "special: expected a Hopf point or a fold of .*, got 0"),
+        ({"parameter": "v_b"}, "expected one of c, got v_b"),
+        ({"between": (0.5, 1.0)}, "contains the start, c = 0.3"),
+        ({"between": (0.5, -1.0)}, "contains the start"),
+        ({"between": (0.1,)}, r"between: expected two numbers, got \(0.1,\)"),
+        ({"between": (0.1, 0.5, 1.0)}, "between: expected two numbers"),
+        ({"between": (0.1, 1e9)}, "boundary: no curve at the start: .*; take a range near"),
+        ({"step": 0}, "step: expected a number > 0 and <= 1, got 0"),
+    ]
+    for changed, text in bad:
         with pytest.raises(ValueError, match=text):
-            boundary(rest, *arguments)
+            boundary(**good | changed)
     with pytest.raises(ValueError, match="a Hopf point or a fold"):
         boundary(continuation(equilibrium(model), "v_b", (0.4, 0.6)), hopf, "c", (0.1, 1.0))

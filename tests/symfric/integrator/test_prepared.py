@@ -86,6 +86,16 @@ def test_results_and_settings_share_no_memory() -> None:
     assert prepared().t.tolist() == [0.0, 0.25, 0.5, 0.75, 1.0]
 
 
+def test_stops_do_not_follow_the_array_of_the_caller() -> None:
+    stops = np.array([0.2, 0.7])
+    prepared = sf.prepare(Drive(sf.LuGre()).model(), 1.0, times=stops, backend="vm")
+    first = numbers(prepared(u={"force": 3.0}))
+    stops[:] = 0.1, 0.15
+    assert numbers(prepared(u={"force": 3.0})) == first
+    with pytest.raises(ValueError, match=r"prepare: times: expected increasing times in \[0, 1\]"):
+        sf.prepare(prepared.model, 1.0, times=[0.3, 0.2])
+
+
 def test_bad_values_and_failures_are_those_of_simulate() -> None:
     model = sf.rabinowicz(sf.LuGre(), free=["mu_s"])
     prepared = sf.prepare(model, 20.0, max_steps=50)

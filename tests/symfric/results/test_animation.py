@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from chains import attach
 from matplotlib.animation import FFMpegWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from PIL import Image
 
@@ -162,7 +163,26 @@ def test_time_and_speed_stand_above_and_joints_show_whether_they_stick() -> None
         found = (str(line.get_markerfacecolor()) for line in axis.lines)
         fills += [fill for fill in found if fill in (STICKS, SLIDES)]
     assert fills == [STICKS, SLIDES]
-    assert axis.get_title(loc="left") == "pendulum   t = 0.500 s  (0.1 x)"
+    assert axis.get_title(loc="left") == "pendulum with ExactCoulomb\nt = 0.500 s  (0.1 x)"
+
+
+def test_labels_of_spatial_axes_are_inside_the_picture() -> None:
+    """Mechanisms that are tall, wide, deep or a line, and their small figures."""
+    for reach in ((0.0, 0.0, 3.0), (2.0, 0.1, 0.1), (0.1, 4.0, 1.0), (0.3, 0.2, 1.0), (5e-3,) * 3):
+        m = Mechanism("r")
+        m.body("a", 1.0, (1.0, 1.0, 1.0))
+        m.body("b", 1.0, (1.0, 1.0, 1.0))
+        m.joint(Revolute("j", "ground", "a"))
+        m.frame("a.end", reach, z=(1.0, 0.0, 0.0))
+        m.joint(Revolute("k", "a.end", "b"))
+        run = simulate(m.build(), 0.1, x0={"j_rate": 1.0}, samples=3)
+        figure, _ = picture(run, np.array([0.0, 0.1]))
+        FigureCanvasAgg(figure).draw()
+        labels = [getattr(figure.axes[0], f"{axis}axis").label for axis in "xyz"]
+        for label in labels:
+            box = label.get_window_extent()
+            assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1, (reach, label.get_text())
+            assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1, (reach, label.get_text())
 
 
 def test_the_hands_of_a_drill_string_turn_and_its_bit_sticks_at_first() -> None:

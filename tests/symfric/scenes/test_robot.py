@@ -30,7 +30,7 @@ def test_joint_with_less_torque_than_its_level_stays_where_it_is() -> None:
 
 
 def test_without_tag_and_level_the_law_leaves_no_trace() -> None:
-    with pytest.warns(UserWarning, match="left out: BrownMcPhee"):
+    with pytest.warns(UserWarning, match="BrownMcPhee has no effect"):
         model = Robot(BrownMcPhee(), BARE).model()
     assert not model.monitors
 

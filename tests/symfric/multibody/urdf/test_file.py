@@ -44,6 +44,24 @@ def test_numbers_of_links_and_joints_are_read() -> None:
     assert (urdf.root, urdf.links["world"]) == ("world", None)
 
 
+@pytest.mark.parametrize(
+    ("tag", "damping", "friction", "left"),
+    [
+        ('<dynamics mu_viscous="16" mu_coulomb="0.4"/>', 16.0, 0.4, ""),
+        ("<dynamics><damping> 0.5 </damping><friction>2</friction></dynamics>", 0.5, 2.0, ""),
+        ('<dynamics damping="1"><damping>5</damping><mu_coulomb>3</mu_coulomb></dynamics>', 1, 3,
+         ""),
+        ('<dynamics damping="0" mu_viscous="16"/>', 0.0, 0.0, "mu_viscous"),
+        ('<dynamics D="1" damping="0.1" friction="0" mu_coulomb="0"/>', 0.1, 0.0, "D"),
+        ("<dynamics/>", 0.0, 0.0, ""),
+    ],
+)  # fmt: skip
+def test_friction_of_any_dialect(tag: str, damping: float, friction: float, left: str) -> None:
+    urdf = parse(small(joint(tag), LINK))
+    assert (urdf.joints[1].damping, urdf.joints[1].friction) == (damping, friction)
+    assert list(urdf.left_out) == ([f"<dynamics {left}> of joint 'wrist'"] if left else [])
+
+
 def test_angles_turn_about_fixed_axes_and_quarter_turns_are_exact() -> None:
     for angles, x, z in (
         ((pi / 2, 0, 0), [1, 0, 0], [0, -1, 0]), ((0, pi / 2, 0), [0, 0, -1], [1, 0, 0]),
@@ -83,6 +101,10 @@ BAD = [
     (small(LINK, joint(name="")), r"joint: expected a name, found none"),
     (small(LINK, joint(kind="ball")),
      r"joint 'wrist' > type: expected one of revolute, .*, planar, got 'ball'"),
+    (small(LINK, joint("<dynamics><friction/></dynamics>")),
+     r"joint 'wrist' > dynamics: expected a number in friction, got ''"),
+    (small(LINK, joint('<dynamics mu_viscous="-1"/>')),
+     r"joint 'wrist' > dynamics > mu_viscous: expected >= 0, got -1"),
     (small(LINK, joint('<axis xyz="0 1"/>')),
      r"urdf 'small' > joint 'wrist' > axis: expected 3 numbers in xyz, got '0 1'"),
     (small(LINK, joint('<axis xyz="0 0 0"/>')), r"joint 'wrist' > axis: expected a direction"),

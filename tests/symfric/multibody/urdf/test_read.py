@@ -7,6 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from robots import SMALL, rod
+from scipy.optimize import brentq
 
 from symfric import Coulomb, LuGre, Sum, Viscous, parameters, simulate
 from symfric.laws import Stribeck
@@ -45,7 +46,9 @@ def test_another_law_gets_the_friction_tag_as_its_normal_force() -> None:
     values = parameters(relative(Stribeck(mu_s=0.6, mu_d=0.15, sigma_2=0.7)))
     assert [values[n].value for n in ("mu_s", "mu_d", "sigma_2")] == [1.0, 0.25, 0.7]
     assert relative(viscous := Viscous()) is viscous
-    with pytest.warns(UserWarning, match="left out: LuGre, because no joint has <dynamics fric"):
+    with pytest.warns(
+        UserWarning, match=r"LuGre has no effect, because .* or --friction-level 0.5"
+    ):
         read_urdf(rod(**{' friction="0.2"': ""}), law=LuGre())
 
 
@@ -152,6 +155,29 @@ def test_all_that_is_left_out_is_reported_once() -> None:
     (message,) = (str(w.message) for w in caught)
     expected = "<safety_controller> of joint 'hinge', <limit> of joint 'hinge', <gazebo>"
     assert message == f"urdf 'small': left out: {expected}"
+
+
+@pytest.mark.filterwarnings("ignore:urdf 'small'. left out. <limit effort, velocity>")
+def test_joints_stop_at_the_limits_of_the_file_on_request() -> None:
+    """At rest on a stop, the weight and the spring of the stop balance."""
+    old, limit = "</joint>", '<limit upper="-0.25" lower="-2" effort="9"/></joint>'
+    for changes, joint, expected in (
+        ({}, "revolute", brentq(lambda q: 2 * 9.81 * 0.25 * np.sin(q) + 500 * (q + 0.25), -1, 0)),
+        ({'axis xyz="0 1 0"': 'axis xyz="0 0 -1"'}, "prismatic", -0.25 + 2 * 9.81 / 500),
+    ):
+        text = rod(**{old: limit, "revolute": joint, 'damping="0.3" friction="0.2"': 'damping="9"'},
+                   **changes)  # fmt: skip
+        m = read_urdf(text, stop_stiffness=500.0, stop_dissipation=1.0)
+        run = simulate(m.build(), 60.0, x0={"hinge": -0.8}, rtol=1e-8)
+        assert run.final["hinge"] == pytest.approx(expected, abs=1e-6)
+    for text in (SMALL, rod(**{old: '<limit effort="9"/></joint>'})):
+        assert not [f for f in read_urdf(text, stop_stiffness=1.0).forces if f.kind == "stop"]
+    with pytest.raises(ValueError, match="urdf: stop_stiffness: expected a number >= 0, got -1"):
+        read_urdf(SMALL, stop_stiffness=-1.0)
+    with pytest.raises(
+        ValueError, match="stop_stiffness: expected > 0 with stop_dissipation, got 0"
+    ):
+        read_urdf(SMALL, stop_dissipation=1.0)
 
 
 def test_names_are_kept_apart() -> None:
