@@ -108,7 +108,7 @@ class Budget:
 
 def counted(machine: Machine, model: Model, rtol: float) -> tuple[int, str]:
     """Return the CasADi instructions of an attempt at the tolerance `rtol`, and the method."""
-    formula = chosen("simulate", "auto", rtol, model)
+    formula = chosen("simulate", "auto", rtol)
     inputs = input_data(model, machine.u, 0.0, machine.t_end)
     instructions = built(model, inputs, formula)[0].instructions
     return max(1, instructions) + (EVENTS if model.events else 0), formula.name

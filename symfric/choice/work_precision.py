@@ -1,5 +1,7 @@
 """Choice of a method: run time against error of the integration methods on the user's model."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -147,7 +149,7 @@ class WorkPrecision(Showing):
             tuple(said),
         )
 
-    def plot(self, path: str | Path | None = None) -> "Figure":
+    def plot(self, path: str | Path | None = None) -> Figure:
         """Draw time against error with a curve for each method; save the figure to `path` if given.
 
         Errors below that of the reference are hatched.
@@ -173,7 +175,7 @@ class WorkPrecision(Showing):
         axis.legend()
         return save(figure, path)
 
-    def thumbnail(self) -> "Figure":
+    def thumbnail(self) -> Figure:
         """Return the figure."""
         return self.plot()
 

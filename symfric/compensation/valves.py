@@ -1,5 +1,7 @@
 """Stiction of control valves: maps from the output of a controller to the position of the valve."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 

@@ -18,12 +18,6 @@ from symfric.model import check_model as check_model
 
 LOOSE = 1e-5
 """Relative tolerance above which whole stick phases may be missed without notice."""
-TIGHT = 1e-8
-"""Relative tolerance up to which Radau9 reaches equal errors in less time than Rodas5P.
-
-One attempt takes twice the time. The number of attempts of stick-slip is half at 1e-8 and a quarter
-at 1e-10, with smaller errors. Bristles have corners, at which a high order has no advantage.
-"""
 BACKENDS = ("auto", "vm", "compiled")
 """Engines: the faster one, CasADi's virtual machine, and machine code of the step."""
 MOST_SAMPLES = 10**7
@@ -135,11 +129,8 @@ def another(method: Method) -> str:
     return "rodas5p" if isinstance(method, Radau) else "radau5"
 
 
-def chosen(where: str, name: str, rtol: float, model: Model | None = None) -> Method:
-    """Return the adaptive method of this name, for single runs of `model` if it is given.
-
-    "auto" is Radau5 at loose tolerances, Radau9 for a single run of a smooth ODE at tight ones, and
-    Rodas5P otherwise.
+def chosen(where: str, name: str, rtol: float) -> Method:
+    """Return the adaptive method of this name; "auto" is Rodas5P, and Radau5 at loose tolerances.
 
     Raises:
         ValueError: an unknown name, or a method with fixed steps.
@@ -150,15 +141,5 @@ def chosen(where: str, name: str, rtol: float, model: Model | None = None) -> Me
             f"{where}: method: expected one with error control, one of {', '.join(ADAPTIVE)}, got "
             f"{name}, which has fixed steps; use it with flow or in the C of plants"
         )
-    if name != "auto":
-        return ADAPTIVE[name]
-    if rtol > LOOSE:
-        return ADAPTIVE["radau5"]
-    tight = rtol <= TIGHT and model is not None and smooth_ode(model)
-    return ADAPTIVE["radau9" if tight else "rodas5p"]
-
-
-def smooth_ode(model: Model) -> bool:
-    """Return True for an ODE without events whose friction laws have no states."""
-    bristles = any(contact.law.states for contact in model.contacts)
-    return model.ode is not None and not (model.z or model.events or bristles)
+    automatic = "radau5" if rtol > LOOSE else "rodas5p"
+    return ADAPTIVE[automatic if name == "auto" else name]

@@ -3,6 +3,8 @@
 `simulate` uses the same class, and keeps it for each model and its settings.
 """
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, fields, replace
@@ -271,7 +273,7 @@ def _checked(
     max_step: float | None,
 ) -> Prepared:
     t_start, t_end, rtol = arguments.check_span(where, model, t_start, t_end, rtol, stacklevel=6)
-    formula = arguments.chosen(where, method, rtol, model)
+    formula = arguments.chosen(where, method, rtol)
     checks.choice(f"{where}: backend", backend, arguments.BACKENDS)
     times = arguments.result_times(where, t_start, t_end, None, samples)
     limits = model.nominal("x"), event_tolerance, max_steps, max_step

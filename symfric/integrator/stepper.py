@@ -76,7 +76,7 @@ def stepper(
     dt = checks.number(f"{where}: dt", dt, unit="s", above=0.0)
     t_start = checks.number(f"{where}: t_start", t_start, unit="s")
     _, t_end, rtol = arguments.check_span(where, model, t_start, t_start + dt, rtol)
-    formula = arguments.chosen(where, method, rtol, model)
+    formula = arguments.chosen(where, method, rtol)
     checks.choice(f"{where}: backend", backend, arguments.BACKENDS)
     members = 1 if batch is None else checks.count(f"{where}: batch", batch)
     # constant inputs have one entry each in the run data

@@ -123,7 +123,8 @@ def test_transients_and_spans_of_any_length_are_started_and_ended() -> None:
     for span, begin in ((1e-9, 0.0), (1.0, 0.0), (1e9, 0.0), (1.0, 1e9)):
         model = Model("slow", x=(x,), ode=-X / span)
         run = sf.simulate(model, begin + span, t_start=begin, rtol=1e-8)
-        assert run.final["x"] == pytest.approx(np.exp(-1), rel=1e-7)
+        rounding = 2 * np.spacing(begin) / span  # of the time, which no method avoids
+        assert run.final["x"] == pytest.approx(np.exp(-1), rel=1e-7 + rounding)
         assert run.statistics.steps < 60
     late = Model("late", x=(Variable("x", "m"),), ode=5 * t**4, t=t)
     run = sf.simulate(late, 2.0, rtol=1e-8)

@@ -110,4 +110,3 @@ def test_order_nine_takes_a_quarter_of_the_attempts_at_tight_tolerances() -> Non
         assert attempts[1] < ratio * attempts[0]
         assert errors[1] < 0.5 * errors[0]
         assert errors[1] < 10 * rtol
-        assert sf.simulate(model, span, rtol=rtol)["x"].tolist() == run["x"].tolist(), "auto"
