@@ -173,6 +173,8 @@ def _descended(system: System | Equations, y: Array, d: Array) -> Array:
     for _ in range(MARQUARDT):
         scale = np.linalg.norm(slope, axis=0)
         bent = np.vstack([slope, np.sqrt(damping) * np.diag(scale + np.spacing(scale.max()))])
+        if not np.isfinite(np.column_stack([bent[: len(g)], g])).all():
+            break  # a parameter is out of range
         new = y.copy()
         new[rows] -= along @ np.linalg.lstsq(bent, np.vstack([g, np.zeros_like(g)]))[0][:, 0]
         g_new, slope_new = evaluate_all(system.constraints, new, d)
