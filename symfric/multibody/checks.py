@@ -79,8 +79,8 @@ def _on_one_base(
     bases = sorted({body_of(joint.parent) for joint in joints if joint.name in turned})
     if len(bases) > 1:
         yield (
-            f"{where}: expected joints with one parent, got {' and '.join(turned)} with the parents "
-            f"{' and '.join(bases)}; add a joint for the relative motion"
+            f"{where}: expected joints with one parent, got {' and '.join(turned)} with the "
+            f"parents {' and '.join(bases)}; add a joint for the relative motion"
         )
 
 

@@ -203,7 +203,8 @@ def _rounding(system: System | Equations, y: Array, d: Array) -> float:
     found: list[float] = []
     for _ in range(4):
         moved = [a * (1.0 + LAST_DIGITS * rng.choice([-1.0, 1.0], a.shape)) for a in (y, d)]
-        found.append(float(np.linalg.norm(evaluate(system.constraints, *moved) - here)))
+        with np.errstate(invalid="ignore"):  # of infinite values
+            found.append(float(np.linalg.norm(evaluate(system.constraints, *moved) - here)))
     return max(found)
 
 
