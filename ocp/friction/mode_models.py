@@ -57,7 +57,7 @@ except near 0."""
 
 
 class Loop(NamedTuple):
-    """Contacts of a loop, which stick together.
+    """Contacts of a loop or of one coordinate, which stick together.
 
     Attributes:
         members: the contacts, two or more.
@@ -83,19 +83,22 @@ class Loop(NamedTuple):
 
 
 def loops_of(model: Model) -> tuple[Loop, ...]:
-    """Return the loops of a mechanism that contain several contacts."""
+    """Return the loops, or coordinates outside loops, of a mechanism with several contacts."""
     mechanics = model.holonomic
-    if mechanics is None or not mechanics.phi.numel() or ca.depends_on(mechanics.phi, model.t):
+    if mechanics is None or ca.depends_on(mechanics.phi, model.t):
         return ()
     q, qd = model.vector("x")[: mechanics.n], model.vector("x")[mechanics.n : 2 * mechanics.n]
     slopes = [(c, ca.jacobian(c.slip, qd)) for c in sticking(model)]
     J = ca.jacobian(mechanics.phi, q)
     loops: list[Loop] = []
-    for columns, rows in coupled(ca.DM(J.sparsity(), 1).full() != 0):
+    bound = coupled(ca.DM(J.sparsity(), 1).full() != 0)
+    used = {k for columns, _ in bound for k in columns}
+    lone = [([k], list[int]()) for k in range(mechanics.n) if k not in used]
+    for columns, rows in [*bound, *lone]:
         if len(columns) != len(rows) + 1 or len(columns) > MINORS:
             continue
         tangent = ca.SX(mechanics.n, 1)
-        tangent[columns] = null_direction(J[rows, columns])
+        tangent[columns] = null_direction(J[rows, columns]) if rows else 1.0
         members = [
             (c, ca.SX(G @ tangent))
             for c, G in slopes

@@ -126,7 +126,7 @@ def valve_stiction(S: float, J: float, *, form: str = "kano", name: str | None =
     checks.number(f"{where}: J", J, lower=0.0)
     if form == "he" and J > S:
         raise ValueError(f"{where}: expected J <= S for the form he, got J = {J:g} and S = {S:g}")
-    made = FORMS[form]
+    made, own = FORMS[form], where if name is None else checks.text(f"{where}: name", name)
     u = Variable("u", "1", doc="output of the controller")
     parameters = (
         Variable("S", "1", start=S, doc="deadband plus stick band", lower=0.0),
@@ -138,7 +138,7 @@ def valve_stiction(S: float, J: float, *, form: str = "kano", name: str | None =
     states = tuple(Variable(n, "1", start=start, doc=doc) for (n, doc), start in named)
     after = made.step(symbols_of(states), u.symbol, s, j)
     return Block(
-        where if name is None else name,
+        own,
         doc=f"Stiction of a control valve, form {form}.",
         states=states,
         inputs=(u,),

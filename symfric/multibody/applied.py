@@ -9,8 +9,9 @@ forces unchanged, s would be constant. F_e is an algebraic unknown. A sticking c
 F = F_e, so its equation is ds/dt = 0 for any W. Contacts that stick independently of each other
 have one such equation each; the equations together determine the forces.
 
-In a loop of one degree of freedom all contacts stick together: s_i = g_i(q) omega, with omega the
-speed along the tangent of the constraints. The distribution of the force that holds the loop,
+In a loop of one degree of freedom, and on one joint coordinate outside loops (a bearing and its
+brake), all contacts stick together: s_i = g_i(q) omega, with omega the speed along the tangent of
+the constraints. The distribution of the force that holds the loop,
 T = sum g_i F_i, is undetermined. The contacts share it in equal fractions of their static levels,
 the distribution that holds the largest force,
 
@@ -175,7 +176,7 @@ class Rest:
     @property
     def is_loop(self) -> bool:
         """Return True if the members move together along the tangent of constraints."""
-        return not self.along[0].is_one()
+        return len(self.members) > 1 or not self.along[0].is_one()
 
     def needed(self, forces: Sequence[ca.SX]) -> ca.SX:
         """Return the residual of the equation for the applied force, shape (1, 1)."""
@@ -281,7 +282,7 @@ class _Maker:
     def loop(self, columns: list[int], rows: list[int], members: Sequence[int]) -> Rest:
         """Return the group of all contacts of a loop of one degree of freedom."""
         eq, contacts = self.eq, [self.eq.contacts[i] for i in members]
-        if ca.depends_on(eq.phi[rows, 0], eq.kin.t):
+        if rows and ca.depends_on(eq.phi[rows, 0], eq.kin.t):
             what = "one that needs only v and N in a loop that moves with time"
             raise self.refuse(contacts, what, "use a smooth law")
         if len(columns) > MINORS:
@@ -291,7 +292,7 @@ class _Maker:
             what = "one that stops only at v = 0 in a loop"
             raise self.refuse(contacts, what, "use ExactCoulomb")
         Z = ca.SX(eq.n, 1)
-        Z[columns] = null_direction(eq.Phi_q[rows, columns])
+        Z[columns] = null_direction(eq.Phi_q[rows, columns]) if rows else 1.0
         along = [ca.jacobian(c.slip, eq.qd) @ Z for c in contacts]
         name = f"{contacts[0].name}_loop"
         return self.group(name, members, along, ca.dot(Z, eq.qd), ca.dot(Z, eq.a), Z.T, columns)
@@ -309,22 +310,30 @@ def rests(where: str, made: Prepared, a0: Array) -> tuple[Rest, ...]:
         return ()
     make = _Maker(where, made, a0)
     loops = coupled(ca.DM(eq.Phi_q.sparsity(), 1).full() != 0)
-    alone, of_loop = list[int](), dict[int, list[int]]()
+    alone, of_loop, of_rate = list[int](), dict[int, list[int]](), dict[int, list[int]]()
     for i, slopes in applied.items():
         moves = set(slopes.sparsity().get_col())
         touched = [k for k, (columns, _) in enumerate(loops) if moves & {*columns}]
         columns, rows = loops[touched[0]] if len(touched) == 1 else ((), ())
         if moves <= {*columns} and len(columns) == len(rows) + 1:
             of_loop.setdefault(touched[0], []).append(i)
+        elif len(moves) == 1 and not touched:
+            of_rate.setdefault(moves.pop(), []).append(i)
         else:
             alone.append(i)
     found = [make.loop(*loops[k], members) for k, members in of_loop.items()]
+    parallel = {k: members for k, members in of_rate.items() if len(members) > 1}
+    found += [make.loop([k], [], members) for k, members in parallel.items()]
+    alone += (members[0] for k, members in of_rate.items() if k not in parallel)
     found += [make.single(i) for i in alone]
-    rows = ca.vertcat(eq.Phi_q, *(applied[i] for i in alone))
-    if eq.m and alone and np.linalg.matrix_rank(make.numbers(rows)) < rows.size1():
+    held = [*alone, *(members[0] for members in parallel.values())]
+    rows = ca.vertcat(eq.Phi_q, *(applied[i] for i in held))
+    if alone and np.linalg.matrix_rank(make.numbers(rows)) < rows.size1():
         raise make.refuse(
-            [eq.contacts[i] for i in alone],
-            "no more of them in a loop than it has degrees of freedom",
+            [eq.contacts[i] for i in held],
+            "no more of them in a loop than it has degrees of freedom"
+            if eq.m
+            else "no more of them between joints than independent sliding velocities",
             "the distribution of their forces is undetermined; use smooth laws in the others",
         )
     return tuple(sorted(found, key=lambda rest: rest.members))

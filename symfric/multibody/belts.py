@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import pi
+from math import pi, sin
 from typing import final
 
 import casadi as ca
@@ -31,11 +31,11 @@ class _Wound(ActuatedElement):
     def problems(self) -> Iterator[str]:
         """Yield a message about an impossible groove."""
         yield from super().problems()
-        half = as_number(self.groove)
+        half, angle = as_number(self.groove), as_number(self.angle)
         if half is not None and half > pi / 2:
             yield f"groove: expected at most pi/2 rad, got {half:g}; angles are in radians"
-        elif half is None or half > 0:
-            yield from overwound(self.law, self.wrap)
+        elif half is not None and half > 0 and angle is not None:
+            yield from overwound(self.law, angle / sin(half))
 
 
 @final

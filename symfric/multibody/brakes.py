@@ -85,7 +85,9 @@ class DiscClutch(ActuatedElement):
         """Yield messages about the ring and the distribution of the pressure."""
         yield from super().problems()
         inner, outer, angle = map(as_number, (self.inner, self.outer, self.half_angle))
-        if inner is not None and not 0 <= inner <= (outer if outer is not None else inner):
+        if inner is not None and inner < 0:
+            yield f"inner: expected a number >= 0, got {inner:g}"
+        elif inner is not None and outer is not None and 0 < outer < inner < inf:
             yield f"inner: expected a radius from 0 to outer = {outer:g} m, got {inner:g}"
         if angle is not None and angle > pi / 2:
             yield f"half_angle: expected at most pi/2 rad, got {angle:g}; angles are in radians"

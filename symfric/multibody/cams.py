@@ -55,8 +55,9 @@ class CamFriction(ElementFriction):
     def problems(self) -> Iterator[str]:
         """Yield messages about invalid values."""
         yield from super().problems()
-        if self.follower not in FOLLOWERS:
-            yield f"follower: expected {', '.join(FOLLOWERS)}, got {shown(self.follower)}"
+        follower = vars(self)["follower"]
+        if not (isinstance(follower, str) and follower in FOLLOWERS):
+            yield f"follower: expected {', '.join(FOLLOWERS)}, got {shown(follower)}"
             return
         for name in self.optional:
             given, rolls = getattr(self, name) is not None, self.follower == "roller"

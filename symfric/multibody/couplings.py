@@ -72,8 +72,9 @@ class Coupling(Constraint):
     def problems(self) -> Iterator[str]:
         """Yield messages about invalid numbers, a zero ratio, or identical displacements."""
         yield from super().problems()
-        if equals(self._ratio, 0.0):
-            yield f"{self.ratio_field}: expected a finite number other than 0, got {self._ratio!r}"
+        given = getattr(self, self.ratio_field)
+        if equals(given, 0.0):
+            yield f"{self.ratio_field}: expected a finite number other than 0, got {given!r}"
         a, b = self._ends
         if a == b:
             yield f"expected two displacements, got {a[1]} of {a[0]} twice"

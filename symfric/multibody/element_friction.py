@@ -18,7 +18,7 @@ from typing import ClassVar, NamedTuple, final
 
 import casadi as ca
 
-from symfric.foundation.checks import as_number, number, shown
+from symfric.foundation.checks import as_number, number, refused, shown
 from symfric.foundation.numeric import Scalar, cos, is_symbolic, sqrt
 from symfric.foundation.variable import take_si
 from symfric.laws import Law
@@ -50,7 +50,8 @@ class ElementFriction(Keywords, ABC):
         law: friction law of v, N and the applied force. Laws with true sticking (`ExactCoulomb`)
             work wherever they work in joints, see `JointFriction`.
         preload: normal force in addition to the reaction [N].
-        eps: smoothing width of the magnitude of the reaction [N].
+        eps: smoothing width of the magnitude of the reaction [N]; N is at least preload + eps, so
+            reduce it for loads below 0.01 N, as in micromechanisms.
     """
 
     kinds: ClassVar[Mapping[str, str]] = {}
@@ -66,7 +67,8 @@ class ElementFriction(Keywords, ABC):
 
     def __post_init__(self) -> None:
         require_law("friction", self.law)
-        take_si("friction", self, *(item.name for item in fields(self) if item.type is Scalar))
+        numbers = (item.name for item in fields(self) if item.type in (Scalar, Scalar | None))
+        take_si("friction", self, *numbers)
 
     def magnitude(self, *components: ca.SX) -> ca.SX:
         """Return the smoothed magnitude of a force with the given components [N]."""
@@ -83,7 +85,8 @@ class ElementFriction(Keywords, ABC):
             value, (good, what) = getattr(self, name), RANGES[kind]
             size = as_number(value)
             absent = value is None and name in self.optional
-            if not (absent or is_symbolic(value) or (size is not None and good(size))):
+            symbol = isinstance(value, ca.SX) and is_symbolic(value)
+            if not (absent or symbol or (size is not None and good(size))):
                 yield f"{name}: expected {what}, got {shown(value)}"
 
 
@@ -194,6 +197,13 @@ class MeshFriction(FlankFriction):
     helix_angle: Scalar = 0.0
     internal: bool = False
 
+    def problems(self) -> Iterator[str]:
+        """Yield messages about invalid values."""
+        yield from super().problems()
+        internal = vars(self)["internal"]
+        if not isinstance(internal, bool):
+            yield f"internal: expected True or False, got {shown(internal)}"
+
     def flank(self, ratio: Scalar, linear: bool) -> Flank:
         """Return levers of the relative angular velocity, and the divisor of the tooth force."""
         slope = cos(self.pressure_angle) * cos(self.helix_angle)
@@ -212,7 +222,8 @@ def mesh_arm(
     Args:
         efficiency: mean efficiency if a drives, between 0 and 1.
         mu: friction coefficient of the law in sliding.
-        radius_a, radius_b: pitch radii [m]; inf for a rack, negative for an internal gear.
+        radius_a, radius_b: pitch radii [m]; radius_b is inf for a rack and negative for an internal
+            gear b, which is larger than a.
         pressure_angle, helix_angle: angles [rad] of the `MeshFriction`.
 
     Raises:
@@ -224,5 +235,13 @@ def mesh_arm(
         number(f"{where}: {name}", value, above=0.0)
         for name, value in (("mu", mu), ("radius_a", radius_a))
     )
-    loss = (1.0 - efficiency) / (1.0 / radius_b + efficiency / radius_a)
+    far = as_number(radius_b)
+    if far is None or not (far > 0 or far < -radius_a):
+        expected = f"a number > 0, or < -{radius_a:g} for an internal gear [m]"
+        raise refused(f"{where}: radius_b", expected, radius_b)
+    for name, value in (("pressure_angle", pressure_angle), ("helix_angle", helix_angle)):
+        good, what = RANGES["angle"]
+        if (size := as_number(value)) is None or not good(size):
+            raise refused(f"{where}: {name}", what, value)
+    loss = (1.0 - efficiency) / (1.0 / far + efficiency / radius_a)
     return float(loss * cos(pressure_angle) * cos(helix_angle) / mu)

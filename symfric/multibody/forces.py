@@ -104,7 +104,8 @@ class Part(Keywords, ABC):
         """Yield messages about numbers that are not finite and values that are not functions."""
         for item in fields(self):
             value, of = getattr(self, item.name), FUNCTION_OF.get(item.name)
-            good = is_symbolic(value) or (is_number(value) and abs(value) < ca.inf)
+            good = isinstance(value, ca.SX) and is_symbolic(value)
+            good = good or (is_number(value) and abs(value) < ca.inf)
             if item.type is Scalar and not good:
                 yield f"{item.name}: expected a finite number, got {value!r}"
             if of is not None and not callable(value):

@@ -333,7 +333,7 @@ def contact(
             f"{type(law).__name__}: expected a law that needs no more than v, N"
             f"{''.join(f', {offered}' for offered in inputs)} here, got one that needs "
             f"{', '.join(f'{i.name} ({i.doc})' for i in needed)}; "
-            "offer it by name, as in contact(..., dv=acceleration)"
+            f"offer it by name, as in contact(..., {needed[0].name}=...)"
         )
     bottom = N if least is None else least
     if is_number(bottom) and bottom == 0 and divides_by_load(law):

@@ -1,5 +1,6 @@
 """Laws from data: friction curves without a formula, whose coefficients are fitted."""
 
+from dataclasses import replace
 from functools import partial
 from itertools import accumulate
 
@@ -63,13 +64,16 @@ class Spline(StaticLaw):
     def over(cls, v_first: float, v_last: float, count: int, **more: Scalar | str) -> "Spline":
         """Return a curve of `count` equal coefficients for data between two speeds [m/s].
 
+        The width v_eps is v_first / 10 unless it is given.
+
         Raises:
             ValueError: bad input, such as fewer than 3 coefficients.
         """
         checks.count("Spline.over: count", count, least=3)
         share = count if more.get("shape") == "falling" else 1
         levels = tuple(Level(0.1 / share) for _ in range(count))
-        return cls(levels, v_first, v_last, **more)  # pyright: ignore[reportArgumentType]
+        law = cls(levels, v_first, v_last, **more)  # pyright: ignore[reportArgumentType]
+        return law if "v_eps" in more else replace(law, v_eps=law.v_first / 10)
 
     def outside(self, speed: Scalar, N: Scalar) -> Scalar:
         """Return the sliding force [N] at a speed >= 0 for zero widths."""
@@ -142,13 +146,16 @@ class Network(StaticLaw):
     def over(cls, v_first: float, v_last: float, count: int, **more: Scalar) -> "Network":
         """Return a network of `count` falling and `count` rising units between two speeds [m/s].
 
+        The width v_eps is v_first / 10 unless it is given.
+
         Raises:
-            ValueError: bad input.
+            ValueError: bad input, such as more than 7 units of each kind.
         """
-        checks.count("Network.over: count", count)
+        checks.count("Network.over: count", count, most=7)
         places = [(k + 0.5) / count for k in range(count)]
         units = (Unit(0.01, a * count, s) for s in places for a in (-4.0, 4.0))
-        return cls(tuple(units), 0.1, v_first, v_last, **more)
+        law = cls(tuple(units), 0.1, v_first, v_last, **more)
+        return law if "v_eps" in more else replace(law, v_eps=law.v_first / 10)
 
     @property
     def weights(self) -> tuple[str, ...]:

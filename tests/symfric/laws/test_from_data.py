@@ -112,6 +112,8 @@ BAD = [
     (lambda: sf.Network((0.1,)), "Network: units: expected one or more, all Unit"),  # type: ignore[arg-type]
     (lambda: sf.Network(sf.Unit()), "Network: units: expected a sequence of units"),  # type: ignore[arg-type]
     (lambda: sf.Network.over(1e-3, 1.0, 0), "Network.over: count: expected"),
+    (lambda: sf.Network.over(1e-3, 1.0, 8), "count: expected a whole number from 1 to 7"),
+    (lambda: sf.Spline.over("slow", 1.0, 6), "v_first"),
     (lambda: sf.Network.over(1.0, 1e-3, 2), "expected v_first < v_last, got v_first = 1"),
     (lambda: sf.Unit(w=-1.0), "Unit: w: expected 0 <= w <= inf"),
     (lambda: sf.Unit(a=31.0), "Unit: a: expected -30 <= a <= 30"),

@@ -1,6 +1,7 @@
 """Brakes, clutches and belts against closed forms of equilibrium and motion."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import exp, pi, sin, tanh
 
 import casadi as ca
@@ -12,6 +13,7 @@ from shafts import SHOE, K, at_start, driven, drum, dry, ramp, shafts, turning
 from tables import Names, table
 
 import symfric as sf
+from ocp.friction.mode_models import restless
 from symfric import Variable, simulate
 from symfric import multibody as mb
 from symfric.laws import Law, law_from_text
@@ -157,6 +159,39 @@ def test_a_brake_holds_up_to_its_static_level(s: int) -> None:
         assert np.abs(run["a_rate"][run.t < 0.999]).max() < 1e-12
 
 
+@pytest.mark.parametrize("s", [1, -1])
+@pytest.mark.parametrize("R", [0.2, 1.0, 1e-4])
+def test_brakes_and_a_bearing_on_one_shaft_stop_and_hold_it_together(s: int, R: float) -> None:
+    """The shaft stops after J w / (sum of the moments) and breaks away at the sum of the levels."""
+    law, P = dry(0.4, 0.3), 50.0 / R
+    m = mb.Mechanism("train", gravity=(0.0, 0.0, 0.0))
+    bearing = mb.JointFriction(dry(0.2, 0.1), radius=R / 10, preload=P)
+    attach(m, mb.Revolute, "a", "shaft_a", J=0.5, rate=s * 30.0, friction=bearing)
+    m.force(mb.DiscClutch("x", "a", law, P, R, R))
+    m.force(mb.DrumBrake("y", "a", law, P, R, 1.0, 1.0, 1.0))
+    m.force(mb.BandBrake("w", "a", law, P, R, 2.0, 0.3, 0.6))
+    m.force(mb.JointSpringDamper("motor", "a", actuator=m.input("torque", "N m")))
+
+    def levels(mu: float, bearing: float) -> float:
+        band = (exp(s * mu * 2.0) - 1) / 2
+        return P * R * (bearing / 10 + mu + 2 * mu / (1 - mu**2) + s * band)
+
+    slide, hold = levels(0.3, 0.1), levels(0.4, 0.2)
+    stop = 0.5 * 30 / slide
+    run = simulate(m.build(), 2 * stop, u={"torque": 0.0}, rtol=1e-9)
+    assert [what for _, what in run.happened] == ["a_loop_stick"]
+    assert run.happened[0][0] == pytest.approx(stop, rel=1e-8)
+    balance = run.energy_balance()
+    assert np.abs(balance.defect).max() < 1e-9 * balance.scale
+    assert "stick one by one, got a, x, y, w" in restless(m.build())
+    m.joints[0] = replace(m.joints[0], rate=0.0)
+    run = simulate(m.build(), 1.2, u={"torque": ramp(s * hold)}, rtol=1e-8)
+    assert run.happened[0] == (pytest.approx(1.0, rel=1e-9), "a_loop_slip")
+    moments = sum(run[f"{name}_load_a"] for name in "xyw") - R / 10 * run["a_friction"]
+    held = run.t < 0.999
+    assert moments[held] == pytest.approx(-s * hold * run.t[held], rel=1e-9, abs=1e-9)
+
+
 def test_a_clutch_locks_after_the_time_of_the_closed_form() -> None:
     m = shafts(150.0, J=0.2)
     attach(m, mb.Revolute, "b", "load", J=0.64)
@@ -225,7 +260,8 @@ def test_a_released_element_has_no_friction_and_never_pulls(law: str) -> None:
 
 
 ELEMENTS = ("DrumBrake", "DiscClutch", "BandBrake", "CapstanDrum", "Belt", "shoe_arms")
-VALUES = {"np": np, "ca": ca, "LAW": sf.BrownMcPhee(), "SHOE": SHOE, "kN": Variable("P", "kN")}
+VALUES = {"np": np, "ca": ca, "sf": sf, "DRY": dry(0.3), "SHOE": SHOE}
+VALUES |= {"LAW": sf.BrownMcPhee(), "kN": Variable("P", "kN")}
 NAMES = Names({name: getattr(mb, name) for name in ELEMENTS} | VALUES)
 
 
@@ -233,7 +269,11 @@ def test_mistakes_are_described_in_one_sentence() -> None:
     """Elements in elements.toml, in a mechanism with the shafts a, b and the joint rope."""
     for text, message in table(__file__, "elements").items():
         with pytest.raises(ValueError) as caught:
-            turning(NAMES.value(text), 1.0, 2.0, rope=True).build()
+            first, *more = NAMES.value(f"[{text}]")
+            m = turning(first, 1.0, 2.0, rope=True)
+            attach(m, mb.Revolute, "on_a", "pinion", "shaft_a")
+            m.forces += more
+            m.build()
         found = str(caught.value)
         assert message in found, (text, found)
         assert "\n" not in found, found
