@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from symfric.dynamics.balance import rows_at_rest
 from symfric.dynamics.branch import Branch, Special
+from symfric.dynamics.continuation import checked_span
 from symfric.dynamics.curve import Equations as Curve
 from symfric.dynamics.curve import Node, corrected, followed, located
 from symfric.dynamics.curve import tangent as direction
@@ -153,7 +154,7 @@ def boundary(
         branch: branch of equilibria.
         special: one of its Hopf points or folds, such as `branch.located("Hopf")[0]`.
         parameter: name of the second free parameter.
-        between: smallest and largest value of the second parameter.
+        between: smallest and largest value of the second parameter, within its bounds.
         points: largest number of points.
         step: longest step, relative to the magnitudes of states and the ranges of the parameters.
 
@@ -171,31 +172,22 @@ def boundary(
         )  # fmt: skip
     names = [v.name for v in model.p if v.name != branch.parameter]
     check_names(f"{where}: parameter", [parameter], names)
-    ends = checks.array(f"{where}: between", between, what="two numbers")
-    if ends.size != 2:
-        raise checks.refused(f"{where}: between", "two numbers", between)
-    low, high = ends.tolist()
-    if not low <= branch.p[parameter] <= high or not low < high:
-        raise ValueError(
-            f"{where}: between: expected a range that contains the start, {parameter} = "
-            f"{branch.p[parameter]:g}, got {low:g} ... {high:g}"
-        )
+    span = checked_span(where, model, between, branch.p[parameter], parameter)
     checks.count(f"{where}: points", points, least=2)
     checks.number(f"{where}: step", step, above=0.0, upper=1.0)
     try:
-        curve, node = _start(branch, special, parameter, (low, high))
+        curve, node = _start(branch, special, parameter, span)
     except ValueError as error:
         hint = "take a range near the magnitude of the parameter"
         raise ValueError(f"{where}: no curve at the start: {error}; {hint}") from error
     tau = direction(curve, node, np.eye(node.z.size)[-1])
     sides = [
-        [n.z for n in _within(curve, node, side * tau, (low, high), step, points // 2)]
-        for side in (-1, 1)
+        [n.z for n in _within(curve, node, side * tau, span, step, points // 2)] for side in (-1, 1)
     ]
     rows = np.array([*reversed(sides[0]), node.z, *sides[1]])
     rates = np.array([curve.critical(row).imag for row in rows])
     periods = 2 * np.pi / rates if curve.hopf else np.zeros(len(rows))
-    message = "; ".join(_reason(side, (low, high), points // 2) for side in sides)
+    message = "; ".join(_reason(side, span, points // 2) for side in sides)
     return Boundary(
         model, special.kind, (branch.parameter, parameter), rows[:, -2:],
         rows[:, : len(model.x)], periods, message,

@@ -22,6 +22,12 @@ from symfric.results.stored import Format
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+SPECIAL = (
+    "fold", "Hopf", "branch point", "period doubling", "Neimark-Sacker", "grazing",
+    "change of stick and slip",
+)  # fmt: skip
+"""Kinds of special points."""
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -107,7 +113,8 @@ class Branch(Showing):
         return np.nan_to_num(growth, nan=-1.0).max(axis=1, initial=-1.0) < 0
 
     def located(self, kind: str) -> tuple[Special, ...]:
-        """Return the special points of a kind, such as "Hopf"."""
+        """Return the special points of a kind, such as "Hopf"; see `Special.kind`."""
+        checks.choice(f"branch of '{self.model.name}': located", kind, SPECIAL)
         return tuple(s for s in self.special if s.kind == kind)
 
     def orbit(self, index: int, rtol: float = 1e-9) -> PeriodicOrbit:

@@ -63,7 +63,7 @@ def continuation(
     model = start.model
     hint = f"free it when the model is made, such as rabinowicz(law, free=['{parameter}'])"
     check_names(f"{where}: parameter", [parameter], [v.name for v in model.p], hint)
-    span = _span(where, model, between, start.p[parameter], parameter)
+    span = checked_span(where, model, between, start.p[parameter], parameter)
     checks.count(f"{where}: points", points, least=2)
     checks.number(f"{where}: step", step, above=0.0, upper=1.0)
     if isinstance(start, PeriodicOrbit):
@@ -106,10 +106,13 @@ def orbits_from(
     Raises:
         ValueError: bad input, a point of another kind, or no orbit next to it.
     """
-    where, model = "orbits_from", branch.model
+    where = "orbits_from"
+    if not isinstance(branch, Branch):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise checks.refused(f"{where}: branch", "a branch of equilibria", branch)
+    model = branch.model
     if not isinstance(hopf, Special) or hopf.kind != "Hopf":  # pyright: ignore[reportUnnecessaryIsInstance]
         raise checks.refused(f"{where}: hopf", "a Hopf point, branch.located('Hopf')[0]", hopf)
-    span = _span(where, model, between, hopf.value, branch.parameter)
+    span = checked_span(where, model, between, hopf.value, branch.parameter)
     nominal = np.maximum(model.nominal("x"), np.abs(hopf.x))
     problem = Shooting(
         model, branch.u, (branch.parameter,), nominal, np.ones(nominal.size), rtol, driven=False
@@ -125,7 +128,7 @@ def orbits_from(
     return _joined(model, branch.parameter, branch.u, branch.p, [Trace(), part], driven=False)
 
 
-def _span(
+def checked_span(
     where: str, model: Model, between: tuple[float, float], value: float, name: str
 ) -> tuple[float, float]:
     """Return the range of a parameter, which contains `value` and is within its bounds."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.dynamics.driving import check_period
 from symfric.dynamics.equilibrium import Equilibrium
 from symfric.dynamics.linear import linearize
 from symfric.dynamics.newton import CLOSED, solved
@@ -165,7 +166,7 @@ def periodic_orbit(
         u: inputs by name; functions of time need a `period`.
         p: values of free parameters; by default those of an orbit or equilibrium as the guess.
         period: period [s] of the inputs or of the time in the equations, from t = 0 on; by default
-            it is an unknown.
+            it is an unknown. Functions of time have to repeat after it.
         symmetric: True if all states except modes without sign change their signs after half a
             period; the result is then the orbit with this symmetry.
         segments: number of parts of the period with states of their own (multiple shooting), for
@@ -190,10 +191,7 @@ def periodic_orbit(
         p = dict(guess.p) if p is None else p
         u = guess.u if u is None else u
     u, p = model.named("u", u), model.named("p", p)
-    if period is None and (moving := [name for name, x in u.items() if not _still(x)]):
-        raise checks.refused(
-            f"{where}: period", f"the period [s] of the input {moving[0]}", None, "give period="
-        )
+    check_period(model, u, p, period)
     run, start, T = _start(model, guess, u, p, period, rtol)
     try:
         return found(model, run, start, T, u, p, symmetric, m, rtol, driven=period is not None)
@@ -251,10 +249,6 @@ def _fraction(orbit: PeriodicOrbit, scale: Array) -> int:
     return max([1, *(n for n, x in zip(parts, off, strict=True) if x < 10 * CLOSED * orbit.rtol)])
 
 
-def _still(value: object) -> bool:
-    return checks.as_number(value) is not None
-
-
 def _signs(model: Model, symmetric: bool) -> Array:
     """Return the signs of the states after half a period."""
     if not symmetric:
@@ -285,8 +279,10 @@ def _start(
     if period is not None:
         first, last = guess.span
         start = period * np.floor((last - period) / period)
-        if start < first:
-            raise checks.refused(where, f"a run of {period:g} s or more", guess)
+        if start < first or ((guess.looks >= start) & (guess.looks <= start + period)).sum() < 3:
+            raise checks.refused(
+                where, f"a run of {period:g} s or more, with 3 times in a period", guess
+            )
         return guess, float(start), period
     cycle = guess.period(tolerance=ROUGH)
     return guess, cycle.start, cycle.period

@@ -54,6 +54,8 @@ def naming(
             yield from _place(where, end, known)
         yield from _moving(where, part.joints(), joints)
         yield from (f"{where} > {text}" for text in part.problems())
+        if isinstance(part, ActuatedElement):
+            yield from _on_one_base(where, part.joints(), joints)
 
 
 def _moving(where: str, pairs: Iterable[tuple[str, str]], joints: Sequence[Joint]) -> Iterator[str]:
@@ -67,6 +69,19 @@ def _moving(where: str, pairs: Iterable[tuple[str, str]], joints: Sequence[Joint
         elif known[name].way(direction) not in known[name].directions:
             expected = " or ".join(known[name].directions) or "a joint that moves along an axis"
             yield f"{where} > direction: expected {expected}, got {direction or 'none'}"
+
+
+def _on_one_base(
+    where: str, pairs: Iterable[tuple[str, str]], joints: Sequence[Joint]
+) -> Iterator[str]:
+    """Yield a message if an element is between angles relative to different bodies."""
+    turned = [name for name, direction in pairs if direction == "turn"]
+    bases = sorted({body_of(joint.parent) for joint in joints if joint.name in turned})
+    if len(bases) > 1:
+        yield (
+            f"{where}: expected joints with one parent, got {' and '.join(turned)} with the "
+            f"parents {' and '.join(bases)}; add a joint for the relative motion"
+        )
 
 
 def _place(where: str, place: str, bodies: Mapping[str, Body]) -> Iterator[str]:

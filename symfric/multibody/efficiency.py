@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from symfric.foundation.checks import listed
+from symfric.foundation.checks import listed, refused
 from symfric.laws.base import smooth
 from symfric.results.quadrature import integrals
 from symfric.results.trajectory import Trajectory
@@ -29,6 +29,8 @@ def efficiency(run: Trajectory, element: str) -> float:
     Raises:
         ValueError: the mechanism has no element of this name with friction.
     """
+    if getattr(run, "details", None) is None:  # an `Ensemble`, for example
+        raise refused("efficiency: run", "one run, such as simulate(...)", run)
     known = [name.removesuffix(f"_{ENDS[0]}") for name in run.details if name.endswith(ENDS[0])]
     if element not in known:
         raise ValueError(

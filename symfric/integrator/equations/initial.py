@@ -173,6 +173,8 @@ def _descended(system: System | Equations, y: Array, d: Array) -> Array:
     for _ in range(MARQUARDT):
         scale = np.linalg.norm(slope, axis=0)
         bent = np.vstack([slope, np.sqrt(damping) * np.diag(scale + np.spacing(scale.max()))])
+        if not np.isfinite(np.column_stack([bent[: len(g)], g])).all():
+            break  # a parameter is out of range
         new = y.copy()
         new[rows] -= along @ np.linalg.lstsq(bent, np.vstack([g, np.zeros_like(g)]))[0][:, 0]
         g_new, slope_new = evaluate_all(system.constraints, new, d)
@@ -201,7 +203,8 @@ def _rounding(system: System | Equations, y: Array, d: Array) -> float:
     found: list[float] = []
     for _ in range(4):
         moved = [a * (1.0 + LAST_DIGITS * rng.choice([-1.0, 1.0], a.shape)) for a in (y, d)]
-        found.append(float(np.linalg.norm(evaluate(system.constraints, *moved) - here)))
+        with np.errstate(invalid="ignore"):  # of infinite values
+            found.append(float(np.linalg.norm(evaluate(system.constraints, *moved) - here)))
     return max(found)
 
 

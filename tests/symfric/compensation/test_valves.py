@@ -206,6 +206,7 @@ def test_c_is_the_same_to_the_last_bit(tmp_path: Path) -> None:
             "form: expected one of kano, choudhury, he, got stenman",
         ),
         ({"S": 1.0, "J": 2.0, "form": "he"}, "expected J <= S for the form he, got J = 2 and"),
+        ({"S": 1.0, "J": 0.1, "name": 3}, "valve_stiction: name: expected a text, got 3"),
         ({"S": "1", "J": 0.1}, "valve_stiction: S: expected a number"),
     ],
 )

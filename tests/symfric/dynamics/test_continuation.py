@@ -321,6 +321,8 @@ def test_what_has_no_branch_is_refused() -> None:
         lambda: continuation(model, "v_b", (0.5, 0.9)): "an equilibrium or a periodic orbit",
         lambda: continuation(equilibrium(held), "k", (0.5, 2.0)): "an isolated equilibrium",
         lambda: orbits_from(rest, at, (0.5, 0.9)): "a Hopf point",
+        lambda: orbits_from(None, at, (0.5, 0.9)): "branch: expected a branch of equilibria",  # pyright: ignore[reportArgumentType]
+        lambda: rest.located("hopf"): "located: expected one of fold, Hopf, .*, got hopf",
         lambda: rest.orbit(0): "a branch of orbits",
         lambda: rest.plot("y"): "got y",
         lambda: load_branch("no such file"): "a saved branch",

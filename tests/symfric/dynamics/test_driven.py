@@ -21,6 +21,30 @@ def test_a_driven_oscillator_has_its_resonance() -> None:
     assert branch.orbit(5).driven and not branch.special
 
 
+@pytest.mark.parametrize("in_equations", [True, False])
+@pytest.mark.parametrize("rate", [2.0, 2e-6, 2e6])
+def test_what_is_no_period_of_the_drive_is_refused(in_equations: bool, rate: float) -> None:
+    """After 3 / rate the states may return, but the motion does not repeat."""
+    x, v = Variable("x", "m"), Variable("v", "m/s", nominal=rate)
+    t, f = ca.SX.sym("t"), Variable("f", "m/s^2", nominal=rate**2)
+    push = rate**2 * ca.cos(rate * t) if in_equations else f.symbol
+    rates = ca.vertcat(v.symbol, push - 2 * rate**2 * x - 0.4 * rate * v)
+    model = Model("driven", x=(x, v), u=() if in_equations else (f,), t=t, ode=rates)
+    u = {} if in_equations else {"f": lambda t: rate**2 * ca.cos(rate * t)}
+    run = simulate(model, 150 / rate, u=u)
+    for turns in (1, 2):
+        period = 2 * np.pi * turns / rate
+        found = periodic_orbit(model, run, u=u, period=period)
+        assert found.amplitude("x") == pytest.approx(1 / np.hypot(1, 0.4), rel=1e-6)
+    for period, text in (
+        (3 / rate, r"a period \[s\] of the inputs and of the equations, got"),
+        (None, r"the period \[s\] of the (equations|input f), got None; give period="),
+        (1e-9 / rate, "guess: expected a run of .* or more, with 3 times in a period"),
+    ):
+        with pytest.raises(ValueError, match=f"periodic_orbit: .*{text}"):
+            periodic_orbit(model, run, u=u, period=period)
+
+
 @pytest.mark.slow
 def test_a_run_leads_beyond_a_fold_that_is_too_sharp() -> None:
     x, v = Variable("x", "m", start=1.2), Variable("v", "m/s")

@@ -80,6 +80,13 @@ def test_screws_need_the_moments_of_the_textbook() -> None:
             assert mb.efficiency(run, "screw") == pytest.approx(gain, rel=1e-9, abs=1e-12)
 
 
+def test_a_parameter_out_of_range_is_refused_at_the_start() -> None:
+    radius = Variable("r", "m", start=0.01)
+    model = jack(DRY, 0.004, radius).build(p=(radius,))
+    with pytest.raises(ValueError, match="expected consistent start values, found no solution"):
+        simulate(model, 1.0, u={"torque": 0.0}, p={"r": 0.0})
+
+
 def test_threads_lock_from_the_friction_angle() -> None:
     """A lead angle just below the friction angle holds the load for ever, just above it slides."""
     for factor, holds in ((1 - 1e-6, True), (1 + 1e-6, False)):

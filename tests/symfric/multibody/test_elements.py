@@ -271,6 +271,7 @@ def test_mistakes_are_described_in_one_sentence() -> None:
         with pytest.raises(ValueError) as caught:
             first, *more = NAMES.value(f"[{text}]")
             m = turning(first, 1.0, 2.0, rope=True)
+            attach(m, mb.Revolute, "on_a", "pinion", "shaft_a")
             m.forces += more
             m.build()
         found = str(caught.value)
