@@ -135,7 +135,7 @@ def simulate(
             within a step, so no slip is missed even at rtol = 1e-3. The error is a tenth of rtol,
             for 1.5 to 2 times the steps; between steps the order is 4.
             "radau9": order 9, five stages, for errors below 1e-7: half the time of rodas5p at 1e-8
-            and a quarter at 1e-10 with Brown-McPhee friction, but only 0.8 and 0.7 times with
+            and a quarter at 1e-10 with Brown-McPhee friction, but only 0.9 and 0.8 times with
             LuGre, whose corners limit the steps, and no gain with a few algebraic unknowns. "auto"
             never chooses it: as with radau5, rounding ends runs with narrow laws at tight
             tolerances (v_t = 1e-8 m/s at 1e-9), a decade before rodas5p.
