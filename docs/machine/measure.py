@@ -145,10 +145,19 @@ def _tables(found: Mapping[str, Any]) -> str:
     text = ""
     for one in found["tables"]:
         title = f"**{plain(one['title'].replace('`', ''))}**\n\n" if one["title"] else ""
-        head = [plain(title) for title in one["rows"][0]]
-        rows = [[plain(cell) for cell in row.values()] for row in one["rows"]]
-        text += title + table(head, rows)
+        text += title
+        for names in _pieces(list(one["rows"][0])):
+            rows = [[plain(row[name]) for name in names] for row in one["rows"]]
+            text += table([plain(name) for name in names], rows)
     return text
+
+
+def _pieces(names: list[str]) -> list[list[str]]:
+    """Return the columns of a table, or of two tables with the same first columns if it is wide."""
+    if len(names) <= WIDEST:
+        return [names]
+    half = (len(names) + KEPT) // 2
+    return [names[:half], names[:KEPT] + names[half:]]
 
 
 def made_by(found: Mapping[str, Any]) -> str:
@@ -158,6 +167,8 @@ def made_by(found: Mapping[str, Any]) -> str:
     return f"`{found['command']}`, {plain(parts)}"
 
 
+WIDEST, KEPT = 13, 2
+"""Largest number of columns that fit the page, and number of columns that both halves have."""
 TOOLS = {"opti": "Opti", "rockit": "rockit", "do_mpc": "do-mpc"}
 ROUTES = {"flow": "`flow`", "collocation": "collocation"}
 
