@@ -156,7 +156,7 @@ def _pieces(names: list[str]) -> list[list[str]]:
     """Return the columns of a table, or of two tables with the same first columns if it is wide."""
     if len(names) <= WIDEST:
         return [names]
-    half = (len(names) + KEPT) // 2
+    half = len(names) // 2
     return [names[:half], names[:KEPT] + names[half:]]
 
 
@@ -168,7 +168,7 @@ def made_by(found: Mapping[str, Any]) -> str:
 
 
 WIDEST, KEPT = 13, 2
-"""Largest number of columns that fit the page, and number of columns that both halves have."""
+"""Largest number of columns that fit the page, and number of columns that the second half repeats."""
 TOOLS = {"opti": "Opti", "rockit": "rockit", "do_mpc": "do-mpc"}
 ROUTES = {"flow": "`flow`", "collocation": "collocation"}
 
