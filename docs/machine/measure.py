@@ -168,7 +168,7 @@ def made_by(found: Mapping[str, Any]) -> str:
 
 
 WIDEST, KEPT = 13, 2
-"""Largest number of columns that fit the page, and number of columns that the second half repeats."""
+"""Largest number of columns of a table, and number of those that its second half repeats."""
 TOOLS = {"opti": "Opti", "rockit": "rockit", "do_mpc": "do-mpc"}
 ROUTES = {"flow": "`flow`", "collocation": "collocation"}
 
