@@ -274,6 +274,10 @@ class Law(Parametric, ABC):
         If |v| is smooth over v_eps, their rate vanishes to rounding for |v| > 20 v_eps.
         """
 
+    def steady_state_at(self, v: Scalar, N: Scalar, **inputs: Scalar) -> Scalar:
+        """Return the `steady_state` under further inputs, which have no effect by default."""
+        return self.steady_state(v, N)
+
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
         """Return the changes of mode; empty for a law without modes."""
         return ()

@@ -56,6 +56,10 @@ def test_lugre_tyre_tends_to_its_closed_form_in_steady_rolling() -> None:
             z = v / (law.sigma_0 * abs(v) / g + law.kappa * abs(v_r))
             expected = 3e3 * (law.sigma_0 * z + law.sigma_2 * v)
             assert steady(law, v, 3e3, v_r) == pytest.approx(expected, rel=1e-7)
+            for one in (law, sf.Sum((law, sf.Coulomb(0.0)))):
+                rests = np.ravel(one.steady_state_at(v, 3e3, v_r=v_r))
+                assert one.rate(v, 3e3, rests, v_r=v_r) == pytest.approx(0.0, abs=1e-12)
+                assert one.force(v, 3e3, rests, v_r=v_r) == pytest.approx(expected, rel=1e-12)
 
 
 def test_lumped_tyre_is_near_the_distributed_one() -> None:
