@@ -12,7 +12,7 @@ Contents; `help` describes each name:
     laws        LuGre, BrownMcPhee, GMS, ... (ALL_LAWS by name, POPULATIONS of random contacts);
                 Law, StaticLaw, State, Input, Switch, Facts (PHENOMENA), parametric, param, smooth
                 to write laws, check_law (LawReport) to check them, Element, Slider, Level and
-                Unit to compose them; law_from_text and any_from_text (AnyLaw), law_name;
+                Neuron to compose them; law_from_text and any_from_text (AnyLaw), law_name;
                 steady_force, steady_inputs; PlanarSlip and SpatialSlip in a plane and in space
     machines    rabinowicz, drive; more in symfric.scenes (ALL_SCENES by name)
     equations   Model of Variable, Output, Event and Monitor; contact adds a law to it (Contact)

@@ -235,7 +235,7 @@ def spline(p: Any, v: float, N: float) -> float:
 
 def network(p: Any, v: float, N: float) -> float:
     x = log(1 + (v / p.v_first) ** 2) / log(1 + (p.v_last / p.v_first) ** 2)
-    steps = [k.w / (1 + exp(-2 * k.a * (x - k.s))) for k in p.units]
+    steps = [k.w / (1 + exp(-2 * k.a * (x - k.s))) for k in p.neurons]
     return N * tanh(v / p.v_eps) * (p.b + sum(steps))
 
 

@@ -27,10 +27,10 @@ from symfric.laws import (
     Element,
     Law,
     Level,
+    Neuron,
     Slider,
     Sum,
     Table,
-    Unit,
     law_name,
 )
 from symfric.laws.catalogue import WRAPPERS
@@ -41,7 +41,7 @@ DIGITS = 6
 """Significant digits of arrays, which are used only for drawing."""
 KINDS: dict[str, type[Parametric]] = {
     **ALL_LAWS, **WRAPPERS, "sum": Sum, "asymmetric": Asymmetric, "table": Table,
-    "element": Element, "slider": Slider, "level": Level, "unit": Unit, "drive": Drive,
+    "element": Element, "slider": Slider, "level": Level, "neuron": Neuron, "drive": Drive,
 }  # fmt: skip
 """Name -> class that can be restored from a file."""
 

@@ -75,8 +75,8 @@ if TYPE_CHECKING:
     from symfric.laws.static.exponential import Tustin as Tustin
     from symfric.laws.static.from_data import Level as Level
     from symfric.laws.static.from_data import Network as Network
+    from symfric.laws.static.from_data import Neuron as Neuron
     from symfric.laws.static.from_data import Spline as Spline
-    from symfric.laws.static.from_data import Unit as Unit
     from symfric.laws.static.lubrication import MixedLubrication as MixedLubrication
     from symfric.laws.static.machines import BAM as BAM
     from symfric.laws.static.machines import Bittencourt as Bittencourt

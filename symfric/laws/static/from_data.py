@@ -1,5 +1,6 @@
 """Laws from data: friction curves without a formula, whose coefficients are fitted."""
 
+from abc import abstractmethod
 from dataclasses import replace
 from functools import partial
 from itertools import accumulate
@@ -8,7 +9,20 @@ from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, log, tanh, total
 from symfric.foundation.parameters import Parametric, option, param, parameters, parametric
 from symfric.laws.base import fields, smooth
-from symfric.laws.base.law import Facts, StaticLaw
+from symfric.laws.base.families import Curve, Fall
+from symfric.laws.base.law import Facts
+
+
+class FromData(Curve):
+    """Law with the force N mu(v) in the direction of sliding."""
+
+    @abstractmethod
+    def coefficient(self, v: Scalar) -> Scalar:
+        """Return mu at a velocity [m/s]."""
+
+    def formula(self, v: Scalar, N: Scalar, s: Scalar, fall: Fall) -> Scalar:
+        """Return the friction force [N] in the direction `s`."""
+        return N * self.coefficient(v) * s
 
 
 @parametric
@@ -24,7 +38,7 @@ SPEED = partial(param, unit="m/s", role="geometry", lower=1e-12)
 
 
 @parametric
-class Spline(StaticLaw):
+class Spline(FromData):
     """Friction curve as a cubic spline over the logarithm of the speed, with n coefficients.
 
         x = (n - 1) log(1 + (v/v_first)^2) / log(1 + (v_last/v_first)^2)
@@ -75,14 +89,6 @@ class Spline(StaticLaw):
         law = cls(levels, v_first, v_last, **more)  # pyright: ignore[reportArgumentType]
         return law if "v_eps" in more else replace(law, v_eps=law.v_first / 10)
 
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Return the sliding force [N] at a speed >= 0 for zero widths."""
-        return N * self.coefficient(speed)
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Return the friction force [N]."""
-        return N * self.coefficient(v) * smooth.sign(v, self.v_eps)
-
     def coefficient(self, v: Scalar) -> Scalar:
         """Return mu at a velocity [m/s]."""
         u, top = v / self.v_first, self.v_last / self.v_first
@@ -98,37 +104,37 @@ class Spline(StaticLaw):
 
 
 @parametric
-class Unit(Parametric):
-    """Smooth step of a friction curve over the logarithm of the speed: one unit of a network."""
+class Neuron(Parametric):
+    """Smooth step of a friction curve over the logarithm of the speed, one neuron of a network."""
 
     w: Scalar = fields.COEFFICIENT(0.05, doc="height of the step")
     a: Scalar = fields.SHAPE(-7.0, doc="steepness of the step", lower=-30.0, upper=30.0)
     s: Scalar = fields.SHAPE(0.4, doc="place of the step", lower=-0.2, upper=1.2)
 
 
-UNITS = (Unit(0.05, -7.0, 0.3), Unit(0.02, -7.0, 0.5), Unit(0.02, 4.0, 1.0))
-"""Units of a curve that falls and rises."""
+NEURONS = (Neuron(0.05, -7.0, 0.3), Neuron(0.02, -7.0, 0.5), Neuron(0.02, 4.0, 1.0))
+"""Neurons of a curve that falls and rises."""
 
 
 @parametric
-class Network(StaticLaw):
-    """Friction curve as a small network of tanh units over the logarithm of the speed.
+class Network(FromData):
+    """Friction curve as a small network of tanh neurons over the logarithm of the speed.
 
         x = log(1 + (v/v_first)^2) / log(1 + (v_last/v_first)^2)
         F = N mu(x) tanh(v / v_eps),   mu = b + sum of w_k [1 + tanh(a_k (x - s_k))] / 2
 
-    Each unit is a step of the height w_k near x = s_k, falling for a_k < 0, where x is 0 at rest
+    Each neuron is a step of the height w_k near x = s_k, falling for a_k < 0, where x is 0 at rest
     and 1 at v_last. The force opposes the velocity for all b, w_k >= 0 and all a_k, s_k. By
     default, `Fit` finds b and w_k, in which mu is linear; `free=law.weights` also fits a_k and s_k,
-    from several starts. The units may be exchanged, so only the curve has a meaning, not a weight
-    or its interval. With few units the law costs less than a `Spline`.
+    from several starts. The neurons may be exchanged, so only the curve has a meaning, not a weight
+    or its interval. With few neurons the law costs less than a `Spline`.
     Limits: w_k = 0 is `Coulomb`. At high speeds mu is constant. Creeps under load.
     Source: Cybenko, Math. Control Signals Systems 2, 1989; constructed here as a law.
     """
 
     facts = Facts(("D", "S", "St", "V"), "C∞", "constructed")
 
-    units: tuple[Unit, ...] = UNITS
+    neurons: tuple[Neuron, ...] = NEURONS
     b: Scalar = fields.COEFFICIENT(0.1, doc="lowest level of the curve")
     v_first: Scalar = SPEED(1e-3, doc="lowest speed that is resolved")
     v_last: Scalar = SPEED(1.0, doc="highest speed that is resolved")
@@ -138,23 +144,23 @@ class Network(StaticLaw):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        units = checks.many("Network: units", self.units, "units, such as (Unit(), ...)")
-        if not units or not all(isinstance(item, Unit) for item in units):
-            raise checks.refused("Network: units", "one or more, all Unit", self.units)
+        neurons = checks.many("Network: neurons", self.neurons, "neurons, such as (Neuron(), ...)")
+        if not neurons or not all(isinstance(item, Neuron) for item in neurons):
+            raise checks.refused("Network: neurons", "one or more, all Neuron", self.neurons)
 
     @classmethod
     def over(cls, v_first: float, v_last: float, count: int, **more: Scalar) -> "Network":
-        """Return a network of `count` falling and `count` rising units between two speeds [m/s].
+        """Return a network of `count` falling and `count` rising neurons between two speeds [m/s].
 
         The width v_eps is v_first / 10 unless it is given.
 
         Raises:
-            ValueError: bad input, such as more than 7 units of each kind.
+            ValueError: bad input, such as more than 7 neurons of each kind.
         """
         checks.count("Network.over: count", count, most=7)
         places = [(k + 0.5) / count for k in range(count)]
-        units = (Unit(0.01, a * count, s) for s in places for a in (-4.0, 4.0))
-        law = cls(tuple(units), 0.1, v_first, v_last, **more)
+        neurons = (Neuron(0.01, a * count, s) for s in places for a in (-4.0, 4.0))
+        law = cls(tuple(neurons), 0.1, v_first, v_last, **more)
         return law if "v_eps" in more else replace(law, v_eps=law.v_first / 10)
 
     @property
@@ -162,16 +168,8 @@ class Network(StaticLaw):
         """Names of all weights a_k and s_k, as the argument `free` of `Fit`."""
         return tuple(n for n, p in parameters(self).items() if p.field in ("a", "s"))
 
-    def outside(self, speed: Scalar, N: Scalar) -> Scalar:
-        """Return the sliding force [N] at a speed >= 0 for zero widths."""
-        return N * self.coefficient(speed)
-
-    def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar:
-        """Return the friction force [N]."""
-        return N * self.coefficient(v) * smooth.sign(v, self.v_eps)
-
     def coefficient(self, v: Scalar) -> Scalar:
         """Return mu at a velocity [m/s]."""
         u, top = v / self.v_first, self.v_last / self.v_first
         x = log(1 + u * u) / log(1 + top * top)
-        return self.b + total(k.w * (1 + tanh(k.a * (x - k.s))) for k in self.units) / 2
+        return self.b + total(k.w * (1 + tanh(k.a * (x - k.s))) for k in self.neurons) / 2

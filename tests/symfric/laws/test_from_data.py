@@ -73,8 +73,8 @@ def test_network_never_drives_and_saturates() -> None:
     for _ in range(60):
         w = rng.choice([0.0, 1.0], 4) * 10 ** rng.uniform(-9, 3, 4)
         a, s, b = rng.uniform(-30, 30, 4), rng.uniform(-0.2, 1.2, 4), rng.choice([0.0, 0.1])
-        units = tuple(sf.Unit(*row) for row in np.column_stack([w, a, s]).tolist())
-        mu = np.asarray(sf.Network(units, b).coefficient(v))
+        neurons = tuple(sf.Neuron(*row) for row in np.column_stack([w, a, s]).tolist())
+        mu = np.asarray(sf.Network(neurons, b).coefficient(v))
         assert (mu >= 0).all()
         assert (mu >= b * (1 - 1e-12)).all()
         assert (mu <= (b + w.sum()) * (1 + 1e-12)).all()
@@ -108,16 +108,16 @@ BAD = [
     (lambda: spline([0.1] * 3, shape="rising"), "shape: expected one of free, falling"),
     (lambda: sf.Spline.over(1e-3, 1.0, 2), "Spline.over: count: expected"),
     (lambda: sf.Spline.over(1e-3, 1.0, 6, v_epz=1.0), "v_epz"),
-    (lambda: sf.Network(()), "Network: units: expected one or more, all Unit"),
-    (lambda: sf.Network((0.1,)), "Network: units: expected one or more, all Unit"),  # type: ignore[arg-type]
-    (lambda: sf.Network(sf.Unit()), "Network: units: expected a sequence of units"),  # type: ignore[arg-type]
+    (lambda: sf.Network(()), "Network: neurons: expected one or more, all Neuron"),
+    (lambda: sf.Network((0.1,)), "Network: neurons: expected one or more, all Neuron"),  # type: ignore[arg-type]
+    (lambda: sf.Network(sf.Neuron()), "Network: neurons: expected a sequence of neurons"),  # type: ignore[arg-type]
     (lambda: sf.Network.over(1e-3, 1.0, 0), "Network.over: count: expected"),
     (lambda: sf.Network.over(1e-3, 1.0, 8), "count: expected a whole number from 1 to 7"),
     (lambda: sf.Spline.over("slow", 1.0, 6), "v_first"),
     (lambda: sf.Network.over(1.0, 1e-3, 2), "expected v_first < v_last, got v_first = 1"),
-    (lambda: sf.Unit(w=-1.0), "Unit: w: expected 0 <= w <= inf"),
-    (lambda: sf.Unit(a=31.0), "Unit: a: expected -30 <= a <= 30"),
-    (lambda: sf.Unit(s=2.0), "Unit: s: expected -0.2 <= s <= 1.2"),
+    (lambda: sf.Neuron(w=-1.0), "Neuron: w: expected 0 <= w <= inf"),
+    (lambda: sf.Neuron(a=31.0), "Neuron: a: expected -30 <= a <= 30"),
+    (lambda: sf.Neuron(s=2.0), "Neuron: s: expected -0.2 <= s <= 1.2"),
 ]  # fmt: skip
 
 
