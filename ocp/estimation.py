@@ -178,9 +178,9 @@ def estimate(
         SolveError: the motion becomes infinite.
 
     Limits: the method finds a local minimum; `unconverged` counts the samples at which it does not
-    converge. Deviations contain the mean square of the error of the linearised model. Single
-    errors of bristles that start to slip within a deviation are larger; the load and the velocity
-    are not affected.
+    converge. Deviations contain the mean square of the error of the linearised model. Bristles
+    that start to slip within a deviation have larger errors: with LuGre, 90 % of the errors of z
+    are within two deviations, single ones reach a hundred.
     """
     check_model("estimate", model)
     step = checks.number("estimate: step", step, above=0.0)

@@ -123,24 +123,24 @@ class Window:
         xi, cost = self._motion(weights)
         if not np.isfinite(cost):
             raise SolveError(DIVERGED, Status.NOT_FINITE)
-        found = self._passed(xi, pins := xi != self.machine.inside(xi))
+        pins = xi != self.machine.inside(xi)
+        found = self._passed(xi, pins)
         for _ in range(ITERATIONS):
             moved = self._searched(found.weights, weights, xi, cost, pins)
             if moved is None:
                 break
             change = float(np.abs(moved[1] - xi).max())
             weights, xi, cost = moved
-            now = xi != self.machine.inside(xi)
-            if change <= TOLERANCE and np.array_equal(pins, now):
+            before, pins = pins, xi != self.machine.inside(xi)
+            if change <= TOLERANCE and np.array_equal(pins, before):
                 found = replace(found, converged=True)
                 break
-            found = self._passed(xi, pins := now)
-        if pins.any():  # covariances ignore bounds
+            found = self._passed(xi, pins)
+        if pins.any():  # covariances and innovations ignore bounds
             free = self._passed(xi, np.zeros_like(pins))
-            means = [mean for mean, _ in found.predicted]
-            spreads = [spread for _, spread in free.predicted]
-            predicted = list(zip(means, spreads, strict=True))
-            found = replace(found, filtered=free.filtered, predicted=predicted)
+            pairs = zip(found.predicted, free.predicted, strict=True)
+            predicted = [(mean, spread) for (mean, _), (_, spread) in pairs]
+            found = replace(free, predicted=predicted, converged=found.converged)
         return replace(found, smooth=xi, weights=weights)
 
     def step_error(self, found: Found) -> Array:
@@ -213,11 +213,11 @@ class Window:
             innovations.append(float(rest @ np.linalg.solve(S, rest)))
             m = m + gain @ rest
             keep = every - gain @ H
-            P = symmetric(keep @ spread @ keep.T + gain @ R @ gain.T)
+            P = _symmetric(keep @ spread @ keep.T + gain @ R @ gain.T)
             means.append(m)
             covariances.append(P)
             ahead = after[:, k] + A[k] @ (m - xi[:, k])
-            after_step = symmetric(A[k] @ P @ A[k].T + machine.Q + self.errors[k])
+            after_step = _symmetric(A[k] @ P @ A[k].T + machine.Q + self.errors[k])
             predicted.append((ahead, after_step))
         return replace(_smoothed(means, covariances, predicted, A), innovations=innovations)
 
@@ -242,6 +242,6 @@ def _outside(xi: Array, limits: Array, pins: NDArray[np.bool_]) -> float:
     return float(np.sum(((xi - limits)[pins] / PINNED) ** 2))
 
 
-def symmetric(P: Array) -> Array:
+def _symmetric(P: Array) -> Array:
     """Return the symmetric part of a covariance."""
     return (P + P.T) / 2

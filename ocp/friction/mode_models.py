@@ -38,12 +38,11 @@ from ocp.formulation.changed_models import rebuilt
 from ocp.formulation.expressions import arguments
 from ocp.friction.smooth_models import sticking
 from symfric.foundation import checks
-from symfric.foundation.graph import coupled
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import at_start, stacked
 from symfric.model import Contact, Model, Output
 from symfric.model.start import rate_of
-from symfric.multibody.applied import MINORS, forward, null_direction
+from symfric.multibody.applied import MINORS, forward, paths_of, tangent_of
 
 RANK = 1e-11
 """Relative size below which singular values of the scaled equations count as zero."""
@@ -91,14 +90,10 @@ def loops_of(model: Model) -> tuple[Loop, ...]:
     slopes = [(c, ca.jacobian(c.slip, qd)) for c in sticking(model)]
     J = ca.jacobian(mechanics.phi, q)
     loops: list[Loop] = []
-    bound = coupled(ca.DM(J.sparsity(), 1).full() != 0)
-    used = {k for columns, _ in bound for k in columns}
-    lone = [([k], list[int]()) for k in range(mechanics.n) if k not in used]
-    for columns, rows in [*bound, *lone]:
+    for columns, rows in paths_of(J):
         if len(columns) != len(rows) + 1 or len(columns) > MINORS:
             continue
-        tangent = ca.SX(mechanics.n, 1)
-        tangent[columns] = null_direction(J[rows, columns]) if rows else 1.0
+        tangent = tangent_of(J, columns, rows)
         members = [
             (c, ca.SX(G @ tangent))
             for c, G in slopes

@@ -25,17 +25,14 @@ from symfric.foundation.variable import take_si
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.laws.base.law import require_law
-from symfric.multibody.contact import Contact, depends_on_load
+from symfric.multibody.contact import UNLOADED, Contact, depends_on_load
 from symfric.multibody.dynamics import Wrench
 from symfric.multibody.forces import Axial, Force, Load
-from symfric.multibody.joint import OFFERED, Joint, JointFriction
+from symfric.multibody.joint import Joint, JointFriction, needs_more
 from symfric.multibody.kinematics import Kinematics
 
 EXPONENT = 50.0
 """Largest |m| times the wrap angle in exp(m angle), so that no iterate of a solver overflows."""
-
-UNLOADED = 1e-12
-"""Force [N] that keeps F / N finite for a released element; it must be negligible under load."""
 
 
 Lever = tuple[Joint, str, Scalar]
@@ -155,24 +152,16 @@ class ActuatedElement(Force):
         for name in (self.actuator, "preload"):
             if (x := size[name]) is not None and x < 0:
                 yield f"{name}: expected a number >= 0, got {x:g}; friction needs pressure"
-        yield from self._unsuitable()
+        if reason := needs_more(self.law):
+            yield reason
+        elif not depends_on_load(self.law):
+            yield (
+                f"law: expected one that depends on the normal force, got {type(self.law).__name__}"
+                "; no actuation would change its friction"
+            )
         ends = self.joints()
         if len(set(ends)) < len(ends):
             yield f"expected two joints, got {ends[0][0]} twice"
-
-    def _unsuitable(self) -> Iterator[str]:
-        """Yield a message if the law has further inputs or ignores the normal force."""
-        law = type(self.law).__name__
-        if strange := [i.name for i in self.law.inputs if i.name not in OFFERED]:
-            known = ", ".join(("v", "N", *OFFERED))
-            yield f"law: expected one that needs only {known}, got {law}, which also needs " + (
-                ", ".join(strange)
-            )
-        elif not depends_on_load(self.law):
-            yield (
-                f"law: expected one that depends on the normal force, got {law}; no actuation "
-                "would change its friction"
-            )
 
 
 @final
@@ -187,6 +176,7 @@ class ActuatedContact(Contact):
     """
 
     kind = "element"
+    measure = "part of the normal force that static friction causes"
 
     element: ActuatedElement
     levers: tuple[Lever, ...]
@@ -222,6 +212,17 @@ class ActuatedContact(Contact):
     def loads(self, kin: Kinematics) -> list[Axial]:
         """Return the loads -c_j F on the joints."""
         return [Axial(joint, way, -c * self.F) for joint, way, c in self.levers]
+
+    def transmitted(self, kin: Kinematics) -> list[Axial]:
+        """Return the loads on the joints, which friction alone causes."""
+        return self.loads(kin)
+
+    @property
+    def locking(self) -> ca.SX:
+        """Ratio `measure` [1], B m for static friction in the direction of F."""
+        held = self.friction.law.static_level(self.N)
+        m = smooth.choose(self.F < 0, -1.0, 1.0) * held / (self.N + UNLOADED)
+        return ca.SX(self.element.pressing(m)[1]) * m
 
     def normal(self, kin: Kinematics, pressing: Mapping[str, Wrench]) -> ca.SX:
         """Return N = G(m) P + B(m) F."""

@@ -49,7 +49,7 @@ from symfric.laws.base import smooth
 from symfric.laws.base.law import FORCE, Switch
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.model import Variables, kinds
-from symfric.multibody.contact import Contact, law_places
+from symfric.multibody.contact import UNLOADED, Contact, law_places
 from symfric.multibody.equations import Equations
 from symfric.multibody.joints import Floating
 from symfric.multibody.prepare import Prepared
@@ -105,11 +105,25 @@ def mobility(eq: Equations, G: ca.SX) -> tuple[ca.SX, ca.SX]:
     return loose - ca.sum1(across * held).T, loose
 
 
-def null_direction(J: ca.SX) -> ca.SX:
-    """Return the unit vector Z with J Z = 0, computed from the minors of J, shape (n - 1, n).
+def paths_of(J: ca.SX) -> list[tuple[list[int], list[int]]]:
+    """Return the columns and rows of each loop, and each column outside loops, of J = phi_q."""
+    loops = coupled(ca.DM(J.sparsity(), 1).full() != 0)
+    inside = {k for columns, _ in loops for k in columns}
+    return [*loops, *(([k], list[int]()) for k in range(J.size2()) if k not in inside)]
 
-    Z is a smooth function of J as long as J has full rank.
+
+def tangent_of(J: ca.SX, columns: Sequence[int], rows: Sequence[int]) -> ca.SX:
+    """Return the unit vector Z along the `columns` of a loop with J Z = 0 in its `rows`.
+
+    Z is computed from minors; it is a smooth function of J as long as the rows have full rank. A
+    coordinate outside loops has no rows.
     """
+    Z = ca.SX(J.size2(), 1)
+    Z[columns] = _null_direction(J[rows, columns]) if rows else 1.0
+    return Z
+
+
+def _null_direction(J: ca.SX) -> ca.SX:
     n = J.size2()
     minors = [ca.det(ca.densify(J[:, [j for j in range(n) if j != k]])) for k in range(n)]
     Z = ca.vertcat(*((-1) ** k * minor for k, minor in enumerate(minors)))
@@ -120,8 +134,6 @@ IMMOVABLE = 1e-10
 """Fraction of the unconstrained W below which the constraints hold a contact."""
 MINORS = 8
 """Largest number of coordinates of a loop whose tangent is computed from minors."""
-UNLOADED = 1e-12
-"""Force [N] that keeps the shares finite without load; it must be negligible at break-away."""
 CALM = 0.1
 """Time constant [s] with which a sliding velocity left by rounding decays in stick.
 
@@ -291,8 +303,7 @@ class _Maker:
         if {s.name for c in contacts for s in some_switches(c.law)} - {"stick", "slip"}:
             what = "one that stops only at v = 0 in a loop"
             raise self.refuse(contacts, what, "use ExactCoulomb")
-        Z = ca.SX(eq.n, 1)
-        Z[columns] = null_direction(eq.Phi_q[rows, columns]) if rows else 1.0
+        Z = tangent_of(eq.Phi_q, columns, rows)
         along = [ca.jacobian(c.slip, eq.qd) @ Z for c in contacts]
         name = f"{contacts[0].name}_loop"
         return self.group(name, members, along, ca.dot(Z, eq.qd), ca.dot(Z, eq.a), Z.T, columns)
@@ -309,24 +320,20 @@ def rests(where: str, made: Prepared, a0: Array) -> tuple[Rest, ...]:
     if not applied:
         return ()
     make = _Maker(where, made, a0)
-    loops = coupled(ca.DM(eq.Phi_q.sparsity(), 1).full() != 0)
-    alone, of_loop, of_rate = list[int](), dict[int, list[int]](), dict[int, list[int]]()
+    paths, alone, together = paths_of(eq.Phi_q), list[int](), dict[int, list[int]]()
     for i, slopes in applied.items():
         moves = set(slopes.sparsity().get_col())
-        touched = [k for k, (columns, _) in enumerate(loops) if moves & {*columns}]
-        columns, rows = loops[touched[0]] if len(touched) == 1 else ((), ())
+        touched = [k for k, (columns, _) in enumerate(paths) if moves & {*columns}]
+        columns, rows = paths[touched[0]] if len(touched) == 1 else ((), ())
         if moves <= {*columns} and len(columns) == len(rows) + 1:
-            of_loop.setdefault(touched[0], []).append(i)
-        elif len(moves) == 1 and not touched:
-            of_rate.setdefault(moves.pop(), []).append(i)
+            together.setdefault(touched[0], []).append(i)
         else:
             alone.append(i)
-    found = [make.loop(*loops[k], members) for k, members in of_loop.items()]
-    parallel = {k: members for k, members in of_rate.items() if len(members) > 1}
-    found += [make.loop([k], [], members) for k, members in parallel.items()]
-    alone += (members[0] for k, members in of_rate.items() if k not in parallel)
+    outside = {k: members for k, members in together.items() if not paths[k][1]}
+    alone += [together.pop(k)[0] for k, members in outside.items() if len(members) == 1]
+    found = [make.loop(*paths[k], members) for k, members in together.items()]
     found += [make.single(i) for i in alone]
-    held = [*alone, *(members[0] for members in parallel.values())]
+    held = [*alone, *(members[0] for members in outside.values() if len(members) > 1)]
     rows = ca.vertcat(eq.Phi_q, *(applied[i] for i in held))
     if alone and np.linalg.matrix_rank(make.numbers(rows)) < rows.size1():
         raise make.refuse(

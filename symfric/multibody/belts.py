@@ -59,7 +59,7 @@ class CapstanDrum(_Wound):
         angle: wrap angle [rad], 2 pi for each turn.
         drum: joint of the drum; "" for a bollard, which does not turn.
         groove: half angle of the groove [rad]; pi/2 for a smooth drum.
-        preload: tension of the free end in addition, also at zero actuation [N].
+        preload: additional tension of the free end, also at zero actuation [N].
 
     Limits: |m| angle / sin(groove) is at most 50. A rope without stiffness and mass; only its load
     end moves a body.
@@ -123,7 +123,7 @@ class Belt(_Wound):
         radius_a, radius_b: radii [m]; of opposite signs for a crossed belt.
         angle: wrap angle on the pulley that slips, the smaller product of coefficient and angle.
         groove: half angle of the groove of a wedge belt [rad]; pi/2 for a flat belt.
-        preload: mean tension in addition, also at zero actuation [N].
+        preload: additional mean tension, also at zero actuation [N].
 
     Limits: |m| angle / sin(groove) is at most 50. A belt without stiffness (no creep) and without
     mass (no centrifugal force), at a constant distance of the axes.

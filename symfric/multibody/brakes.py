@@ -38,7 +38,7 @@ class DiscClutch(ActuatedElement):
         faces: number of faces in contact, each with the axial force.
         half_angle: half angle of the cone [rad]; pi/2 is a flat disc.
         pressure: "uniform pressure" or "uniform wear".
-        preload: axial force in addition, also at zero actuation [N].
+        preload: additional axial force, also at zero actuation [N].
 
     Limits: the sliding velocity is that at the mean radius, so a law whose coefficient depends on
     the velocity is not integrated over the ring. A cone releases without a force. For outer = inner
@@ -135,9 +135,24 @@ SHOES: Mapping[str, tuple[int, int]] = MappingProxyType(
 """Numbers of leading and trailing shoes in positive rotation."""
 
 
+class _OnDrum(ActuatedElement):
+    """Brake on a drum."""
+
+    joint: str
+    radius: Scalar
+
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """Return the joint of the drum."""
+        return ((self.joint, "turn"),)
+
+    def levers(self) -> tuple[Scalar, ...]:
+        """Return the radius of the drum."""
+        return (self.radius,)
+
+
 @final
 @dataclass(frozen=True, eq=False)
-class DrumBrake(ActuatedElement):
+class DrumBrake(_OnDrum):
     """Drum brake with pivoted shoes on the child of a joint.
 
         v = radius w,   torque = radius F,   k = arm_friction / arm_normal
@@ -158,7 +173,7 @@ class DrumBrake(ActuatedElement):
             friction force about the pivot of the shoe [m]; see `shoe_arms` for long shoes.
         shoes: "leading", "trailing", "leading and trailing" or "two leading", as named for positive
             rotation.
-        preload: force on each shoe in addition, also at zero actuation [N].
+        preload: additional force on each shoe, also at zero actuation [N].
 
     Limits: both shoes have the same coefficient m in stick.
     Source: Shigley, Mechanical Engineering Design, chapter on clutches and brakes.
@@ -177,14 +192,6 @@ class DrumBrake(ActuatedElement):
     shoes: str = "leading and trailing"
     preload: Scalar = 0.0
 
-    def joints(self) -> tuple[tuple[str, str], ...]:
-        """Return the joint of the drum."""
-        return ((self.joint, "turn"),)
-
-    def levers(self) -> tuple[Scalar, ...]:
-        """Return the radius of the drum."""
-        return (self.radius,)
-
     def pressing(self, m: ca.SX) -> tuple[Scalar, Scalar]:
         """Return the gains of the levers of all shoes."""
         leading, trailing = SHOES[self.shoes]
@@ -201,7 +208,7 @@ class DrumBrake(ActuatedElement):
 
 @final
 @dataclass(frozen=True, eq=False)
-class BandBrake(ActuatedElement):
+class BandBrake(_OnDrum):
     """Band brake on a drum, whose ends are on one lever.
 
         v = radius w,   torque = radius F,   F = T_1 - T_2,   T_1 = T_2 exp(m angle)
@@ -223,7 +230,7 @@ class BandBrake(ActuatedElement):
         arm_tight: arm of T_1, which pulls the lever on [m]; 0 for an end at the pivot (simple band
             brake), negative for an end that also releases it (both directions brake alike at
             -arm_slack).
-        preload: force on the lever in addition, also at zero actuation [N].
+        preload: additional force on the lever, also at zero actuation [N].
 
     Limits: |m| angle is at most 50. A band without stiffness and mass.
     Source: Eytelwein 1808; Shigley, Mechanical Engineering Design.
@@ -241,14 +248,6 @@ class BandBrake(ActuatedElement):
     arm_slack: Scalar
     arm_tight: Scalar = 0.0
     preload: Scalar = 0.0
-
-    def joints(self) -> tuple[tuple[str, str], ...]:
-        """Return the joint of the drum."""
-        return ((self.joint, "turn"),)
-
-    def levers(self) -> tuple[Scalar, ...]:
-        """Return the radius of the drum."""
-        return (self.radius,)
 
     def pressing(self, m: ca.SX) -> tuple[Scalar, Scalar]:
         """Return the gains of the lever, times N / T_2 of the arc."""

@@ -9,7 +9,7 @@ import casadi as ca
 from symfric.foundation.checks import shown
 from symfric.foundation.numeric import Scalar, sqrt
 from symfric.multibody.constraints import Constraint, Held, impossible
-from symfric.multibody.contact import Contact, End, element_contact
+from symfric.multibody.contact import Contact, element_contact
 from symfric.multibody.element_friction import ElementFriction, Flank
 from symfric.multibody.forces import Axial
 from symfric.multibody.kinematics import Kinematics
@@ -137,11 +137,9 @@ class Cam(Constraint):
         """Return the contact between cam and follower."""
         if self.friction is None or lam.is_empty():
             return ()
-        a, b = (kin.topology.joints[name] for name in (self.a, self.b))
         lift, slope = self._profile(kin)
-        lever_a, lever_b, divisor = self.friction.flank(slope, lift)
-        ends = End(a, self.direction_a, -slope, lever_a), End(b, self.direction_b, 1.0, lever_b)
-        return (element_contact(self.name, kin, self.friction, ends, lam, divisor),)
+        flank = self.friction.flank(slope, lift)
+        return (element_contact(self, kin, self.friction, slope, flank, lam),)
 
     def _profile(self, kin: Kinematics) -> tuple[ca.SX, ca.SX]:
         """Return lift and slope at the angle of the cam."""

@@ -13,13 +13,17 @@ import casadi as ca
 from symfric.foundation.numeric import Scalar, equals
 from symfric.foundation.units import turned
 from symfric.laws import Law
+from symfric.laws.base import smooth
 from symfric.laws.composed.isotropic import SpatialSlip
 from symfric.multibody.dynamics import Wrench
-from symfric.multibody.element_friction import ElementFriction
-from symfric.multibody.forces import ZERO, Axial, Load
+from symfric.multibody.element_friction import ElementFriction, Flank
+from symfric.multibody.forces import ZERO, Axial, Load, Part
 from symfric.multibody.joint import Joint, JointFriction
 from symfric.multibody.kinematics import Kinematics
 from symfric.multibody.topology import body_of
+
+UNLOADED = 1e-12
+"""Force [N] that keeps ratios of contact forces finite without load; negligible under load."""
 
 
 class End(NamedTuple):
@@ -191,6 +195,7 @@ class ElementContact(Contact):
     """
 
     kind = "coupling"
+    measure = "static friction over that which holds a load on b"
 
     friction: ElementFriction
     ends: tuple[End, ...]
@@ -202,9 +207,22 @@ class ElementContact(Contact):
         """Magnitude of the normal force by the multiplier [N]."""
         return self.friction.magnitude(self.lam / self.divisor)
 
-    def transmitted(self, end: End) -> ca.SX:
-        """Return the force [N] or moment [N m] on the child of the joint, including friction."""
-        return end.share * self.lam - end.lever * self.F
+    def transmitted(self, kin: Kinematics) -> list[Axial]:
+        """Return the loads on the joints along their axes, including friction."""
+        return [
+            Axial(end.joint, end.direction, end.share * self.lam - end.lever * self.F)
+            for end in self.ends
+        ]
+
+    @property
+    def locking(self) -> ca.SX:
+        """Ratio `measure` [1]."""
+        a, held = (
+            self.ends[0],
+            self.friction.law.static_level(self.friction.preload + self.pressing),
+        )
+        pull = a.share * self.divisor * self.pressing
+        return ca.SX(smooth.magnitude(held * a.lever / pull, 0.0))
 
     def loads(self, kin: Kinematics) -> Sequence[Load | Axial]:
         """Return the loads of friction on the joints along their axes."""
@@ -217,10 +235,11 @@ class ElementContact(Contact):
 
 
 def element_contact(
-    name: str, kin: Kinematics, friction: ElementFriction, ends: tuple[End, ...], lam: ca.SX,
-    divisor: Scalar,
-) -> ElementContact:  # fmt: skip
-    """Return the contact of the element `name`."""
+    part: Part, kin: Kinematics, friction: ElementFriction, slope: Scalar, flank: Flank, lam: ca.SX
+) -> ElementContact:
+    """Return the contact of an element that couples joints with ds_b/ds_a = `slope`."""
+    rows = zip(part.joints(), (-slope, 1.0), (flank.lever_a, flank.lever_b), strict=True)
+    ends = tuple(End(kin.topology.joints[j], way, share, lever) for (j, way), share, lever in rows)
     slip = sum((end.lever * kin.rate(end.joint, end.direction) for end in ends), ca.SX(0))
-    F = ca.SX.sym(f"{name}_friction")
-    return ElementContact(name, name, friction, friction.law, name, slip, F, ends, lam, divisor)
+    F, name, law = ca.SX.sym(f"{part.name}_friction"), part.name, friction.law
+    return ElementContact(name, name, friction, law, name, slip, F, ends, lam, flank.divisor)

@@ -1,6 +1,6 @@
 """Couplings of the displacements of two joints: gears, racks, screws."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import pi
@@ -11,7 +11,7 @@ import casadi as ca
 from symfric.foundation.checks import shown
 from symfric.foundation.numeric import Scalar, equals, is_symbolic
 from symfric.multibody.constraints import Constraint, Held, impossible, linear, wraps
-from symfric.multibody.contact import Contact, End, element_contact
+from symfric.multibody.contact import Contact, element_contact
 from symfric.multibody.element_friction import FlankFriction, MeshFriction, ThreadFriction
 from symfric.multibody.kinematics import Kinematics
 
@@ -57,17 +57,12 @@ class Coupling(Constraint):
     friction: FlankFriction | None
 
     @property
-    def _ends(self) -> tuple[tuple[str, str], tuple[str, str]]:
-        """Joint and direction of a and of b."""
-        return (self.a, self.direction_a), (self.b, self.direction_b)
-
-    @property
     def _ratio(self) -> Scalar:
         return getattr(self, self.ratio_field)
 
-    def joints(self) -> Iterable[tuple[str, str]]:
+    def joints(self) -> tuple[tuple[str, str], tuple[str, str]]:
         """Return both coupled joints with their directions."""
-        return self._ends
+        return (self.a, self.direction_a), (self.b, self.direction_b)
 
     def problems(self) -> Iterator[str]:
         """Yield messages about invalid numbers, a zero ratio, or identical displacements."""
@@ -75,7 +70,7 @@ class Coupling(Constraint):
         given = getattr(self, self.ratio_field)
         if equals(given, 0.0):
             yield f"{self.ratio_field}: expected a finite number other than 0, got {given!r}"
-        a, b = self._ends
+        a, b = self.joints()
         if a == b:
             yield f"expected two displacements, got {a[1]} of {a[0]} twice"
         if isinstance(self.friction, self.accepts):
@@ -87,7 +82,7 @@ class Coupling(Constraint):
 
     def held(self, kin: Kinematics) -> Held:
         """Return offset + ratio s_a - s_b = 0."""
-        (a, along_a), (b, along_b) = ((kin.topology.joints[name], d) for name, d in self._ends)
+        (a, along_a), (b, along_b) = ((kin.topology.joints[name], d) for name, d in self.joints())
         ratio, offset, period = self._ratio, self.offset, None
         cyclic = wraps(kin, a, along_a), wraps(kin, b, along_b)
         ways = a.linear(along_a), b.linear(along_b)
@@ -114,10 +109,8 @@ class Coupling(Constraint):
         """Return the contact between the flanks."""
         if self.friction is None or lam.is_empty():
             return ()
-        (a, along_a), (b, along_b) = ((kin.topology.joints[name], d) for name, d in self._ends)
-        lever_a, lever_b, divisor = self.friction.flank(self._ratio, self.linear)
-        ends = End(a, along_a, -self._ratio, lever_a), End(b, along_b, 1.0, lever_b)
-        return (element_contact(self.name, kin, self.friction, ends, lam, divisor),)
+        flank = self.friction.flank(self._ratio, self.linear)
+        return (element_contact(self, kin, self.friction, self._ratio, flank, lam),)
 
 
 @final
@@ -183,8 +176,8 @@ class Screw(Coupling):
     offset: Scalar = 0.0
     friction: FlankFriction | None = None
 
-    @property
-    def _ends(self) -> tuple[tuple[str, str], tuple[str, str]]:
+    def joints(self) -> tuple[tuple[str, str], tuple[str, str]]:
+        """Return both directions of the joint."""
         return (self.joint, "turn"), (self.joint, "slide")
 
     @property

@@ -23,8 +23,8 @@ from symfric.foundation.numeric import Scalar, cos, is_symbolic, sqrt
 from symfric.foundation.variable import take_si
 from symfric.laws import Law
 from symfric.laws.base import smooth
-from symfric.laws.base.law import FORCE, require_law
-from symfric.multibody.joint import Keywords
+from symfric.laws.base.law import require_law
+from symfric.multibody.joint import Keywords, needs_more
 
 RANGES: dict[str, tuple[Callable[[float], bool], str]] = {
     "length": (lambda x: 0.0 < x < inf, "a number > 0"),
@@ -76,11 +76,8 @@ class ElementFriction(Keywords, ABC):
 
     def problems(self) -> Iterator[str]:
         """Yield messages about invalid values."""
-        if strange := [i.name for i in self.law.inputs if i.name != FORCE]:
-            yield (
-                f"law: expected one that needs only v, N, {FORCE}, got {type(self.law).__name__}, "
-                f"which also needs {', '.join(strange)}"
-            )
+        if reason := needs_more(self.law):
+            yield reason
         for name, kind in {**self.kinds, "preload": "level", "eps": "length"}.items():
             value, (good, what) = getattr(self, name), RANGES[kind]
             size = as_number(value)

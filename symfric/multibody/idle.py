@@ -8,10 +8,9 @@ import numpy as np
 from symfric.foundation.variable import stacked
 from symfric.laws import Law
 from symfric.multibody.constraints import Constraint
-from symfric.multibody.contact import JointContact
+from symfric.multibody.contact import JointContact, depends_on_load
 from symfric.multibody.couplings import Coupling
 from symfric.multibody.equations import Equations
-from symfric.multibody.slips import depends_on_load
 
 ROUNDING = 1e-12
 """Largest load of a bearing by rounding, relative to the largest reaction."""

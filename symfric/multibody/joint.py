@@ -47,6 +47,14 @@ OFFERED = (FORCE,)
 """Inputs in addition to v and N that a joint other than a ball provides for a law."""
 
 
+def needs_more(law: Law, offered: Sequence[str] = OFFERED) -> str:
+    """Return a message if a law has inputs other than v, N and `offered`; otherwise ""."""
+    strange = ", ".join(i.name for i in law.inputs if i.name not in offered)
+    known = ", ".join(("v", "N", *offered))
+    expected = f"law: expected one that needs only {known}, got {type(law).__name__}"
+    return f"{expected}, which also needs {strange}" if strange else ""
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class JointFriction:
@@ -107,12 +115,8 @@ class JointFriction:
         if not rubs:
             yield "expected a joint with friction, such as a hinge, a guide or a ball"
         offered = () if "ball" in rubs else OFFERED
-        if strange := [i.name for i in self.law.inputs if i.name not in offered]:
-            yield (
-                f"law: expected one that needs only {', '.join(('v', 'N', *offered))}, got "
-                f"{type(self.law).__name__}, which also needs {', '.join(strange)}; "
-                f"a {'ball' if 'ball' in rubs else 'joint'} has no such input"
-            )
+        if reason := needs_more(self.law, offered):
+            yield f"{reason}; a {'ball' if 'ball' in rubs else 'joint'} has no such input"
         elif "ball" in rubs and (reason := anisotropy(self.law)):
             yield (
                 f"law: expected an isotropic one, got {type(self.law).__name__}; a ball slips in "

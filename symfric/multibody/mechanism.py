@@ -238,14 +238,13 @@ class Mechanism(packed.Portable, Showing):
         problems += checks.naming(bodies, self.joints, (*self.forces, *self.constraints), u)
         weights = list(checks.weights(bodies, p))
         bearings = list(checks.bearings(self.joints, symbols_of(p), symbols_of(u)))
-        rubbing = ((c, getattr(c, "friction", None)) for c in self.constraints)
         known = symbols_of((*p, *u))
-        for c, friction in rubbing:
+        for part in (*self.constraints, *self.forces):
+            friction, where = getattr(part, "friction", part), f"{part.kind} '{part.name}'"
             if isinstance(friction, ElementFriction):
-                bearings += checks.rubbing(f"{c.kind} '{c.name}' > friction", friction, known)
-        for f in self.forces:
-            if isinstance(f, ActuatedElement):
-                bearings += checks.rubbing(f"{f.kind} '{f.name}'", f, known)
+                bearings += checks.rubbing(f"{where} > friction", friction, known)
+            elif isinstance(friction, ActuatedElement):
+                bearings += checks.rubbing(where, friction, known)
         self._refuse([*problems, *weights, *bearings] if problems else ())
         tree = spanning_tree({body.name: body for body in bodies}, self.joints)
         loose = list(checks.connected(tree))

@@ -7,11 +7,10 @@ import casadi as ca
 
 from symfric.foundation.numeric import equals
 from symfric.foundation.variable import stacked, strays
-from symfric.laws.base import smooth
 from symfric.model import Output
 from symfric.model.kinds import WORK
 from symfric.model.sketch import Mark, Part, Sketch, Symbol
-from symfric.multibody.actuated import UNLOADED, ActuatedContact
+from symfric.multibody.actuated import ActuatedContact
 from symfric.multibody.contact import ElementContact
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import SpringDamper
@@ -35,13 +34,7 @@ def results(eq: Equations, undetermined: Sequence[str], p: ca.SX, put: Put) -> d
         put: function that rewrites expressions in the symbols of the model.
     """
     still = ca.vertcat(eq.q, eq.angles, p)
-    found = [
-        *_reactions(eq, undetermined),
-        *_elements(eq),
-        *_pressed(eq),
-        *_centres(eq),
-        *_work(eq, still),
-    ]
+    found = [*_reactions(eq, undetermined), *_elements(eq), *_centres(eq), *_work(eq, still)]
     values = put([output.expression for _, output in found])
     own = {str(eq.q[i]) for i in range(eq.n)}
     return {
@@ -73,26 +66,24 @@ def _reactions(eq: Equations, undetermined: Sequence[str]) -> Iterator[tuple[str
 
 
 def _elements(eq: Equations) -> Iterator[tuple[str, Output]]:
-    """Yield loads, powers and the locking ratio of each element with friction.
-
-    The ratio is the static friction over the friction that holds any load on b without one on a.
-    """
-    for contact in (c for c in eq.contacts if isinstance(c, ElementContact)):
-        name, (a, b) = contact.name, contact.ends
-        for letter, end in (("a", a), ("b", b)):
-            load, rate = contact.transmitted(end), eq.kin.rate(end.joint, end.direction)
-            unit = "N" if end.joint.linear(end.direction) else "N m"
-            on = f"the child of '{end.joint.name}' in its direction {end.direction}"
-            yield f"{name}_load_{letter}", Output(load, unit, f"load by '{name}' on {on}")
-            yield f"{name}_power_{letter}", Output(load * rate, "W", f"power to {on}")
+    """Yield loads, powers, tensions and the locking ratio of each element with friction."""
+    for contact in eq.contacts:
+        if not isinstance(contact, ElementContact | ActuatedContact):
+            continue
+        name = contact.name
+        for letter, load in zip("ab", contact.transmitted(eq.kin), strict=False):
+            unit = "N" if load.joint.linear(load.direction) else "N m"
+            on = f"the child of '{load.joint.name}' in its direction {load.direction}"
+            yield f"{name}_load_{letter}", Output(load.value, unit, f"load by '{name}' on {on}")
+            yield f"{name}_power_{letter}", Output(load.power(eq.kin), "W", f"power to {on}")
+        pressed = isinstance(contact, ActuatedContact)
+        for end, tension in (contact.element.tensions(contact.F) if pressed else {}).items():
+            yield f"{name}_{end}", Output(tension, "N", f"tension of the {end} end")
         try:
-            held = contact.friction.law.static_level(contact.normal(eq.kin, eq.pressing))
+            ratio = contact.locking
         except ValueError:
             continue
-        pull = a.share * contact.divisor * contact.pressing
-        ratio = smooth.magnitude(held * a.lever / pull, 0.0)
-        doc = "static friction over that which holds a load on b; locks from 1"
-        yield f"{name}_locking", Output(ca.SX(ratio), "1", doc)
+        yield f"{name}_locking", Output(ratio, "1", f"{contact.measure}; locks from 1")
 
 
 def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
@@ -105,30 +96,6 @@ def _centres(eq: Equations) -> Iterator[tuple[str, Output]]:
             yield f"{name}_{axis}", Output(at[i], "m", f"centre of mass of '{name}' along {axis}")
         for i, axis in enumerate("xyz"):
             yield f"{name}_v{axis}", Output(v[i], "m/s", f"its velocity along {axis}")
-
-
-def _pressed(eq: Equations) -> Iterator[tuple[str, Output]]:
-    """Yield loads, powers, tensions and the locking ratio of brakes, clutches and belts.
-
-    The ratio is the part of the normal force that friction at its static level causes.
-    """
-    for contact in (c for c in eq.contacts if isinstance(c, ActuatedContact)):
-        name, F = contact.name, contact.F
-        for letter, load in zip("ab", contact.loads(eq.kin), strict=False):
-            unit = "N" if load.joint.linear(load.direction) else "N m"
-            on = f"the child of '{load.joint.name}'"
-            yield f"{name}_load_{letter}", Output(load.value, unit, f"load by '{name}' on {on}")
-            yield f"{name}_power_{letter}", Output(load.power(eq.kin), "W", f"power to {on}")
-        for end, tension in contact.element.tensions(F).items():
-            yield f"{name}_{end}", Output(tension, "N", f"tension of the {end} end")
-        try:
-            held = contact.friction.law.static_level(contact.N)
-        except ValueError:
-            continue
-        m = smooth.choose(F < 0, -1.0, 1.0) * held / (contact.N + UNLOADED)
-        ratio = ca.SX(contact.element.pressing(m)[1]) * m
-        doc = "part of the normal force that static friction causes; locks from 1"
-        yield f"{name}_locking", Output(ratio, "1", doc)
 
 
 def _work(eq: Equations, still: ca.SX) -> Iterator[tuple[str, Output]]:

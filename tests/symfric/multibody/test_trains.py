@@ -199,6 +199,6 @@ def test_a_plain_bearing_follows_its_hersey_number() -> None:
     H = 0.03 * 0.02 * run["a_rate"] * 2e-3 / 200.0
     mu = 0.1 / (1 + (H / 1e-8) ** 2) + H / 2e-5
     assert run["a_friction"][:-1] == pytest.approx(200.0 * mu[:-1], rel=1e-6)
-    assert log(H[0] / 1e-8) > 4  # from the film ...
+    assert log(H[0] / 1e-8) > 4  # a full film at the start
     same = by_scipy(lambda w: -0.02 / 0.05 * law.force(0.02 * w, 200.0), [100.0], 3.0)
     assert run.final["a_rate"] == pytest.approx(same[0], abs=1e-6)
