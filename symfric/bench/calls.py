@@ -52,12 +52,9 @@ def bench(quick: bool = False, progress: Progress = None) -> Report:
 
 
 def _rows(
-    task: str,
-    per: str,
-    times: dict[str, float],
-    errors: dict[str, float] | None = None,
+    task: str, per: str, times: dict[str, float], errors: dict[str, float] | None = None,
     title: str = TITLE,
-) -> Iterator[Found]:
+) -> Iterator[Found]:  # fmt: skip
     """Yield a row for each method from its time [s] and the relative error of its result."""
     first = next(iter(times.values()))
     for who, time in times.items():

@@ -84,18 +84,10 @@ def belt(width: float, points: int, mesh: int = 200) -> Found:
         rest, first = _run(folder, ips=1, start=0, free="1", step=-0.01, longest=0.02, points=300)
         hopf = rest[rest[:, 2] == HOPF]
         shutil.move(folder / "fort.8", folder / "fort.3")
-        start = int(hopf[0, 3])
         orbits, second = _run(
-            folder,
-            ips=2,
-            start=start,
-            free="1,11",
-            step=0.01,
-            longest=0.05,
-            points=points,
-            mesh=mesh,
-            eps=1e-7,
-        )
+            folder, ips=2, start=int(hopf[0, 3]), free="1,11", step=0.01, longest=0.05,
+            points=points, mesh=mesh, eps=1e-7,
+        )  # fmt: skip
     folds = orbits[orbits[:, 2] == FOLD, 4]
     fold = float(folds[0]) if folds.size else np.nan
     return Found(hopf[:, 4], fold, len(orbits), float(orbits[-1, 4]), first + second)

@@ -78,7 +78,10 @@ class Status(Enum):
     @property
     def ok(self) -> bool:
         """True if the result can be used."""
-        return self.name in ("SUCCESS", "TERMINATED", "SOLVED", "ACCEPTABLE", "DOUBTFUL")
+        return self in USABLE
+
+
+USABLE = Status.SUCCESS, Status.TERMINATED, Status.SOLVED, Status.ACCEPTABLE, Status.DOUBTFUL
 
 
 class SolveError(RuntimeError):

@@ -25,7 +25,7 @@ from symfric.integrator.equations.inputs import Input, InputData, input_data, pa
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.doubts import doubts
 from symfric.integrator.running.integrator import Integrator, built
-from symfric.integrator.running.record import GOOD, Run
+from symfric.integrator.running.record import Run
 from symfric.integrator.running.run import Tolerances, integrate, watchful
 from symfric.integrator.stored import trajectory_of
 from symfric.model import Model
@@ -167,7 +167,7 @@ def checked(trajectory: Trajectory) -> Trajectory:
     Raises:
         SolveError: the integration failed.
     """
-    if trajectory.status not in (*GOOD, Status.INTERRUPTED):
+    if not trajectory.status.ok and trajectory.status is not Status.INTERRUPTED:
         raise SolveError(trajectory.message, trajectory.status, trajectory)
     return trajectory
 

@@ -134,10 +134,10 @@ def simulate(
             "radau5": order 5, the most robust method: its iteration fails if a contact changes
             within a step, so no slip is missed even at rtol = 1e-3. The error is a tenth of rtol,
             for 1.5 to 2 times the steps; between steps the order is 4.
-            "radau9": order 9, five stages, for errors below 1e-7: half the time of rodas5p at 1e-8
-            and a quarter at 1e-10 with Brown-McPhee friction, but only 0.9 and 0.8 times with
-            LuGre, whose corners limit the steps, and no gain with a few algebraic unknowns. "auto"
-            never chooses it: as with radau5, rounding ends runs with narrow laws at tight
+            "radau9": order 9, five stages, for errors below 1e-7: a third of the time of rodas5p at
+            1e-8 and a fifth at 1e-10 with Brown-McPhee friction, but 0.95 and 0.75 times with
+            LuGre, whose corners limit the steps, and no gain with algebraic unknowns. "auto" never
+            chooses it: as with radau5, rounding stops the progress with narrow laws at tight
             tolerances (v_t = 1e-8 m/s at 1e-9), a decade before rodas5p.
             "dopri5": order 5, explicit, for non-stiff ODEs: orbits, pendulums, contacts that only
             slide, and mechanisms without friction from reactions (their multipliers have no error

@@ -41,7 +41,7 @@ from symfric.foundation.variable import strays, symbols_of
 from symfric.integrator.compiled.columns import Columns
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.record import GOOD, Run
+from symfric.integrator.running.record import Run
 from symfric.model import Model
 from symfric.model.contact import APPLIED, Contact
 from symfric.model.forces import by_laws
@@ -64,7 +64,7 @@ LOOKS = 200
 
 def doubts(integrator: Integrator, inputs: InputData, run: Run, p: Array) -> list[UserWarning]:
     """Return the warnings about a run that ended well; empty if there are none."""
-    if run.status not in GOOD:
+    if not run.status.ok:
         return []
     found = list[UserWarning]()
     for held in places(integrator.model):

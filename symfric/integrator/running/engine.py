@@ -86,6 +86,7 @@ class Work:
         )  # fmt: skip
         self.address = ctypes.addressof(self.loop)
         self.outputs: Outputs = Outputs.at(np.zeros(0), n)
+        self.breaks, self.data = np.zeros(2), np.zeros((0, 1))
         self.events = events
         if events is not None:
             self.loop.memory, self.loop.jumps, self.loop.max_jumps = events.pointers
@@ -94,7 +95,6 @@ class Work:
         """Start at time `t` [s] from the unknowns `y` with the step `h` [s]."""
         self.S[: State.MEMORY] = State.fresh(t, h)
         self.S[State.Y] = self.reach[:] = y
-        self.breaks, self.data = np.zeros(2), np.zeros((0, 1))
 
     def over(self, breaks: Array, data: Array) -> None:
         """Set the input intervals: `breaks` (k + 1,) and the `data` (n_data, k) on each of them."""

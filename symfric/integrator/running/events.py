@@ -4,16 +4,15 @@ This file contains the search of the virtual machine, and the types that both en
 `search.c` repeats the search in C, operation by operation.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from enum import IntEnum
 from functools import cached_property, partial
 from typing import final
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.foundation.numeric import Array, bound
+from symfric.foundation.numeric import Array, Buffered, bound
 from symfric.integrator.equations.initial import SURE
 from symfric.integrator.running import crossings as limits
 from symfric.integrator.running.crossings import (
@@ -139,9 +138,9 @@ class Search:
         self.eventful, self.crossings = eventful, eventful.crossings
         self.memory = eventful.memory
         self._before = self.memory[Memory.before(self.crossings.count)]
-        functions = map(_called, self.crossings.functions)
+        functions = map(Buffered, self.crossings.functions)
         self._looks, self._noise, _, self._values, self._cut, self._jump = functions
-        self._doubts = _called(self.crossings.doubts)
+        self._doubts = Buffered(self.crossings.doubts)
         self._directions = np.array(self.crossings.directions)
         self._changes = np.array(self.crossings.changes)
         count = self.crossings.count
@@ -192,7 +191,7 @@ class Search:
         theta, which = found
         h = float(row[Record.T1] - row[Record.T0])
         self.memory[Memory.RESUME] = max(self.memory[Memory.RESUME], h)
-        (cut,) = self._cut(np.array([theta]), row)
+        (cut,) = self._cut(theta, row)
         t, record = float(cut[Record.T1]), self.crossings.record
         kept = t != row[Record.T0]
         size = (h if kept else -h) if theta > 0 else 0.0
@@ -245,7 +244,7 @@ class Search:
             low = min(limits.SOON * tolerance / h, 0.1)
             g[0] = self._inside(row, d, low)
             jumped = passed(self._before, g[0], self._directions) & (g[0] != 0)
-        g[1:] = self._looks(np.array([low]), row, d)[0].reshape(-1, count)
+        g[1:] = self._looks(low, row, d)[0].reshape(-1, count)
         doubts = self._doubted(self._none, g)
         if doubts.any() or passed(g[:-1], g[1:], self._directions).any() or jumped.any():
             noise = self._noise(row, d)[0] if doubts.any() else self._none
@@ -261,26 +260,11 @@ class Search:
 
     def _inside(self, row: Array, d: Array, theta: float) -> Array:
         """Return the event values at `theta` within a step."""
-        return self._values(np.array([theta]), row, d)[0].copy()
+        return self._values(theta, row, d)[0]
 
     def _doubted(self, noise: Array, g: Array) -> Array:
         """Return an array over pieces and events, nonzero where a piece is doubtful."""
-        return self._doubts(g.ravel(), noise)[0].reshape(-1, g.shape[1]).copy()
-
-
-def _called(function: ca.Function) -> Callable[..., list[Array]]:
-    """Return `function` as a callable of flat arrays that reuses its result buffers."""
-    arguments = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
-    results = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
-    call = bound(function, arguments, results)
-
-    def called(*values: Array) -> list[Array]:
-        for argument, value in zip(arguments, values, strict=True):
-            argument[:] = value
-        call()
-        return results
-
-    return called
+        return self._doubts(g.ravel(), noise)[0].reshape(-1, g.shape[1])
 
 
 def piled(memory: Array, t: float, which: NDArray[np.bool_], changes: NDArray[np.intp]) -> bool:

@@ -209,10 +209,6 @@ second run, which gives the same bits.
 """
 
 
-GOOD = Status.SUCCESS, Status.TERMINATED
-"""Statuses of a run that ended well."""
-
-
 class Extent(NamedTuple):
     """Shortest and longest accepted step [s]."""
 

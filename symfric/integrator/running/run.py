@@ -22,7 +22,7 @@ from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.running.diagnosis import chattering, explain
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.record import GOOD, MOST_BYTES, Outputs, Run
+from symfric.integrator.running.record import MOST_BYTES, Outputs, Run
 from symfric.integrator.step.attempt import Given, State
 
 SMALL, REST = 1e-3, 1e-12
@@ -43,7 +43,7 @@ def own_scale(size: Array, nominal: Array) -> Array:
 def finer(scale: Array, size: Array, nominal: Array) -> Array | None:
     """Return the scale for another run of a motion of `size`; None if `scale` is fine enough.
 
-    It uses `own_scale`, in a form that is fast for few states.
+    It repeats `own_scale` in a form that is fast for few states.
     """
     used = scale.tolist()
     each = zip(used, size.tolist(), nominal.tolist(), strict=True)
@@ -119,7 +119,7 @@ def integrate(
     march = _March(integrator, inputs, y0, p, *settings)
     run = march.run()
     for _ in range(ROUNDS if tolerances.follow else 0):
-        if run.status not in GOOD or not _ends_small(run, integrator):
+        if not run.status.ok or not _ends_small(run, integrator):
             break
         own = finer(scale, run.farthest[: nominal.size], nominal)
         if own is None:
@@ -127,7 +127,7 @@ def integrate(
         scale, used = own, march.integrator
         march.atol, march.progress = atol * own / nominal, None
         again = march.run()
-        if again.status not in (*GOOD, Status.INTERRUPTED):
+        if not again.status.ok and again.status is not Status.INTERRUPTED:
             run.message += f" Tiny motions were not resolved on their own scale: {again.message}"
             return run, used
         run = again
@@ -192,7 +192,7 @@ class _March:
         outputs = Outputs.at(self.times, y.size)
         work.want(outputs)
         work.over(inputs.breaks, inputs.values)
-        run = self.made = Run(t_start, y, outputs, [], [], kept=[], most=self.most)
+        run = self.made = Run(t_start, y, outputs, most=self.most)
         self.places, self.limit, self.limit_set_at = [y], allowed.max_steps, t_start
         try:
             self._march(t_start, t_end)

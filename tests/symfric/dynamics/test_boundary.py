@@ -56,12 +56,7 @@ def test_what_has_no_boundary_is_refused() -> None:
     model = damped_belt(1.0)
     rest = continuation(equilibrium(model), "v_b", (0.1, 0.6))
     (hopf,) = rest.located("Hopf")
-    good: dict[str, Any] = {
-        "branch": rest,
-        "special": hopf,
-        "parameter": "c",
-        "between": (0.1, 1.0),
-    }
+    good = dict[str, Any](branch=rest, special=hopf, parameter="c", between=(0.1, 1.0))
     bad: list[tuple[dict[str, Any], str]] = [
         ({"branch": None}, "branch: expected a branch of `continuation`, got None"),
         ({"special": 0}, "special: expected a Hopf point or a fold of .*, got 0"),

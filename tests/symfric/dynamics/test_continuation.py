@@ -12,7 +12,6 @@ from scipy.optimize import brentq
 
 from symfric import (
     ExactCoulomb,
-    Law,
     LuGre,
     Model,
     Variable,
@@ -22,6 +21,7 @@ from symfric import (
     simulate,
     simulate_many,
 )
+from symfric.bench.dynamics import EXACT, LEVELS, belt
 from symfric.dynamics import (
     continuation,
     curve,
@@ -31,19 +31,6 @@ from symfric.dynamics import (
     periodic_orbit,
 )
 from symfric.laws import Stribeck
-
-
-def belt(law: Law) -> Model:
-    """Block of unit mass, stiffness and load on a belt, as measured with AUTO-07p."""
-    x, v = Variable("x", "m", start=1.2), Variable("v", "m/s")
-    speed = Variable("v_b", "m/s", start=0.8)
-    slip = contact("belt", law, v - speed, 1.0, {"v": speed.symbol}, F_e=-x.symbol)
-    rates = ca.vertcat(v.symbol, -x - slip.force)
-    return Model("belt", x=(x, v), p=(speed,), ode=rates, contacts=(slip,))
-
-
-LEVELS = {"mu_s": 1.5, "mu_d": 1.0, "v_s": 0.2, "sigma_2": 0.1}
-EXACT = ExactCoulomb(form="stribeck", **LEVELS)
 
 
 def slope(speed: float) -> float:

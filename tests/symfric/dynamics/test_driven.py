@@ -4,7 +4,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from symfric import LuGre, Model, Variable, contact, simulate
+from symfric import LuGre, Model, Variable, simulate
+from symfric.bench.dynamics import LEVELS, belt
 from symfric.dynamics import continuation, equilibrium, orbits_from, periodic_orbit
 
 
@@ -47,13 +48,7 @@ def test_what_is_no_period_of_the_drive_is_refused(in_equations: bool, rate: flo
 
 @pytest.mark.slow
 def test_a_run_leads_beyond_a_fold_that_is_too_sharp() -> None:
-    x, v = Variable("x", "m", start=1.2), Variable("v", "m/s")
-    speed = Variable("v_b", "m/s", start=0.8)
-    law = LuGre(mu_s=1.5, mu_d=1.0, v_s=0.2, sigma_2=0.1)
-    slip = contact("belt", law, v - speed, 1.0, {"v": speed.symbol}, F_e=-x.symbol)
-    model = Model("belt", x=(x, v), p=(speed,), ode=ca.vertcat(v.symbol, -x - slip.force),
-                  contacts=(slip,))  # fmt: skip
-    rest = continuation(equilibrium(model), "v_b", (0.3, 0.9))
+    rest = continuation(equilibrium(belt(LuGre(**LEVELS))), "v_b", (0.3, 0.9))
     whole = orbits_from(rest, rest.located("Hopf")[-1], (0.3, 2.0))
     (found,) = whole.special  # exact friction grazes at 1.43549791
     assert found.kind == "fold" and found.value == pytest.approx(1.4352, abs=1e-4)

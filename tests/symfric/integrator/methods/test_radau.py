@@ -110,3 +110,11 @@ def test_order_nine_takes_a_quarter_of_the_attempts_at_tight_tolerances() -> Non
         assert attempts[1] < ratio * attempts[0]
         assert errors[1] < 0.5 * errors[0]
         assert errors[1] < 10 * rtol
+
+
+def test_rounding_stops_radau_with_a_narrow_law_a_decade_before_rodas5p() -> None:
+    model, methods = sf.rabinowicz(sf.BrownMcPhee(v_t=1e-8)), ("rodas5p", "radau5", "radau9")
+    for rtol, able in ((1e-8, [*methods]), (1e-9, ["rodas5p"]), (1e-10, [])):
+        limits = {"rtol": rtol, "max_steps": 4000, "throw": False}
+        runs = {name: sf.simulate(model, 5.0, method=name, **limits) for name in methods}
+        assert [name for name, run in runs.items() if run.status.ok] == able

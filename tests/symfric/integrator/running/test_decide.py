@@ -22,12 +22,8 @@ def hammered() -> Model:
     t, three = ca.SX.sym("t"), range(3)
     x = [sf.Variable(f"x{i}", "m") for i in three]
     v = [sf.Variable(f"v{i}", "m/s") for i in three]
-    names = (
-        "k",
-        "F",
-        *(f"{a}{i}" for a in ("omega", "mu_s", "mu_d", "kept", "hit") for i in three),
-    )
-    p = {name: sf.Variable(name, "1", start=1.0) for name in names}
+    indexed = (f"{a}{i}" for a in ("omega", "mu_s", "mu_d", "kept", "hit") for i in three)
+    p = {name: sf.Variable(name, "1", start=1.0) for name in ("k", "F", *indexed)}
     own = {name: one.symbol for name, one in p.items()}
     q = [0, *(a.symbol for a in x), 0]
     forces = [
