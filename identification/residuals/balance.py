@@ -339,7 +339,7 @@ def _states(
         here = [put(x) for x in (c.slip, c.N, *c.given.values())]
         then = [ca.substitute(x, now, later) for x in here]
         before, after = ((x[0], x[1], dict(zip(c.given, x[2:], strict=True))) for x in (here, then))
-        steady.append(put(ca.SX(law.steady_state(c.slip, c.N))))
+        steady.append(put(ca.SX(law.steady_state_at(c.slip, c.N, **c.given))))
         speed, share = preloads.get(c.name, (0.0, ca.SX(0.0)))
         start.append(put(begun(law, (c.slip, c.N), speed, share)))
         step.append(put(imposed_step(law, symbols_of(c.states), before, after, h, at)))

@@ -285,7 +285,7 @@ def _sliding(law: Law, p: ca.SX, speed: float | None) -> Sampled:
     given = {i.name: w[2 + k] for k, i in enumerate(law.inputs)}
     v, N = w[0], w[1]
     if speed is None:
-        steady = ca.SX(law.steady_state(v, N)) if law.states else ca.SX(0, 1)
+        steady = ca.SX(law.steady_state_at(v, N, **given)) if law.states else ca.SX(0, 1)
         return Sampled.of(w, p, ca.SX(law.force(v, N, steady, **given)))
     share = ca.SX.sym("preload")
     start = begun(law, (v, N), speed, share)

@@ -16,6 +16,7 @@ from symfric.foundation.shown import brief
 from symfric.foundation.status import Status
 from symfric.foundation.units import turned
 from symfric.laws import Law
+from symfric.laws.base.law import FORCE
 from symfric.laws.composed.populations import steady_force
 from symfric.scenes import Drive
 
@@ -265,7 +266,9 @@ class Curve:
 def of_points(law: Law, N: float, points: dict[str, tuple[Array, Array]], turning: bool) -> Curve:
     """Return the curve of a law with measured points (v, F) of each record."""
     lines = {name: Line(v, F) for name, (v, F) in points.items()}
-    return _curve(law, N, lines, turning, "measured points")
+    inputs = [f"{i.name} = {i.steady:g} {i.unit}" for i in law.inputs if i.name != FORCE]
+    says = ", ".join(["measured points", *(f"line at {one}" for one in inputs)])
+    return _curve(law, N, lines, turning, says)
 
 
 def of_drive(drive: Drive, records: Sequence[Record]) -> Curve:

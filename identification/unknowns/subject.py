@@ -243,7 +243,7 @@ def points_model(law: Law, load: float, p: Variables) -> Model:
     v, N = Variable("v", "m/s", nominal=0.1), Variable("N", "N", start=load, nominal=load)
     further = tuple(Variable(i.name, i.unit, start=i.steady, nominal=i.nominal) for i in law.inputs)
     inputs = {x.name: x.symbol for x in further}
-    z = ca.SX(law.steady_state(v.symbol, N.symbol)) if law.states else ca.SX(0, 1)
+    z = ca.SX(law.steady_state_at(v.symbol, N.symbol, **inputs)) if law.states else ca.SX(0, 1)
     F = Output(ca.SX(law.force(v.symbol, N.symbol, z, **inputs)), "N", "friction force opposing v")
     return Model(name="points", u=(v, N, *further), p=p, outputs={"F": F})
 

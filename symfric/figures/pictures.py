@@ -93,9 +93,9 @@ def over_input(law: AnyLaw, N: float, given: Scales, name: str) -> FigureData:
         raise ValueError(f"over_input of {law_name(law)}: expected a law, got a population")
     inputs = {i.name: i for i in law.inputs}
     V, u = given.velocity, np.linspace(-2.0, 2.0, 401) * inputs[name].nominal
-    others = {i.name: i.steady for i in law.inputs if i.name != name}
+    at = {i.name: u if i.name == name else i.steady for i in law.inputs}
     v = np.full(u.shape, V)
-    F = law.force(v, N, law.steady_state(v, N), **others, **{name: u})
+    F = law.force(v, N, law.steady_state_at(v, N, **at), **at)
     return FigureData(
         f"input_{name}",
         f"sliding at {V:.3g} m/s over {name}, N = {N:g} N",

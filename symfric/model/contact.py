@@ -45,6 +45,7 @@ class FrictionLaw(Protocol):
     def force(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar: ...  # noqa: D102
     def rate(self, v: Scalar, N: Scalar, z: Scalar = ()) -> Scalar: ...  # noqa: D102
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar: ...  # noqa: D102
+    def steady_state_at(self, v: Scalar, N: Scalar, **inputs: Scalar) -> Scalar: ...  # noqa: D102
     def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar: ...  # noqa: D102
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Any, ...]: ...  # noqa: D102
     def sliding(self, v: Scalar, N: Scalar, side: int) -> Scalar: ...  # noqa: D102

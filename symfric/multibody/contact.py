@@ -1,6 +1,6 @@
 """Contacts with friction of a mechanism: sliding velocity, normal force, loads on the bodies.
 
-Only the contacts of this module apply friction laws to bodies, with the minus sign of their loads.
+Only contacts apply friction laws to bodies, with the minus sign of their loads.
 """
 
 from abc import ABC, abstractmethod

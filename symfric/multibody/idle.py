@@ -54,7 +54,7 @@ def _advice(joint: str, constraints: Sequence[Constraint]) -> str:
             kind, friction = type(c).__name__, c.accepts[0].__name__
             return (
                 f"{expected}, because coupling '{c.name}' carries the load; write "
-                f"{kind}('{c.name}', ..., friction={friction}(law, ...)) and leave this friction "
-                "away, or give the bearing a preload"
+                f"{kind}('{c.name}', ..., friction={friction}(law, ...)) and omit this friction, "
+                "or give the bearing a preload"
             )
-    return f"{expected}; write preload=... or normal=... [N], or leave the friction away"
+    return f"{expected}; write preload=... or normal=... [N], or omit the friction"

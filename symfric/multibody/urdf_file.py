@@ -327,11 +327,10 @@ def _dynamics(where: str, tag: ET.Element | None, notes: Notes) -> tuple[float, 
         found = {
             key: notes.number(f"{where} > dynamics", both, key) for key in names if key in inside
         }
+        levels.append(next(iter(found.values()), 0.0))
         for key, value in found.items():
             if value < 0:
                 notes.problems.append(f"{where} > dynamics > {key}: expected >= 0, got {value:g}")
-        levels.append(next(iter(found.values()), 0.0))
-        for key, value in found.items():
             if value not in (0.0, levels[-1]):
                 notes.left(f"dynamics {key}", where)
     return levels[0], levels[1]

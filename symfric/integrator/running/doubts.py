@@ -161,7 +161,7 @@ def _sliding(model: Model, contact: Contact) -> Sliding | None:
     law, v, N, p = contact.law, ca.SX.sym("v"), ca.SX.sym("N"), model.vector("p")
 
     def steady(slip: Any, load: Any, given: Mapping[str, Any]) -> ca.SX:
-        return ca.SX(law.force(slip, load, law.steady_state(slip, load), **given))
+        return ca.SX(law.force(slip, load, law.steady_state_at(slip, load, **given), **given))
 
     def rows() -> list[Any]:
         there = steady(contact.slip, contact.N, contact.given)

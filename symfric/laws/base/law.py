@@ -65,8 +65,7 @@ class State:
     """Internal state of a law: name, unit, typical magnitude and description.
 
     An `even` state, such as an age, keeps its value when the motion is mirrored; all other states,
-    such as deflections and forces, change sign. A `whole` state is a mode with the value -1, 0 or
-    1, in results as well.
+    such as deflections, change sign. A `whole` state is a mode: -1, 0 or 1, in results as well.
     """
 
     name: str
@@ -274,6 +273,10 @@ class Law(Parametric, ABC):
         If |v| is smooth over v_eps, their rate vanishes to rounding for |v| > 20 v_eps.
         """
 
+    def steady_state_at(self, v: Scalar, N: Scalar, **inputs: Scalar) -> Scalar:
+        """Return the `steady_state` under further inputs, which have no effect by default."""
+        return self.steady_state(v, N)
+
     def switches(self, v: Scalar, N: Scalar, z: Scalar = ()) -> tuple[Switch, ...]:
         """Return the changes of mode; empty for a law without modes."""
         return ()
@@ -287,10 +290,7 @@ class Law(Parametric, ABC):
         return None
 
     def held_rest(self, v: Scalar, N: Scalar, z: Scalar) -> Scalar | None:
-        """Return the equilibrium of each state while v, N and the other states stay constant.
-
-        Return None if only `steady_state` is known, in which all states are in equilibrium.
-        """
+        """Return the equilibrium of each state at constant v, N and other states; None: unknown."""
         return None
 
     def warnings(self) -> tuple[str, ...]:

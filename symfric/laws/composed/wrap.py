@@ -119,7 +119,12 @@ class Composed(Law):
 
     def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
         """Return the steady states of all laws."""
-        return _join(v, [law.steady_state(v, self.load(N)) for law in self.at(v) if law.states])
+        return self.steady_state_at(v, N)
+
+    def steady_state_at(self, v: Scalar, N: Scalar, **inputs: Scalar) -> Scalar:
+        """Return the steady states of all laws under further inputs."""
+        load, laws = self.load(N), [law for law in self.at(v) if law.states]
+        return _join(v, [law.steady_state_at(v, load, **chosen(law, inputs)) for law in laws])
 
     def warnings(self) -> tuple[str, ...]:
         """Return the warnings of the laws."""
@@ -209,7 +214,7 @@ class Lagged(Wrapper):
         """Return the rate of the lagged velocity [m/s^2], shape (1, 1)."""
         return column((v - z[0]) / self.tau_L)
 
-    def steady_state(self, v: Scalar, N: Scalar) -> Scalar:
+    def steady_state_at(self, v: Scalar, N: Scalar, **inputs: Scalar) -> Scalar:
         """Return the velocity itself, shape (1, 1)."""
         return column(v)
 

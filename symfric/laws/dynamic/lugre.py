@@ -2,7 +2,7 @@
 
 from math import pi
 
-from symfric.foundation.numeric import Scalar, column, equals, exp, is_number, sin
+from symfric.foundation.numeric import Scalar, column, equals, exp, is_number, sin, sqrt
 from symfric.foundation.parameters import parametric
 from symfric.laws.base import fields, smooth
 from symfric.laws.base.law import Facts, Input, State, Switch, one_sided
@@ -173,9 +173,9 @@ class LuGreTyre(LuGreNormalised):
     of the wheel, which carries deflected bristles out of the contact. kappa is between 1/L and 2/L
     for a contact of length L; 7/(6 L) is usual, and 2/L gives the stiffness at small slip of a
     contact with even pressure. |v| and |v_r| are smooth as in `LuGre`, as is the passivity.
-    Limits: v_r = 0, a locked wheel, is `LuGreNormalised`, to which `steady_state` refers. In steady
-    rolling z = v / (sigma_0 |v|/g + kappa |v_r|), so that F = N (sigma_0/kappa) v/v_r for small
-    slip; the relaxation length is about 1/kappa.
+    Limits: v_r = 0, a locked wheel, is `LuGreNormalised`, to which `steady_state` refers;
+    `steady_state_at` depends on v_r. In steady rolling z = v / (sigma_0 |v|/g + kappa |v_r|), so
+    that F = N (sigma_0/kappa) v/v_r for small slip; the relaxation length is about 1/kappa.
     Source: Canudas de Wit, Tsiotras, Velenis, Basset, Gissinger, Vehicle System Dynamics 39(3),
     2003 (from memory).
     Checked: integration of the bristles over the contact.
@@ -206,6 +206,15 @@ class LuGreTyre(LuGreNormalised):
     def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the break-away force of a locked wheel [N], a bound for a rolling one."""
         return self.mu_s * N
+
+    def steady_state_at(
+        self, v: Scalar, N: Scalar, *, v_r: Scalar = 0.0, **inputs: Scalar
+    ) -> Scalar:
+        """Return the bristle deflection in steady rolling [m], shape (1, 1)."""
+        if equals(v_r, 0.0):
+            return self.steady_state(v, N)
+        carried = self.kappa * sqrt(v_r * v_r + self.v_eps * self.v_eps)
+        return column(v / (self.relaxation(v, 1.0) + carried))
 
     def switches(
         self, v: Scalar, N: Scalar, z: Scalar = (), **inputs: Scalar

@@ -6,6 +6,7 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 import symfric as sf
+from identification import Dataset, Fit, Points
 
 TYRES = [(1.0, 8e4, 4e3), (0.3, 500.0, 20.0), (1.7, 2e6, 3e5)]
 """Friction coefficient, cornering stiffness [N] and load [N], from a toy to an aircraft."""
@@ -56,6 +57,10 @@ def test_lugre_tyre_tends_to_its_closed_form_in_steady_rolling() -> None:
             z = v / (law.sigma_0 * abs(v) / g + law.kappa * abs(v_r))
             expected = 3e3 * (law.sigma_0 * z + law.sigma_2 * v)
             assert steady(law, v, 3e3, v_r) == pytest.approx(expected, rel=1e-7)
+            for one in (law, sf.Sum((law, sf.Coulomb(0.0)))):
+                rests = np.ravel(one.steady_state_at(v, 3e3, v_r=v_r))
+                assert one.rate(v, 3e3, rests, v_r=v_r) == pytest.approx(0.0, abs=1e-12)
+                assert one.force(v, 3e3, rests, v_r=v_r) == pytest.approx(expected, rel=1e-12)
 
 
 def test_lumped_tyre_is_near_the_distributed_one() -> None:
@@ -98,3 +103,19 @@ def test_a_braked_car_decelerates_at_the_slip_of_the_closed_form() -> None:
             assert slip == pytest.approx(expected, rel=1e-3)
         else:
             assert pytest.approx(steady(law, slip * 16.0, N, 16.0), rel=0.02) == F
+
+
+def test_points_of_a_rolling_tyre_determine_its_parameters() -> None:
+    true = {"mu_s": 1.1, "mu_d": 0.7, "v_s": 4.0, "kappa": 7.0}
+    v, v_r = np.linspace(-6.0, 6.0, 240), np.tile([8.0, 20.0], 120)
+    g = 0.7 + 0.4 * np.exp(-((v / 4.0) ** 2))
+    noise = 1 + 0.01 * np.random.default_rng(0).standard_normal(v.size)
+    F = 180.0 * v / (180.0 * np.abs(v) / g + 7.0 * v_r) * noise
+    data = Dataset.of(v=v, F=F, v_r=v_r, points=True)
+    fit = Fit(Points(), sf.LuGreTyre(), data, free=["kappa"], fixed={"sigma_2": 0.0}).solve()
+    for name, value in true.items():
+        found = fit.parameters[name]
+        assert found.standard_error is not None
+        assert abs(found.value - value) < 3 * found.standard_error
+    assert fit.curve is not None
+    assert fit.curve.says == "measured points, line at v_r = 0 m/s"
