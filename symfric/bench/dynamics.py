@@ -37,9 +37,8 @@ LEVELS = {"mu_s": 1.5, "mu_d": 1.0, "v_s": 0.2, "sigma_2": 0.1}
 EXACT = ExactCoulomb(form="stribeck", **LEVELS)
 GRAZING = 1.43549791
 """Speed of the belt [m/s] at which the sliding orbit with exact friction touches it."""
-WIDTHS = (1e-2, 1e-3, 1e-4)
-STEPS = {"exact": 0.028, "v_t = 0.01 m/s": 0.032, "v_t = 0.001 m/s": 0.033}
-"""Longest steps with which a branch has about 200 points."""
+STEPS = {1e-2: 0.032, 1e-3: 0.033, 1e-4: 0.034}
+"""Width v_t [m/s] -> longest step with which a branch has about 200 points."""
 G = 9.81
 
 
@@ -50,12 +49,12 @@ def bench(quick: bool = False, progress: Progress = None) -> Report:
         "Hopf speed": partial(hopf_speed, 2 if quick else 8),
         "grazing": grazing,
         "linear": linear,
-        "belt, exact": partial(belt_branch, "exact", EXACT),
+        "belt, exact": partial(belt_branch, "exact", EXACT, 0.028),
     }
-    for w in () if quick else WIDTHS:
+    for w in () if quick else STEPS:
         tasks[f"belt, {w:g}"] = partial(smooth_branch, w)
     if not quick:
-        tasks |= {"belt, LuGre": partial(belt_branch, "LuGre", LuGre(**LEVELS))}
+        tasks |= {"belt, LuGre": partial(belt_branch, "LuGre", LuGre(**LEVELS), 0.03)}
         tasks |= {"slider-crank": mechanism_branch}
     for kind in KINDS:
         tasks[f"runs, {kind}"] = partial(compared, kind, range(2 if quick else 8))
@@ -173,10 +172,10 @@ def followed(model: Model, step: float) -> tuple[Branch, float]:
     return branch, process_time() - began
 
 
-def belt_branch(name: str, law: Law) -> Iterator[Found]:
+def belt_branch(name: str, law: Law, step: float) -> Iterator[Found]:
     """Measure the branch of one law and compare its time with that of an ensemble."""
     model = belt(law)
-    branch, seconds = followed(model, STEPS.get(name, 0.03))
+    branch, seconds = followed(model, step)
     end = next(iter(branch.special))
     yield BRANCHES, _row("symfric", name, branch.values.size, end.value, branch.values[-1], seconds)
     for_200 = seconds * 200 / branch.values.size
@@ -198,7 +197,7 @@ def belt_branch(name: str, law: Law) -> Iterator[Found]:
 def smooth_branch(width: float) -> Iterator[Found]:
     """Measure the branch of a smooth law in symfric and in AUTO-07p."""
     name = f"v_t = {width:g} m/s"
-    branch, seconds = followed(belt(Stribeck(v_eps=width, **LEVELS)), STEPS.get(name, 0.034))
+    branch, seconds = followed(belt(Stribeck(v_eps=width, **LEVELS)), STEPS[width])
     (fold,) = branch.located("fold")
     size = branch.values.size
     yield BRANCHES, _row("symfric", name, size, fold.value, branch.values[-1], seconds)

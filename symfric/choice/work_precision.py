@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from math import exp, inf, log, nan
+from math import exp, inf, isnan, log, nan
 from pathlib import Path
 from time import process_time
 from typing import TYPE_CHECKING, Any, NamedTuple, final
@@ -126,8 +126,8 @@ class WorkPrecision(Showing):
         rows: list[tuple[str, ...]] = []
         for error in (10.0**k for k in range(first, last - 1, -1)):
             times = [1e3 * self.time_at(method, error) for method in self.methods]
-            if any(time == time for time in times):
-                cells = (f"{time:.3g}" if time == time else "-" for time in times)
+            if not all(map(isnan, times)):
+                cells = ("-" if isnan(time) else f"{time:.3g}" for time in times)
                 rows.append((f"{error:.0e}", *cells))
         start, end, hidden = *self.span, sum(not p.resolved for p in self.points)
         said = [f"{name}: {reason}" for name, reason in self.failed.items()]

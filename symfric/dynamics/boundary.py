@@ -18,7 +18,7 @@ from symfric.dynamics.balance import rows_at_rest
 from symfric.dynamics.branch import Branch, Special
 from symfric.dynamics.continuation import checked_span
 from symfric.dynamics.curve import Equations as Curve
-from symfric.dynamics.curve import Node, corrected, followed, located
+from symfric.dynamics.curve import Node, at_edge, corrected, followed
 from symfric.dynamics.curve import tangent as direction
 from symfric.dynamics.equations import equations
 from symfric.dynamics.families import TINY, Equilibria
@@ -231,11 +231,7 @@ def _within(
         return
 
     for k, found in enumerate(followed(curve, node, tau, step, any_node, lambda _: np.inf)):
-        value = float(found.node.z[-1])
-        if not span[0] < value < span[1]:
-            edge = span[0] if value <= span[0] else span[1]
-            yield located(curve, found, lambda n, _, edge=edge: float(n.z[-1]) - edge)[0]
-            return
-        yield found.node
-        if k + 2 > points:
+        end = at_edge(curve, found, span)
+        yield end or found.node
+        if end or k + 2 > points:
             return

@@ -1,12 +1,11 @@
 """Continuation of equilibria and periodic orbits in a parameter, through folds and grazing."""
 
 from collections.abc import Iterator, Mapping
-from functools import partial
 
 import numpy as np
 
 from symfric.dynamics.branch import Branch, Special
-from symfric.dynamics.curve import Node, Step, corrected, followed, located, tangent
+from symfric.dynamics.curve import Node, Step, at_edge, corrected, followed, tangent
 from symfric.dynamics.equilibrium import Equilibrium
 from symfric.dynamics.families import Equilibria, Orbits
 from symfric.dynamics.orbit import PeriodicOrbit
@@ -183,9 +182,7 @@ def _traced(
     try:
         for found in _steps(curve, node, tau, span, step, trace):
             note(curve, found, trace)
-            if not span[0] < found.node.z[-1] < span[1]:
-                edge = span[0] if found.node.z[-1] <= span[0] else span[1]
-                last, _ = located(curve, found, partial(_beyond, edge))
+            if last := at_edge(curve, found, span):
                 if last is not found.node:
                     trace.points.append(point(curve, last))
                 trace.message = "ends at the given range"
@@ -201,10 +198,6 @@ def _traced(
     except KeyboardInterrupt:
         trace.message = INTERRUPTED
     return trace
-
-
-def _beyond(edge: float, node: Node, _: Array) -> float:
-    return float(node.z[-1]) - edge
 
 
 def _steps(

@@ -260,3 +260,13 @@ def located(
     if root not in found:
         value(float(root))
     return found[float(root)]
+
+
+def at_edge(curve: Equations, step: Step, span: tuple[float, float]) -> Node | None:
+    """Return the node at which the last unknown leaves `span`; None if it stays within."""
+    low, high = span
+    value = float(step.node.z[-1])
+    if low < value < high:
+        return None
+    edge = low if value <= low else high
+    return located(curve, step, lambda node, _: float(node.z[-1]) - edge)[0]
