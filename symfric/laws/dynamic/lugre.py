@@ -203,7 +203,7 @@ class LuGreTyre(LuGreNormalised):
             raise one_sided(self, "the force of a rolling tyre does not jump at v = 0")
         return super().outside(speed, N)
 
-    def static_level(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
+    def most_held(self, N: Scalar, side: int = 1, **inputs: Scalar) -> Scalar:
         """Return the break-away force of a locked wheel [N], a bound for a rolling one."""
         return self.mu_s * N
 

@@ -119,3 +119,8 @@ def test_points_of_a_rolling_tyre_determine_its_parameters() -> None:
         assert abs(found.value - value) < 3 * found.standard_error
     assert fit.curve is not None
     assert fit.curve.says == "measured points, line at v_r = 0 m/s"
+    at_rest = Dataset.of(
+        v=np.append(v, 0.0), F=np.append(F, 0.0), v_r=np.append(v_r, 9.0), points=True
+    )
+    with pytest.raises(ValueError, match=r"break-away at v = 0: .* rolling tyre does not jump"):
+        Fit(Points(), sf.LuGreTyre(), at_rest).solve()
