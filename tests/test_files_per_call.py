@@ -63,7 +63,7 @@ print(files(lambda: generate(LuGre(), "c")))
 
 MOST = {
     "simulate, first": 33,
-    "simulate, second": 18,
+    "simulate, second": 15,
     "Fit.solve": 54,
     "ocp.solve": 93,
     "generate": 34,

@@ -133,20 +133,18 @@ class Prepared:
         p: Mapping[str, float] | None,
         looks: Array,
         progress: Callable[[float], None] | None = None,
-        stacklevel: int = 3,
     ) -> Ran:
         """Run once with results at the times `looks`, which belong to the result.
 
-        Warnings name `where` and point to the line `stacklevel` calls above.
+        Warnings name `where` and point to the line that calls the caller of this method.
         """
         model, begin, known = self.model, perf_counter(), "_built" in self.__dict__
         (integrator, allowed, fresh), inputs = self._built, self.inputs
         build_time = perf_counter() - begin if fresh and not known else 0.0
         values = model.values("p", p)
-        y0, system = model.started(x0, values, self.t_start), integrator.system
-        if y0.size < system.n:
-            y0 = first_guess(system, model, y0, self.t_start)
-        if system.has_pivots:
+        start = model.started(x0, values, self.t_start)
+        y0 = first_guess(integrator.system, model, start, self.t_start)
+        if integrator.system.has_pivots:
             at_start = (y0, np.concatenate([values, inputs.values[:, 0]]))
             integrator = integrator.suited([at_start], self.t_end - self.t_start)
         compiled_before, begin = integrator.compile_time, perf_counter()
@@ -156,7 +154,7 @@ class Prepared:
         count = partial(_statistics, integrator, run, build_time, compile_time, run_time)
         for said in doubts(own, inputs, run, values):
             run.message += f" {said}"
-            warnings.warn(type(said)(f"{where} '{model.name}': {said}"), stacklevel=stacklevel)
+            warnings.warn(type(said)(f"{where} '{model.name}': {said}"), stacklevel=3)
         made = trajectory_of(model, lambda: integrator, inputs, run, values, count, self.backend)
         return Ran(made, run, own, y0, values)
 
