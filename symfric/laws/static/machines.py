@@ -196,7 +196,7 @@ class BrushTyre(StaticLaw):
     v is the slip velocity of the tyre at the contact, and the input v_r = r omega the rolling speed
     of the wheel. v / v_r is the theoretical slip: tan(alpha) of the slip angle alpha in free
     rolling. Like other laws, it opposes v and is odd. `PlanarSlip` of this law is the brush tyre
-    with equal stiffnesses in combined slip.
+    with equal stiffnesses in combined slip; its v_r is a vector.
     Limits: F = C tan(alpha) for small alpha; the whole contact slides from tan(alpha) =
     3 mu_d N / C on. v_r = 0 is Coulomb friction that is smooth over 3 mu_d N v_eps / C; it creeps
     at rest. No relaxation length, aligning moment or camber. Not valid for N = 0.

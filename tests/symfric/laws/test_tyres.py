@@ -39,6 +39,16 @@ def test_slope_and_limit_over_the_slip_angle() -> None:
     assert law.force(-0.5, 3e3) == pytest.approx(-2700.0)  # a locked wheel
 
 
+@pytest.mark.parametrize(("mu", "C", "N"), TYRES)
+def test_combined_slip_acts_along_the_slip(mu: float, C: float, N: float) -> None:
+    tyre, v_r = sf.PlanarSlip(sf.BrushTyre(mu, C, v_eps=1e-9)), np.array([12.0, 0.0])
+    for share, angle in ((1e-3, 0.3), (0.5, 2.0), (0.9, -1.0), (2.0, -2.5)):
+        way = np.array([np.cos(angle), np.sin(angle)])
+        expected = mu * N * (1 - (1 - min(share, 1.0)) ** 3) * way
+        found = tyre.force(share * 3 * mu * N / C * 12.0 * way, N, v_r=v_r)
+        assert np.ravel(found) == pytest.approx(expected, rel=1e-9)
+
+
 def steady(law: sf.LuGreTyre, v: float, N: float, v_r: float) -> float:
     """Return the force after long rolling, from the equations of the law."""
 
