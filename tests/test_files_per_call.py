@@ -64,7 +64,7 @@ print(files(lambda: generate(LuGre(), "c")))
 MOST = {
     "simulate, first": 33,
     "simulate, second": 15,
-    "Fit.solve": 54,
+    "Fit.solve": 51,
     "ocp.solve": 93,
     "generate": 34,
 }

@@ -12,7 +12,7 @@ from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol, final
+from typing import Any, NamedTuple, Protocol, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,17 +179,19 @@ class Blocks:
 @final
 @dataclass(frozen=True, eq=False)
 class Extended:
-    """Residuals with further unknowns in which they are linear, r(p) + C q.
+    """Residuals with additional terms that are linear in further unknowns, r(p) + C q + shift.
 
     Attributes:
         residuals: r.
         more: the unknowns q.
         columns: C, shape (rows, unknowns).
+        shift: change of the data, shape (rows,); 0: none.
     """
 
-    residuals: Blocks
+    residuals: Any
     more: tuple[Unknown, ...]
     columns: Array
+    shift: Array | float = 0.0
 
     @property
     def own(self) -> tuple[Unknown, ...]:
@@ -209,7 +211,7 @@ class Extended:
     @property
     def linear(self) -> bool:
         """True if the residuals are linear in all values."""
-        return self.residuals.linear
+        return getattr(self.residuals, "linear", False)
 
     def motion_noise(self, values: Array) -> Array:
         """Return the rms of the residuals by the noise of the measured motion, per channel."""
@@ -221,7 +223,7 @@ class Extended:
         found = self.residuals.at(values[:count])
         if isinstance(found, str):
             return found
-        r = found.r + np.einsum("ij,j->i", self.columns, values[count:])
+        r = found.r + self.shift + np.einsum("ij,j->i", self.columns, values[count:])
         return Evaluation(r, np.hstack([found.J, self.columns]))
 
 

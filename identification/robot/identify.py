@@ -14,9 +14,16 @@ from identification.result.parts import Estimate
 from identification.result.stored import plain
 from identification.robot.base import Base, base_of, consistent
 from identification.robot.dynamics import WHERE, RobotModel
-from identification.robot.estimate import METHODS, Equations, Estimated, estimate
+from identification.robot.estimate import (
+    METHODS,
+    Equations,
+    Estimated,
+    Information,
+    estimate,
+    information,
+    seen_in,
+)
 from identification.robot.friction import USUAL, JointLaw, laws_of
-from identification.robot.information import Information, information, seen_in
 from identification.robot.motion import RobotMotion, motions
 from identification.robot.result import OFFSET, RobotFit, TorqueError, TorqueSeries
 from identification.verdict.minimum import Sandwich

@@ -183,7 +183,7 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     wanders = np.abs(moved * size[:, None]).max(axis=1, initial=0.0) > 1e-4
     size_of = np.abs(found.slope)  # a value at its upper bound moves by rounding with its partner
     fixed = ~np.any((size_of > ROUNDING * size_of.max(axis=1, keepdims=True)) & ~found.held, axis=1)
-    matrix, white = (_without(C, wanders | fixed) for C in (inside.coloured, inside.white))
+    matrix, white = (without(C, wanders | fixed) for C in (inside.coloured, inside.white))
     low, high = _intervals(found, np.sqrt(np.diag(matrix)), inside.freedom)
     mine = tuple(names[i] for i in own)
     change = partial(_change, found, own)
@@ -204,8 +204,8 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     out = np.array([name in notes for name in names], dtype=bool)
     return Covariance(
         names=names,
-        matrix=_without(matrix, out),
-        white=_without(white, out),
+        matrix=without(matrix, out),
+        white=without(white, out),
         freedom=inside.freedom,
         low=np.where(out, np.nan, low),
         high=np.where(out, np.nan, high),
@@ -217,7 +217,7 @@ def covariance(found: Minimum, levels: Levels | None = None) -> Covariance:
     )
 
 
-def _without(matrix: Array, out: NDArray[np.bool_]) -> Array:
+def without(matrix: Array, out: NDArray[np.bool_]) -> Array:
     """Return a matrix with the rows and columns in `out` set to NaN."""
     return np.where(out[:, None] | out, np.nan, matrix)
 
