@@ -1,17 +1,26 @@
 """Continuation of equilibria and periodic orbits in a parameter, through folds and grazing."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from symfric.dynamics.branch import Branch, Special
 from symfric.dynamics.curve import Node, Step, at_edge, corrected, followed, tangent
 from symfric.dynamics.equilibrium import Equilibrium
-from symfric.dynamics.families import Equilibria, Orbits
+from symfric.dynamics.families import (
+    Equilibria,
+    Family,
+    Orbits,
+    Trace,
+    kind_of,
+    note,
+    point,
+    vanishing,
+)
 from symfric.dynamics.orbit import PeriodicOrbit
 from symfric.dynamics.shooting import Shooting
 from symfric.dynamics.sticking import Near, restarted, same_sequence
-from symfric.dynamics.trace import Family, Point, Trace, kind_of, note, point, vanishing
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import check_names
@@ -171,7 +180,7 @@ def _equilibria(
     """Return the equations of equilibria through `start`, and the unknowns there."""
     eq, k = start.equations, [*start.u, *start.p].index(name)
     scale = np.append(np.maximum(eq.scale, np.abs(start.y)), span[1] - span[0])
-    return Equilibria(eq, start.data, k, scale, 1e-11), np.append(start.y, start.data[k])
+    return Equilibria(eq, start.data, (k,), scale, 1e-11), np.append(start.y, start.data[k])
 
 
 def _traced(
@@ -252,22 +261,14 @@ def _joined(
     back, on = parts
     points = [*reversed(back.points[1:]), *on.points]
     shift = max(len(back.points) - 1, 0)
-    special = [
-        Special(s.kind, s.value, shift + 1 - s.index, s.x, s.period, s.direction)
-        for s in reversed(back.special)
-    ]
-    special += [
-        Special(s.kind, s.value, shift + s.index, s.x, s.period, s.direction) for s in on.special
-    ]
-    width = max(pt.exponents.size for pt in points)
-    exponents = np.full((len(points), width, 2), np.nan)
-    for row, pt in zip(exponents, points, strict=True):
-        row[: pt.exponents.size] = np.column_stack([pt.exponents.real, pt.exponents.imag])
-    column = {n: np.array([getattr(pt, n) for pt in points]) for n in Point._fields[:3]}
+    special = [replace(s, index=shift + 1 - s.index) for s in reversed(back.special)]
+    special += [replace(s, index=shift + s.index) for s in on.special]
+    values, x, periods, exponents, low, high, sequences = zip(*points, strict=True)
+    parts_of = np.full((len(points), max(found.size for found in exponents), 2), np.nan)
+    for row, found in zip(parts_of, exponents, strict=True):
+        row[: found.size] = np.column_stack([found.real, found.imag])
     message = "; ".join(m for m in (back.message, on.message, *back.notes, *on.notes) if m)
     return Branch(
-        model, name, dict(u), dict(p), column["value"], column["x"], column["period"], exponents,
-        np.array([pt.low for pt in points]), np.array([pt.high for pt in points]),
-        tuple(pt.sequence for pt in points), tuple(special), message,
-        driven,
+        model, name, dict(u), dict(p), np.array(values), np.array(x), np.array(periods), parts_of,
+        np.array(low), np.array(high), sequences, tuple(special), message, driven,
     )  # fmt: skip

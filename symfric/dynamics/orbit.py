@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.dynamics.driving import check_period
 from symfric.dynamics.equilibrium import Equilibrium
 from symfric.dynamics.linear import linearize
-from symfric.dynamics.newton import CLOSED, solved
-from symfric.dynamics.shooting import METHOD, Linear, Shooting
+from symfric.dynamics.shooting import CLOSED, METHOD, Linear, Shooting, check_period, solved
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.shown import Showing, Shown, Table

@@ -8,9 +8,8 @@ import casadi as ca
 import numpy as np
 
 from symfric.dynamics.curve import Node, Step, corrected
-from symfric.dynamics.families import Orbits
+from symfric.dynamics.families import Family, Orbits, finer, sequence
 from symfric.dynamics.orbit import periodic_orbit
-from symfric.dynamics.trace import Family, finer, sequence
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError
 from symfric.integrator.simulate import simulate
@@ -61,7 +60,7 @@ def gap(curve: Orbits, node: Node) -> Gap:
         y[: len(model.x)] = [*run.states(at).values()]
         known = run.at(at) if model.u else {}
         d = [*(known[v.name] for v in model.u), *np.outer(node.content.p, np.ones(at.size))]
-        slips = eq.sliding(y, np.array(d).reshape(-1, at.size)).full()
+        slips = eq.values(y, np.array(d).reshape(-1, at.size))[2].full()
         return {str(k): row for k, row in enumerate(np.abs(slips))}
 
     free = {str(k) for k, (c, _) in enumerate(eq.switching) if c.called("stick") not in happened}
