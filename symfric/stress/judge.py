@@ -17,8 +17,7 @@ from typing import final
 
 import numpy as np
 
-from symfric.foundation.status import SolveError, Status
-from symfric.results.trajectory import Trajectory
+from symfric import SolveError, Status, Trajectory
 from symfric.stress.cases import Case
 from symfric.stress.problem import (
     RIGHT,

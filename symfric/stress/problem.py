@@ -10,17 +10,13 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric import Model, SolveError, Trajectory, law_from_text, parameters, with_values
 from symfric.foundation.numeric import Array
-from symfric.foundation.parameters import parameters, with_values
-from symfric.foundation.status import SolveError
 from symfric.integrator import Hold, Input, Linear, simulate
 from symfric.integrator.arguments import another, chosen
-from symfric.laws import law_from_text
-from symfric.model import Model
-from symfric.results.trajectory import Trajectory
 from symfric.scenes import ALL_SCENES
 from symfric.stress.cases import Case
-from symfric.stress.referee.solve import NO_FORCE, SINE, Question, Signal, knows, solve
+from symfric.stress.referee import NO_FORCE, SINE, Question, Signal, knows, solve
 
 WORK = 120_000
 TIMES = 101
