@@ -15,7 +15,7 @@ from symfric.foundation.numeric import Array
 from symfric.laws import ALL_LAWS
 from symfric.stress import referee
 from symfric.stress.cases import Case, Signal
-from symfric.stress.problem import problem, question
+from symfric.stress.problem import problem
 from symfric.stress.referee import Motion, knows, solve
 from symfric.stress.referee_equations import LAWS, SCENES, SIGNS
 
@@ -45,7 +45,7 @@ class Both:
 
     def __init__(self, case: Case) -> None:
         self.case, ready = case, problem(case)
-        self.model, requested = ready.model, question(ready, ready.times)
+        self.model, requested = ready.model, ready.question()
         assert requested is not None
         self.requested = requested
         self.ode = self.model.function("ode")
@@ -106,7 +106,7 @@ def test_a_mass_moves_under_each_kind_of_force(signal: Signal, kinks: int) -> No
     """Without friction m v is the integral of the force, here by the trapezoidal rule."""
     case = Case(1, 1, "drive", "coulomb", {"mu_d": 0.0}, inputs={"force": signal}, t_end=2.0)
     ready = problem(case)
-    requested = question(ready, ready.times)
+    requested = ready.question()
     assert requested is not None
     assert len(requested.signal.kinks) == kinks
     cuts = sorted({0.0, 2.0, *(t for t in requested.signal.kinks if 0 < t < 2)})
@@ -122,7 +122,7 @@ def test_exact_block_on_its_belt_is_that_of_the_closed_form() -> None:
     """It sticks to mu_s m g / k, then slides for half a period about mu_d m g / k and sticks."""
     values = {"mu_s": 0.2, "mu_d": 0.1, "m": 1.0, "k": 4.0, "v_belt": 0.05, "g": 10.0}
     ready = problem(Case(1, 1, "rabinowicz", "exact_coulomb", values, t_end=12.0))
-    requested = question(ready, ready.times)
+    requested = ready.question()
     assert requested is not None
     x, v, mode = solve(replace(requested, y=np.array([0.0, 0.05, 0.0])))
     t, w, away = ready.times, 2.0, 0.5 / 0.05
