@@ -12,16 +12,7 @@ import numpy as np
 
 from symfric import BrownMcPhee, Law, Model, Viscous, simulate
 from symfric.bench.contenders import MECHANISMS, Array, Contender
-from symfric.bench.report import (
-    Found,
-    Progress,
-    Report,
-    Row,
-    best_time,
-    curves,
-    ratios,
-    unwarned,
-)
+from symfric.bench.report import Found, Progress, Report, Row, best_time, curves, ratios, unwarned
 from symfric.foundation.numeric import bound
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.equations.initial import consistent, first_guess
