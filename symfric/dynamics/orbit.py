@@ -15,12 +15,10 @@ from symfric.dynamics.shooting import CLOSED, METHOD, Linear, Shooting, check_pe
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.shown import Showing, Shown, Table
-from symfric.integrator.equations.inputs import Input
-from symfric.integrator.simulate import simulate
+from symfric.integrator import Input, Trajectory, simulate
 from symfric.model import Model, check_model
 from symfric.model.kinds import MODE
 from symfric.results.sections import Cycle
-from symfric.results.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

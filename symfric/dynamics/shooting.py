@@ -23,10 +23,8 @@ from symfric.dynamics.equations import Equations, Indices, equations, independen
 from symfric.foundation import checks
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError
-from symfric.integrator.equations.inputs import Input
-from symfric.integrator.simulate import simulate
+from symfric.integrator import Input, Trajectory, simulate
 from symfric.model import Model
-from symfric.results.trajectory import Trajectory
 
 METHOD = "rodas5p"
 

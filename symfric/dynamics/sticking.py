@@ -12,10 +12,9 @@ from symfric.dynamics.families import Family, Orbits, finer, sequence
 from symfric.dynamics.orbit import periodic_orbit
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError
-from symfric.integrator.simulate import simulate
+from symfric.integrator import Trajectory, simulate
 from symfric.model import Contact
 from symfric.results.quadrature import extremes
-from symfric.results.trajectory import Trajectory
 
 GRAZES, NEARLY = 1e-3, 1e-2
 """Distances from sticking, relative to the largest sliding velocity, at which a branch ends, and up

@@ -30,7 +30,7 @@ COSTLY = ("arm", "four_bar", "double_pendulum")
 
 
 def test_a_few_random_cases_are_right() -> None:
-    numbers = [n for n in range(24, 36) if draw(1, n).scene not in COSTLY]
+    numbers = [n for n in range(24, 31) if draw(1, n).scene not in COSTLY]
     report = campaign(numbers, work=12_000)
     assert not {n: v.reason for n, v in report.verdicts.items() if v.kind in FAILING}
     assert report.passed
@@ -206,12 +206,12 @@ def test_a_run_as_good_as_its_reference_is_right() -> None:
 
 
 def test_what_is_refused_is_reported_with_its_reason() -> None:
-    bad = replace(EASY, values={"mu_d": 0.5, "mu_s": 0.2})
-    assert (judge(bad).kind, judge(bad).group) == ("refused", "input")
-    assert "expected mu_d <= mu_s" in judge(bad).reason
-    stuck = Case(1, 1, "four_mass", "lugre", t_end=1.0)
-    assert judge(stuck).kind == "refused"
-    assert judge(stuck).group.startswith("STEP_TOO_SMALL")
+    bad = judge(replace(EASY, values={"mu_d": 0.5, "mu_s": 0.2}))
+    assert (bad.kind, bad.group) == ("refused", "input")
+    assert "expected mu_d <= mu_s" in bad.reason
+    stuck = judge(Case(1, 1, "four_mass", "lugre", t_end=1.0))
+    assert stuck.kind == "refused"
+    assert stuck.group.startswith("STEP_TOO_SMALL")
 
 
 class Wrong:
