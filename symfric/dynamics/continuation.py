@@ -8,16 +8,7 @@ import numpy as np
 from symfric.dynamics.branch import Branch, Special
 from symfric.dynamics.curve import Node, Step, at_edge, corrected, followed, tangent
 from symfric.dynamics.equilibrium import Equilibrium
-from symfric.dynamics.families import (
-    Equilibria,
-    Family,
-    Orbits,
-    Trace,
-    kind_of,
-    note,
-    point,
-    vanishing,
-)
+from symfric.dynamics.families import Equilibria, Family, Orbits, Trace
 from symfric.dynamics.orbit import PeriodicOrbit
 from symfric.dynamics.shooting import Shooting
 from symfric.dynamics.sticking import Near, restarted, same_sequence
@@ -187,17 +178,17 @@ def _traced(
     curve: Family, node: Node, tau: Array, span: tuple[float, float], points: int, step: float
 ) -> Trace:
     """Return the part of the curve from `node` in the direction `tau`."""
-    trace = Trace([point(curve, node)])
+    trace = Trace([curve.point(node)])
     try:
         for found in _steps(curve, node, tau, span, step, trace):
-            note(curve, found, trace)
+            trace.locate(curve, found)
             if last := at_edge(curve, found, span):
                 if last is not found.node:
-                    trace.points.append(point(curve, last))
+                    trace.points.append(curve.point(last))
                 trace.message = "ends at the given range"
                 break
-            trace.points.append(point(curve, found.node))
-            if (value := vanishing(curve, trace.points)) is not None:
+            trace.points.append(curve.point(found.node))
+            if (value := curve.vanishing(trace.points)) is not None:
                 trace.add("Hopf", curve, found.node, value)
                 trace.message = "ends at a Hopf point"
                 break
@@ -213,12 +204,12 @@ def _steps(
     curve: Family, node: Node, tau: Array, span: tuple[float, float], step: float, trace: Trace
 ) -> Iterator[Step]:
     """Yield steps along the curve, also across changes of stick and slip."""
-    known = {kind_of(curve, node)}
+    known = {curve.kind_of(node)}
     while True:
         near = Near(curve)
         for found in followed(curve, node, tau, step, same_sequence, near.most):
             node, tau = found.node, found.tau
-            known.add(kind_of(curve, node))
+            known.add(curve.kind_of(node))
             yield found
         if isinstance(curve, Equilibria) and curve.turns(node.z + step * tau * curve.scale):
             trace.message = "ends where a sliding contact comes to rest"
@@ -227,8 +218,8 @@ def _steps(
         if other is None:
             return
         node, away = other
-        known.add(kind_of(curve, node))
-        trace.points.append(point(curve, node))
+        known.add(curve.kind_of(node))
+        trace.points.append(curve.point(node))
         tau = tangent(curve, node, away * _unit(node.z.size))
 
 
@@ -246,7 +237,7 @@ def _other(
         kind, value = near.boundary(node)
         trace.add(kind, curve, node, value)
         trace.message = f"ends where the sequence of stick and slip changes ({kind})"
-    other = restarted(curve, node, span, lambda new: kind_of(curve, new) not in known)
+    other = restarted(curve, node, span, lambda new: curve.kind_of(new) not in known)
     if other is not None and not curve.problem.eq.switching:
         trace.add("fold", curve, node)
         trace.rough("fold", float(node.z[-1]))

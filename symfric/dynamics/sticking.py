@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from symfric.dynamics.curve import Node, Step, corrected
-from symfric.dynamics.families import Family, Orbits, finer, sequence
+from symfric.dynamics.families import Family, Orbits, sequence
 from symfric.dynamics.orbit import periodic_orbit
 from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError
@@ -114,7 +114,7 @@ class Near:
 
     def boundary(self, node: Node) -> tuple[str, float]:
         """Return the kind and the parameter of the change after `node`."""
-        value, last, curve = float(node.z[-1]), self.last, finer(self.curve)
+        value, last, curve = float(node.z[-1]), self.last, self.curve.finer()
         if not isinstance(curve, Orbits) or last is None or not self.gaps:
             return "change of stick and slip", value
         if self.gaps[-1].share > NEARLY:
