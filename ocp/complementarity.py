@@ -21,10 +21,10 @@ from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
 from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solved, Solver
-from ocp.solving.penalties import largest_product
 from ocp.solving.prepared import Prepared, Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start, start_of
+from ocp.solving.verification import largest_product
 from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Transcription, discretise

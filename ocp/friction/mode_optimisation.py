@@ -31,7 +31,7 @@ from ocp.checking.mesh_refinement import MeshErrors, refined
 from ocp.checking.resimulate import arcs_of
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
-from ocp.formulation.relaxed import Soft
+from ocp.formulation.statement import Soft
 from ocp.friction.arc_solution import ModeSolver, SolvedSequence, StoppedError, reassemble
 from ocp.friction.arcs import MARGIN, Rules
 from ocp.friction.mode_models import restless

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 from ocp.formulation.phase import Free, Row, limits
 from ocp.formulation.problem import Posed, Problem, posed
 from ocp.transcription import conditions, intervals, unknowns
-from ocp.transcription.assembly import Assembled, Slot, assemble
-from ocp.transcription.blocks import Array, Indices, Piece
+from ocp.transcription.assembly import Slot, assemble
+from ocp.transcription.blocks import Array, Indices, Piece, numbered
 from ocp.transcription.closed_loops import Closing, closing
 from ocp.transcription.conditions import Maker
 from ocp.transcription.intervals import PointEquations, Shot
@@ -108,17 +108,15 @@ class Discretisation:
             pieces = [replace(piece, slot=piece.span // phases) for piece in pieces]
             pieces += conditions.largest(layout, scenarios, len(problem.spans), LARGEST)
             c[layout.largest] = 1.0
-        assembled = assemble(w, p, pieces, slots, c)
-        f, g, gradient, jacobian, hessian, rows_of = assembled
-        lower, upper = np.zeros(g.numel()), np.zeros(g.numel())
-        for piece, at in zip(pieces, rows_of, strict=True):
-            rows = piece.rows
-            lower[at], upper[at] = ((b / rows.scale)[:, None] for b in (rows.lower, rows.upper))
+        pieces = numbered(pieces)
+        functions = assemble(w, p, pieces, slots, c)
+        lower, upper = np.zeros(functions[1].numel()), np.zeros(functions[1].numel())
+        for piece in pieces:
+            sides = piece.rows.lower, piece.rows.upper
+            lower[piece.at], upper[piece.at] = ((b / piece.rows.scale)[:, None] for b in sides)
         bounds, scale = bounds_of(problem, grid), unknowns.scale_of(problem, layout)
-        program = Program(
-            w, p, f, g, gradient, jacobian, hessian, *bounds, lower, upper, np.zeros(0), scale
-        )  # fmt: skip
-        return Skeleton(problem, layout, program, tuple(pieces), assembled, self.closing)
+        program = Program(w, p, *functions, *bounds, lower, upper, np.zeros(0), scale)
+        return Skeleton(problem, layout, program, pieces, self.closing)
 
     def _pieces(self, grid: Grid) -> Iterator[Piece]:
         """Yield the rows and costs of all phases."""
@@ -194,7 +192,7 @@ class Skeleton:
         problem: the problem.
         layout: places of the unknowns in w.
         program: program without values of parameters and names of rows and unknowns.
-        pieces, assembled: rows and costs, and their places in the program.
+        pieces: numbered rows and costs.
         closing: for each phase, the constraints of its mechanism; None if it has none.
     """
 
@@ -202,13 +200,12 @@ class Skeleton:
     layout: Layout
     program: Program
     pieces: tuple[Piece, ...]
-    assembled: Assembled
     closing: tuple[Closing | None, ...]
 
     @cached_property
     def structure(self) -> tuple[Stages | None, str]:
         """Stages of the program, or None and the reason why it has none."""
-        return stages_of(self.problem, self.layout, self.pieces, self.assembled)
+        return stages_of(self.problem, self.layout, self.pieces, self.program.jacobian)
 
     @cached_property
     def violations(self) -> list[tuple[Indices, Indices, int]]:
@@ -217,9 +214,9 @@ class Skeleton:
         for number, span in enumerate(self.problem.spans):
             names = tuple(row.name for row in span.penalised)
             columns = self.layout.spans[number].slacks(len(span.sides))
-            for piece, at in zip(self.pieces, self.assembled.at, strict=True):
+            for piece in self.pieces:
                 if names and piece.span == number and piece.names[-len(names) :] == names:
-                    rows = at[-len(names) :]
+                    rows = piece.at[-len(names) :]
                     found += [
                         (own.T.ravel(), rows[k], side)
                         for own, (k, side) in zip(columns, span.sides, strict=True)
@@ -229,8 +226,7 @@ class Skeleton:
     @cached_property
     def largest(self) -> list[int]:
         """Indices of the rows that bound the costs of scenarios by the largest one, if any."""
-        pairs = zip(self.pieces, self.assembled.at, strict=True)
-        return [int(at[0, 0]) for piece, at in pairs if piece.names == (LARGEST,)]
+        return [int(piece.at[0, 0]) for piece in self.pieces if piece.names == (LARGEST,)]
 
 
 @final
@@ -371,10 +367,10 @@ class Transcription(packed.Portable):
     def rows(self) -> list[Place]:
         """Names and places of all rows of the program."""
         places = [Place("", 0, 0.0)] * self.skeleton.program.g.numel()
-        for piece, at in zip(self.skeleton.pieces, self.skeleton.assembled.at, strict=True):
+        for piece in self.skeleton.pieces:
             mesh = self.meshes[piece.span]
             fractions = mesh[piece.interval] + np.diff(mesh)[piece.interval] * piece.offset
-            for name, scale, numbers in zip(piece.names, piece.rows.scale, at, strict=True):
+            for name, scale, numbers in zip(piece.names, piece.rows.scale, piece.at, strict=True):
                 for k, fraction in zip(numbers.tolist(), fractions.tolist(), strict=True):
                     places[k] = Place(name, piece.span, fraction, float(scale))
         return places
