@@ -19,7 +19,7 @@ from ocp.friction.smooth_models import smoothed, widths
 from ocp.friction.transfer import Known, Reader
 from ocp.problems import cart_pendulum, load_through_spring, out_and_back
 from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import starts_around
+from ocp.solving.one_solve import Task, starts_around
 from ocp.solving.starts import initial_points
 from ocp.transcription.schemes import Radau, make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
@@ -149,7 +149,7 @@ def test_rests_are_inserted_in_phases_whose_inputs_can_hold() -> None:
 def modes_solver() -> ModeSolver:
     problem = out_and_back()
     rules = Rules(problem, Reader(problem, known()).sizes(), ("guide",), SHORTEST * 2)
-    return ModeSolver(rules, Ipopt(max_iter=100), Radau(3), KICK * 2)
+    return ModeSolver(rules, Task(problem, solver=Ipopt(max_iter=100)), KICK * 2)
 
 
 def found_for(legs: tuple[Leg, ...]) -> SolvedSequence:
