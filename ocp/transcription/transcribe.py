@@ -25,7 +25,7 @@ from ocp.transcription.closed_loops import Closing, closing
 from ocp.transcription.conditions import Maker
 from ocp.transcription.intervals import PointEquations, Shot
 from ocp.transcription.program import Place, Program, Stages, bounds_of, stages_of
-from ocp.transcription.schemes import Scheme, Shooting, check_meshes, nodes_of
+from ocp.transcription.schemes import Scheme, Shooting, nodes_of
 from ocp.transcription.unknowns import Grid, Layout, Local, Points, SpanPoints
 from symfric.foundation import packed
 from symfric.foundation.parameters import check_names
@@ -65,10 +65,11 @@ class Discretisation:
         differ only in values and share their symbols and Functions.
 
         Raises:
-            ValueError: invalid meshes.
+            ValueError: a mesh has no node at a fraction with conditions.
         """
-        meshes = check_meshes(self.problem, meshes)
-        return Transcription(self.problem, self.scheme, meshes, self.starts, self.skeleton(meshes))
+        scenarios = len(self.problem.spans) // len(meshes)
+        every = tuple(meshes) * scenarios  # meshes may be those of one scenario
+        return Transcription(self.problem, self.scheme, every, self.starts, self.skeleton(every))
 
     def skeleton(self, meshes: Sequence[Array]) -> "Skeleton":
         """Return the common part of programs with the numbers of intervals of `meshes`."""
