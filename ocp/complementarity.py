@@ -18,7 +18,6 @@ from math import sqrt
 from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.formulation.expressions import EPS
 from ocp.formulation.phase import Array
-from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solved, Task
 from ocp.solving.prepared import Prepared, Supervisor
 from ocp.solving.solution import Solution, with_sentence
@@ -48,9 +47,7 @@ def solve_relaxed(task: Task, meshes: Sequence[Array], guess: Start, goals: Goal
 
     The status is not ok if eps remains above `MOST`. The problem of the solution has the last eps.
     """
-    later = task.solver
-    if isinstance(later, Ipopt):
-        later = later.with_options(**({"mu_init": LATER} | dict(later.options)))
+    later = task.solver.with_defaults(mu_init=LATER)
     on = discretise(task.problem, task.scheme).on(meshes)
     prepared = task.solver.prepared(on.program), later.prepared(on.program)
     eps, solution = _decreased(on, prepared, start_of(on, guess)[0], task.supervisor)

@@ -25,7 +25,6 @@ from ocp.checking.interval_errors import cut_meshes, local_errors
 from ocp.checking.resimulate import arcs_of
 from ocp.checking.verify import confirmed, verified
 from ocp.formulation.phase import Array
-from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solved, Task
 from ocp.solving.prepared import Option
 from ocp.solving.solution import Solution, with_sentence
@@ -121,7 +120,8 @@ class OriginalLaw:
             begin = perf_counter()
             on = made.on(meshes)
             start = start_of(on, guess)[0]
-            prepared = self._solver(CLOSE).prepared(project_control(on, start.w))
+            solver = self.task.ipopt.with_defaults(**CLOSE)
+            prepared = solver.prepared(project_control(on, start.w))
             stage = f"law itself {number}"
             outcome = self.task.supervisor.run(on, prepared, start, stage, begin=begin)
             past = outcome.statistics if past is None else past.then(outcome.statistics)
@@ -147,7 +147,7 @@ class OriginalLaw:
         If it is neither solved nor stopped, return the best feasible iterate as ACCEPTABLE.
         """
         on = made.on(near.meshes)
-        prepared = self._solver(COST).prepared(on.program)
+        prepared = self.task.ipopt.with_defaults(**COST).prepared(on.program)
         start = Iterate.cold(near.iterate.w, on.program.g.numel())
         outcome = self.task.supervisor.run(on, prepared, start, "law itself, cost")
         statistics = near.statistics.then(outcome.statistics)
@@ -156,9 +156,6 @@ class OriginalLaw:
             better = outcome.violation < KEPT and outcome.cost < near.cost
             found = replace(found if better else near, status=Status.ACCEPTABLE)
         return replace(found, statistics=statistics)
-
-    def _solver(self, options: dict[str, Option]) -> Ipopt:
-        return self.task.ipopt.with_options(**(options | dict(self.task.ipopt.options)))
 
 
 def project_control(transcription: Transcription, w: ArrayLike) -> Program:

@@ -26,9 +26,6 @@ from symfric.foundation.status import SolveError
 if TYPE_CHECKING:
     from ocp.strategies import Friction
 
-OVER = "obj_scaling_factor"
-"""Option of Ipopt for the factor by which it multiplies the cost."""
-
 
 def solve(
     problem: Problem,
@@ -133,10 +130,9 @@ def solve(
     if intervals is not None:
         make_meshes(problem, intervals)  # raises ValueError for invalid meshes of any strategy
     posed = sized(problem)
-    if isinstance(solver, Ipopt) and OVER not in solver.options:
-        size = cost_size(posed)
-        if posed is not problem or size < 1.0 / FAR:  # Ipopt itself scales large costs
-            solver = solver.with_options(**{OVER: 1.0 / size})
+    size = cost_size(posed)
+    if posed is not problem or size < 1.0 / FAR:  # Ipopt itself scales large costs
+        solver = solver.with_defaults(obj_scaling_factor=1.0 / size)
     goals = Goals.of(tolerance) if refine else replace(Goals.of(tolerance), passes=1)
     if not isinstance(executor, Executor | None):  # pyright: ignore[reportUnnecessaryIsInstance]
         what = "an executor of concurrent.futures, or None"

@@ -36,7 +36,6 @@ from ocp.friction.smooth_models import (
     sticking,
 )  # fmt: skip
 from ocp.original_law import FAILURES, STEPS, OriginalLaw, reason_of
-from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import STARTS, Task
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start
@@ -117,8 +116,8 @@ class Search:
         if close:
             passes, most = min(goals.passes, CLOSE_PASSES), CLOSE_ITERATIONS
             goals = replace(goals, passes=passes, most=CLOSE_INTERVALS, patient=False)
-        if most and isinstance(solver, Ipopt) and "max_iter" not in solver.options:
-            solver = solver.with_options(max_iter=most)
+        if most:
+            solver = solver.with_defaults(max_iter=most)
         task = replace(self.task, solver=solver)
         return refined_solve(task, meshes, guess, goals, starts=starts or 1)
 

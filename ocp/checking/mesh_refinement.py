@@ -16,7 +16,6 @@ from ocp.checking.interval_errors import estimated_errors, zoh_losses
 from ocp.checking.resimulate import Arc, arcs_of
 from ocp.checking.verify import TOLERANCE, left_between, restarted
 from ocp.formulation.phase import Array
-from ocp.solving.methods import Ipopt
 from ocp.solving.one_solve import Solved, Starts, Task, starts_around
 from ocp.solving.prepared import Prepared
 from ocp.solving.solution import Solution, with_sentence
@@ -216,8 +215,7 @@ def refined_solve(
             later: dict[str, float] = {"max_iter": CAP} if capped else {}
             if made.problem.kind != "worst":  # a small barrier prevents convergence of multipliers
                 later["mu_init"] = LATER
-            again = isinstance(solver, Ipopt) and number > 1
-            own = solver.with_options(**(later | dict(solver.options))) if again else solver
+            own = solver.with_defaults(**later) if number > 1 else solver
             ready[key] = own.prepared(transcription.program)
         start, warm = start_of(transcription, guess)
         each = Starts(transcription, solver, ready[key], transcription.program.values)

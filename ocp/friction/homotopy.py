@@ -32,7 +32,6 @@ from ocp.formulation.phase import Array, initial
 from ocp.formulation.problem import Problem
 from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
-from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
 from ocp.solving.one_solve import (
     STARTS,
@@ -346,9 +345,7 @@ class _Path:
             options = {name: v for name, v in options.items() if name != "mu_init"} | BOUNDING
         key = (id(transcription.skeleton), str(options))
         if key not in self.prepared:
-            solver = self.task.solver
-            if isinstance(solver, Ipopt):
-                solver = Ipopt(max_time=solver.max_time, **(dict(options) | dict(solver.options)))
+            solver = self.task.solver.with_defaults(**options)
             self.prepared[key] = solver, solver.prepared(transcription.program)
         starts = Starts(transcription, *self.prepared[key], values)
         steps: list[Step] = []
