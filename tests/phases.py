@@ -17,6 +17,7 @@ from ocp.solving.solution import Solution
 from ocp.solving.starts import Start
 from ocp.solving.watch import Report
 from ocp.transcription.schemes import Radau, Scheme, make_meshes
+from ocp.transcription.transcribe import Transcription, discretise
 from symfric import BrownMcPhee, Model, Variable
 from symfric.multibody import JointSpringDamper
 from symfric.scenes import SliderCrank
@@ -51,6 +52,11 @@ def fastest_move(v_t: float = 1e-3) -> Problem:
     """1 m from rest to rest with |force| <= 20 N in the shortest time, against friction."""
     phase = Phase(stage(v_t), Free(0.1, 10.0, guess=1.0), end={"x": 1.0, "v": 0.0})
     return Problem(phase, TIME, bounds={"force": (-20.0, 20.0)})
+
+
+def on(problem: Problem, intervals: Any = 10, scheme: Scheme | None = None) -> Transcription:
+    """Return the program of a problem on one mesh."""
+    return discretise(problem, scheme or Radau()).on(make_meshes(problem, intervals))
 
 
 def solve_once(
