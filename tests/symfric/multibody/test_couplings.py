@@ -30,7 +30,7 @@ from symfric.codegen import generate, inverse_dynamics_block, verify
 from symfric.fmu import export_fmu, running
 from symfric.foundation.parameters import Variable
 from symfric.laws import Law
-from symfric.multibody.cams import CamFriction
+from symfric.multibody.element_friction import CamFriction
 
 SHARP = partial(Coulomb, v_eps=1e-9)
 DRY = ExactCoulomb(mu_s=0.15, mu_d=0.15)
