@@ -46,7 +46,7 @@ class Coupling(Constraint):
     b: str
     direction_a: str
     direction_b: str
-    friction: ElementFriction | None
+    friction: Any
 
     def joints(self) -> tuple[tuple[str, str], tuple[str, str]]:
         """Return both coupled joints with their directions."""

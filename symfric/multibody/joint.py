@@ -62,8 +62,10 @@ RANGES: dict[str, tuple[Callable[[float], bool], str]] = {
 }
 """Test and description of the numbers of each kind."""
 
-BEARING = dict.fromkeys(("radius", "length", "width"), "length")
-BEARING |= {"preload": "level", "normal": "level", "eps": "length"}
+BEARING = {
+    "radius": "length", "length": "length", "width": "length", "preload": "level",
+    "normal": "level", "eps": "length",
+}  # fmt: skip
 """Kind of each number of a `JointFriction`."""
 
 
