@@ -358,7 +358,7 @@ def test_mistakes_are_answered_by_one_sentence_each() -> None:
 
 
 def built(element: Any, *more: Any) -> Any:
-    """Build a crank, a wheel and a slide with an element."""
+    """Prepare a crank, a wheel and a slide with an element."""
     m = mb.Mechanism("m")
     for name, joint in (("crank", mb.Revolute), ("wheel", mb.Revolute), ("slide", mb.Prismatic)):
         m.body(f"{name}_body", 1.0, (0.1, 0.1, 0.1))
@@ -367,7 +367,7 @@ def built(element: Any, *more: Any) -> Any:
     m.joint(mb.Cylindrical("thread", "ground", "nut"))
     for each in (element, *more):
         m.constraint(each)
-    return m.build()
+    return m.prepare()
 
 
 def screw(*given: Any, **options: Any) -> Any:
