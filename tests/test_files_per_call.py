@@ -66,7 +66,7 @@ MOST = {
     "simulate, second": 15,
     "Fit.solve": 51,
     "ocp.solve": 93,
-    "generate": 34,
+    "generate": 30,
 }
 
 
