@@ -25,10 +25,10 @@ from symfric.foundation.numeric import bound
 from symfric.foundation.programs import find_compiler
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.simulate import simulate
-from symfric.integrator.step.attempt import Given, State
 from symfric.laws import BrownMcPhee, Law, Viscous
 from symfric.model import Model
 from symfric.multibody import JointFriction, Mechanism, Revolute

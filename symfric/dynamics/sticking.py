@@ -15,7 +15,7 @@ from symfric.foundation.numeric import Array
 from symfric.foundation.status import SolveError
 from symfric.integrator.simulate import simulate
 from symfric.model import Contact
-from symfric.results.quadrature import extremes
+from symfric.results.signals import extremes
 from symfric.results.trajectory import Trajectory
 
 GRAZES, NEARLY = 1e-3, 1e-2

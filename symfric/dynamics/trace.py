@@ -11,7 +11,7 @@ from symfric.dynamics.curve import Node, Step, located
 from symfric.dynamics.families import Equilibria, Orbits
 from symfric.dynamics.shooting import Linear
 from symfric.foundation.numeric import Array
-from symfric.results.quadrature import extremes
+from symfric.results.signals import extremes
 
 Family = Orbits | Equilibria
 NEUTRAL = 1e-7

@@ -14,6 +14,7 @@ from symfric.foundation.programs import CompileError, find_compiler
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.many.members import fastest
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.running.crossings import Memory
 from symfric.integrator.running.diagnosis import explain
 from symfric.integrator.running.integrator import Integrator
@@ -32,7 +33,6 @@ from symfric.integrator.running.plants import (
     looking,
 )
 from symfric.integrator.running.run import MOST_ORDERS
-from symfric.integrator.step.attempt import Given, State
 
 Numbers = Mapping[str, ArrayLike]
 

@@ -14,7 +14,7 @@ from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import parameters, with_values
 from symfric.foundation.status import SolveError
 from symfric.integrator import Hold, Input, Linear, simulate
-from symfric.integrator.arguments import another, chosen
+from symfric.integrator.methods.tableaux import another, chosen
 from symfric.laws import law_from_text
 from symfric.model import Model
 from symfric.results.trajectory import Trajectory

@@ -23,9 +23,9 @@ from symfric.foundation.parameters import Parameter, Parametric, Variable, param
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.attempt import build_fixed
 from symfric.integrator.methods.method import suited_to_start
 from symfric.integrator.methods.tableaux import METHODS
-from symfric.integrator.step.attempt import build_fixed
 from symfric.model import Model, Output, Variables, check_model
 
 

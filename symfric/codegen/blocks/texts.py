@@ -12,7 +12,7 @@ from typing import NamedTuple
 from symfric.foundation.parameters import Option, Parametric, options
 from symfric.integrator.methods.families import BackwardEuler, Exponential, Rosenbrock
 from symfric.integrator.methods.method import Method
-from symfric.integrator.methods.radau import Radau
+from symfric.integrator.methods.tableaux import Radau
 
 SHEET = tomllib.loads(Path(__file__).with_name("sheet.toml").read_text(encoding="utf-8"))
 """Fixed texts of data sheets."""

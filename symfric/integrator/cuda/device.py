@@ -15,9 +15,9 @@ from symfric.emitter.c99 import DOUBLE, Real
 from symfric.integrator.compiled.columns import densified
 from symfric.integrator.equations.blocks import DONE, ROUNDS
 from symfric.integrator.equations.initial import FLOOR
+from symfric.integrator.methods.attempt import Given, State
+from symfric.integrator.methods.pieces import in_c, macros
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import Given, State
-from symfric.integrator.step.pieces import in_c, macros
 
 NAME = "symfric_launch"
 DONE_IN_SINGLE = 1e-5

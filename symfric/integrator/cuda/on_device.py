@@ -14,9 +14,9 @@ from symfric.integrator.cuda.device import Device, Kernel, Loaded, kernel_of
 from symfric.integrator.many.chunk import Chunk, Job, Solved
 from symfric.integrator.many.member_data import MemberData
 from symfric.integrator.many.members import Advanced, Counts, Program, Stretch, struct, with_code
+from symfric.integrator.methods.attempt import State
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import State
 from symfric.model import Model
 
 WHERE = "simulate_many: backend='cuda'"

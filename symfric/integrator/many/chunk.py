@@ -16,11 +16,11 @@ from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_step
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.many.members import Program, Runner, Stretch, with_code
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.methods.method import Method
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator, built
 from symfric.integrator.running.run import ROUNDS, Tolerances, integrate, own_scale, watchful
-from symfric.integrator.step.attempt import Given, State
 from symfric.model import Model
 
 Indices = NDArray[np.intp]

@@ -21,6 +21,7 @@ from symfric.integrator.equations.blocks import Following
 from symfric.integrator.equations.initial import ASSEMBLED, FLOOR, ITERATIONS, Equations
 from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.plants import (
     AGAIN,
@@ -32,7 +33,6 @@ from symfric.integrator.running.plants import (
     compiled,
     loaded,
 )
-from symfric.integrator.step.attempt import Given, State
 
 Counts = NDArray[np.int64]
 _LOCK = Lock()

@@ -13,12 +13,12 @@ from symfric.foundation.memory import remember
 from symfric.foundation.numeric import Array, Buffered, Scalar, is_casadi
 from symfric.foundation.programs import CompileError
 from symfric.foundation.variable import stacked
-from symfric.integrator.compiled.background import Prospect
-from symfric.integrator.compiled.columns import Columns
+from symfric.integrator.compiled.columns import Columns, Prospect
 from symfric.integrator.equations.blocks import Following, corrected, following
 from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
+from symfric.integrator.methods.attempt import written
 from symfric.integrator.methods.method import Method, suited
 from symfric.integrator.running.contact_modes import ContactModes
 from symfric.integrator.running.crossings import Crossings, crossings
@@ -31,7 +31,6 @@ from symfric.integrator.running.engine import (
     loop_source,
 )
 from symfric.integrator.running.events import Eventful
-from symfric.integrator.step.attempt import written
 from symfric.model import Model
 from symfric.model.kinds import MODE
 
@@ -65,7 +64,7 @@ class Integrator:
         model, inputs, tableau: model, structure of its inputs, and method.
         whole: system, if its pivots are not those chosen by default; else None.
         memory: objects that other modules derive from the integrator.
-        step: attempt as in `step.attempt`.
+        step: attempt as in `methods.attempt`.
         f: (y, d) -> right-hand sides.
         events, resets: (t, y, d) -> event expressions, and values of all resets.
     """

@@ -17,11 +17,11 @@ from symfric.foundation.numeric import Array, bound, evaluate
 from symfric.integrator.compiled.columns import densified, filled
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.initial import FLOOR, first_step
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.running.engine import FOLDER, Engine, Work, c_source
 from symfric.integrator.running.events import Eventful, Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Outputs
-from symfric.integrator.step.attempt import Given, State
 
 Counts = NDArray[np.int64]
 END, ATTEMPTS, STEP_TOO_SMALL, SEARCH, AGAIN, STORM, OVER = 0, 2, 3, 4, 5, 6, -1
@@ -50,7 +50,7 @@ class Plants:
     """Data of plants of one model; mutable, and shared by both engines.
 
     Attributes:
-        S, R: columns of an attempt, one row per plant (`symfric.integrator.step.attempt`).
+        S, R: columns of an attempt, one row per plant (`symfric.integrator.methods.attempt`).
         u: inputs to hold next, shape (plants, nu); the last run data in R are those held now.
         begin: start times [s]; the k-th sample of a plant is at begin + k dt.
         count: k of each plant; unchanged for a plant that has not reached its sample.

@@ -15,7 +15,7 @@ import symfric as sf
 from symfric.model import Event, Output
 from symfric.multibody import JointSpringDamper, Mechanism, PrescribedMotion, Prismatic, Revolute
 from symfric.results.pictures import plot_trajectories
-from symfric.results.quadrature import extremes, looks
+from symfric.results.signals import extremes, looks
 from symfric.results.trajectory import EnergyBalance
 from symfric.scenes import MECHANISMS, FourBar, FourMass, Pendulum, Prescribed, SliderCrank
 

@@ -28,11 +28,11 @@ from symfric.integrator.equations.initial import first_guess
 from symfric.integrator.equations.inputs import Input, input_data
 from symfric.integrator.equations.system import system
 from symfric.integrator.many.chunk import Chunk, Job, Solved, digest
+from symfric.integrator.many.member_data import Store
 from symfric.integrator.many.members import Assembly, program
-from symfric.integrator.many.store import Store
+from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.methods.tableaux import RODAS5P
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.step.attempt import Given, State
 from symfric.scenes import Pendulum
 
 

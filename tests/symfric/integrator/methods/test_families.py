@@ -16,6 +16,15 @@ import symfric as sf
 from symfric import Model, SolveError, Status, Variable, flow, simulate, simulate_many
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
+from symfric.integrator.methods.attempt import (
+    KAPPA,
+    Given,
+    State,
+    build_dense_step,
+    build_fixed,
+    build_step,
+    converged,
+)
 from symfric.integrator.methods.families import SMALL, eliminated, exp_phi1_phi2, need_ode
 from symfric.integrator.methods.method import combination
 from symfric.integrator.methods.tableaux import (
@@ -28,15 +37,6 @@ from symfric.integrator.methods.tableaux import (
 )
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Dense
-from symfric.integrator.step.attempt import (
-    KAPPA,
-    Given,
-    State,
-    build_dense_step,
-    build_fixed,
-    build_step,
-    converged,
-)
 from symfric.scenes import DoublePendulum, FourBar, MechanismScene, SliderCrank
 
 x = sf.Variable("x", "1", start=1.0)

@@ -10,9 +10,17 @@ import pytest
 from closed_forms import ClosedForm, assemble, observed_order, smooth_dae, smooth_ode
 
 import symfric as sf
-from symfric.integrator.methods.radau import Radau, collocation, eigenbasis, error_weights, nodes
-from symfric.integrator.methods.tableaux import RADAU5, RADAU9, through
-from symfric.integrator.step.attempt import build_fixed
+from symfric.integrator.methods.attempt import build_fixed
+from symfric.integrator.methods.tableaux import (
+    RADAU5,
+    RADAU9,
+    Radau,
+    collocation,
+    eigenbasis,
+    error_weights,
+    nodes,
+    through,
+)
 
 x = sf.Variable("x", "1", start=1.0)
 

@@ -22,11 +22,10 @@ from closed_forms import (
 from numpy.typing import NDArray
 
 from symfric import Model, Variable
+from symfric.integrator.methods.attempt import build_fixed
 from symfric.integrator.methods.families import Explicit, Rosenbrock
 from symfric.integrator.methods.method import Method
-from symfric.integrator.methods.radau import Radau
-from symfric.integrator.methods.tableaux import ADAPTIVE, DOPRI5, METHODS, shampine
-from symfric.integrator.step.attempt import build_fixed
+from symfric.integrator.methods.tableaux import ADAPTIVE, DOPRI5, METHODS, Radau, shampine
 
 Array = NDArray[np.floating[Any]]
 Tree = tuple["Tree", ...]

@@ -23,13 +23,13 @@ import symfric.integrator.running.integrator as module
 import symfric.integrator.running.run as running
 from symfric import BrownMcPhee, LuGre, Model, rabinowicz
 from symfric.foundation.numeric import Array
+from symfric.integrator.methods.attempt import Given, State, build_step
 from symfric.integrator.methods.tableaux import ADAPTIVE, RODAS5P
 from symfric.integrator.running import run
 from symfric.integrator.running.engine import CompiledEngine, Engine, VmEngine, Work, loop_source
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.run import _March
-from symfric.integrator.step.attempt import Given, State, build_step
 from symfric.laws import ALL_LAWS
 from symfric.scenes import PendulumBox, SliderCrank
 

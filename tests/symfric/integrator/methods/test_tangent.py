@@ -10,7 +10,8 @@ from closed_forms import assemble
 from symfric import BrownMcPhee, Model, flow, simulate
 from symfric.foundation.parameters import symbolise
 from symfric.integrator.equations.system import System
-from symfric.integrator.step.tangent import Tangent, tangent
+from symfric.integrator.methods.attempt import tangent
+from symfric.integrator.methods.tangent import Tangent
 from symfric.multibody import Mechanism, PrescribedMotion
 from symfric.scenes import FourBar, FourMass, MechanismScene, PendulumBox, SliderCrank
 
