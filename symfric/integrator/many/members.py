@@ -23,16 +23,7 @@ from symfric.integrator.equations.manifold import Manifold
 from symfric.integrator.many.vectors import c_text, lanes_header, vector_source
 from symfric.integrator.methods.attempt import Given, State
 from symfric.integrator.running.integrator import Integrator
-from symfric.integrator.running.plants import (
-    AGAIN,
-    MEMBERS,
-    REFUSED,
-    SEARCH,
-    Advance,
-    Plants,
-    compiled,
-    loaded,
-)
+from symfric.integrator.running.plants import MEMBERS, Advance, Plants, Why, compiled, loaded
 
 Counts = NDArray[np.int64]
 _LOCK = Lock()
@@ -344,8 +335,8 @@ def plants_source(integrator: Integrator) -> str:
     nothing = ca.Function("nothing", [ca.SX.sym("t"), s.y, s.d], [ca.SX(0, 1)])
     every = many_source(integrator.step, nothing, integrator.follows, integrator.follow)
     numbers = {
-        "HELD": integrator.inputs.data.numel(), "REFUSED": REFUSED, "SEARCHED": SEARCH,
-        "AGAIN": AGAIN,
+        "HELD": integrator.inputs.data.numel(), "REFUSED": Plants.REFUSED,
+        "SEARCHED": Why.SEARCH, "AGAIN": Why.AGAIN,
     }  # fmt: skip
     defined = "".join(f"#define {name} ({value})\n" for name, value in numbers.items())
     return every + MEMBERS + defined + c_text("plants.c")

@@ -105,10 +105,6 @@ class Work:
             loop.breaks, loop.data = address(self.breaks), address(self.data)
         self.enter(0)
 
-    def interval(self, times: Array) -> NDArray[np.intp]:
-        """Return the index of the input interval of each time; at a break, the later interval."""
-        return np.searchsorted(self.breaks[1:-1], times, side="right")
-
     def enter(self, interval: int) -> None:
         """Start an input interval: set its end and its data."""
         self.loop.interval = interval

@@ -73,7 +73,6 @@ class Integrator:
     inputs: InputData
     tableau: Method
     whole: System | None = None
-    build_time: float = 0.0
     compile_time: float = 0.0
     vm_time: float = 0.0
     memory: dict[str, Any] = field(default_factory=dict[str, Any])
@@ -83,7 +82,6 @@ class Integrator:
     _spare: list[Work] = field(default_factory=list[Work])
 
     def __post_init__(self) -> None:
-        begin = perf_counter()
         self.system: System = self.whole or system(self.model, self.inputs)
         self.step, self.instructions = written(self.system, self.tableau, INLINE)
         self.f = ca.Function("f", [self.system.y, self.system.d], [self.system.f])
@@ -98,7 +96,6 @@ class Integrator:
                 self.model, self.events, sizes, self.resets, rows, self.follows, closes
             )
         self.prospect = Prospect(self._source, ("symfric_march",), self.instructions)
-        self.build_time = perf_counter() - begin
 
     def _event_functions(self) -> tuple[ca.Function, ca.Function]:
         """Return the Functions (t, y, d) of the event expressions and of their magnitudes.
