@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from time import perf_counter
 from typing import Any, NamedTuple, final
@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symfric.foundation import checks
-from symfric.foundation.memory import remember
 from symfric.foundation.numeric import Array
+from symfric.foundation.packed import state_of
 from symfric.foundation.status import SolveError, Status
 from symfric.integrator.compiled.columns import BACKENDS
 from symfric.integrator.equations.initial import first_guess
@@ -26,7 +26,7 @@ from symfric.integrator.equations.inputs import Input, InputData, input_data, pa
 from symfric.integrator.methods.method import Method
 from symfric.integrator.methods.tableaux import LOOSE, chosen
 from symfric.integrator.running.doubts import doubts
-from symfric.integrator.running.integrator import Integrator, built
+from symfric.integrator.running.integrator import Integrator, built, remember
 from symfric.integrator.running.record import Run
 from symfric.integrator.running.run import MANY_STEPS, Tolerances, integrate, watchful
 from symfric.integrator.stored import statistics_of, trajectory_of
@@ -189,7 +189,7 @@ class Prepared:
     stops: ArrayLike = ()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {item.name: getattr(self, item.name) for item in fields(self)}
+        return state_of(self)
 
     def __call__(
         self,

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
+from symfric.foundation.packed import state_of
 from symfric.foundation.status import Status
 from symfric.integrator.equations.initial import consistent_many, smallest_step
 from symfric.integrator.equations.inputs import InputData
@@ -254,7 +255,7 @@ class SingleJob:
     times: Array
 
     def __getstate__(self) -> dict[str, Any]:
-        return {item.name: getattr(self, item.name) for item in fields(self)}
+        return state_of(self)
 
     @cached_property
     def integrator(self) -> Integrator:

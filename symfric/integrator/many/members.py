@@ -5,7 +5,7 @@ A `Program` contains the equations of an ensemble for workers that do not have t
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from threading import Lock
 from typing import Any, cast, final
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.numeric import Array
+from symfric.foundation.packed import state_of
 from symfric.integrator.compiled.columns import Columns, densified
 from symfric.integrator.compiled.compiler import load
 from symfric.integrator.equations.blocks import Following
@@ -257,7 +258,7 @@ class Program:
     follow: Following | None
 
     def __getstate__(self) -> dict[str, Any]:
-        return {item.name: getattr(self, item.name) for item in fields(self)}
+        return state_of(self)
 
     @property
     def nx(self) -> int:

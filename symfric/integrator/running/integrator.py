@@ -3,13 +3,13 @@
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from threading import Lock
 from time import perf_counter
-from typing import Any, final
+from typing import Any, TypeVar, final
 
 import casadi as ca
 import numpy as np
 
-from symfric.foundation.memory import remember
 from symfric.foundation.numeric import Array, Buffered, Scalar, is_casadi
 from symfric.foundation.programs import CompileError
 from symfric.foundation.variable import stacked
@@ -47,6 +47,19 @@ SPARE = 2
 """Number of buffer sets kept: one for a run, one for a run within its callback."""
 REMEMBERED = 16
 """Number of integrators cached per model; the oldest is dropped first."""
+T = TypeVar("T")
+_LOCK = Lock()
+
+
+def remember(known: dict[Hashable, T], key: Hashable, made: T, most: int) -> T:
+    """Store `made` in `known` unless `key` is present, and return the stored object.
+
+    If `known` has `most` entries, the oldest entry is removed. Threads may share `known`.
+    """
+    with _LOCK:
+        if key not in known and len(known) >= most:
+            del known[next(iter(known))]
+        return known.setdefault(key, made)
 
 
 @final

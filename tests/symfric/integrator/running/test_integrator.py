@@ -6,7 +6,7 @@ Dense output, values at the times of the result, and the steps that a run keeps.
 import copy
 import gc
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
@@ -26,9 +26,18 @@ from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.tableaux import METHODS
 from symfric.integrator.running.crossings import cutting
-from symfric.integrator.running.integrator import REMEMBERED, Integrator, built
+from symfric.integrator.running.integrator import REMEMBERED, Integrator, built, remember
 from symfric.integrator.running.record import Dense, Record, Run, hermite
 from symfric.scenes import PendulumBox, SliderCrank
+
+
+def test_the_first_remembered_stays_and_the_oldest_goes() -> None:
+    known: dict[Hashable, str] = {}
+    for key, made, kept in ((1, "a", "a"), (1, "b", "a"), (2, "c", "c"), (2, "d", "c")):
+        assert remember(known, key, made, 2) == kept
+    assert known == {1: "a", 2: "c"}
+    assert remember(known, 3, "e", 2) == "e"
+    assert known == {2: "c", 3: "e"}
 
 
 @pytest.fixture
