@@ -14,7 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from backends import each_backend
+from backends import each_backend, made
 
 import symfric as sf
 import symfric.integrator.running.integrator as module
@@ -33,8 +33,8 @@ from symfric.scenes import PendulumBox, SliderCrank
 
 def test_the_first_remembered_stays_and_the_oldest_goes() -> None:
     known: dict[Hashable, str] = {}
-    for key, made, kept in ((1, "a", "a"), (1, "b", "a"), (2, "c", "c"), (2, "d", "c")):
-        assert remember(known, key, made, 2) == kept
+    for key, new, kept in ((1, "a", "a"), (1, "b", "a"), (2, "c", "c"), (2, "d", "c")):
+        assert remember(known, key, new, 2) == kept
     assert known == {1: "a", 2: "c"}
     assert remember(known, 3, "e", 2) == "e"
     assert known == {2: "c", 3: "e"}
@@ -241,7 +241,7 @@ CASES: dict[str, Case] = {
 
 def run_of(case: str, backend: str, **further: Any) -> sf.Trajectory:
     make, arguments = CASES[case]
-    return sf.simulate(make(), 2.0, t_eval=TIMES, backend=backend, **(arguments | further))
+    return sf.simulate(made(make), 2.0, t_eval=TIMES, backend=backend, **(arguments | further))
 
 
 @each_backend
