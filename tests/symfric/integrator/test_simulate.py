@@ -7,6 +7,7 @@ Invalid arguments of simulations, ensembles, plants, flows and inputs: one table
 
 import math
 import warnings
+from functools import cache
 from math import exp
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,7 @@ def by(runner: str, model: sf.Model, t_end: float, **arguments: Any) -> sf.Traje
     return simulate_by_peer(model, t_end, runner, **arguments)
 
 
+@cache
 def cart() -> sf.Model:
     """m v' = force - c v."""
     return sf.drive(sf.Viscous(sigma_2=C), m=M)
