@@ -77,7 +77,6 @@ if TYPE_CHECKING:
     from symfric.laws.static.from_data import Network as Network
     from symfric.laws.static.from_data import Neuron as Neuron
     from symfric.laws.static.from_data import Spline as Spline
-    from symfric.laws.static.lubrication import MixedLubrication as MixedLubrication
     from symfric.laws.static.machines import BAM as BAM
     from symfric.laws.static.machines import Bittencourt as Bittencourt
     from symfric.laws.static.machines import BrushTyre as BrushTyre
@@ -98,6 +97,7 @@ if TYPE_CHECKING:
     from symfric.laws.static.smooth_peak import BrownMcPhee as BrownMcPhee
     from symfric.laws.static.smooth_peak import Lorentzian as Lorentzian
     from symfric.laws.static.smooth_peak import MakkarDixon as MakkarDixon
+    from symfric.laws.static.smooth_peak import MixedLubrication as MixedLubrication
     from symfric.laws.static.smooth_peak import PoppStelter as PoppStelter
     from symfric.laws.static.smooth_peak import SimscapeBreakaway as SimscapeBreakaway
     from symfric.laws.static.smooth_peak import Specker as Specker

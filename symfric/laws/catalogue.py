@@ -16,7 +16,6 @@ from symfric.laws.static import (
     coulomb,
     exponential,
     from_data,
-    lubrication,
     machines,
     piecewise,
     self_tuning,
@@ -61,7 +60,7 @@ STATIC_LAWS: dict[str, type[Law]] = {
     "bam": machines.BAM,
     "capstan": machines.Capstan,
     "brush_tyre": machines.BrushTyre,
-    "mixed_lubrication": lubrication.MixedLubrication,
+    "mixed_lubrication": smooth_peak.MixedLubrication,
     "spline": from_data.Spline,
     "network": from_data.Network,
 }

@@ -14,15 +14,15 @@ if TYPE_CHECKING:
     from symfric.multibody.brakes import DiscClutch as DiscClutch
     from symfric.multibody.brakes import DrumBrake as DrumBrake
     from symfric.multibody.brakes import shoe_arms as shoe_arms
-    from symfric.multibody.cams import Cam as Cam
-    from symfric.multibody.cams import CamFriction as CamFriction
     from symfric.multibody.constraints import Constraint as Constraint
     from symfric.multibody.constraints import PrescribedMotion as PrescribedMotion
     from symfric.multibody.constraints import UserConstraint as UserConstraint
+    from symfric.multibody.couplings import Cam as Cam
     from symfric.multibody.couplings import Gear as Gear
     from symfric.multibody.couplings import Rolling as Rolling
     from symfric.multibody.couplings import Screw as Screw
     from symfric.multibody.efficiency import efficiency as efficiency
+    from symfric.multibody.element_friction import CamFriction as CamFriction
     from symfric.multibody.element_friction import ElementFriction as ElementFriction
     from symfric.multibody.element_friction import MeshFriction as MeshFriction
     from symfric.multibody.element_friction import ThreadFriction as ThreadFriction
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from symfric.multibody.forces import Force as Force
     from symfric.multibody.forces import Gravity as Gravity
     from symfric.multibody.forces import JointSpringDamper as JointSpringDamper
+    from symfric.multibody.forces import JointStop as JointStop
     from symfric.multibody.forces import SpringDamper as SpringDamper
     from symfric.multibody.forces import UserForce as UserForce
     from symfric.multibody.joint import Joint as Joint
@@ -54,7 +55,6 @@ if TYPE_CHECKING:
     from symfric.multibody.spatial import GROUND as GROUND
     from symfric.multibody.spatial import Body as Body
     from symfric.multibody.spatial import Frame as Frame
-    from symfric.multibody.stops import JointStop as JointStop
     from symfric.multibody.urdf import read_urdf as read_urdf
 
 load_lazily(__name__)

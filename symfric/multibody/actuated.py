@@ -25,18 +25,14 @@ from symfric.foundation.variable import take_si
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.laws.base.law import require_law
-from symfric.multibody.contact import UNLOADED, Contact, depends_on_load
+from symfric.multibody.contact import UNLOADED, End, LeverContact, depends_on_load, slip_of
 from symfric.multibody.dynamics import Wrench
 from symfric.multibody.forces import Axial, Force, Load
-from symfric.multibody.joint import Joint, JointFriction, needs_more
+from symfric.multibody.joint import JointFriction, needs_more
 from symfric.multibody.kinematics import Kinematics
 
 EXPONENT = 50.0
 """Largest |m| times the wrap angle in exp(m angle), so that no iterate of a solver overflows."""
-
-
-Lever = tuple[Joint, str, Scalar]
-"""Joint, direction, lever c_j."""
 
 
 def wrapped(m: ca.SX, angle: Scalar) -> tuple[ca.SX, ca.SX]:
@@ -127,13 +123,10 @@ class ActuatedElement(Force):
     def contact(self, kin: Kinematics) -> "ActuatedContact":
         """Return the contact of the element."""
         pairs = zip(self.joints(), self.levers(), strict=True)
-        levers = [(kin.topology.joints[name], way, c) for (name, way), c in pairs]
-        slip = sum((c * kin.rate(joint, way) for joint, way, c in levers), start=ca.SX(0))
+        ends = tuple(End(kin.topology.joints[name], way, c) for (name, way), c in pairs)
         F, N = (ca.SX.sym(f"{self.name}_{what}") for what in ("friction", "N"))
-        return ActuatedContact(
-            self.name, self.name, JointFriction(self.law), self.law, self.name, slip, F, self,
-            tuple(levers), N,
-        )  # fmt: skip
+        name, friction, slip = self.name, JointFriction(self.law), slip_of(kin, ends)
+        return ActuatedContact(name, name, friction, self.law, name, slip, F, ends, self, N)
 
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield nothing: an actuating force inside a brake does not load the bodies."""
@@ -166,12 +159,11 @@ class ActuatedElement(Force):
 
 @final
 @dataclass(frozen=True, eq=False)
-class ActuatedContact(Contact):
+class ActuatedContact(LeverContact):
     """Friction of an element under an actuating force.
 
     Attributes:
         element: brake, clutch or belt.
-        levers: joint, direction and c_j of each displacement.
         N: symbol of the normal force [N].
     """
 
@@ -179,7 +171,6 @@ class ActuatedContact(Contact):
     measure = "part of the normal force that static friction causes"
 
     element: ActuatedElement
-    levers: tuple[Lever, ...]
     N: ca.SX
 
     @property
@@ -190,14 +181,14 @@ class ActuatedContact(Contact):
     @property
     def link(self) -> str:
         """First joint."""
-        return self.levers[0][0].name
+        return self.ends[0].joint.name
 
     @property
     def rate(self) -> str:
         """Name of the rate of the only joint; empty if there are two."""
-        joint, direction, _ = self.levers[0]
+        joint, direction, *_ = self.ends[0]
         own = f"{joint.coordinate(joint.directions[direction])}_rate"
-        return own if len(self.levers) == 1 else ""
+        return own if len(self.ends) == 1 else ""
 
     @property
     def normal_symbol(self) -> ca.SX:
@@ -209,13 +200,9 @@ class ActuatedContact(Contact):
         """Mobilised coefficient m = F / N."""
         return self.F / (self.N + UNLOADED)
 
-    def loads(self, kin: Kinematics) -> list[Axial]:
-        """Return the loads -c_j F on the joints."""
-        return [Axial(joint, way, -c * self.F) for joint, way, c in self.levers]
-
-    def transmitted(self, kin: Kinematics) -> list[Axial]:
-        """Return the loads on the joints, which friction alone causes."""
-        return self.loads(kin)
+    def tensions(self) -> dict[str, ca.SX]:
+        """Return the tensions [N] of a band, rope or belt by end."""
+        return self.element.tensions(self.F)
 
     @property
     def locking(self) -> ca.SX:

@@ -1,7 +1,7 @@
-"""Checks of the parts of a mechanism: names, numbers, connections."""
+"""Checks of a mechanism: names, numbers and connections of its parts, and its equations."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from difflib import get_close_matches
 
 import casadi as ca
@@ -9,14 +9,23 @@ import numpy as np
 
 from symfric.foundation.checks import shown
 from symfric.foundation.numeric import is_number, is_symbolic
-from symfric.foundation.variable import strays, symbols_of
+from symfric.foundation.variable import stacked, strays, symbols_of
+from symfric.laws import Law
 from symfric.model import Variables
 from symfric.multibody.actuated import ActuatedElement
+from symfric.multibody.constraints import Constraint
+from symfric.multibody.contact import JointContact, depends_on_load
+from symfric.multibody.couplings import Coupling
 from symfric.multibody.element_friction import ElementFriction
-from symfric.multibody.forces import Part
+from symfric.multibody.equations import Equations
+from symfric.multibody.forces import Axial, Load, Part
 from symfric.multibody.joint import Joint, JointFriction
+from symfric.multibody.prepare import Prepared, weightless
 from symfric.multibody.spatial import GROUND, Body
 from symfric.multibody.topology import Topology, body_of
+
+ROUNDING = 1e-12
+"""Largest load of a bearing by rounding, relative to the largest reaction."""
 
 
 def texts(part: object) -> Iterator[str]:
@@ -164,3 +173,111 @@ def connected(topology: Topology) -> Iterator[str]:
             )
     if not loose and not topology.n:
         yield "expected bodies that can move, got none"
+
+
+def left_open(made: Prepared) -> Iterator[str]:
+    """Yield messages about friction that depends on undetermined reactions."""
+    for name in made.undetermined:
+        yield (
+            f"{name} > friction: expected reactions that the motion determines, got a "
+            f"normal force that the redundant constraints {', '.join(made.redundant)} leave open; "
+            "close the loop with a joint of fewer constraints: PlanarRevolute, PlanarPrismatic or "
+            "PinInSlot in a planar mechanism, a ball or a PointOnLine in space"
+        )
+    if made.singular:
+        yield "start: expected independent constraints, got a singular position; start elsewhere"
+
+
+def undeclared_in_forces(made: Prepared) -> Iterator[str]:
+    """Yield messages about undeclared symbols in forces."""
+    eq = made.eq
+    known = ca.vertcat(eq.q, eq.qd, eq.angles, symbols_of((*made.p, *made.u)), eq.kin.t)
+    expected = "positions, velocities, time, parameters and inputs"
+    for force in eq.forces:
+        parts = [x for load in force.loads(eq.kin) for x in _parts(load)]
+        yield from undeclared(f"force '{force.name}'", parts, known, expected)
+
+
+def _parts(load: Load | Axial) -> tuple[ca.SX, ...]:
+    return (load.value,) if isinstance(load, Axial) else (load.force, load.moment)
+
+
+def infinite(made: Prepared) -> Iterator[str]:
+    """Yield messages about forces that are not finite at the start, with zero inputs."""
+    for force in made.eq.forces:
+        (found,) = made.numbers(ca.veccat(*(_parts(x)[0] for x in force.loads(made.eq.kin))))
+        if not np.isfinite(found).all():
+            yield (
+                f"force '{force.name}': expected a finite force at the start, got "
+                f"{shown(float(np.abs(found).sum()))}; do its places coincide there?"
+            )
+
+
+def without_inertia(made: Prepared) -> Iterator[str]:
+    """Yield messages about coordinates without inertia near the start."""
+    eq = made.eq
+    if not any(eq.kin.topology.bodies[link.body].ideal for link in eq.kin.topology.links):
+        return
+    near = made.q0 + 0.1 * np.random.default_rng(0).standard_normal(eq.n)
+    found = weightless(replace(made, q0=near).numbers(eq.mass)[0])
+    if found.any():
+        names = ", ".join(v.name for v, is_one in zip(made.q, found, strict=True) if is_one)
+        yield (
+            f"expected a mass matrix that is positive definite, got one that is not in {names}: "
+            "the bodies they move have no mass (massless links, points on an axis, parallel axes) "
+            "or an unphysical inertia"
+        )
+
+
+def inseparable(made: Prepared) -> Iterator[str]:
+    """Yield messages about bodies whose inertia does not allow absolute coordinates."""
+    for name, body in made.eq.kin.topology.bodies.items():
+        if body.ideal and name != GROUND and any(replace(body, ideal=False).problems(made.p)):
+            yield (
+                f"body '{name}': expected a rigid body in absolute coordinates, got a "
+                "massless link, a point or an unphysical body; use joint coordinates"
+            )
+
+
+def idle(eq: Equations, constraints: Sequence[Constraint]) -> Iterator[str]:
+    """Yield messages about joints whose friction is zero in every motion.
+
+    The normal force of such a joint is zero for random coordinates, rates, accelerations,
+    multipliers, friction forces, inputs and parameters, and its law does not act without load.
+    """
+    joints = [c for c in eq.contacts if isinstance(c, JointContact) and c.friction.normal is None]
+    if not joints:
+        return
+    loads = stacked(N for c, N in zip(eq.contacts, eq.normals, strict=True) if c in joints)
+    reactions = stacked(ca.vertcat(*eq.pressing[c.part]) for c in joints)
+    symbols = stacked(ca.symvar(ca.vertcat(loads, reactions)))
+    at = np.random.default_rng(0).standard_normal(symbols.numel())
+    found, largest = ca.Function("loads", [symbols], [ca.densify(loads), ca.densify(reactions)])(at)
+    least = ROUNDING * max(1.0, float(ca.norm_inf(largest)))
+    unloaded = [c for c, load in zip(joints, found.nonzeros(), strict=True) if abs(load) <= least]
+    for part in dict.fromkeys(c.part for c in unloaded if not acts_without_load(c.friction.law)):
+        yield f"joint '{part}' > friction: {_advice(part, constraints)}"
+
+
+def acts_without_load(law: Law) -> bool:
+    """Return True unless the friction force is known to be zero without a normal force."""
+    if not depends_on_load(law):
+        return True
+    try:
+        return not ca.SX(law.outside(ca.SX.sym("v"), ca.SX(0.0))).is_zero()
+    except ValueError:
+        return True
+
+
+def _advice(joint: str, constraints: Sequence[Constraint]) -> str:
+    """Return what is wrong with the friction of a joint, what carries the load, and the remedy."""
+    expected = "expected a reaction that loads the bearing, got none in any motion"
+    for c in constraints:
+        if isinstance(c, Coupling) and joint in (name for name, _ in c.joints()):
+            kind, friction = type(c).__name__, c.accepts[0].__name__
+            return (
+                f"{expected}, because coupling '{c.name}' carries the load; write "
+                f"{kind}('{c.name}', ..., friction={friction}(law, ...)) and omit this friction, "
+                "or give the bearing a preload"
+            )
+    return f"{expected}; write preload=... or normal=... [N], or omit the friction"

@@ -9,7 +9,7 @@ pi. In this case phi is taken modulo its period, so that full turns are possible
 """
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 from typing import Any, ClassVar, NamedTuple, final
@@ -20,7 +20,7 @@ from symfric.foundation.checks import expression
 from symfric.foundation.numeric import Scalar
 from symfric.multibody.contact import Contact
 from symfric.multibody.dynamics import numbered, twist_jacobian
-from symfric.multibody.forces import Axial, Load, Part
+from symfric.multibody.forces import Axial, Load, OnJoint, Part
 from symfric.multibody.joint import Joint
 from symfric.multibody.kinematics import Kinematics, Motion
 from symfric.multibody.spatial import GROUND
@@ -104,7 +104,7 @@ def wraps(kin: Kinematics, joint: Joint, direction: str) -> bool:
 
 @final
 @dataclass(frozen=True, eq=False)
-class PrescribedMotion(Constraint):
+class PrescribedMotion(OnJoint, Constraint):
     """Prescribed motion of a joint: s = motion(t).
 
     `direction` may be omitted for a joint with one direction; for other joints the default is
@@ -127,10 +127,6 @@ class PrescribedMotion(Constraint):
     motion: Callable[[ca.SX], Scalar]
     direction: str = ""
 
-    def joints(self) -> Iterable[tuple[str, str]]:
-        """Return the driven joint and the direction of the motion."""
-        return ((self.joint, self.direction),)
-
     def held(self, kin: Kinematics) -> Held:
         """Return motion(t) - s = 0."""
         what = "motion: expected a function of time that returns one expression"
@@ -141,8 +137,7 @@ class PrescribedMotion(Constraint):
             return impossible(f"{what}, got {reason}; use casadi functions, not those of math")
         if target.numel() != 1:
             return impossible(f"motion: expected one expression, got {target.numel()}")
-        joint = kin.topology.joints[self.joint]
-        direction = joint.way(self.direction)
+        joint, direction = self.place(kin)
         period = 2 * pi if wraps(kin, joint, direction) else None
         return linear(kin, self.name, [(joint, direction, 1.0)], target, period)
 

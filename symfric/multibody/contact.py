@@ -27,18 +27,18 @@ UNLOADED = 1e-12
 
 
 class End(NamedTuple):
-    """Displacement s of a joint that an element couples.
+    """Displacement s of a joint on which an element acts.
 
     Attributes:
         joint, direction: the joint and the direction of s.
-        share: generalised force on s per unit multiplier.
         lever: l of the sliding velocity v = sum l s' [m/s].
+        share: generalised force on s per unit multiplier of the element.
     """
 
     joint: Joint
     direction: str
-    share: Scalar
     lever: Scalar
+    share: Scalar = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,16 +181,54 @@ def joint_contacts(kin: Kinematics) -> Iterator[JointContact]:
             yield JointContact(name, joint.name, friction, law, pressed, slip, F, direction)
 
 
-@final
 @dataclass(frozen=True, eq=False)
-class ElementContact(Contact):
-    """Friction of an element that couples displacements s_j of joints.
+class LeverContact(Contact):
+    """Friction of an element that acts on displacements s_j of joints.
 
-        v = sum l_j s_j',   load on joint j: c_j lam - l_j F,   N = preload + |lam / divisor|
+        v = sum l_j s_j',   load on joint j = -l_j F
 
     Attributes:
-        ends: coupled displacements, with c_j and l_j.
-        lam: multiplier of the element.
+        ends: displacements with their levers l_j.
+    """
+
+    measure: ClassVar[str]
+    """Meaning of `locking`."""
+
+    ends: tuple[End, ...]
+
+    @property
+    @abstractmethod
+    def locking(self) -> ca.SX:
+        """Ratio `measure` [1]; the element locks itself from 1 on."""
+
+    def loads(self, kin: Kinematics) -> Sequence[Load | Axial]:
+        """Return the loads of friction on the joints along their axes."""
+        own = (end for end in self.ends if not equals(end.lever, 0.0))
+        return [Axial(end.joint, end.direction, -end.lever * self.F) for end in own]
+
+    def transmitted(self, kin: Kinematics) -> list[Axial]:
+        """Return the loads on the joints along their axes, including friction."""
+        return [Axial(end.joint, end.direction, -end.lever * self.F) for end in self.ends]
+
+    def tensions(self) -> dict[str, ca.SX]:
+        """Return the tensions [N] of a band, rope or belt by end; none by default."""
+        return {}
+
+
+def slip_of(kin: Kinematics, ends: Iterable[End]) -> ca.SX:
+    """Return the sliding velocity sum l_j s_j' [m/s]."""
+    return sum((end.lever * kin.rate(end.joint, end.direction) for end in ends), ca.SX(0))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ElementContact(LeverContact):
+    """Friction of an element that couples two displacements, whose reaction is the multiplier lam.
+
+        load on joint j: c_j lam - l_j F,   N = preload + |lam / divisor|
+
+    Attributes:
+        lam: multiplier of the element; c_j are the shares of `ends`.
         divisor: multiplier per unit normal force.
     """
 
@@ -198,7 +236,6 @@ class ElementContact(Contact):
     measure = "static friction over that which holds a load on b"
 
     friction: ElementFriction
-    ends: tuple[End, ...]
     lam: ca.SX
     divisor: Scalar
 
@@ -217,17 +254,10 @@ class ElementContact(Contact):
     @property
     def locking(self) -> ca.SX:
         """Ratio `measure` [1]."""
-        a, held = (
-            self.ends[0],
-            self.friction.law.static_level(self.friction.preload + self.pressing),
-        )
+        a, friction = self.ends[0], self.friction
+        held = friction.law.static_level(friction.preload + self.pressing)
         pull = a.share * self.divisor * self.pressing
         return ca.SX(smooth.magnitude(held * a.lever / pull, 0.0))
-
-    def loads(self, kin: Kinematics) -> Sequence[Load | Axial]:
-        """Return the loads of friction on the joints along their axes."""
-        own = (end for end in self.ends if not equals(end.lever, 0.0))
-        return [Axial(end.joint, end.direction, -end.lever * self.F) for end in own]
 
     def normal(self, kin: Kinematics, pressing: Mapping[str, Wrench]) -> ca.SX:
         """Return the normal force between the flanks."""
@@ -238,8 +268,9 @@ def element_contact(
     part: Part, kin: Kinematics, friction: ElementFriction, slope: Scalar, flank: Flank, lam: ca.SX
 ) -> ElementContact:
     """Return the contact of an element that couples joints with ds_b/ds_a = `slope`."""
-    rows = zip(part.joints(), (-slope, 1.0), (flank.lever_a, flank.lever_b), strict=True)
-    ends = tuple(End(kin.topology.joints[j], way, share, lever) for (j, way), share, lever in rows)
-    slip = sum((end.lever * kin.rate(end.joint, end.direction) for end in ends), ca.SX(0))
-    F, name, law = ca.SX.sym(f"{part.name}_friction"), part.name, friction.law
-    return ElementContact(name, name, friction, law, name, slip, F, ends, lam, flank.divisor)
+    rows = zip(part.joints(), (flank.lever_a, flank.lever_b), (-slope, 1.0), strict=True)
+    ends = tuple(End(kin.topology.joints[j], way, lever, share) for (j, way), lever, share in rows)
+    F, name, slip = ca.SX.sym(f"{part.name}_friction"), part.name, slip_of(kin, ends)
+    return ElementContact(
+        name, name, friction, friction.law, name, slip, F, ends, lam, flank.divisor
+    )

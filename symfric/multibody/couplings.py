@@ -1,10 +1,11 @@
-"""Couplings of the displacements of two joints: gears, racks, screws."""
+"""Couplings of the displacements of two joints: gears, racks, screws, cams."""
 
-from collections.abc import Iterator, Sequence
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import pi
-from typing import ClassVar, final
+from typing import Any, ClassVar, final
 
 import casadi as ca
 
@@ -12,7 +13,15 @@ from symfric.foundation.checks import shown
 from symfric.foundation.numeric import Scalar, equals, is_symbolic
 from symfric.multibody.constraints import Constraint, Held, impossible, linear, wraps
 from symfric.multibody.contact import Contact, element_contact
-from symfric.multibody.element_friction import FlankFriction, MeshFriction, ThreadFriction
+from symfric.multibody.element_friction import (
+    CamFriction,
+    ElementFriction,
+    Flank,
+    FlankFriction,
+    MeshFriction,
+    ThreadFriction,
+)
+from symfric.multibody.forces import Axial
 from symfric.multibody.kinematics import Kinematics
 
 TEETH = 1000
@@ -20,6 +29,55 @@ TEETH = 1000
 
 
 class Coupling(Constraint):
+    """Coupling of the displacements of two joints, with or without friction.
+
+    The multiplier does not contain the friction; the results of the friction have the names of
+    those of a joint, `<name>_N`, `<name>_slip`, ...
+    """
+
+    kind: ClassVar[str] = "coupling"
+
+    accepts: ClassVar[tuple[type[ElementFriction], ...]] = (MeshFriction, ThreadFriction)
+    """Types of friction."""
+    linear: ClassVar[bool] = True
+    """True if s_b is a displacement [m] where the element has friction; s_a is an angle."""
+
+    a: str
+    b: str
+    direction_a: str
+    direction_b: str
+    friction: Any
+
+    def joints(self) -> tuple[tuple[str, str], tuple[str, str]]:
+        """Return both coupled joints with their directions."""
+        return (self.a, self.direction_a), (self.b, self.direction_b)
+
+    def problems(self) -> Iterator[str]:
+        """Yield messages about invalid numbers, identical displacements, or invalid friction."""
+        yield from super().problems()
+        a, b = self.joints()
+        if a == b:
+            yield f"expected two displacements, got {a[1]} of {a[0]} twice"
+        if isinstance(self.friction, self.accepts):
+            own = (*self.friction.problems(), *self.friction.fit(self.linear))
+            yield from (f"friction: {text}" for text in own)
+        elif self.friction is not None:
+            kinds = " or ".join(f"{kind.__name__}(law, ...)" for kind in self.accepts)
+            yield f"friction: expected {kinds}, got {shown(self.friction)}"
+
+    @abstractmethod
+    def slope_and_flank(self, kin: Kinematics, friction: Any) -> tuple[Scalar, Flank]:
+        """Return ds_b/ds_a, and the geometry of the contact with the given friction."""
+
+    def contacts(self, kin: Kinematics, lam: ca.SX) -> Sequence[Contact]:
+        """Return the contact between the coupled parts."""
+        if self.friction is None or lam.is_empty():
+            return ()
+        slope, flank = self.slope_and_flank(kin, self.friction)
+        return (element_contact(self, kin, self.friction, slope, flank, lam),)
+
+
+class RatioCoupling(Coupling):
     """Coupling of the displacements of two joints: gears, rolling without slipping, screws.
 
         s_b = ratio s_a + offset
@@ -40,29 +98,15 @@ class Coupling(Constraint):
     the pressure between teeth; use a `UserConstraint` for that. There is no backlash.
     """
 
-    kind: ClassVar[str] = "coupling"
-
     ratio_field: ClassVar[str] = "ratio"
     """Name of the field that is or determines the ratio."""
-    accepts: ClassVar[tuple[type[FlankFriction], ...]] = (MeshFriction, ThreadFriction)
-    """Types of friction between the flanks."""
-    linear: ClassVar[bool] = True
-    """True if s_b is a displacement [m] where the element has friction; s_a is an angle."""
 
-    a: str
-    b: str
     offset: Scalar
-    direction_a: str
-    direction_b: str
     friction: FlankFriction | None
 
     @property
     def _ratio(self) -> Scalar:
         return getattr(self, self.ratio_field)
-
-    def joints(self) -> tuple[tuple[str, str], tuple[str, str]]:
-        """Return both coupled joints with their directions."""
-        return (self.a, self.direction_a), (self.b, self.direction_b)
 
     def problems(self) -> Iterator[str]:
         """Yield messages about invalid numbers, a zero ratio, or identical displacements."""
@@ -70,15 +114,6 @@ class Coupling(Constraint):
         given = getattr(self, self.ratio_field)
         if equals(given, 0.0):
             yield f"{self.ratio_field}: expected a finite number other than 0, got {given!r}"
-        a, b = self.joints()
-        if a == b:
-            yield f"expected two displacements, got {a[1]} of {a[0]} twice"
-        if isinstance(self.friction, self.accepts):
-            own = (*self.friction.problems(), *self.friction.fit(self.linear))
-            yield from (f"friction: {text}" for text in own)
-        elif self.friction is not None:
-            kinds = " or ".join(f"{kind.__name__}(law, ...)" for kind in self.accepts)
-            yield f"friction: expected {kinds}, got {shown(self.friction)}"
 
     def held(self, kin: Kinematics) -> Held:
         """Return offset + ratio s_a - s_b = 0."""
@@ -105,17 +140,14 @@ class Coupling(Constraint):
             period = 2 * pi * ratio if cyclic[0] else 2 * pi
         return linear(kin, self.name, [(a, along_a, -ratio), (b, along_b, 1.0)], offset, period)
 
-    def contacts(self, kin: Kinematics, lam: ca.SX) -> Sequence[Contact]:
-        """Return the contact between the flanks."""
-        if self.friction is None or lam.is_empty():
-            return ()
-        flank = self.friction.flank(self._ratio, self.linear)
-        return (element_contact(self, kin, self.friction, self._ratio, flank, lam),)
+    def slope_and_flank(self, kin: Kinematics, friction: Any) -> tuple[Scalar, Flank]:
+        """Return the ratio and the geometry of the flanks."""
+        return self._ratio, friction.flank(self._ratio, self.linear)
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Gear(Coupling):
+class Gear(RatioCoupling):
     """Coupling of two angles: angle_b = ratio angle_a + offset.
 
     With z the number of teeth and axes in the same direction, `ratio` is -z_a/z_b for external
@@ -137,7 +169,7 @@ class Gear(Coupling):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Rolling(Coupling):
+class Rolling(RatioCoupling):
     """Coupling of an angle and a displacement: s_b = radius angle_a + offset.
 
     Examples are a pinion on its rack, a wheel that rolls without slipping, and a drum with its
@@ -160,7 +192,7 @@ class Rolling(Coupling):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Screw(Coupling):
+class Screw(RatioCoupling):
     """Thread of a cylindrical joint: slide = lead / (2 pi) turn + offset.
 
     `friction` is a `ThreadFriction`; friction of the joint itself is that of its bearing, which the
@@ -183,3 +215,63 @@ class Screw(Coupling):
     @property
     def _ratio(self) -> Scalar:
         return self.lead / (2 * pi)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Cam(Coupling):
+    """Cam that moves a translating follower: s_b = lift(angle_a).
+
+    `lift` takes the SX symbol of the cam angle [rad] and returns the displacement [m] of the
+    follower, twice differentiable. Result: `<name>_force` [N] on the child of b; `friction` adds
+    the results of a contact, `<name>_N`, `<name>_slip`, ...
+
+    Limits: the cam pushes and pulls (a groove, or a spring that holds the follower); where the
+    force is negative, a follower on one side of the cam would lift off. The force loads the joints
+    along their axes only, not the guide of the follower. If the angle of a is known modulo 2 pi
+    (see `RatioCoupling`), the lift must be periodic.
+    """
+
+    accepts = (CamFriction,)
+
+    a: str
+    b: str
+    lift: Callable[[ca.SX], Scalar]
+    friction: CamFriction | None = None
+    direction_a: str = "turn"
+    direction_b: str = "slide"
+
+    def held(self, kin: Kinematics) -> Held:
+        """Return lift(angle) - s_b = 0."""
+        a, b = (kin.topology.joints[name] for name in (self.a, self.b))
+        if a.linear(self.direction_a) or not b.linear(self.direction_b):
+            return impossible("expected an angle a and a displacement b")
+        try:
+            lift, slope = self._profile(kin)
+        except (TypeError, ValueError, ArithmeticError, RuntimeError, NotImplementedError):
+            return impossible(
+                "lift: expected a function of the angle that returns one expression of it; use "
+                "casadi functions, not those of math"
+            )
+
+        def loads(lam: ca.SX) -> Sequence[Axial]:
+            return [Axial(a, self.direction_a, -slope * lam), Axial(b, self.direction_b, lam)]
+
+        phi = lift - kin.along(b, self.direction_b)[0]
+        return Held(phi, (f"{self.name}_force",), loads, "N")
+
+    def slope_and_flank(self, kin: Kinematics, friction: Any) -> tuple[Scalar, Flank]:
+        """Return the slope of the lift and the geometry of cam and follower."""
+        lift, slope = self._profile(kin)
+        return slope, friction.flank(slope, lift)
+
+    def _profile(self, kin: Kinematics) -> tuple[ca.SX, ca.SX]:
+        """Return lift and slope at the angle of the cam."""
+        angle = ca.SX.sym("angle")
+        lift = ca.SX(self.lift(angle))
+        if lift.numel() != 1 or not ca.depends_on(lift, angle):
+            raise ValueError
+        slope = ca.gradient(lift, angle)
+        now = kin.along(kin.topology.joints[self.a], self.direction_a)[0]
+        lift, slope = ca.substitute([lift, slope], [angle], [now])
+        return lift, slope

@@ -1,4 +1,4 @@
-"""Friction of machine elements whose normal force is their own reaction: threads, gear teeth.
+"""Friction of machine elements whose normal force is their own reaction: threads, teeth, cams.
 
 An element that couples s_b = ratio s_a + offset transmits the multiplier lam, a force or moment on
 b. A contact between its flanks has the sliding velocity v and the normal force N
@@ -11,7 +11,7 @@ sliding direction, so lam contains no friction.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from math import inf, pi
 from typing import ClassVar, NamedTuple, final
@@ -19,19 +19,12 @@ from typing import ClassVar, NamedTuple, final
 import casadi as ca
 
 from symfric.foundation.checks import as_number, number, refused, shown
-from symfric.foundation.numeric import Scalar, cos, is_symbolic, sqrt
+from symfric.foundation.numeric import Scalar, cos, sqrt
 from symfric.foundation.variable import take_si
 from symfric.laws import Law
 from symfric.laws.base import smooth
 from symfric.laws.base.law import require_law
-from symfric.multibody.joint import Keywords, needs_more
-
-RANGES: dict[str, tuple[Callable[[float], bool], str]] = {
-    "length": (lambda x: 0.0 < x < inf, "a number > 0"),
-    "level": (lambda x: 0.0 <= x < inf, "a number >= 0"),
-    "angle": (lambda x: 0.0 <= x < pi / 2, "an angle [rad] >= 0 and < pi/2"),
-}
-"""Test and description of the numbers of each kind."""
+from symfric.multibody.joint import RANGES, Keywords, needs_more, out_of_range
 
 
 class Flank(NamedTuple):
@@ -54,10 +47,8 @@ class ElementFriction(Keywords, ABC):
             reduce it for loads below 0.01 N, as in micromechanisms.
     """
 
-    kinds: ClassVar[Mapping[str, str]] = {}
-    """Kind of each number of the geometry, a key of `RANGES`."""
-    optional: ClassVar[tuple[str, ...]] = ()
-    """Numbers that may be None."""
+    kinds: ClassVar[dict[str, str]] = {}
+    """Kind of each number of the geometry, see `out_of_range`."""
     turning: ClassVar[bool] = False
     normal: ClassVar[Scalar | None] = None
 
@@ -78,13 +69,11 @@ class ElementFriction(Keywords, ABC):
         """Yield messages about invalid values."""
         if reason := needs_more(self.law):
             yield reason
-        for name, kind in {**self.kinds, "preload": "level", "eps": "length"}.items():
-            value, (good, what) = getattr(self, name), RANGES[kind]
-            size = as_number(value)
-            absent = value is None and name in self.optional
-            symbol = isinstance(value, ca.SX) and is_symbolic(value)
-            if not (absent or symbol or (size is not None and good(size))):
-                yield f"{name}: expected {what}, got {shown(value)}"
+        yield from out_of_range(self, self.kinds | {"preload": "level", "eps": "length"})
+
+    def fit(self, linear: bool) -> Iterator[str]:
+        """Yield messages if the friction does not fit a motion of b; `linear` if b slides."""
+        yield from ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,10 +124,8 @@ class ThreadFriction(FlankFriction):
         lead: lead of the worm [m], for a `Gear`, in which a is the worm; otherwise None.
     """
 
-    kinds: ClassVar[Mapping[str, str]] = {
-        "radius": "length", "flank_angle": "angle", "lead": "length",
-    }  # fmt: skip
-    optional, of_angle = ("lead",), "lead"
+    kinds: ClassVar = {"radius": "length", "flank_angle": "angle", "lead": "length"}
+    of_angle = "lead"
 
     radius: Scalar
     flank_angle: Scalar = 0.0
@@ -183,10 +170,10 @@ class MeshFriction(FlankFriction):
         internal: True if one gear has internal teeth; the sign of the ratio is not used.
     """
 
-    kinds: ClassVar[Mapping[str, str]] = {
+    kinds: ClassVar = {
         "arm": "length", "radius": "length", "pressure_angle": "angle", "helix_angle": "angle",
     }  # fmt: skip
-    optional, of_angle = ("radius",), "radius"
+    of_angle = "radius"
 
     arm: Scalar
     radius: Scalar | None = None
@@ -208,6 +195,67 @@ class MeshFriction(FlankFriction):
             return Flank(self.arm, 0.0, slope)
         lever = self.arm * smooth.sign(ratio, 0.0)
         return Flank(self.arm, -lever if self.internal else lever, self.radius * slope)
+
+
+FOLLOWERS = ("flat", "pointed", "roller")
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CamFriction(ElementFriction):
+    """Friction between a cam and a follower whose line of motion passes through the cam axis.
+
+    With r = base_radius + s_b, pressure angle alpha, tan(alpha) = slope / r for the slope ds_b/ds_a
+    of the lift, angular velocity w of the cam and velocity u of the follower:
+
+        follower   v                                            N
+        flat       r w                                          |f|
+        pointed    r cos(alpha) w + sin(alpha) u                |f| / cos(alpha)
+        roller     k (r cos(alpha) w + sin(alpha) u - R w)      |f| / cos(alpha)
+
+    with the force f of the multiplier. The roller of radius R rolls without slipping and without
+    mass; friction acts at its pin, k = pin_radius / R.
+    Limits: at constant s_b the moment of friction on the cam is mu f r for a flat follower. To lift
+    a load F, a pointed follower needs the moment F r tan(alpha + phi), phi = atan(mu).
+
+    Attributes:
+        base_radius: distance at s_b = 0 from the cam axis to the face, the point, or the centre of
+            the roller [m].
+        follower: "flat", "pointed" or "roller".
+        roller_radius, pin_radius: radii of the roller and its pin [m].
+    """
+
+    kinds = dict.fromkeys(("base_radius", "roller_radius", "pin_radius"), "length")
+
+    base_radius: Scalar
+    follower: str = "flat"
+    roller_radius: Scalar | None = None
+    pin_radius: Scalar | None = None
+
+    def problems(self) -> Iterator[str]:
+        """Yield messages about invalid values."""
+        yield from super().problems()
+        follower = vars(self)["follower"]
+        if not (isinstance(follower, str) and follower in FOLLOWERS):
+            yield f"follower: expected {', '.join(FOLLOWERS)}, got {shown(follower)}"
+            return
+        for name in ("roller_radius", "pin_radius"):
+            given, rolls = getattr(self, name) is not None, self.follower == "roller"
+            if given != rolls:
+                expected = "a length [m] of the roller" if rolls else "none without a roller"
+                yield f"{name}: expected {expected}, got {shown(getattr(self, name))}"
+
+    def flank(self, slope: Scalar, s: Scalar) -> Flank:
+        """Return levers and divisor at the follower displacement `s`."""
+        r = self.base_radius + s
+        if self.follower == "flat":
+            return Flank(r, 0.0, 1.0)
+        length = sqrt(r * r + slope * slope)
+        along, across = r / length, slope / length
+        if self.roller_radius is None:
+            return Flank(r * along, across, along)
+        k = self.pin_radius / self.roller_radius
+        return Flank(k * (r * along - self.roller_radius), k * across, along)
 
 
 def mesh_arm(

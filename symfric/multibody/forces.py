@@ -1,4 +1,4 @@
-"""Applied forces: gravity, springs, dampers, actuators, user expressions.
+"""Applied forces: gravity, springs, dampers, actuators, stops, user expressions.
 
 A force defines its loads on bodies and its potential energy V. The power of a load is the force
 times the velocity of its point plus the moment times the angular velocity. For conservative forces,
@@ -14,6 +14,7 @@ import casadi as ca
 
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, equals, is_number, is_symbolic
+from symfric.laws.base.smooth import positive
 from symfric.multibody.joint import Joint, Keywords
 from symfric.multibody.kinematics import Kinematics, Motion
 from symfric.multibody.spatial import GROUND, Body, Vector, is_vector, vector
@@ -113,6 +114,22 @@ class Part(Keywords, ABC):
                 yield f"{item.name}: {expected}, got {value!r}; write lambda {of[1]}: ..."
 
 
+class OnJoint(Part):
+    """Force or constraint in one direction of a joint."""
+
+    joint: str
+    direction: str
+
+    def joints(self) -> Iterable[tuple[str, str]]:
+        """Return the joint and the direction."""
+        return ((self.joint, self.direction),)
+
+    def place(self, kin: Kinematics) -> tuple[Joint, str]:
+        """Return the joint and the direction; an omitted one is the only one, or "turn"."""
+        joint = kin.topology.joints[self.joint]
+        return joint, joint.way(self.direction)
+
+
 @dataclass(frozen=True, eq=False)
 class Force(Part):
     """Applied force on bodies."""
@@ -198,7 +215,7 @@ class SpringDamper(Force):
 
 @final
 @dataclass(frozen=True, eq=False)
-class JointSpringDamper(Force):
+class JointSpringDamper(OnJoint, Force):
     """Spring, damper and actuator in a direction of a joint: "slide", "turn", ...
 
     `direction` may be omitted for a joint with one direction; for other joints the default is
@@ -220,14 +237,9 @@ class JointSpringDamper(Force):
     damping: Scalar = 0.0
     actuator: Scalar = 0.0
 
-    def joints(self) -> Iterable[tuple[str, str]]:
-        """Return the joint and the direction in which the force acts."""
-        return ((self.joint, self.direction),)
-
     def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
         """Yield the sum of spring, damper and actuator as one load of the joint."""
-        joint = kin.topology.joints[self.joint]
-        direction = joint.way(self.direction)
+        joint, direction = self.place(kin)
         f = ca.SX(self.actuator)
         if not equals(self.stiffness, 0.0):
             f -= self.stiffness * (kin.along(joint, direction)[0] - self.rest)
@@ -239,9 +251,75 @@ class JointSpringDamper(Force):
         """Return stiffness (s - rest)^2 / 2."""
         if equals(self.stiffness, 0.0):
             return ca.SX(0)
-        joint = kin.topology.joints[self.joint]
-        s, _ = kin.along(joint, joint.way(self.direction))
+        s, _ = kin.along(*self.place(kin))
         return self.stiffness * (s - self.rest) ** 2 / 2
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class JointStop(OnJoint, Force):
+    """Compliant stops that keep a joint between two positions.
+
+        f = stiffness d max(0, 1 + dissipation d')
+
+    with d >= 0 the displacement [m] or angle [rad] beyond `lower` or `upper`; f acts on the child
+    towards the permitted range and never pulls. `direction` is that of a `JointSpringDamper`. An
+    impact at the speed v leaves at the speed u that satisfies, with e = dissipation,
+    e v - ln(1 + e v) = -e u - ln(1 - e u), for any stiffness and mass; u = v if e = 0.
+
+    Limits: f has a kink at d = 0. The largest d is v sqrt(m / stiffness) for e = 0 and a mass or
+    inertia m, less for e > 0.
+
+    Attributes:
+        lower, upper: positions of the stops [m] or [rad], lower < upper.
+        stiffness: stiffness of the stops [N/m] or [N m/rad], above zero.
+        dissipation: dissipation e [s/m] or [s/rad].
+
+    Source: Hunt and Crossley 1975, Coefficient of restitution interpreted as damping in
+    vibroimpact, with the exponent 1.
+    """
+
+    kind: ClassVar[str] = "stop"
+
+    joint: str
+    lower: Scalar
+    upper: Scalar
+    stiffness: Scalar
+    dissipation: Scalar = 0.0
+    direction: str = ""
+
+    @property
+    def conservative(self) -> bool:
+        """True if the stops dissipate nothing."""
+        return equals(self.dissipation, 0.0)
+
+    def problems(self) -> Iterator[str]:
+        """Yield messages about numbers, their signs and the order of the stops."""
+        yield from super().problems()
+        if is_number(self.lower) and is_number(self.upper) and not self.lower < self.upper:
+            yield f"lower: expected a position below upper = {self.upper}, got {self.lower!r}"
+        if is_number(self.stiffness) and not self.stiffness > 0:
+            yield f"stiffness: expected > 0, got {self.stiffness!r}"
+        if is_number(self.dissipation) and not self.dissipation >= 0:
+            yield f"dissipation: expected >= 0, got {self.dissipation!r}"
+
+    def loads(self, kin: Kinematics) -> Iterator[Load | Axial]:
+        """Yield the force of both stops as one load of the joint."""
+        joint, direction = self.place(kin)
+        approach = self.dissipation * kin.rate(joint, direction)
+        below, above = self._beyond(kin)
+        f = below * positive(1 - approach, 0.0) - above * positive(1 + approach, 0.0)
+        yield Axial(joint, direction, ca.SX(self.stiffness * f))
+
+    def energy(self, kin: Kinematics) -> ca.SX:
+        """Return stiffness d^2 / 2."""
+        below, above = self._beyond(kin)
+        return self.stiffness * (below**2 + above**2) / 2
+
+    def _beyond(self, kin: Kinematics) -> tuple[ca.SX, ca.SX]:
+        """Return the displacements below `lower` and above `upper`, zero between them."""
+        s, _ = kin.along(*self.place(kin))
+        return ca.SX(positive(self.lower - s, 0.0)), ca.SX(positive(s - self.upper, 0.0))
 
 
 @final

@@ -27,15 +27,15 @@ bristles of other laws are vectors, see `Isotropic`. Source: Haug, Mech. Based D
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from math import inf
+from math import inf, pi
 from typing import Any, ClassVar, Self, final
 
 import casadi as ca
 import numpy as np
 
-from symfric.foundation.checks import as_number
+from symfric.foundation.checks import as_number, shown
 from symfric.foundation.numeric import Scalar, is_number, is_symbolic
 from symfric.foundation.variable import take_si
 from symfric.laws import Law
@@ -53,6 +53,35 @@ def needs_more(law: Law, offered: Sequence[str] = OFFERED) -> str:
     known = ", ".join(("v", "N", *offered))
     expected = f"law: expected one that needs only {known}, got {type(law).__name__}"
     return f"{expected}, which also needs {strange}" if strange else ""
+
+
+RANGES: dict[str, tuple[Callable[[float], bool], str]] = {
+    "length": (lambda x: 0.0 < x < inf, "a number > 0"),
+    "level": (lambda x: 0.0 <= x < inf, "a number >= 0"),
+    "angle": (lambda x: 0.0 <= x < pi / 2, "an angle [rad] >= 0 and < pi/2"),
+}
+"""Test and description of the numbers of each kind."""
+
+BEARING = {
+    "radius": "length", "length": "length", "width": "length", "preload": "level",
+    "normal": "level", "eps": "length",
+}  # fmt: skip
+"""Kind of each number of a `JointFriction`."""
+
+
+def out_of_range(friction: Any, kinds: Mapping[str, str]) -> Iterator[str]:
+    """Yield messages about fields that are not numbers of their kind, a key of `RANGES`.
+
+    Symbols are accepted, and None in fields whose default is None.
+    """
+    optional = [item.name for item in fields(friction) if item.default is None]
+    for name, kind in kinds.items():
+        value, (good, what) = getattr(friction, name), RANGES[kind]
+        size = as_number(value)
+        absent = value is None and name in optional
+        symbol = isinstance(value, ca.SX) and is_symbolic(value)
+        if not (absent or symbol or (size is not None and good(size))):
+            yield f"{name}: expected {what}, got {shown(value)}"
 
 
 @final
@@ -132,13 +161,7 @@ class JointFriction:
                 yield "normal: expected the level of the friction moment [N m], got none"
         elif turns and self.radius is None:
             yield "radius: expected the bearing's radius [m], got none"
-        for name in ("radius", "length", "width", "preload", "normal", "eps"):
-            value, size = getattr(self, name), as_number(getattr(self, name))
-            sign = ">=" if name in ("preload", "normal") else ">"
-            good = size is not None and (0 < size < inf or (size == 0 and sign == ">="))
-            absent = value is None and name not in ("preload", "eps")
-            if not (good or absent or is_symbolic(value)):
-                yield f"{name}: expected a number {sign} 0, got {value!r}"
+        yield from out_of_range(self, BEARING)
 
     @property
     def arm(self) -> Scalar:

@@ -22,22 +22,17 @@ from symfric.multibody.constraints import Constraint
 from symfric.multibody.contact import places_of
 from symfric.multibody.element_friction import ElementFriction
 from symfric.multibody.forces import Force, Gravity, SpringDamper
-from symfric.multibody.idle import idle
 from symfric.multibody.joint import Joint
 from symfric.multibody.prepare import (
     Prepared,
+    following,
     in_absolute_coordinates,
-    infinite,
-    inseparable,
-    left_open,
-    undeclared_in_forces,
-    without_inertia,
+    project,
     written,
 )
 from symfric.multibody.results import sketch
 from symfric.multibody.slips import slips
 from symfric.multibody.spatial import GROUND, Body, Frame, Vector, is_vector
-from symfric.multibody.start import following, project
 from symfric.multibody.topology import Topology, spanning_tree
 
 if TYPE_CHECKING:
@@ -208,15 +203,15 @@ class Mechanism(packed.Portable, Showing):
         for variable in p:
             kind(where, variable, Variable, "variables made by Variable(...)")
         made = written(self._tree(p), self.forces, self.constraints, p, tuple(self.inputs))
-        loose = undeclared_in_forces(made)
-        self._refuse([*made.problems, *made.misfits, *left_open(made), *loose])
-        self._refuse(infinite(made))
-        self._refuse(without_inertia(made))
-        self._refuse(idle(made.eq, self.constraints))
+        loose = checks.undeclared_in_forces(made)
+        self._refuse([*made.problems, *made.misfits, *checks.left_open(made), *loose])
+        self._refuse(checks.infinite(made))
+        self._refuse(checks.without_inertia(made))
+        self._refuse(checks.idle(made.eq, self.constraints))
         if formulation == "absolute":
-            self._refuse(inseparable(made))
+            self._refuse(checks.inseparable(made))
             made = in_absolute_coordinates(made, self.constraints)
-            self._refuse([*made.problems, *left_open(made)])
+            self._refuse([*made.problems, *checks.left_open(made)])
         return made
 
     def _refuse(self, problems: Iterable[str]) -> None:

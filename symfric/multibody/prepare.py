@@ -2,24 +2,33 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import final
+from typing import NamedTuple, final
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
-from symfric.foundation.checks import shown
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import at_start, stacked, starts_of, strays, symbols_of, undeclared
 from symfric.model import Variables, kinds
-from symfric.multibody import checks, start
 from symfric.multibody.constraints import Constraint
 from symfric.multibody.equations import Equations, equations
-from symfric.multibody.forces import Axial, Force, Load
+from symfric.multibody.forces import Force
 from symfric.multibody.kinematics import Cuts
 from symfric.multibody.spatial import GROUND, euler_e, euler_parameters
 from symfric.multibody.topology import Topology, absolute
 
+Position = Callable[[Array], tuple[Array, Array, Array]]
+"""Function q -> (phi, phi_q, phi_t) at time 0, shapes (m,), (m, n), (m,)."""
+FITS = 1e-8
+"""Largest accepted violation of a constraint at the start [m, m/s]."""
+FASTEST = 1e4
+"""Largest ratio of dependent to independent rates; larger ratios occur only at a dead centre."""
+RANK = 1e-9
+"""Fraction of the largest singular value below which singular values count as zero."""
+SINGULAR = 1e-12
+"""Value below which eigenvalues of a mass matrix with unit diagonal count as zero."""
 LONG, LONG_WITH_FRICTION = 16, 12
 """Number of links of a chain from which cuts save operations.
 
@@ -78,7 +87,7 @@ class Prepared:
         return [value.full() for value in f.call([at, others(rest.numel())])]
 
     @property
-    def position(self) -> start.Position:
+    def position(self) -> Position:
         """Function q -> (phi, phi_q, phi_t) at time 0 with the start values of the parameters."""
         eq = self.eq
         parts = [eq.phi, ca.densify(eq.Phi_q), ca.densify(eq.phi_t)]
@@ -127,7 +136,7 @@ def written(
     at = made.position
     made = replace(made, misfits=tuple(_misfits(made, at)))
     # norms are kept even if loops imply them: their multipliers also contain loop terms along p
-    found = start.rank(at, q0, range(eq.m - eq.norms, eq.m))
+    found = rank(at, q0, range(eq.m - eq.norms, eq.m))
     if not found.redundant:
         return replace(made, singular=found.singular)
     normals = zip((c.place for c in eq.contacts), eq.normals, strict=True)
@@ -158,19 +167,19 @@ def _held(eq: Equations, constraints: Sequence[Constraint], p: Variables) -> Ite
             )
 
 
-def _misfits(made: Prepared, at: start.Position) -> Iterator[str]:
+def _misfits(made: Prepared, at: Position) -> Iterator[str]:
     """Yield messages about constraints violated at the start, with the nearest valid values."""
     phi, J, phi_t = at(made.q0)
     speed = J @ made.qd0 + phi_t
-    fast = start.FITS * max(1.0, float(np.abs(made.qd0).max()))
-    if np.abs(phi).max() > start.FITS:
-        near = start.project(at, made.q0)
+    fast = FITS * max(1.0, float(np.abs(made.qd0).max()))
+    if np.abs(phi).max() > FITS:
+        near = project(at, made.q0)
         yield _offer("positions", made, phi, made.q, near)
     elif not np.isfinite(speed).all():
         worst = int(np.abs(speed).argmax())
         yield f"start: expected a finite velocity of {made.labels[worst]}, got {speed[worst]:.3g}"
     elif np.abs(speed).max() > fast:
-        yield _offer("velocities", made, speed, made.qd, start.following(J, made.qd0, phi_t))
+        yield _offer("velocities", made, speed, made.qd, following(J, made.qd0, phi_t))
 
 
 def _offer(what: str, made: Prepared, off: Array, group: Variables, near: Array | None) -> str:
@@ -207,7 +216,7 @@ def _fixed_already(made: Prepared, constraints: Sequence[Constraint], free: Arra
     For example, two prescribed motions of one coordinate agree only at the start.
     """
     phi, t = made.eq.phi, made.eq.kin.t
-    involved = np.abs(free).max(axis=1) > start.RANK
+    involved = np.abs(free).max(axis=1) > RANK
     for constraint, part in zip(constraints, made.eq.held, strict=True):
         for label in part.labels:
             i = made.labels.index(label)
@@ -244,70 +253,6 @@ def in_absolute_coordinates(tree: Prepared, constraints: Sequence[Constraint]) -
     return written(topology, tree.eq.forces, constraints, tree.p, tree.u)
 
 
-def left_open(made: Prepared) -> Iterator[str]:
-    """Yield messages about friction that depends on undetermined reactions."""
-    for name in made.undetermined:
-        yield (
-            f"{name} > friction: expected reactions that the motion determines, got a "
-            f"normal force that the redundant constraints {', '.join(made.redundant)} leave open; "
-            "close the loop with a joint of fewer constraints: PlanarRevolute, PlanarPrismatic or "
-            "PinInSlot in a planar mechanism, a ball or a PointOnLine in space"
-        )
-    if made.singular:
-        yield "start: expected independent constraints, got a singular position; start elsewhere"
-
-
-def undeclared_in_forces(made: Prepared) -> Iterator[str]:
-    """Yield messages about undeclared symbols in forces."""
-    eq = made.eq
-    known = ca.vertcat(eq.q, eq.qd, eq.angles, symbols_of((*made.p, *made.u)), eq.kin.t)
-    expected = "positions, velocities, time, parameters and inputs"
-    for force in eq.forces:
-        parts = [x for load in force.loads(eq.kin) for x in _parts(load)]
-        yield from checks.undeclared(f"force '{force.name}'", parts, known, expected)
-
-
-def _parts(load: Load | Axial) -> tuple[ca.SX, ...]:
-    return (load.value,) if isinstance(load, Axial) else (load.force, load.moment)
-
-
-def infinite(made: Prepared) -> Iterator[str]:
-    """Yield messages about forces that are not finite at the start, with zero inputs."""
-    for force in made.eq.forces:
-        (found,) = made.numbers(ca.veccat(*(_parts(x)[0] for x in force.loads(made.eq.kin))))
-        if not np.isfinite(found).all():
-            yield (
-                f"force '{force.name}': expected a finite force at the start, got "
-                f"{shown(float(np.abs(found).sum()))}; do its places coincide there?"
-            )
-
-
-def without_inertia(made: Prepared) -> Iterator[str]:
-    """Yield messages about coordinates without inertia near the start."""
-    eq = made.eq
-    if not any(eq.kin.topology.bodies[link.body].ideal for link in eq.kin.topology.links):
-        return
-    near = made.q0 + 0.1 * np.random.default_rng(0).standard_normal(eq.n)
-    found = start.weightless(replace(made, q0=near).numbers(eq.mass)[0])
-    if found.any():
-        names = ", ".join(v.name for v, is_one in zip(made.q, found, strict=True) if is_one)
-        yield (
-            f"expected a mass matrix that is positive definite, got one that is not in {names}: "
-            "the bodies they move have no mass (massless links, points on an axis, parallel axes) "
-            "or an unphysical inertia"
-        )
-
-
-def inseparable(made: Prepared) -> Iterator[str]:
-    """Yield messages about bodies whose inertia does not allow absolute coordinates."""
-    for name, body in made.eq.kin.topology.bodies.items():
-        if body.ideal and name != GROUND and any(replace(body, ideal=False).problems(made.p)):
-            yield (
-                f"body '{name}': expected a rigid body in absolute coordinates, got a "
-                "massless link, a point or an unphysical body; use joint coordinates"
-            )
-
-
 def without_friction(made: Prepared) -> tuple[Array, Array, Array]:
     """Return the accelerations, multipliers and normal forces at the start without friction."""
     eq = made.eq
@@ -337,3 +282,105 @@ def with_cuts(made: Prepared) -> Equations | None:
     if applied or eq.m or topology.depth < (LONG_WITH_FRICTION if loaded else LONG):
         return None
     return equations(topology, eq.forces, (), eq.q, eq.qd, eq.kin.t, cuts=Cuts())
+
+
+class Rank(NamedTuple):
+    """Independent and redundant constraints.
+
+    Attributes:
+        kept: indices of independent constraints, which determine the motion.
+        redundant: indices of all other constraints.
+        undetermined: combinations of multipliers without effect on the motion, shape (m, k).
+        singular: True if the rank at the start is lower than near it.
+    """
+
+    kept: tuple[int, ...]
+    redundant: tuple[int, ...]
+    undetermined: Array
+    singular: bool
+
+
+def rank(at: Position, q: Array, first: Sequence[int]) -> Rank:
+    """Return the independent constraints near q, by Gram-Schmidt with pivoting.
+
+    Args:
+        at: function q -> (phi, phi_q, phi_t).
+        q: start position, shape (n,).
+        first: indices of constraints that are always kept; they must be independent.
+    """
+    here = at(q)[1]
+    near = here
+    rng = np.random.default_rng(0)
+    for size in (1e-3, 1e-2):
+        guess = project(at, q + size * rng.standard_normal(q.size))
+        if guess is not None:
+            other = at(guess)[1]
+            near = other if _rank(other) > _rank(near) else near
+    u, s, _ = np.linalg.svd(near)
+    r = int((s > RANK * max(1.0, s[0])).sum()) if s.size else 0
+    kept = tuple(sorted(_independent(near, r, first)))
+    redundant = tuple(i for i in range(near.shape[0]) if i not in kept)
+    return Rank(kept, redundant, u[:, r:], _rank(here) < r)
+
+
+def _rank(A: Array) -> int:
+    return int(np.linalg.matrix_rank(A, tol=RANK * max(1.0, float(np.abs(A).max(initial=0.0)))))
+
+
+def _independent(A: Array, r: int, first: Sequence[int]) -> list[int]:
+    """Return the indices of r independent rows, beginning with `first`, by Gram-Schmidt.
+
+    The next row is the first whose remainder is more than half the largest, so that the constraints
+    of the joints that were added first are kept.
+    """
+    left, chosen = A.copy(), list[int]()
+    for k in range(r):
+        size = np.linalg.norm(left, axis=1)
+        i = first[k] if k < len(first) else int(np.argmax(size > 0.5 * size.max()))
+        chosen.append(i)
+        direction = left[i] / size[i]
+        left -= np.outer(left @ direction, direction)
+    return chosen
+
+
+def weightless(M: Array) -> NDArray[np.bool_]:
+    """Return a mask of the coordinates in which the mass matrix M (n, n) is not positive definite.
+
+    M is scaled to unit diagonal, so that the result does not depend on units.
+    """
+    own = np.diag(M)
+    if not (own > 0).all():
+        return own <= 0
+    least, along = np.linalg.eigh((M + M.T) / 2 / np.sqrt(np.outer(own, own)))
+    return (least[0] < SINGULAR) & (np.abs(along[:, 0]) > 0.1)
+
+
+def following(J: Array, wanted: Array, phi_t: Array) -> Array:
+    """Return rates near `wanted` that satisfy J rates + phi_t = 0.
+
+    Nonzero rates are kept if changes of the zero rates can satisfy the equations; otherwise the
+    nearest rates in the sense of least squares are returned.
+    """
+    if not J.size:
+        return wanted
+    miss, rest = J @ wanted + phi_t, wanted == 0.0
+    step = np.zeros_like(wanted)
+    step[rest] = np.linalg.lstsq(J[:, rest], miss, rcond=1e-10)[0]
+    fits = np.abs(J @ step - miss).max() <= FITS * (1.0 + np.abs(miss).max())
+    near_a_dead_centre = np.abs(step).max() > FASTEST * max(1.0, np.abs(wanted).max())
+    if not fits or near_a_dead_centre:
+        step = np.linalg.lstsq(J, miss, rcond=None)[0]
+    return wanted - step
+
+
+def project(at: Position, q: Array, iterations: int = 30) -> Array | None:
+    """Return q near the given one that satisfies the constraints; None if Gauss-Newton fails."""
+    for _ in range(iterations):
+        phi, J, _ = at(q)
+        if not phi.size or np.abs(phi).max() < 1e-13:
+            return q
+        step = np.linalg.lstsq(J, phi, rcond=1e-10)[0]
+        if not np.isfinite(step).all():
+            return None
+        q = q - step
+    return q if np.abs(at(q)[0]).max() < FITS else None

@@ -10,8 +10,7 @@ from symfric.foundation.variable import stacked, strays
 from symfric.model import Output
 from symfric.model.kinds import WORK
 from symfric.model.parts import Mark, Part, Sketch, Symbol
-from symfric.multibody.actuated import ActuatedContact
-from symfric.multibody.contact import ElementContact
+from symfric.multibody.contact import LeverContact
 from symfric.multibody.equations import Equations
 from symfric.multibody.forces import SpringDamper
 from symfric.multibody.joint import COMPONENTS, FORCE_NAMES
@@ -68,7 +67,7 @@ def _reactions(eq: Equations, undetermined: Sequence[str]) -> Iterator[tuple[str
 def _elements(eq: Equations) -> Iterator[tuple[str, Output]]:
     """Yield loads, powers, tensions and the locking ratio of each element with friction."""
     for contact in eq.contacts:
-        if not isinstance(contact, ElementContact | ActuatedContact):
+        if not isinstance(contact, LeverContact):
             continue
         name = contact.name
         for letter, load in zip("ab", contact.transmitted(eq.kin), strict=False):
@@ -76,8 +75,7 @@ def _elements(eq: Equations) -> Iterator[tuple[str, Output]]:
             on = f"the child of '{load.joint.name}' in its direction {load.direction}"
             yield f"{name}_load_{letter}", Output(load.value, unit, f"load by '{name}' on {on}")
             yield f"{name}_power_{letter}", Output(load.power(eq.kin), "W", f"power to {on}")
-        pressed = isinstance(contact, ActuatedContact)
-        for end, tension in (contact.element.tensions(contact.F) if pressed else {}).items():
+        for end, tension in contact.tensions().items():
             yield f"{name}_{end}", Output(tension, "N", f"tension of the {end} end")
         try:
             ratio = contact.locking

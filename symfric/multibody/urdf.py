@@ -15,12 +15,11 @@ from symfric.foundation.parameters import check_names, parameters, with_values
 from symfric.laws import Coulomb, Law, Sum, Viscous
 from symfric.laws.base.law import require_law
 from symfric.multibody.couplings import Gear
-from symfric.multibody.forces import JointSpringDamper
+from symfric.multibody.forces import JointSpringDamper, JointStop
 from symfric.multibody.joint import Joint, JointFriction
 from symfric.multibody.joints import Floating, Planar, Prismatic, Revolute
 from symfric.multibody.mechanism import Mechanism
 from symfric.multibody.spatial import GROUND, Vector, unphysical
-from symfric.multibody.stops import JointStop
 from symfric.multibody.urdf_file import Array, Inertial, Urdf, UrdfJoint, parse
 
 KINDS: dict[str, type[Joint]] = {

@@ -75,13 +75,14 @@ def steps_of(name: str, axes: int) -> ca.Function:
     one = LAWS[name]
     law = {0: one, 2: sf.PlanarSlip(one), 3: sf.SpatialSlip(one)}[axes]
     z, v = ca.SX.sym("z", len(law.states)), ca.SX.sym("v", max(axes, 1), 3)
+    both = ca.Function("law", [z, v[:, 0]], [law.rate(v[:, 0], N, z), law.force(v[:, 0], N, z)])
     at = [v[:, k] for k in range(3)]
-    k_1 = law.rate(at[0], N, z)
-    k_2 = law.rate(at[1], N, z + STEP / 2 * k_1)
-    k_3 = law.rate(at[1], N, z + STEP / 2 * k_2)
-    k_4 = law.rate(at[2], N, z + STEP * k_3)
+    k_1, _ = both(z, at[0])
+    k_2, _ = both(z + STEP / 2 * k_1, at[1])
+    k_3, _ = both(z + STEP / 2 * k_2, at[1])
+    k_4, _ = both(z + STEP * k_3, at[2])
     new = z + STEP / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
-    F = law.force(at[2], N, new)
+    _, F = both(new, at[2])
     step = ca.Function("step", [z, ca.vec(v)], [new, F, ca.dot(F, at[2]) * STEP])
     return step.mapaccum(COUNT)
 

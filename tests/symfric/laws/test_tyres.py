@@ -55,7 +55,7 @@ def steady(law: sf.LuGreTyre, v: float, N: float, v_r: float) -> float:
     def rate(_: float, z: np.ndarray) -> np.ndarray:
         return np.ravel(law.rate(v, N, z, v_r=v_r))
 
-    found = solve_ivp(rate, (0.0, 60.0), [0.0], method="Radau", rtol=1e-10, atol=1e-14)
+    found = solve_ivp(rate, (0.0, 1.5), [0.0], method="LSODA", rtol=1e-10, atol=1e-14)
     return float(law.force(v, N, found.y[:, -1], v_r=v_r))
 
 

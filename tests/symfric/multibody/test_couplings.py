@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from math import atan, cos, inf, pi, tan
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ from symfric.codegen import generate, inverse_dynamics_block, verify
 from symfric.fmu import export_fmu, running
 from symfric.foundation.parameters import Variable
 from symfric.laws import Law
-from symfric.multibody.cams import CamFriction
+from symfric.multibody.element_friction import CamFriction
 
 SHARP = partial(Coulomb, v_eps=1e-9)
 DRY = ExactCoulomb(mu_s=0.15, mu_d=0.15)
@@ -55,14 +56,13 @@ def jack(law: Law, lead: Any, radius: Any = 0.01, flank: Any = 0.0, mass: Any = 
 
 def test_screws_need_the_moments_of_the_textbook() -> None:
     """F r tan(lambda + phi) and F r tan(phi - lambda) over six decades of loads and sizes."""
-    names = {"lead": "m", "radius": "m", "flank": "rad", "mass": "kg", "mu": "1", "speed": "rad/s"}
-    p = [Variable(name, unit, start=0.1) for name, unit in names.items()]
+    p = variables(lead="m", radius="m", flank="rad", mass="kg", mu="1", speed="rad/s")
     lead, radius, flank, mass, mu, speed = (v.symbol for v in p)
     m = jack(SHARP(mu_d=mu), lead, radius, flank, mass)
     m.joints = [replace(m.joints[0], rate=(lead / (2 * pi) * speed, speed))]
     m.constraint(mb.PrescribedMotion("drive", "thread", lambda t: speed * t))
     model, draw = m.build(p=p), np.random.default_rng(1)
-    for _ in range(15):
+    for _ in range(8):
         r, slope, angle = 10 ** draw.uniform(-3, 0), draw.uniform(0.01, 1.0), draw.uniform(0, 0.7)
         load, level, side = 10 ** draw.uniform(-1, 5), 10 ** draw.uniform(-3, -0.2), 1.0
         values = {"lead": 2 * pi * r * tan(slope), "radius": r, "flank": angle, "mass": load / G}
@@ -112,7 +112,7 @@ def test_a_lowered_load_accelerates_as_in_closed_form(options: dict[str, Any]) -
     assert np.abs(balance.defect).max() < 1e-9 * balance.scale
 
 
-def pair(coupling: Any, speed: float, load: float, slides: bool = False) -> mb.Mechanism:
+def pair(coupling: Any, speed: Any, load: Any, slides: bool = False) -> mb.Mechanism:
     """A shaft driven at constant speed, and a shaft or rack with a load."""
     m = mb.Mechanism("pair", gravity=(0.0, 0.0, 0.0))
     for name in ("first", "second"):
@@ -127,41 +127,50 @@ def pair(coupling: Any, speed: float, load: float, slides: bool = False) -> mb.M
     return m
 
 
+def variables(**units: str) -> list[Variable]:
+    return [Variable(name, unit, start=0.1) for name, unit in units.items()]
+
+
 def test_worms_drive_and_are_driven_as_screws() -> None:
     """Moment of the worm M r / r_g tan(lambda +- phi), for left-hand and right-hand worms."""
     r, wheel, slope, mu, angle = 0.02, 0.11, 0.3, 0.08, 0.35
     phi, lead = atan(mu / cos(angle)), 2 * pi * 0.02 * tan(0.3)
     friction = mb.ThreadFriction(SHARP(mu_d=mu), r, angle, lead)
-    for side in (1.0, -1.0):
-        for speed in (5.0, -5.0):
-            for load in (40.0, -40.0):
-                gear = mb.Gear("worm", "a", "b", side * r * tan(slope) / wheel, friction=friction)
-                run = simulate(pair(gear, speed, load).build(), 0.1)
-                axial = -side * load / wheel
-                sign = np.sign(axial * speed)
-                wanted = axial * r * tan(slope + sign * phi)
-                assert run["drive_moment"] == pytest.approx(wanted, rel=1e-9)
-                ratio = tan(slope) / tan(slope + phi)
-                gain = ratio if sign > 0 else tan(slope - phi) / tan(slope)
-                assert mb.efficiency(run, "worm") == pytest.approx(gain, rel=1e-9)
+    p = variables(ratio="1", speed="rad/s", load="N m")
+    gear = mb.Gear("worm", "a", "b", p[0].symbol, friction=friction)
+    model = pair(gear, p[1].symbol, p[2].symbol).build(p=p)
+    for side, speed, load in product((1.0, -1.0), (5.0, -5.0), (40.0, -40.0)):
+        values = {"ratio": side * r * tan(slope) / wheel, "speed": speed, "load": load}
+        run = simulate(model, 0.1, p=values)
+        axial = -side * load / wheel
+        sign = np.sign(axial * speed)
+        wanted = axial * r * tan(slope + sign * phi)
+        assert run["drive_moment"] == pytest.approx(wanted, rel=1e-9)
+        ratio = tan(slope) / tan(slope + phi)
+        gain = ratio if sign > 0 else tan(slope - phi) / tan(slope)
+        assert mb.efficiency(run, "worm") == pytest.approx(gain, rel=1e-9)
 
 
-def test_meshes_have_the_efficiency_that_gave_their_arm() -> None:
-    draw = np.random.default_rng(2)
+@pytest.mark.parametrize("kind", ["external", "internal", "rack"])
+def test_meshes_have_the_efficiency_that_gave_their_arm(kind: str) -> None:
+    slides, mu = kind == "rack", 0.07
+    p = variables(ratio="m" if slides else "1", load="N" if slides else "N m", arm="m", r_b="m")
+    ratio, load, arm, radius = (v.symbol for v in p)
+    friction = mb.MeshFriction(
+        SHARP(mu_d=mu), arm, None if slides else radius, 0.4, 0.2, internal=kind == "internal"
+    )
+    element = (mb.Rolling if slides else mb.Gear)("mesh", "a", "b", ratio, friction=friction)
+    model, draw = pair(element, 7.0, load, slides).build(p=p), np.random.default_rng(2)
     for eta in (0.5, 0.9, 0.99, 0.9999):
-        r_a, r_b, mu = 10 ** draw.uniform(-2, -1), 10 ** draw.uniform(-0.9, 0), 0.07
-        ratio = r_a / r_b
-        for far, k, inner in ((r_b, -ratio, False), (-r_b, ratio, True), (inf, r_a, False)):
-            arm = mb.mesh_arm(eta, mu, r_a, far, pressure_angle=0.4, helix_angle=0.2)
-            own = None if far == inf else r_b
-            law = SHARP(mu_d=mu)
-            friction = mb.MeshFriction(law, arm, own, 0.4, 0.2, internal=inner)
-            coupling = mb.Rolling if own is None else mb.Gear
-            element = coupling("mesh", "a", "b", k, friction=friction)
-            run = simulate(pair(element, 7.0, -np.sign(k) * 50.0, own is None).build(), 0.1)
-            assert mb.efficiency(run, "mesh") == pytest.approx(eta, rel=1e-9)
-            lever = mu * arm / (cos(0.4) * cos(0.2))
-            assert run["mesh_locking"] == pytest.approx(lever / r_a, rel=1e-9)
+        r_a, r_b = 10 ** draw.uniform(-2, -1), 10 ** draw.uniform(-0.9, 0)
+        far = {"external": r_b, "internal": -r_b, "rack": inf}[kind]
+        k = r_a if slides else -r_a / far
+        length = mb.mesh_arm(eta, mu, r_a, far, pressure_angle=0.4, helix_angle=0.2)
+        values = {"ratio": k, "load": -np.sign(k) * 50.0, "arm": length, "r_b": r_b}
+        run = simulate(model, 0.1, p=values)
+        assert mb.efficiency(run, "mesh") == pytest.approx(eta, rel=1e-9)
+        lever = mu * length / (cos(0.4) * cos(0.2))
+        assert run["mesh_locking"] == pytest.approx(lever / r_a, rel=1e-9)
 
 
 def hump(angle: ca.SX) -> ca.SX:
@@ -172,18 +181,20 @@ def hump(angle: ca.SX) -> ca.SX:
 def test_cams_need_their_moments() -> None:
     """Flat, pointed and roller followers with s = e (1 - cos x) at constant speed."""
     e, base, mu, mass, rolls = 0.01, 0.03, 0.2, 2.0, (0.008, 0.003)
+    (w,) = variables(w="rad/s")
     for kind in ("flat", "pointed", "roller"):
+        own = rolls if kind == "roller" else (None, None)
+        m = mb.Mechanism("valve")
+        m.body("cam", 1.0, (0.01, 0.01, 0.01))
+        m.body("tappet", mass, (0.01, 0.01, 0.01))
+        m.joint(mb.Revolute("shaft", "ground", "cam", rate=w.symbol))
+        m.joint(mb.Prismatic("guide", "ground", "tappet"))
+        friction = CamFriction(SHARP(mu_d=mu), base, kind, *own)
+        m.constraint(mb.Cam("lobe", "shaft", "guide", hump, friction))
+        m.constraint(mb.PrescribedMotion("drive", "shaft", lambda t: w.symbol * t))
+        model = m.build(p=(w,))
         for speed in (5.0, -5.0):
-            own = rolls if kind == "roller" else (None, None)
-            m = mb.Mechanism("valve")
-            m.body("cam", 1.0, (0.01, 0.01, 0.01))
-            m.body("tappet", mass, (0.01, 0.01, 0.01))
-            m.joint(mb.Revolute("shaft", "ground", "cam", rate=speed))
-            m.joint(mb.Prismatic("guide", "ground", "tappet"))
-            friction = CamFriction(SHARP(mu_d=mu), base, kind, *own)
-            m.constraint(mb.Cam("lobe", "shaft", "guide", hump, friction))
-            m.constraint(mb.PrescribedMotion("drive", "shaft", lambda t, w=speed: w * t))
-            run = simulate(m.build(), 2.0)
+            run = simulate(model, 2.0, p={"w": speed}, samples=41)
             x, sign = speed * run.t, np.sign(speed)
             load, r = mass * (G + e * speed**2 * np.cos(x)), base + e * (1 - np.cos(x))
             slope, alpha = e * np.sin(x), np.arctan(e * np.sin(x) / r)
@@ -207,7 +218,7 @@ def check_trains(seeds: range) -> None:
     """Energy in is energy out and losses; the motor's moment is that by hand, to 1e-9."""
     for seed in seeds:
         train = random_train(seed)
-        run = simulate(train.mechanism.build(), 2.0, rtol=1e-10)
+        run = simulate(train.mechanism.build(), 0.5, rtol=1e-10, samples=21)
         balance, stages = run.energy_balance(), range(len(train.stages))
         assert np.abs(balance.defect).max() < 1e-9 * balance.scale, seed
         accelerations = [run[f"j{k}_acc"] for k in range(len(train.stages) + 1)]
@@ -321,14 +332,14 @@ def test_friction_that_cannot_act_is_refused_with_its_carrier() -> None:
             for screw, message in ((True, CARRIER), (False, "write preload=... or normal=")):
                 m = nut(friction, z, g, screw)
                 if acts:
-                    m.build()
+                    m.prepare()
                 else:
                     with pytest.raises(ValueError, match=message):
-                        m.build()
+                        m.prepare()
     load = Variable("load", "N", start=5.0)
-    nut(mb.JointFriction(law, 0.01, preload=load), *axes[0]).build(p=(load,))
+    nut(mb.JointFriction(law, 0.01, preload=load), *axes[0]).prepare((load,))
     # a weight across the axis loads the bearing
-    nut(mb.JointFriction(law, 0.01), (1, 0, 0), (0, 0, -G)).build()
+    nut(mb.JointFriction(law, 0.01), (1, 0, 0), (0, 0, -G)).prepare()
 
 
 CARRIER = r"coupling 'screw' carries the load; write Screw\('screw', ..., friction=ThreadFriction"
@@ -347,7 +358,7 @@ def test_mistakes_are_answered_by_one_sentence_each() -> None:
 
 
 def built(element: Any, *more: Any) -> Any:
-    """Build a crank, a wheel and a slide with an element."""
+    """Prepare a crank, a wheel and a slide with an element."""
     m = mb.Mechanism("m")
     for name, joint in (("crank", mb.Revolute), ("wheel", mb.Revolute), ("slide", mb.Prismatic)):
         m.body(f"{name}_body", 1.0, (0.1, 0.1, 0.1))
@@ -356,7 +367,7 @@ def built(element: Any, *more: Any) -> Any:
     m.joint(mb.Cylindrical("thread", "ground", "nut"))
     for each in (element, *more):
         m.constraint(each)
-    return m.build()
+    return m.prepare()
 
 
 def screw(*given: Any, **options: Any) -> Any:

@@ -108,7 +108,7 @@ def belt(rng: np.random.Generator, mu: float, s: int, law: Law) -> Case:
 @pytest.mark.parametrize("make", [disc, worn, shoe, band, capstan, belt])
 @pytest.mark.parametrize("s", [1, -1])
 def test_forces_are_those_of_equilibrium(make: Callable[..., Case], s: int) -> None:
-    for seed in range(3):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         mu = 10 ** rng.uniform(-2, -0.2)
         law = dry(mu) if seed % 2 else sf.Coulomb(mu_d=mu, v_eps=1e-6)
@@ -159,8 +159,9 @@ def test_a_brake_holds_up_to_its_static_level(s: int) -> None:
         assert np.abs(run["a_rate"][run.t < 0.999]).max() < 1e-12
 
 
-@pytest.mark.parametrize("s", [1, -1])
-@pytest.mark.parametrize("R", [0.2, 1.0, 1e-4])
+@pytest.mark.parametrize(
+    ("s", "R"), [(1, 0.2), (-1, 1.0), pytest.param(1, 1e-4, marks=pytest.mark.slow)]
+)
 def test_brakes_and_a_bearing_on_one_shaft_stop_and_hold_it_together(s: int, R: float) -> None:
     """The shaft stops after J w / (sum of the moments) and breaks away at the sum of the levels."""
     law, P = dry(0.4, 0.3), 50.0 / R
@@ -178,7 +179,7 @@ def test_brakes_and_a_bearing_on_one_shaft_stop_and_hold_it_together(s: int, R: 
 
     slide, hold = levels(0.3, 0.1), levels(0.4, 0.2)
     stop = 0.5 * 30 / slide
-    run = simulate(m.build(), 2 * stop, u={"torque": 0.0}, rtol=1e-9)
+    run = simulate(m.build(), 2 * stop, u={"torque": 0.0}, rtol=1e-9, samples=21)
     assert [what for _, what in run.happened] == ["a_loop_stick"]
     assert run.happened[0][0] == pytest.approx(stop, rel=1e-8)
     balance = run.energy_balance()

@@ -15,7 +15,7 @@ from symfric import BrownMcPhee, LuGre, SolveError, Viscous, simulate
 from symfric import multibody as mb
 from symfric.foundation.numeric import Scalar
 from symfric.foundation.parameters import Variable
-from symfric.multibody.start import following
+from symfric.multibody.prepare import following
 
 LAW = BrownMcPhee()
 

@@ -170,7 +170,8 @@ def test_c_of_a_scene_takes_presets_and_places(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     line = "codegen --law coulomb --scene pendulum_box --preset jing_mi_table_7 --step-size 1e-3"
-    assert main([*line.split(), "--law-of", "hinge=dahl", "--out", str(tmp_path)]) == 0
+    more = ("--law-of", "hinge=dahl", "--real", "double", "--out", str(tmp_path))
+    assert main([*line.split(), *more]) == 0
     source = "".join(path.read_text() for path in tmp_path.rglob("*.h"))
     assert "mu_d_1" in source
     assert "sigma_0" in source
