@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 
 from symfric.codegen import Block, law_block
+from symfric.codegen.blocks.block import CBlock
 from symfric.codegen.compared import Run
 from symfric.codegen.guards import Status
-from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import WARNINGS, program, run_vm
 from symfric.codegen.source import header, source
 from symfric.codegen.vectors import changed_value

@@ -66,7 +66,7 @@ MOST = {
     "simulate, second": 14,
     "Fit.solve": 54,
     "ocp.solve": 93,
-    "generate": 34,
+    "generate": 30,
 }
 
 

@@ -57,8 +57,7 @@ from pathlib import Path
 import casadi as ca
 
 from ocp.mpc.design import Control, CycleStatus, Design
-from symfric.codegen.layout import filled, folded
-from symfric.emitter.c99 import DOUBLE, FLOAT, TRANSCENDENTAL, Real, macro
+from symfric.emitter.c99 import DOUBLE, FLOAT, TRANSCENDENTAL, Real, filled, folded, macro
 from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph
 

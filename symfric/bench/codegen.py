@@ -17,7 +17,7 @@ from symfric import BrownMcPhee, ExactCoulomb, Hold, Law, LuGre, SolveError, sim
 from symfric.bench.embedded import CASES, whole
 from symfric.bench.report import Found, Progress, Report, Row, goal
 from symfric.codegen import Block, law_block, plant_block
-from symfric.codegen.fuzz import STEPS, fuzz
+from symfric.codegen.contract import STEPS, fuzz
 from symfric.compensation import (
     Cascade,
     close_loop,

@@ -7,9 +7,8 @@ from math import isfinite, nan
 import numpy as np
 
 from symfric.choice.friction import Friction
-from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.block import Block, CBlock
 from symfric.codegen.blocks.from_law import law_block
-from symfric.codegen.layout import CBlock
 from symfric.codegen.source import routines
 from symfric.embedded import measure
 from symfric.emitter.c99 import REALS

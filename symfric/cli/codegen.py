@@ -13,7 +13,7 @@ from symfric import Law, with_values
 from symfric.cli import options as opt
 from symfric.cli import output
 from symfric.cli.codegen_report import report
-from symfric.cli.controllers import OPTIONS, REALS, write_controllers
+from symfric.cli.controllers import REALS, write_controllers
 from symfric.cli.machines import kind_of, settable, with_set
 from symfric.cli.options import Strings
 from symfric.codegen import (
@@ -36,7 +36,7 @@ from symfric.compensation import (
     settings_from_text,
 )
 from symfric.compensation import compensator as compensator_block
-from symfric.compensation.adaptation import adaptation_from_text
+from symfric.compensation.settings import adaptation_from_text
 from symfric.embedded import CORES, StepError, measure, step_errors
 from symfric.foundation import checks
 from symfric.foundation.files import check_folder
@@ -62,12 +62,12 @@ APPLIES = {
     "--fold": (LAW, FUNCTION, PLANT, INVERSE, COMPENSATOR),
     "--turning": (LAW, FUNCTION, COMPENSATOR, ESTIMATOR),
     "--payload": (INVERSE,),
-    "--tunable-gravity": (INVERSE,),
     "--compensation": (COMPENSATOR,),
-    "--drive": (COMPENSATOR,),
-    "--adaptation": (ESTIMATOR,),
+    "--tunable-gravity": (INVERSE,),
     "--preset": (PLANT,),
     "--law-of": (PLANT,),
+    "--adaptation": (ESTIMATOR,),
+    "--drive": (COMPENSATOR,),
 }
 """Option that applies only to some subjects -> these subjects."""
 
@@ -146,7 +146,7 @@ def codegen(
 
     Example: symfric codegen fit.json --estimator recursive --adaptation noise=1e-4 --out build
     """
-    others = opt.changed(codegen, locals(), OPTIONS)
+    given = opt.changed(codegen, locals())
     check_names("--core", core or (), CORES)
     check_folder(out)
     opt.check_outputs(json)
@@ -155,7 +155,7 @@ def codegen(
     if compiler is not None:
         find_compiler(checks.text("--compiler", compiler, "a C compiler"))
     if mpc is not None:
-        return write_controllers(out, mpc, others, settings, step_size, real, core, json)
+        return write_controllers(out, mpc, given, settings, step_size, real, core, json)
     if fit and not law and fit.suffix.lower() not in (".json", ".urdf") and not fit.is_file():
         fit, law = None, str(fit)
     texts = opt.assignments("--set", settings)
@@ -163,13 +163,7 @@ def codegen(
     subject = subject_of(chosen, scene, compensator, estimator)
     kind = ("double" if subject == PLANT else "both") if real is None else real
     check_names("--real", [kind], REALS)
-    given = {
-        "--step-size": step_size, "--method": method, "--free": free, "--fold": fold or None,
-        "--turning": turning or None, "--payload": payload, "--compensation": compensation,
-        "--tunable-gravity": tunable_gravity or None, "--preset": preset, "--law-of": law_of,
-        "--adaptation": adaptation, "--drive": drive,
-    }  # fmt: skip
-    check_applicable(subject, [option for option, value in given.items() if value is not None])
+    check_applicable(subject, [option for option in APPLIES if option in given])
     own: dict[str, Any] = {"fold": fold or None, "free": free, "name": name, "h": step_size}
     own = {option: value for option, value in own.items() if value is not None}
     options, adjustable = dict[str, Any](), None

@@ -13,27 +13,27 @@ from symfric.foundation.parameters import check_names
 
 REALS = {"double": ("double",), "float": ("float",), "both": ("double", "float")}
 """Value of --real -> floating-point types."""
-OPTIONS = ("out", "mpc", "settings", "step_size", "real", "core", "json")
+OPTIONS = ("--out", "--mpc", "--settings", "--step-size", "--real", "--core", "--json")
 """Options of `symfric codegen` that apply to a controller."""
 STEP = 0.01
 """Default time between cycles [s] of a controller of a problem."""
 
 
 def write_controllers(
-    out: Path, text: str, others: Sequence[str], settings: Strings, step: float | None,
+    out: Path, text: str, given: Sequence[str], settings: Strings, step: float | None,
     real: str | None, cores: Strings, json: str | None,
 ) -> None:  # fmt: skip
     """Write the controller of FILE.py[:NAME] in each type, verify it, and measure it on cores.
 
     Raises:
-        ValueError: `others`, further options; a file without a problem or controller, or a step
-            size for a controller, which has its own.
+        ValueError: options `given` other than `OPTIONS`; a file without a problem or controller,
+            or a step size for a controller, which has its own.
     """
     from ocp import Controller, Problem  # noqa: PLC0415  (slow to import)
     from ocp.mpc.target import measure_controller  # noqa: PLC0415  (slow to import)
 
     check_names("--real", [real or "both"], REALS)
-    if others:
+    if others := [option for option in given if option not in OPTIONS]:
         raise ValueError(
             "codegen --mpc: expected only --out, --set, --step-size, --real, --core and --json in "
             f"addition, got {', '.join(others)}"

@@ -1,4 +1,4 @@
-"""`symfric identify`: fit friction laws to measured data and assess the result."""
+"""`symfric identify`: fit friction laws or a robot to measured data and assess the result."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -18,12 +18,14 @@ from identification.residuals.inverse import InverseDynamics
 from identification.residuals.points import Points
 from identification.residuals.shooting import Shooting
 from identification.result.fitted import Fitted
+from identification.robot.friction import USUAL
+from identification.robot.identify import identify_robot
 from identification.select import INTERRUPTED, Ranking, select
 from identification.unknowns.spec import above, linear, log, tied
 from identification.verdict.profile import Profile
 from symfric import Drive, SolveError, Status
 from symfric.cli import options as opt
-from symfric.cli import output, robots
+from symfric.cli import output
 from symfric.cli.options import Strings
 from symfric.foundation import checks
 from symfric.foundation.parameters import check_names
@@ -203,7 +205,7 @@ def identify(
             "--profile": profiles, "--html": html,
         })  # fmt: skip
         read = reader(columns, units, "inverse", missing, resample, step, variable, scales)
-        robots.identify(data, law, validate, read, loss, plot, json, rotors, urdf)
+        identify_robots(data, law, validate, read, loss, plot, json, rotors, urdf)
         return
     refuse_options("without ROBOT.urdf", {"--rotors": rotors, "--urdf": urdf})
     if not law:
@@ -297,3 +299,38 @@ def refuse(fit: Fitted, ranking: Ranking | None, failed: Sequence[str]) -> None:
         )
     if failed:
         raise SolveError("; ".join(failed), fit.status, fit)
+
+
+METHODS = {"squares": "weighted", "huber": "robust"}
+"""Value of --loss -> method of `identify_robot`."""
+
+
+def identify_robots(
+    data: list[str], law: Strings, validate: Strings, read: Callable[[list[str]], Dataset],
+    loss: str, plot: Path | None, json: str | None, rotors: bool, urdf: Path | None,
+) -> None:  # fmt: skip
+    """Identify a robot, print the table and write the requested files."""
+    robot, *logs = data
+    if not logs:
+        raise ValueError(f"identify: expected logs of the joints of '{robot}', got none")
+    laws = opt.laws_of(law or [USUAL])
+    if len(laws) > 1:
+        raise ValueError(f"--law: expected one law for the joints of a robot, got {len(laws)}")
+    method = METHODS[checks.choice("--loss of a robot", loss, [*METHODS])]
+    others = read(validate) if validate else None
+    fit = identify_robot(
+        robot, read(logs), *laws.values(), validation=others, method=method, rotors=rotors
+    )
+    if plot:
+        fit.plot(plot)
+    if urdf:
+        fit.to_urdf(urdf)
+    shown = fit.shown()
+
+    def show() -> None:
+        output.show("\n".join((shown.title, *shown.lines, "")))
+        output.show_table(shown.table.header, shown.table.rows)
+        for text in shown.after:
+            output.show(f"\n{text}")
+
+    output.finish(fit.to_dict(), json, show, plot, urdf)

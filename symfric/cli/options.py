@@ -120,14 +120,12 @@ def called_with(text: str, make: Callable[..., Any], values: dict[str, float]) -
     return make(**values)
 
 
-def changed(
-    command: Callable[..., Any], given: Mapping[str, Any], allowed: Iterable[str]
-) -> list[str]:
-    """Return the options of a command that differ from their defaults and are not `allowed`."""
+def changed(command: Callable[..., Any], given: Mapping[str, Any]) -> list[str]:
+    """Return the options of a command that differ from their defaults."""
     return [
         f"--{'no-' * (known.default is True)}{name.replace('_', '-')}"
         for name, known in signature(command).parameters.items()
-        if name not in allowed and given[name] != known.default
+        if given[name] != known.default
     ]
 
 

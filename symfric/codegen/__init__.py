@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from symfric.codegen.blocks.inverse_dynamics import (
         inverse_dynamics_block as inverse_dynamics_block,
     )
+    from symfric.codegen.contract import Proof as Proof
+    from symfric.codegen.contract import prove as prove
     from symfric.codegen.generated import Generated as Generated
     from symfric.codegen.generated import generate as generate
-    from symfric.codegen.proof import Proof as Proof
-    from symfric.codegen.proof import prove as prove
     from symfric.codegen.verification import Check as Check
     from symfric.codegen.verification import Verification as Verification
     from symfric.codegen.verification import verify as verify

@@ -18,10 +18,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.block import Block, CBlock
 from symfric.codegen.guards import Status
-from symfric.codegen.layout import CBlock
-from symfric.codegen.runner import GuardModel, in_type
+from symfric.codegen.runner import GuardModel, evaluated, in_type
 from symfric.foundation.graph import SELECT, Graph, graph, rebuild
 from symfric.foundation.numeric import Array
 from symfric.model.kinds import CONSTRAINTS
@@ -131,7 +130,7 @@ class Run:
         states = np.vstack([self.c.start, self.rows[:-1, :count]])
         if self.c.guards:
             inputs, _ = model.inputs(inputs)
-            states = np.where([[model.lost(x)] for x in states], self.c.start, states)
+            states = np.where(model.lost(states)[:, None], self.c.start, states)
         return states, parameters, inputs
 
     @cached_property
@@ -182,7 +181,7 @@ def terms(block: Block) -> ca.Function:
     plain = _found(source, values, [*states, *outputs], PASSES)
     deep = _found(source, values, residuals, PASSES | PRODUCTS)
     rows = [plain[i] for i in states] + [deep.get(i, plain[i]) for i in outputs]
-    return ca.Function("terms", arguments, [ca.vertcat(ca.SX(0, 1), *rows)])
+    return ca.Function("terms", arguments, [ca.densify(ca.vertcat(ca.SX(0, 1), *rows))])
 
 
 def _found(
@@ -230,9 +229,8 @@ def magnitudes(block: Block, states: Array, parameters: Array, inputs: Array) ->
     """
     every = max(1, len(inputs) // SAMPLES)
     given = (states, np.broadcast_to(parameters, (len(inputs), len(block.parameters))), inputs)
-    columns = (ca.DM(np.ascontiguousarray(column[::every].T)) for column in given)
-    found = terms(block)(*columns).full()
-    largest = np.where(np.isfinite(found), found, 0.0).max(axis=1, initial=0.0)
+    found = evaluated(terms(block), *(column[::every] for column in given))
+    largest = np.where(np.isfinite(found), found, 0.0).max(axis=0, initial=0.0)
     return np.maximum(largest, [v.nominal for v in block.states] + [0.0] * len(block.outputs))
 
 

@@ -10,13 +10,11 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, final
 
-from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.block import SHEET, Block, CBlock
 from symfric.codegen.blocks.from_law import contact_block, law_block
-from symfric.codegen.blocks.texts import SHEET
 from symfric.codegen.blocks.variables import Fold
 from symfric.codegen.guards import MEANING, Range, Status, parameter_range, range_of
 from symfric.codegen.kit import kit_files
-from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import footprint
 from symfric.codegen.source import header, routines, source
 from symfric.emitter.c99 import REALS

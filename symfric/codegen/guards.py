@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from symfric.codegen.blocks.texts import SHEET
-from symfric.codegen.layout import TEMPLATES, CBlock, filled
+from symfric.codegen.blocks.block import SHEET, TEMPLATES, CBlock
+from symfric.emitter.c99 import filled
 from symfric.foundation.parameters import Variable
 
 WIDE = 1e6

@@ -13,19 +13,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.codegen.blocks.block import GROUPS
-from symfric.codegen.layout import (
-    TEMPLATES,
-    CBlock,
-    banner,
-    comment,
-    filled,
-    folded,
-    head,
-    indented,
-)
+from symfric.codegen.blocks.block import GROUPS, TEMPLATES, CBlock, banner, head
 from symfric.codegen.vectors import BASE, PARAMETER_SHARE, ROUNDINGS, Vectors, vectors
-from symfric.emitter.c99 import Real
+from symfric.emitter.c99 import Real, comment, filled, folded, indented
 
 
 def kit_files(several: Sequence[CBlock]) -> dict[str, str]:

@@ -19,8 +19,9 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from symfric.codegen.blocks.block import TEMPLATES, CBlock
 from symfric.codegen.guards import STEP_SIZE, Range, Status, parameter_range, range_of, state_limit
-from symfric.codegen.layout import TEMPLATES, CBlock, filled
+from symfric.emitter.c99 import filled
 from symfric.foundation.files import write_text
 from symfric.foundation.graph import SELECT, graph
 from symfric.foundation.instructions import CODES
@@ -169,36 +170,61 @@ def run_vm(
             from the row before it; by default the steps start from their own results.
         parameters: parameters of every step, shape (steps, parameters); default those of the block.
     """
-    block, model = c.block, GuardModel(c)
-    inputs, said = c.real.rounded(inputs), np.zeros(len(inputs), np.int64)
+    block, model, steps = c.block, GuardModel(c), len(inputs)
+    u, said = c.real.rounded(inputs), np.zeros(steps, np.int64)
+    p = np.tile(c.default, (steps, 1)) if parameters is None else c.real.rounded(parameters)
     if c.guards:
-        inputs, said = model.inputs(inputs)
-    p, x, u = c.default.copy(), c.start.copy(), np.zeros(len(block.inputs))
-    following, y = np.zeros_like(x), np.zeros(len(block.outputs))
-    others = [np.zeros_like(x) for _ in block.resets]
-    results = [(following, y), *((other,) for other in others)]
-    calls = [bound(f, (x, p, u), of) for f, of in zip(block.functions, results, strict=True)]
-    rows = np.zeros((len(inputs), len(c.signals)))
-    for k, (row, now) in enumerate(zip(rows, inputs, strict=True)):
-        u[:] = now
-        if states is not None and k:
-            x[:] = states[k - 1]
-        if parameters is not None:
-            p[:] = c.real.rounded(parameters[k])
-            if c.guards:
-                p[:], bits = model.parameters(p)
-                said[k] |= bits
+        (u, said), (p, unfit) = model.inputs(u), model.parameters(p)
+        said |= unfit
+    if states is None:
+        x, rows = _followed(c, p, u)
+    else:
+        x, rows = np.vstack([c.start, states])[:steps], None
+    if c.guards:
+        lost = model.lost(x)
+        x[lost] = c.start
+        said[lost] |= Status.STATE
+    if rows is None:
+        rows = evaluated(block.step, x, p, u)
+    resets = [evaluated(block.reset(name), x, p, u) for name in block.resets]
+    if not c.guards:
+        return np.hstack([rows, *resets])
+    count = len(block.states)
+    bad = ~np.isfinite(rows[:, count:]).all(axis=1)
+    rows[bad, :count], rows[bad, count:] = c.start, 0.0
+    said[bad] |= Status.OUTPUT
+    return np.hstack([rows, *resets, said[:, None]])
+
+
+def _followed(c: CBlock, parameters: Array, inputs: Array) -> tuple[Array, Array]:
+    """Return the states before every step and its results, each from the step before it."""
+    step, model = c.block.step, GuardModel(c)
+    x, p, u = c.start.copy(), c.default.copy(), np.zeros(inputs.shape[1])
+    following, y = np.zeros(len(x)), np.zeros(step.numel_out(1))
+    call = bound(step, (x, p, u), (following, y))
+    before, rows = np.zeros((len(inputs), len(x))), np.zeros((len(inputs), len(x) + len(y)))
+    for k in range(len(inputs)):
+        before[k], p[:], u[:] = x, parameters[k], inputs[k]
         if c.guards and model.lost(x):
             x[:] = c.start
-            said[k] |= Status.STATE
-        for call in calls:
-            call()
-        if c.guards and not np.isfinite(y).all():
-            following[:], y[:] = c.start, 0.0
-            said[k] |= Status.OUTPUT
-        row[:] = np.concatenate([following, y, *others, said[k : k + 1] if c.guards else ()])
-        x[:] = following
-    return rows
+        call()
+        rows[k] = np.concatenate([following, y])
+        x[:] = c.start if c.guards and not np.isfinite(y).all() else following
+    return before, rows
+
+
+def evaluated(function: ca.Function, *arguments: Array) -> Array:
+    """Return the results of a function, concatenated, for every row of its arguments.
+
+    Args:
+        function: function of columns with dense results.
+        arguments: rows of each argument, shape (rows, size of the argument).
+    """
+    count = len(arguments[0])
+    given = [np.ascontiguousarray(rows, float) for rows in arguments]
+    results = [np.zeros((count, function.numel_out(i))) for i in range(function.n_out())]
+    bound(function.map(count), given, results)()  # rows of arrays are columns in CasADi
+    return np.hstack(results)
 
 
 @final
@@ -219,21 +245,18 @@ class GuardModel:
             status[finite & (found[:, i] != rows[:, i])] |= Status.CLAMPED
         return found, status
 
-    def lost(self, states: Array) -> bool:
-        """Return True if the guards restart the states (states,) before a step."""
-        return not bool((np.abs(states) <= self._limits).all())
+    def lost(self, states: Array) -> NDArray[np.bool_]:
+        """Return True for the states (..., states) that the guards restart before a step."""
+        return np.asarray((~(np.abs(states) <= self._limits)).any(axis=-1))
 
-    def parameters(self, values: Array) -> tuple[Array, int]:
-        """Return the guarded parameters (parameters,) and the status."""
+    def parameters(self, rows: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Return the guarded parameters (steps, parameters) and the status of every step."""
         low, high, is_size = self._ranges
-        unfit = ~((values >= low) & (values <= high))
-        found = values.copy()
-        if unfit[~is_size].any():
-            found[~is_size] = self.c.default[~is_size]
-        for i in np.flatnonzero(unfit & is_size):
-            clipped = np.clip(values[i], low[i], high[i])
-            found[i] = clipped if np.isfinite(values[i]) else self.c.default[i]
-        return found, int(Status.PARAMETER) if unfit.any() else 0
+        unfit = ~((rows >= low) & (rows <= high))
+        replaced = (unfit & ~is_size).any(axis=1, keepdims=True) & ~is_size
+        size = np.where(np.isfinite(rows), np.clip(rows, low, high), self.c.default)
+        found = np.where(is_size, size, np.where(replaced, self.c.default, rows))
+        return found, np.where(unfit.any(axis=1), int(Status.PARAMETER), 0)
 
     @cached_property
     def _used(self) -> dict[int, Range]:

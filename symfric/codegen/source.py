@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import casadi as ca
 
-from symfric.codegen.blocks.block import GROUPS, Block, Member
-from symfric.codegen.blocks.texts import SHEET
+from symfric.codegen.blocks.block import GROUPS, SHEET, TEMPLATES, Block, CBlock, Member, banner
 from symfric.codegen.guards import (
     STEP_SIZE,
     constants,
@@ -22,18 +21,18 @@ from symfric.codegen.guards import (
     parameter_range,
     range_of,
 )
-from symfric.codegen.layout import (
-    TEMPLATES,
+from symfric.emitter.arrays import emit_rolled
+from symfric.emitter.c99 import (
+    TRANSCENDENTAL,
     WIDTH,
-    CBlock,
-    banner,
     block_comment,
     comment,
     filled,
     folded,
+    macro,
+    representable,
 )
-from symfric.emitter.arrays import emit_rolled
-from symfric.emitter.c99 import TRANSCENDENTAL, macro, representable
+from symfric.emitter.emit import emit
 from symfric.foundation.graph import graph
 from symfric.foundation.parameters import Variable
 
@@ -109,14 +108,14 @@ def _routine(
         for i, group in enumerate(block.groups)
         for j, place in enumerate(block.places(group))
     }
-    code = emit_rolled(
-        representable(graph(function), c.real),
-        [[v.name for v in of] for of in block.groups.values()],
-        targets,
-        c.real,
-        block.indexed(GROUPS[::3][: len(targets)], c.guards),
-        {entry: place for entry, place in loads.items() if entry not in checked},
-    )
+    whole, arrays = graph(function), block.indexed(GROUPS[::3][: len(targets)], c.guards)
+    names = [[v.name for v in of] for of in block.groups.values()]
+    given = representable(whole, c.real), names, targets, c.real
+    free = {entry: place for entry, place in loads.items() if entry not in checked}
+    if arrays.read or arrays.written:
+        code = emit_rolled(*given, arrays, free)
+    else:
+        code = emit(*given, loads=free)
     arguments = [
         f"{'const ' * (group in GROUPS[1:3])}{c.name}_{group}_t *{group}"
         for group in GROUPS

@@ -14,9 +14,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.codegen.blocks.block import Block
-from symfric.codegen.layout import CBlock
-from symfric.codegen.runner import in_type, run_vm
+from symfric.codegen.blocks.block import Block, CBlock
+from symfric.codegen.runner import evaluated, in_type, run_vm
 from symfric.foundation.graph import Graph, graph, rebuild
 from symfric.foundation.numeric import Array
 from symfric.foundation.parameters import Variable
@@ -189,7 +188,7 @@ def _telling(c: CBlock, steps: Steps) -> Integers:
     """Return the indices of rows with each outcome of each comparison, and of equidistant rows."""
     count, seen = len(steps.changed), set[tuple[int, bool]]()
     chosen = set(np.linspace(0, count - 1, min(PLAIN, count)).astype(int).tolist())
-    for k, outcomes in enumerate(_outcomes(c, steps).astype(bool).tolist()):
+    for k, outcomes in enumerate(_outcomes(c, steps).tolist()):
         new = set(enumerate(outcomes)) - seen
         if new:
             seen |= new
@@ -202,22 +201,21 @@ SIDES = frozenset({ca.OP_FABS, ca.OP_SIGN, ca.OP_FMIN, ca.OP_FMAX})
 """Operations with two branches in C, chosen by the sign of a number or by the smaller of two."""
 
 
-def _outcomes(c: CBlock, steps: Steps) -> Array:
+def _outcomes(c: CBlock, steps: Steps) -> NDArray[np.bool_]:
     """Return outcomes of the comparisons in a step, shape (rows, comparisons)."""
     step, count = c.block.step, len(steps.changed)
     source = graph(step)
     plain = tuple(i for i, n in enumerate(source.nodes) if n.op in COMPARISONS)
     sides = [(*n.args, n.args[0])[:2] for n in source.nodes if n.op in SIDES]
     if not ((plain or sides) and count):
-        return np.zeros((count, 0))
+        return np.zeros((count, 0), bool)
     alone = np.array([a == b for a, b in sides], bool)
     wanted = (plain, tuple(a for a, _ in sides), tuple(b for _, b in sides))
     arguments = [ca.SX.sym("x", *step.size_in(i)) for i in range(3)]
-    columns = rebuild(Graph(source.nodes, wanted), arguments, {})
-    function = ca.Function("outcomes", arguments, columns).map(count)
-    p = np.tile(c.default[:, None], (1, count))
-    found = function(steps.states.T, p, steps.inputs.T)
-    held, first, second = (column.full().T for column in found)
+    columns = map(ca.densify, rebuild(Graph(source.nodes, wanted), arguments, {}))
+    function = ca.Function("outcomes", arguments, [*columns])
+    found = evaluated(function, steps.states, _parameters(c, steps), steps.inputs)
+    held, first, second = np.split(found, np.cumsum([len(plain), len(sides)]), axis=1)
     return np.hstack([held != 0, first < np.where(alone, 0.0, second)])
 
 

@@ -8,11 +8,10 @@ from typing import Any, final
 
 import numpy as np
 
-from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.block import Block, CBlock
 from symfric.codegen.compared import TOLERANCE, Run, ulp
 from symfric.codegen.generated import Generated
 from symfric.codegen.guards import HUGE, STEP_SIZE, Status, parameter_range, range_of
-from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import compile_object, compiled, needed_symbols, run_c, run_vm
 from symfric.codegen.source import routines
 from symfric.emitter.c99 import DOUBLE

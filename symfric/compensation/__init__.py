@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from symfric.foundation.lazy import load_lazily
 
 if TYPE_CHECKING:
-    from symfric.compensation.adaptation import Adaptation as Adaptation
     from symfric.compensation.compensator import compensator as compensator
     from symfric.compensation.estimators import kalman_estimator as kalman_estimator
     from symfric.compensation.estimators import recursive_estimator as recursive_estimator
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from symfric.compensation.result import moves as moves
     from symfric.compensation.result import sine as sine
     from symfric.compensation.result import step as step
+    from symfric.compensation.settings import Adaptation as Adaptation
     from symfric.compensation.settings import Compensation as Compensation
     from symfric.compensation.settings import settings_from_text as settings_from_text
     from symfric.compensation.valves import valve_describing_function as valve_describing_function

@@ -11,7 +11,8 @@ import numpy as np
 from symfric.codegen import Block, law_block
 from symfric.codegen.blocks.from_law import in_turning
 from symfric.codegen.blocks.variables import arranged, step_size
-from symfric.compensation.adaptation import (
+from symfric.compensation.force import TABLES, Parts, terms, within_load
+from symfric.compensation.settings import (
     FALLEN,
     SAMPLES,
     SHARES,
@@ -21,7 +22,6 @@ from symfric.compensation.adaptation import (
     estimated,
     scale_parameters,
 )
-from symfric.compensation.force import TABLES, Parts, terms, within_load
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable, parameters
 from symfric.foundation.variable import starts_of, symbols_of

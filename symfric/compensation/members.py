@@ -10,9 +10,9 @@ from typing import Any, final
 import numpy as np
 
 from symfric.codegen import Block, generate
-from symfric.codegen.layout import TEMPLATES, CBlock, filled
+from symfric.codegen.blocks.block import TEMPLATES, CBlock
 from symfric.codegen.runner import FLAGS
-from symfric.emitter.c99 import REALS
+from symfric.emitter.c99 import REALS, filled
 from symfric.foundation import checks
 from symfric.foundation.files import write_text
 from symfric.foundation.numeric import Array, bound

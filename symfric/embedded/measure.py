@@ -10,9 +10,8 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.block import Block, CBlock
 from symfric.codegen.generated import Generated
-from symfric.codegen.layout import CBlock, filled
 from symfric.codegen.runner import compiled, run_c, run_vm
 from symfric.codegen.verification import motions
 from symfric.embedded.target import (
@@ -30,7 +29,7 @@ from symfric.embedded.target import (
     literals,
     own,
 )
-from symfric.emitter.c99 import REALS
+from symfric.emitter.c99 import REALS, filled
 from symfric.foundation import checks
 from symfric.foundation.files import json_data
 from symfric.foundation.numeric import Array

@@ -7,10 +7,9 @@ from typing import final
 
 import numpy as np
 
-from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.block import Block, CBlock
 from symfric.codegen.blocks.from_model import Machine, plant_block
 from symfric.codegen.guards import STEP_SIZE
-from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import run_vm
 from symfric.emitter.c99 import DOUBLE
 from symfric.foundation import checks

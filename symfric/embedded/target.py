@@ -18,8 +18,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.codegen.blocks.block import Block
-from symfric.codegen.layout import CBlock
+from symfric.codegen.blocks.block import Block, CBlock
 from symfric.codegen.source import header, source
 from symfric.emitter.c99 import FUNCTIONS, REALS
 from symfric.foundation.files import write_text

@@ -46,7 +46,7 @@ def emit_rolled(
     targets: Sequence[Sequence[str]],
     real: Real,
     arrays: Arrays,
-    loads: Places | None = None,
+    loads: Places,
 ) -> Code:
     """Write `source` as C statements with loops over `arrays`.
 
@@ -59,10 +59,9 @@ def emit_rolled(
     Raises:
         ValueError: errors of `emit`.
     """
-    if arrays.read or arrays.written:
-        plan = planned(_better(source), arrays)
-        if plan.loops:
-            return _Rolled(plan, names, targets, real, arrays, loads or {}).code()
+    plan = planned(_better(source), arrays)
+    if plan.loops:
+        return _Rolled(plan, names, targets, real, arrays, loads).code()
     return emit(source, names, targets, real, loads=loads)
 
 

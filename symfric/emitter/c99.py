@@ -1,8 +1,11 @@
-"""C99 text of CasADi's numbers, operations and expressions."""
+"""C99 text of CasADi's numbers, operations and expressions; comments, long lines and templates."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from string import Template
+from textwrap import wrap
 from typing import Any, NamedTuple, final
 
 import casadi as ca
@@ -232,3 +235,44 @@ class Writer:
 
 MIRRORED = {ca.OP_LT: "{} > {}", ca.OP_LE: "{} >= {}", ca.OP_EQ: "{} == {}", ca.OP_NE: "{} != {}"}
 """Comparisons that move a constant from the left to the right, such as x > 0 for 0 < x."""
+
+
+WIDTH = 100
+"""Largest width of a line [columns]."""
+
+
+class _AtTemplate(Template):
+    """Template with placeholders @name, since $ has a meaning in CMake."""
+
+    delimiter = "@"
+
+
+def filled(template: Path, **values: object) -> str:
+    """Return the text of a template file with a value in each placeholder @name."""
+    return _AtTemplate(template.read_text(encoding="utf-8")).substitute(values)
+
+
+def indented(lines: Sequence[str], depth: int = 1) -> str:
+    """Return lines of C, indented by `depth` levels."""
+    return "\n".join("    " * depth + line for line in lines)
+
+
+def block_comment(lines: Sequence[str]) -> str:
+    """Return lines of text as one C comment."""
+    return "/* " + "\n".join(f" * {comment(line)}".rstrip() for line in lines)[3:] + "\n */"
+
+
+def comment(text: str) -> str:
+    """Return `text` without character pairs that begin or end a C comment."""
+    return text.replace("*/", "* /").replace("/*", "/ *")
+
+
+def folded(line: str, margin: str) -> str:
+    """Return a long line wrapped at blanks; the continuation lines are indented further."""
+    text = line.lstrip(" ")
+    margin += " " * (len(line) - len(text))
+    lines = wrap(
+        text, WIDTH, initial_indent=margin, subsequent_indent=f"{margin}    ",
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
+    return "\n".join(lines)

@@ -17,7 +17,7 @@ from zipfile import ZipFile
 import numpy as np
 
 from symfric.codegen.blocks.from_model import fixed_method
-from symfric.codegen.layout import filled
+from symfric.emitter.c99 import filled
 from symfric.fmu.equations import equations, fingerprint, header, source
 from symfric.fmu.package import (
     SOURCES,

@@ -189,8 +189,8 @@ class Stems(Points):
     """Vertical lines from zero."""
 
     def draw(self, frame: Frame) -> str:
-        """Return one path with all lines."""
-        zero, ends = (frame.places(self.x, y) for y in (np.zeros(self.x.size), self.y))
+        """Return one path with the lines of all finite points."""
+        zero, ends = (frame.places(self.x, y) for y in (0.0 * self.y, self.y))
         stems = "".join(f"M{a:g} {b:g}V{c:g}" for (a, b), (_, c) in zip(zero, ends, strict=True))
         return f'<path class="{self.kind}" d="{stems}"/>'
 

@@ -1,21 +1,30 @@
 """Discrete-time block, from which C functions on structs are generated.
 
+Names begin with block and type: struct types `NAME_f32_state_t` (likewise param, in, out), default
+parameters `NAME_f32_default`, functions `NAME_f32_init`, `NAME_f32_step`; `f64` for double, so that
+both types may be used in one program. The C allocates nothing and its only data are the constant
+defaults, so one block serves any number of joints.
+
 In memory, a struct equals the flat column of the block's variables. Neighbouring numbers of
 identical elements, such as the states F_1 ... F_10, form one array member, `float F[10]`.
 """
 
+import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
 from re import ASCII, fullmatch
 from typing import NamedTuple, final
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
-from symfric.emitter.c99 import FUNCTIONS
+from symfric.emitter.c99 import FUNCTIONS, Real, block_comment
 from symfric.emitter.rolling import Array, Arrays
 from symfric.foundation import checks
 from symfric.foundation.graph import graph
@@ -25,8 +34,14 @@ from symfric.model import Output, Variables
 GROUPS = ("state", "param", "in", "out")
 """Names of the structs, and of the pointers to them."""
 
+TEMPLATES = Path(__file__).parents[1] / "templates"
+"""Folder of the fixed text of generated files."""
+
 KEYWORDS = frozenset(Path(__file__).with_name("keywords.txt").read_text(encoding="utf-8").split())
 """Keywords of C99 and C++."""
+
+SHEET = tomllib.loads(Path(__file__).with_name("sheet.toml").read_text(encoding="utf-8"))
+"""Fixed texts of data sheets."""
 
 RESERVED = frozenset(
     {*KEYWORDS, *GROUPS, "status", *FUNCTIONS.values(), *(f"{f}f" for f in FUNCTIONS.values())}
@@ -268,3 +283,95 @@ class Block:
         columns = [symbols_of(group) for group in self.groups.values()]
         dense = [ca.densify(ca.SX(result)) for result in results.values()]
         return ca.Function(name, columns, dense, list(GROUPS[:3]), list(results))
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CBlock:
+    """Block as C in one floating-point type.
+
+    Attributes:
+        guards: True if the C checks its numbers, see `symfric.codegen.guards`.
+    """
+
+    block: Block
+    real: Real
+    guards: bool = True
+
+    @property
+    def name(self) -> str:
+        """Prefix of all names and files."""
+        return f"{self.block.name}_{self.real.suffix}"
+
+    @cached_property
+    def start(self) -> NDArray[np.float64]:
+        """Start values of the states, rounded to the type."""
+        return self.real.rounded([float(v.start) for v in self.block.states])
+
+    @cached_property
+    def default(self) -> NDArray[np.float64]:
+        """Default parameters, rounded to the type."""
+        return self.real.rounded([float(v.start) for v in self.block.parameters])
+
+    def call(
+        self, pointers: Mapping[str, str], inputs: Sequence[str], status: str = "&status"
+    ) -> str:
+        """Return the C expression that calls one step.
+
+        Args:
+            pointers: pointer to each struct, by group.
+            inputs: arguments of a function of scalars.
+            status: pointer to the status, in which a guarded function of scalars sets bits.
+        """
+        structs = [pointers[group] for group in GROUPS if group in self.block.members]
+        if self.block.is_function:
+            arguments = [*inputs, *structs, *[status] * self.guards]
+            return f"{self.name}({', '.join(arguments)})"
+        return f"{self.name}_step({', '.join(structs)})"
+
+    @property
+    def sizes(self) -> dict[str, str | int]:
+        """Names and sizes for templates that call `flat_step`."""
+        counts = {
+            "states": len(self.block.states),
+            "params": len(self.block.parameters),
+            "inputs": len(self.block.inputs),
+            "outputs": len(self.block.outputs),
+        }
+        return {"name": self.name, "real": self.real.name, "step": self.flat_step} | counts
+
+    @property
+    def signals(self) -> list[str]:
+        """Columns of a run: states after a step, outputs, states after each reset, status."""
+        states = [v.name for v in self.block.states]
+        later = [f"{reset}.{name}" for reset in self.block.resets for name in states]
+        return [*states, *self.block.outputs, *later, *["status"] * self.guards]
+
+    @property
+    def casts(self) -> dict[str, str]:
+        """Casts of the pointers `state`, `param`, `in` and `out` from flat arrays to structs."""
+        return {
+            group: f"({'const ' * (group in GROUPS[1:3])}{self.name}_{group}_t *){group}"
+            for group in GROUPS
+        }
+
+    @property
+    def flat_step(self) -> str:
+        """Statement of a step on flat arrays `state`, `param`, `in`, `out`, and on `status`."""
+        inputs = [f"in[{k}]" for k in range(len(self.block.inputs))]
+        result = "*out = " if self.block.is_function else "*status |= " * self.guards
+        return f"{result}{self.call(self.casts, inputs, 'status')};"
+
+
+def banner(block: Block, file: str) -> list[str]:
+    """Return the first lines of a file: generator and licence."""
+    return [
+        f"{file}: C99 made by symfric {version('symfric')} with CasADi {version('casadi')}, "
+        f"model {block.fingerprint}.",
+        "This generated code is yours. SPDX-License-Identifier: MIT-0",
+    ]
+
+
+def head(block: Block, file: str) -> str:
+    """Return the first lines of a C file as a comment that is not closed."""
+    return block_comment(banner(block, file)).removesuffix("\n */")

@@ -1,16 +1,20 @@
 """Friction law as a block: a function, or a step of its states with held inputs.
 
+The texts of its data sheet follow from the docstring of the law.
+
 The block of a population is one of its contacts; C calls it in a loop over an array of states.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
-from re import search, sub
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields, replace
+from inspect import getdoc
+from re import match, search, split, sub
+from textwrap import dedent
+from typing import Any, NamedTuple
 
 import casadi as ca
 
-from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.block import SHEET, Block
 from symfric.codegen.blocks.held_step import (
     LEAST_LOAD,
     advanced,
@@ -19,7 +23,6 @@ from symfric.codegen.blocks.held_step import (
     needs_unloaded_case,
     with_unloaded_case,
 )
-from symfric.codegen.blocks.texts import SHEET, equations, of_law, texts
 from symfric.codegen.blocks.variables import (
     STEP_SIZE,
     Fold,
@@ -32,7 +35,14 @@ from symfric.codegen.blocks.variables import (
 )
 from symfric.foundation import checks
 from symfric.foundation.numeric import is_casadi
-from symfric.foundation.parameters import Variable, parameters, symbolise
+from symfric.foundation.parameters import (
+    Option,
+    Parametric,
+    Variable,
+    options,
+    parameters,
+    symbolise,
+)
 from symfric.foundation.units import turned
 from symfric.foundation.variable import stacked, starts_of, symbols_of
 from symfric.laws import Law, Population, law_name
@@ -202,6 +212,7 @@ def _step(numeric: Law, law: Law, runtime: Variables, h: float | None, where: st
         use = (*use, said["no_load"].format(least=LEAST_LOAD * N.nominal))
     when = {"F": "mean over the step", "F_end": "at the end of the step"}
     outputs = {n: Output(e, "N", f"{said['force']}, {when[n]}") for n, e in forces.items()}
+    steps = ("held", *step.kinds, "mean", *("end",) * ("F_end" in outputs))
     return Block(
         "F",
         states=states,
@@ -211,7 +222,7 @@ def _step(numeric: Law, law: Law, runtime: Variables, h: float | None, where: st
         outputs=outputs,
         resets={"init_sliding": (ca.SX(law.steady_state(v.symbol, N.symbol)), said["sliding"])},
         constants=size.constants,
-        discretisation=of_law(step.kinds, "F_end" in outputs),
+        discretisation="\n".join(SHEET["step"][name] for name in steps),
         use=(*use, *[said["which_force"]] * ("F_end" in outputs)),
     )
 
@@ -284,3 +295,88 @@ def contact_block(law: Population, *, name: str | None = None, h: float | None =
         outputs={"F": Output(rows[len(states)], "N", "friction force of this contact")},
         **as_constants(parameters(law).values(), size.constants),
     )
+
+
+TELLING = (
+    r"[Nn]ot valid|[Cc]reeps? |[Dd]rifts?\b|Needs |Keep |Never |[Oo]nly if |smooth over|rounded"
+)
+"""Pattern of sentences that users of the law must read."""
+
+LEANING = r"^Without it|^Made for slip|, as there|that form|form = "
+"""Pattern of sentences that depend on the previous sentence or describe another form."""
+
+
+class LawText(NamedTuple):
+    """Texts about a law, without Python terms.
+
+    Attributes:
+        title: name of the law, one line.
+        equations: formulas, line by line.
+        limits: sentences about restrictions.
+        source: publication.
+    """
+
+    title: str
+    equations: str
+    limits: tuple[str, ...]
+    source: str
+
+
+def texts(law: Parametric) -> tuple[LawText, ...]:
+    """Return the texts of a law and of its parts, without repetitions."""
+
+    def every(part: Parametric) -> Iterator[LawText]:
+        yield _text(part)
+        for item in fields(part):
+            value = getattr(part, item.name)
+            for inner in value if isinstance(value, tuple) else (value,):
+                if isinstance(inner, Parametric) and "\n\n    " in (getdoc(type(inner)) or ""):
+                    yield from every(inner)
+
+    return tuple(dict.fromkeys(every(law)))
+
+
+def equations(obj: Parametric) -> str:
+    """Return the formulas of a law or machine and its parts; several parts have titles."""
+    found = texts(obj)
+    if len(found) == 1:
+        return found[0].equations
+    return "\n\n".join(f"{text.title}\n{text.equations}".rstrip() for text in found)
+
+
+def _text(law: Parametric) -> LawText:
+    paragraphs = (getdoc(type(law)) or type(law).__name__).split("\n\n")
+    if "Raises:" in paragraphs:
+        paragraphs = paragraphs[: paragraphs.index("Raises:")]
+    formulas = [dedent(p) for p in _formulas(paragraphs, options(law).values())]
+    prose = "\n".join(p for p in paragraphs[1:] if not p.startswith(("    ", "Raises:")))
+    about, _, source = prose.partition("\nSource: ")
+    chosen = "    ".join(f"{name}: {option.value}." for name, option in options(law).items())
+    return LawText(
+        title=" ".join(paragraphs[0].split()),
+        equations="\n".join(formulas + [chosen.capitalize()] * bool(chosen)).replace("`", ""),
+        limits=tuple(_limits(about)),
+        source=" ".join(source.partition("\nChecked: ")[0].split()),
+    )
+
+
+def _formulas(paragraphs: Sequence[str], forms: Iterable[Option]) -> Iterator[str]:
+    """Yield the formulas, except those whose introduction names another value of an option."""
+    others = "|".join(rf'{o.name} = "(?!{o.value}")' for o in forms) or "(?!)"
+    before = ""
+    for paragraph in paragraphs:
+        if not paragraph.startswith("    "):
+            before = " ".join(paragraph.split())
+        elif not search(others, before.rpartition(". ")[2]):
+            lines = paragraph.splitlines()
+            yield "\n".join(line for line in lines if not search(others, line))
+
+
+def _limits(prose: str) -> Iterator[str]:
+    """Yield the sentences about restrictions and smoothing widths of a law."""
+    for sentence in split(r"(?<=\.)(?<!al\.)\s+", " ".join(prose.split())):
+        for clause in split(r";\s+", sentence.removeprefix("Limits: ").replace("`", "")):
+            if search(TELLING, clause) and not search(LEANING, clause):
+                text = clause.strip().rstrip(".")
+                capital = match(r"[a-z]+[ ']", text)
+                yield f"{text[0].upper() if capital else text[0]}{text[1:]}."

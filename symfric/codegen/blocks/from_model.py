@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from symfric.codegen.blocks.block import Block
-from symfric.codegen.blocks.texts import SHEET, equations, of_method
+from symfric.codegen.blocks.block import SHEET, Block
+from symfric.codegen.blocks.from_law import equations
 from symfric.codegen.blocks.variables import (
     Fold,
     above_zero,
@@ -24,8 +24,9 @@ from symfric.integrator.equations.initial import consistent
 from symfric.integrator.equations.inputs import InputData
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.attempt import build_fixed
-from symfric.integrator.methods.method import suited_to_start
-from symfric.integrator.methods.tableaux import METHODS
+from symfric.integrator.methods.families import BackwardEuler, Exponential, Rosenbrock
+from symfric.integrator.methods.method import Method, suited_to_start
+from symfric.integrator.methods.tableaux import METHODS, Radau
 from symfric.model import Model, Output, Variables, check_model
 
 
@@ -196,3 +197,40 @@ def _outputs(model: Model, whole: System, following: ca.SX, where: str) -> dict[
         name: replace(o, expression=ca.substitute(ca.SX(o.expression), whole.y, following))
         for name, o in model.outputs.items()
     }
+
+
+def of_method(method: Method, algebraic: bool) -> str:
+    """Return the text about the fixed step of a method for x' = f(x, u), 0 = g(x, z, u).
+
+    Args:
+        algebraic: True if there are algebraic unknowns z.
+    """
+    texts = SHEET["step"]
+    return (
+        f"Fixed steps by {method.name}, order {method.order}. {texts['held']}\n"
+        f"{_formula(method)}{texts['algebraic'] * algebraic}\n{texts['outputs']}"
+    )
+
+
+def _formula(method: Method) -> str:
+    """Return the formula of one step."""
+    match method:
+        case BackwardEuler():
+            return f"    x+ = x + h f(x+, u)    by {method.iterations} Newton iterations from x"
+        case Radau():
+            return (
+                f"    X_i = x + h sum a_ij f(X_j, u),   i, j = 1 ... {len(method.A)},   "
+                f"x+ = X_{len(method.A)}\n"
+                f"    by {method.iterations} simplified Newton iterations"
+            )
+        case Rosenbrock():
+            return (
+                "    [I / (gamma h) - df/dx] k_i = f(x + sum a_ij k_j, u) + sum c_ij k_j / h\n"
+                f"    x+ = x + sum m_i k_i,   i = 1 ... {len(method.A)}, gamma = {method.gamma:.6g}"
+            )
+        case Exponential():
+            return "    x_i+ = x_i + h phi1(h df_i/dx_i) f_i(x, u),   phi1(a) = (exp(a) - 1) / a"
+        case _:
+            return (
+                "    X_i = x + h sum a_ij f(X_j, u),   x+ = x + h sum b_i f(X_i, u)    (explicit)"
+            )

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symfric.foundation.graph import LEAVES, graph, rebuild
-from symfric.foundation.numeric import Scalar
+from symfric.foundation.numeric import Scalar, exp_phi1_phi2
 from symfric.foundation.parameters import Variable
 from symfric.foundation.variable import stacked
-from symfric.integrator.methods.families import exp_phi1_phi2
 from symfric.laws import Law, Sum
 from symfric.laws.base.law import chosen
 

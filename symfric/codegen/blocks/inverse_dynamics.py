@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from symfric.codegen.blocks.block import Block
+from symfric.codegen.blocks.block import SHEET, Block
 from symfric.codegen.blocks.joints import ContactStep, contact_step, with_gravity, with_payload
-from symfric.codegen.blocks.texts import SHEET
 from symfric.codegen.blocks.variables import in_arrays, numbered, step_size
 from symfric.foundation import checks
 from symfric.foundation.parameters import Variable

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, final
 import casadi as ca
 
 from symfric.foundation.checks import listed
-from symfric.foundation.numeric import reciprocal
+from symfric.foundation.numeric import exp_phi1_phi2, reciprocal
 from symfric.integrator.equations.blocks import at_rest, blocks
 from symfric.integrator.equations.matrices import Factors, factorise
 from symfric.integrator.equations.system import System
@@ -199,27 +199,6 @@ def need_ode(system: System, method: str) -> None:
         f"method {method}: expected an ODE x' = f(x), got {found}; use an implicit method such as "
         "rodas5p, also for mechanisms with friction from reactions"
     )
-
-
-SMALL = 1e-2
-"""Largest |x| at which the series replaces the quotient; its next term is 4e-14 of the sum."""
-
-
-def exp_phi1_phi2(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return exp x, phi1 = (exp(x) - 1) / x and phi2 = (phi1 - 1) / x, element by element.
-
-    They are the weights of the rate in the end value and in the mean of a solution of
-    dz/dt = a + b z over a step: z(h) = z + h phi1(b h) dz/dt, mean z = z + h phi2(b h) dz/dt.
-    Values and derivatives are also correct at zero. Far below zero, exp is 0; its error is one unit
-    in the last place of 1, not of exp itself.
-    """
-    near = ca.fabs(x) < SMALL
-    divisor, beyond = ca.if_else(near, 1.0, x), ca.expm1(x)
-    quotient = beyond / divisor
-    series = 1 / 2 + x * (1 / 6 + x * (1 / 24 + x * (1 / 120 + x * (1 / 720))))
-    phi2 = ca.if_else(near, series, (quotient - 1) / divisor)
-    phi1 = ca.if_else(near, 1 + x * phi2, quotient)
-    return ca.if_else(near, 1 + x * phi1, 1 + beyond), phi1, phi2
 
 
 @final

@@ -19,6 +19,7 @@ from symfric.cli.codegen_report import compared, show_verification
 from symfric.codegen import Block, Proof
 from symfric.codegen.verification import Check, Verification
 from symfric.embedded import Measured
+from symfric.scenes import ALL_SCENES
 
 pytestmark = needs_compiler
 
@@ -121,7 +122,8 @@ def test_a_problem_becomes_a_controller(symfric, monkeypatch) -> None:
         assert message in symfric(f"codegen --mpc {wrong} --out d", 2).err
 
 
-def test_a_scene_becomes_a_plant(symfric) -> None:
+def test_a_scene_becomes_a_plant(symfric, monkeypatch) -> None:
+    monkeypatch.setattr(ALL_SCENES["rabinowicz"], "t_end", 1.0)
     line = "codegen --scene rabinowicz --law lugre --set k=3 --out c --free mu_s --no-kit"
     result = json.loads(symfric(f"{line} --step-size 1e-3 --method backward_euler --json -").out)
     manifest = result["manifest"]
@@ -145,7 +147,8 @@ def test_a_scene_becomes_a_plant(symfric) -> None:
     assert described("drive")["constants"]["m"] == 2
 
 
-def test_a_step_that_is_too_long_is_refused_with_one_that_is_not(symfric) -> None:
+def test_a_step_that_is_too_long_is_refused_with_one_that_is_not(symfric, monkeypatch) -> None:
+    monkeypatch.setattr(ALL_SCENES["rabinowicz"], "t_end", 1.0)
     line = "codegen --scene rabinowicz --law lugre --method dopri5 --no-kit --out c --step-size"
     status = json.loads(symfric(f"{line} 0.05 --json -", 1).out)["verification"]["status"]
     assert "steps of 0.05 s it runs away, in CasADi as in C: that step is too long, 0.0" in status

@@ -22,8 +22,8 @@ LINE = "identify one.csv --law coulomb+viscous --starts 1"
 @pytest.fixture(scope="session")
 def made() -> list[Dataset]:
     law = Sum((Coulomb(mu_d=TRUTH["mu_d"], v_eps=1e-4), Viscous(sigma_2=TRUTH["sigma_2"])))
-    how: dict[str, Any] = {"m": TRUTH["m"], "offset": TRUTH["offset"], "speeds": (0.02, 0.1)}
-    return [synthetic_drive_data(law, **how, seed=seed) for seed in (1, 2)]
+    how: dict[str, Any] = {"m": TRUTH["m"], "offset": TRUTH["offset"], "rate": 250.0}
+    return [synthetic_drive_data(law, **how, speeds=(0.02, 0.1), seed=seed) for seed in (1, 2)]
 
 
 @pytest.fixture(autouse=True)

@@ -129,7 +129,8 @@ LAW_COMMANDS = {
     "codegen LAW --real double --out c": "verified",
     "export-fmu rabinowicz --law LAW": "FMI 3.0 co-simulation",
     "identify record.csv --law LAW+viscous --fix m=95": "sigma_2",
-    "select rabinowicz --law LAW,stribeck --need stiction --accuracy 0.1 --effort 0.1": "LAW",
+    "select rabinowicz --law LAW,stribeck --need stiction --accuracy 0.1 --t-end 2 --workers 1 "
+    "--no-fixed-steps": "LAW",
 }
 
 

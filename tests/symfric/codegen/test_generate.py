@@ -19,8 +19,7 @@ from tables import Names, table
 
 from symfric import BrownMcPhee, LuGre, Model, Output, Variable, Viscous, drive, law_from_text
 from symfric.codegen import Block, generate, law_block, plant_block
-from symfric.codegen.blocks.block import Elements
-from symfric.codegen.layout import CBlock
+from symfric.codegen.blocks.block import CBlock, Elements
 from symfric.codegen.runner import run_vm
 from symfric.codegen.source import header, interval, routines, source
 from symfric.codegen.verification import excitation

@@ -8,9 +8,9 @@ from tables import Names, table
 
 from symfric import Output, Variable
 from symfric.codegen import Block, generate, runner
+from symfric.codegen.blocks.block import CBlock
 from symfric.codegen.blocks.variables import arranged
 from symfric.codegen.guards import Status, parameter_range, range_of, state_limit
-from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import compile_object, compiled, needed_symbols, run_c, run_vm
 from symfric.emitter.c99 import DOUBLE
 from symfric.foundation.programs import CompileError

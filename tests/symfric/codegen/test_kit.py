@@ -16,8 +16,8 @@ from robots import SMALL
 
 from symfric import BrownMcPhee, LuGre
 from symfric.codegen import generate, inverse_dynamics_block, law_block, plant_block
+from symfric.codegen.blocks.block import CBlock
 from symfric.codegen.kit import kit_files, wrapper
-from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import run_vm
 from symfric.codegen.source import header, source
 from symfric.codegen.vectors import excitation

@@ -7,8 +7,8 @@ from one_program import block_of
 
 from symfric import BrownMcPhee, LuGre, Output, Variable
 from symfric.codegen import Block
+from symfric.codegen.blocks.block import CBlock
 from symfric.codegen.guards import Status
-from symfric.codegen.layout import CBlock
 from symfric.codegen.vectors import BASE, changed_value, excitation, made, vectors
 from symfric.emitter.c99 import DOUBLE, FLOAT
 

@@ -1,33 +1,27 @@
-"""Verification and random tests find errors of C; rounding and ties are no errors."""
+"""Verification finds errors of C; rounding and ties are no errors."""
 
 import json
-from dataclasses import replace
 from math import erf, remainder
 
 import casadi as ca
 import numpy as np
 import pytest
-from law_cases import CASES, NO_STEP
-from one_program import LIMITED, block_of
+from one_program import block_of
 from tables import Names, table
 
 from symfric import BrownMcPhee, LuGre, Model, Output, Stribeck, Variable, law_from_text
-from symfric.codegen import Block, fuzz, generate, guards, law_block, plant_block, source, verify
+from symfric.codegen import Block, generate, guards, law_block, plant_block, verify
+from symfric.codegen.blocks.block import CBlock
 from symfric.codegen.compared import Run, magnitudes, modes, rounded, terms, ulp
-from symfric.codegen.fuzz import Fuzzed
-from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import in_type, run_vm
 from symfric.codegen.verification import excitation, longest_step, runs_away, spoiled, varied
 from symfric.compensation import (
     compensator,
-    disturbance_observer,
     gms_observer,
-    lugre_observer,
 )
 from symfric.emitter.c99 import DOUBLE, FLOAT
 from symfric.laws import GMS
 from symfric.model.kinds import CONSTRAINTS
-from symfric.scenes import Drive
 
 LUGRE = block_of(LuGre())
 
@@ -293,78 +287,3 @@ def test_a_step_that_is_too_long_is_found_with_a_shorter_one(compiler, tmp_path)
     eager = Block("eager", states=(X,), next=3.0 * X.symbol)
     found = verify(generate(eager, tmp_path, real="double", kit=False))
     assert "it runs away within" in found.status
-
-
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=[] if name == "lugre" else pytest.mark.slow)
-     for name in CASES if name not in NO_STEP],
-)  # fmt: skip
-def test_a_law_survives_random_steps(name, compiler):
-    real = "float" if len(name) % 2 else "double"
-    found = fuzz.fuzz(block_of(CASES[name]), real, compiler, steps=20_000)
-    assert found.ok, found
-    assert found.last_resort == 0 or name in LIMITED, found
-    assert found.valid > 11_000
-    assert found.repaired > 1000
-
-
-FORCES = {
-    "lugre": compensator(LuGre(), N=100.0, limit=60.0, slew=1e4),
-    "static": compensator(Stribeck(), limit=5.0, build_up=1e-3, hold=(1e-4, 1e-3)),
-    "events": compensator(GMS(form="event"), N=10.0, limit=5.0),
-    "reference": compensator(
-        LuGre(), limit=5.0, velocity="reference", delay=1e-3, error_gain=1.0, offset=0.3
-    ),
-    "stuck": compensator(LuGre(), limit=5.0, stick=(1.0, 0.1, 1e-3), dither=(1.0, 100.0)),
-    "lugre_observer": lugre_observer(LuGre(), gain=1.0, limit=2.0),
-    "gms_observer": gms_observer(GMS(form="event"), gain=1.0, limit=2.0),
-    "disturbance_observer": disturbance_observer(1.0, 100.0, order=2, limit=10.0),
-}
-
-
-@pytest.mark.parametrize(
-    ("steps", "fast"),
-    [(20_000, True), pytest.param(10_000_000, True, marks=pytest.mark.slow),
-     pytest.param(10_000_000, False, marks=pytest.mark.slow)],
-)  # fmt: skip
-@pytest.mark.parametrize("name", FORCES)
-def test_no_bits_cause_a_force_beyond_its_limit(name, steps, fast, compiler):
-    """With `fast`, the compiler assumes that NaN does not occur."""
-    for real in ("float", "double") if steps > 20_000 else ("float",):
-        found = fuzz.fuzz(FORCES[name], real, compiler, steps=steps, fast=fast)
-        assert found.ok and found.last_resort == 0, found
-
-
-def test_random_steps_find_guards_that_are_wrong(compiler, monkeypatch):
-    assert Fuzzed("f", "float", 10, valid=8, repaired=2, last_resort=1).ok
-    for found in (
-        {"altered": 1},
-        {"unflagged": 1},
-        {"unfinished": 1},
-        {"beyond": 1},
-        {"report": "overflow"},
-    ):
-        assert not Fuzzed("f", "float", 10, valid=8, repaired=2, **found).ok
-    monkeypatch.setattr(fuzz, "SANITIZED", ("-std=c99", "-O0", "-ffp-contract=off"))
-    limited = compensator(LuGre(), limit=5.0, slew=100.0)
-    assert fuzz.fuzz(limited, "float", compiler, steps=5000).ok
-    above = {"F": replace(limited.outputs["F"], expression=2 * limited.outputs["F"].expression)}
-    assert fuzz.fuzz(replace(limited, outputs=above), "float", compiler, steps=5000).beyond > 0
-    plant = fuzz.fuzz(plant_block(Drive(LuGre()).model()), "float", compiler, steps=3000)
-    assert plant.ok, plant
-
-    def silent(*given):
-        return guards.helpers(*given).replace("*status |= clamped;", "", 1)
-
-    def doubled(c, variable, *rest):
-        return [*guards.mended(c, variable, *rest), f"{variable.name} = 2 * {variable.name};"]
-
-    for module, name, wrong, count in (
-        (fuzz, "state_limit", lambda v: 1e-3, "unflagged"),
-        (source, "helpers", silent, "unflagged"),
-        (source, "mended", doubled, "altered"),
-    ):
-        with monkeypatch.context() as patch:
-            patch.setattr(module, name, wrong)
-            assert getattr(fuzz.fuzz(LUGRE, "double", compiler, steps=5000), count) > 0

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from one_program import Stepper
 
 from symfric import Drive, LuGre, Model, Stribeck, drive, driven
 from symfric.compensation import Cascade, close_loop, compensator, sine
@@ -16,14 +17,8 @@ H = 1e-3
 
 def stepped(block: Any, rows: list[dict[str, float]], **p: float) -> list[float]:
     """Return the first output for the inputs of each row."""
-    state = [float(v.start) for v in block.states]
-    values = [p.get(v.name, float(v.start)) for v in block.parameters]
-    found = list[float]()
-    for row in rows:
-        given = [row.get(v.name, 1.0 if v.name == "enable" else 0.0) for v in block.inputs]
-        state, out = (part.full().ravel() for part in block.step(state, values, given))
-        found.append(float(out[0]))
-    return found
+    go = Stepper(block, **p)
+    return [next(iter(go(**{"enable": 1.0, **row}).values())) for row in rows]
 
 
 def test_the_current_is_the_force_over_the_force_constant() -> None:

@@ -11,8 +11,7 @@ from tables import Names, table
 
 from symfric import Output, Variable
 from symfric.codegen import Block
-from symfric.codegen.blocks.block import Elements
-from symfric.codegen.layout import CBlock
+from symfric.codegen.blocks.block import CBlock, Elements
 from symfric.codegen.runner import run_vm
 from symfric.codegen.source import source
 from symfric.emitter.c99 import DOUBLE, FORMS, FUNCTIONS

@@ -11,7 +11,7 @@ from one_program import block_of
 from tables import Names, table
 
 from symfric import LuGre, VelocityBased
-from symfric.codegen.layout import CBlock
+from symfric.codegen.blocks.block import CBlock
 from symfric.codegen.source import routines
 from symfric.emitter.c99 import DOUBLE, FLOAT, SMALLEST_FLOAT, Real, representable
 from symfric.emitter.emit import Code, emit

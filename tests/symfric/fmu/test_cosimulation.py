@@ -11,7 +11,7 @@ from units import DISCARD, ERROR, OK, Second, Third, over
 
 from symfric import Hold, simulate
 from symfric.codegen import plant_block
-from symfric.codegen.layout import CBlock
+from symfric.codegen.blocks.block import CBlock
 from symfric.codegen.runner import run_vm
 from symfric.emitter.c99 import DOUBLE
 

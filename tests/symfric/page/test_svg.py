@@ -35,6 +35,8 @@ def test_points_are_at_their_numbers_and_a_missing_number_splits_a_line() -> Non
     line = Path("line", np.arange(7.0), np.array([0.0, 1.0, np.nan, 1.0, 0.0, np.nan, np.nan]))
     drawn = line.draw(Frame(Axis("x", "", 0.0, 6.0), Axis("y", "", 0.0, 1.0), 60.0, 10.0))
     assert findall(r'points="([^"]*)"', drawn) == ["0,10 10,0", "30,0 40,10"]
+    stems = Stems("stem", np.arange(3.0), np.array([1.0, np.nan, 0.5]))
+    assert 'd="M0 10V0M40 10V5"' in stems.draw(Frame(x, Axis("y", "", 0.0, 1.0), 200.0, 10.0))
 
 
 def test_a_logarithmic_axis_has_its_decades() -> None:

@@ -12,8 +12,8 @@ from tables import Names, table
 
 from symfric import BrownMcPhee, Coulomb, LuGre, law_from_text, multibody
 from symfric.codegen import Block, law_block
+from symfric.codegen.blocks.block import CBlock
 from symfric.codegen.blocks.inverse_dynamics import gravity_block, inverse_dynamics_block
-from symfric.codegen.layout import CBlock
 from symfric.codegen.runner import run_vm
 from symfric.codegen.source import header
 from symfric.codegen.verification import excitation

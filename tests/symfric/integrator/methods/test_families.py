@@ -14,6 +14,7 @@ from scipy.integrate import RK45
 
 import symfric as sf
 from symfric import Model, SolveError, Status, Variable, flow, simulate, simulate_many
+from symfric.foundation.numeric import NEAR, exp_phi1_phi2
 from symfric.integrator.equations.initial import consistent, first_guess
 from symfric.integrator.equations.inputs import input_data
 from symfric.integrator.methods.attempt import (
@@ -25,7 +26,7 @@ from symfric.integrator.methods.attempt import (
     build_step,
     converged,
 )
-from symfric.integrator.methods.families import SMALL, eliminated, exp_phi1_phi2, need_ode
+from symfric.integrator.methods.families import eliminated, need_ode
 from symfric.integrator.methods.method import combination
 from symfric.integrator.methods.tableaux import (
     BACKWARD_EULER,
@@ -90,10 +91,10 @@ def test_exponential_functions_are_their_integrals() -> None:
     function = ca.Function("phi", [point], [*phi, *slopes])
     nodes, weights = (0.5 * part for part in np.polynomial.legendre.leggauss(40))
     s = nodes + 0.5
-    for at in (0.0, 1e-9, -1e-4, -0.999 * SMALL, -1.001 * SMALL, 0.5, -1.0, 2.0, -5.0, -20.0):
+    for at in (0.0, 1e-9, -1e-4, -0.999 * NEAR, -1.001 * NEAR, 0.5, -1.0, 2.0, -5.0, -20.0):
         phi1, phi2, *_ = map(float, function(at))
         assert phi1 == pytest.approx(weights @ np.exp(at * s), rel=1e-13)
-        assert phi2 == pytest.approx(weights @ ((1 - s) * np.exp(at * s)), rel=3e-14 / SMALL)
+        assert phi2 == pytest.approx(weights @ ((1 - s) * np.exp(at * s)), rel=3e-14 / NEAR)
     for at in (-1e4, -1e12, -1e300):
         assert [float(one) for one in function(at)[:2]] == pytest.approx([-1 / at] * 2, rel=2e-4)
     assert [float(slope) for slope in function(0.0)[2:]] == pytest.approx([1 / 2, 1 / 6])
