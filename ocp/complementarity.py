@@ -18,15 +18,12 @@ from math import sqrt
 from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.formulation.expressions import EPS
 from ocp.formulation.phase import Array
-from ocp.formulation.problem import Problem
-from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import Solved, Solver
-from ocp.solving.penalties import largest_product
+from ocp.solving.one_solve import Solved, Task
 from ocp.solving.prepared import Prepared, Supervisor
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start, start_of
+from ocp.solving.verification import largest_product
 from ocp.transcription.program import Iterate, SolverStatistics
-from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Transcription, discretise
 from symfric.foundation.status import Status
 
@@ -45,27 +42,20 @@ LATER = 1e-3
 """Initial barrier parameter of Ipopt after the first solve."""
 
 
-def solve_relaxed(
-    problem: Problem, meshes: Sequence[Array], scheme: Scheme, solver: Solver, guess: Start,
-    goals: Goals, supervisor: Supervisor,
-) -> Solution:  # fmt: skip
+def solve_relaxed(task: Task, meshes: Sequence[Array], guess: Start, goals: Goals) -> Solution:
     """Solve a problem with complementary signals; see `refined_solve` for the arguments.
 
     The status is not ok if eps remains above `MOST`. The problem of the solution has the last eps.
     """
-    later = solver
-    if isinstance(solver, Ipopt):
-        later = solver.with_options(**({"mu_init": LATER} | dict(solver.options)))
-    on = discretise(problem, scheme).on(meshes)
-    prepared = solver.prepared(on.program), later.prepared(on.program)
-    eps, solution = _decreased(on, prepared, start_of(on, guess)[0], supervisor)
-    problem = replace(problem, p=dict(problem.p) | {EPS: eps})
+    later = task.solver.with_defaults(mu_init=LATER)
+    on = discretise(task.problem, task.scheme).on(meshes)
+    prepared = task.solver.prepared(on.program), later.prepared(on.program)
+    eps, solution = _decreased(on, prepared, start_of(on, guess)[0], task.supervisor)
+    problem = replace(task.problem, p=dict(task.problem.p) | {EPS: eps})
     solution = replace(solution, problem=problem)
     if solution.ok:
         goals = replace(goals, loss=UNREFINED, passes=min(goals.passes, PASSES), patient=False)
-        finer = refined_solve(
-            problem, meshes, scheme, later, solution, goals=goals, supervisor=supervisor
-        )
+        finer = refined_solve(replace(task, problem=problem, solver=later), meshes, solution, goals)
         statistics = solution.statistics.then(finer.statistics)
         kept = finer if finer.ok or finer.status.stopped else solution
         solution = replace(kept, statistics=statistics)

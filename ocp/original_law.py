@@ -25,14 +25,11 @@ from ocp.checking.interval_errors import cut_meshes, local_errors
 from ocp.checking.resimulate import arcs_of
 from ocp.checking.verify import confirmed, verified
 from ocp.formulation.phase import Array
-from ocp.formulation.problem import Problem
-from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import Solved
-from ocp.solving.prepared import Option, Supervisor
+from ocp.solving.one_solve import Solved, Task
+from ocp.solving.prepared import Option
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import start_of
 from ocp.transcription.program import Iterate, Program
-from ocp.transcription.schemes import Shooting
 from ocp.transcription.transcribe import Discretisation, Transcription, discretise
 from symfric.foundation.status import SolveError, Status
 
@@ -56,21 +53,16 @@ KEPT = 1e-6
 @final
 @dataclass(frozen=True, eq=False)
 class OriginalLaw:
-    """Solver of a problem with laws with states, and its settings.
+    """Solver of a problem with laws with states.
 
     Attributes:
-        problem: the user's problem, whose laws have states.
-        scheme: shooting scheme that resolves these states.
-        solver: solver with the user's options, which take precedence.
+        task: the user's problem, whose laws have states, and a shooting scheme that resolves them;
+            the options of its solver take precedence.
         tolerance: tolerance of the verification.
-        supervisor: time limit and progress.
     """
 
-    problem: Problem
-    scheme: Shooting
-    solver: Ipopt
+    task: Task
     tolerance: float
-    supervisor: Supervisor
 
     def continued(self, exact: Solution) -> Solution:
         """Return the verified motion near `exact`, or `exact` with the reason of a failure."""
@@ -81,7 +73,7 @@ class OriginalLaw:
         own = replace(own, statistics=exact.statistics.then(own.statistics))
         if confirmed(own):
             return replace(own, modes=exact.modes)
-        kept = with_sentence(exact, f"By {self.scheme} with the law itself: {own.message}")
+        kept = with_sentence(exact, f"By {self.task.scheme} with the law itself: {own.message}")
         kept = replace(kept, statistics=own.statistics)
         stopped = own.status.stopped
         return replace(kept, status=own.status, cause=own.cause) if stopped else kept
@@ -93,9 +85,9 @@ class OriginalLaw:
         conditions but not the optimality conditions.
 
         Raises:
-            ValueError: `scheme` does not support a model.
+            ValueError: the scheme does not support a model.
         """
-        made = discretise(self.problem, self.scheme)
+        made = discretise(self.task.problem, self.task.scheme)
         near = self._near(made, static, 1)
         best = self._cheaper(made, near) if near.ok else near
         if not best.ok and best.status is not Status.ACCEPTABLE:
@@ -103,7 +95,7 @@ class OriginalLaw:
         near = self._near(made, best, PASSES)
         if not near.verified:
             return near
-        text = f"ocp '{self.problem.name}': By {self.scheme} with the law itself,"
+        text = f"ocp '{made.problem.name}': By {made.scheme} with the law itself,"
         if best.status is Status.SOLVED:
             best = self._cheaper(made, near)
             if best.status is Status.SOLVED or best.status.stopped:
@@ -123,19 +115,21 @@ class OriginalLaw:
     def _near(self, made: Discretisation, guess: Solution, passes: int) -> Solution:
         """Return the motion by the control nearest to that of `guess`; verified if passes > 1."""
         meshes: Sequence[Array] = guess.meshes
-        goal, past, phases = GOAL * self.tolerance, None, len(self.problem.chain)
+        goal, past, phases = GOAL * self.tolerance, None, len(made.problem.chain)
         for number in range(1, passes + 1):
             begin = perf_counter()
             on = made.on(meshes)
             start = start_of(on, guess)[0]
-            prepared = self._solver(CLOSE).prepared(project_control(on, start.w))
-            outcome = self.supervisor.run(on, prepared, start, f"law itself {number}", begin=begin)
+            solver = self.task.ipopt.with_defaults(**CLOSE)
+            prepared = solver.prepared(project_control(on, start.w))
+            stage = f"law itself {number}"
+            outcome = self.task.supervisor.run(on, prepared, start, stage, begin=begin)
             past = outcome.statistics if past is None else past.then(outcome.statistics)
             cost = float(on.program.gradient(outcome.iterate.w, on.program.values)[0])
             guess = replace(Solved(on, outcome).solution, cost=cost, statistics=past)
             if not guess.ok or passes == 1:
                 return guess
-            arcs = arcs_of(self.problem, guess.meshes, guess.points)
+            arcs = arcs_of(made.problem, guess.meshes, guess.points)
             errors, finer = local_errors(arcs, min(1e-6, 1e-2 * self.tolerance)), None
             while finer is None and number < passes:
                 finer = cut_meshes(guess.meshes, errors, phases, goal, order=2, most=MOST_PARTS)
@@ -153,18 +147,15 @@ class OriginalLaw:
         If it is neither solved nor stopped, return the best feasible iterate as ACCEPTABLE.
         """
         on = made.on(near.meshes)
-        prepared = self._solver(COST).prepared(on.program)
+        prepared = self.task.ipopt.with_defaults(**COST).prepared(on.program)
         start = Iterate.cold(near.iterate.w, on.program.g.numel())
-        outcome = self.supervisor.run(on, prepared, start, "law itself, cost")
+        outcome = self.task.supervisor.run(on, prepared, start, "law itself, cost")
         statistics = near.statistics.then(outcome.statistics)
         found = Solved(on, outcome).solution
         if not found.ok and not outcome.status.stopped:
             better = outcome.violation < KEPT and outcome.cost < near.cost
             found = replace(found if better else near, status=Status.ACCEPTABLE)
         return replace(found, statistics=statistics)
-
-    def _solver(self, options: dict[str, Option]) -> Ipopt:
-        return self.solver.with_options(**(options | dict(self.solver.options)))
 
 
 def project_control(transcription: Transcription, w: ArrayLike) -> Program:

@@ -14,7 +14,7 @@ from ocp.formulation.expressions import kinks
 from ocp.formulation.problem import FAR, Problem, cost_size, sized
 from ocp.formulation.validate import doubts
 from ocp.solving.methods import Fatrop, Ipopt, Sqp
-from ocp.solving.one_solve import Solver
+from ocp.solving.one_solve import Solver, Task
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Start
@@ -25,9 +25,6 @@ from symfric.foundation.status import SolveError
 
 if TYPE_CHECKING:
     from ocp.strategies import Friction
-
-OVER = "obj_scaling_factor"
-"""Option of Ipopt for the factor by which it multiplies the cost."""
 
 
 def solve(
@@ -111,7 +108,7 @@ def solve(
     Limits: the solution is a local optimum; with friction, the best of a few starts.
     """
     from ocp.checking.mesh_refinement import Goals  # noqa: PLC0415  (slow to load)
-    from ocp.strategies import Direct, Friction, Search, solved  # noqa: PLC0415  (slow to load)
+    from ocp.strategies import Friction, Search, solved  # noqa: PLC0415  (slow to load)
 
     checks.kind("solve", problem, Problem, "a problem, such as Problem(Phase(model, T=1.0), cost)")
     tolerance = checks.number("solve: tolerance", tolerance, above=0.0)
@@ -133,17 +130,15 @@ def solve(
     if intervals is not None:
         make_meshes(problem, intervals)  # raises ValueError for invalid meshes of any strategy
     posed = sized(problem)
-    if isinstance(solver, Ipopt) and OVER not in solver.options:
-        size = cost_size(posed)
-        if posed is not problem or size < 1.0 / FAR:  # Ipopt itself scales large costs
-            solver = solver.with_options(**{OVER: 1.0 / size})
+    size = cost_size(posed)
+    if posed is not problem or size < 1.0 / FAR:  # Ipopt itself scales large costs
+        solver = solver.with_defaults(obj_scaling_factor=1.0 / size)
     goals = Goals.of(tolerance) if refine else replace(Goals.of(tolerance), passes=1)
     if not isinstance(executor, Executor | None):  # pyright: ignore[reportUnnecessaryIsInstance]
         what = "an executor of concurrent.futures, or None"
         raise checks.refused("solve: executor", what, executor)
-    supervisor = Supervisor(max_time, progress, executor)
-    direct = Direct(posed, scheme, solver, intervals, goals, supervisor)
-    search = Search(direct, tolerance, verify, resting_margin)
+    task = Task(posed, scheme, solver, Supervisor(max_time, progress, executor))
+    search = Search(task, intervals, goals, tolerance, verify, resting_margin)
     solution = solved(search, friction, guess, starts)
     if not solution.ok:
         costs = dict.fromkeys(kinks(ca.vertcat(span.running, span.end)) for span in posed.spans)

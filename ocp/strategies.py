@@ -36,12 +36,10 @@ from ocp.friction.smooth_models import (
     sticking,
 )  # fmt: skip
 from ocp.original_law import FAILURES, STEPS, OriginalLaw, reason_of
-from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import STARTS, Solver
-from ocp.solving.prepared import Supervisor
+from ocp.solving.one_solve import STARTS, Task
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start
-from ocp.transcription.schemes import Radau, Scheme, Shooting, make_meshes
+from ocp.transcription.schemes import Radau, Shooting, make_meshes
 from symfric.foundation import checks
 from symfric.foundation.status import Status
 
@@ -61,69 +59,6 @@ FOUND = (*MISSED, Status.UNSTABLE)
 """Statuses of a motion that was found but violates its conditions."""
 SHARPEST = 1e-4
 """Smallest smoothing width, in multiples of the speeds, of a direct solve."""
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Direct:
-    """Direct solves of a problem, on meshes refined by its local errors.
-
-    Attributes:
-        problem, scheme, solver, intervals: as in `ocp.solve`.
-        goals: goals of mesh refinement; with one pass the mesh is not refined.
-        supervisor: time limit and progress of all solves.
-    """
-
-    problem: Problem
-    scheme: Scheme
-    solver: Solver
-    intervals: int | ArrayLike | Sequence[ArrayLike] | None
-    goals: Goals
-    supervisor: Supervisor
-
-    @property
-    def ipopt(self) -> Ipopt:
-        """The solver if it is Ipopt, otherwise Ipopt without options."""
-        return self.solver if isinstance(self.solver, Ipopt) else Ipopt()
-
-    @property
-    def meshes(self) -> list[Array]:
-        """First meshes."""
-        wanted = INTERVALS if self.intervals is None else self.intervals
-        return make_meshes(self.problem, wanted)
-
-    def solved(
-        self, guess: Start, meshes: Sequence[Array] | None = None, *, close: bool = False,
-        starts: int | None = None,
-    ) -> Solution:  # fmt: skip
-        """Solve from `starts` starts around `guess`; `close` limits passes and iterations."""
-        goals, solver, most = self.goals, self.solver, 0
-        if meshes is None:
-            meshes = self.meshes
-        elif self.problem.scenarios:
-            passes, most = min(goals.passes, SHARED_PASSES), SHARED_ITERATIONS
-            goals = replace(goals, passes=passes)
-        if close:
-            passes, most = min(goals.passes, CLOSE_PASSES), CLOSE_ITERATIONS
-            goals = replace(goals, passes=passes, most=CLOSE_INTERVALS, patient=False)
-        if most and isinstance(solver, Ipopt) and "max_iter" not in solver.options:
-            solver = solver.with_options(max_iter=most)
-        return refined_solve(
-            self.problem, meshes, self.scheme, solver, guess, goals=goals,
-            supervisor=self.supervisor, starts=starts or 1,
-        )  # fmt: skip
-
-    def sharpened(self, guess: Start, starts: int | None, last: float) -> Iterator[Sharp]:
-        """Yield motions with decreasing smoothing widths, down to `last`."""
-        intervals = FINE
-        if self.intervals is not None:
-            meshes = make_meshes(self.problem, self.intervals)
-            intervals = sum(mesh.size - 1 for mesh in meshes[: len(self.problem.chain)])
-        return sharpened(
-            self.problem, self.scheme, self.solver, guess, intervals=intervals,
-            starts=starts or STARTS, last=last,
-            rivals=last > 0 and not bristles(self.problem), supervisor=self.supervisor,
-        )  # fmt: skip
 
 
 class Judged(NamedTuple):
@@ -146,16 +81,55 @@ class Search:
     """Solution of a problem by its strategies, and verification of the motions that they find.
 
     Attributes:
-        direct: direct solves of the problem.
+        task: the problem, with scheme, solver, time limit and progress.
+        intervals: as in `ocp.solve`.
+        goals: goals of mesh refinement; with one pass the mesh is not refined.
         tolerance: tolerance of the verification.
         verify: True to verify motions.
         margin: margin of a contact at rest, as a share of its static level.
     """
 
-    direct: Direct
+    task: Task
+    intervals: int | ArrayLike | Sequence[ArrayLike] | None
+    goals: Goals
     tolerance: float
     verify: bool
     margin: float
+
+    @property
+    def meshes(self) -> list[Array]:
+        """First meshes."""
+        wanted = INTERVALS if self.intervals is None else self.intervals
+        return make_meshes(self.task.problem, wanted)
+
+    def direct(
+        self, guess: Start, meshes: Sequence[Array] | None = None, *, close: bool = False,
+        starts: int | None = None,
+    ) -> Solution:  # fmt: skip
+        """Solve on refined meshes from `starts` starts; `close` limits passes and iterations."""
+        goals, solver, most = self.goals, self.task.solver, 0
+        if meshes is None:
+            meshes = self.meshes
+        elif self.task.problem.scenarios:
+            passes, most = min(goals.passes, SHARED_PASSES), SHARED_ITERATIONS
+            goals = replace(goals, passes=passes)
+        if close:
+            passes, most = min(goals.passes, CLOSE_PASSES), CLOSE_ITERATIONS
+            goals = replace(goals, passes=passes, most=CLOSE_INTERVALS, patient=False)
+        if most:
+            solver = solver.with_defaults(max_iter=most)
+        task = replace(self.task, solver=solver)
+        return refined_solve(task, meshes, guess, goals, starts=starts or 1)
+
+    def sharpened(self, guess: Start, starts: int | None, last: float) -> Iterator[Sharp]:
+        """Yield motions with decreasing smoothing widths, down to `last`."""
+        problem, intervals = self.task.problem, FINE
+        if self.intervals is not None:
+            intervals = sum(mesh.size - 1 for mesh in self.meshes[: len(problem.chain)])
+        return sharpened(
+            self.task, guess, intervals=intervals, starts=starts or STARTS, last=last,
+            rivals=last > 0 and not bristles(problem),
+        )  # fmt: skip
 
     def checked(self, solution: Solution) -> Solution:
         """Return `solution` with its verification.
@@ -227,13 +201,12 @@ class Search:
 
         Motions with small margins of contacts at rest are tried first.
         """
-        direct, problem = self.direct, self.direct.problem
-        each = sharp.rivals or (sharp,)
+        problem, each = self.task.problem, sharp.rivals or (sharp,)
         found = optimise_modes(
             [(one.solution, speeds_at(problem, one.scales, one.level)) for one in each],
-            problem, solver=direct.ipopt, scheme=direct.scheme, margin=self.margin,
-            supervisor=direct.supervisor,
-        )  # fmt: skip
+            self.task,
+            self.margin,
+        )
         narrow = own_level(problem, sharp.scales) < SHARPEST
         margins = found.margins if narrow else (*found.margins[:1], *found.margins[1:][-1:])
         margins = margins[-1:] if bristles(problem) else margins
@@ -243,7 +216,7 @@ class Search:
             if exact.status.stopped:
                 return Judged(_stopped(exact, sharp.solution), right=False)
             exact = self.checked(_after(sharp.solution, exact))
-            if exact.status in MISSED and last and not direct.supervisor.over:
+            if exact.status in MISSED and last and not self.task.supervisor.over:
                 exact = self.by_original_law(exact) if bristles(problem) else exact
                 own = exact if narrow or confirmed(exact) else self._by_own_law(exact)
                 if confirmed(own):
@@ -257,15 +230,14 @@ class Search:
 
     def _by_own_law(self, exact: Solution) -> Solution:
         """Return the verified motion with the laws of the problem, near a motion by modes."""
-        own = self.checked(self.direct.solved(exact, exact.meshes, close=True))
+        own = self.checked(self.direct(exact, exact.meshes, close=True))
         return replace(_after(exact, own), modes=exact.modes)
 
     def by_original_law(self, exact: Solution) -> Solution:
         """Return a motion with the law and its states, found by shooting from `exact`."""
-        direct, scheme = self.direct, self.direct.scheme
+        scheme = self.task.scheme
         scheme = scheme if isinstance(scheme, Shooting) else Shooting("exponential", STEPS)
-        settings = scheme, direct.ipopt, self.tolerance, direct.supervisor
-        return OriginalLaw(direct.problem, *settings).continued(exact)
+        return OriginalLaw(replace(self.task, scheme=scheme), self.tolerance).continued(exact)
 
 
 def _stopped(exact: Solution, sharp: Solution) -> Solution:
@@ -278,11 +250,10 @@ def _stopped(exact: Solution, sharp: Solution) -> Solution:
 
 
 def solved(search: Search, friction: Friction, guess: Start, starts: int | None) -> Solution:
-    """Solve the problem of `search.direct` by the strategy that it requires."""
-    direct, check = search.direct, search.checked
-    if any(row.is_product for span in direct.problem.spans for row in span.path):
+    """Solve the problem of `search` by the strategy that it requires."""
+    problem, shooting = search.task.problem, isinstance(search.task.scheme, Shooting)
+    if any(row.is_product for span in problem.spans for row in span.path):
         return _by_relaxation(search, friction, guess)
-    problem, shooting = direct.problem, isinstance(direct.scheme, Shooting)
     holding = any(sticking(phase.model) for phase in problem.chain)
     static = friction == "auto" and not isinstance(guess, Solution) and bool(law_states(problem))
     if shooting and static and not (_refused(problem) or _events(problem)):
@@ -297,26 +268,24 @@ def solved(search: Search, friction: Friction, guess: Start, starts: int | None)
             f"solve: expected models without events, got {checks.listed(events)}; with "
             "collocation friction='modes' or 'sharpen' replaces laws that have them"
         )
-    return check(direct.solved(guess, starts=starts))
+    return search.checked(search.direct(guess, starts=starts))
 
 
 def _by_relaxation(search: Search, friction: Friction, guess: Start) -> Solution:
     """Solve a problem with complementary signals, with the friction of its models."""
-    direct = search.direct
-    problem, meshes = direct.problem, direct.meshes
-    if friction != "smooth" and any(sticking(phase.model) for phase in problem.chain):
+    meshes = search.meshes
+    if friction != "smooth" and any(sticking(phase.model) for phase in search.task.problem.chain):
         raise ValueError(
             "solve: expected friction='smooth' with complementary(...), as modes and widths of "
             f"friction are not sought together with it, got {friction!r}"
         )
-    settings = direct.goals, direct.supervisor
-    found = solve_relaxed(problem, meshes, direct.scheme, direct.solver, guess, *settings)
+    found = solve_relaxed(search.task, meshes, guess, search.goals)
     return with_products(search.checked(found))
 
 
 def _by_shooting(search: Search, guess: Start, starts: int | None) -> Solution:
     """Solve with laws with states by shooting, started from the motion with static friction."""
-    collocation = replace(search, direct=replace(search.direct, scheme=Radau()), verify=False)
+    collocation = replace(search, task=replace(search.task, scheme=Radau()), verify=False)
     static = _by_homotopy(collocation, "modes", guess, starts)
     if static.status.stopped or not static.ok:
         return static
@@ -329,28 +298,27 @@ def _by_homotopy(search: Search, friction: Friction, guess: Start, starts: int |
 
     If there is none, return the best motion, with a message about the steps that failed.
     """
-    problem, check = search.direct.problem, search.checked
+    problem, check = search.task.problem, search.checked
     reason = _refused(problem) if friction != "sharpen" else "not requested"
     if reason and friction == "modes":
         raise ValueError(f"solve: friction 'modes': {reason}")
     if isinstance(guess, Solution) and guess.modes and starts is None and not reason:
         with suppress(*FAILURES):
-            direct = search.direct
-            last = resumed(problem, direct.scheme, direct.solver, guess, direct.supervisor)
+            last = resumed(search.task, guess)
             if last.solution.ok and (found := search.near(last)).right:
                 return found.solution
-    path = search.direct.sharpened(guess, starts, 0.0 if reason else LAST)
+    path = search.sharpened(guess, starts, 0.0 if reason else LAST)
     try:
         sharp = next(path)
     except FAILURES as error:
         if _events(problem):
             raise
-        smooth = check(search.direct.solved(guess, starts=starts))
+        smooth = check(search.direct(guess, starts=starts))
         return with_sentence(smooth, f"Friction was not sharpened: {reason_of(error)}.")
     tried, text = list[Judged](), f"No motion by modes was sought: {reason}." if reason else ""
     while sharp.solution.ok:
         if friction != "modes" and sharp.level <= own_level(problem, sharp.scales) * 1.001:
-            smooth = search.direct.solved(sharp.solution, sharp.solution.meshes)
+            smooth = search.direct(sharp.solution, sharp.solution.meshes)
             return check(_after(sharp.solution, smooth))
         early = sharp.level <= EARLY and not sharp.steady
         if not reason and (sharp.rivals or early or sharp.level <= LAST * 1.001):

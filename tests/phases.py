@@ -10,12 +10,14 @@ from ocp.checking.mesh_refinement import Goals, refined_solve
 from ocp.formulation.expressions import TIME, integral
 from ocp.formulation.phase import Free, Phase
 from ocp.formulation.problem import Problem
-from ocp.solving.one_solve import Solver
+from ocp.solving.methods import Ipopt
+from ocp.solving.one_solve import Solver, Task
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Start
 from ocp.solving.watch import Report
-from ocp.transcription.schemes import Scheme, make_meshes
+from ocp.transcription.schemes import Radau, Scheme, make_meshes
+from ocp.transcription.transcribe import Transcription, discretise
 from symfric import BrownMcPhee, Model, Variable
 from symfric.multibody import JointSpringDamper
 from symfric.scenes import SliderCrank
@@ -52,6 +54,11 @@ def fastest_move(v_t: float = 1e-3) -> Problem:
     return Problem(phase, TIME, bounds={"force": (-20.0, 20.0)})
 
 
+def on(problem: Problem, intervals: Any = 10, scheme: Scheme | None = None) -> Transcription:
+    """Return the program of a problem on one mesh."""
+    return discretise(problem, scheme or Radau()).on(make_meshes(problem, intervals))
+
+
 def solve_once(
     problem: Problem,
     intervals: Any = 50,
@@ -61,9 +68,9 @@ def solve_once(
     progress: Report | None = None,
 ) -> Solution:
     """Solve on one mesh."""
+    task = Task(problem, scheme or Radau(), solver or Ipopt(), Supervisor(progress=progress))
     goals, meshes = replace(Goals.of(1e-3), passes=1), make_meshes(problem, intervals)
-    supervisor = Supervisor(progress=progress)
-    return refined_solve(problem, meshes, scheme, solver, guess, goals=goals, supervisor=supervisor)
+    return refined_solve(task, meshes, guess, goals)
 
 
 SLIDER_CRANK = SliderCrank(BrownMcPhee(mu_s=0.2, mu_d=0.15, v_t=0.02), omega=0.0)

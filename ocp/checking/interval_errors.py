@@ -61,7 +61,7 @@ def _collocated(transcription: Transcription, w: Array, values: Array, number: i
     ends, equations = np.full((nx, N), np.nan), _equations(transcription, number)
     if equations is None:
         return ends
-    piece, block, _ = equations
+    piece, block = equations
     n = 0 if span.model.holonomic is None else span.model.holonomic.n
     first = block.n - len(span.sides) - n
     old, new = transcription.scheme.coefficients(), FINER.coefficients()
@@ -296,9 +296,9 @@ def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tupl
     equations = _equations(transcription, number)
     if equations is None:
         return np.zeros(shape), np.zeros(shape)
-    piece, block, at = equations
+    piece, block = equations
     places = piece.places
-    lam, sigma = iterate.lam_g[at], cost_weight(transcription, iterate.lam_g, number)
+    lam, sigma = iterate.lam_g[piece.at], cost_weight(transcription, iterate.lam_g, number)
     v, theta = _at_places(piece, iterate.w, program.p, program.values)
     inputs = own.nodes.shape[0] + own.z.shape[0] + np.arange(shape[0])
     H_u, H_uu = np.zeros((shape[0], places)), np.zeros((shape[0], places))
@@ -319,12 +319,11 @@ def _slopes(transcription: Transcription, iterate: Iterate, number: int) -> tupl
     return H_u.reshape(shape), H_uu.reshape(shape)
 
 
-def _equations(transcription: Transcription, number: int) -> tuple[Piece, Block, Indices] | None:
-    """Return the equations of a phase at collocation points, their block and their row numbers."""
-    skeleton, first = transcription.skeleton, "the equation of"
-    for piece, at in zip(skeleton.pieces, skeleton.assembled.at, strict=True):
-        if piece.span == number and any(name.startswith(first) for name in piece.names):
-            return (piece, piece.block, at) if piece.block is not None else None
+def _equations(transcription: Transcription, number: int) -> tuple[Piece, Block] | None:
+    """Return the equations of a phase at collocation points, and their block."""
+    for piece in transcription.skeleton.pieces:
+        if piece.span == number and any(n.startswith("the equation of") for n in piece.names):
+            return (piece, piece.block) if piece.block is not None else None
     return None
 
 

@@ -16,13 +16,11 @@ from ocp.checking.interval_errors import estimated_errors, zoh_losses
 from ocp.checking.resimulate import Arc, arcs_of
 from ocp.checking.verify import TOLERANCE, left_between, restarted
 from ocp.formulation.phase import Array
-from ocp.formulation.problem import Problem
-from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import Solved, Solver, Starts, starts_around
-from ocp.solving.prepared import Prepared, Supervisor
+from ocp.solving.one_solve import Solved, Starts, Task, starts_around
+from ocp.solving.prepared import Prepared
 from ocp.solving.solution import Solution, with_sentence
 from ocp.solving.starts import Start, start_of
-from ocp.transcription.schemes import Radau, Scheme, Shooting
+from ocp.transcription.schemes import Shooting
 from ocp.transcription.transcribe import Discretisation, Skeleton, discretise
 from symfric.foundation.status import Status
 
@@ -179,30 +177,20 @@ class Goals:
 
 
 def refined_solve(
-    problem: Problem,
-    meshes: Sequence[Array],
-    scheme: Scheme | None = None,
-    solver: Solver | None = None,
-    guess: Start = None,
-    *,
-    goals: Goals | None = None,
-    supervisor: Supervisor | None = None,
+    task: Task, meshes: Sequence[Array], guess: Start = None, goals: Goals | None = None, *,
     starts: int = 1,
-) -> Solution:
-    """Solve `problem` repeatedly, each time on meshes derived from the remaining errors.
+) -> Solution:  # fmt: skip
+    """Solve a problem repeatedly, each time on meshes derived from the remaining errors.
 
     A mesh is fine enough if the local error of each interval, the loss by constant inputs and the
     violations between nodes reach the `goals`. A mesh with the same number of intervals uses the
     same program.
 
     Args:
-        problem: the problem to solve.
+        task: the problem to solve, with scheme, solver, time limit and progress.
         meshes: initial meshes, such as `make_meshes(problem, 50)`.
-        scheme: `Radau(3)` by default.
-        solver: `Ipopt()` by default.
         guess: see `ocp.solving.starts`.
         goals: criteria for a fine mesh, by default for a verification within 1e-3.
-        supervisor: time limit and progress.
         starts: number of solves on the first mesh from starts around the guess; the best one is
             continued. If the solution is the only start, another start is tried, as the gradient
             of the cost is also zero at a saddle or a maximum.
@@ -214,8 +202,8 @@ def refined_solve(
         result.
     """
     begin = perf_counter()
-    goals, supervisor = goals or Goals.of(TOLERANCE), supervisor or Supervisor()
-    solver, made = solver or Ipopt(), discretise(problem, scheme or Radau())
+    goals, solver, supervisor = goals or Goals.of(TOLERANCE), task.solver, task.supervisor
+    made = discretise(task.problem, task.scheme)
     ready: dict[tuple[Skeleton, bool, bool], Prepared] = {}
     texts: list[str] = []
 
@@ -225,10 +213,9 @@ def refined_solve(
         key = (transcription.skeleton, number == 1, capped)
         if key not in ready:  # meshes with equal numbers of intervals have the same program
             later: dict[str, float] = {"max_iter": CAP} if capped else {}
-            if problem.kind != "worst":  # a small barrier prevents convergence of its multipliers
+            if made.problem.kind != "worst":  # a small barrier prevents convergence of multipliers
                 later["mu_init"] = LATER
-            again = isinstance(solver, Ipopt) and number > 1
-            own = solver.with_options(**(later | dict(solver.options))) if again else solver
+            own = solver.with_defaults(**later) if number > 1 else solver
             ready[key] = own.prepared(transcription.program)
         start, warm = start_of(transcription, guess)
         each = Starts(transcription, solver, ready[key], transcription.program.values)

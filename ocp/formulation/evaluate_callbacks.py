@@ -13,8 +13,7 @@ from ocp.formulation import expressions
 from ocp.formulation.changed_models import typical
 from ocp.formulation.expressions import EPS, MissingError, Signals, arguments
 from ocp.formulation.phase import Join, Link, PathCondition, Row
-from ocp.formulation.relaxed import Complementary, Soft
-from ocp.formulation.statement import Setting, Statement
+from ocp.formulation.statement import Complementary, Setting, Soft, Statement
 from symfric.foundation.variable import strays
 from symfric.model import Model
 

@@ -12,8 +12,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from ocp.formulation.changed_models import Form, Forms
 from ocp.formulation.expressions import Cost, Signals, arguments
-from ocp.formulation.inputs import Form, Forms
 from symfric.foundation import checks
 from symfric.foundation.numeric import Scalar, is_number
 from symfric.model import Model, check_model

@@ -18,9 +18,8 @@ from typing import Any, Literal, final
 import casadi as ca
 import numpy as np
 
-from ocp.formulation.changed_models import rebuilt
+from ocp.formulation.changed_models import rate_name, rebuilt, states_of
 from ocp.formulation.expressions import TIME, arguments, integral
-from ocp.formulation.inputs import rate_name, states_of
 from ocp.formulation.phase import Chain, Free, Phase, Span, as_box, initial, size_of
 from ocp.formulation.resolve import resolved
 from ocp.formulation.statement import Choice, Statement, chosen_of, forms_of, only, settings_of

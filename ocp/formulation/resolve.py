@@ -14,9 +14,8 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation import statement
-from ocp.formulation.changed_models import with_constants, with_outputs
+from ocp.formulation.changed_models import states_of, with_constants, with_outputs
 from ocp.formulation.evaluate_callbacks import Evaluated, collected, evaluated
-from ocp.formulation.inputs import states_of
 from ocp.formulation.phase import FREE, Box, Free, Link, Range, Row, Span, as_box, fixed, meet
 from ocp.formulation.statement import Choice, Setting, Statement
 from ocp.formulation.validate import input_problems, type_problems

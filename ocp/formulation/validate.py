@@ -9,8 +9,8 @@ from math import inf, isfinite
 from typing import Any, cast
 
 from ocp.formulation import statement
+from ocp.formulation.changed_models import FORM, is_form, order_of, rate_name
 from ocp.formulation.expressions import Cost, offered
-from ocp.formulation.inputs import FORM, is_form, order_of, rate_name
 from ocp.formulation.phase import RANGE, Chain, Free, Phase, as_box, is_range, limits
 from ocp.formulation.statement import Setting, Statement
 from symfric.foundation import checks

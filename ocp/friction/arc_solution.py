@@ -15,13 +15,11 @@ from ocp.formulation.problem import Problem
 from ocp.friction.arcs import CAUGHT, FIRST, PULLED, STOPPED, Rules, breaks_away, in_arcs
 from ocp.friction.sequence import Leg, Legs, flat, modes_of, placed, shown, tracks_of
 from ocp.friction.transfer import Known, points_in
-from ocp.solving.methods import Ipopt
 from ocp.solving.motion import motions_of
-from ocp.solving.one_solve import Solved, along_points
-from ocp.solving.prepared import Option, Supervisor
+from ocp.solving.one_solve import Solved, Task, along_points
+from ocp.solving.prepared import Option
 from ocp.solving.solution import Solution
 from ocp.transcription.program import Iterate, SolverStatistics
-from ocp.transcription.schemes import Scheme
 from ocp.transcription.transcribe import Discretisation, discretise
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation.parameters import Variable
@@ -123,16 +121,14 @@ class ModeSolver:
 
     Attributes:
         rules: rules by which arcs become phases.
-        solver, scheme, supervisor: as in `optimise_modes`.
+        task: the user's problem, with scheme, solver, time limit and progress.
         kick: smallest length of the interval in which a contact breaks away or is stopped [s].
         tried: results of all solves. A stopped solve is added before `StoppedError` is raised.
     """
 
     rules: Rules
-    solver: Ipopt
-    scheme: Scheme
+    task: Task
     kick: float
-    supervisor: Supervisor = field(default_factory=Supervisor)
     tried: list[SolvedSequence] = field(default_factory=list[SolvedSequence])
 
     def solve(self, legs: Legs, known: Known, intervals: int, barrier: float) -> SolvedSequence:
@@ -162,7 +158,7 @@ class ModeSolver:
             u = span.model.vector("u")
             rows = [row for row in span.rows_at[0.0] if FIRST in row.name]
             peaks[number] = [row for row in rows if ca.depends_on(row.expression, u)]
-        return discretise(problem, self.scheme, peaks)
+        return discretise(problem, self.task.scheme, peaks)
 
     @property
     def stopped(self) -> bool:
@@ -171,7 +167,8 @@ class ModeSolver:
 
     def with_iterations(self, limit: int) -> "ModeSolver":
         """Return the solver with another limit of the iterations of one solve."""
-        return replace(self, solver=self.solver.with_options(max_iter=limit))
+        solver = self.task.ipopt.with_options(max_iter=limit)
+        return replace(self, task=replace(self.task, solver=solver))
 
     def with_margin(self, margin: float) -> "ModeSolver":
         """Return the solver with another friction margin."""
@@ -202,9 +199,9 @@ class ModeSolver:
             for mesh, span, arc in zip(meshes, spans, arcs, strict=True)
         ]
         made = discretisation.on(meshes)
-        prepared = self.solver.with_options(mu_init=barrier, **options).prepared(made.program)
+        prepared = self.task.ipopt.with_options(mu_init=barrier, **options).prepared(made.program)
         start = Iterate.cold(made.pack(points_in(made, arcs, known)), made.program.g.numel())
-        outcome = self.supervisor.run(made, prepared, start, f"modes {shown(legs)}")
+        outcome = self.task.supervisor.run(made, prepared, start, f"modes {shown(legs)}")
         durations = [span.T for span in made.unpack(outcome.iterate.w).spans]
         solved = SolvedSequence(made, outcome, placed(legs, durations), discretisation)
         self.tried.append(solved)

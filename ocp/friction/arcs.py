@@ -32,8 +32,7 @@ from typing import Any, NamedTuple, final
 
 import casadi as ca
 
-from ocp.formulation.changed_models import further_states, rebuilt
-from ocp.formulation.inputs import states_of
+from ocp.formulation.changed_models import further_states, rebuilt, states_of
 from ocp.formulation.phase import Chain, Free, Phase, Range, Span, Start, fixed, limits, meet
 from ocp.formulation.problem import Problem
 from ocp.formulation.statement import Duration, added_signals, forms_of, only

@@ -32,15 +32,23 @@ from ocp.formulation.phase import Array, initial
 from ocp.formulation.problem import Problem
 from ocp.friction import smooth_models
 from ocp.friction.smooth_models import Scales, same_size, scales_of, widths_at
-from ocp.solving.methods import Ipopt
 from ocp.solving.motion import span_motions
-from ocp.solving.one_solve import STARTS, Solver, Starts, Step, finalists, least, starts_around
+from ocp.solving.one_solve import (
+    STARTS,
+    Solver,
+    Starts,
+    Step,
+    Task,
+    finalists,
+    least,
+    starts_around,
+)
 from ocp.solving.optimum import Optimum
-from ocp.solving.prepared import Option, Prepared, Supervisor
+from ocp.solving.prepared import Option, Prepared
 from ocp.solving.solution import Solution
 from ocp.solving.starts import Start, resample, start_of
 from ocp.transcription.program import SolverStatistics
-from ocp.transcription.schemes import Scheme, make_meshes
+from ocp.transcription.schemes import make_meshes
 from ocp.transcription.transcribe import Transcription, discretise
 from ocp.transcription.unknowns import Points
 
@@ -104,16 +112,13 @@ class Sharp(NamedTuple):
 
 
 def sharpened(
-    problem: Problem,
-    scheme: Scheme,
-    solver: Solver,
+    task: Task,
     guess: Start = None,
     *,
     intervals: int = FINE,
     starts: int = STARTS,
     last: float = LAST,
     rivals: bool = False,
-    supervisor: Supervisor | None = None,
 ) -> Iterator[Sharp]:
     """Yield solutions with decreasing smoothing widths, one solve at a time.
 
@@ -122,16 +127,14 @@ def sharpened(
     With `rivals`, motions on the coarse mesh at a width of about `RIVAL` precede them.
 
     Args:
-        problem: the user's problem, with contacts.
-        scheme, solver: as in `solve`; the user's options of Ipopt take precedence.
+        task: the user's problem, with contacts; the options of its solver take precedence.
         guess: initial guess; additional starts are generated around it.
         intervals: total number of intervals before refinement.
         starts: number of coarse solves from different starts; the best one is continued.
         last: final smoothing width, in multiples of the speeds.
         rivals: True to yield motions on the coarse mesh first.
-        supervisor: time limit and progress.
     """
-    path = _Path(problem, scheme, solver, supervisor or Supervisor())
+    path = _Path(task)
     coarse = path.coarse(guess, starts)
     if rivals and (found := path.rivals(coarse)):
         yield found[0]._replace(rivals=found)
@@ -158,19 +161,17 @@ def sharpened(
             return
 
 
-def resumed(
-    problem: Problem, scheme: Scheme, solver: Solver, guess: Solution, supervisor: Supervisor
-) -> Sharp:
+def resumed(task: Task, guess: Solution) -> Sharp:
     """Return the motion with the width `LAST` near a solution by modes.
 
     Raises:
         ValueError: its meshes do not suit the problem.
     """
-    path = _Path(problem, scheme, solver, supervisor)
-    same = len(guess.meshes) == len(problem.spans)
-    on = path.discretisation.on(guess.meshes if same else _meshes(problem, FINE))
+    path = _Path(task)
+    same = len(guess.meshes) == len(path.user.spans)
+    on = path.discretisation.on(guess.meshes if same else _meshes(path.user, FINE))
     points = on.unpack(start_of(on, guess)[0].w)
-    path.scales = scales_of(problem, path.problem, points, {})
+    path.scales = scales_of(path.user, path.problem, points, {})
     return path.sharp(path.solve(on, points, LAST, ONTO, "guess"), steady=True)
 
 
@@ -178,12 +179,10 @@ def resumed(
 class _Path:
     """Problem with smooth models, scales and prepared solvers, shared by all steps."""
 
-    def __init__(
-        self, user: Problem, scheme: Scheme, solver: Solver, supervisor: Supervisor
-    ) -> None:
-        self.user, self.scheme, self.solver, self.supervisor = user, scheme, solver, supervisor
-        self.problem = smooth_models.smoothed(user)
-        self.discretisation = discretise(self.problem, scheme)
+    def __init__(self, task: Task) -> None:
+        self.task, self.user = task, task.problem
+        self.problem = smooth_models.smoothed(self.user)
+        self.discretisation = discretise(self.problem, task.scheme)
         self.scales: Scales = {}
         self.spent: list[SolverStatistics] = []
         self.prepared: dict[tuple[int, str], tuple[Solver, Prepared]] = {}
@@ -346,13 +345,11 @@ class _Path:
             options = {name: v for name, v in options.items() if name != "mu_init"} | BOUNDING
         key = (id(transcription.skeleton), str(options))
         if key not in self.prepared:
-            solver = self.solver
-            if isinstance(solver, Ipopt):
-                solver = Ipopt(max_time=solver.max_time, **(dict(options) | dict(solver.options)))
+            solver = self.task.solver.with_defaults(**options)
             self.prepared[key] = solver, solver.prepared(transcription.program)
         starts = Starts(transcription, *self.prepared[key], values)
         steps: list[Step] = []
-        for outcome in starts.outcomes(tries, self.supervisor, stages):
+        for outcome in starts.outcomes(tries, self.task.supervisor, stages):
             self.spent.append(outcome.statistics)
             steps.append(Step(transcription, outcome, values, level))
             if until is not None and until(steps):
@@ -362,7 +359,7 @@ class _Path:
     def moved(self, step: Step, into: Transcription) -> Points:
         """Return the motion of a step interpolated to the meshes of `into`."""
         meshes, points = step.transcription.meshes, step.points
-        spans = span_motions(self.problem, self.scheme, meshes, points)
+        spans = span_motions(self.problem, self.task.scheme, meshes, points)
         return resample(into, spans, points.chosen)
 
     def with_errors(self, step: Step) -> Step:

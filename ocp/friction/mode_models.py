@@ -116,21 +116,10 @@ def mode_model(model: Model, modes: Mapping[str, int]) -> Model:
     are cached in the model.
 
     Raises:
-        ValueError: unknown contacts, contacts without a mode, invalid modes, or sticking contacts
-            whose forces the equations do not determine.
+        ValueError: sticking contacts whose forces the equations do not determine.
     """
-    where = f"model '{model.name}': modes"
-    names = [c.name for c in model.contacts]
-    given = checks.named(where, modes, names)
-    for name, mode in given.items():
-        checks.count(f"{where}: {name}", mode, least=-1, most=1)
-    missing = [c.name for c in sticking(model) if c.name not in given]
-    if missing:
-        raise ValueError(
-            f"{where}: expected 1, 0 or -1 for each contact, got none for {', '.join(missing)}"
-        )
     kept: dict[Any, Model] = model.memory.setdefault("mode models", {})
-    key = tuple((name, int(given.get(name, 1))) for name in names)
+    key = tuple((c.name, int(modes.get(c.name, 1))) for c in model.contacts)
     if key not in kept:
         kept[key] = _in_modes(model, dict(key))
     return kept[key]

@@ -31,17 +31,15 @@ from ocp.checking.mesh_refinement import MeshErrors, refined
 from ocp.checking.resimulate import arcs_of
 from ocp.formulation.phase import Array
 from ocp.formulation.problem import Problem
-from ocp.formulation.relaxed import Soft
+from ocp.formulation.statement import Soft
 from ocp.friction.arc_solution import ModeSolver, SolvedSequence, StoppedError, reassemble
 from ocp.friction.arcs import MARGIN, Rules
 from ocp.friction.mode_models import restless
 from ocp.friction.sequence import Legs, flat, inserted, neighbours, pruned, shown
 from ocp.friction.smooth_models import shortfall
 from ocp.friction.transfer import Known, Reader
-from ocp.solving.methods import Ipopt
-from ocp.solving.prepared import Supervisor
+from ocp.solving.one_solve import Task
 from ocp.solving.solution import Solution
-from ocp.transcription.schemes import Radau, Scheme
 
 TOUCH = 1e-5
 """Share of the largest sliding velocity of a contact below which its slip touches zero. It exceeds
@@ -170,13 +168,7 @@ class ModeMotions:
 
 
 def optimise_modes(
-    smooth: Sequence[tuple[Solution, Mapping[str, float]]],
-    problem: Problem,
-    *,
-    solver: Ipopt | None = None,
-    scheme: Scheme | None = None,
-    margin: float = MARGIN,
-    supervisor: Supervisor | None = None,
+    smooth: Sequence[tuple[Solution, Mapping[str, float]]], task: Task, margin: float = MARGIN
 ) -> ModeMotions:
     """Return the best motion with exact friction near one of several sharpened motions.
 
@@ -185,13 +177,11 @@ def optimise_modes(
     serves to find its cost.
 
     Args:
-        smooth: solutions of `problem` with smooth friction, with widths of about a hundredth of the
-            speeds, and contact -> sliding velocity [m/s] over which its friction is smoothed; they
-            need not be verified.
-        problem: the user's problem.
-        solver, scheme: as in `ocp.solve`.
+        smooth: solutions of the problem with smooth friction, with widths of about a hundredth of
+            the speeds, and contact -> sliding velocity [m/s] over which its friction is smoothed;
+            they need not be verified.
+        task: the user's problem, with scheme, solver, time limit and progress.
         margin: margin between stiction and its static level, as a share of this level.
-        supervisor: time limit and progress.
 
     Returns:
         A search result, whose solutions have `modes` for exact Coulomb friction with stiction,
@@ -206,13 +196,12 @@ def optimise_modes(
     dependent slips (a loop of one degree of freedom) have no unique reactions in stick and are
     refused.
     """
+    problem, first, tried = task.problem, max(MARGIN, margin), list[SolvedSequence]()
     if reason := refusal(problem):
         raise ValueError(f"optimise_modes: {reason}")
-    solver, first = solver or Ipopt(), max(MARGIN, margin)
     limits = [MOST_ITERATIONS] if len(smooth) > 1 else [MOST_ITERATIONS, PATIENT]
-    if "max_iter" in solver.options:
-        limits = [int(solver.options["max_iter"])]
-    shared = solver, scheme or Radau(3), supervisor or Supervisor(), list[SolvedSequence]()
+    if "max_iter" in task.ipopt.options:
+        limits = [int(task.ipopt.options["max_iter"])]
 
     def near(motion: Solution, widths: Mapping[str, float], most: int | None) -> ModeMotions:
         known = Known.of(problem, motion.motions[0], motion.chosen)
@@ -220,7 +209,7 @@ def optimise_modes(
         reader, best = Reader(problem, known), None
         at_rest = reader.starts_at_rest(widths)
         rules = Rules(problem, reader.sizes(), at_rest, SHORTEST * whole, first)
-        modes_solver = ModeSolver(rules, *shared[:2], KICK * whole, *shared[2:])
+        modes_solver = ModeSolver(rules, task, KICK * whole, tried)
         quick = modes_solver.with_iterations(limits[0])
         with suppress(StoppedError):
             for limit, legs in islice(_attempts(limits, reader, widths), most):

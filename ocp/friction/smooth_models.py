@@ -50,14 +50,9 @@ class Width(NamedTuple):
     least: float = 0.0
 
     def at(self, layer: float) -> float:
-        """Return the value of the parameter for a smoothing width `layer` [m/s].
-
-        Raises:
-            ValueError: the parameter is not a width of velocities.
-        """
-        if self.layer is None:
-            raise checks.refused(self.parameter, "a width of velocities", "one of a load [N]")
-        return self.number * (layer / self.layer) ** self.exponent
+        """Return the value of the parameter for a smoothing width `layer` [m/s]."""
+        own = 1.0 if self.layer is None else self.layer
+        return self.number * (layer / own) ** self.exponent
 
 
 def smooth_model(model: Model) -> Model:

@@ -88,9 +88,9 @@ class Optimality:
         defects = c[:, 0] / np.tile(model.nominal("x"), h.count)
         v, below = v[:, 0], np.maximum(-v[:, 0], 0.0)
         kept = np.maximum(below, np.abs(plan.z * v) / np.maximum(plan.z, h.curvature))
-        price = np.where(prices.soft, prices.rho, 1.0)
-        owed = (prices.rho + prices.sigma * below - plan.z) * v / price
-        rows = np.where(prices.soft & (v < 0.0), np.minimum(kept, np.abs(owed)), kept)
+        soft = prices > 0.0
+        owed = (prices + prices * below - plan.z) * v / np.where(soft, prices, 1.0)
+        rows = np.where(soft & (v < 0.0), np.minimum(kept, np.abs(owed)), kept)
         parts = (left / h.curvature, defects, rows)
         return max(float(np.abs(part).max(initial=0.0)) for part in parts)
 

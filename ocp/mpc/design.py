@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import NamedTuple, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.formulation.phase import Array
 from ocp.mpc.horizon import Horizon
@@ -48,14 +47,10 @@ class Settings:
     Attributes:
         tolerance: residual at which a plan is optimal.
         iterations: largest number of quadratic programs; 1 is the real-time iteration.
-        program: largest number of interior-point iterations in a quadratic program.
-        halvings: largest number of step halvings.
     """
 
-    tolerance: float = 1e-3
-    iterations: int = 20
-    program: int = 40
-    halvings: int = 6
+    tolerance: float
+    iterations: int
 
 
 class Plan(NamedTuple):
@@ -80,14 +75,6 @@ class CycleData(NamedTuple):
     t: Array
     p: Array
     b: Array
-
-
-class Prices(NamedTuple):
-    """Penalties rho and sigma of rows, which are zero for hard rows, and a mask of soft rows."""
-
-    rho: Array
-    sigma: Array
-    soft: NDArray[np.bool_]
 
 
 @final
@@ -178,16 +165,13 @@ class Design:
         return tuple(names)
 
     @cached_property
-    def row_prices(self) -> Prices:
-        """Penalties of the rows of one interval and of the end."""
+    def row_prices(self) -> Array:
+        """Linear and quadratic penalties of soft rows of one interval and the end, 0 if hard."""
         soft = np.array([limit.soft for limit in self.horizon.all_limits], dtype=bool)
-        price = np.where(soft, self.penalty * self.horizon.weight, 0.0)
-        return Prices(price, price, soft)
+        return np.where(soft, self.penalty * self.horizon.weight, 0.0)
 
     @cached_property
-    def prices(self) -> Prices:
+    def prices(self) -> Array:
         """Penalties of the rows of all intervals and of the end."""
-        h, one = self.horizon, self.row_prices
-        rows = np.arange(one.soft.size)
-        rows = np.append(np.tile(rows[: len(h.limits)], h.count), rows[len(h.limits) :])
-        return Prices(one.rho[rows], one.sigma[rows], one.soft[rows])
+        each, end = np.split(self.row_prices, [len(self.horizon.limits)])
+        return np.append(np.tile(each, self.horizon.count), end)

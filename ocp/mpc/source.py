@@ -78,8 +78,9 @@ BACK = 0.995
 RESOLUTION = {DOUBLE: 1e-15, FLOAT: 1.5e-5}
 """Estimate of the rounding error of a gradient relative to its terms; in float, where it decides
 when iterations end, 130 rounding units."""
-MOST_IN_FLOAT = 18
-"""Iterations of the interior-point method in float; later ones make no progress."""
+MOST, MOST_IN_FLOAT, HALVINGS = 40, 18, 6
+"""Largest numbers of iterations of the interior-point method, in double and in float, where later
+ones make no progress, and of halvings of a step."""
 SMALLEST = {DOUBLE: 1e-200, FLOAT: 1e-18}
 """Smallest slack and multiplier in the interior-point method, whose ratios are finite."""
 CLOSE = {DOUBLE: 1e-7, FLOAT: 1e-4}
@@ -216,8 +217,8 @@ def sizes(design: Design) -> dict[str, int]:
         "SUBSTEPS": h.substeps,
         "NP": k.matrix.size1_in(0),
         "STEP": k.forward.size1_out(1),
-        "MOST": design.settings.program,
-        "HALVINGS": design.settings.halvings,
+        "MOST": MOST,
+        "HALVINGS": HALVINGS,
     }
 
 
@@ -249,9 +250,9 @@ def _lines(lines: Iterable[str], margin: int) -> str:
 def _macros(design: Design, real: Real) -> str:
     parts: dict[str, int | str] = dict(sizes(design))
     if real is FLOAT:
-        parts["MOST"] = min(MOST_IN_FLOAT, design.settings.program)
+        parts["MOST"] = MOST_IN_FLOAT
     numbers = {
-        "PAIRS": float(parts["ALL"]) + float(design.prices.soft.sum()),
+        "PAIRS": float(parts["ALL"]) + float((design.prices > 0.0).sum()),
         "CURVATURE": design.horizon.curvature,
         "CLOSE": CLOSE[real],
         "AWAY": AWAY,
@@ -269,7 +270,7 @@ def _macros(design: Design, real: Real) -> str:
 
 def _tables(design: Design, real: Real) -> str:
     """Return the constant arrays and the default parameters."""
-    name, h, prices = design.name, design.horizon, design.row_prices
+    name, h, prices = design.name, design.horizon, design.row_prices.tolist()
     tables = {
         "nominal_x": h.model.nominal("x").tolist(),
         "nominal_u": h.model.nominal("u").tolist(),
@@ -277,15 +278,15 @@ def _tables(design: Design, real: Real) -> str:
         "start_u": design.u0.tolist(),
         "identity": list(design.kernels.identity),
     }
-    if prices.soft.size:
-        tables |= {"rho": prices.rho.tolist(), "sigma": prices.sigma.tolist()}
+    if prices:
+        tables |= {"rho": prices, "sigma": prices}
     text = ""
     for table, values in tables.items():
         numbers = ", ".join(map(real.literal, values))
         text += folded(f"static const double {table}[{len(values)}] = {{{numbers}}};", "") + "\n"
-    if prices.soft.size:
-        flags = ", ".join(str(int(flag)) for flag in prices.soft)
-        text += f"static const int soft[{prices.soft.size}] = {{{flags}}};\n"
+    if prices:
+        flags = ", ".join(str(int(price > 0.0)) for price in prices)
+        text += f"static const int soft[{len(prices)}] = {{{flags}}};\n"
     values = [*design.p0.tolist(), *design.bounds.tolist(), design.settings.tolerance]
     numbers = ", ".join([*map(real.literal, values), str(design.settings.iterations)])
     return f"{text}\nconst {name}_param_t {name}_default = {{\n    {numbers}\n}};\n\n"

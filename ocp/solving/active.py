@@ -1,9 +1,9 @@
-"""Active conditions of a solution with their multipliers, in words and SI units."""
+"""Active conditions of a solution with their multipliers, its condition, and its derivatives."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Any, NamedTuple, final
+from typing import NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +83,7 @@ class ActiveConditions(tuple[Active, ...]):
 
 
 class BoundStatus(NamedTuple):
-    """Rows or unknowns at their bounds.
+    """Unknowns, followed by rows, at their bounds.
 
     Attributes:
         active: mask of those that are active.
@@ -99,19 +99,16 @@ class BoundStatus(NamedTuple):
     fixed: NDArray[np.bool_]
     ratio: Array
 
-    @staticmethod
-    def joined(unknowns: "BoundStatus", rows: "BoundStatus") -> "BoundStatus":
-        """Return the status of unknowns, then of rows."""
-        pairs: Any = zip(unknowns, rows, strict=True)
-        return BoundStatus(*map(np.concatenate, pairs))
 
-
-def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> BoundStatus:
-    """Return which of `values` are at a bound, where the multiplier exceeds the distance.
+def status_of(optimum: Optimum) -> BoundStatus:
+    """Return which unknowns and rows are at a bound, where the multiplier exceeds the distance.
 
     Distances are relative to the range between the bounds. An interior-point method ends with a
     small product of multiplier and distance, so both are small only where this is uncertain.
     """
+    lower, upper = optimum.transcription.program.bounds
+    values = np.concatenate([optimum.iterate.w, optimum.rows[0]])
+    strength = optimum.iterate.multipliers / optimum.size
     fixed, span = lower == upper, upper - lower
     below, above = values - lower, upper - values
     size = np.maximum(np.where(np.isfinite(span), span, np.abs(values)), 1.0)
@@ -123,15 +120,6 @@ def status_of(values: Array, lower: Array, upper: Array, strength: Array) -> Bou
     weak = ~fixed & (larger < SMALL) & (smaller >= WEAK * larger - TINY)
     ratio = pressure / np.maximum(distance, TINY)
     return BoundStatus(fixed | (pressure > distance), high, weak, fixed, ratio)
-
-
-def statuses(optimum: Optimum) -> tuple[BoundStatus, BoundStatus]:
-    """Return the status of all unknowns and of all rows."""
-    program, iterate, size = optimum.transcription.program, optimum.iterate, optimum.size
-    return (
-        status_of(iterate.w, program.lower_w, program.upper_w, iterate.lam_w / size),
-        status_of(optimum.rows[0], program.lower_g, program.upper_g, iterate.lam_g / size),
-    )
 
 
 class Entry(NamedTuple):
@@ -213,14 +201,8 @@ def per_unit(unit: str) -> str:
     return f"cost/({unit})" if " " in unit or "/" in unit else f"cost/{unit}"
 
 
-def active_conditions(optimum: Optimum, each: tuple[BoundStatus, BoundStatus]) -> ActiveConditions:
-    """Return the active conditions in the order of time; consecutive times are joined.
-
-    Args:
-        optimum: the solution.
-        each: status of all unknowns and of all rows.
-    """
-    status = BoundStatus.joined(*each)
+def active_conditions(optimum: Optimum, status: BoundStatus) -> ActiveConditions:
+    """Return the active conditions in the order of time; consecutive times are joined."""
     groups: dict[tuple[str, int], list[Entry]] = {}
     for entry in entries(optimum):
         groups.setdefault((entry.name, entry.place.span), []).append(entry)
@@ -244,7 +226,7 @@ def in_words(optimum: Optimum, signals: Collection[str]) -> list[str]:
         return []
     found = [
         one
-        for one in active_conditions(optimum, statuses(optimum))
+        for one in active_conditions(optimum, status_of(optimum))
         if one.side != "=" and not one.weak
     ]
     named = [one for one in found if one.name.removeprefix("the bound on ") in signals]
@@ -254,12 +236,11 @@ def in_words(optimum: Optimum, signals: Collection[str]) -> list[str]:
 
 def _active(optimum: Optimum, status: BoundStatus, run: Sequence[Entry]) -> Active:
     """Return the condition on the entries of a run, which are all active on the same side."""
-    program, points = optimum.transcription.program, optimum.points.spans
-    lam = np.concatenate([optimum.iterate.lam_w, optimum.iterate.lam_g])
+    points, lam = optimum.points.spans, optimum.iterate.multipliers
     (name, place, first, _, unit), last = run[0], run[-1]
     numbers = [entry.number for entry in run]
     upper = bool(status.upper[first])
-    bounds = (program.upper_w, program.upper_g) if upper else (program.lower_w, program.lower_g)
+    bound = optimum.transcription.program.bounds[upper][first]
     problem = optimum.transcription.problem
     span = problem.spans[place.span]
     first_span = place.span - span.phase
@@ -271,7 +252,7 @@ def _active(optimum: Optimum, status: BoundStatus, run: Sequence[Entry]) -> Acti
     return Active(
         name=name,
         side="=" if status.fixed[first] else ("lower", "upper")[upper],
-        value=float(np.concatenate(bounds)[first] * place.scale),
+        value=float(bound * place.scale),
         begin=start + length * (0.0 if whole else place.fraction),
         end=start + length * (1.0 if whole else last.end),
         multiplier=-float(sum(lam[entry.number] / entry.place.scale for entry in run)),
@@ -295,3 +276,71 @@ def _merged(found: Sequence[Active]) -> list[Active]:
         else:
             merged.append(one)
     return merged
+
+
+@final
+@dataclass(frozen=True)
+class Condition:
+    """Condition of an optimum.
+
+    Attributes:
+        unknowns, active: numbers of unknowns, and of active conditions including equations.
+        degrees_of_freedom: number of unknowns minus number of active conditions; some more if the
+            conditions depend on each other.
+        residual: relative residual of stationarity.
+        number: estimated condition number of the equilibrated optimality conditions; inf if they
+            are singular.
+        sufficient: True if the Hessian is positive definite on the active conditions, so the
+            optimum is a strict local minimum.
+        weak: names of conditions that may or may not be active.
+    """
+
+    unknowns: int
+    active: int
+    degrees_of_freedom: int
+    residual: float
+    number: float
+    sufficient: bool
+    weak: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        order = "strict local minimum" if self.sufficient else "second-order conditions not met"
+        weak = f"; weakly active: {', '.join(self.weak)}" if self.weak else ""
+        return (
+            f"{self.unknowns} unknowns, {self.active} active conditions, "
+            f"{self.degrees_of_freedom} degrees of freedom; {order}; condition number "
+            f"{self.number:.1e}{weak}"
+        )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Derivatives of an optimum by one number p.
+
+    Attributes:
+        name: name of p.
+        unit: unit of p.
+        cost: dJ*/dp.
+        T: derivative of the total duration [s/unit].
+        chosen: derivatives of the chosen parameters.
+        t: derivatives of the times of the signals [s/unit], which include switching times.
+        signals: derivatives of states, algebraic variables and inputs at the points of the mesh,
+            which move with `t`; at fixed times the derivative of a state x is signals["x"] - x' t.
+        doubts: reasons why the derivatives may be wrong: conditions that may or may not be active,
+            so derivatives in both directions differ; a motion or multipliers that are not unique.
+            If the derivatives of the motion are not unique they are NaN; `cost` remains valid.
+    """
+
+    name: str
+    unit: str
+    cost: float
+    T: float
+    chosen: Mapping[str, float]
+    t: Array
+    signals: Mapping[str, Array]
+    doubts: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        rates = f"dJ = {self.cost:.6g}, dT = {self.T:.6g} s"
+        return f"<Sensitivity by {self.name}: {'; '.join([rates, *self.doubts])}>"

@@ -1,4 +1,4 @@
-"""Optimality conditions linearised at a solution, for its derivatives and its condition.
+"""Optimality conditions linearised at a solution, for its derivatives and full precision.
 
 With the active conditions A fixed, the optimality conditions are equations in w and the
 multipliers. Their derivative by a parameter p is
@@ -14,7 +14,7 @@ Nocedal and Wright, Numerical Optimization, 2006, 12.5, 16.1 (second-order condi
 """
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple, final
 
 import casadi as ca
@@ -23,11 +23,11 @@ import scipy.sparse as sp
 
 from ocp.formulation.expressions import offered
 from ocp.formulation.phase import Array, fixed
-from ocp.solving.active import BoundStatus, Entry, entries, statuses
+from ocp.solving.active import BoundStatus, Condition, Entry, Sensitivity, entries, status_of
 from ocp.solving.equations import Equations
+from ocp.solving.methods import Ipopt
 from ocp.solving.motion import Motion, at_times
 from ocp.solving.optimum import STATIONARY, Optimum, Sparse
-from ocp.solving.sensitivity import Condition, Sensitivity
 from ocp.transcription.blocks import Indices
 from ocp.transcription.program import Iterate, worst_of
 from ocp.transcription.unknowns import SpanPoints
@@ -102,23 +102,21 @@ class Linearised:
         return replace(self.optimum, iterate=replace(self.source.iterate, w=self.optimum.iterate.w))
 
     @cached_property
-    def status(self) -> tuple[BoundStatus, BoundStatus]:
-        """Status of all unknowns and of all rows, with the conditions `changed`."""
-        w, g = statuses(self.optimum)
-        active = np.concatenate([w.active, g.active])
-        active[self.changed] ^= True
-        n = w.active.size
-        return w._replace(active=active[:n]), g._replace(active=active[n:])
+    def status(self) -> BoundStatus:
+        """Status of all unknowns and rows, with the conditions `changed`."""
+        found = status_of(self.optimum)
+        found.active[self.changed] ^= True
+        return found
 
     @cached_property
     def free(self) -> Indices:
         """Indices of unknowns that are not at bounds."""
-        return np.flatnonzero(~self.status[0].active)
+        return np.flatnonzero(~self.status.active[: self.optimum.iterate.w.size])
 
     @cached_property
     def held(self) -> Indices:
         """Indices of the active rows."""
-        return np.flatnonzero(self.status[1].active)
+        return np.flatnonzero(self.status.active[self.optimum.iterate.w.size :])
 
     @cached_property
     def entries(self) -> list[Entry]:
@@ -128,8 +126,8 @@ class Linearised:
     @cached_property
     def weak(self) -> tuple[str, ...]:
         """Names of conditions that may or may not be active."""
-        uncertain = np.concatenate([status.weak for status in self.status])
-        return tuple(dict.fromkeys(e.name for e in self.entries if uncertain[e.number]))
+        uncertain = (e.name for e in self.entries if self.status.weak[e.number])
+        return tuple(dict.fromkeys(uncertain))
 
     @cached_property
     def hessian(self) -> Sparse:
@@ -147,11 +145,11 @@ class Linearised:
 
     def stepped(self) -> Optimum | None:
         """Return the optimum after a Newton step with these active conditions, None without one."""
-        optimum, program = self.optimum, self.optimum.transcription.program
-        (g, J), (unknowns, rows), n = optimum.rows, self.status, self.free.size
-        bounds = np.where(unknowns.upper, program.upper_w, program.lower_w)
-        moved = np.where(unknowns.active, bounds - optimum.iterate.w, 0.0)
-        wanted = np.where(rows.upper, program.upper_g, program.lower_g)
+        optimum, (lower, upper) = self.optimum, self.optimum.transcription.program.bounds
+        (g, J), status, n = optimum.rows, self.status, self.free.size
+        bounds, wanted = np.split(np.where(status.upper, upper, lower), [optimum.iterate.w.size])
+        at_bound = status.active[: bounds.size]
+        moved = np.where(at_bound, bounds - optimum.iterate.w, 0.0)
         first = optimum.slope / optimum.size + self.hessian @ moved
         last = (J @ moved)[self.held] + (g - wanted)[self.held]
         found = self.equations.solved(-np.concatenate([first[self.free], last]))
@@ -160,7 +158,7 @@ class Linearised:
         lam_g, moved[self.free] = np.zeros(g.size), found[:n]
         lam_g[self.held] = found[n:] * optimum.size
         slope = optimum.slope + optimum.size * (self.hessian @ moved) + J.T @ lam_g
-        lam_w = np.where(unknowns.active, -slope, 0.0)
+        lam_w = np.where(at_bound, -slope, 0.0)
         return replace(optimum, iterate=Iterate(optimum.iterate.w + moved, lam_w, lam_g))
 
     @cached_property
@@ -183,9 +181,7 @@ class Linearised:
     @cached_property
     def conditions(self) -> dict[str, list[tuple[Entry, bool]]]:
         """Name -> restricted unknowns and rows, and whether the name means their upper bound."""
-        program = self.optimum.transcription.program
-        lower = np.concatenate([program.lower_w, program.lower_g])
-        upper = np.concatenate([program.upper_w, program.upper_g])
+        lower, upper = self.optimum.transcription.program.bounds
         found: dict[str, list[tuple[Entry, bool]]] = {}
         for entry in self.entries:
             if lower[entry.number] == upper[entry.number]:
@@ -202,8 +198,8 @@ class Linearised:
     def by_condition(self, name: str) -> Change:
         """Return the effect of a prescribed value or of a bound."""
         n, iterate = self.optimum.iterate.w.size, self.central.iterate
-        active, high, _, equal, _ = BoundStatus.joined(*self.status)
-        lam, shift, cost = np.append(iterate.lam_w, iterate.lam_g), np.zeros(active.size), 0.0
+        active, high, _, equal, _ = self.status
+        lam, shift, cost = iterate.multipliers, np.zeros(active.size), 0.0
         for entry, upper in self.conditions[name]:
             k, scale = entry.number, entry.place.scale
             cost -= (lam[k] if equal[k] or (lam[k] > 0) == upper else 0.0) / scale
@@ -327,3 +323,78 @@ class Linearised:
         known = size, held + size - free, free - held, self.optimum.residual
         equations = self.equations
         return Condition(*known, equations.number, equations.sufficient, self.weak)
+
+
+KEPT = 2
+"""Number of optima whose conditions are cached, as several properties of a solution need them."""
+STEPS = 10
+CONVERGED, CLOSE = 1e-8, 1e-5
+"""Change of scaled unknowns by the last step, and largest relative change of the cost."""
+MOST = 2
+"""Number of conditions that may be given up, in multiples of the number that are too many."""
+SHARP, MOST_ITERATIONS = 1e-11, 30
+"""Tolerance and most iterations of a repeated solve if conditions are uncertain."""
+NEAREST = 1e-3
+"""Least ratio of multiplier and distance of a condition that may count as active."""
+
+
+def determined(optimum: Optimum) -> Linearised:
+    """Return the optimality conditions with active conditions that determine a strict minimum.
+
+    Near a switch of a bang-bang control both multiplier and distance from the bound are small. If
+    active conditions are too few or too many, those that are nearest to the limit are changed.
+    """
+    plain = Linearised(optimum)
+    if plain.regular:
+        return plain
+    active, _, _, fixed, ratio = plain.status
+    spare = plain.free.size - plain.held.size
+    near = ~active & (ratio > NEAREST) if spare > 0 else active & ~fixed
+    order = np.argsort(np.where(near, -ratio if spare > 0 else ratio, np.inf))
+    order = order[: min(int(near.sum()), max(spare, -MOST * spare))]
+    few, many = 0, order.size
+    if not Linearised(optimum, order).regular:
+        return plain
+    while many - few > 1:
+        middle = (few + many) // 2
+        enough = Linearised(optimum, order[:middle]).regular
+        few, many = (few, middle) if enough else (middle, many)
+    return Linearised(optimum, order[:many])
+
+
+@lru_cache(KEPT)
+def polished(optimum: Optimum) -> Linearised:
+    """Return the optimality conditions at an optimum of full precision.
+
+    A primal-dual active set method makes a condition active where it is violated, and inactive
+    where its multiplier has the wrong sign. If active conditions do not determine a strict minimum,
+    if this does not converge, or if it changes the cost, the optimum of the solver is kept.
+
+    Source: Hintermueller, Ito and Kunisch, SIAM J. Optimization 13(3), 2002, 865-888.
+
+    Raises:
+        ValueError: the point does not satisfy the optimality conditions.
+    """
+    first = determined(optimum)
+    if first.weak or not first.regular:
+        first = determined(_sharper(optimum))
+    now = first
+    for _ in range(STEPS if first.regular else 0):
+        if (step := now.stepped()) is None or not step.residual <= STATIONARY:
+            break
+        later, change = determined(step), np.abs(step.iterate.w - now.optimum.iterate.w).max()
+        same = np.array_equal(now.free, later.free) and np.array_equal(now.held, later.held)
+        if same and change < CONVERGED:
+            violation = worst_of(step.transcription.program, step.iterate.w, step.rows[0])
+            near = abs(step.cost - optimum.cost) <= CLOSE * max(abs(optimum.cost), optimum.size)
+            return replace(later, source=first.optimum) if near and violation < CLOSE else first
+        now = later
+    return first
+
+
+def _sharper(optimum: Optimum) -> Optimum:
+    """Return the optimum with smaller errors, in which more conditions are certain."""
+    program = optimum.transcription.program
+    solver = Ipopt(tol=SHARP, obj_scaling_factor=1.0 / optimum.size, max_iter=MOST_ITERATIONS)
+    outcome = solver.prepared(program).run(optimum.iterate, optimum.values, warm=True)
+    return replace(optimum, iterate=outcome.iterate) if outcome.status.ok else optimum

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ocp.formulation.phase import Array
 from ocp.solving.prepared import OVERDETERMINED, Built, Option, Prepared, reason_of, refused_options
 from ocp.solving.watch import GradientHook, IterationHook, Shaped
+from ocp.transcription.blocks import Indices
 from ocp.transcription.program import Program
 from symfric.foundation import checks
 from symfric.foundation.status import Status
@@ -67,8 +68,6 @@ def both(program: Program) -> ca.Function:
     names = ["f", "grad_f_x", "g", "jac_g_x"]
     return ca.Function("nlp_jac_fg", [x, p], outputs, MULTIPLIERS[:2], names)
 
-
-Indices = NDArray[np.int64]
 
 FLOOR = 1e-8
 """Smallest eigenvalue of a convexified block, relative to its largest eigenvalue."""
@@ -244,6 +243,12 @@ class _Method(ABC):
     def with_options(self, **options: Option) -> Self:
         """Return the solver with additional or changed options."""
         return type(self)(max_time=self.max_time, **(dict(self.options) | options))
+
+    def with_defaults(self, **options: Option) -> Self:
+        """Return Ipopt with options that the user's options override, or another solver as is."""
+        if self.plugin != "ipopt":
+            return self
+        return self.with_options(**(options | dict(self.options)))
 
     def prepared(self, program: Program) -> Prepared:
         """Return the solver prepared for `program`.

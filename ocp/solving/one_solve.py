@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from math import isfinite, pi
 from time import time
@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 from ocp.formulation.phase import Array, Span
+from ocp.formulation.problem import Problem
 from ocp.solving.methods import Fatrop, Ipopt, Sqp
 from ocp.solving.motion import along_points, motions_of
 from ocp.solving.optimum import Optimum
@@ -20,6 +21,7 @@ from ocp.solving.solution import Solution
 from ocp.solving.starts import rates_of
 from ocp.solving.watch import Progress, in_stage
 from ocp.transcription.program import Iterate, Outcome, SolverStatistics
+from ocp.transcription.schemes import Radau, Scheme
 from ocp.transcription.transcribe import Transcription
 from ocp.transcription.unknowns import Points, SpanPoints
 from symfric.foundation import checks
@@ -50,6 +52,27 @@ HALF_WAVES = np.arange(1, 4)
 STILL = 0.3
 """Deviation, relative to the nominal value, of a state that is constant in the given start if all
 states of its unit are constant."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Task:
+    """Problem, and the means to solve it.
+
+    Attributes:
+        problem, scheme, solver: as in `ocp.solve`.
+        supervisor: time limit and progress of all solves.
+    """
+
+    problem: Problem
+    scheme: Scheme = field(default_factory=Radau)
+    solver: Solver = field(default_factory=Ipopt)
+    supervisor: Supervisor = field(default_factory=Supervisor)
+
+    @property
+    def ipopt(self) -> Ipopt:
+        """The solver if it is Ipopt, otherwise Ipopt without options."""
+        return self.solver if isinstance(self.solver, Ipopt) else Ipopt()
 
 
 @dataclass(frozen=True, eq=False)

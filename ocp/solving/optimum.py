@@ -24,7 +24,6 @@ from typing import Any, final
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from ocp.formulation.phase import Array
 from ocp.solving.motion import along_points, joined, sampled
@@ -100,8 +99,8 @@ class Optimum:
         """
         made, lam, (_, J) = self.transcription, self.iterate.lam_g, self.rows
         parity, d = np.full(lam.size, -1), made.scheme.coefficients().degree
-        for piece, at in self._dynamics(d):
-            parity[at] = piece.interval % 2
+        for piece in self._dynamics(d):
+            parity[piece.at] = piece.interval % 2
         halves = [J.T @ np.where(parity == side, lam, 0.0) for side in (0, 1)]
         found: list[SpanPoints] = []
         for number, (own, points) in enumerate(
@@ -116,28 +115,27 @@ class Optimum:
             found.append(SpanPoints(points.T, nodes / size, inner, none, np.zeros((0, N))))
         return tuple(found)
 
-    def _dynamics(self, degree: int) -> Iterator[tuple[Piece, NDArray[np.int64]]]:
-        """Yield the pieces of the equations of intervals, with the indices of their rows."""
-        spans, made = self.transcription.layout.spans, self.transcription.skeleton
-        for piece, at in zip(made.pieces, made.assembled.at, strict=True):
+    def _dynamics(self, degree: int) -> Iterator[Piece]:
+        """Yield the pieces of the equations of intervals."""
+        spans = self.transcription.layout.spans
+        for piece in self.transcription.skeleton.pieces:
             inside = piece.order & Piece.LAST
             known = (inside == 0) | ((inside >= 2) & (inside < 2 + degree))
             own = piece.order >> 6 == (np.int64(piece.span) << 34) + piece.interval
             if piece.places >= spans[piece.span].intervals and bool((known & own).all()):
-                yield piece, at
+                yield piece
 
     def _inner(self, number: int) -> Array:
         """Return the costates of a phase at its collocation points, (nx, N d)."""
         made, span = self.transcription, self.transcription.problem.spans[number]
         scheme, lam, n = made.scheme.coefficients(), self.iterate.lam_g, len(span.model.x)
-        equations = (
-            (piece, at)
-            for piece, at in self._dynamics(scheme.degree)
+        piece = next(
+            piece
+            for piece in self._dynamics(scheme.degree)
             if piece.span == number and (piece.order & Piece.LAST).any()
         )
-        piece, at = next(equations)
-        values = lam[at[:n]] / piece.rows.scale[:n, None]
-        values /= np.tile(scheme.weights, at.shape[1] // scheme.degree)
+        values = lam[piece.at[:n]] / piece.rows.scale[:n, None]
+        values /= np.tile(scheme.weights, piece.places // scheme.degree)
         mechanics = span.model.holonomic
         if mechanics is not None:
             mass = ca.jacobian(mechanics.implicit[: mechanics.n], mechanics.a)

@@ -1,24 +1,26 @@
-"""Figures of optimal motions: optimised points and simulated motion."""
+"""Figures of optimal motions, optimised and simulated, and of the motion while `solve` runs."""
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, replace
 from math import isfinite
 from pathlib import Path
+from time import perf_counter
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, final
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from ocp.formulation.phase import Array, Span
-from ocp.formulation.problem import Problem
+from ocp.formulation.phase import Span
 from ocp.solving.active import per_unit
 from ocp.solving.motion import Motion, Stretch
+from ocp.solving.solution import Solution
+from ocp.solving.watch import Progress
 from symfric.foundation import checks
 from symfric.foundation.panels import panels, save
 from symfric.foundation.parameters import check_names
-from symfric.foundation.status import Status
 from symfric.foundation.style import Line, colour, line
 from symfric.results.pictures import level
 from symfric.results.trajectory import Trajectory
@@ -55,52 +57,8 @@ class Drawn(NamedTuple):
     ending: str
 
 
-class Plotted(Protocol):
-    """Attributes of a `Solution` that a plot shows."""
-
-    @property
-    def problem(self) -> Problem:
-        """The solved problem."""
-        ...
-
-    @property
-    def status(self) -> Status:
-        """Status of the solution."""
-        ...
-
-    @property
-    def cost(self) -> float:
-        """Cost J."""
-        ...
-
-    @property
-    def motions(self) -> tuple[Motion, ...]:
-        """Motion of each scenario."""
-        ...
-
-    @property
-    def trajectories(self) -> Sequence[Trajectory]:
-        """Re-simulated motion of each phase."""
-        ...
-
-    @property
-    def verified(self) -> bool:
-        """True if the re-simulated motion satisfies all conditions."""
-        ...
-
-    @property
-    def modes(self) -> Mapping[str, Sequence[Any]]:
-        """Contact -> its modes in order."""
-        ...
-
-    @property
-    def costates(self) -> Mapping[str, Array]:
-        """State -> costate at the times of the first motion."""
-        ...
-
-
 def plot_solutions(
-    solutions: Mapping[str, Plotted],
+    solutions: Mapping[str, Solution],
     names: Sequence[str] = (),
     path: str | Path | None = None,
 ) -> Figure:
@@ -142,7 +100,7 @@ def plot_solutions(
     return plot_motions(drawn, list(names) or shared, spans, modes, path)
 
 
-def _with_costates(solution: Plotted, names: Sequence[str]) -> tuple[Motion, ...]:
+def _with_costates(solution: Solution, names: Sequence[str]) -> tuple[Motion, ...]:
     """Return the motions, or the first one with its costates if `names` contain some."""
     if not any(name.startswith(COSTATE) for name in names):
         return solution.motions
@@ -260,3 +218,63 @@ def _modes(axis: "Axes", modes: Mapping[str, Modes]) -> None:
                 begin, end, k / count, (k + 1) / count,
                 facecolor=SHADES.get(kind, "0.8"), alpha=0.2, linewidth=0, zorder=0,
             )  # fmt: skip
+
+
+SHOWN = 4
+"""Number of signals that are shown by default."""
+
+
+@final
+class LivePlot:
+    """Plot that is redrawn while `solve(problem, progress=LivePlot("x", "force"))` runs.
+
+    A notebook updates the figure of the cell; elsewhere a window opens if the backend of Matplotlib
+    has windows. `figure` is the last plot in all cases.
+    """
+
+    def __init__(self, *names: str, every: float = 0.5) -> None:
+        """Create the plot.
+
+        Args:
+            names: signals to show; by default the first four.
+            every: shortest time between two plots [s]; drawing takes about 0.1 s.
+        """
+        self.names, self.every = names, checks.number("LivePlot: every", every, lower=0.0, unit="s")
+        self.figure: Any = None
+        self._axes: list[Any] = []
+        self._handle: Any = None
+        self._next = 0.0
+
+    def __call__(self, now: Progress) -> None:
+        """Draw the motion of the iterate, with cost and violation in the title."""
+        if perf_counter() < self._next:
+            return
+        motion = now.motion
+        check_names("LivePlot", self.names, motion.signals)
+        shown = self.names or [*motion.signals][:SHOWN]
+        if self.figure is None:
+            self.figure, self._axes = panels(len(shown))
+            self._axes[-1].set_xlabel("t [s]")
+        for axis, name in zip(self._axes, shown, strict=True):
+            for old in [*axis.lines]:
+                old.remove()
+            style = "steps-post" if name in motion.controls else "default"
+            axis.plot(motion.t, motion[name], color="C0", linewidth=1.2, drawstyle=style)
+            axis.set_ylabel(f"{name} [{motion.units[name]}]")
+        where = f"{now.stage}, iteration {now.iteration}"
+        self._axes[0].set_title(f"{where}: J = {now.cost:.5g}, violation {now.violation:.1g}")
+        self._show()
+        self._next = perf_counter() + self.every
+
+    def _show(self) -> None:
+        """Show the figure in the notebook or in its window."""
+        shell: Any = sys.modules.get("IPython")
+        if shell is not None and shell.get_ipython() is not None:
+            if self._handle is None:
+                self._handle = shell.display.display(self.figure, display_id=True)
+            else:
+                self._handle.update(self.figure)
+        elif self.figure.has_window():
+            self.figure.canvas.manager.show()
+            self.figure.canvas.draw_idle()
+            self.figure.canvas.flush_events()

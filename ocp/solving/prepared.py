@@ -173,9 +173,8 @@ class Prepared:
         w = np.clip(_finite(start, program), program.lower_w, program.upper_w)
         watch = Watch(program, progress, self.max_time)
         result, answer, status = None, OVERDETERMINED, Status.INFEASIBLE
-        fixed = (program.lower_g == program.upper_g).sum()
-        fixed += (program.lower_w == program.upper_w).sum()
-        overdetermined = fixed > w.size  # refused by all solvers
+        lower, upper = program.bounds
+        overdetermined = (lower == upper).sum() > w.size  # refused by all solvers
         if not overdetermined and warm not in self._built:
             self._built[warm] = self.build(warm)
         built = perf_counter()

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, final
 
@@ -13,8 +14,7 @@ from ocp.formulation.problem import Posed, Problem, posed
 from ocp.solving.active import ActiveConditions, active_conditions, in_words
 from ocp.solving.motion import Motion, Stretch, at_times
 from ocp.solving.optimum import Optimum
-from ocp.solving.penalties import Penalty, penalties_of
-from ocp.solving.verification import Verification
+from ocp.solving.verification import Penalty, Verification, penalties_of
 from ocp.transcription.program import Iterate, SolverStatistics
 from ocp.transcription.schemes import Scheme
 from ocp.transcription.unknowns import Points
@@ -29,8 +29,8 @@ from symfric.results.trajectory import Trajectory
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from ocp.solving.active import Condition, Sensitivity
     from ocp.solving.linearised import Linearised
-    from ocp.solving.sensitivity import Condition, Sensitivity
 
 
 AT_BOUND = 1e-5
@@ -283,7 +283,7 @@ class Solution(packed.Portable):
 
     def _linearised(self, what: str) -> "Linearised":
         """Return the optimality conditions for the property `what`."""
-        from ocp.solving.polish import polished  # noqa: PLC0415  (loads scipy.sparse)
+        from ocp.solving.linearised import polished  # noqa: PLC0415  (loads scipy.sparse)
 
         if self.optimum is None or self.status.stopped:
             old = "one from a file of an older version"
@@ -317,9 +317,8 @@ class Solution(packed.Portable):
             names: signals to show, by default all; "costate x" is the costate of x.
             path: image file; its extension selects the format.
         """
-        from ocp.solving.picture import plot_solutions  # noqa: PLC0415  (matplotlib is slow)
-
-        return plot_solutions({self.problem.name: self}, names, path)
+        picture = import_module("ocp.solving.picture")  # matplotlib is slow
+        return picture.plot_solutions({self.problem.name: self}, names, path)
 
     def to_csv(self, path: str | Path) -> None:
         """Write all signals as columns with units in the header, such as `v [m/s]`.

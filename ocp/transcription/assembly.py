@@ -8,7 +8,7 @@ Hessian. No further differentiation is necessary, and the graph does not grow wi
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple, final
+from typing import final
 
 import casadi as ca
 import numpy as np
@@ -20,49 +20,28 @@ Slot = tuple[float, int]
 cost, 0 and the index of the piece with this row."""
 
 
-class Assembled(NamedTuple):
-    """Functions of a program (see `Program`), and `at`: row indices of each piece, (m, places)."""
-
-    f: ca.MX
-    g: ca.MX
-    gradient: ca.Function
-    jacobian: ca.Function
-    hessian: ca.Function
-    at: tuple[Indices, ...]
-
-
-def row_numbers(pieces: Sequence[Piece]) -> tuple[Indices, ...]:
-    """Return the row indices of each piece, shape (m, places), sorted by `order`."""
-    keys = np.concatenate([np.zeros(0, np.int64), *(np.repeat(p.order, p.m) for p in pieces)])
-    numbers = np.empty(keys.size, np.int64)
-    numbers[np.argsort(keys, kind="stable")] = np.arange(keys.size)
-    parts = np.split(numbers, np.cumsum([p.m * p.places for p in pieces])[:-1])
-    return tuple(part.reshape(p.places, p.m).T for part, p in zip(parts, pieces, strict=True))
-
-
 def assemble(
     w: ca.MX, p: ca.MX, pieces: Sequence[Piece], slots: Sequence[Slot], c: Array
-) -> Assembled:
-    """Assemble the functions of a program from its pieces.
+) -> tuple[ca.MX, ca.MX, ca.Function, ca.Function, ca.Function]:
+    """Return f, g, gradient, jacobian and hessian of a program (see `Program`) from its pieces.
 
     Args:
         w, p: unknowns and parameters of the program; `theta` of each piece depends on p.
-        pieces: rows and costs.
+        pieces: numbered rows and costs.
         slots: targets of the shares of each cost.
         c: linear part of the objective, shape (n,).
     """
-    at = row_numbers(pieces)
-    n, m = w.numel(), sum(piece.m * piece.places for piece in pieces)
-    targets = [(weight, -1 if k < 0 else int(at[k][0, 0])) for weight, k in slots]
+    n, m = w.numel(), sum(piece.at.size for piece in pieces)
+    targets = [(weight, -1 if k < 0 else int(pieces[k].at[0, 0])) for weight, k in slots]
     parts = [
-        _Part(piece, piece.block, piece.selection, rows, *targets[piece.slot], w)
-        for piece, rows in zip(pieces, at, strict=True)
+        _Part(piece, piece.block, piece.selection, *targets[piece.slot], w)
+        for piece in pieces
         if piece.block is not None and piece.selection is not None
     ]
     lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", m)
     linear = [
-        (rows[A.rows, A.places], A.columns, A.weights)
-        for piece, rows in zip(pieces, at, strict=True)
+        (piece.at[A.rows, A.places], A.columns, A.weights)
+        for piece in pieces
         if (A := piece.linear) is not None
     ]
     constant = _joined(linear)
@@ -84,13 +63,12 @@ def assemble(
     both = [_rows(parts, rows, constant, w, m), J]
     slope = ca.densify(gradient.matrix()).T
     multipliers = ["x", "p", "lam_f", "lam_g"]
-    return Assembled(
+    return (
         f,
         g,
         ca.Function("nlp_grad_f", [w, p], [f, slope], ["x", "p"], ["f", "grad_f_x"]),
         ca.Function("nlp_jac_g", [w, p], both, ["x", "p"], ["g", "jac_g_x"]),
         ca.Function("nlp_hess_l", [w, p, lam_f, lam_g], [H], multipliers, ["triu_hess_gamma_x_x"]),
-        at,
     )
 
 
@@ -107,7 +85,7 @@ def _joined(triplets: Sequence[Triplets]) -> Triplets:
 @final
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Piece with a block, and the indices of its rows (m, places).
+    """Piece with a block.
 
     The share of the cost is added to the objective with the factor `weight`, and to row `bounded`
     of the program unless `bounded` is -1.
@@ -116,7 +94,6 @@ class _Part:
     piece: Piece
     block: Block
     selection: Selection
-    rows: Indices
     weight: float
     bounded: int
     w: ca.MX
@@ -159,7 +136,7 @@ class _Part:
     def numbers(self) -> Indices:
         """Indices in the program of the rows of `rows_alone`."""
         cost = self.bounded >= 0 and self.block.share is not None
-        return np.append(self.rows.ravel(order="F"), np.full(int(cost), self.bounded))
+        return np.append(self.piece.at.ravel(order="F"), np.full(int(cost), self.bounded))
 
     def add_slopes(self, gradient: "_Sum", jacobian: "_Sum") -> None:
         """Add the derivative of the share of the cost."""
@@ -173,14 +150,14 @@ class _Part:
     def add_jacobian(self, jacobian: "_Sum") -> ca.MX:
         """Add the derivative of the rows, and return the values of `rows_alone`."""
         rows, entries = self.mapped(self.block.jacobian)
-        jacobian.add(self.block.of_jacobian, self.rows, self.selection, entries)
+        jacobian.add(self.block.of_jacobian, self.piece.at, self.selection, entries)
         return ca.vertcat(ca.vec(rows), self.bounded_cost())
 
     def add_hessian(self, hessian: "_Sum", lam_f: ca.MX, lam_g: ca.MX) -> None:
         """Add the second derivative of the Lagrangian."""
         places, m = self.piece.places, self.block.m
         sigma = self.weight * lam_f + (lam_g[self.bounded] if self.bounded >= 0 else 0)
-        lam = ca.reshape(lam_g[self.rows.ravel(order="F").tolist()], m, places)
+        lam = ca.reshape(lam_g[self.piece.at.ravel(order="F").tolist()], m, places)
         (entries,) = self.mapped(self.block.hessian, ca.repmat(sigma, 1, places), lam)
         hessian.symmetric(self.block.of_hessian, self.selection, entries)
 

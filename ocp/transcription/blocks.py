@@ -11,7 +11,7 @@ Source: Griewank and Toint, Numerische Mathematik 39, 1982, 119-137 (partial sep
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, final
 
@@ -227,6 +227,7 @@ class Piece:
         theta: parameters of the block, MX (k, places) or (k, 1).
         linear: linear part of the rows.
         slot: index of the cost to which the shares of the block are added.
+        at: indices of the rows in the program, shape (m, places); see `numbered`.
     """
 
     rows: Rows
@@ -239,6 +240,7 @@ class Piece:
     theta: ca.MX = field(default_factory=lambda: ca.MX(0, 1))
     linear: Linear | None = None
     slot: int = 0
+    at: Indices = field(default_factory=lambda: np.zeros((0, 0), np.int64))
 
     LAST: ClassVar[int] = 63
     """Last number inside an interval; 0 is the gap to the next interval."""
@@ -262,6 +264,16 @@ class Piece:
     def places(self) -> int:
         """Number of places."""
         return self.order.size
+
+
+def numbered(pieces: Sequence[Piece]) -> tuple[Piece, ...]:
+    """Return the pieces with the indices of their rows, which are sorted by `order`."""
+    keys = np.concatenate([np.zeros(0, np.int64), *(np.repeat(p.order, p.m) for p in pieces)])
+    numbers = np.empty(keys.size, np.int64)
+    numbers[np.argsort(keys, kind="stable")] = np.arange(keys.size)
+    parts = np.split(numbers, np.cumsum([p.m * p.places for p in pieces])[:-1])
+    pairs = zip(pieces, parts, strict=True)
+    return tuple(replace(p, at=part.reshape(p.places, p.m).T) for p, part in pairs)
 
 
 def linear_piece(rows: Rows, columns: Indices, weights: Array, span: int, order: Indices) -> Piece:

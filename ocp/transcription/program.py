@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple, final
 
 import casadi as ca
@@ -9,7 +10,6 @@ import numpy as np
 
 from ocp.formulation.phase import Box, limits
 from ocp.formulation.problem import Problem
-from ocp.transcription.assembly import Assembled
 from ocp.transcription.blocks import Array, Indices, Piece
 from ocp.transcription.unknowns import Grid, Layout, scale_of
 from symfric.foundation.parameters import Variable
@@ -91,6 +91,12 @@ class Program:
         """Name and place of each unknown."""
         return self.places()[1]
 
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds of all unknowns, followed by those of all rows."""
+        lower, upper = (self.lower_w, self.lower_g), (self.upper_w, self.upper_g)
+        return np.concatenate(lower), np.concatenate(upper)
+
     @property
     def nlp(self) -> dict[str, ca.MX]:
         """Arguments of the program for `casadi.nlpsol`."""
@@ -141,9 +147,12 @@ def bounds_of(problem: Problem, grid: Grid) -> tuple[Array, Array]:
 
 
 def stages_of(
-    problem: Problem, layout: Layout, pieces: Sequence[Piece], made: Assembled
+    problem: Problem, layout: Layout, pieces: Sequence[Piece], jacobian: ca.Function
 ) -> tuple[Stages | None, str]:
-    """Return the stages and "", or None and the coupling that prevents them."""
+    """Return the stages and "", or None and the coupling that prevents them.
+
+    `jacobian` is that of the program.
+    """
     if len(problem.scenario_names) > 1:
         return None, "several scenarios"
     if problem.chosen:
@@ -153,12 +162,12 @@ def stages_of(
     first = np.concatenate([span.nodes[0] for span in layout.spans])
     nx = np.concatenate([np.full(s.nodes.shape[1], s.nodes.shape[0]) for s in layout.spans])
     stage_of = np.searchsorted(first, np.arange(layout.size), side="right") - 1
-    owner, gap = _owners(layout, pieces, made)
+    owner, gap = _owners(layout, pieces)
     K = nx.size - 1
     gaps = np.bincount(owner[gap], minlength=K + 1)
     if (gaps[:-1] != nx[1:]).any() or gaps[-1]:
         return None, "states that restart after a phase"
-    triplet = made.jacobian.sparsity_out(1).get_triplet()
+    triplet = jacobian.sparsity_out(1).get_triplet()
     rows, columns = (np.array(part, np.int64) for part in triplet)
     place = columns - first[np.minimum(owner[rows] + 1, K)]
     number = np.arange(owner.size) - np.searchsorted(owner, owner)
@@ -168,8 +177,8 @@ def stages_of(
     if wrong.size:
         names = (
             name
-            for piece, at in zip(pieces, made.at, strict=True)
-            for name, numbers in zip(piece.names, at, strict=True)
+            for piece in pieces
+            for name, numbers in zip(piece.names, piece.at, strict=True)
             if wrong[0] in numbers
         )
         return None, f"{next(names)}, which depends on more than its interval"
@@ -179,18 +188,18 @@ def stages_of(
 
 
 def _owners(
-    layout: Layout, pieces: Sequence[Piece], made: Assembled
+    layout: Layout, pieces: Sequence[Piece]
 ) -> tuple[Indices, np.ndarray[tuple[int], np.dtype[np.bool_]]]:
     """Return the stage of each row, and a mask of rows of the gap to the next stage."""
     begins = np.cumsum([0, *(span.intervals + 1 for span in layout.spans)])
-    m = made.g.numel()
+    m = sum(piece.at.size for piece in pieces)
     owner, gap = np.zeros(m, np.int64), np.zeros(m, dtype=bool)
-    for piece, at in zip(pieces, made.at, strict=True):
+    for piece in pieces:
         span, interval = piece.order >> 40, (piece.order >> 6) & ((1 << 34) - 1)
         stage = begins[np.minimum(span, len(layout.spans))] + interval
         known = stage < begins[-1]  # rows between all phases come after them
-        owner[at] = np.where(known, stage, begins[-1] - 1)
-        gap[at] = known & ((piece.order & 63) == 0)
+        owner[piece.at] = np.where(known, stage, begins[-1] - 1)
+        gap[piece.at] = known & ((piece.order & 63) == 0)
     return owner, gap
 
 
@@ -202,6 +211,11 @@ class Iterate:
     w: Array
     lam_w: Array
     lam_g: Array
+
+    @property
+    def multipliers(self) -> Array:
+        """Multipliers of all unknowns, followed by those of all rows."""
+        return np.concatenate([self.lam_w, self.lam_g])
 
     @staticmethod
     def cold(w: Array, rows: int) -> "Iterate":
@@ -275,5 +289,4 @@ def outside(values: Array, lower: Array, upper: Array) -> Array:
 
 def worst_of(program: Program, w: Array, g: Array) -> float:
     """Return the largest violation of a row or of a bound of an unknown."""
-    rows = outside(g, program.lower_g, program.upper_g).max(initial=0.0)
-    return float(max(rows, outside(w, program.lower_w, program.upper_w).max(initial=0.0)))
+    return float(outside(np.concatenate([w, g]), *program.bounds).max(initial=0.0))

@@ -246,33 +246,3 @@ def nodes_of(span: Span, mesh: Array) -> dict[float, int]:
             )
         nodes[fraction] = node
     return nodes
-
-
-def check_meshes(problem: Problem, meshes: Sequence[Array]) -> tuple[Array, ...]:
-    """Return a mesh for each phase of each scenario; `meshes` may hold those of one scenario.
-
-    Raises:
-        ValueError: the number of meshes is wrong, a mesh does not consist of increasing fractions
-            from 0 to 1, or meshes of phases that share inputs differ.
-    """
-    spans, phases = problem.spans, len(problem.chain)
-    given = [np.asarray(mesh, dtype=float).ravel() for mesh in meshes]
-    if len(given) == phases:
-        given = given * (len(spans) // phases)
-    if len(given) != len(spans):
-        raise ValueError(
-            f"meshes: expected {phases}, one for each phase, or {len(spans)} with scenarios, got "
-            f"{len(given)}"
-        )
-    for span, mesh in zip(spans, given, strict=True):
-        if not _bounds_intervals(mesh):
-            ends = f" numbers from {mesh[0]:g} to {mesh[-1]:g}" if mesh.size else ""
-            raise ValueError(
-                f"mesh of {span.name}: expected increasing fractions of T from 0 to 1, got "
-                f"{mesh.size or 'none'}{ends}"
-            )
-        if problem.shared_inputs and not np.array_equal(mesh, given[span.phase]):
-            raise ValueError(
-                f"mesh of {span.name}: expected the same in all scenarios, which share inputs"
-            )
-    return tuple(given)

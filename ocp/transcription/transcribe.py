@@ -19,13 +19,13 @@ from numpy.typing import ArrayLike
 from ocp.formulation.phase import Free, Row, limits
 from ocp.formulation.problem import Posed, Problem, posed
 from ocp.transcription import conditions, intervals, unknowns
-from ocp.transcription.assembly import Assembled, Slot, assemble
-from ocp.transcription.blocks import Array, Indices, Piece
+from ocp.transcription.assembly import Slot, assemble
+from ocp.transcription.blocks import Array, Indices, Piece, numbered
 from ocp.transcription.closed_loops import Closing, closing
 from ocp.transcription.conditions import Maker
 from ocp.transcription.intervals import PointEquations, Shot
 from ocp.transcription.program import Place, Program, Stages, bounds_of, stages_of
-from ocp.transcription.schemes import Scheme, Shooting, check_meshes, nodes_of
+from ocp.transcription.schemes import Scheme, Shooting, nodes_of
 from ocp.transcription.unknowns import Grid, Layout, Local, Points, SpanPoints
 from symfric.foundation import packed
 from symfric.foundation.parameters import check_names
@@ -65,10 +65,11 @@ class Discretisation:
         differ only in values and share their symbols and Functions.
 
         Raises:
-            ValueError: invalid meshes.
+            ValueError: a mesh has no node at a fraction with conditions.
         """
-        meshes = check_meshes(self.problem, meshes)
-        return Transcription(self.problem, self.scheme, meshes, self.starts, self.skeleton(meshes))
+        scenarios = len(self.problem.spans) // len(meshes)
+        every = tuple(meshes) * scenarios  # meshes may be those of one scenario
+        return Transcription(self.problem, self.scheme, every, self.starts, self.skeleton(every))
 
     def skeleton(self, meshes: Sequence[Array]) -> "Skeleton":
         """Return the common part of programs with the numbers of intervals of `meshes`."""
@@ -108,17 +109,15 @@ class Discretisation:
             pieces = [replace(piece, slot=piece.span // phases) for piece in pieces]
             pieces += conditions.largest(layout, scenarios, len(problem.spans), LARGEST)
             c[layout.largest] = 1.0
-        assembled = assemble(w, p, pieces, slots, c)
-        f, g, gradient, jacobian, hessian, rows_of = assembled
-        lower, upper = np.zeros(g.numel()), np.zeros(g.numel())
-        for piece, at in zip(pieces, rows_of, strict=True):
-            rows = piece.rows
-            lower[at], upper[at] = ((b / rows.scale)[:, None] for b in (rows.lower, rows.upper))
+        pieces = numbered(pieces)
+        functions = assemble(w, p, pieces, slots, c)
+        lower, upper = np.zeros(functions[1].numel()), np.zeros(functions[1].numel())
+        for piece in pieces:
+            sides = piece.rows.lower, piece.rows.upper
+            lower[piece.at], upper[piece.at] = ((b / piece.rows.scale)[:, None] for b in sides)
         bounds, scale = bounds_of(problem, grid), unknowns.scale_of(problem, layout)
-        program = Program(
-            w, p, f, g, gradient, jacobian, hessian, *bounds, lower, upper, np.zeros(0), scale
-        )  # fmt: skip
-        return Skeleton(problem, layout, program, tuple(pieces), assembled, self.closing)
+        program = Program(w, p, *functions, *bounds, lower, upper, np.zeros(0), scale)
+        return Skeleton(problem, layout, program, pieces, self.closing)
 
     def _pieces(self, grid: Grid) -> Iterator[Piece]:
         """Yield the rows and costs of all phases."""
@@ -194,7 +193,7 @@ class Skeleton:
         problem: the problem.
         layout: places of the unknowns in w.
         program: program without values of parameters and names of rows and unknowns.
-        pieces, assembled: rows and costs, and their places in the program.
+        pieces: numbered rows and costs.
         closing: for each phase, the constraints of its mechanism; None if it has none.
     """
 
@@ -202,13 +201,12 @@ class Skeleton:
     layout: Layout
     program: Program
     pieces: tuple[Piece, ...]
-    assembled: Assembled
     closing: tuple[Closing | None, ...]
 
     @cached_property
     def structure(self) -> tuple[Stages | None, str]:
         """Stages of the program, or None and the reason why it has none."""
-        return stages_of(self.problem, self.layout, self.pieces, self.assembled)
+        return stages_of(self.problem, self.layout, self.pieces, self.program.jacobian)
 
     @cached_property
     def violations(self) -> list[tuple[Indices, Indices, int]]:
@@ -217,9 +215,9 @@ class Skeleton:
         for number, span in enumerate(self.problem.spans):
             names = tuple(row.name for row in span.penalised)
             columns = self.layout.spans[number].slacks(len(span.sides))
-            for piece, at in zip(self.pieces, self.assembled.at, strict=True):
+            for piece in self.pieces:
                 if names and piece.span == number and piece.names[-len(names) :] == names:
-                    rows = at[-len(names) :]
+                    rows = piece.at[-len(names) :]
                     found += [
                         (own.T.ravel(), rows[k], side)
                         for own, (k, side) in zip(columns, span.sides, strict=True)
@@ -229,8 +227,7 @@ class Skeleton:
     @cached_property
     def largest(self) -> list[int]:
         """Indices of the rows that bound the costs of scenarios by the largest one, if any."""
-        pairs = zip(self.pieces, self.assembled.at, strict=True)
-        return [int(at[0, 0]) for piece, at in pairs if piece.names == (LARGEST,)]
+        return [int(piece.at[0, 0]) for piece in self.pieces if piece.names == (LARGEST,)]
 
 
 @final
@@ -371,10 +368,10 @@ class Transcription(packed.Portable):
     def rows(self) -> list[Place]:
         """Names and places of all rows of the program."""
         places = [Place("", 0, 0.0)] * self.skeleton.program.g.numel()
-        for piece, at in zip(self.skeleton.pieces, self.skeleton.assembled.at, strict=True):
+        for piece in self.skeleton.pieces:
             mesh = self.meshes[piece.span]
             fractions = mesh[piece.interval] + np.diff(mesh)[piece.interval] * piece.offset
-            for name, scale, numbers in zip(piece.names, piece.rows.scale, at, strict=True):
+            for name, scale, numbers in zip(piece.names, piece.rows.scale, piece.at, strict=True):
                 for k, fraction in zip(numbers.tolist(), fractions.tolist(), strict=True):
                     places[k] = Place(name, piece.span, fraction, float(scale))
         return places

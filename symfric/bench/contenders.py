@@ -17,6 +17,7 @@ from typing import Any, final
 import casadi as ca
 import numpy as np
 
+from symfric import BrownMcPhee, Model, simulate
 from symfric.bench.report import FASTEST, compile_time
 from symfric.foundation.numeric import Array, bound
 from symfric.integrator.by_peer import peer
@@ -25,14 +26,11 @@ from symfric.integrator.equations.initial import consistent, first_guess, first_
 from symfric.integrator.equations.inputs import InputData, input_data
 from symfric.integrator.equations.system import System, system
 from symfric.integrator.methods.attempt import Given, State
-from symfric.integrator.methods.tableaux import chosen
+from symfric.integrator.prepared import chosen
 from symfric.integrator.running.events import Stop
 from symfric.integrator.running.integrator import Integrator
 from symfric.integrator.running.record import Outputs
 from symfric.integrator.running.run import ATTEMPTS, Tolerances
-from symfric.integrator.simulate import simulate
-from symfric.laws import BrownMcPhee
-from symfric.model import Model
 from symfric.scenes import Rabinowicz
 
 Watched = tuple[str, ...]

@@ -7,8 +7,8 @@ from typing import cast, get_args
 
 from ocp import Problem, Solution, load, solve
 from ocp.problems import READY, Ready
+from ocp.solving.active import Sensitivity
 from ocp.solving.methods import Fatrop, Ipopt, Sqp
-from ocp.solving.sensitivity import Sensitivity
 from ocp.strategies import Friction
 from ocp.transcription.schemes import Legendre, Radau, Scheme, Shooting
 from symfric import SolveError

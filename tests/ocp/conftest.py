@@ -2,9 +2,10 @@
 
 import pytest
 
-from ocp import Ipopt, Radau, Solution, solve, strategies
+from ocp import Solution, solve, strategies
 from ocp.friction.homotopy import Sharp, sharpened
 from ocp.problems import out_and_back
+from ocp.solving.one_solve import Task
 
 SHARP = 1e-5
 """Width of the law [m/s]."""
@@ -13,7 +14,7 @@ SHARP = 1e-5
 @pytest.fixture(scope="session")
 def steps() -> tuple[Sharp, ...]:
     """Out and back with smooth friction, from wide to narrow."""
-    return tuple(sharpened(out_and_back(SHARP), Radau(3), Ipopt(), starts=2))
+    return tuple(sharpened(Task(out_and_back(SHARP)), starts=2))
 
 
 @pytest.fixture(scope="session")

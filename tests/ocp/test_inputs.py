@@ -7,7 +7,7 @@ from motions import double_integrator
 from numpy.polynomial import polynomial
 
 from ocp import Phase, Polynomial, Problem, absolute, integral, largest, soft, solve, verify_exactly
-from ocp.formulation.inputs import Form
+from ocp.formulation.changed_models import Form
 from symfric import BrownMcPhee, Model, Variable, drive
 
 MODEL = double_integrator()

@@ -28,6 +28,7 @@ from ocp.problems import (
     hang_glider,
 )  # fmt: skip
 from ocp.solving.methods import Ipopt
+from ocp.solving.one_solve import Task
 from ocp.solving.prepared import Supervisor
 from ocp.solving.solution import Solution
 from ocp.solving.watch import Progress
@@ -300,7 +301,7 @@ def test_intervals_are_cut_where_any_scenario_errs() -> None:
 
 
 def solved(problem: Problem, intervals: int = 50) -> Solution:
-    return refined_solve(problem, make_meshes(problem, intervals))
+    return refined_solve(Task(problem), make_meshes(problem, intervals))
 
 
 @cache
@@ -351,7 +352,7 @@ def test_nodes_move_and_their_number_stays_where_errors_are_misplaced() -> None:
     problem = Problem(Phase(model, 1.0, end={"x": 1.0}), integral(lambda s: s.u**2))
     goals = replace(Goals.of(1e-3), loss=1.0)
     meshes = make_meshes(problem, 40)
-    solution = refined_solve(problem, meshes, goals=goals)
+    solution = refined_solve(Task(problem), meshes, goals=goals)
     assert solution.meshes[0].size == meshes[0].size
     assert solution.statistics.solves > 1
     lengths = np.diff(solution.meshes[0])
@@ -362,7 +363,7 @@ def test_nodes_move_and_their_number_stays_where_errors_are_misplaced() -> None:
 def test_large_program_is_not_refined_for_the_cost_alone() -> None:
     problem = bryson_denham()
     goals = replace(Goals.of(1e-3), nonzeros=5000)
-    solution = refined_solve(problem, make_meshes(problem, 20), goals=goals)
+    solution = refined_solve(Task(problem), make_meshes(problem, 20), goals=goals)
     statistics = solution.statistics
     assert 2500 < statistics.jacobian_nonzeros + statistics.hessian_nonzeros < 5500
     share = (solution.cost - 4.0) / 4.0
@@ -376,12 +377,13 @@ def test_failed_first_solve_and_stop_on_a_later_mesh() -> None:
             raise KeyboardInterrupt
 
     problem = bryson_denham()
-    stopped = refined_solve(problem, make_meshes(problem, 20), supervisor=Supervisor(progress=stop))
+    meshes = make_meshes(problem, 20)
+    stopped = refined_solve(Task(problem, supervisor=Supervisor(progress=stop)), meshes)
     assert stopped.status is Status.INTERRUPTED
     assert stopped.meshes[0].size == 21
     assert stopped.cost == pytest.approx(4.0, rel=1e-2)
     assert "previous mesh" in stopped.message
-    failed = refined_solve(problem, make_meshes(problem, 20), solver=Ipopt(max_iter=2))
+    failed = refined_solve(Task(problem, solver=Ipopt(max_iter=2)), meshes)
     assert failed.status is Status.MAX_ITERATIONS
     assert failed.statistics.solves == 1
 

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from phases import slider_crank, solve_once
+from phases import on, slider_crank, solve_once
 
 from ocp.checking.interval_errors import estimated_errors, local_errors
 from ocp.checking.resimulate import arcs_of
@@ -14,8 +14,7 @@ from ocp.formulation.phase import Phase
 from ocp.formulation.problem import Problem
 from ocp.problems import brachistochrone, out_and_back
 from ocp.solving.starts import initial_points
-from ocp.transcription.schemes import Legendre, Radau, make_meshes
-from ocp.transcription.transcribe import discretise
+from ocp.transcription.schemes import Legendre, Radau
 
 
 def turned_crank() -> Problem:
@@ -23,18 +22,25 @@ def turned_crank() -> Problem:
     return Problem(turn, integral(lambda s: s.torque**2))
 
 
-@pytest.mark.parametrize("scheme", [Radau(2), Radau(3), Legendre(2)], ids=str)
+DRY = partial(out_and_back, v_t=0.2)
+
+
 @pytest.mark.parametrize(
-    "make",
-    [brachistochrone, turned_crank, partial(out_and_back, v_t=0.2)],
-    ids=["ode", "loop", "dry"],
+    ("make", "scheme"),
+    [
+        (brachistochrone, Radau(2)),
+        (brachistochrone, Legendre(2)),
+        (turned_crank, Radau(3)),
+        (turned_crank, Legendre(2)),
+        (DRY, Radau(3)),
+    ],
 )
 def test_estimates_of_local_errors_agree_with_simulations(
     make: Callable[[], Problem], scheme: Radau | Legendre
 ) -> None:
     """An explicit model with free duration, a loop with reactions, and friction by two phases."""
     problem = make()
-    made = discretise(problem, scheme).on(make_meshes(problem, 20))
+    made = on(problem, 20, scheme)
     solution = solve_once(problem, 20, scheme)
     arcs = arcs_of(problem, made.meshes, solution.points)
     found = estimated_errors(made, solution.iterate.w, made.program.values, arcs)
@@ -47,7 +53,7 @@ def test_estimates_of_local_errors_agree_with_simulations(
 def test_intervals_that_collocation_does_not_resolve_are_simulated() -> None:
     """Layers a hundred thousand times narrower than the speeds."""
     problem = out_and_back(v_t=1e-5)
-    made = discretise(problem, Radau(3)).on(make_meshes(problem, 10))
+    made = on(problem)
     w = made.pack(initial_points(made))
     arcs = arcs_of(problem, made.meshes, made.unpack(w))
     found = estimated_errors(made, w, made.program.values, arcs)

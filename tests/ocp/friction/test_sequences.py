@@ -6,7 +6,7 @@ from functools import cache
 import casadi as ca
 import numpy as np
 import pytest
-from phases import solve_once
+from phases import on, solve_once
 
 from ocp import Phase, integral, solve
 from ocp.formulation.problem import Problem
@@ -19,10 +19,8 @@ from ocp.friction.smooth_models import smoothed, widths
 from ocp.friction.transfer import Known, Reader
 from ocp.problems import cart_pendulum, load_through_spring, out_and_back
 from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import starts_around
+from ocp.solving.one_solve import Task, starts_around
 from ocp.solving.starts import initial_points
-from ocp.transcription.schemes import Radau, make_meshes
-from ocp.transcription.transcribe import Transcription, discretise
 from symfric import BrownMcPhee, Contact, Model, Variable
 
 
@@ -149,7 +147,7 @@ def test_rests_are_inserted_in_phases_whose_inputs_can_hold() -> None:
 def modes_solver() -> ModeSolver:
     problem = out_and_back()
     rules = Rules(problem, Reader(problem, known()).sizes(), ("guide",), SHORTEST * 2)
-    return ModeSolver(rules, Ipopt(max_iter=100), Radau(3), KICK * 2)
+    return ModeSolver(rules, Task(problem, solver=Ipopt(max_iter=100)), KICK * 2)
 
 
 def found_for(legs: tuple[Leg, ...]) -> SolvedSequence:
@@ -201,10 +199,6 @@ def test_neighbouring_sequences_are_tried_and_the_better_one_is_kept() -> None:
 
 
 # --- starts around a motion ---------------------------------------------------------------------
-
-
-def on(problem: Problem, intervals: int) -> Transcription:
-    return discretise(problem, Radau(3)).on(make_meshes(problem, intervals))
 
 
 def test_other_starts_differ_and_rates_belong_to_positions() -> None:

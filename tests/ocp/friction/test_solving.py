@@ -35,9 +35,7 @@ from ocp.friction.homotopy import FIRST, LAST, Sharp, sharpened
 from ocp.friction.mode_models import holding, mode_model
 from ocp.friction.smooth_models import Scale, own_level, speeds_at, sticking, widths_at
 from ocp.problems import out_and_back
-from ocp.solving.methods import Ipopt
-from ocp.solving.one_solve import STARTS
-from ocp.transcription.schemes import Radau
+from ocp.solving.one_solve import STARTS, Task
 from symfric import BrownMcPhee, Contact, ExactCoulomb, Model, SolveError, Status, Variable, drive
 from symfric.scenes import PendulumBox
 
@@ -74,13 +72,13 @@ def test_cost_tends_to_that_of_coulomb(steps: tuple[Sharp, ...]) -> None:
 
 def test_step_to_a_worse_motion_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(homotopy, "ABOVE", -1.0)  # nothing is good enough
-    steps = list(sharpened(out_and_back(), Radau(3), Ipopt(), starts=1, intervals=20))
+    steps = list(sharpened(Task(out_and_back()), starts=1, intervals=20))
     assert [step.level for step in steps] == [FIRST]
 
 
 def test_a_failed_solve_on_the_finer_mesh_is_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(homotopy, "ONTO", {"max_iter": 1})
-    first = next(sharpened(out_and_back(), Radau(3), Ipopt(), starts=1, intervals=20))
+    first = next(sharpened(Task(out_and_back()), starts=1, intervals=20))
     assert first.solution.ok
 
 
@@ -93,7 +91,7 @@ def test_sizes_do_not_matter(steps: tuple[Sharp, ...]) -> None:
         for phase in out_and_back().chain
     )
     problem = replace(out_and_back(), phases=out >> back)
-    first = next(sharpened(problem, Radau(3), Ipopt(), starts=2))
+    first = next(sharpened(Task(problem), starts=2))
     assert first.scales["guide"].speed == pytest.approx(1e-3 * steps[0].scales["guide"].speed, 0.1)
     assert first.solution.cost == pytest.approx(steps[0].solution.cost, 0.02)
 

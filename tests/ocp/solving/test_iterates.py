@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
-from phases import UNIT, fastest_move, solve_once, there_and_back, unit_move
+from phases import UNIT, fastest_move, on, solve_once, there_and_back, unit_move
 
 from ocp.formulation.expressions import at_end, integral
 from ocp.formulation.phase import FREE, Free, Phase
@@ -21,16 +21,12 @@ from ocp.solving.solution import Solution
 from ocp.solving.starts import Guess, initial_points, resample, start_of
 from ocp.solving.watch import WINDOW, Seen, Watch
 from ocp.transcription.program import Place, Program, SolverStatistics, outside, worst_of
-from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
-from ocp.transcription.transcribe import Transcription, discretise
+from ocp.transcription.schemes import Legendre, Radau
+from ocp.transcription.transcribe import Transcription
 from ocp.transcription.unknowns import SpanPoints
 from symfric import Model, Status, simulate
 
 EFFORT = integral(lambda s: s.a**2)
-
-
-def on(problem: Problem, intervals: int = 10, scheme: Scheme | None = None) -> Transcription:
-    return discretise(problem, scheme or Radau()).on(make_meshes(problem, intervals))
 
 
 def first(problem: Problem, intervals: int = 10) -> SpanPoints:
@@ -210,8 +206,7 @@ def test_multipliers_are_used_where_the_program_is_the_same() -> None:
 
 @cache
 def bounded(**more: object) -> Program:
-    problem = unit_move(bounds={"a": (-8.0, 8.0)}, **more)
-    return discretise(problem, Radau()).on(make_meshes(problem, 4)).program
+    return on(unit_move(bounds={"a": (-8.0, 8.0)}, **more), 4).program
 
 
 def test_worst_of_rows_and_bounds_is_named_with_its_time() -> None:
@@ -250,23 +245,21 @@ def test_worst_of_rows_and_bounds_is_named_with_its_time() -> None:
     ],
 )
 def test_what_is_not_finite_is_named(cost: object, text: str) -> None:
-    problem = unit_move(cost=cost, end={})
-    made = discretise(problem, Radau()).on(make_meshes(problem, 4)).program
+    made = on(unit_move(cost=cost, end={}), 4).program
     reported = not_finite(made, np.zeros(made.w.numel()), made.values, as_fraction)
     assert reported.startswith(text) and bool(reported) == bool(text)
 
 
 def test_times_of_places_continue_over_the_phases() -> None:
-    problem = there_and_back(scenarios={"dry": {}, "oiled": {}})
-    on = discretise(problem, Radau()).on(make_meshes(problem, 4))
+    made = on(there_and_back(scenarios={"dry": {}, "oiled": {}}), 4)
     places = {
         (0, 0.25): "at t = 0.25 s in out of scenario dry",
         (1, 0.25): "at t = 1.25 s in back of scenario dry",
         (3, 1.0): "at t = 2 s in back of scenario oiled",
         (2, np.nan): "in out of scenario oiled",
     }
-    w = np.zeros(on.program.w.numel())
-    assert [on.when(w, Place("v", *at)) for at in places] == list(places.values())
+    w = np.zeros(made.program.w.numel())
+    assert [made.when(w, Place("v", *at)) for at in places] == list(places.values())
 
 
 # --- watching an iteration ----------------------------------------------------------------------
@@ -332,7 +325,7 @@ def test_statistics_of_solves_add_up() -> None:
 
 def hessians(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     """Return the Hessian of a Lagrangian, and its convexified form, at random unknowns."""
-    made = discretise(problem, Radau()).on(make_meshes(problem, 4)).program
+    made = on(problem, 4).program
     random = np.random.default_rng(0)
     w, lam = random.standard_normal(made.w.numel()), random.standard_normal(made.g.numel())
     triangle = ca.DM(made.hessian(w, made.values, 1.0, lam)).full()

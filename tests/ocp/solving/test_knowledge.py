@@ -39,9 +39,9 @@ def test_costates_of_least_effort_are_those_of_the_closed_form(scheme: Scheme) -
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_costates_at_the_start_are_derivatives_by_the_start_values(scheme: Scheme) -> None:
-    found = solve_once(move(k=30.0), 12, scheme)
+    found = solve_once(move(k=30.0), 8, scheme)
     for name in "xv":
-        wanted = slope(lambda **p: move(k=30.0, **p), name, 0.0, 12, scheme)[0]
+        wanted = slope(lambda **p: move(k=30.0, **p), name, 0.0, 8, scheme)[0]
         np.testing.assert_allclose(found.costates[name][0], wanted, rtol=1e-6)
         there = {f"{name} at the start": found.costates[name][0]}
         there[f"{name} at the end"] = -found.costates[name][-1]
@@ -106,11 +106,10 @@ def mechanism(x: float = 0.0, phi: float = 0.0, T: float = 1.5) -> Problem:
     return Problem(phase, integral(lambda s: s.f**2))
 
 
-@pytest.mark.parametrize("scheme", SCHEMES[:2])
-def test_costates_of_a_mechanism_account_for_its_mass_matrix(scheme: Scheme) -> None:
-    found = solve_once(mechanism(), 30, scheme)
+def test_costates_of_a_mechanism_account_for_its_mass_matrix() -> None:
+    found = solve_once(mechanism(), 30)
     for name in ("x", "phi"):
-        wanted = slope(mechanism, name, 0.0, 30, scheme)[0]
+        wanted = slope(mechanism, name, 0.0, 30, Radau(3))[0]
         np.testing.assert_allclose(found.costates[name][0], wanted, rtol=1e-6)
     np.testing.assert_allclose(found.costates["x"], found.costates["x"][0], rtol=1e-6)
     nodes = found.motions[0].nodes  # the costates are continuous over nodes and points
@@ -118,14 +117,14 @@ def test_costates_of_a_mechanism_account_for_its_mass_matrix(scheme: Scheme) -> 
         inside = np.interp(found.t[nodes], found.t[~nodes], found.costates[name][~nodes])
         error = np.abs(inside - found.costates[name][nodes])[1:-1]
         assert error.max() < 0.02 * np.ptp(found.costates[name])
-    wanted = slope(mechanism, "T", 1.5, 30, scheme)[0]
+    wanted = slope(mechanism, "T", 1.5, 30, Radau(3))[0]
     np.testing.assert_allclose(found.sensitivity("T").cost, wanted, rtol=1e-6)
     np.testing.assert_allclose(found.hamiltonian, wanted, rtol=4e-3)
 
 
 def test_bang_bang_motions_have_no_degrees_of_freedom() -> None:
     """The interior-point method ends with many forces near the switch inside their bounds."""
-    for N in (31, 90):
+    for N in (31, 61):
         found = solve_once(fastest(), N)
         assert found.condition.degrees_of_freedom == 0
         assert found.condition.sufficient
@@ -178,7 +177,7 @@ def test_multipliers_of_conditions_have_names_and_units(name: str) -> None:
                   outputs={"power": power})  # fmt: skip
     rest = {"x": 0.0, "v": 0.0}
     known: dict[str, Any] = {"start": rest, "end": rest | {"x": 1.0}} | fields
-    found = solve_once(Problem(Phase(model, 1.0, **known), EFFORT), 20)
+    found = solve_once(Problem(Phase(model, 1.0, **known), EFFORT), 10)
     hits = [one for one in found.active() if one.name == name and one.side == side]
     assert hits and {one.unit for one in hits} == {unit}
     assert abs(sum(one.multiplier for one in hits)) > 1e-3
@@ -227,9 +226,9 @@ def test_multipliers_of_scenarios_add_up_to_the_derivative_of_their_common_cost(
         scenarios = {"light": {"m": 1.0}, "heavy": {"m": 3.0}}
         return Problem(phase, worst(cost) if largest else cost, scenarios=scenarios)
 
-    found = solve_once(both(), 12)
+    found = solve_once(both(), 6)
     each = {one.scenario: one for one in found.active() if one.name == "x at the start"}
     total = sum(one.multiplier for one in each.values())
-    np.testing.assert_allclose(total, slope(both, "x", 0.0, 12, Radau(3))[0], rtol=1e-5)
+    np.testing.assert_allclose(total, slope(both, "x", 0.0, 6, Radau(3))[0], rtol=1e-5)
     np.testing.assert_allclose(found.costates["x"][0], each["light"].multiplier, rtol=1e-6)
     assert "(heavy)" in str(found.active())

@@ -37,8 +37,8 @@ from symfric.scenes import drive
 def test_sensitivities_are_differences_of_solves(
     make: Callable[..., Problem], name: str, argument: str, value: float
 ) -> None:
-    found = solve_once(make(), 31).sensitivity(name)
-    cost, signals = slope(make, argument, value, 31, Radau(3))
+    found = solve_once(make(), 16).sensitivity(name)
+    cost, signals = slope(make, argument, value, 16, Radau(3))
     np.testing.assert_allclose(found.cost, cost, rtol=1e-5)
     np.testing.assert_allclose(found.T, signals["t"][-1], rtol=1e-5, atol=1e-9)
     for n, row in ({"t": found.t} | dict(found.signals)).items():
@@ -185,7 +185,7 @@ def test_statements_do_not_depend_on_units(kind: str) -> None:
         return [active, counts, by.doubts, str(found).count("active:")]
 
     first = stated(1.0, 1.0, 1.0)
-    for scales in ((1, 1, 1e-6), (1, 1, 1e6), (1e-3, 1, 1), (1e3, 1, 1), (1, 1e-3, 1), (1, 1e3, 1)):
+    for scales in ((1e-3, 1e3, 1e6), (1e3, 1e-3, 1e-6)):
         assert stated(*scales) == first
     assert stated(1e3, 1e-3, 1e-6, nominal=False) == first
 

@@ -12,7 +12,7 @@ import pytest
 from discretised import dae
 from discretised import stage as wide_stage
 from motions import stage
-from phases import algebraic_move, fastest_move, solve_once, there_and_back, unit_move
+from phases import algebraic_move, fastest_move, on, solve_once, there_and_back, unit_move
 
 from ocp.formulation.expressions import at_end, integral
 from ocp.formulation.phase import FREE, Free, Phase
@@ -21,8 +21,7 @@ from ocp.solving.methods import ANSWERS, Fatrop, Ipopt, Sqp
 from ocp.solving.solution import Solution
 from ocp.solving.starts import start_of
 from ocp.solving.watch import Progress, in_stage
-from ocp.transcription.schemes import Legendre, Radau, Scheme, make_meshes
-from ocp.transcription.transcribe import discretise
+from ocp.transcription.schemes import Legendre, Radau, Scheme
 from symfric import Model, Status, Variable
 
 HARD = fastest_move()
@@ -84,7 +83,7 @@ def test_free_durations_scenarios_and_algebraic_variables() -> None:
 
 
 def test_multipliers_of_fatrop_satisfy_the_optimality_conditions() -> None:
-    transcription = discretise(PUSHED, Radau()).on(make_meshes(PUSHED, 10))
+    transcription = on(PUSHED, 10)
     program = transcription.program
     found = Fatrop().prepared(program).run(start_of(transcription, None)[0]).iterate
     slope = ca.DM(program.gradient(found.w, program.values)[1])
@@ -96,9 +95,9 @@ def test_multipliers_of_fatrop_satisfy_the_optimality_conditions() -> None:
 
 
 def test_prepared_solver_runs_with_other_starts_and_parameters() -> None:
-    on = discretise(HARD, Radau()).on([np.linspace(0.0, 1.0, 11)])
-    late = discretise(HARD, Radau()).on([np.linspace(0.0, 1.0, 11) ** 1.2])
-    prepared, start = Ipopt().prepared(on.program), start_of(on, None)[0]
+    even = on(HARD, 10)
+    late = on(HARD, np.linspace(0.0, 1.0, 11) ** 1.2)
+    prepared, start = Ipopt().prepared(even.program), start_of(even, None)[0]
     first = prepared.run(start)
     warm = prepared.run(first.iterate, warm=True)
     cold = prepared.run(first.iterate)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 from unittest.mock import patch
 
@@ -10,7 +11,7 @@ import discretised
 import numpy as np
 import pytest
 from discretised import CASES, EFFORT, all_at_once, mean_of_scenarios, mechanism, stage
-from phases import UNIT, unit_move
+from phases import UNIT, on, unit_move
 
 from ocp import solve
 from ocp.formulation.expressions import at_end, integral
@@ -25,8 +26,10 @@ from symfric import Model, Variable
 LOW = [Radau(2), Legendre(2), Legendre(3)]
 
 
-def put(problem: Problem, intervals: int = 4, scheme: Scheme | None = None) -> Transcription:
-    return discretise(problem, scheme or Radau(3)).on(make_meshes(problem, intervals))
+@cache
+def cased(make: Callable[[], Problem]) -> Transcription:
+    """Return one of the `CASES` on three intervals."""
+    return on(make(), 3, Radau(2))
 
 
 def motion(
@@ -57,12 +60,12 @@ def clock(rate: Callable[[ca.SX, ca.SX], ca.SX]) -> Model:
 
 @pytest.mark.parametrize("scheme", LOW, ids=str)
 def test_motion_of_low_degree_satisfies_all_equations_at_their_times(scheme: Scheme) -> None:
-    t = put(unit_move(T=2.0), 4, scheme)
+    t = on(unit_move(T=2.0), 4, scheme)
     f, g = values(t, motion(t, lambda s: (s**2 / 2, s), 1.0, 2.0))
     np.testing.assert_allclose(g, 0.0, atol=1e-12)
     assert f == pytest.approx(2.0)  # a^2 over 2 s
     phase = Phase(clock(lambda t, u: t + u), 2.0)  # x' = t + u
-    t = put(Problem(phase, at_end(lambda s: s.x**2) + integral(lambda s: s.t)), 4, scheme)
+    t = on(Problem(phase, at_end(lambda s: s.x**2) + integral(lambda s: s.t)), 4, scheme)
     f, g = values(t, motion(t, lambda s: (s**2 / 2 + s,), 1.0, 2.0))
     np.testing.assert_allclose(g, 0.0, atol=1e-12)
     assert f == pytest.approx(16.0 + 2.0)
@@ -71,7 +74,7 @@ def test_motion_of_low_degree_satisfies_all_equations_at_their_times(scheme: Sch
 @pytest.mark.parametrize("T", [(1.0, 2.0), (Free(0.5, 4.0), Free(0.5, 4.0))])
 def test_time_continues_from_phase_to_phase(T: tuple[float | Free, ...]) -> None:
     first, second = (Phase(clock(lambda t, u: t + 0 * u), one) for one in T)
-    t = put(Problem(first >> second, at_end(lambda s: s.x * s.t)), 2)
+    t = on(Problem(first >> second, at_end(lambda s: s.x * s.t)), 2)
     f, g = values(t, motion(t, lambda s: (s**2 / 2,), 0.0, 1.0, 2.0))
     np.testing.assert_allclose(g, 0.0, atol=1e-12)
     assert f == pytest.approx(4.5 * 3.0)
@@ -81,7 +84,7 @@ def test_implicit_rows_of_a_mechanism_are_the_explicit_ones_times_its_masses() -
     problem = mechanism()
     model = problem.chain[0].model
     explicit = replace(problem.chain[0], model=replace(model, holonomic=None))
-    pair = [put(p, 2, Radau(2)) for p in (problem, replace(problem, phases=explicit))]
+    pair = [on(p, 2, Radau(2)) for p in (problem, replace(problem, phases=explicit))]
     w = np.random.default_rng(1).uniform(0.5, 1.0, pair[0].program.w.numel())
     implicit, plain = (t.program.jacobian(w, t.program.values)[0].full().ravel() for t in pair)
     masses = ca.jacobian(model.holonomic.implicit[:2], model.holonomic.a)
@@ -130,7 +133,7 @@ def test_path_conditions_with_inputs_hold_between_the_collocation_points() -> No
 def test_nominal_values_scale_unknowns_and_rows() -> None:
     x, u = (tuple(replace(v, nominal=10.0) for v in group) for group in (UNIT.x, UNIT.u))
     larger = replace(UNIT, x=x, u=u)
-    one, ten = put(unit_move()), put(unit_move(model=larger))
+    one, ten = on(unit_move(), 4), on(unit_move(model=larger), 4)
     points = motion(one, lambda s: (s**3, 2 * s), 2.0, 1.0)
     (f, g), (f_10, g_10) = values(one, points), values(ten, points)
     np.testing.assert_allclose(ten.pack(points), one.pack(points) / 10)
@@ -153,7 +156,8 @@ def test_derivatives_and_their_sparsity_are_those_of_the_rows(
     make: Callable[[], Problem], scheme: Scheme
 ) -> None:
     """Compare with the derivatives of the graph of f and g that CasADi makes."""
-    p, by_steps = put(make(), 3, scheme).program, isinstance(scheme, Shooting)
+    made = cased(make) if scheme == Radau(2) else on(make(), 3, scheme)
+    p, by_steps = made.program, isinstance(scheme, Shooting)
     sigma, lam = ca.MX.sym("sigma"), ca.MX.sym("lam", p.g.numel())
     hessian = ca.triu(ca.hessian(sigma * p.f + ca.dot(lam, p.g), p.w)[0])
     graph = [p.f, ca.gradient(p.f, p.w), p.g, ca.jacobian(p.g, p.w), hessian]
@@ -175,9 +179,9 @@ def missed(method: str, steps: int) -> tuple[float, float]:
     x, u, t = Variable("x", "m", nominal=2.0), Variable("u", "m/s"), ca.SX.sym("t")
     decay = Model("decay", x=(x,), u=(u,), ode=u.symbol - 2 * t * x.symbol**2, t=t)
     phases = Phase(decay, 1.0, start={"x": 1.0}) >> Phase(decay, 0.5)
-    on = put(Problem(phases, integral(lambda s: s.x)), 2, Shooting(method, steps))
-    spans = motion(on, lambda s: (1 / (1 + s**2),), 0.0, 1.0, 0.5).spans
-    f, g = values(on, Points(tuple(replace(span, z=np.zeros((0, 0))) for span in spans)))
+    made = on(Problem(phases, integral(lambda s: s.x)), 2, Shooting(method, steps))
+    spans = motion(made, lambda s: (1 / (1 + s**2),), 0.0, 1.0, 0.5).spans
+    f, g = values(made, Points(tuple(replace(span, z=np.zeros((0, 0))) for span in spans)))
     return abs(f - np.arctan(1.5)), float(np.abs(g).max())
 
 
@@ -201,7 +205,7 @@ def test_shooting_has_conditions_at_every_node_and_with_inputs_at_the_start_too(
 
 
 def test_rows_and_unknowns_are_named_with_their_place() -> None:
-    program = put(all_at_once(), 2, Radau(2)).program
+    program = on(all_at_once(), 2, Radau(2)).program
     rows, unknowns = program.rows, program.unknowns
     assert (len(rows), len(unknowns)) == (program.g.numel(), program.w.numel())
     names = [place.name for place in rows]
@@ -215,7 +219,7 @@ def test_rows_and_unknowns_are_named_with_their_place() -> None:
     durations = [place for place in unknowns if place.name == "T"]
     assert [place.span for place in durations] == [0, 1]
     assert np.isnan(durations[0].fraction)
-    t = put(unit_move(T=2.0))
+    t = on(unit_move(T=2.0), 4)
     _, g = values(t, motion(t, lambda s: (s**2 / 2 + 0.5 * s, s), 1.0, 2.0))
     wrong = {row.name for row, x in zip(t.program.rows, g, strict=True) if abs(x) > 1e-9}
     assert wrong == {"the equation of x"}
@@ -224,7 +228,7 @@ def test_rows_and_unknowns_are_named_with_their_place() -> None:
 @pytest.mark.parametrize("scheme", [Radau(2), Legendre(2)], ids=str)
 def test_bounds_apply_once_at_their_places(scheme: Scheme) -> None:
     problem = unit_move(bounds={"v": (None, 1.5), "a": (-9.0, 8.0)}, via={0.5: {"x": 0.4}})
-    t = put(problem, 4, scheme)
+    t = on(problem, 4, scheme)
     lower, upper = (t.unpack(b).spans[0] for b in (t.program.lower_w, t.program.upper_w))
     np.testing.assert_array_equal(lower.nodes[:, [0, -1]], [[0, 1], [0, 0]])
     np.testing.assert_array_equal(upper.nodes[:, [0, -1]], [[0, 1], [0, 0]])
@@ -239,7 +243,7 @@ def test_bounds_apply_once_at_their_places(scheme: Scheme) -> None:
 
 
 def test_scenarios_share_inputs_and_durations_and_the_largest_cost_bounds_each() -> None:
-    t = put(discretised.largest_of_scenarios())
+    t = on(discretised.largest_of_scenarios(), 4)
     light, heavy = t.layout.spans
     np.testing.assert_array_equal(light.u, heavy.u)
     assert light.T == heavy.T
@@ -262,7 +266,7 @@ def test_scenarios_share_inputs_and_durations_and_the_largest_cost_bounds_each()
 
 @pytest.mark.parametrize("make", CASES, ids=lambda make: make.__name__)
 def test_unpack_inverts_pack(make: Callable[[], Problem]) -> None:
-    t = put(make(), 3, Radau(2))
+    t = cased(make)
     w = np.random.default_rng(0).uniform(0.5, 1.0, t.program.w.numel())
     back = t.pack(t.unpack(w))
     extra = np.concatenate([span.extra.ravel() for span in t.layout.spans])
@@ -272,7 +276,7 @@ def test_unpack_inverts_pack(make: Callable[[], Problem]) -> None:
 
 def test_parameters_are_numbers_of_the_program() -> None:
     problem = discretised.one_phase()
-    t, other = put(problem), put(replace(problem, p={"m": 2.0}))
+    t, other = on(problem, 4), on(replace(problem, p={"m": 2.0}), 4)
     np.testing.assert_array_equal(t.values({"m": 2.0}), other.program.values)
     w = np.full(t.program.w.numel(), 0.3)
     g, g_2 = (x.program.jacobian(w, other.program.values)[0].full() for x in (t, other))
@@ -341,7 +345,7 @@ def test_compiled_blocks_give_the_same_bits() -> None:
 
 def test_jacobian_has_the_form_of_the_stages() -> None:
     phase = Phase(stage(), 1.0, end={"x": 0.1, "power": (None, 2.0)}, via={0.5: {"power": 0.1}})
-    made = put(Problem(phase, EFFORT)).program
+    made = on(Problem(phase, EFFORT), 4).program
     stages, _ = made.structure()
     assert stages is not None
     assert stages.nu == (7, 7, 7, 7, 0)  # 3 points of 2 states, and the force
@@ -377,6 +381,6 @@ def chained(**more: Any) -> Problem:
     ],
 )  # fmt: skip
 def test_coupling_of_more_than_neighbours_is_named(problem: Problem, reason: str) -> None:
-    stages, why = put(problem, 3).program.structure()
+    stages, why = on(problem, 3).program.structure()
     assert stages is None
     assert why.endswith(reason)

@@ -11,12 +11,11 @@ from discretised import (
     angles,
     double_pendulum,
     four_bar,
-    largest_of_scenarios,
     mean_of_scenarios,
     stage,
 )
 from numpy.polynomial import Polynomial
-from phases import slider_crank
+from phases import on, slider_crank
 
 from ocp.formulation.expressions import at_end, integral
 from ocp.formulation.phase import Phase
@@ -69,7 +68,7 @@ def error(scheme: Scheme, intervals: int) -> float:
     x, u = Variable("x", "1"), Variable("u", "1")
     model = Model("tangent", x=(x,), u=(u,), ode=1 + x.symbol**2 + 0 * u.symbol)
     problem = Problem(Phase(model, 1.0, start={"x": 0.0}), at_end(lambda s: s.x))
-    p = discretise(problem, scheme).on(make_meshes(problem, intervals)).program
+    p = on(problem, intervals, scheme).program
     w, free = np.zeros(p.w.numel()), p.lower_w < p.upper_w
     free[[place.name == "u" for place in p.unknowns]] = False
     for _ in range(12):
@@ -117,24 +116,9 @@ def test_impossible_meshes_are_refused(intervals: Any) -> None:
         make_meshes(TWO, intervals)
 
 
-@pytest.mark.parametrize(
-    ("problem", "meshes", "text"),
-    [
-        (ONE, [[0.0, 0.5, 1.0]], r"expected a node at 0\.3"),
-        (TWO, [[0.0, 1.0]] * 3, r"meshes: expected 2, one for each phase, .* got 3"),
-        (ONE, [[0.0, 0.6, 0.5, 1.0]], "increasing fractions"),
-        (ONE, [[0.0, 0.9]], "got 2 numbers from 0 to 0.9"),
-        (ONE, [[]], "got none"),
-        (
-            largest_of_scenarios(),
-            [[0.0, 0.5, 1.0], [0.0, 0.4, 1.0]],
-            "expected the same in all scenarios",
-        ),
-    ],
-)
-def test_meshes_fit_the_phases(problem: Problem, meshes: list[list[float]], text: str) -> None:
-    with pytest.raises(ValueError, match=text):
-        discretise(problem, Radau(2)).on([np.array(mesh) for mesh in meshes])
+def test_meshes_have_nodes_at_conditions() -> None:
+    with pytest.raises(ValueError, match=r"expected a node at 0\.3"):
+        discretise(ONE, Radau(2)).on([np.array([0.0, 0.5, 1.0])])
 
 
 LEAST = integral(lambda s: s.tau**2)
@@ -142,10 +126,6 @@ TORQUE = integral(lambda s: s.torque**2)
 Q_END, V_END = angles(2.0)
 MODEL = four_bar()
 DRIVEN = {"theta_crank": 2.0, "theta_crank_rate": 0.0}
-
-
-def put(problem: Problem, scheme: Scheme, intervals: int = 6) -> Transcription:
-    return discretise(problem, scheme).on(make_meshes(problem, intervals))
 
 
 def towards(t: Transcription, *ends: dict[int, float], T: float = 0.5) -> Points:
@@ -196,7 +176,7 @@ def test_loops_stay_closed_with_any_coordinates_named(
     scheme: Scheme, end: dict[str, float]
 ) -> None:
     start = {"theta_crank": 1.2}
-    t = put(Problem(Phase(MODEL, 0.5, start=start, end=end), LEAST), scheme)
+    t = on(Problem(Phase(MODEL, 0.5, start=start, end=end), LEAST), 6, scheme)
     points = solved(t, towards(t, {0: 2.0}))
     assert opening(points) < 1e-9
     last = [2.0, Q_END["theta_rocker"], Q_END["theta_coupler"], 0.0, 0.0, 0.0]
@@ -210,7 +190,7 @@ def test_slider_crank_may_name_its_slider_its_crank_or_both() -> None:
     for names in (("crank",), ("slider",), ("crank", "slider")):
         known = dict(zip(("crank", "slider"), ends[0][:2].tolist(), strict=True)) if ends else {}
         end = {name: known.get(name, 1.0) for name in names} | {"crank_rate": 0.0}
-        t = put(Problem(Phase(model, 0.5, end=end), TORQUE), Legendre(2), 4)
+        t = on(Problem(Phase(model, 0.5, end=end), TORQUE), 4, Legendre(2))
         to = {i: end[v.name] for i, v in enumerate(model.x) if v.name in end}
         ends.append(solved(t, towards(t, to)).spans[0].nodes[:, -1])
     np.testing.assert_allclose(ends[1:], [ends[0]] * 2, atol=1e-7)
@@ -218,7 +198,7 @@ def test_slider_crank_may_name_its_slider_its_crank_or_both() -> None:
 
 @pytest.mark.parametrize("end", [DRIVEN, Q_END | V_END, {}])
 def test_redundant_values_leave_the_jacobian_of_full_rank(end: dict[str, float]) -> None:
-    t = put(Problem(Phase(MODEL, 0.5, end=end), LEAST), Radau(2), 2)
+    t = on(Problem(Phase(MODEL, 0.5, end=end), LEAST), 2, Radau(2))
     p = t.program
     J = p.jacobian(t.pack(towards(t, {0: 2.0})), p.values)[1].full()
     values = np.linalg.svd(J[:, p.lower_w < p.upper_w], compute_uv=False)  # without fixed ones
@@ -246,7 +226,7 @@ def test_prescribed_motion_continues_from_phase_to_phase() -> None:
         phases = Phase(model, 0.4) >> Phase(model, 0.6, end={"q1": q1, "q2": 0.1})
         return Problem(phases, integral(lambda s: s.tau2**2))
 
-    t = put(moved(1.0), Radau(2), 4)
+    t = on(moved(1.0), 4, Radau(2))
     points = solved(t, towards(t, {}, {}))
     at = 0.4 + 0.6 * t.meshes[1]
     np.testing.assert_allclose(points.spans[1].nodes[[0, 2]], [at**2, 2 * at], atol=1e-9)
@@ -260,7 +240,7 @@ def test_constraints_and_links_are_imposed_once_between_phases() -> None:
     plain = Phase(MODEL, 0.25) >> Phase(MODEL, 0.25, end=DRIVEN)
     linked = Phase(MODEL, 0.25) >> Phase(MODEL, 0.25, link=link)
     names, others = (
-        [row.name for row in put(Problem(both, LEAST), Radau(2), 2).program.rows]
+        [row.name for row in on(Problem(both, LEAST), 2, Radau(2)).program.rows]
         for both in (plain, linked)
     )
     assert sum(name in ("the loop 1", "the loop 2") for name in names) == 2 * (3 + 2)
