@@ -64,7 +64,7 @@ print(files(lambda: generate(LuGre(), "c")))
 MOST = {
     "simulate, first": 31,
     "simulate, second": 14,
-    "Fit.solve": 54,
+    "Fit.solve": 51,
     "ocp.solve": 93,
     "generate": 30,
 }
