@@ -65,7 +65,7 @@ MOST = {
     "simulate, first": 33,
     "simulate, second": 15,
     "Fit.solve": 54,
-    "ocp.solve": 93,
+    "ocp.solve": 90,
     "generate": 30,
 }
 
